@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Dr.Jit array types of one precision, so that every method runs in float32 and float64 from the same source."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from realtime.errors import InputError
+
+PRECISIONS = ("single", "double")
+
+
+@dataclass(frozen=True)
+class ArrayTypes:
+    """The array types of one precision and of Mitsuba's current variant."""
+
+    scalar: Any  #: one floating-point number per lane
+    vector: Any  #: three-vector: positions, directions
+    color: Any  #: linear RGB
+
+
+def array_types(precision: str = "single") -> ArrayTypes:
+    """Return the array types of a precision.
+
+    Parameters
+    ----------
+    precision
+        'single' (float32) or 'double' (float64). Rays are always cast in float32, the only precision of Mitsuba's wheels.
+
+    Raises
+    ------
+    InputError
+        If the precision has another name.
+    """
+    import mitsuba as mi
+
+    if precision == "single":
+        return ArrayTypes(mi.Float, mi.Vector3f, mi.Color3f)
+    if precision == "double":
+        return ArrayTypes(mi.Float64, mi.Vector3d, mi.Color3d)
+    raise InputError(f"precision: got {precision!r}, wanted one of {', '.join(PRECISIONS)}")

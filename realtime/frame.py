@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A frame: primary rays, the lit surface and the airlight, each stage one frozen function.
+
+Frozen functions (`drjit.freeze`) record their kernels on the first call and replay them afterwards, so a frame costs its
+kernels and little else. All that moves (camera, lights, medium, shadow maps) is passed in as opaque arrays.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from realtime.camera import ray_directions, tiled_pixels
+from realtime.errors import InputError
+from realtime.methods import Method
+from realtime.scene import Scene
+from realtime.shadow_map import cast_shadow_map
+from realtime.surface import lit_surface, visible_surface
+from realtime.view import View
+
+
+@dataclass(frozen=True)
+class FrameRenderer:
+    """The stages of a frame of one scene with one method, ready to be run any number of times."""
+
+    scene: Scene
+    pixel: Any  #: pixel numbers in the order of the lanes
+    shadow_maps: Callable[[], tuple[Any, ...]]  #: casts the maps that the method asks for
+    surface: Callable[..., Any]  #: -> distance, surface radiance
+    airlight: Callable[..., Any]  #: -> airlight radiance
+
+
+@dataclass(frozen=True)
+class Frame:
+    """What a frame shows, as float arrays of shape (height, width[, 3])."""
+
+    airlight: Any  #: in-scattered radiance [W/(m^2 sr)]
+    surface: Any  #: radiance of the lit surface through the medium [W/(m^2 sr)]
+    distance: Any  #: to the visible surface, infinite where there is none [m]
+
+
+def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -> FrameRenderer:
+    """Prepare the stages of a frame.
+
+    Parameters
+    ----------
+    scene
+        From `realtime.scene.read_scene`.
+    method
+        A real-time method.
+    kernel
+        An airlight kernel function; needed where `method.uses_kernel`.
+    parameters
+        Parameters of the method; the others have its defaults.
+
+    Raises
+    ------
+    InputError
+        For a parameter that the method does not have, and where a kernel is missing.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    unknown = set(parameters) - set(method.parameters)
+    if unknown:
+        known = ", ".join(method.parameters) or "none"
+        raise InputError(f"method {method.name}: got a parameter {sorted(unknown)[0]!r}, wanted one of: {known}")
+    if method.uses_kernel and kernel is None:
+        raise InputError(f"method {method.name}: got no kernel, wanted one of realtime.kernels.KERNELS")
+    settings = dict(method.parameters) | parameters
+    plan, camera = scene.plan, scene.camera
+    pixel = mi.UInt32(tiled_pixels(camera.width, camera.height))
+
+    @dr.freeze
+    def surface(geometry, pixel, camera, medium, lights):
+        direction = ray_directions(camera, pixel)
+        distance, interaction = visible_surface(geometry, camera.origin, direction)
+        color = lit_surface(geometry, direction, interaction, distance=distance, medium=medium, lights=lights)
+        return distance, color
+
+    @dr.freeze
+    def airlight(geometry, pixel, camera, medium, lights, maps, distance):
+        view = View(
+            origin=camera.origin,
+            direction=ray_directions(camera, pixel),
+            distance=distance,
+            lights=lights,
+            medium=medium,
+            plan=plan,
+            visible=lambda point, light: _visible(geometry, point, light),
+            shadow_maps=maps,
+        )
+        return method.function(view, kernel=kernel, **settings)
+
+    def shadow_maps():
+        if not plan.shadows or settings.get("shadow") != "map":
+            return ()
+        maps = tuple(cast_shadow_map(scene.geometry, light, settings["map"]) for light in scene.lights)
+        dr.eval(maps)
+        return maps
+
+    dr.eval(pixel)
+    return FrameRenderer(scene, pixel, shadow_maps, surface if plan.surfaces else _no_surface, airlight)
+
+
+def render_frame(renderer: FrameRenderer) -> Frame:
+    """Render one frame and bring it to the host in the order of the image."""
+    maps = renderer.shadow_maps()
+    distance, surface, airlight = run_stages(renderer, maps)
+    height, width = renderer.scene.camera.height, renderer.scene.camera.width
+    return Frame(
+        _image(renderer, airlight, (height, width, 3)),
+        _image(renderer, surface, (height, width, 3)),
+        _image(renderer, distance, (height, width)),
+    )
+
+
+def run_stages(renderer: FrameRenderer, maps):
+    """Run the stages on the device and return distance, surface and airlight, evaluated, in the order of the lanes."""
+    import drjit as dr
+
+    scene = renderer.scene
+    distance, surface = renderer.surface(scene.geometry, renderer.pixel, scene.camera, scene.medium, scene.lights)
+    airlight = renderer.airlight(
+        scene.geometry, renderer.pixel, scene.camera, scene.medium, scene.lights, maps, distance
+    )
+    dr.eval(distance, surface, airlight)
+    return distance, surface, airlight
+
+
+def _visible(geometry, point, light):
+    """Cast a shadow ray from the light, where nothing can block it at once, to just before the point."""
+    import drjit as dr
+    import mitsuba as mi
+
+    start = mi.Point3f(light.position)
+    direction = mi.Vector3f(point) - mi.Vector3f(start)
+    length = dr.norm(direction)
+    # Twenty units in the last place before the point: on a surface the point itself must not block the light.
+    return ~geometry.ray_test(mi.Ray3f(start, direction / length, length * (1 - 2e-6), 0.0, []))
+
+
+def _no_surface(geometry, pixel, camera, medium, lights):
+    import drjit as dr
+
+    Float, Color = type(camera.origin.x), type(medium.albedo)
+    return dr.full(Float, dr.inf, dr.width(pixel)), dr.zeros(Color, dr.width(pixel))
+
+
+def _image(renderer: FrameRenderer, values, shape):
+    import numpy as np
+
+    lanes = np.array(values)
+    lanes = lanes.T if lanes.ndim == 2 else lanes
+    image = np.empty_like(lanes)
+    image[np.array(renderer.pixel)] = lanes
+    return image.reshape(shape)

@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Gauss-Legendre quadrature of the airlight integral in w = asinh(q/h).
+
+With E = q/h (q = (x - foot) + r, the path form of DESIGN section 2) and a = sigma_t h the integral is
+
+    J = (2/h) int_{E0}^{E1} exp(-sigma_t (foot + h E)) p(cos) / (1 + E^2) dE,     cos = (1 - E^2)/(1 + E^2),
+
+and E = sinh w turns dE/(1 + E^2) into dw/cosh w, an integrand without poles near the real axis that decays on its own:
+
+    J = (2/h) int_{w0}^{w1} exp(-sigma_t (foot + h sinh w)) p(2/cosh^2 w - 1) / cosh w dw.
+
+Everything is arranged so that float32 loses nothing by cancellation:
+
+* E at an end is (s + r)/h for s = x - foot >= 0 and h/(r - s) below; both forms are exact where they are used.
+* The far end is clipped where the extinction since the near end has left nothing: E1 <= E0 + 20/a (e^-20 = 2e-9; 40 in
+  float64).
+* The half width D of the w interval comes from the *difference* of the ends, never from the difference of two asinh:
+  E1 - E0 = (x1 - x0)(E0 + E1)/(r0 + r1) since dq = (1 + ds/dr) dx, and with C = sqrt(1 + E^2)
+  w1 - w0 = asinh(E1 C0 - E0 C1) = asinh((E1 - E0)(E0 + E1)/(E1 C0 + E0 C1)).
+* Nodes lie in pairs w_c +- D xi about the centre, so one exponential gives sinh and cosh of D xi for both:
+  E = E_c ch +- C_c sh and cosh w = C_c ch +- E_c sh by the addition theorems; the product of the two cosh is ch^2 + E_c^2, so a
+  pair costs three exponentials and two reciprocals.
+
+Where the phase function is not isotropic, the range is split at the foot point (E = 1), where forward lobes end; where a
+spot falls off between beam and cut-off, it is split at the cone of the beam, where the falloff has kinks.
+"""
+
+from functools import lru_cache
+
+from realtime.exponential import exp_bounded
+from realtime.geometry import RayGeometry, clip_to_cone, falloff
+from realtime.lights import Light
+from realtime.medium import Medium, per_extinction
+from realtime.phase import evaluate
+
+
+def quadrature(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, nodes: int = 16):
+    """Return the airlight integral J by Gauss-Legendre quadrature in w [1/m].
+
+    Parameters
+    ----------
+    geometry, x0, x1, medium, light
+        See `realtime.kernels`.
+    nodes
+        Nodes of each panel, a positive even number.
+
+    Notes
+    -----
+    Valid for any ray that does not pass through the light, any extinction, vacuum included, and `x1` infinite. With 16
+    nodes and an isotropic phase function the relative error in float32 stays below about 1e-5 for optical depths up to
+    100; sharp phase functions (g above 0.8) need more nodes.
+    """
+    return sum_panels(geometry, _panels(geometry, x0, x1, medium, light), medium, light, nodes)
+
+
+def sum_panels(geometry: RayGeometry, panels, medium: Medium, light: Light, nodes: int):
+    """Return the sum of the panels' integrals, one value per extinction."""
+    return per_extinction(
+        medium, lambda sigma_t: sum(_panel(geometry, a, b, sigma_t, medium, light, nodes) for a, b in panels)
+    )
+
+
+def _panels(geometry: RayGeometry, x0, x1, medium: Medium, light: Light):
+    import drjit as dr
+
+    if light.soft:
+        inner0, inner1 = clip_to_cone(geometry, light.cos_beam, x0, x1)
+        return [(x0, inner0), (inner0, inner1), (inner1, x1)]
+    if medium.phase.name != "isotropic":
+        split = dr.clip(geometry.foot, x0, x1)
+        return [(x0, split), (split, x1)]
+    return [(x0, x1)]
+
+
+@lru_cache
+def _positive_nodes(nodes: int) -> tuple[tuple[float, float], ...]:
+    """Return the positive half of the Gauss-Legendre nodes of [-1, 1] with their weights."""
+    import numpy as np
+
+    if nodes < 2 or nodes % 2:
+        from realtime.errors import InputError
+
+        raise InputError(f"nodes: got {nodes}, wanted a positive even number of quadrature nodes")
+    xi, weight = np.polynomial.legendre.leggauss(nodes)
+    return tuple((float(x), float(w)) for x, w in zip(xi, weight) if x > 0)
+
+
+def _panel(geometry: RayGeometry, x0, x1, sigma_t, medium: Medium, light: Light, nodes: int):
+    import drjit as dr
+
+    foot, h = geometry.foot, geometry.height
+    Float = type(h)
+    single = dr.itemsize_v(Float) == 4
+    # J is even in h, so a height below rounding of the distances is as good as zero, and this one keeps E finite.
+    s0, s1 = x0 - foot, x1 - foot
+    h = dr.maximum(h, (1e-9 if single else 1e-17) * (dr.abs(s0) + dr.smallest(Float)))
+    r0 = dr.sqrt(dr.fma(s0, s0, h * h))
+    e0, e1 = _path_over_height(s0, r0, h), None
+    # Beyond the first term extinction has left e^-20 (e^-40); beyond the second, 1/(1+E^2) has.
+    reach = dr.minimum((20.0 if single else 40.0) / (sigma_t * h), (1e7 if single else 1e16) * (1 + e0))
+    s1 = dr.select(dr.isfinite(s1), s1, 0)
+    r1 = dr.sqrt(dr.fma(s1, s1, h * h))
+    e1 = _path_over_height(s1, r1, h)
+    clipped = dr.isinf(x1) | (e1 > e0 + reach)
+    e1 = dr.select(clipped, e0 + reach, e1)
+    difference = dr.select(clipped, reach, (x1 - x0) * (e0 + e1) / (r0 + r1))
+
+    c0, c1 = dr.sqrt(dr.fma(e0, e0, 1)), dr.sqrt(dr.fma(e1, e1, 1))
+    half = 0.5 * dr.asinh(difference * ((e0 + e1) / dr.fma(e1, c0, e0 * c1)))
+    sinh, cosh = _sinh_cosh(half)
+    e_mid, c_mid = dr.fma(e0, cosh, c0 * sinh), dr.fma(c0, cosh, e0 * sinh)
+    return _pairs(
+        geometry,
+        (foot, h, sigma_t),
+        (half, e_mid, c_mid),
+        phase=medium.phase,
+        light=light,
+        nodes=_positive_nodes(nodes),
+    )
+
+
+def _path_over_height(s, r, h):
+    import drjit as dr
+
+    return dr.select(s >= 0, (s + r) / h, h / (r - s))
+
+
+def _sinh_cosh(u):
+    import drjit as dr
+
+    grown = dr.exp(u)
+    shrunk = dr.rcp(grown)
+    return 0.5 * (grown - shrunk), 0.5 * (grown + shrunk)
+
+
+def _pairs(geometry: RayGeometry, ray, panel, *, phase, light: Light, nodes):
+    """Sum the pairs of nodes of one panel; `ray` is foot, height, extinction and `panel` half width, E_c, C_c."""
+    import drjit as dr
+
+    foot, h, sigma_t = ray
+    half, e_mid, c_mid = panel
+    plain = phase.name == "isotropic" and not light.soft
+    decay_e, decay_c = -(sigma_t * h) * e_mid, -(sigma_t * h) * c_mid
+    e_mid_squared = dr.square(e_mid)
+    total = type(h)(0)
+    for xi, weight in nodes:
+        grown = exp_bounded(half * xi)
+        shrunk = dr.rcp(grown)
+        sh, ch = 0.5 * (grown - shrunk), 0.5 * (grown + shrunk)
+        even, odd = decay_e * (ch - 1), decay_c * sh
+        after, before = exp_bounded(even + odd), exp_bounded(even - odd)
+        cosh_even, cosh_odd = c_mid * ch, e_mid * sh
+        if plain:
+            # 1/cosh w of both nodes over their common denominator.
+            pair = dr.fma(after, cosh_even - cosh_odd, before * (cosh_even + cosh_odd))
+            total += weight * pair / dr.fma(ch, ch, e_mid_squared)
+            continue
+        for factor, sign in ((after, 1.0), (before, -1.0)):
+            inverse = dr.rcp(dr.fma(sign, cosh_odd, cosh_even))
+            value = factor * inverse * evaluate(phase, dr.fma(2 * inverse, inverse, -1))
+            if light.soft:
+                e = dr.fma(sign * c_mid, sh, e_mid * ch)
+                value *= falloff(geometry, light, foot + 0.5 * h * (e - dr.rcp(e)))
+            total += weight * value
+    return total * half * (2 / h) * dr.exp(-sigma_t * dr.fma(h, e_mid, foot))

@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The polynomial kernel of Biri, Arques and Michelin 2006 (section 4.1), with coefficients re-derived.
+
+In the angle form of DESIGN section 2 the integrand is
+
+    f(theta) = exp(-a (1 + sin theta)/cos theta) p(-sin theta),     a = sigma_t h.
+
+Its Taylor series about theta = 0, cut after degree N, is integrated term by term:
+
+    J ~ exp(-sigma_t foot)/h  sum_n c_n (theta1^(n+1) - theta0^(n+1))/(n + 1).
+
+The coefficients follow from three recurrences, for any degree:
+
+* g = (1 + sin)/cos = sec + tan solves 2 g' = 1 + g^2, hence (n + 1) g_{n+1} = (delta_{n0} + sum_k g_k g_{n-k})/2, g_0 = 1.
+* e = exp(-a (g - 1)) solves e' = -a g' e, hence n e_n = -a sum_{k=1..n} k g_k e_{n-k}, e_0 = 1. The factor e^-a is left out.
+* c_n = sum_k e_{n-k} p_k, where p_k is the series of p(-sin theta), by `_phase_series`.
+
+The printed annex of the paper differs in six places (DESIGN section 3).
+
+The difference of powers is written (theta1 - theta0) sum_k theta1^k theta0^(n-k), and theta1 - theta0 as one arc tangent,
+so that short segments and rays that pass the light do not cancel.
+"""
+
+from realtime.errors import InputError
+from realtime.geometry import RayGeometry, falloff
+from realtime.lights import Light
+from realtime.medium import Medium, per_extinction
+from realtime.phase import Phase
+
+
+def taylor(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, degree: int = 4):
+    """Return the airlight integral J by the Taylor polynomial about the foot [1/m].
+
+    Parameters
+    ----------
+    geometry, x0, x1, medium, light
+        See `realtime.kernels`.
+    degree
+        Degree of the polynomial, 4 in the paper.
+
+    Raises
+    ------
+    InputError
+        For a tabulated phase function, which has no series, and for a negative degree.
+
+    Notes
+    -----
+    Valid near theta = 0 only: the error is large where the segment ends more than about 1 rad from the foot or where
+    sigma_t h is large; far behind the camera exp(-sigma_t foot) overflows. That is the published method's own limit.
+    """
+    import drjit as dr
+
+    if degree < 0:
+        raise InputError(f"degree: got {degree}, wanted 0 or more")
+    foot, h = geometry.foot, geometry.height
+    s0, s1 = x0 - foot, dr.minimum(x1 - foot, dr.largest(type(h)))
+    theta0, theta1 = dr.atan2(s0, h), dr.atan2(s1, h)
+    series = _phase_series(medium.phase, degree, type(h))
+
+    def integral(sigma_t):
+        a = sigma_t * h
+        coefficients = _product(_extinction_series(a, degree), series, degree)
+        if light.soft:
+            total = _weighted(geometry, light, (theta0, theta1), coefficients)
+        else:
+            total = _integrated(geometry, (s0, s1), (theta0, theta1), coefficients)
+        return total * dr.exp(-sigma_t * foot - a) / h
+
+    return per_extinction(medium, integral)
+
+
+def _integrated(geometry: RayGeometry, ends, angles, coefficients):
+    """Integrate the polynomial between two angles in closed form."""
+    import drjit as dr
+
+    (s0, s1), (theta0, theta1) = ends, angles
+    h = geometry.height
+    bounded = dr.atan2(h * (s1 - s0), dr.fma(s0, s1, h * h))
+    difference = dr.select(dr.isfinite(s0 * s1), bounded, theta1 - theta0)
+    total, powers, power0 = type(h)(0), type(h)(1), type(h)(1)
+    for n, c in enumerate(coefficients):
+        total += (c / (n + 1)) * powers
+        power0 = power0 * theta0
+        powers = dr.fma(powers, theta1, power0)
+    return total * difference
+
+
+def _weighted(geometry: RayGeometry, light: Light, angles, coefficients):
+    """Integrate polynomial times falloff by eight Gauss-Legendre nodes: the paper's int I(theta) theta^n dtheta."""
+    import drjit as dr
+    import numpy as np
+
+    theta0, theta1 = angles
+    half, middle = 0.5 * (theta1 - theta0), 0.5 * (theta1 + theta0)
+    total = type(half)(0)
+    for xi, weight in zip(*np.polynomial.legendre.leggauss(8)):
+        theta = dr.fma(half, float(xi), middle)
+        value = coefficients[-1]
+        for c in reversed(coefficients[:-1]):
+            value = dr.fma(value, theta, c)
+        total += float(weight) * value * falloff(geometry, light, geometry.foot + geometry.height * dr.tan(theta))
+    return total * half
+
+
+def _extinction_series(a, degree: int):
+    g = [1.0]
+    for n in range(degree):
+        g.append((float(n == 0) + sum(g[k] * g[n - k] for k in range(n + 1))) / (2 * (n + 1)))
+    e = [type(a)(1)]
+    for n in range(1, degree + 1):
+        e.append((-a / n) * sum((k * g[k]) * e[n - k] for k in range(1, n + 1)))
+    return e
+
+
+def _product(left, right, degree: int):
+    return [sum(left[n - k] * right[k] for k in range(n + 1)) for n in range(degree + 1)]
+
+
+def _phase_series(phase: Phase, degree: int, Float):
+    """Return the coefficients of p(-sin theta) in powers of theta."""
+    sine = [0.0 if n % 2 == 0 else (-1.0) ** (n // 2) / _factorial(n) for n in range(degree + 1)]
+    one = [1.0] + [0.0] * degree
+    if phase.name == "isotropic":
+        return one
+    if phase.name == "rayleigh":
+        return [0.75 * (a + b) for a, b in zip(one, _product(sine, sine, degree))]
+    if phase.name in ("hazy", "murky"):
+        doublings, scale, mean = (3, 9.0, 2.0) if phase.name == "hazy" else (5, 50.0, 83 / 33)
+        power = [0.5 * (a - b) for a, b in zip(one, sine)]
+        for _ in range(doublings):
+            power = _product(power, power, degree)
+        return [(a + scale * b) / mean for a, b in zip(one, power)]
+    if phase.name == "hg":
+        return _henyey_greenstein_series(phase.g, sine, degree)
+    raise InputError(
+        f"kernel taylor: phase function {phase.name!r} has no Taylor series; use the kernel 'quadrature' or one of "
+        "isotropic, rayleigh, hazy, murky, hg"
+    )
+
+
+def _henyey_greenstein_series(g, sine, degree: int):
+    """Return the series of (1 - g^2) b^(-3/2), b = 1 + g^2 + 2 g sin theta, from b y' = -(3/2) b' y."""
+    import drjit as dr
+
+    b = [1 + g * g] + [2 * g * s for s in sine[1:]]
+    y = [(1 - g) * (1 + g) * dr.rsqrt(b[0]) / b[0]]
+    for n in range(1, degree + 1):
+        y.append(sum((-1.5 * k - (n - k)) * b[k] * y[n - k] for k in range(1, n + 1)) / (n * b[0]))
+    return y
+
+
+def _factorial(n: int) -> float:
+    return 1.0 if n < 2 else n * _factorial(n - 1)

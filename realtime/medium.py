@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A homogeneous medium as Dr.Jit values."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from realtime.phase import Phase
+
+
+@dataclass(frozen=True)
+class Medium:
+    """A homogeneous medium. One extinction for a grey medium, three for a coloured one: code runs once for each."""
+
+    sigma_t: tuple[Any, ...]  #: extinction [1/m], one or three values
+    albedo: Any  #: single-scattering albedo, RGB [1]
+    phase: Phase
+
+
+def per_extinction(medium: Medium, function: Callable[[Any], Any]):
+    """Return `function(sigma_t)` for a grey medium, and its three values as a colour for a coloured one."""
+    values = [function(sigma_t) for sigma_t in medium.sigma_t]
+    return values[0] if len(values) == 1 else type(medium.albedo)(*values)
+
+
+def transmittance(medium: Medium, distance):
+    """Return exp(-sigma_t distance) [1], one value or a colour as in `per_extinction`."""
+    import drjit as dr
+
+    return per_extinction(medium, lambda sigma_t: dr.exp(-sigma_t * distance))

@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Ray marching: the airlight integral by the midpoint rule, with one visibility test a step.
+
+Two spacings of the same number of steps:
+
+* `uniform` in the distance x, weight dx exp(-sigma_t (x + r)) p / r^2. What most shaders do; it misses the peak near the
+  light. Where nothing ends the ray it stops at 20 optical depths (e^-20 = 2e-9 is left).
+* `equiangular` in theta, the angle at the light. With x = foot + h tan theta, dx / r^2 = dtheta / h: the peak is gone and
+  the weight is dtheta/h exp(-sigma_t (x + r)) p.
+
+The order of convergence in the number of steps is 2 on a ray without shadows and 1 where shadow edges fall between steps.
+"""
+
+from realtime.errors import InputError
+from realtime.geometry import RayGeometry, clip_to_cone, distance_to_light, falloff, ray_geometry
+from realtime.lights import Light
+from realtime.medium import per_extinction
+from realtime.phase import evaluate
+from realtime.shadow_map import lit_in_map
+from realtime.view import View, radiance
+
+SPACINGS = ("equiangular", "uniform")
+SHADOWS = ("ray", "map", "none")
+_OPTICAL_REACH = 20.0
+
+
+def ray_march(
+    view: View, *, kernel=None, steps: int = 100, spacing: str = "equiangular", shadow: str = "ray", map: int = 512
+):
+    """Return the airlight of every ray by marching [W/(m^2 sr)].
+
+    Parameters
+    ----------
+    view
+        The frame.
+    kernel
+        Not used: each step evaluates the integrand itself.
+    steps
+        Steps a ray and light, at least 1.
+    spacing
+        'equiangular' or 'uniform'.
+    shadow
+        'ray' (a shadow ray a step), 'map' (a shadow-map look-up a step) or 'none'.
+    map
+        Resolution of the shadow map where `shadow` is 'map' [texels].
+
+    Raises
+    ------
+    InputError
+        For an unknown spacing or shadow, less than one step, or uniform steps on an endless ray through a vacuum.
+
+    References
+    ----------
+    Billeter, Sintorn, Assarsson 2010, section 2 (the marcher that they compare with). Kulla, Fajardo 2012, *Importance
+    sampling techniques for path tracing in participating media*, section 4 (the equi-angular variable).
+    """
+    import drjit as dr
+
+    _check(steps, spacing, shadow, view)
+    total = type(view.medium.albedo)(0)
+    for number, light in enumerate(view.lights):
+        geometry = ray_geometry(view.origin, view.direction, light)
+        x0, x1 = type(view.distance)(0), view.distance
+        if light.kind == "spot":
+            x0, x1 = clip_to_cone(geometry, light.cos_cutoff, x0, x1)
+        if spacing == "uniform":
+            x1 = dr.minimum(x1, x0 + _OPTICAL_REACH / dr.minimum(*_two(view.medium.sigma_t)))
+        shadow_map = view.shadow_maps[number] if shadow == "map" and view.plan.shadows else None
+        lit = _visibility(view, light, shadow, shadow_map)
+        integral = _march(view, light, geometry, (x0, x1), steps=steps, spacing=spacing, lit=lit)
+        total += radiance(view.medium, light, integral)
+    return total
+
+
+def _check(steps: int, spacing: str, shadow: str, view: View) -> None:
+    for name, value, allowed in (("spacing", spacing, SPACINGS), ("shadow", shadow, SHADOWS)):
+        if value not in allowed:
+            raise InputError(f"{name}: got {value!r}, wanted one of {', '.join(allowed)}")
+    if not isinstance(steps, int) or steps < 1:
+        raise InputError(f"steps: got {steps!r}, wanted a whole number of at least 1")
+    if spacing == "uniform" and view.plan.vacuum:
+        raise InputError("spacing=uniform: an endless ray through a vacuum has no step length; use spacing=equiangular")
+
+
+def _two(values):
+    """Return the smallest candidates of one or three extinctions as two arguments."""
+    import drjit as dr
+
+    return (values[0], values[0]) if len(values) == 1 else (dr.minimum(values[0], values[1]), values[2])
+
+
+def _visibility(view: View, light: Light, shadow: str, shadow_map):
+    if shadow == "none" or not view.plan.shadows:
+        return lambda point: True
+    if shadow == "map":
+        return lambda point: lit_in_map(shadow_map, light, point)
+    return lambda point: view.visible(point, light)
+
+
+def _march(view: View, light: Light, geometry: RayGeometry, segment, *, steps: int, spacing: str, lit):
+    """Sum the steps of every ray in one loop, so that the kernel does not grow with their number."""
+    import drjit as dr
+    import mitsuba as mi
+
+    x0, x1 = segment
+    Float = type(geometry.height)
+    foot, height, medium = geometry.foot, geometry.height, view.medium
+    theta0 = dr.atan2(x0 - foot, height)
+    theta1 = dr.select(dr.isfinite(x1), dr.atan2(x1 - foot, height), 0.5 * dr.pi)
+    begin, end = (x0, x1) if spacing == "uniform" else (theta0, theta1)
+    width = (end - begin) / steps
+
+    def step(index, total):
+        u = dr.fma(Float(index) + 0.5, width, begin)
+        x = u if spacing == "uniform" else dr.fma(height, dr.tan(u), foot)
+        r = distance_to_light(geometry, x)
+        weight = dr.rcp(dr.square(r)) if spacing == "uniform" else dr.rcp(height)
+        weight *= evaluate(medium.phase, (foot - x) / r)
+        if light.soft:
+            weight *= falloff(geometry, light, x)
+        point = view.origin + view.direction * x
+        term = per_extinction(medium, lambda sigma_t: weight * dr.exp(-sigma_t * (x + r)))
+        return index + 1, total + dr.select((width > 0) & lit(point), term, 0)
+
+    total = Float(0) if len(medium.sigma_t) == 1 else type(medium.albedo)(0)
+    _, total = dr.while_loop(
+        state=(mi.UInt32(0), total + dr.zeros(Float, dr.width(width))),
+        cond=lambda index, total: index < steps,
+        body=step,
+        labels=("index", "total"),
+    )
+    return total * width

@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Airlight without volumetric shadows: one integral from the camera to the visible surface, for each light."""
+
+from realtime.geometry import ray_geometry
+from realtime.kernels import airlight_integral
+from realtime.view import View, radiance
+
+
+def unshadowed(view: View, *, kernel):
+    """Return the airlight of every ray as if nothing cast a shadow [W/(m^2 sr)].
+
+    Parameters
+    ----------
+    view
+        The frame.
+    kernel
+        An airlight kernel, see `realtime.kernels`.
+
+    Notes
+    -----
+    Valid for any scene without occluders between a light and a visible part of the medium; elsewhere it shows how much
+    light the volumetric shadows take away.
+
+    References
+    ----------
+    Biri, Arques, Michelin 2006, eq. 2. Sun, Ramamoorthi, Narasimhan, Nayar 2005.
+    """
+    total = type(view.medium.albedo)(0)
+    start = type(view.distance)(0)
+    for light in view.lights:
+        geometry = ray_geometry(view.origin, view.direction, light)
+        integral = airlight_integral(kernel, geometry, start, view.distance, medium=view.medium, light=light)
+        total += radiance(view.medium, light, integral)
+    return total

@@ -1,0 +1,221 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reading a Mitsuba scene: the camera, the medium, the lights, and the plan of what they need.
+
+Mitsuba's own scene is the scene; nothing of ours is needed in it. What no method can do yet is refused by name.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from realtime.arrays import ArrayTypes, array_types
+from realtime.camera import Camera
+from realtime.errors import InputError
+from realtime.lights import Light
+from realtime.medium import Medium
+from realtime.phase import Phase
+from realtime.plan import Plan
+
+_PHASES = {
+    "IsotropicPhaseFunction": "isotropic",
+    "HGPhaseFunction": "hg",
+    "RayleighPhaseFunction": "rayleigh",
+    "TabulatedPhaseFunction": "tabulated",
+}
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A Mitsuba scene with what a real-time method reads from it."""
+
+    geometry: Any  #: the `mi.Scene`, for casting rays
+    camera: Camera
+    medium: Medium
+    lights: tuple[Light, ...]
+    plan: Plan
+
+
+def read_scene(scene, precision: str = "single") -> Scene:
+    """Read a Mitsuba scene.
+
+    Parameters
+    ----------
+    scene
+        An `mi.Scene` of the current RGB variant.
+    precision
+        'single' or 'double': the precision of every array that the methods compute with.
+
+    Raises
+    ------
+    InputError
+        For a scene that no method can render, with the name of what it cannot do.
+    """
+    types = array_types(precision)
+    camera, sensor = _read_camera(scene, types)
+    medium = _read_medium(sensor, types)
+    lights = tuple(_read_light(emitter, types) for emitter in scene.emitters())
+    if not lights:
+        raise InputError("the scene has no light; wanted at least one emitter of type 'point' or 'spot'")
+    return Scene(scene, camera, medium, lights, _make_plan(scene, medium, lights))
+
+
+def _read_camera(scene, types: ArrayTypes):
+    import drjit as dr
+    import mitsuba as mi
+    import numpy as np
+
+    sensors = scene.sensors()
+    if not sensors:
+        raise InputError("the scene has no camera; wanted a sensor of type 'perspective'")
+    sensor = sensors[0]
+    if sensor.class_name() != "PerspectiveCamera":
+        raise InputError(f"the scene's sensor is a {sensor.class_name()}; wanted a sensor of type 'perspective'")
+    parameters = mi.traverse(sensor)
+    width, height = (int(n) for n in parameters["film.size"])
+    if list(parameters["film.crop_size"]) != [width, height]:
+        raise InputError("the camera's film is cropped; remove crop_width, crop_height and crop_offset from the film")
+    if any(float(parameters[f"principal_point_offset_{axis}"][0]) for axis in "xy"):
+        raise InputError("the camera has a principal point offset; remove principal_point_offset_x and _y")
+    matrix = np.array(sensor.world_transform().matrix, dtype=np.float64).reshape(4, 4)
+    tangent = math.tan(0.5 * math.radians(float(parameters["x_fov"][0])))
+    columns = matrix[:3, 3], matrix[:3, 2], matrix[:3, 0] * tangent, matrix[:3, 1] * (tangent * height / width)
+    vectors = [types.vector(*(float(c) for c in column)) for column in columns]
+    dr.make_opaque(*vectors)
+    return Camera(width, height, *vectors), sensor
+
+
+def _read_medium(sensor, types: ArrayTypes) -> Medium:
+    import drjit as dr
+    import mitsuba as mi
+    import numpy as np
+
+    medium = sensor.get_medium()
+    if medium is None:
+        raise InputError(
+            "the camera references no medium: it would be in a vacuum; declare the medium with an id and put "
+            '<ref name="medium" id="..."/> inside the sensor'
+        )
+    if not medium.is_homogeneous():
+        raise InputError(f"the medium is a {medium.class_name()}; wanted a medium of type 'homogeneous'")
+    sigma_s, _, sigma_t = medium.get_scattering_coefficients(dr.zeros(mi.MediumInteraction3f))
+    scattering = np.array(sigma_s, dtype=np.float64).reshape(-1)
+    extinction = np.array(sigma_t, dtype=np.float64).reshape(-1)
+    for name, values in (("sigma_t", extinction), ("sigma_s = albedo sigma_t", scattering)):
+        if not np.all(np.isfinite(values)) or np.any(values < 0):
+            raise InputError(f"the medium's {name} is {values.tolist()}; wanted finite values of 0 or more [1/m]")
+    albedo = np.divide(scattering, extinction, out=np.zeros(3), where=extinction > 0)
+    if np.any(albedo > 1 + 1e-6):
+        raise InputError(f"the medium's albedo is {albedo.tolist()}; wanted values from 0 to 1")
+    grey = extinction[0] == extinction[1] == extinction[2]
+    sigma = tuple(dr.opaque(types.scalar, float(value)) for value in (extinction[:1] if grey else extinction))
+    color = types.color(*(float(value) for value in albedo))
+    dr.make_opaque(color)
+    return Medium(sigma, color, _read_phase(medium.phase_function(), types))
+
+
+def _read_phase(phase, types: ArrayTypes) -> Phase:
+    import drjit as dr
+    import mitsuba as mi
+    import numpy as np
+
+    name = _PHASES.get(phase.class_name())
+    if name is None:
+        raise InputError(
+            f"the phase function is a {phase.class_name()}; wanted one of isotropic, hg, rayleigh, tabphase"
+        )
+    parameters = mi.traverse(phase)
+    if name == "hg":
+        return Phase(name, g=dr.opaque(types.scalar, float(parameters["g"][0])))
+    if name == "tabulated":
+        values = np.array(parameters["values"], dtype=np.float64)
+        # The mean over the sphere is half the integral over the cosine: the trapezoidal rule is exact on linear pieces.
+        mean = (values.sum() - 0.5 * (values[0] + values[-1])) / (len(values) - 1)
+        return Phase(name, values=types.scalar(values / mean))
+    return Phase(name)
+
+
+def _read_light(emitter, types: ArrayTypes) -> Light:
+    import drjit as dr
+    import mitsuba as mi
+    import numpy as np
+
+    kind = {"PointLight": "point", "SpotLight": "spot"}.get(emitter.class_name())
+    if kind is None:
+        raise InputError(
+            f"the scene has an emitter of class {emitter.class_name()}; wanted emitters of type 'point' or 'spot' only: "
+            "replace it or remove it"
+        )
+    parameters = mi.traverse(emitter)
+    if "intensity.value" not in parameters or (kind == "spot" and "texture.value" not in parameters):
+        raise InputError(f"the {kind} light has a textured or spectral intensity; wanted a constant 'rgb' intensity")
+    intensity = np.array(parameters["intensity.value"], dtype=np.float64).reshape(-1)
+    intensity = np.broadcast_to(intensity, 3) if intensity.size == 1 else intensity
+    if not np.all(np.isfinite(intensity)) or np.any(intensity < 0):
+        raise InputError(
+            f"the {kind} light's intensity is {intensity.tolist()}; wanted finite values of 0 or more [W/sr]"
+        )
+    matrix = np.array(emitter.world_transform().matrix, dtype=np.float64).reshape(4, 4)
+    position = np.array(parameters["position"], dtype=np.float64).reshape(-1) if kind == "point" else matrix[:3, 3]
+    arrays: dict[str, Any] = {
+        "position": types.vector(*(float(c) for c in position)),
+        "intensity": types.color(*(float(c) for c in intensity)),
+    }
+    soft = False
+    if kind == "spot":
+        soft, cone = _read_cone(parameters, matrix, types)
+        arrays |= cone
+    dr.make_opaque(*arrays.values())
+    return Light(kind, soft, **arrays)
+
+
+def _read_cone(parameters, matrix, types: ArrayTypes):
+    import numpy as np
+
+    cutoff = math.radians(float(parameters["cutoff_angle"][0]))
+    beam = min(math.radians(float(parameters["beam_width"][0])), cutoff)
+    if not 0 < cutoff < 0.5 * math.pi:
+        raise InputError(
+            f"the spot light's cutoff_angle is {math.degrees(cutoff):g} degrees; wanted more than 0, less than 90"
+        )
+    axis = matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])
+    soft = beam < cutoff
+    cone = {
+        "axis": types.vector(*(float(c) for c in axis)),
+        "cutoff": types.scalar(cutoff),
+        "cos_cutoff": types.scalar(math.cos(cutoff)),
+        "cos_beam": types.scalar(math.cos(beam)),
+    }
+    if soft:
+        cone["inverse_transition"] = types.scalar(1 / (cutoff - beam))
+    return soft, cone
+
+
+def _make_plan(scene, medium: Medium, lights: tuple[Light, ...]) -> Plan:
+    import mitsuba as mi
+
+    notes = []
+    for shape in scene.shapes():
+        if shape.interior_medium() is not None or shape.exterior_medium() is not None:
+            raise InputError(
+                f"shape '{shape.id()}' bounds a medium; wanted one unbounded medium, referenced by the camera alone: remove "
+                "the medium from the shape"
+            )
+        bsdf = shape.bsdf()
+        if mi.has_flag(bsdf.flags(), mi.BSDFFlags.Null):
+            raise InputError(f"shape '{shape.id()}' is (partly) transparent; wanted opaque surfaces")
+        if bsdf.flags() & ~int(mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide) & 0x3FF:
+            notes.append(
+                f"shape '{shape.id()}' is not purely diffuse: shaded by its diffuse reflectance, airlight unaffected"
+            )
+    return Plan(
+        shadows=bool(scene.shapes()),
+        surfaces=bool(scene.shapes()),
+        extinctions=len(medium.sigma_t),
+        isotropic=medium.phase.name == "isotropic",
+        bounded=False,
+        vacuum=any(float(sigma_t[0]) == 0 for sigma_t in medium.sigma_t),
+        point_lights=sum(light.kind == "point" for light in lights),
+        spot_lights=sum(light.kind == "spot" for light in lights),
+        soft_spots=any(light.soft for light in lights),
+        notes=tuple(dict.fromkeys(notes)),
+    )

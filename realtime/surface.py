@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Primary rays and the lit surface.
+
+Biri, Arques, Michelin 2006, section 5.1.2, with the extinction to the eye of eq. 1:
+
+    L = rho I cos(theta_p) / (pi r_p^2) exp(-sigma_t r_p) exp(-sigma_t distance),
+
+zero where a shadow ray is blocked. A one-sided surface is black from behind, as in Mitsuba's `diffuse`.
+"""
+
+from typing import Any
+
+from realtime.geometry import falloff, ray_geometry
+from realtime.lights import Light
+from realtime.medium import Medium, transmittance
+
+
+def visible_surface(scene, origin, direction):
+    """Cast the camera rays.
+
+    Parameters
+    ----------
+    scene
+        The Mitsuba scene.
+    origin, direction
+        Rays in any precision; they are cast in float32.
+
+    Returns
+    -------
+    distance
+        To the nearest surface, infinite where there is none [m], in the precision of the rays.
+    interaction
+        Mitsuba's surface interaction.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    ray = mi.Ray3f(mi.Point3f(origin), mi.Vector3f(direction))
+    hit = scene.ray_intersect_preliminary(ray, coherent=True)
+    interaction = hit.compute_surface_interaction(ray, ray_flags=mi.RayFlags.All)
+    return dr.select(hit.is_valid(), type(origin.x)(hit.t), dr.inf), interaction
+
+
+def lit_surface(scene, view_direction, interaction, *, distance, medium: Medium, lights: tuple[Light, ...]):
+    """Return the radiance that the visible surface sends to the eye through the medium [W/(m^2 sr)].
+
+    Parameters
+    ----------
+    scene
+        The Mitsuba scene, for shadow rays.
+    view_direction
+        Unit directions of the camera rays.
+    interaction, distance
+        From `visible_surface`.
+    medium, lights
+        What the light crosses and where it comes from.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    Vector, Color = type(view_direction), type(medium.albedo)
+    bsdf = interaction.bsdf()
+    albedo = Color(bsdf.eval_diffuse_reflectance(interaction))
+    normal = Vector(interaction.sh_frame.n)
+    facing = -dr.dot(normal, view_direction)
+    two_sided = mi.has_flag(bsdf.flags(), mi.BSDFFlags.BackSide)
+    normal = dr.select(two_sided & (facing < 0), -normal, normal)
+    seen = interaction.is_valid() & (two_sided | (facing > 0))
+    point = Vector(interaction.p)
+    total: Any = Color(0)
+    for light in lights:
+        to_light = light.position - point
+        r = dr.norm(to_light)
+        cosine = dr.dot(normal, to_light) / r
+        arriving = light.intensity * _profile(light, point, -to_light / r)
+        blocked = scene.ray_test(interaction.spawn_ray_to(mi.Point3f(light.position)), seen & (cosine > 0))
+        lit = seen & (cosine > 0) & ~blocked
+        path = dr.select(lit, distance + r, 0)
+        total += dr.select(
+            lit, albedo * arriving * (dr.inv_pi * cosine / dr.square(r)) * transmittance(medium, path), Color(0)
+        )
+    return total
+
+
+def _profile(light: Light, point, away):
+    """Return the relative intensity of the light towards a point, `away` being the unit direction from light to point."""
+    import drjit as dr
+
+    if light.kind == "point":
+        return type(away.x)(1)
+    inside = dr.dot(light.axis, away) > light.cos_cutoff
+    if not light.soft:
+        return dr.select(inside, type(away.x)(1), 0)
+    # The point lies at x = 0 of a ray that starts there.
+    return dr.select(inside, falloff(ray_geometry(point, away, light), light, type(away.x)(0)), 0)

@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a method is given: the view of a frame."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from realtime.lights import Light
+from realtime.medium import Medium
+from realtime.plan import Plan
+
+
+@dataclass(frozen=True)
+class View:
+    """The rays of a frame and all that scatters light into them, as Dr.Jit arrays with one entry per pixel.
+
+    A method ``method(view, *, kernel, **parameters)`` returns from it the in-scattered radiance of every pixel
+    [W/(m^2 sr)], an RGB colour.
+    """
+
+    origin: Any  #: start of the rays [m]
+    direction: Any  #: unit directions
+    distance: Any  #: to the visible surface, infinite where there is none [m]
+    lights: tuple[Light, ...]
+    medium: Medium
+    plan: Plan  #: what the scene needs; a method leaves out the rest
+    visible: Callable[[Any, Light], Any]  #: (point, light) -> whether the light reaches the point
+    shadow_maps: tuple[Any, ...] = ()  #: one map a light, for methods that ask for them
+
+
+def radiance(medium: Medium, light: Light, integral):
+    """Return the radiance albedo sigma_t I J / (4 pi) of an airlight integral J (Biri 2006 eq. 1, DESIGN section 2)."""
+    import drjit as dr
+
+    sigma_t = medium.sigma_t[0] if len(medium.sigma_t) == 1 else type(medium.albedo)(*medium.sigma_t)
+    return medium.albedo * light.intensity * (sigma_t * (integral * (0.25 * dr.inv_pi)))
