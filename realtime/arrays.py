@@ -24,7 +24,8 @@ def array_types(precision: str = "single") -> ArrayTypes:
     Parameters
     ----------
     precision
-        'single' (float32) or 'double' (float64). Rays are always cast in float32, the only precision of Mitsuba's wheels.
+        'single' (float32) or 'double' (float64). Rays are always cast in float32, the only precision of Mitsuba's
+        wheels.
 
     Raises
     ------

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The pinhole camera: pixel to ray.
 
-Mitsuba's perspective sensor looks along +z of its own frame, with +x to the left of the image and +y up. A pixel (i, j) of a
-W x H image has the centre u = (i + 1/2)/W, v = (j + 1/2)/H from the upper left corner, and
+Mitsuba's perspective sensor looks along +z of its own frame, with +x to the left of the image and +y up. A pixel (i, j)
+of a W x H image has the centre u = (i + 1/2)/W, v = (j + 1/2)/H from the upper left corner, and
 
     direction ~ forward + (1 - 2u) tan(fov_x/2) left + (1 - 2v) tan(fov_x/2) (H/W) up.
 
-`Camera` keeps the three vectors with the tangents multiplied in. Rays start at the pinhole; the near clip plane does not
-cut the medium away (DESIGN section 6.3).
+`Camera` keeps the three vectors with the tangents multiplied in. Rays start at the pinhole; the near clip plane does
+not cut the medium away (DESIGN section 6.3).
 """
 
 from dataclasses import dataclass

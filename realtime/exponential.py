@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """An exponential for bounded arguments.
 
-Dr.Jit's exp guards overflow, underflow and NaN, which costs more than the function itself on a processor: 24 of them take
-3.0 ms for 480 000 lanes on two AVX-512 cores, 24 of these 1.9 ms. The quadrature kernel spends most of its time here.
+Dr.Jit's exp guards overflow, underflow and NaN, which costs more than the function itself on a processor: 24 of them
+take 3.0 ms for 480 000 lanes on two AVX-512 cores, 24 of these 1.9 ms. The quadrature kernel spends most of its time
+here.
 """
 
 #: Coefficients of 2^f on [-1/2, 1/2], highest power first: a Remez fit of degree 6 with relative error below 1.5e-8;

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A frame: primary rays, the lit surface and the airlight, each stage one frozen function.
 
-Frozen functions (`drjit.freeze`) record their kernels on the first call and replay them afterwards, so a frame costs its
-kernels and little else. All that moves (camera, lights, medium, shadow maps) is passed in as opaque arrays.
+Frozen functions (`drjit.freeze`) record their kernels on the first call and replay them afterwards, so a frame costs
+its kernels and little else. All that moves (camera, lights, medium, shadow maps) is passed in as opaque arrays.
 """
 
 from collections.abc import Callable

@@ -82,13 +82,14 @@ def distance_to_light(geometry: RayGeometry, x):
 def clip_to_cone(geometry: RayGeometry, cos_angle, x0, x1):
     """Clip [x0, x1] to the part of the ray inside a cone around the axis of a spot.
 
-    With s = x - foot, the point at x lies in the cone where (axial s + offset) >= cos_angle sqrt(s^2 + height^2). Squared,
+    With s = x - foot, the point at x lies in the cone where (axial s + offset) >= cos_angle sqrt(s^2 + height^2).
+    Squared,
 
         A s^2 + 2 B s + C >= 0,   A = axial^2 - cos^2,   B = axial offset,   C = offset^2 - cos^2 height^2,
 
-    and (B^2 - A C) = cos^2 (offset^2 + height^2 A). The double cone loses its second nappe by the sign of axial s + offset:
-    for A < 0 the solution is the interval between the roots, both on one nappe; for A > 0 it is a half line, beyond the
-    larger root if axial > 0, before the smaller one otherwise.
+    and (B^2 - A C) = cos^2 (offset^2 + height^2 A). The double cone loses its second nappe by the sign of axial s +
+    offset: for A < 0 the solution is the interval between the roots, both on one nappe; for A > 0 it is a half line,
+    beyond the larger root if axial > 0, before the smaller one otherwise.
 
     Parameters
     ----------

@@ -142,8 +142,8 @@ def _read_light(emitter, types: ArrayTypes) -> Light:
     kind = {"PointLight": "point", "SpotLight": "spot"}.get(emitter.class_name())
     if kind is None:
         raise InputError(
-            f"the scene has an emitter of class {emitter.class_name()}; wanted emitters of type 'point' or 'spot' only: "
-            "replace it or remove it"
+            f"the scene has an emitter of class {emitter.class_name()}; wanted emitters of type 'point' or 'spot' "
+            "only: replace it or remove it"
         )
     parameters = mi.traverse(emitter)
     if "intensity.value" not in parameters or (kind == "spot" and "texture.value" not in parameters):
@@ -197,8 +197,8 @@ def _make_plan(scene, medium: Medium, lights: tuple[Light, ...]) -> Plan:
     for shape in scene.shapes():
         if shape.interior_medium() is not None or shape.exterior_medium() is not None:
             raise InputError(
-                f"shape '{shape.id()}' bounds a medium; wanted one unbounded medium, referenced by the camera alone: remove "
-                "the medium from the shape"
+                f"shape '{shape.id()}' bounds a medium; wanted one unbounded medium, referenced by the camera alone: "
+                "remove the medium from the shape"
             )
         bsdf = shape.bsdf()
         if mi.has_flag(bsdf.flags(), mi.BSDFFlags.Null):

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Shadow maps by ray casting into plain arrays: one face for a spot, six for a point light.
 
-A map stores for each texel the distance *along the ray* from the light to the first surface [m], infinite where there is
-none. A face looks along one axis with two others across; (u, v) in [-1, 1] on the plane at distance `extent` from the light,
-1 for a cube face, 1/tan(cutoff) for a spot whose cone just fits.
+A map stores for each texel the distance *along the ray* from the light to the first surface [m], infinite where there
+is none. A face looks along one axis with two others across; (u, v) in [-1, 1] on the plane at distance `extent` from
+the light, 1 for a cube face, 1/tan(cutoff) for a spot whose cone just fits.
 """
 
 from dataclasses import dataclass

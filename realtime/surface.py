@@ -83,7 +83,7 @@ def lit_surface(scene, view_direction, interaction, *, distance, medium: Medium,
 
 
 def _profile(light: Light, point, away):
-    """Return the relative intensity of the light towards a point, `away` being the unit direction from light to point."""
+    """Return the relative intensity of the light in the unit direction `away`, from the light to a point."""
     import drjit as dr
 
     if light.kind == "point":

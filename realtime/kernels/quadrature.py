@@ -18,11 +18,11 @@ Everything is arranged so that float32 loses nothing by cancellation:
   E1 - E0 = (x1 - x0)(E0 + E1)/(r0 + r1) since dq = (1 + ds/dr) dx, and with C = sqrt(1 + E^2)
   w1 - w0 = asinh(E1 C0 - E0 C1) = asinh((E1 - E0)(E0 + E1)/(E1 C0 + E0 C1)).
 * Nodes lie in pairs w_c +- D xi about the centre, so one exponential gives sinh and cosh of D xi for both:
-  E = E_c ch +- C_c sh and cosh w = C_c ch +- E_c sh by the addition theorems; the product of the two cosh is ch^2 + E_c^2, so a
-  pair costs three exponentials and two reciprocals.
+  E = E_c ch +- C_c sh and cosh w = C_c ch +- E_c sh by the addition theorems; the product of the two cosh is ch^2 +
+  E_c^2, so a pair costs three exponentials and two reciprocals.
 
-Where the phase function is not isotropic, the range is split at the foot point (E = 1), where forward lobes end; where a
-spot falls off between beam and cut-off, it is split at the cone of the beam, where the falloff has kinks.
+Where the phase function is not isotropic, the range is split at the foot point (E = 1), where forward lobes end; where
+a spot falls off between beam and cut-off, it is split at the cone of the beam, where the falloff has kinks.
 """
 
 from functools import lru_cache

@@ -11,14 +11,16 @@ Its Taylor series about theta = 0, cut after degree N, is integrated term by ter
 
 The coefficients follow from three recurrences, for any degree:
 
-* g = (1 + sin)/cos = sec + tan solves 2 g' = 1 + g^2, hence (n + 1) g_{n+1} = (delta_{n0} + sum_k g_k g_{n-k})/2, g_0 = 1.
-* e = exp(-a (g - 1)) solves e' = -a g' e, hence n e_n = -a sum_{k=1..n} k g_k e_{n-k}, e_0 = 1. The factor e^-a is left out.
+* g = (1 + sin)/cos = sec + tan solves 2 g' = 1 + g^2, hence (n + 1) g_{n+1} = (delta_{n0} + sum_k g_k g_{n-k})/2, g_0 =
+  1.
+* e = exp(-a (g - 1)) solves e' = -a g' e, hence n e_n = -a sum_{k=1..n} k g_k e_{n-k}, e_0 = 1. The factor e^-a is left
+  out.
 * c_n = sum_k e_{n-k} p_k, where p_k is the series of p(-sin theta), by `_phase_series`.
 
 The printed annex of the paper differs in six places (DESIGN section 3).
 
-The difference of powers is written (theta1 - theta0) sum_k theta1^k theta0^(n-k), and theta1 - theta0 as one arc tangent,
-so that short segments and rays that pass the light do not cancel.
+The difference of powers is written (theta1 - theta0) sum_k theta1^k theta0^(n-k), and theta1 - theta0 as one arc
+tangent, so that short segments and rays that pass the light do not cancel.
 """
 
 from realtime.errors import InputError
