@@ -149,14 +149,13 @@ def _pairs(geometry: RayGeometry, ray, panel, *, phase, light: Light, nodes):
         sh, ch = 0.5 * (grown - shrunk), 0.5 * (grown + shrunk)
         even, odd = decay_e * (ch - 1), decay_c * sh
         after, before = exp_bounded(even + odd), exp_bounded(even - odd)
-        cosh_even, cosh_odd = c_mid * ch, e_mid * sh
+        # The cosh of the node before the centre is never formed as a difference: it is product / (the one after).
+        cosh_after, product = dr.fma(c_mid, ch, e_mid * sh), dr.fma(ch, ch, e_mid_squared)
         if plain:
-            # 1/cosh w of both nodes over their common denominator.
-            pair = dr.fma(after, cosh_even - cosh_odd, before * (cosh_even + cosh_odd))
-            total += weight * pair / dr.fma(ch, ch, e_mid_squared)
+            difference = dr.fma(c_mid, ch, -e_mid * sh)
+            total += weight * dr.fma(after, difference, before * cosh_after) / product
             continue
-        for factor, sign in ((after, 1.0), (before, -1.0)):
-            inverse = dr.rcp(dr.fma(sign, cosh_odd, cosh_even))
+        for factor, inverse, sign in ((after, dr.rcp(cosh_after), 1.0), (before, cosh_after / product, -1.0)):
             value = factor * inverse * evaluate(phase, dr.fma(2 * inverse, inverse, -1))
             if light.soft:
                 e = dr.fma(sign * c_mid, sh, e_mid * ch)

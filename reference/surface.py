@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The lit surface of the truth: Mitsuba's own materials and lights, attenuated in float64.
+
+    L = f(w_i, w_o) cos I / r^2 exp(-sigma_t (distance + s r)),
+
+with f cos by `BSDF.eval` and I / r^2 by `Emitter.sample_direction`; s scales the shadow leg (see
+`reference.quadrature`).
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.scene import TruthScene
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SurfaceHits:
+    """What the pixel-centre rays hit."""
+
+    distance: Array  #: (pixels,), infinite where nothing is hit [m]
+    interaction: Any  #: Mitsuba's surface interactions
+
+
+def surface_hits(truth: TruthScene) -> SurfaceHits:
+    """Cast the pixel-centre rays from the pinhole."""
+    import drjit as dr
+    import mitsuba as mi
+
+    ray = mi.Ray3f(mi.Point3f(*(float(c) for c in truth.origin)), dr.normalize(mi.Vector3f(truth.direction.T)))
+    interaction = truth.scene.ray_intersect(ray, mi.RayFlags.All, coherent=True)
+    valid = np.array(interaction.is_valid(), dtype=bool)
+    return SurfaceHits(np.where(valid, np.array(interaction.t, dtype=np.float64), np.inf), interaction)
+
+
+def lit_surface(truth: TruthScene, hits: SurfaceHits, *, shadow_scale: float = 1.0) -> Array:
+    """Return the radiance of the lit surface at each pixel centre, (pixels, 3) [W/(m^2 sr)]."""
+    import mitsuba as mi
+
+    interaction = hits.interaction
+    total = np.zeros((len(hits.distance), 3))
+    if not truth.scene.shapes():
+        return total
+    for emitter in truth.scene.emitters():
+        towards, arriving = emitter.sample_direction(interaction, mi.Point2f(0.5))
+        facing = interaction.is_valid()
+        blocked = truth.scene.ray_test(interaction.spawn_ray_to(towards.p), facing)
+        reflected = interaction.bsdf().eval(mi.BSDFContext(), interaction, interaction.to_local(towards.d), facing)
+        radiance = np.array(reflected * arriving, dtype=np.float64).T
+        lit = np.array(facing & ~blocked, dtype=bool)
+        path = np.where(lit, hits.distance, 0) + shadow_scale * np.array(towards.dist, dtype=np.float64)
+        transmitted = np.exp(-np.where(lit, path, 0)[:, None] * truth.medium.sigma_t)
+        total += np.where(lit[:, None], radiance * transmitted, 0.0)
+    return total

@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Mitsuba's volumetric path tracer as the check by code that nobody here wrote.
+
+`volpath` with ``max_depth = 2`` is exactly one scattering, on a surface or in the medium (DESIGN section 6.4). It is
+run along the pixel-centre rays from the pinhole itself, so neither the reconstruction filter, nor the film's float32
+sums, nor the near clip plane come into play; what remains of Mitsuba's biases is the shadow-ray epsilon
+(`reference.epsilon`).
+
+Airlight and surface come apart by two runs: with black surfaces only the medium scatters, with albedo 0 only surfaces
+do. Where the extinction depends on the channel, each channel has a run of its own in a grey medium, since a path that
+picks its channel at random may have infinite variance (DESIGN section 6.7).
+
+Each batch has its own seed and at most 256 samples a pixel; means and standard errors are taken over the batches in
+float64.
+"""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.scene import TruthScene
+
+Array = NDArray[np.float64]
+Progress = Callable[[int, int, str], None]
+
+LARGEST_BATCH = 256  # samples a pixel: float32 sums of more lose digits (DESIGN section 6.2)
+_PATHS = 1 << 22  # paths traced at once
+
+
+@dataclass(frozen=True)
+class Batches:
+    """Running sums of the batch means; `merged` adds batches up in any order."""
+
+    seeds: tuple[int, ...]
+    samples: int  #: samples a pixel in each batch
+    mean: Array  #: mean of the batch means, (layers, pixels, 3)
+    squares: Array  #: sum of squared deviations from the mean, (layers, pixels, 3)
+    totals: Array  #: image means of every batch, (batches, layers, 3)
+
+    @property
+    def standard_error(self) -> Array:
+        """Standard error of `mean`, (layers, pixels, 3)."""
+        count = len(self.seeds)
+        return np.sqrt(self.squares / (count * (count - 1)))
+
+
+LAYERS = ("airlight", "surface")
+
+
+def volpath_batch(truth: TruthScene, seed: int, samples: int) -> Batches:
+    """Trace one batch.
+
+    Parameters
+    ----------
+    truth
+        The scene.
+    seed
+        Seed of the batch; different seeds are independent.
+    samples
+        Samples a pixel, at most 256.
+    """
+    import mitsuba as mi
+
+    if not 1 <= samples <= LARGEST_BATCH:
+        raise ValueError(f"samples: got {samples}, wanted 1 to {LARGEST_BATCH}")
+    integrator = mi.load_dict({"type": "volpath", "max_depth": 2, "rr_depth": 1000})
+    with _black_surfaces(truth.scene):
+        airlight = _trace(truth, integrator, truth.medium.albedo, 2 * seed, samples)
+    surface = np.zeros_like(airlight)
+    if truth.scene.shapes():
+        surface = _trace(truth, integrator, np.zeros(3), 2 * seed + 1, samples)
+    mean = np.stack([airlight, surface])
+    return Batches((seed,), samples, mean, np.zeros_like(mean), mean.mean(axis=1)[None])
+
+
+def merged(one: Batches, other: Batches) -> Batches:
+    """Add up two sets of batches (Chan, Golub and LeVeque's update of mean and sum of squares)."""
+    if one.samples != other.samples or set(one.seeds) & set(other.seeds):
+        raise ValueError("batches to merge need the same samples a pixel and different seeds")
+    n, m = len(one.seeds), len(other.seeds)
+    difference = other.mean - one.mean
+    return Batches(
+        one.seeds + other.seeds,
+        one.samples,
+        one.mean + difference * (m / (n + m)),
+        one.squares + other.squares + difference**2 * (n * m / (n + m)),
+        np.concatenate([one.totals, other.totals]),
+    )
+
+
+@contextmanager
+def _black_surfaces(scene) -> Iterator[None]:
+    """Make every surface black for a while."""
+    import mitsuba as mi
+
+    black = mi.load_dict({"type": "diffuse", "reflectance": 0.0})
+    own = [(shape, shape.bsdf()) for shape in scene.shapes()]
+    try:
+        for shape, _ in own:
+            shape.set_bsdf(black)
+        yield
+    finally:
+        for shape, bsdf in own:
+            shape.set_bsdf(bsdf)
+
+
+def _trace(truth: TruthScene, integrator, albedo: Array, seed: int, samples: int) -> Array:
+    """Return the mean radiance of every pixel, (pixels, 3)."""
+    pixels = truth.width * truth.height
+    rows = max(1, _PATHS // samples)
+    image = np.zeros((pixels, 3))
+    for number, sigma_t in enumerate(dict.fromkeys(truth.medium.sigma_t)):
+        medium = _grey_medium(truth, float(sigma_t), albedo)
+        channels = truth.medium.sigma_t == sigma_t
+        for start in range(0, pixels, rows):
+            # Streams differ by seed; the chunk and the channel get seeds of their own.
+            stream = (seed * 3 + number) * (pixels // rows + 1) + start // rows
+            chunk = _trace_pixels(truth, integrator, medium, slice(start, min(start + rows, pixels)), stream, samples)
+            image[start : start + rows, channels] = chunk[:, channels]
+    return image
+
+
+def _trace_pixels(truth: TruthScene, integrator, medium, pixels: slice, seed: int, samples: int) -> Array:
+    import drjit as dr
+    import mitsuba as mi
+
+    direction = mi.Vector3f(truth.direction[pixels].T)
+    count = dr.width(direction)
+    lane = dr.arange(mi.UInt32, count * samples)
+    sampler = mi.load_dict({"type": "independent"})
+    sampler.seed(seed, count * samples)
+    start = mi.Point3f(*(float(c) for c in truth.origin))
+    ray = mi.Ray3f(start, dr.normalize(dr.gather(mi.Vector3f, direction, lane // samples)))
+    radiance, _, _ = integrator.sample(truth.scene, sampler, mi.RayDifferential3f(ray), medium)
+    means = [np.array(dr.block_sum(channel, samples), dtype=np.float64) / samples for channel in radiance]
+    return np.stack(means, axis=1)
+
+
+def _grey_medium(truth: TruthScene, sigma_t: float, albedo: Array):
+    import mitsuba as mi
+
+    return mi.load_dict(
+        {
+            "type": "homogeneous",
+            "sigma_t": sigma_t,
+            "albedo": {"type": "rgb", "value": [float(a) for a in albedo]},
+            "has_spectral_extinction": False,
+            "phase": truth.medium.plugin.phase_function(),
+        }
+    )

@@ -1,0 +1,26 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Fixtures shared by all tests."""
+
+from pathlib import Path
+
+import pytest
+
+
+@pytest.fixture(scope="session")
+def data_folder() -> Path:
+    """The folder of certified values."""
+    return Path(__file__).parent / "data"
+
+
+@pytest.fixture(scope="session")
+def variant() -> str:
+    """The best Mitsuba variant that works on this machine, made current."""
+    from reports.environment import activate
+
+    return activate()
+
+
+@pytest.fixture(autouse=True)
+def _own_cache(tmp_path_factory, monkeypatch):
+    """Keep the tests away from the user's cache, and let them share one of their own."""
+    monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path_factory.getbasetemp() / "airlight-cache"))

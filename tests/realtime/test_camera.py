@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import numpy as np
+import pytest
+
+
+@pytest.mark.parametrize("size", [(64, 48), (37, 53)])
+@pytest.mark.parametrize("axis", ["x", "y", "smaller"])
+def test_rays_are_those_of_mitsuba(variant, size, axis):
+    import mitsuba as mi
+
+    from realtime.camera import ray_directions
+    from realtime.scene import _read_camera
+    from realtime.arrays import array_types
+
+    sensor = {
+        "type": "perspective",
+        "fov": 47.0,
+        "fov_axis": axis,
+        "to_world": mi.ScalarTransform4f().look_at([1.3, -2.1, 0.7], [0.2, 0.4, 0.9], [0.1, 0.2, 1.0]),
+        "film": {"type": "hdrfilm", "width": size[0], "height": size[1]},
+    }
+    scene = mi.load_dict({"type": "scene", "sensor": sensor})
+    camera, plugin = _read_camera(scene, array_types("double"))
+    pixel = np.arange(size[0] * size[1])
+    direction = np.array(ray_directions(camera, mi.UInt32(pixel.astype(np.uint32))))
+    position = mi.Point2f((pixel % size[0] + 0.5) / size[0], (pixel // size[0] + 0.5) / size[1])
+    ray, _ = plugin.sample_ray(0.0, 0.5, position, mi.Point2f(0.5))
+    assert np.max(np.abs(direction - np.array(ray.d))) < 5e-7  # float32 matrices on Mitsuba's side
+    assert np.max(np.abs(np.linalg.norm(direction, axis=0) - 1)) < 1e-14
+
+
+@pytest.mark.parametrize("size", [(8, 8), (800, 600), (37, 53), (1, 5)])
+def test_tiles_hold_every_pixel_once(size):
+    from realtime.camera import tiled_pixels
+
+    pixels = tiled_pixels(*size)
+    assert np.array_equal(np.sort(pixels), np.arange(size[0] * size[1]))
+    if size == (8, 8):
+        assert pixels[:16].tolist() == [row * 8 + column for row in range(4) for column in range(4)]

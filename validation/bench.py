@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Speed against error: every configuration of a scene is timed and compared with the quadrature truth."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+from analytic.errors import InputError as TruthInputError
+from realtime.errors import InputError
+from realtime.frame import Frame, render_frame
+from realtime.methods import METHODS
+from realtime.plan import Plan
+from realtime.scene import Scene, read_scene
+from reference.quadrature import TruthImage
+from validation.configurations import STANDARD, Configuration, prepared
+from validation.load import LoadedScene
+from validation.metrics import Metrics, error_metrics
+from validation.timing import FrameTimes, time_frame
+from validation.truth import truth_image
+
+Progress = Callable[[int, int, str], None]
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """What one configuration costs in one scene and how wrong it is."""
+
+    configuration: Configuration
+    frame: Frame | None  #: None where it was refused
+    times: FrameTimes | None
+    error: Metrics | None  #: of the airlight
+    surface_error: Metrics | None
+    refused: str | None = None  #: why this configuration cannot render this scene
+
+
+def configurations_for(plan: Plan, configurations: Sequence[Configuration] = STANDARD) -> tuple[Configuration, ...]:
+    """Leave out what the scene does not need: variants that differ in their shadows where nothing casts one."""
+    if plan.shadows:
+        return tuple(configurations)
+    return tuple(chosen for chosen in configurations if "shadow" not in dict(chosen.parameters))
+
+
+def measure(
+    scene: Scene, chosen: Configuration, *, truth: TruthImage, timed: Scene | None = None, seconds: float = 0.6
+) -> Measurement:
+    """Render, compare and time one configuration.
+
+    Parameters
+    ----------
+    scene
+        From `realtime.scene.read_scene`, at the size of the truth.
+    chosen
+        The configuration.
+    truth
+        The quadrature truth of the same scene.
+    timed
+        The scene at another size to time, where that differs from the size of the truth.
+    seconds
+        Time to spend on each timing.
+    """
+    try:
+        renderer = prepared(scene, chosen)
+        frame = render_frame(renderer)
+    except RuntimeError as error:
+        refusal = _refusal(error)
+        if refusal is None:
+            raise
+        return Measurement(chosen, None, None, None, None, refusal)
+    times = time_frame(renderer if timed is None else prepared(timed, chosen), seconds=seconds)
+    return Measurement(
+        chosen,
+        frame,
+        times,
+        error_metrics(truth.airlight, frame.airlight),
+        error_metrics(truth.surface, frame.surface) if scene.plan.surfaces else None,
+    )
+
+
+def _refusal(error: BaseException | None) -> str | None:
+    """Return the message of the InputError behind a frozen function's RuntimeError."""
+    while error is not None:
+        if isinstance(error, InputError | TruthInputError):
+            return str(error)
+        error = error.__cause__ or error.__context__
+    return None
+
+
+def bench(
+    loaded: LoadedScene, configurations: Sequence[Configuration] = STANDARD, *, progress: Progress | None = None
+) -> Iterator[tuple[Scene, Measurement]]:
+    """Measure the configurations of a scene at its own size, one after the other."""
+    scene = read_scene(loaded.scene)
+    chosen = configurations_for(scene.plan, configurations)
+    truth = truth_image(loaded.scene)
+    for number, one in enumerate(chosen):
+        yield scene, measure(scene, one, truth=truth)
+        if progress is not None:
+            progress(number + 1, len(chosen), loaded.name)
+
+
+def knows_shadows(chosen: Configuration) -> bool:
+    """Return whether a configuration renders volumetric shadows."""
+    return METHODS[chosen.method].shadows and dict(chosen.parameters).get("shadow") != "none"

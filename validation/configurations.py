@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Configurations: a method with a kernel and the values of its parameters, as a user names them."""
+
+import importlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from analytic.errors import InputError
+from realtime.frame import FrameRenderer, frame_renderer
+from realtime.kernels import KERNELS
+from realtime.methods import METHODS
+from realtime.scene import Scene
+from validation.load import nearest
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """A method, the kernel that it calls (if it calls one) and the parameters that differ from its defaults."""
+
+    method: str
+    kernel: str | None = None
+    parameters: tuple[tuple[str, int | str], ...] = ()
+
+    @property
+    def label(self) -> str:
+        """A name for tables, plots and files."""
+        values = [f"{name}={value}" for name, value in self.parameters]
+        inside = ", ".join(([self.kernel] if self.kernel else []) + values)
+        return f"{self.method} ({inside})" if inside else self.method
+
+
+#: What `bench` and `report` measure unless told otherwise.
+STANDARD: tuple[Configuration, ...] = (
+    Configuration("unshadowed", "taylor"),
+    Configuration("unshadowed", "quadrature"),
+    Configuration("ray-march", None, (("steps", 16),)),
+    Configuration("ray-march", None, (("steps", 100),)),
+    Configuration("ray-march", None, (("steps", 100), ("spacing", "uniform"))),
+    Configuration("ray-march", None, (("steps", 100), ("shadow", "map"))),
+    Configuration("ray-march", None, (("steps", 400), ("shadow", "map"), ("map", 1024))),
+)
+
+
+def configuration(method: str, kernel: str | None = None, parameters: Mapping[str, Any] | None = None) -> Configuration:
+    """Return a configuration, checked.
+
+    Parameters
+    ----------
+    method
+        A name of `realtime.methods.METHODS`.
+    kernel
+        A name of `realtime.kernels.KERNELS`, or 'module:function' for one's own; 'quadrature' by default for methods
+        that call a kernel.
+    parameters
+        Values of the method's parameters; words are converted to the type of the default.
+
+    Raises
+    ------
+    InputError
+        For an unknown method, kernel or parameter (the nearest is named) and a value of the wrong type.
+    """
+    if method not in METHODS:
+        raise InputError(f"method: got {method!r}, wanted one of {', '.join(METHODS)}" + nearest(method, METHODS))
+    record = METHODS[method]
+    if not record.uses_kernel and kernel is not None:
+        raise InputError(f"method {method}: got the kernel {kernel!r}, but this method calls no kernel: leave it out")
+    if record.uses_kernel:
+        kernel = kernel or "quadrature"
+        kernel_function(kernel)
+    values = [(name, _converted(record, name, value)) for name, value in (parameters or {}).items()]
+    return Configuration(method, kernel, tuple(values))
+
+
+def parse_settings(settings: Sequence[str]) -> dict[str, str]:
+    """Return the mapping of 'NAME=VALUE' words."""
+    pairs = {}
+    for setting in settings:
+        name, separator, value = setting.partition("=")
+        if not separator or not name or not value:
+            raise InputError(f"--set: got {setting!r}, wanted NAME=VALUE, for example steps=100")
+        pairs[name.strip()] = value.strip()
+    return pairs
+
+
+def kernel_function(name: str):
+    """Return the kernel function of a name, or of 'module:function'."""
+    if name in KERNELS:
+        return KERNELS[name].function
+    if ":" in name:
+        module, _, function = name.partition(":")
+        try:
+            return getattr(importlib.import_module(module), function)
+        except (ImportError, AttributeError) as error:
+            raise InputError(
+                f"kernel: cannot load {name!r}: {error}; wanted an importable 'module:function'"
+            ) from error
+    raise InputError(f"kernel: got {name!r}, wanted one of {', '.join(KERNELS)}" + nearest(name, KERNELS))
+
+
+def prepared(scene: Scene, chosen: Configuration) -> FrameRenderer:
+    """Return the frame renderer of a configuration for a scene."""
+    kernel = kernel_function(chosen.kernel) if chosen.kernel else None
+    return frame_renderer(scene, METHODS[chosen.method], kernel=kernel, **dict(chosen.parameters))
+
+
+def _converted(record, name: str, value: Any) -> int | str:
+    if name not in record.parameters:
+        known = ", ".join(record.parameters) or "none"
+        raise InputError(
+            f"method {record.name}: got a parameter {name!r}, wanted one of: {known}" + nearest(name, record.parameters)
+        )
+    default = record.parameters[name]
+    if isinstance(default, int):
+        try:
+            return int(value)
+        except ValueError:
+            raise InputError(f"method {record.name}: {name} got {value!r}, wanted a whole number") from None
+    return str(value)

@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""Error of one image against another.
+
+With r the reference, t the test, d = t - r, n values (pixels times channels) and m = mean(r):
+
+    bias          = mean(d)                     relative_bias = bias / m
+    rmse          = sqrt(mean(d^2))             relative_rmse = rmse / m
+    e             = |d| / max(r, 0.001 m)       p50, p99, max = its quantiles and its largest value
+
+Channels count as values of their own: nothing is summed or weighted over them. The floor under r scales with the
+image, so that every relative number is free of units, and dim airlight counts as much as bright.
+"""
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from analytic.errors import InputError
+
+FLOOR = 1e-3  #: the least denominator of a relative error, as a share of the mean of the reference
+
+
+@dataclass(frozen=True)
+class Metrics:
+    """Error of a test image against a reference.
+
+    Attributes
+    ----------
+    pixels
+        Pixels compared, those of the mask, with or without finite values.
+    bias, rmse
+        Mean error and root of the mean square error [W/(m^2 sr)].
+    relative_bias, relative_rmse
+        The same over the mean of the reference; NaN if that is not above zero.
+    p50, p99, max
+        Median, 99 % quantile (between order statistics linear) and largest of |test - ref| / max(ref, 0.001 mean(ref)).
+    nonfinite
+        Pixels with a NaN or an infinity in either image. They are left out of all averages: whoever sees a number
+        above zero here must call the comparison failed.
+    negative
+        Pixels in which the test image has a negative value. They stay in the averages.
+    """
+
+    pixels: int
+    bias: float
+    relative_bias: float
+    rmse: float
+    relative_rmse: float
+    p50: float
+    p99: float
+    max: float
+    nonfinite: int
+    negative: int
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the numbers by name; what is not finite becomes None, which JSON can hold."""
+        return {name: plain(value) for name, value in asdict(self).items()}
+
+
+def error_metrics(reference: ArrayLike, test: ArrayLike, *, mask: ArrayLike | None = None) -> Metrics:
+    """Compare a test image with a reference (formulae: see the module).
+
+    Parameters
+    ----------
+    reference, test
+        Radiance [W/(m^2 sr)], (height, width) or (height, width, channels).
+    mask
+        Pixels to compare, (height, width) of truth values; all by default.
+
+    Returns
+    -------
+    Metrics
+        In float64. If no pixel is finite in both images, every error is NaN; if the reference is black, the relative
+        ones are.
+
+    Raises
+    ------
+    InputError
+        If the sizes differ, an image is empty, or the mask does not fit or leaves nothing.
+    """
+    ref, tst, chosen = compared(reference, test, mask)
+    finite = chosen & (np.isfinite(ref) & np.isfinite(tst)).all(axis=2)
+    counts = {
+        "pixels": int(chosen.sum()),
+        "nonfinite": int(chosen.sum() - finite.sum()),
+        "negative": int((chosen & (tst < 0).any(axis=2)).sum()),
+    }
+    if not finite.any():
+        nan = float("nan")
+        return Metrics(bias=nan, relative_bias=nan, rmse=nan, relative_rmse=nan, p50=nan, p99=nan, max=nan, **counts)
+    r, d = ref[finite], tst[finite] - ref[finite]
+    mean, bias = float(r.mean()), float(d.mean())
+    largest = float(np.abs(d).max())
+    # Scaled before squaring: the square of a very dim or bright error is out of range.
+    rmse = largest * float(np.sqrt(np.mean((d / largest) ** 2))) if largest > 0 else 0.0
+    if mean > 0:
+        relative = np.abs(d) / np.maximum(r, FLOOR * mean)
+        p50, p99 = (float(q) for q in np.quantile(relative, [0.5, 0.99]))
+        return Metrics(
+            bias=bias,
+            relative_bias=bias / mean,
+            rmse=rmse,
+            relative_rmse=rmse / mean,
+            p50=p50,
+            p99=p99,
+            max=float(relative.max()),
+            **counts,
+        )
+    nan = float("nan")
+    return Metrics(bias=bias, relative_bias=nan, rmse=rmse, relative_rmse=nan, p50=nan, p99=nan, max=nan, **counts)
+
+
+def compared(
+    reference: ArrayLike, test: ArrayLike, mask: ArrayLike | None
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+    """Return two images as float64 (height, width, channels) and the pixels to compare (height, width).
+
+    Raises
+    ------
+    InputError
+        If the sizes differ, an image is empty, or the mask does not fit or leaves nothing.
+    """
+    ref, tst = np.asarray(reference, dtype=np.float64), np.asarray(test, dtype=np.float64)
+    if ref.shape != tst.shape:
+        raise InputError(
+            f"images of two sizes: the reference is {_size(ref)}, the test {_size(tst)}; render both at one size"
+        )
+    if ref.ndim not in (2, 3) or ref.size == 0:
+        raise InputError(f"images of shape {ref.shape}; wanted (height, width) or (height, width, channels), not empty")
+    chosen = np.ones(ref.shape[:2], dtype=bool) if mask is None else np.asarray(mask)
+    if chosen.dtype != np.bool_ or chosen.shape != ref.shape[:2]:
+        raise InputError(f"a mask of {chosen.dtype} {chosen.shape}; wanted truth values (bool) {ref.shape[:2]}")
+    if not chosen.any():
+        raise InputError("the mask leaves no pixel to compare; choose at least one")
+    return ref.reshape(*ref.shape[:2], -1), tst.reshape(*tst.shape[:2], -1), chosen
+
+
+def plain(value: Any) -> Any:
+    """Return a number, a pair or a text as JSON holds it: no NumPy types, None for what is not finite."""
+    if isinstance(value, tuple | list):
+        return [plain(item) for item in value]
+    if isinstance(value, bool | np.bool_):
+        return bool(value)
+    if isinstance(value, int | np.integer):
+        return int(value)
+    if isinstance(value, float | np.floating):
+        return float(value) if np.isfinite(value) else None
+    return value
+
+
+def _size(image: NDArray[np.float64]) -> str:
+    """Say the size of an image as width x height."""
+    if image.ndim not in (2, 3):
+        return f"an array of shape {image.shape}"
+    channels = f" with {image.shape[2]} channels" if image.ndim == 3 else ""
+    return f"{image.shape[1]} x {image.shape[0]} pixels{channels}"

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The built-in scenes: one registry for tests, benchmarks and figures.
+
+Each is built procedurally with arbitrary, never round numbers, so that no constant of the code can hide behind one of
+the scene. `SCENES` is the registry: add a `SceneRecord` to it and every command and report knows it.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from validation.scenes.colonnade import colonnade
+from validation.scenes.open_fog import open_fog
+from validation.scenes.sphere_spot import sphere_spot
+from validation.scenes.two_pens import two_pens
+
+
+@dataclass(frozen=True)
+class SceneRecord:
+    """A built-in scene."""
+
+    name: str
+    build: Callable[[], dict[str, Any]]  #: the dictionary for `mi.load_dict`; needs an active Mitsuba variant
+    purpose: str  #: what it is for, one sentence
+    published: str  #: the published figure that it answers to
+
+
+SCENES: dict[str, SceneRecord] = {
+    record.name: record
+    for record in (
+        SceneRecord(
+            "open-fog",
+            open_fog,
+            "Fog and a lamp in view, nothing else: the airlight integral alone, with its peak near the light.",
+            "Biri, Arques, Michelin 2006, section 4.1; Sun et al. 2005",
+        ),
+        SceneRecord(
+            "sphere-spot",
+            sphere_spot,
+            "A sphere below a spot light: one shadow in a cone of light, a silhouette of 32 edges.",
+            "Biri, Arques, Michelin 2006, section 6: 120 frames/s at 800 x 600",
+        ),
+        SceneRecord(
+            "colonnade",
+            colonnade,
+            "A hall of fluted columns in fog, lit through them: many parallel shafts, thin shadows, 66 000 triangles.",
+            "Billeter, Sintorn, Assarsson 2010, Fig. 7 (the Sponza atrium)",
+        ),
+        SceneRecord(
+            "two-pens",
+            two_pens,
+            "Two pens standing on a sheet before a lamp: smooth casters whose shadows cross, 34 549 triangles.",
+            "Biri, Arques, Michelin 2006, Fig. 7a and Table 2: 23 frames/s",
+        ),
+    )
+}

@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Parts that the built-in scenes share: meshes, materials, cameras and media for `mi.load_dict`."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Vertices = NDArray[np.float64]  #: (vertices, 3)
+Faces = NDArray[np.int64]  #: (faces, 3), counter-clockwise seen from outside
+Mesh = tuple[Vertices, Faces]
+
+
+def lathe(radius: Sequence[float], height: Sequence[float], sides: int) -> Mesh:
+    """Return the closed surface of a profile turned about the z axis: 2 sides len(radius) triangles.
+
+    Parameters
+    ----------
+    radius, height
+        The profile from bottom to top [m]; every radius is above 0, the ends are closed by fans.
+    sides
+        Corners of each ring.
+    """
+    angle = 2 * np.pi * np.arange(sides) / sides
+    circle = np.stack([np.cos(angle), np.sin(angle), np.zeros(sides)], axis=1)
+    rings = np.asarray(radius)[:, None, None] * circle + np.asarray(height)[:, None, None] * np.array([0.0, 0.0, 1.0])
+    count = len(radius)
+    i = np.arange(sides)
+    j = (i + 1) % sides
+    faces = []
+    for k in range(count - 1):
+        low, high = k * sides, (k + 1) * sides
+        faces += [np.stack([low + i, low + j, high + j], axis=1), np.stack([low + i, high + j, high + i], axis=1)]
+    bottom, top = count * sides, count * sides + 1
+    faces += [np.stack([np.full(sides, bottom), j, i], axis=1)]
+    faces += [np.stack([np.full(sides, top), (count - 1) * sides + i, (count - 1) * sides + j], axis=1)]
+    centres = np.array([[0.0, 0.0, height[0]], [0.0, 0.0, height[-1]]])
+    return np.concatenate([rings.reshape(-1, 3), centres]), np.concatenate(faces)
+
+
+def grid(corner: Sequence[float], across: Sequence[float], up: Sequence[float], cells: tuple[int, int]) -> Mesh:
+    """Return an open rectangle of 2 cells[0] cells[1] triangles; its normal is across x up."""
+    n, m = cells
+    u, v = np.meshgrid(np.arange(n + 1) / n, np.arange(m + 1) / m, indexing="ij")
+    vertices = np.asarray(corner) + u.reshape(-1, 1) * np.asarray(across) + v.reshape(-1, 1) * np.asarray(up)
+    i, j = (index.reshape(-1) for index in np.meshgrid(np.arange(n), np.arange(m), indexing="ij"))
+    a, b, c, d = i * (m + 1) + j, (i + 1) * (m + 1) + j, (i + 1) * (m + 1) + j + 1, i * (m + 1) + j + 1
+    return vertices, np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+
+
+def rotation(axis: Sequence[float], degrees: float) -> NDArray[np.float64]:
+    """Return the matrix of a rotation about an axis (Rodrigues' formula)."""
+    x, y, z = np.asarray(axis, dtype=np.float64) / np.linalg.norm(axis)
+    skew = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    angle = np.deg2rad(degrees)
+    return np.eye(3) + np.sin(angle) * skew + (1 - np.cos(angle)) * (skew @ skew)
+
+
+def placed(mesh: Mesh, position: Sequence[float], turn: NDArray[np.float64] | None = None) -> Mesh:
+    """Return a mesh turned about the origin, then moved."""
+    vertices, faces = mesh
+    return (vertices if turn is None else vertices @ turn.T) + np.asarray(position), faces
+
+
+def joined(meshes: Sequence[Mesh]) -> Mesh:
+    """Return several meshes as one."""
+    offsets = np.cumsum([0] + [len(vertices) for vertices, _ in meshes[:-1]])
+    return (
+        np.concatenate([vertices for vertices, _ in meshes]),
+        np.concatenate([faces + offset for (_, faces), offset in zip(meshes, offsets)]),
+    )
+
+
+def mitsuba_mesh(name: str, mesh: Mesh, reflectance: Sequence[float]):
+    """Return a Mitsuba mesh with flat shading and a two-sided diffuse material."""
+    import mitsuba as mi
+
+    properties = mi.Properties()
+    properties["mesh_bsdf"] = mi.load_dict(
+        {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": list(reflectance)}}}
+    )
+    vertices, faces = mesh
+    result = mi.Mesh(name, vertex_count=len(vertices), face_count=len(faces), props=properties)
+    parameters = mi.traverse(result)
+    parameters["vertex_positions"] = vertices.astype(np.float32).ravel()
+    parameters["faces"] = faces.astype(np.uint32).ravel()
+    parameters.update()
+    return result
+
+
+def fog(
+    sigma_t: float | Sequence[float], albedo: Sequence[float], phase: dict[str, Any] | None = None
+) -> dict[str, Any]:
+    """Return a homogeneous medium with the id 'fog'; `sigma_t` is grey or RGB [1/m]."""
+    grey = isinstance(sigma_t, float)
+    scale = sigma_t if grey else max(sigma_t)  # type: ignore[arg-type]
+    return {
+        "type": "homogeneous",
+        "id": "fog",
+        # An rgb value of Mitsuba lies in [0, 1]; the scale takes the rest.
+        "sigma_t": 1.0 if grey else {"type": "rgb", "value": [s / scale for s in sigma_t]},  # type: ignore[union-attr]
+        "scale": scale,
+        "has_spectral_extinction": not grey,
+        "albedo": {"type": "rgb", "value": list(albedo)},
+        "phase": phase or {"type": "isotropic"},
+    }
+
+
+def camera(
+    origin: Sequence[float], target: Sequence[float], *, fov: float, size: tuple[int, int], up=(0.0, 0.0, 1.0)
+) -> dict[str, Any]:
+    """Return a perspective sensor in the medium 'fog'; `fov` is the horizontal field of view [degrees]."""
+    import mitsuba as mi
+
+    return {
+        "type": "perspective",
+        "fov": fov,
+        "fov_axis": "x",
+        "near_clip": 1e-5,
+        "far_clip": 1e5,
+        "to_world": mi.ScalarTransform4f().look_at(origin=list(origin), target=list(target), up=list(up)),
+        "medium": {"type": "ref", "id": "fog"},
+        "film": {
+            "type": "hdrfilm",
+            "width": size[0],
+            "height": size[1],
+            "rfilter": {"type": "box"},
+            "component_format": "float32",
+        },
+    }
