@@ -1,0 +1,13 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The one exception for what a user gave wrong, on the side of the ground truth.
+
+`realtime` defines its own: the two sides share no code. The command line catches both.
+"""
+
+
+class InputError(ValueError):
+    """An input that cannot be used: the user's to mend, not a fault of the program.
+
+    The message is one line that says what was given, what is wanted and what to do. The command line prints it
+    without a traceback and exits with status 2.
+    """
