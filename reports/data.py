@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The data of a report: plain numbers and words, ready for JSON.
+
+`report.json` has the schema "airlight-report/1": `environment`, `settings`, `claims` (sentences) and `scenes`, each
+with `truth`, `agreement` by layer and `methods`, each of these with `times` [ms], `error` (airlight) and
+`surface_error`, and the files written. Not-a-number is null.
+"""
+
+import math
+from dataclasses import asdict, is_dataclass
+from typing import Any
+
+from realtime.plan import describe
+from validation.agreement import Agreement
+from validation.bench import Measurement, knows_shadows
+from validation.study import SceneStudy
+
+SCHEMA = "airlight-report/1"
+
+
+def plain(value: Any) -> Any:
+    """Return dataclasses, NumPy numbers and containers as what JSON can hold."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return plain(asdict(value))
+    if isinstance(value, dict):
+        return {str(key): plain(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(one) for one in value]
+    if hasattr(value, "item"):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def scene_data(study: SceneStudy) -> dict[str, Any]:
+    """Return what a study found, without its images."""
+    import numpy as np
+
+    truth = study.truth
+    finite = np.isfinite(truth.airlight)
+    height, width = truth.distance.shape
+    mean = float(truth.airlight[finite].mean())
+    return {
+        "name": study.loaded.name,
+        "purpose": study.loaded.purpose,
+        "published": study.loaded.published,
+        "path": str(study.loaded.path) if study.loaded.path else None,
+        "size": [width, height],
+        "plan": describe(study.plan),
+        "notes": list(study.plan.notes),
+        "truth": {
+            "mean": mean,
+            "relative_bound": float(truth.airlight_bound[finite].mean()) / mean if mean > 0 else None,
+            "transitions": truth.transitions,
+            "missed": truth.missed,
+        },
+        "agreement": {layer: agreement_data(one) for layer, one in study.agreement.items()},
+        "methods": [measurement_data(one) for one in study.measurements],
+    }
+
+
+def agreement_data(agreed: Agreement) -> dict[str, Any]:
+    """Return the comparison of one layer with volpath."""
+    return plain(agreed)
+
+
+def measurement_data(measured: Measurement) -> dict[str, Any]:
+    """Return what one configuration costs and how wrong it is."""
+    return {
+        "label": measured.configuration.label,
+        "method": measured.configuration.method,
+        "kernel": measured.configuration.kernel,
+        "parameters": dict(measured.configuration.parameters),
+        "knows_shadows": knows_shadows(measured.configuration),
+        "refused": measured.refused,
+        "times": plain(measured.times),
+        "error": plain(measured.error),
+        "surface_error": plain(measured.surface_error),
+        "files": {},
+    }
+
+
+def claims(scenes: list[dict[str, Any]]) -> list[str]:
+    """Return the sentences at the top of a report; each follows from numbers in `scenes`."""
+    sentences = [_trust(scenes)] if scenes else []
+    for target in (0.01, 0.001):
+        sentences += [_fastest(scene, target) for scene in scenes]
+    refused = [f"{m['label']} in {scene['name']}" for scene in scenes for m in scene["methods"] if m["refused"]]
+    if refused:
+        sentences.append("Refused, with the reason in the tables: " + "; ".join(refused) + ".")
+    return sentences
+
+
+def _trust(scenes: list[dict[str, Any]]) -> str:
+    compared = [(scene["name"], one) for scene in scenes for one in scene["agreement"].values()]
+    failed = [f"{name} ({one['layer']})" for name, one in compared if not one["statistics"]["equivalent"]]
+    detectable = max(one["statistics"]["detectable_bias"] for _, one in compared)
+    margin = 100 * compared[0][1]["statistics"]["margin"]
+    if failed:
+        return (
+            f"The truth is NOT confirmed within {margin:g} % in {', '.join(failed)}: there the 95 % interval of volpath's "
+            "relative bias is not inside the margin."
+        )
+    return (
+        f"The truth is confirmed by Mitsuba's volpath in {len(compared)} of {len(compared)} comparisons: the 95 % interval of "
+        f"the pooled relative bias lies within ±{margin:g} %; the least bias that would have been found is at worst "
+        f"{100 * detectable:.2g} %."
+    )
+
+
+def _fastest(scene: dict[str, Any], target: float) -> str:
+    measured = [m for m in scene["methods"] if m["error"] and m["error"]["relative_rmse"] is not None]
+    good = [m for m in measured if m["error"]["relative_rmse"] <= target]
+    if not good:
+        return f"{scene['name']}: no method reaches a relative RMSE of {100 * target:g} %."
+    best = min(good, key=lambda m: m["times"]["frame"]["median_ms"])
+    milliseconds = best["times"]["frame"]["median_ms"]
+    return (
+        f"{scene['name']}: the fastest method within {100 * target:g} % relative RMSE is {best['label']}: "
+        f"{milliseconds:.3g} ms a frame ({1000 / milliseconds:.0f} frames/s)."
+    )

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Pictures of radiance and of errors, as 8-bit arrays and PNG files."""
+
+import io
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.files import write_bytes
+
+Picture = NDArray[np.uint8]
+
+ERROR_FLOOR, ERROR_CEILING = 1e-4, 1.0  #: relative errors where the scale of the error maps begins and ends
+
+
+def exposure(reference: NDArray[np.float64]) -> float:
+    """Return the factor that brings the 99th percentile of the finite pixels of a reference to 0.9."""
+    values = reference[np.isfinite(reference)]
+    bright = float(np.percentile(values, 99)) if values.size else 0.0
+    return 0.9 / bright if bright > 0 else 1.0
+
+
+def tone_mapped(radiance: NDArray[np.float64], factor: float) -> Picture:
+    """Return linear RGB times a factor, clipped to 1 and encoded in sRGB; pixels that are not finite become magenta."""
+    import colour
+
+    finite = np.all(np.isfinite(radiance), axis=-1)
+    linear = np.clip(np.where(finite[..., None], radiance, 0) * factor, 0, 1)
+    encoded = np.asarray(colour.cctf_encoding(linear, function="sRGB"))
+    picture = np.round(255 * np.clip(encoded, 0, 1)).astype(np.uint8)
+    picture[~finite] = (255, 0, 255)
+    return picture
+
+
+def error_map(reference: NDArray[np.float64], test: NDArray[np.float64]) -> Picture:
+    """Return the signed relative error in false colour: blue too dark, red too bright, white below 1e-4.
+
+    The error of a pixel is its largest over the channels of (test - reference) / max(reference, 0.001 mean(reference)),
+    on a scale that is logarithmic from 1e-4 to 1 on either side, so that one scale serves every method.
+    """
+    import matplotlib
+
+    finite = np.isfinite(reference) & np.isfinite(test)
+    mean = float(reference[finite].mean()) if finite.any() else 0.0
+    with np.errstate(invalid="ignore", divide="ignore"):
+        relative = (test - reference) / np.maximum(reference, 1e-3 * mean)
+    relative = np.where(finite, relative, 0)
+    worst = np.take_along_axis(relative, np.abs(relative).argmax(axis=-1)[..., None], axis=-1)[..., 0]
+    decades = np.log10(ERROR_CEILING / ERROR_FLOOR)
+    size = np.clip(np.log10(np.maximum(np.abs(worst), 1e-30) / ERROR_FLOOR) / decades, 0, 1)
+    colours = matplotlib.colormaps["RdBu_r"](0.5 + 0.5 * np.sign(worst) * size)[..., :3]
+    picture = np.round(255 * colours).astype(np.uint8)
+    picture[~np.all(finite, axis=-1)] = (255, 0, 255)
+    return picture
+
+
+def error_scale() -> Picture:
+    """Return the colour scale of `error_map` as a horizontal bar."""
+    import matplotlib
+
+    bar = matplotlib.colormaps["RdBu_r"](np.linspace(0, 1, 512))[:, :3]
+    return np.repeat(np.round(255 * bar).astype(np.uint8)[None], 12, axis=0)
+
+
+def png_bytes(picture: Picture) -> bytes:
+    """Return a picture as a PNG file."""
+    from PIL import Image
+
+    buffer = io.BytesIO()
+    Image.fromarray(picture).save(buffer, format="PNG", optimize=True)
+    return buffer.getvalue()
+
+
+def write_png(path: Path | str, picture: Picture) -> None:
+    """Write a picture, whole or not at all."""
+    write_bytes(path, png_bytes(picture))

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The study of one scene: its truth, how far that can be trusted, and every configuration measured against it."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from realtime.plan import Plan
+from realtime.scene import read_scene
+from reference.quadrature import TruthImage
+from validation.agreement import Agreement, agreement
+from validation.bench import Measurement, configurations_for, measure
+from validation.configurations import STANDARD, Configuration
+from validation.load import LoadedScene, load_scene
+from validation.truth import truth_image
+
+Progress = Callable[[float, str], None]
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much work a study does."""
+
+    name: str
+    image: tuple[int, int]  #: width and height of the images that are compared and shown [pixels]
+    timed: tuple[int, int]  #: width and height of the frames that are timed [pixels]
+    volpath: tuple[int, int]  #: width and height of the comparison with volpath [pixels]
+    batches: int  #: of volpath
+    samples: int  #: a pixel in each batch of volpath
+    seconds: float  #: spent on each timing
+
+
+EFFORTS: dict[str, Effort] = {
+    effort.name: effort
+    for effort in (
+        Effort("quick", (320, 240), (320, 240), (120, 90), 32, 64, 0.15),
+        Effort("default", (400, 300), (800, 600), (160, 120), 48, 128, 0.4),
+        Effort("full", (800, 600), (800, 600), (240, 180), 96, 256, 1.0),
+    )
+}
+
+
+@dataclass(frozen=True)
+class SceneStudy:
+    """What a study of a scene found."""
+
+    loaded: LoadedScene
+    plan: Plan
+    truth: TruthImage
+    agreement: dict[str, Agreement]  #: by layer
+    measurements: tuple[Measurement, ...]
+
+
+def study_scene(
+    name_or_path: str,
+    effort: Effort,
+    *,
+    configurations: Sequence[Configuration] = STANDARD,
+    progress: Progress | None = None,
+) -> SceneStudy:
+    """Study one scene.
+
+    Parameters
+    ----------
+    name_or_path
+        A built-in scene or the path of a Mitsuba XML file.
+    effort
+        How much work to do.
+    configurations
+        What to measure; variants that the scene has no use for are left out.
+    progress
+        Called with (share done, what) now and then.
+    """
+    tell = progress or (lambda share, what: None)
+    loaded = load_scene(name_or_path, effort.image)
+    tell(0.0, "the quadrature truth")
+    scene = read_scene(loaded.scene)
+    truth = truth_image(loaded.scene)
+    tell(0.1, "volpath")
+
+    def batch_done(done: int, total: int, what: str) -> None:
+        tell(0.1 + 0.4 * done / total, what)
+
+    small = load_scene(name_or_path, effort.volpath)
+    agreed = agreement(small.scene, batches=effort.batches, samples=effort.samples, progress=batch_done)
+    timed = None
+    if effort.timed != effort.image:
+        timed = read_scene(load_scene(name_or_path, effort.timed).scene)
+    chosen = configurations_for(scene.plan, configurations)
+    measurements = []
+    for number, one in enumerate(chosen):
+        tell(0.5 + 0.5 * number / len(chosen), one.label)
+        measurements.append(measure(scene, one, truth=truth, timed=timed, seconds=effort.seconds))
+    tell(1.0, "done")
+    return SceneStudy(loaded, scene.plan, truth, agreed, tuple(measurements))
