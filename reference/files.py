@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Files written whole or not at all.
+
+A file is first written under a hidden name in the folder where it belongs, flushed to the disk, and then moved over its
+final name, which POSIX and Windows both do in one step. Whoever is killed half-way leaves the old file as it was.
+"""
+
+import os
+import stat
+import tempfile
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from analytic.errors import InputError
+
+
+def ensure_folder(path: str | os.PathLike[str]) -> Path:
+    """Make a folder with its parents, and prove that files can be written into it.
+
+    Call this before any work is done: it costs one empty temporary file. Permission bits are not asked, because they
+    say nothing about a read-only or full disk, nor about what the superuser may do.
+
+    Parameters
+    ----------
+    path
+        The folder; it may exist already.
+
+    Returns
+    -------
+    Path
+        The folder.
+
+    Raises
+    ------
+    InputError
+        If it is something else than a folder, or cannot be made or written.
+    """
+    folder = Path(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except (FileExistsError, NotADirectoryError) as error:
+        raise InputError(
+            f"the output folder {folder} cannot be made: {_obstacle(folder)} is not a folder; give another place"
+        ) from error
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(
+            f"cannot write into the folder {folder}: {reason}; give a folder that can be written"
+        ) from error
+    return folder
+
+
+def ensure_writable(path: str | os.PathLike[str]) -> Path:
+    """Prove before any work is done that a file can be written there; make its folder.
+
+    Raises
+    ------
+    InputError
+        If `path` is a folder or a device, or its folder cannot be written.
+    """
+    target = Path(path)
+    try:
+        # Seen through symbolic links, so that a link keeps pointing to the file that it names.
+        target = target.resolve()
+        mode = target.stat().st_mode if target.exists() else stat.S_IFREG
+    except (OSError, ValueError) as error:
+        raise InputError(f"cannot write the file {path!r}: {error}; give another name") from error
+    # Moving a file over a device such as /dev/null replaces the device, if it is the superuser who does it.
+    if not stat.S_ISREG(mode):
+        kind = "a folder" if stat.S_ISDIR(mode) else "not a regular file"
+        raise InputError(f"cannot write the file {path}: it is {kind}; give the name of a file")
+    ensure_folder(target.parent)
+    return target
+
+
+@contextmanager
+def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
+    r"""Give the name of a temporary file that becomes `path` when the block ends without an exception.
+
+    The temporary file lies in the same folder, so that the move is one step, and has the same suffix, so that a writer
+    that picks the format by the suffix works. Any exception, a KeyboardInterrupt too, removes it and leaves `path` as
+    it was.
+
+    Parameters
+    ----------
+    path
+        The file to write; its folder is made if needed.
+
+    Yields
+    ------
+    Path
+        Where the block must write the file.
+
+    Raises
+    ------
+    InputError
+        If `path` cannot be written.
+
+    Examples
+    --------
+    >>> with atomic_path("table.csv") as temporary:  # doctest: +SKIP
+    ...     temporary.write_text("x,y\n")
+    """
+    target = ensure_writable(path)
+    # Not tempfile's: its files are readable by their owner alone and would stay so.
+    temporary = target.with_name(f".{target.stem[:100]}-{uuid.uuid4().hex}{target.suffix}")
+    try:
+        yield temporary
+        _flush(temporary)
+        os.replace(temporary, target)
+    except BaseException:
+        with suppress(OSError):
+            temporary.unlink()
+        raise
+
+
+def write_text(path: str | os.PathLike[str], text: str) -> None:
+    """Write a text file in UTF-8 with line feeds, whole or not at all."""
+    write_bytes(path, text.encode("utf-8"))
+
+
+def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
+    """Write a file, whole or not at all."""
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(data)
+
+
+def _flush(path: Path) -> None:
+    """Wait until the content is on the disk: the move must not overtake it."""
+    with open(path, "rb+") as stream:
+        os.fsync(stream.fileno())
+
+
+def _obstacle(folder: Path) -> Path:
+    """Return the part of the path that exists and is no folder."""
+    for part in (*reversed(folder.parents), folder):
+        if part.exists() and not part.is_dir():
+            return part
+    return folder
