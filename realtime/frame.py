@@ -55,7 +55,7 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
     Raises
     ------
     InputError
-        For a parameter that the method does not have, and where a kernel is missing.
+        For a parameter that the method does not have, where a kernel is missing, and for what method or kernel refuse.
     """
     import drjit as dr
     import mitsuba as mi
@@ -77,8 +77,7 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
         color = lit_surface(geometry, direction, interaction, distance=distance, medium=medium, lights=lights)
         return distance, color
 
-    @dr.freeze
-    def airlight(geometry, pixel, camera, medium, lights, maps, distance):
+    def run_method(geometry, pixel, camera, medium, lights, maps, distance):
         view = View(
             origin=camera.origin,
             direction=ray_directions(camera, pixel),
@@ -91,13 +90,21 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
         )
         return method.function(view, kernel=kernel, **settings)
 
-    def shadow_maps():
+    def cast_maps():
         if not plan.shadows or settings.get("shadow") != "map":
             return ()
-        maps = tuple(cast_shadow_map(scene.geometry, light, settings["map"]) for light in scene.lights)
+        return tuple(cast_shadow_map(scene.geometry, light, settings["map"]) for light in scene.lights)
+
+    def shadow_maps():
+        maps = cast_maps()
         dr.eval(maps)
         return maps
 
+    # Trace one pixel without launching anything: what the method refuses must not be raised while a frozen function is
+    # being recorded, which Dr.Jit 1.5 answers by aborting a later recording.
+    one = type(camera.origin.x)(1)
+    run_method(scene.geometry, mi.UInt32(0), camera, scene.medium, scene.lights, cast_maps(), one)
+    airlight = dr.freeze(run_method)
     dr.eval(pixel)
     return FrameRenderer(scene, pixel, shadow_maps, surface if plan.surfaces else _no_surface, airlight)
 

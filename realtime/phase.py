@@ -39,9 +39,10 @@ def evaluate(phase: Phase, cos_scatter):
     if phase.name == "murky":
         return (33 / 83) * dr.fma(50.0, _power(0.5 + 0.5 * c, 5), 1)
     if phase.name == "hg":
-        # Written with 1 - c: near the forward direction 1 + g^2 - 2 g c cancels for g close to 1.
-        base = dr.fma(2 * phase.g, 1 - c, dr.square(1 - phase.g))
-        return (1 - phase.g) * (1 + phase.g) * dr.rsqrt(base) / base
+        # 1 + g^2 - 2 g c cancels in the lobe of a sharp g; (1 - |g|)^2 + 2 |g| (1 -+ c) is the same without.
+        g = type(c)(phase.g)
+        base = dr.fma(2 * dr.abs(g), 1 - dr.mulsign(c, g), dr.square(1 - dr.abs(g)))
+        return (1 - g) * (1 + g) * dr.rsqrt(base) / base
     return _interpolate(phase.values, c)
 
 

@@ -4,7 +4,6 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from analytic.errors import InputError as TruthInputError
 from realtime.errors import InputError
 from realtime.frame import Frame, render_frame
 from realtime.methods import METHODS
@@ -60,11 +59,8 @@ def measure(
     try:
         renderer = prepared(scene, chosen)
         frame = render_frame(renderer)
-    except RuntimeError as error:
-        refusal = _refusal(error)
-        if refusal is None:
-            raise
-        return Measurement(chosen, None, None, None, None, refusal)
+    except InputError as error:
+        return Measurement(chosen, None, None, None, None, str(error))
     times = time_frame(renderer if timed is None else prepared(timed, chosen), seconds=seconds)
     return Measurement(
         chosen,
@@ -73,15 +69,6 @@ def measure(
         error_metrics(truth.airlight, frame.airlight),
         error_metrics(truth.surface, frame.surface) if scene.plan.surfaces else None,
     )
-
-
-def _refusal(error: BaseException | None) -> str | None:
-    """Return the message of the InputError behind a frozen function's RuntimeError."""
-    while error is not None:
-        if isinstance(error, InputError | TruthInputError):
-            return str(error)
-        error = error.__cause__ or error.__context__
-    return None
 
 
 def bench(

@@ -2,9 +2,9 @@
 r"""Does an image with random errors agree with another one, and how small a disagreement would have been seen?
 
 Each of the two images has a mean per value (a value is one channel of one pixel) and may have a standard error: with
-r +- s_r the reference, t +- s_t the test, d = t - r and s^2 = s_r^2 + s_t^2. Both variances are used, and none is raised
-to a floor: a dim image is tested as sharply as a bright one. The two images must be independent, and so must be the
-errors of two pixels of one image (box filter, seeds of their own); channels of a pixel may depend on one another.
+r +- s_r the reference, t +- s_t the test, d = t - r and s^2 = s_r^2 + s_t^2. Both variances are used, and none is
+raised to a floor: a dim image is tested as sharply as a bright one. The two images must be independent, and so must be
+the errors of two pixels of one image (box filter, seeds of their own); channels of a pixel may depend on one another.
 
 **Values.** z = d / s follows Student's law if the errors are normal and the standard errors come from K batch means.
 For two random images the degrees of freedom are Welch and Satterthwaite's, s^4 / (s_r^4/(K_r - 1) + s_t^4/(K_t - 1));
@@ -22,8 +22,8 @@ Kolmogorov and Smirnov's test of the p-values against the uniform law.
 **Blocks.** sum d / sqrt(sum s^2) over the 8 x 8 pixels of a block, one channel: it shows a bias of local extent up to
 eight times as well as one pixel.
 
-**The image.** One relative bias with its 95 % interval, equivalence and detectable bias: see `validation.pooled`. A bias
-that all pixels share shows here first: at 262 144 pixels 360 times better than by rejected pixels.
+**The image.** One relative bias with its 95 % interval, equivalence and detectable bias: see `validation.pooled`. A
+bias that all pixels share shows here first: with 262 144 pixels 360 times better than in any one of them.
 
 Values without variance (s = 0: a pixel without light, one that no path reached, a reference without noise) have no z.
 They are counted and compared in absolute terms, and they do enter the relative bias.
@@ -139,9 +139,10 @@ def compare_statistics(
     """Test two images against each other (derivations: see the module).
 
     Valid for pixels whose beam keeps away from the light: where it holds the light the variance is infinite and no test
-    means anything, so mask them. Few batches of a skewed estimate underestimate the error whenever the rare large values
-    are missing: with 32 batch means, each a mean of one log-normal number of variance e - 1, 3.8 % of values exceed the
-    1 % level (tests/validation/test_statistics.py). `exceeding_p` shows it; the interval of the image hardly suffers.
+    means anything, so mask them. Few batches of a skewed estimate underestimate the error whenever the rare large
+    values are missing: with 32 batch means, each a mean of one log-normal number of variance e - 1, 3.8 % of values
+    exceed the 1 % level (tests/validation/test_statistics.py). `exceeding_p` shows it; the interval of the image hardly
+    suffers.
 
     Parameters
     ----------
@@ -149,7 +150,8 @@ def compare_statistics(
         Two independent estimates; at least one has a standard error.
     mask
         Pixels to compare, (height, width) of truth values; all by default. Pixels that are not finite in either mean
-        are left out too: `error_metrics` counts them. Batch means are then ignored, as they would not be of these pixels.
+        are left out too: `error_metrics` counts them. Batch means are then ignored, as they would not be of these
+        pixels.
     margin
         Largest relative bias that counts as agreement, such as 0.005.
     family_level
@@ -172,8 +174,8 @@ def compare_statistics(
     # Free of units from here on. A power of two leaves every digit as it is; squares stay in range.
     largest = max(float(np.abs(image[chosen]).max(initial=0.0)) for image in (ref, tst))
     scale = float(2.0 ** np.frexp(largest)[1]) if largest > 0 else 1.0
-    one = _side("reference", reference, ref / scale, chosen, scale if whole else None)
-    two = _side("test", test, tst / scale, chosen, scale if whole else None)
+    one = _side("reference", reference, chosen, scale=scale, with_batches=whole)
+    two = _side("test", test, chosen, scale=scale, with_batches=whole)
     pooled = relative_bias(one, two, int(chosen.sum()))
     return Statistics(
         **_value_tests(one, two, chosen, family_level, plain_level),
@@ -246,6 +248,34 @@ def _check_levels(margin: float | None, family_level: float, plain_level: float)
         raise InputError(f"margin: got {margin}, wanted a relative bias above 0, such as 0.005")
 
 
-def _side(name: str, estimate: Estimate, mean: Array, chosen: NDArray[np.bool_], scale: float | None) -> Side:
-    """Check one estimate and make it regular; without a scale its batch means are not those of the pixels chosen."""
-    raise NotImplementedError
+def _side(name: str, estimate: Estimate, chosen: NDArray[np.bool_], *, scale: float, with_batches: bool) -> Side:
+    """Check one estimate and make it regular: float64 of three dimensions, scaled, zero outside the chosen pixels."""
+    shape = np.shape(estimate.mean)
+    inside = chosen[:, :, None]
+    mean = np.asarray(estimate.mean, dtype=np.float64).reshape(*shape[:2], -1)
+    mean = np.where(inside, mean, 0.0) / scale
+    error = np.zeros_like(mean)
+    if estimate.standard_error is not None:
+        given = np.asarray(estimate.standard_error, dtype=np.float64)
+        if given.shape != shape:
+            raise InputError(
+                f"the standard error of the {name} has shape {given.shape}; wanted that of its image, {shape}"
+            )
+        error = np.where(inside, given.reshape(mean.shape), 0.0) / scale
+    wrong = int((~(np.isfinite(error) & (error >= 0))).any(axis=2).sum())
+    if wrong:
+        raise InputError(f"the standard error of the {name} is negative or not finite in {wrong} pixels; mask them")
+    if estimate.batches is not None and estimate.batches < 2:
+        raise InputError(f"batches of the {name}: got {estimate.batches}, wanted at least 2 for a standard error")
+    if estimate.batch_means is None or not with_batches:
+        return Side(mean, error, estimate.batches)
+    means = np.asarray(estimate.batch_means, dtype=np.float64) / scale
+    means = means.reshape(len(means), -1).mean(axis=1)
+    # Means of a mask, or of other pixels, would give an interval for something else; float32 sums agree to 1e-4.
+    pooled = float(mean[chosen].mean())
+    if len(means) < 2 or not np.isclose(means.mean(), pooled, rtol=1e-4, atol=0):
+        raise InputError(
+            f"the {len(means)} batch means of the {name} have the mean {means.mean() * scale:.6g}, the pixels compared "
+            f"{pooled * scale:.6g}; give two or more, taken over the same pixels"
+        )
+    return Side(mean, error, estimate.batches, means)

@@ -24,17 +24,16 @@ class Effort:
     image: tuple[int, int]  #: width and height of the images that are compared and shown [pixels]
     timed: tuple[int, int]  #: width and height of the frames that are timed [pixels]
     volpath: tuple[int, int]  #: width and height of the comparison with volpath [pixels]
-    batches: int  #: of volpath
-    samples: int  #: a pixel in each batch of volpath
+    margin: float  #: of the relative bias of volpath
     seconds: float  #: spent on each timing
 
 
 EFFORTS: dict[str, Effort] = {
     effort.name: effort
     for effort in (
-        Effort("quick", (320, 240), (320, 240), (120, 90), 32, 64, 0.15),
-        Effort("default", (400, 300), (800, 600), (160, 120), 48, 128, 0.4),
-        Effort("full", (800, 600), (800, 600), (240, 180), 96, 256, 1.0),
+        Effort("quick", (320, 240), (320, 240), (120, 90), 0.01, 0.15),
+        Effort("default", (400, 300), (800, 600), (160, 120), 0.005, 0.4),
+        Effort("full", (800, 600), (800, 600), (240, 180), 0.002, 1.0),
     )
 }
 
@@ -81,7 +80,7 @@ def study_scene(
         tell(0.1 + 0.4 * done / total, what)
 
     small = load_scene(name_or_path, effort.volpath)
-    agreed = agreement(small.scene, batches=effort.batches, samples=effort.samples, progress=batch_done)
+    agreed = agreement(small.scene, margin=effort.margin, progress=batch_done)
     timed = None
     if effort.timed != effort.image:
         timed = read_scene(load_scene(name_or_path, effort.timed).scene)

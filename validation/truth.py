@@ -39,7 +39,13 @@ def truth_image(
 
 
 def volpath_batches(
-    scene, *, batches: int, samples: int, first_seed: int = 0, progress: Progress | None = None
+    scene,
+    *,
+    batches: int,
+    samples: int,
+    first_seed: int = 0,
+    enough: Callable[[Batches], bool] | None = None,
+    progress: Progress | None = None,
 ) -> Batches:
     """Return volpath's batches of a Mitsuba scene at its own size.
 
@@ -50,11 +56,13 @@ def volpath_batches(
     scene
         The `mi.Scene`.
     batches
-        How many, at least 2.
+        How many at most, at least 2.
     samples
         Samples a pixel in each, at most 256.
     first_seed
         Seed of the first batch; the others count up.
+    enough
+        Asked after every eighth batch whether to stop.
     progress
         Called with (done, total, what) after every batch.
     """
@@ -63,16 +71,15 @@ def volpath_batches(
     truth = read_truth(scene)
     key = cache_key(scene, "volpath", {"samples": samples, "first_seed": first_seed})
     done = _stored_batches(key, samples)
-    if done is not None and len(done.seeds) > batches:
-        # More than asked for is no harm: the caller learns how many from `seeds`.
-        return done
-    for number in range(0 if done is None else len(done.seeds), batches):
+    while done is None or len(done.seeds) < batches:
+        number = 0 if done is None else len(done.seeds)
+        if done is not None and enough is not None and number % 8 == 0 and enough(done):
+            break
         batch = volpath_batch(truth, first_seed + number, samples)
         done = batch if done is None else merged(done, batch)
         store_arrays(key, {name: np.asarray(getattr(done, name)) for name in _BATCH_ARRAYS})
         if progress is not None:
             progress(number + 1, batches, "volpath")
-    assert done is not None
     return done
 
 

@@ -8,9 +8,9 @@ import pytest
 def test_rays_are_those_of_mitsuba(variant, size, axis):
     import mitsuba as mi
 
+    from realtime.arrays import array_types
     from realtime.camera import ray_directions
     from realtime.scene import _read_camera
-    from realtime.arrays import array_types
 
     sensor = {
         "type": "perspective",

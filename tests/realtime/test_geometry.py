@@ -43,12 +43,14 @@ def test_height_of_rays_that_nearly_meet_the_light(variant):
     height = np.linalg.norm(np.cross(light, exact), axis=1)
     # 1.5 units in the last place for each component, and one for each step of the norm.
     assert np.max(np.abs(np.array(geometry.height) / height - 1)) < 3e-7
-    assert np.max(np.abs(np.array(geometry.foot) - exact @ light)) < 4 * np.finfo(np.float32).eps * np.linalg.norm(light)
+    assert np.max(np.abs(np.array(geometry.foot) - exact @ light)) < 4 * np.finfo(np.float32).eps * np.linalg.norm(
+        light
+    )
 
 
 @pytest.mark.parametrize("precision", ["single", "double"])
 def test_cone_clip_against_sampling(variant, precision):
-    """Every sample inside the clipped segment is in the cone, every sample outside is not, but for a rounding at its ends."""
+    """A sample lies in the clipped segment if and only if it lies in the cone, but for a rounding at its ends."""
     from realtime.arrays import array_types
     from realtime.geometry import clip_to_cone, ray_geometry
 

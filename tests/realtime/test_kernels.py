@@ -38,9 +38,12 @@ def worst(values, rows):
     return error[k], rows[k]
 
 
-# Certified values at float32 inputs. Sixteen nodes alone reach 4e-6 (the double-precision column of the same nodes shows
-# it: `near_light` is the worst tag); float32 adds rounding of the exponent, 6e-8 times an optical depth of up to 100.
-@pytest.mark.parametrize(("precision", "nodes", "bound"), [("single", 16, 6e-6), ("double", 16, 6e-6), ("double", 32, 1e-11)])
+# Certified values at float32 inputs. Sixteen nodes alone reach 4e-6 (the double-precision column of the same nodes
+# shows it: `near_light` is the worst tag); float32 adds rounding of the exponent, 6e-8 times an optical depth of up to
+# 100.
+@pytest.mark.parametrize(
+    ("precision", "nodes", "bound"), [("single", 16, 6e-6), ("double", 16, 6e-6), ("double", 32, 1e-11)]
+)
 def test_quadrature_isotropic(variant, rows, precision, nodes, bound):
     from realtime.kernels.quadrature import quadrature
 
@@ -49,7 +52,8 @@ def test_quadrature_isotropic(variant, rows, precision, nodes, bound):
     assert error < bound, where
 
 
-# Sharp lobes (g up to 0.98 in the file) are wider than what 16 nodes a panel resolve: 1e-3; 64 nodes resolve all of them.
+# Sharp lobes (g up to 0.98 in the file) are wider than what 16 nodes a panel resolve: 1e-3; 64 nodes resolve all of
+# them.
 @pytest.mark.parametrize("phase", ["rayleigh", "hazy", "murky", "hg"])
 @pytest.mark.parametrize(("precision", "nodes", "bound"), [("single", 16, 2e-3), ("double", 64, 1e-9)])
 def test_quadrature_anisotropic(variant, rows, phase, precision, nodes, bound):
@@ -128,9 +132,7 @@ def test_light_beside_the_segment_on_the_ray(variant):
 
     from realtime.kernels.quadrature import quadrature
 
-    rows = [
-        {"phase": "isotropic", "g": 0, "t": t, "h": 0.0, "x0": 0.0, "x1": 1.0, "sigma_t": 0.7} for t in (-0.5, 2.5)
-    ]
+    rows = [{"phase": "isotropic", "g": 0, "t": t, "h": 0.0, "x0": 0.0, "x1": 1.0, "sigma_t": 0.7} for t in (-0.5, 2.5)]
     values = evaluate(quadrature, rows, "single")
     for value, t in zip(values, (-0.5, 2.5)):
         expected = quad(lambda x, t=t: np.exp(-0.7 * (x + abs(x - t))) / (x - t) ** 2, 0, 1)[0]

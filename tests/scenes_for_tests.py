@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Small scenes that tests share; arbitrary numbers, each field can be replaced."""
+
+from typing import Any
+
+
+def tiny_scene(*, size=(16, 12), **changes: Any) -> dict[str, Any]:
+    """Return a ball over a floor in fog, lit by a point light; `changes` replace or (with None) remove entries."""
+    import mitsuba as mi
+
+    scene: dict[str, Any] = {
+        "type": "scene",
+        "fog": {
+            "type": "homogeneous",
+            "id": "fog",
+            "sigma_t": 0.31,
+            "albedo": {"type": "rgb", "value": [0.9, 0.8, 0.7]},
+            "has_spectral_extinction": False,
+        },
+        "sensor": {
+            "type": "perspective",
+            "fov": 49.0,
+            "fov_axis": "x",
+            "near_clip": 1e-4,
+            "to_world": mi.ScalarTransform4f().look_at([0.2, -4.1, 1.3], [0.1, 0.0, 0.6], [0, 0, 1]),
+            "medium": {"type": "ref", "id": "fog"},
+            "film": {"type": "hdrfilm", "width": size[0], "height": size[1], "rfilter": {"type": "box"}},
+        },
+        "lamp": {"type": "point", "position": [0.9, 0.7, 1.9], "intensity": {"type": "rgb", "value": [5.0, 4.0, 3.0]}},
+        "ball": {
+            "type": "sphere",
+            "center": [0.1, 0.1, 0.7],
+            "radius": 0.41,
+            "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.6, 0.5, 0.3]}},
+        },
+        "floor": {
+            "type": "rectangle",
+            "to_world": mi.ScalarTransform4f().scale(6.3),
+            "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.4, 0.4, 0.5]}},
+        },
+    }
+    scene |= changes
+    return {name: entry for name, entry in scene.items() if entry is not None}
+
+
+def spot(*, cutoff=33.0, beam=33.0) -> dict[str, Any]:
+    """Return a spot light above the ball."""
+    import mitsuba as mi
+
+    return {
+        "type": "spot",
+        "to_world": mi.ScalarTransform4f().look_at([0.7, -0.3, 2.6], [0.1, 0.1, 0.4], [0, 1, 0]),
+        "cutoff_angle": cutoff,
+        "beam_width": beam,
+        "intensity": {"type": "rgb", "value": [9.0, 7.0, 8.0]},
+    }
