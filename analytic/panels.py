@@ -1,0 +1,303 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The airlight integral of millions of segments in float64, each to a tolerance that its own error estimate meets.
+
+The integral is taken in w = asinh((x - foot)/height) (DESIGN section 2), with E = e^w = q/h, where every quantity is
+free of cancellation and of overflow:
+
+    J = (1/h) int_{w0}^{w1} exp(-sigma_t (foot + h E)) p(cos) 2E/(1 + E^2) dw
+    (1 + cos)/2 = 1/(1 + E^2),      (1 - cos)/2 = E^2/(1 + E^2).
+
+A leg from the light that counts only s times in the exponent (`shadow_scale`) turns x + r into x + s r, that is
+
+    foot + h (E - 1/E)/2 + s h (E + 1/E)/2  =  foot + h ((1 + s)/2 E - (1 - s)/2 1/E).
+
+Why w and why panels of one width do for all parameters: the integrand is analytic in the strip |Im w| < pi/2. Its poles
+E = +-i lie on the edge, as do those of Henyey-Greenstein, E^2 = -((1 -+ g)/(1 +- g))^2, and exp(-a E) is bounded there
+since Re E > 0. The optical thickness and the sharpness of a lobe only shift the places where the integrand changes and
+do not bring the singularities closer. Gauss rules with n nodes on a panel of half width H hence converge as rho^(-2n),
+rho = H' + sqrt(1 + H'^2), H' = pi/(2H) (Trefethen 2013, Approximation Theory and Approximation Practice, theorem 19.3).
+
+Each panel is integrated by the 21 nodes of Kronrod, its error estimated by the difference from the 10 of Gauss among
+them: the estimate is that of the worse rule, an upper bound by many digits for smooth integrands. Panels of segments
+that miss the tolerance are halved until they meet it.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from analytic.errors import InputError
+from analytic.kronrod import KRONROD_AND_GAUSS, NODES
+from analytic.phase import PhaseFunction
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+Weight = Callable[[Array, Index], Array]
+
+_PANEL = 2.4  # width of the first panels: rho = 2.97, so that Gauss's ten nodes are right to about 1e-9 to 1e-11
+_NEGLIGIBLE = 44.0  # e-folds after which the rest of a segment is below 1e-19 of it
+_CHUNK = 8192  # panels evaluated at once: 1.4 MB an array
+_HALVINGS = 40
+_NEAR_ZERO = 1e-15  # height over distance below which a light beside the segment may as well be at this height
+_AT_LIGHT = 1e-290  # height [m] below which 1/height would overflow
+
+
+@dataclass(frozen=True)
+class _Segments:
+    """Segments of one chunk in the variables of the integral, arrays of shape (n,)."""
+
+    index: Index  # row numbers in the caller's input
+    foot: Array
+    height: Array  # > 0
+    sigma_t: Array
+    start: Array  # w0
+    scale: Array  # E at w0
+    width: Array  # w1 - w0 > 0
+
+
+@dataclass(frozen=True)
+class _Integrand:
+    """What all segments share."""
+
+    phase: PhaseFunction
+    shadow_scale: float
+    weight: Weight | None
+
+
+def airlight_segments(
+    foot: ArrayLike,
+    height: ArrayLike,
+    x0: ArrayLike,
+    x1: ArrayLike,
+    sigma_t: ArrayLike,
+    phase: PhaseFunction,
+    *,
+    shadow_scale: float = 1.0,
+    weight: Weight | None = None,
+    rtol: float = 1e-10,
+) -> tuple[Array, Array]:
+    """Integrate the airlight of N segments of rays.
+
+    Parameters
+    ----------
+    foot, height
+        Signed distance of the foot point and distance between light and ray [m]; numbers or shape (N,).
+    x0, x1
+        Ends of the segments along the ray [m], x0 <= x1; x1 may be infinite.
+    sigma_t
+        Extinction coefficient [1/m], >= 0.
+    phase
+        Phase function, the same for all segments.
+    shadow_scale
+        s in [0, 1]: the light's leg counts s times in the exponent, exp(-sigma_t (x + s r)), as in a renderer that
+        attenuates over shortened shadow rays (DESIGN section 6.1).
+    weight
+        Relative intensity of the light: called as weight(x, index) with distances x of shape (m, 21) [m] and the row
+        numbers of their segments, shape (m,); returns an array of the shape of x. Where it has kinks, cut the segments
+        there, otherwise the panels around them are halved many times.
+    rtol
+        Relative tolerance, in [1e-13, 0.1].
+
+    Returns
+    -------
+    value, error
+        J [1/m] and an estimate of its absolute error, mostly many digits too large, of shape (N,).
+
+    Raises
+    ------
+    InputError
+        For numbers out of their ranges, NaN, or arrays that do not broadcast.
+
+    Notes
+    -----
+    Valid for all finite inputs: x0 = x1 gives 0, the light on the segment +inf (error inf), the light on the ray beside
+    the segment the finite limit. A segment that cannot meet `rtol` comes back with an error estimate that says so.
+    """
+    columns = _checked(foot, height, x0, x1, sigma_t)
+    if not 0 <= shadow_scale <= 1:
+        raise InputError(f"shadow_scale is {shadow_scale}; wanted a number from 0 to 1 (1 is the physical value)")
+    if not 1e-13 <= rtol <= 0.1:
+        raise InputError(f"rtol is {rtol}; wanted a relative tolerance from 1e-13 to 0.1")
+    integrand = _Integrand(phase, float(shadow_scale), weight)
+    n = len(columns[0])
+    value, error = np.zeros(n), np.zeros(n)
+    # Fewer segments at once where a table cuts each of them into many panels.
+    step = max(64, _CHUNK // (1 + len(phase.kinks)))
+    for first in range(0, n, step):
+        rows = np.arange(first, min(first + step, n))
+        part = slice(first, first + len(rows))
+        value[part], error[part] = _integrate_chunk([c[part] for c in columns], rows, integrand, rtol)
+    return value, error
+
+
+def _integrate_chunk(columns: list[Array], rows: Index, integrand: _Integrand, rtol: float) -> tuple[Array, Array]:
+    """Integrate the segments of one chunk; `rows` are their numbers in the caller's input."""
+    value, error = np.zeros(len(rows)), np.zeros(len(rows))
+    foot, height, x0, x1, _ = columns
+    through_light = (height < _AT_LIGHT) & (x0 <= foot) & (foot <= x1) & (x0 < x1)
+    value[through_light] = error[through_light] = np.inf
+    regular = np.flatnonzero((x0 < x1) & ~through_light)
+    if len(regular):
+        segments = _segments([c[regular] for c in columns], rows[regular], integrand)
+        value[regular], error[regular] = _adapt(segments, integrand, rtol)
+    return value, error
+
+
+def _segments(columns: list[Array], rows: Index, integrand: _Integrand) -> _Segments:
+    """Change variables to w, without cancellation, and cut off what the exponential or 1/cosh w makes negligible.
+
+    With A and B the values of w at the ends, sinh(A - B) = sinh A cosh B - cosh A sinh B = (s1 r0 - s0 r1)/h^2. Since
+    (s1 r0)^2 - (s0 r1)^2 = h^2 (s1^2 - s0^2), the width of a segment that does not hold the foot is
+
+        w1 - w0 = asinh( (x1 - x0) (s0 + s1) / (s1 r0 + s0 r1) ),
+
+    all sums being of one sign. Of a segment that holds the foot it is the sum of two positive terms.
+    """
+    foot, height, x0, x1, sigma_t = columns
+    s0, s1 = x0 - foot, x1 - foot
+    beside = np.where(s0 > 0, s0, np.where(s1 < 0, -s1, 0.0))
+    height = np.maximum(height, _NEAR_ZERO * beside)
+    start = np.arcsinh(s0 / height)
+    folds = _folds(integrand)
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        r0, r1 = np.hypot(height, s0), np.hypot(height, s1)
+        apart = np.arcsinh((x1 - x0) * (s0 + s1) / (s1 * r0 + s0 * r1))
+        width = np.where(s0 * s1 > 0, apart, np.arcsinh(s1 / height) - start)
+        width = np.where(np.isinf(x1), np.inf, width)
+        scale = np.where(s0 > 0, (s0 + r0) / height, height / (r0 - s0))
+        thickness = 0.5 * (1 + integrand.shadow_scale) * sigma_t * height * scale
+        width = np.minimum(width, np.log1p(folds / thickness))
+    width = np.minimum(width, np.maximum(-start, 0.0) + folds)
+    return _Segments(rows, foot, height, sigma_t, start, scale, width)
+
+
+def _folds(integrand: _Integrand) -> float:
+    """Return after how many e-folds of decay to stop: more where the lobe can outweigh the decay."""
+    phase = integrand.phase
+    if phase.table is not None or integrand.weight is not None:
+        return 745.0  # zeros are possible: only what underflows is left out, which costs one panel more
+    ends = phase(np.array([-1.0, 0.0, 1.0]))
+    return float(_NEGLIGIBLE + np.log(ends.max() / ends.min()))
+
+
+@dataclass(frozen=True)
+class _Panels:
+    """Panels and what the two rules gave for them, arrays of shape (m,)."""
+
+    owner: Index  # row of the segment in its chunk
+    start: Array  # distance in w from the start of the segment
+    width: Array
+    value: Array
+    error: Array
+    noise: Array  # rounding error of the value
+
+
+def _adapt(segments: _Segments, integrand: _Integrand, rtol: float) -> tuple[Array, Array]:
+    """Halve the panels of all segments that miss the tolerance until none does, or only rounding is left."""
+    n = len(segments.foot)
+    panels = _evaluate(segments, integrand, *_first_panels(segments, integrand.phase.kinks))
+    for _ in range(_HALVINGS):
+        value = np.bincount(panels.owner, panels.value, n)
+        error = np.bincount(panels.owner, panels.error, n)
+        allowed = rtol * np.abs(value)
+        missed = error > allowed
+        if not missed.any():
+            break
+        share = allowed / np.maximum(np.bincount(panels.owner, minlength=n), 1)
+        halve = missed[panels.owner] & (panels.error > share[panels.owner]) & (panels.error > panels.noise)
+        if not halve.any():
+            break
+        width = 0.5 * panels.width[halve]
+        starts = np.concatenate([panels.start[halve], panels.start[halve] + width])
+        halves = _evaluate(segments, integrand, np.tile(panels.owner[halve], 2), starts, np.tile(width, 2))
+        panels = _joined(panels, ~halve, halves)
+    value = np.bincount(panels.owner, panels.value, n)
+    return value, np.bincount(panels.owner, panels.error + panels.noise, n)
+
+
+def _first_panels(segments: _Segments, kinks: Array) -> tuple[Index, Array, Array]:
+    """Cut the segments at the kinks of the phase function and into panels no wider than `_PANEL`."""
+    owner: Index = np.arange(len(segments.foot), dtype=np.int64)
+    start, width = np.zeros(len(owner)), segments.width
+    if len(kinks):
+        # cos = -tanh w, so the kinks in increasing order of w are those in decreasing order of the cosine.
+        at = np.clip(np.arctanh(-kinks[::-1]) - segments.start[:, None], 0.0, width[:, None])
+        ends = np.concatenate([np.zeros((len(start), 1)), at, width[:, None]], axis=1)
+        pieces = np.diff(ends, axis=1)
+        owner, piece = np.nonzero(pieces > 0)
+        start, width = ends[owner, piece], pieces[owner, piece]
+    count = np.maximum(np.ceil(width / _PANEL), 1).astype(np.int64)
+    number = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+    width = np.repeat(width / count, count)
+    return np.repeat(owner, count), np.repeat(start, count) + number * width, width
+
+
+def _evaluate(segments: _Segments, integrand: _Integrand, owner: Index, start: Array, width: Array) -> _Panels:
+    """Integrate panels by both rules, a block at a time so that the arrays stay in the cache."""
+    both = np.empty((len(owner), 2))
+    noise = np.empty(len(owner))
+    for first in range(0, len(owner), _CHUNK):
+        block = slice(first, first + _CHUNK)
+        both[block], noise[block] = _evaluate_block(segments, integrand, owner[block], start[block], width[block])
+    return _Panels(owner, start, width, both[:, 0], np.abs(both[:, 0] - both[:, 1]), noise * np.abs(both[:, 0]))
+
+
+def _evaluate_block(
+    segments: _Segments, integrand: _Integrand, owner: Index, start: Array, width: Array
+) -> tuple[Array, Array]:
+    """Return the integrals of the panels by both rules, (m, 2), and the relative rounding error of the integrand."""
+    foot, height, sigma_t = segments.foot[owner], segments.height[owner], segments.sigma_t[owner]
+    middle, half = start + 0.5 * width, 0.5 * width
+    e = np.exp(middle[:, None] + half[:, None] * NODES)
+    e *= segments.scale[owner, None]
+    inverse = 1 / e
+    kernel = 2 / (e + inverse)
+    s = integrand.shadow_scale
+    up_rate = 0.5 * (1 + s) * sigma_t * height
+    exponent = up_rate[:, None] * e
+    exponent += (sigma_t * foot)[:, None]
+    if s != 1:
+        exponent -= (0.5 * (1 - s) * sigma_t * height)[:, None] * inverse
+    f = np.exp(np.negative(exponent, out=exponent), out=exponent)
+    f *= kernel
+    if integrand.phase.name != "isotropic":
+        kernel *= 0.5
+        f *= integrand.phase.from_half(e * kernel, inverse * kernel)
+    if integrand.weight is not None:
+        x = foot[:, None] + 0.5 * height[:, None] * (e - inverse)
+        f *= integrand.weight(x, segments.index[owner])
+    scale = half / height
+    with np.errstate(over="ignore"):
+        size = 16 + np.abs(sigma_t * foot) + (1 + up_rate * e[:, 10]) * (1 + middle)
+    return (f @ KRONROD_AND_GAUSS) * scale[:, None], np.finfo(float).eps * size
+
+
+def _joined(panels: _Panels, keep: NDArray[np.bool_], more: _Panels) -> _Panels:
+    """Return the panels that are kept followed by more."""
+    fields = ("owner", "start", "width", "value", "error", "noise")
+    return _Panels(*(np.concatenate([getattr(panels, f)[keep], getattr(more, f)]) for f in fields))
+
+
+def _checked(foot: ArrayLike, height: ArrayLike, x0: ArrayLike, x1: ArrayLike, sigma_t: ArrayLike) -> tuple[Array, ...]:
+    """Return the inputs as float64 arrays of one shape (N,), or refuse them."""
+    names = ("foot", "height", "x0", "x1", "sigma_t")
+    try:
+        columns = [np.asarray(c, dtype=np.float64) for c in (foot, height, x0, x1, sigma_t)]
+        columns = [np.atleast_1d(c) for c in np.broadcast_arrays(*columns)]
+    except (TypeError, ValueError) as reason:
+        raise InputError(f"foot, height, x0, x1 and sigma_t do not fit together: {reason}") from None
+    if columns[0].ndim != 1:
+        raise InputError(f"foot, height, x0, x1 and sigma_t have the shape {columns[0].shape}; wanted one column each")
+    for name, column in zip(names, columns):
+        fine = np.isfinite(column) if name != "x1" else ~np.isnan(column)
+        if name in ("height", "sigma_t"):
+            fine &= column >= 0
+        if name == "x1":
+            fine &= column >= columns[2]
+        if not fine.all():
+            row = int(np.argmin(fine))
+            wanted = {"height": "a number >= 0", "sigma_t": "a number >= 0", "x1": "a number >= x0, or inf"}
+            raise InputError(f"{name} of row {row} is {column[row]}; wanted {wanted.get(name, 'a finite number')}")
+    return tuple(columns)
