@@ -169,7 +169,8 @@ def _segments(columns: list[Array], rows: Index, integrand: _Integrand) -> _Segm
         scale = np.where(s0 > 0, (s0 + r0) / height, height / (r0 - s0))
         thickness = 0.5 * (1 + integrand.shadow_scale) * sigma_t * height * scale
         width = np.minimum(width, np.log1p(folds / thickness))
-    width = np.minimum(width, np.maximum(-start, 0.0) + folds)
+    # 1/cosh w falls by an e-fold for each unit of w behind the foot.
+    width = np.minimum(width, np.maximum(-start, 0.0) + min(folds, 120.0))
     return _Segments(rows, foot, height, sigma_t, start, scale, width)
 
 
@@ -199,8 +200,8 @@ def _adapt(segments: _Segments, integrand: _Integrand, rtol: float) -> tuple[Arr
     n = len(segments.foot)
     panels = _evaluate(segments, integrand, *_first_panels(segments, integrand.phase.kinks))
     for _ in range(_HALVINGS):
-        value = np.bincount(panels.owner, panels.value, n)
-        error = np.bincount(panels.owner, panels.error, n)
+        value = _summed(panels.owner, panels.value, n)
+        error = _summed(panels.owner, panels.error, n)
         allowed = rtol * np.abs(value)
         missed = error > allowed
         if not missed.any():
@@ -213,8 +214,12 @@ def _adapt(segments: _Segments, integrand: _Integrand, rtol: float) -> tuple[Arr
         starts = np.concatenate([panels.start[halve], panels.start[halve] + width])
         halves = _evaluate(segments, integrand, np.tile(panels.owner[halve], 2), starts, np.tile(width, 2))
         panels = _joined(panels, ~halve, halves)
-    value = np.bincount(panels.owner, panels.value, n)
-    return value, np.bincount(panels.owner, panels.error + panels.noise, n)
+    value = _summed(panels.owner, panels.value, n)
+    return value, _summed(panels.owner, panels.error + panels.noise, n)
+
+
+def _summed(owner: Index, values: Array, n: int) -> Array:
+    return np.bincount(owner, values, n).astype(np.float64, copy=False)
 
 
 def _first_panels(segments: _Segments, kinks: Array) -> tuple[Index, Array, Array]:
