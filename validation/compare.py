@@ -125,11 +125,11 @@ def _compare(
 
 def _estimate(path: str, image: Image, name: str) -> Estimate:
     """Take a layer with its standard error out of an image."""
-    batches = image.attributes.get(BATCHES)
     error = image.layers.get(f"{name}_se")
-    return Estimate(
-        image_layer(image, name, path), error, batches if isinstance(batches, int) and error is not None else None
-    )
+    batches = image.attributes.get(BATCHES) if error is not None else None
+    if batches is not None and not isinstance(batches, int):
+        raise InputError(f"{path} has the attribute {BATCHES} {batches!r}; wanted an integer; correct it or remove it")
+    return Estimate(image_layer(image, name, path), error, batches)
 
 
 def _statistics_lines(s: Statistics) -> list[str]:
