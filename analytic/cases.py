@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Tables of airlight integrals: one case a row, read from CSV, checked, and integrated.
+
+Two sets of columns are known, each in any order and beside others:
+
+    tag, phase, g, t, h, x0, x1, sigma_t, value                         the ray by foot (t) and height (h)
+    phase, g, ox, oy, oz, dx, dy, dz, lx, ly, lz, x0, x1, sigma_t, value      the ray by origin, direction and light
+
+`tag`, `g` (then 0) and `value` may be missing. An x1 of `inf` is a ray that never ends.
+"""
+
+import csv
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analytic.errors import InputError
+from analytic.geometry import foot_and_height
+from analytic.panels import airlight_segments
+from analytic.phase import PHASE_NAMES, PhaseFunction, unknown_phase
+
+Array = NDArray[np.float64]
+
+_RAY = ("ox", "oy", "oz", "dx", "dy", "dz", "lx", "ly", "lz")
+_FOOT = ("t", "h")
+
+
+@dataclass(frozen=True)
+class Cases:
+    """The rows of a table of cases, arrays of shape (n,) in the order of the file."""
+
+    phase: tuple[str, ...]  #: names of phase functions
+    g: Array  #: mean cosine, 0 where the phase function has none
+    foot: Array  #: [m]
+    height: Array  #: [m]
+    x0: Array  #: [m]
+    x1: Array  #: [m], may be infinite
+    sigma_t: Array  #: [1/m]
+    value: Array | None  #: J [1/m] as given by the file
+    tag: tuple[str, ...] | None  #: kind of each case as given by the file
+    origin: Array | None  #: (n, 3) [m], where the file gives rays
+    direction: Array | None  #: (n, 3), where the file gives rays
+    light: Array | None  #: (n, 3) [m], where the file gives rays
+    header: tuple[str, ...]  #: names of all columns of the file
+    rows: tuple[tuple[str, ...], ...]  #: the text of all columns, to write the table out again
+
+
+def read_cases(path: str | Path) -> Cases:
+    """Read a table of cases.
+
+    Parameters
+    ----------
+    path
+        A CSV file with a header line; see the module's docstring for the columns.
+
+    Raises
+    ------
+    InputError
+        For a file that cannot be read, a missing column, a word where a number belongs, a number out of its range or an
+        unknown phase function: the message names file, line (from 1, the header) and column.
+    """
+    header, lines = _read_text(Path(path))
+    table = _Table(Path(path), header, lines)
+    rays = "t" not in header and any(name in header for name in _RAY)
+    table.require("phase", *(_RAY if rays else _FOOT), "x0", "x1", "sigma_t")
+    columns = {name: table.numbers(name) for name in ("x0", "x1", "sigma_t", *(_RAY if rays else _FOOT))}
+    g = table.numbers("g") if "g" in header else np.zeros(len(lines))
+    phase = tuple(cell.strip().lower() for cell in table.cells("phase"))
+    for row, name in enumerate(phase):
+        if name not in PHASE_NAMES or name == "tabulated":
+            reason = "'tabulated' has no place for its table here" if name == "tabulated" else unknown_phase(name)
+            raise InputError(f"{table.where(row, 'phase')}: {reason}")
+    table.check("g", np.abs(g) < 1, "a number between -1 and 1")
+    table.check("sigma_t", columns["sigma_t"] >= 0, "a number >= 0")
+    table.check("x1", columns["x1"] >= columns["x0"], "a number >= x0, or inf")
+    origin = direction = light = None
+    if rays:
+        origin, direction, light = (np.stack([columns[n] for n in _RAY[k : k + 3]], axis=1) for k in (0, 3, 6))
+        length = np.sqrt(np.sum(direction**2, axis=1))
+        table.check("dx", np.abs(length - 1) <= 1e-5, "a direction of length 1")
+        foot, height = foot_and_height(origin, direction, light)
+    else:
+        foot, height = columns["t"], columns["h"]
+        table.check("h", height >= 0, "a number >= 0")
+    return Cases(
+        phase,
+        np.where(np.array(phase) == "hg", g, 0.0),
+        foot,
+        height,
+        columns["x0"],
+        columns["x1"],
+        columns["sigma_t"],
+        table.numbers("value", infinite=True) if "value" in header else None,
+        tuple(table.cells("tag")) if "tag" in header else None,
+        origin,
+        direction,
+        light,
+        tuple(header),
+        tuple(tuple(cells) for _, cells in lines),
+    )
+
+
+def integrate_cases(cases: Cases, *, rtol: float = 1e-10) -> tuple[Array, Array]:
+    """Return J and its error estimate [1/m] for every case, by `analytic.panels.airlight_segments`."""
+    value, error = np.empty(len(cases.phase)), np.empty(len(cases.phase))
+    for name, g in sorted(set(zip(cases.phase, cases.g.tolist()))):
+        rows = np.flatnonzero((np.array(cases.phase) == name) & (cases.g == g))
+        columns = (cases.foot[rows], cases.height[rows], cases.x0[rows], cases.x1[rows], cases.sigma_t[rows])
+        value[rows], error[rows] = airlight_segments(*columns, PhaseFunction(name, g=g), rtol=rtol)
+    return value, error
+
+
+@dataclass(frozen=True)
+class _Table:
+    """The text of a table and where it came from, for messages."""
+
+    path: Path
+    header: list[str]
+    lines: list[tuple[int, list[str]]]  # number of the line in the file, cells
+
+    def require(self, *names: str) -> None:
+        missing = [name for name in names if name not in self.header]
+        if missing:
+            raise InputError(
+                f"{self.path}, line 1: no column '{missing[0]}'; the file has {', '.join(self.header)}: add it, the "
+                f"columns wanted are phase, x0, x1, sigma_t and either t, h or {', '.join(_RAY)}"
+            )
+
+    def cells(self, name: str) -> list[str]:
+        column = self.header.index(name)
+        return [cells[column] for _, cells in self.lines]
+
+    def where(self, row: int, name: str) -> str:
+        return f"{self.path}, line {self.lines[row][0]}, column '{name}'"
+
+    def numbers(self, name: str, *, infinite: bool = False) -> Array:
+        values = np.empty(len(self.lines))
+        for row, cell in enumerate(self.cells(name)):
+            try:
+                values[row] = float(cell)
+            except ValueError:
+                raise InputError(f"{self.where(row, name)}: '{cell}' is not a number; write one") from None
+            fine = not math.isnan(values[row]) if infinite or name == "x1" else math.isfinite(values[row])
+            if not fine:
+                raise InputError(f"{self.where(row, name)}: {cell} is not finite; write a finite number")
+        return values
+
+    def check(self, name: str, fine: NDArray[np.bool_], wanted: str) -> None:
+        if not fine.all():
+            row = int(np.argmin(fine))
+            given = self.cells(name)[row]
+            raise InputError(f"{self.where(row, name)}: {given} is out of range; wanted {wanted}")
+
+
+def _read_text(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
+    """Return the header and the lines with cells, each with its number in the file."""
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            reader = csv.reader(file)
+            lines = [(reader.line_num, cells) for cells in reader if cells]
+    except (OSError, UnicodeDecodeError, csv.Error) as reason:
+        raise InputError(f"{path} cannot be read as a CSV file: {reason}; give a text file with a header") from None
+    if len(lines) < 2:
+        raise InputError(f"{path} has {'no lines' if not lines else 'a header only'}; wanted a header and cases")
+    header = [cell.strip() for cell in lines[0][1]]
+    for number, cells in lines[1:]:
+        if len(cells) != len(header):
+            raise InputError(
+                f"{path}, line {number}: {len(cells)} cells under a header of {len(header)} columns; write one for each"
+            )
+    return header, lines[1:]
