@@ -30,6 +30,8 @@ class Comparison:
         reasons = []
         if self.metrics.nonfinite:
             reasons.append(f"{self.metrics.nonfinite} pixels are NaN or infinite")
+        if self.metrics.negative:
+            reasons.append(f"{self.metrics.negative} pixels of the test image are negative")
         if self.statistics is not None and self.statistics.equivalent is False:
             reasons.append(f"the relative bias is not shown to be within +-{self.statistics.margin:.3g}")
         return tuple(reasons)

@@ -84,9 +84,11 @@ def test_failures_name_what_is_wrong(pair):
     reference, test = pair
     wrong = 1.05 * test.layers["airlight"]
     wrong[0, 0, 0] = np.nan
+    wrong[2, 1:3, 1] = -1e-9
     comparison = compare_images(reference, Image({"airlight": wrong}), margin=0.01)
     assert comparison.failures == (
         "1 pixels are NaN or infinite",
+        "2 pixels of the test image are negative",
         "the relative bias is not shown to be within +-0.01",
     )
     assert comparison.metrics.relative_bias == pytest.approx(comparison.statistics.relative_bias, rel=1e-12)
