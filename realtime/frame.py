@@ -72,15 +72,17 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
 
     @dr.freeze
     def surface(geometry, pixel, camera, medium, lights):
-        direction = ray_directions(camera, pixel)
+        direction, _ = ray_directions(camera, pixel)
         distance, interaction = visible_surface(geometry, camera.origin, direction)
         color = lit_surface(geometry, direction, interaction, distance=distance, medium=medium, lights=lights)
         return distance, color
 
     def run_method(geometry, pixel, camera, medium, lights, maps, distance):
+        direction, low = ray_directions(camera, pixel)
         view = View(
             origin=camera.origin,
-            direction=ray_directions(camera, pixel),
+            direction=direction,
+            direction_low=low,
             distance=distance,
             lights=lights,
             medium=medium,

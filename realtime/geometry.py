@@ -7,6 +7,9 @@ float32. Each component of the cross product is a difference of two products, a 
 multiply-add gives it to 1.5 units in the last place:
 
     w = c d;   e = fma(-c, d, w)   (the exact rounding error of w);   a b - c d = fma(a, b, -w) + e
+
+That is as good as v and d are. The rounding errors of both are known, v's from the subtraction and d's from
+`realtime.camera`, and enter to first order: (v + v') x (d + d') = v x d + v' x d + v x d'.
 """
 
 from dataclasses import dataclass
@@ -40,7 +43,7 @@ def difference_of_products(a, b, c, d):
     return dr.fma(a, b, -w) + error
 
 
-def ray_geometry(origin, direction, light: Light) -> RayGeometry:
+def ray_geometry(origin, direction, light: Light, *, low=None) -> RayGeometry:
     """Return foot and height of rays with respect to one light.
 
     Parameters
@@ -49,6 +52,8 @@ def ray_geometry(origin, direction, light: Light) -> RayGeometry:
         Camera rays, three-vectors of Dr.Jit arrays [m]; `direction` has unit length.
     light
         A point or spot light.
+    low
+        What rounding took from `direction`, if that is known (see `realtime.camera.ray_directions`).
 
     Notes
     -----
@@ -57,12 +62,18 @@ def ray_geometry(origin, direction, light: Light) -> RayGeometry:
     import drjit as dr
 
     v = light.position - origin
+    # The rounding error of the difference (Knuth's two_sum).
+    of_origin = light.position - v
+    v_low = (light.position - (v + of_origin)) + (of_origin - origin)
     d = direction
     cross = type(v)(
         difference_of_products(v.y, d.z, v.z, d.y),
         difference_of_products(v.z, d.x, v.x, d.z),
         difference_of_products(v.x, d.y, v.y, d.x),
     )
+    cross += dr.cross(v_low, d)
+    if low is not None:
+        cross += dr.cross(v, low)
     foot = dr.dot(v, d)
     height = dr.norm(cross)
     if light.kind == "point":

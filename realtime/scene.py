@@ -78,8 +78,11 @@ def _read_camera(scene, types: ArrayTypes):
         raise InputError("the camera has a principal point offset; remove principal_point_offset_x and _y")
     matrix = np.array(sensor.world_transform().matrix, dtype=np.float64).reshape(4, 4)
     tangent = math.tan(0.5 * math.radians(float(parameters["x_fov"][0])))
-    columns = matrix[:3, 3], matrix[:3, 2], matrix[:3, 0] * tangent, matrix[:3, 1] * (tangent * height / width)
-    vectors = [types.vector(*(float(c) for c in column)) for column in columns]
+    pixel = 2 * tangent / width
+    basis = matrix[:3, 2], matrix[:3, 0] * pixel, matrix[:3, 1] * pixel
+    real = np.float32 if types.scalar is mi.Float else np.float64
+    low = [column - column.astype(real) for column in basis]
+    vectors = [types.vector(*(float(c) for c in column)) for column in (matrix[:3, 3], *basis, *low)]
     dr.make_opaque(*vectors)
     return Camera(width, height, *vectors), sensor
 

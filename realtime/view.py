@@ -20,6 +20,7 @@ class View:
 
     origin: Any  #: start of the rays [m]
     direction: Any  #: unit directions
+    direction_low: Any  #: what rounding took from their aim; it matters for rays that nearly meet a light
     distance: Any  #: to the visible surface, infinite where there is none [m]
     lights: tuple[Light, ...]
     medium: Medium

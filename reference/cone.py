@@ -45,10 +45,9 @@ def cone_interval(direction: Array, normal: Array, light: TruthLight, angle: flo
 
 
 def falloff(theta: Array, direction: Array, normal: Array, light: TruthLight) -> Array:
-    """Return Mitsuba's spot profile at angle theta: one in the beam, linear in the angle to zero at the cut-off."""
+    """Return Mitsuba's spot profile at theta, (rays, angles): one in the beam, then linear down to the cut-off."""
     if light.axis is None or light.beam >= light.cutoff:
         return np.ones_like(theta)
-    axial, across = direction @ light.axis, normal @ light.axis
-    cosine = axial * np.sin(theta) + across * np.cos(theta)
-    angle = np.arccos(np.clip(cosine, -1.0, 1.0))
+    axial, across = (direction @ light.axis)[:, None], (normal @ light.axis)[:, None]
+    angle = np.arccos(np.clip(axial * np.sin(theta) + across * np.cos(theta), -1.0, 1.0))
     return np.clip((light.cutoff - angle) / (light.cutoff - light.beam), 0.0, 1.0)

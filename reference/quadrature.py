@@ -143,10 +143,7 @@ def _sum_intervals(
     def profile(x: Array, index: NDArray[np.int64]) -> Array:
         rows = ray[index]
         theta = np.arctan2(x - rays.foot[rows, None], rays.height[rows, None])
-        return np.stack(
-            [falloff(theta[:, k], rays.direction[rows], rays.normal[rows], light) for k in range(theta.shape[1])],
-            axis=1,
-        )
+        return falloff(theta, rays.direction[rows], rays.normal[rows], light)
 
     values, errors = np.empty((3, len(ray))), np.empty((3, len(ray)))
     for channel, sigma_t in enumerate(medium.sigma_t):

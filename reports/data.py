@@ -99,13 +99,13 @@ def _trust(scenes: list[dict[str, Any]]) -> str:
     margin = 100 * compared[0][1]["statistics"]["margin"]
     if failed:
         return (
-            f"The truth is NOT confirmed within {margin:g} % in {', '.join(failed)}: there the 95 % interval of volpath's "
-            "relative bias is not inside the margin."
+            f"The truth is NOT confirmed within {margin:g} % in {', '.join(failed)}: there the 95 % interval of "
+            "volpath's relative bias is not inside the margin."
         )
     return (
-        f"The truth is confirmed by Mitsuba's volpath in {len(compared)} of {len(compared)} comparisons: the 95 % interval of "
-        f"the pooled relative bias lies within ±{margin:g} %; the least bias that would have been found is at worst "
-        f"{100 * detectable:.2g} %."
+        f"The truth is confirmed by Mitsuba's volpath in {len(compared)} of {len(compared)} comparisons: the 95 % "
+        f"interval of the pooled relative bias lies within ±{margin:g} %; the least bias that would have been found is "
+        f"at worst {100 * detectable:.2g} %."
     )
 
 

@@ -46,7 +46,7 @@ def render_page(data: dict[str, Any], folder: Path) -> str:
 def _number(value: float | None, digits: int = 3) -> str:
     """Return a number with some significant digits, an en dash for none."""
     if value is None:
-        return "–"
+        return "\N{EN DASH}"
     text = f"{value:.{digits}g}"
     if "e" in text:
         mantissa, exponent = text.split("e")
@@ -55,12 +55,12 @@ def _number(value: float | None, digits: int = 3) -> str:
 
 
 def _percent(value: float | None, digits: int = 3) -> str:
-    return "–" if value is None else f"{_number(100 * value, digits)} %"
+    return "\N{EN DASH}" if value is None else f"{_number(100 * value, digits)} %"
 
 
 def _interval(pair: list[float] | None) -> str:
     """Return an interval of relative values in per cent."""
-    return "–" if pair is None else f"{100 * pair[0]:+.3f} … {100 * pair[1]:+.3f} %"
+    return "\N{EN DASH}" if pair is None else f"{100 * pair[0]:+.3f} … {100 * pair[1]:+.3f} %"
 
 
 def _superscript(value: int) -> str:

@@ -72,6 +72,15 @@ def configuration(method: str, kernel: str | None = None, parameters: Mapping[st
     return Configuration(method, kernel, tuple(values))
 
 
+def chosen_configurations(methods: Sequence[str]) -> tuple[Configuration, ...]:
+    """Return the standard configurations of some methods, and the defaults of a method that has none."""
+    found: list[Configuration] = []
+    for method in methods:
+        checked = configuration(method)
+        found += [one for one in STANDARD if one.method == method] or [checked]
+    return tuple(found)
+
+
 def parse_settings(settings: Sequence[str]) -> dict[str, str]:
     """Return the mapping of 'NAME=VALUE' words."""
     pairs = {}

@@ -60,7 +60,7 @@ def ray_march(
     _check(steps, spacing, shadow, view)
     total = type(view.medium.albedo)(0)
     for number, light in enumerate(view.lights):
-        geometry = ray_geometry(view.origin, view.direction, light)
+        geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
         x0, x1 = type(view.distance)(0), view.distance
         if light.kind == "spot":
             x0, x1 = clip_to_cone(geometry, light.cos_cutoff, x0, x1)

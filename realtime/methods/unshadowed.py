@@ -28,7 +28,7 @@ def unshadowed(view: View, *, kernel):
     total = type(view.medium.albedo)(0)
     start = type(view.distance)(0)
     for light in view.lights:
-        geometry = ray_geometry(view.origin, view.direction, light)
+        geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
         integral = airlight_integral(kernel, geometry, start, view.distance, medium=view.medium, light=light)
         total += radiance(view.medium, light, integral)
     return total

@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`airlight report`: the error report."""
+
+import shlex
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def report(
+    quick: Annotated[bool, typer.Option("--quick", help="Small images, few samples: three minutes.")] = False,
+    full: Annotated[bool, typer.Option("--full", help="Large images, many samples: an hour.")] = False,
+    scenes: Annotated[
+        str | None,
+        typer.Option(help="Comma-separated built-in scenes and Mitsuba XML files; all built-in ones by default."),
+    ] = None,
+    methods: Annotated[str | None, typer.Option(help="Comma-separated methods; all by default.")] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the report.")] = Path("airlight-report"),
+    json: Annotated[bool, typer.Option("--json", help="Print report.json.")] = False,
+) -> None:
+    """Measure every method in every scene and write the report: one HTML page, report.json, EXR and PNG files.
+
+    Exit status 1 if volpath does not confirm the truth within the margin.
+    """
+    from analytic.errors import InputError
+    from realtime.methods import METHODS
+    from realtime.scene import read_scene
+    from reference.files import ensure_folder
+    from reports.environment import activate
+    from reports.progress import progress_bar
+    from reports.report import write_report
+    from reports.tables import print_json
+    from validation.configurations import chosen_configurations
+    from validation.load import load_scene
+    from validation.scenes import SCENES
+    from validation.study import EFFORTS
+
+    if quick and full:
+        raise InputError("report: got both --quick and --full; give one of them, or neither for the default")
+    effort = EFFORTS["quick" if quick else "full" if full else "default"]
+    chosen = chosen_configurations([name.strip() for name in (methods.split(",") if methods else METHODS)])
+    names = [name.strip() for name in scenes.split(",")] if scenes else list(SCENES)
+    ensure_folder(output)
+    activate()
+    for name in names:  # refuse what cannot be used before the work begins
+        read_scene(load_scene(name, (8, 6)).scene)
+    with progress_bar("report") as tell:
+        command = shlex.join(["airlight", *sys.argv[1:]])
+        data = write_report(output, scenes=names, effort=effort, configurations=chosen, command=command, progress=tell)
+    if json:
+        print_json(data)
+    else:
+        print("\n".join(f"- {claim}" for claim in data["claims"]))
+        print(f"{output / 'report.html'}: {len(names)} scenes in {data['seconds']:.0f} s")
+    agreements = [one for scene in data["scenes"] for one in scene["agreement"].values()]
+    if not all(one["statistics"]["equivalent"] for one in agreements):
+        raise typer.Exit(1)

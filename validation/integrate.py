@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Kernels on certified cases: the airlight integral of every row of a file."""
+
+import csv
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analytic.cases import Cases
+from reference.files import write_text
+from validation.configurations import kernel_function
+
+Array = NDArray[np.float64]
+
+_TINY = 1e-37  # below this float32 has no normal numbers: such values are compared in absolute terms
+
+
+def integrate_cases(cases: Cases, kernel: str, precision: str) -> Array:
+    """Return J of every case by a kernel [1/m].
+
+    Parameters
+    ----------
+    cases
+        From `analytic.cases.read_cases`; where it has rays, foot and height are computed from them in `precision`.
+    kernel
+        A name of `realtime.kernels.KERNELS` or 'module:function'.
+    precision
+        'single' or 'double'.
+    """
+    function = kernel_function(kernel)
+    results = np.empty(len(cases.x0))
+    for name in dict.fromkeys(cases.phase):
+        rows = np.flatnonzero(np.asarray(cases.phase) == name)
+        results[rows] = _evaluate(cases, rows, str(name), function, precision)
+    return results
+
+
+def _evaluate(cases: Cases, rows: NDArray[np.int64], name: str, function, precision: str) -> Array:
+    """Evaluate the cases of one phase function."""
+    from realtime.arrays import array_types
+    from realtime.geometry import RayGeometry, ray_geometry
+    from realtime.lights import Light
+    from realtime.medium import Medium
+    from realtime.phase import Phase
+
+    types = array_types(precision)
+    medium = Medium(
+        (types.scalar(cases.sigma_t[rows]),),
+        types.color(1),
+        Phase(name, g=types.scalar(cases.g[rows]) if name == "hg" else None),
+    )
+    if cases.light is None:
+        light = Light("point", False, types.vector(0), types.color(1))
+        geometry = RayGeometry(types.scalar(cases.foot[rows]), types.scalar(cases.height[rows]), None, None)
+    else:
+        light = Light("point", False, types.vector(cases.light[rows].T), types.color(1))
+        geometry = ray_geometry(types.vector(cases.origin[rows].T), types.vector(cases.direction[rows].T), light)
+    x0, x1 = types.scalar(cases.x0[rows]), types.scalar(cases.x1[rows])
+    return np.array(function(geometry, x0, x1, medium, light), dtype=np.float64)
+
+
+def summary(cases: Cases, results: Array) -> dict[str, Any]:
+    """Return quantiles of the relative error against the certified values, where there are any."""
+    found: dict[str, Any] = {"rows": len(results), "compared": 0, "nonfinite": int(np.sum(~np.isfinite(results)))}
+    if cases.value is None:
+        return found
+    error = np.abs(results - cases.value) / np.maximum(np.abs(cases.value), _TINY)
+    finite = np.isfinite(error)
+    if not finite.any():
+        return found
+    p50, p99, largest = np.percentile(error[finite], [50, 99, 100])
+    worst = int(np.flatnonzero(finite)[np.argmax(error[finite])])
+    # Row 1 of the file is its header.
+    return found | {"compared": int(finite.sum()), "p50": p50, "p99": p99, "max": largest, "worst_row": worst + 2}
+
+
+def write_results(source: Path, results: Array, target: Path) -> None:
+    """Write the rows of a file with a column `result`, whole or not at all."""
+    with open(source, newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    buffer = io.StringIO()
+    writer = csv.DictWriter(buffer, [*(name for name in rows[0] if name != "result"), "result"], lineterminator="\n")
+    writer.writeheader()
+    for row, result in zip(rows, results):
+        writer.writerow(row | {"result": repr(float(result))})
+    write_text(target, buffer.getvalue())
