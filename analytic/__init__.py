@@ -3,7 +3,7 @@
 
 - `analytic.phase`: phase functions of mean 1 over the sphere;
 - `analytic.geometry`: foot and height of a ray over a light, and the changes of variables x, theta, q, w;
-- `analytic.integral`: the airlight integral of one segment in three forms, by adaptive quadrature, with their derivation;
+- `analytic.integral`: the airlight integral of one segment in three forms, derived, by adaptive quadrature;
 - `analytic.certified`: the same to 15 digits and more, by two quadratures in mpmath that must agree;
 - `analytic.panels`: the same for millions of segments, in NumPy, each with its error estimate;
 - `analytic.series`: the power series behind the polynomial of Biri 2006;
@@ -13,7 +13,7 @@ Names and units are those of DESIGN section 2: lengths in metres, extinction in 
 """
 
 from analytic.cases import Cases, integrate_cases, read_cases
-from analytic.certified import certified, isotropic_closed_form
+from analytic.certified import integrate_certified, isotropic_closed_form
 from analytic.errors import InputError
 from analytic.geometry import foot_and_height, path_length
 from analytic.integral import Estimate, integrate_angle, integrate_distance, integrate_path
@@ -28,10 +28,10 @@ __all__ = [
     "InputError",
     "PhaseFunction",
     "airlight_segments",
-    "certified",
     "foot_and_height",
     "integrate_angle",
     "integrate_cases",
+    "integrate_certified",
     "integrate_distance",
     "integrate_path",
     "isotropic_closed_form",

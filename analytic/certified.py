@@ -27,7 +27,7 @@ from analytic.phase import PhaseFunction
 _FEWEST_DIGITS = 15
 
 
-def certified(
+def integrate_certified(
     foot: float, height: float, x0: float, x1: float, sigma_t: float, phase: PhaseFunction, *, digits: int = 20
 ) -> Any:
     """Return J [1/m] as an mpmath number of which `digits` digits are certain.
@@ -75,7 +75,7 @@ def certified(
 def isotropic_closed_form(foot: float, height: float, x0: float, x1: float, sigma_t: float, *, digits: int = 20) -> Any:
     """Return J [1/m] of an isotropic medium by the complex exponential integral (module docstring, last equation).
 
-    Parameters, errors and special values are those of `certified`.
+    Parameters, errors and special values are those of `integrate_certified`.
 
     Notes
     -----
@@ -88,7 +88,7 @@ def isotropic_closed_form(foot: float, height: float, x0: float, x1: float, sigm
     if special is not None:
         return mpf(special)
     if height == 0:
-        raise InputError("height is 0; the closed form wants a positive height: use `certified`")
+        raise InputError("height is 0; the closed form wants a positive height: use integrate_certified")
     precision = digits + 30
     for _ in range(8):
         with mp.workdps(precision):

@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Tables of cases: both sets of columns, and every way to get one wrong."""
+
+import numpy as np
+import pytest
+
+from analytic import InputError, integrate_cases, read_cases
+
+HEAD = "phase,g,t,h,x0,x1,sigma_t\n"
+
+
+@pytest.fixture
+def table(tmp_path):
+    def write(text):
+        path = tmp_path / "cases.csv"
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return write
+
+
+def test_both_files(data_folder):
+    cases = read_cases(data_folder / "airlight_integral.csv")
+    assert len(cases.phase) == len(cases.tag) == len(cases.rows) == 2004
+    assert cases.origin is None
+    assert np.isinf(cases.x1).any()
+    assert cases.header[0] == "tag"
+    rays = read_cases(data_folder / "airlight_integral_rays.csv")
+    assert rays.origin.shape == rays.direction.shape == rays.light.shape == (1002, 3)
+    assert rays.tag is None
+    assert (rays.height >= 0).all()
+
+
+def test_optional_columns_order_and_extra_columns(table):
+    path = table("name,x1,x0,h,t,sigma_t,phase\na,inf,0,1,0,0,Isotropic\n\nb,2,1,0.5,1.5,0.1,hazy\n")
+    cases = read_cases(path)
+    assert cases.value is None
+    assert cases.phase == ("isotropic", "hazy")
+    assert cases.rows[1][0] == "b"
+    value, error = integrate_cases(cases)
+    assert value[0] == pytest.approx(np.pi / 2, rel=1e-10)
+    assert (error < 1e-9 * value).all()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("phase,g,t,h,x0,x1\nhazy,0,1,1,0,1\n", "line 1: no column 'sigma_t'"),
+        ("phase,ox,oy,x0,x1,sigma_t\nhazy,0,1,1,0,1\n", "line 1: no column 'oz'"),
+        (HEAD + "hazy,0,1,1,0,1,0.1\nhazy,0,1,one,0,1,0.1\n", "line 3, column 'h': 'one' is not a number"),
+        (HEAD + "\nhazy,0,1,1,0,1,\n", "line 3, column 'sigma_t': '' is not a number"),
+        (HEAD + "hazy,0,nan,1,0,1,0.1\n", "line 2, column 't': nan is not finite"),
+        (HEAD + "hazy,0,1,1,0,nan,0.1\n", "line 2, column 'x1': nan is not finite"),
+        (HEAD + "hazy,0,1,1,inf,inf,0.1\n", "line 2, column 'x0': inf is not finite"),
+        (HEAD + "hazy,0,1,-1,0,1,0.1\n", "line 2, column 'h': -1 is out of range; wanted a number >= 0"),
+        (HEAD + "hazy,0,1,1,3,1,0.1\n", "line 2, column 'x1': 1 is out of range"),
+        (HEAD + "hg,1.5,1,1,0,1,0.1\n", "line 2, column 'g': 1.5 is out of range"),
+        (
+            HEAD + "hazi,0,1,1,0,1,0.1\n",
+            "line 2, column 'phase': no phase function is called 'hazi'; did you mean 'hazy'",
+        ),
+        (HEAD + "tabulated,0,1,1,0,1,0.1\n", "no place for its table"),
+        (HEAD + "hazy,0,1,1,0,1\n", "line 2: 6 cells under a header of 7 columns"),
+        (HEAD, "a header only"),
+        ("", "no lines"),
+        (
+            "phase,ox,oy,oz,dx,dy,dz,lx,ly,lz,x0,x1,sigma_t\nhazy,0,0,0,0,0,2,1,1,1,0,1,0.1\n",
+            "line 2, column 'dx': 0 is out of range; wanted a direction of length 1",
+        ),
+    ],
+)
+def test_refusals(table, text, message):
+    with pytest.raises(InputError, match=message):
+        read_cases(table(text))
+
+
+def test_a_file_that_is_not_there(tmp_path):
+    with pytest.raises(InputError, match="cannot be read as a CSV file"):
+        read_cases(tmp_path / "none.csv")

@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The fast route: every certified value, the laws that J obeys, weights, shortened shadow rays, hard corners."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from analytic import InputError, PhaseFunction, airlight_segments, integrate_cases, integrate_distance, read_cases
+
+ISOTROPIC = PhaseFunction("isotropic")
+PHASES = [
+    ISOTROPIC,
+    PhaseFunction("rayleigh"),
+    PhaseFunction("murky"),
+    PhaseFunction("hg", g=0.91),
+    PhaseFunction("hg", g=-0.64),
+    PhaseFunction("tabulated", table=[1.0, 0.0, 3.0, 0.2, 9.0]),
+]
+
+
+def worst_by_tag(cases, relative):
+    tags = np.array(cases.tag if cases.tag is not None else ["ray"] * len(relative))
+    return {str(tag): float(relative[tags == tag].max()) for tag in np.unique(tags)}
+
+
+# Tolerances: the panels are right to rounding, of which the exponent, up to 70 in these files, has the largest share
+# (1e-14); the rays add the rounding of the foot point, eps |light - origin|, times the steepness of the integrand.
+@pytest.mark.parametrize(
+    ("name", "tolerance"), [("airlight_integral.csv", 2e-14), ("airlight_integral_rays.csv", 1e-12)]
+)
+def test_every_certified_value(data_folder, name, tolerance):
+    cases = read_cases(data_folder / name)
+    assert len(cases.phase) == {"airlight_integral.csv": 2004, "airlight_integral_rays.csv": 1002}[name]
+    value, error = integrate_cases(cases)
+    relative = np.abs(value - cases.value) / cases.value
+    assert relative.max() < tolerance, worst_by_tag(cases, relative)
+    # the error estimate meets the tolerance asked for and covers the error (but for the rounding of the geometry)
+    assert (error <= 1.01e-10 * value).all()
+    assert (np.abs(value - cases.value) <= error + (0 if "rays" not in name else tolerance * value)).all()
+
+
+def test_the_error_estimate_covers_the_error_at_loose_tolerances(data_folder):
+    cases = read_cases(data_folder / "airlight_integral.csv")
+    for rtol in (1e-2, 1e-5):
+        value, error = integrate_cases(cases, rtol=rtol)
+        assert (np.abs(value - cases.value) <= error).all()
+
+
+lengths = st.floats(min_value=0.0, max_value=50.0)
+positive = st.floats(min_value=1e-3, max_value=20.0)
+segments = st.tuples(
+    st.floats(min_value=-20.0, max_value=50.0),  # foot
+    positive,  # height
+    lengths,  # x0
+    st.floats(min_value=1e-3, max_value=50.0),  # x1 - x0
+    st.floats(min_value=0.0, max_value=5.0),  # sigma_t
+    st.sampled_from(PHASES),
+)
+
+
+def close(a, b, *, relative=2e-10):
+    """Equal to the sum of two tolerances of 1e-10."""
+    return np.abs(a - b) <= relative * np.maximum(np.abs(a), np.abs(b))
+
+
+@settings(deadline=None)
+@given(segments, st.floats(min_value=1e-3, max_value=1e3))
+def test_law_of_units(segment, k):
+    foot, height, x0, length, sigma_t, phase = segment
+    value, _ = airlight_segments(foot, height, x0, x0 + length, sigma_t, phase)
+    scaled, _ = airlight_segments(k * foot, k * height, k * x0, k * (x0 + length), sigma_t / k, phase)
+    # the exponent, rounded in both units, may reach 700 before J underflows
+    assert close(scaled * k, value, relative=1e-11)
+
+
+@settings(deadline=None)
+@given(segments, st.floats(min_value=0.01, max_value=0.99))
+def test_segments_add_up(segment, share):
+    foot, height, x0, length, sigma_t, phase = segment
+    middle = x0 + share * length
+    value, error = airlight_segments(
+        foot, height, np.array([x0, x0, middle]), np.array([x0 + length, middle, x0 + length]), sigma_t, phase
+    )
+    assert abs(value[0] - value[1] - value[2]) <= error.sum() + 1e-15 * value[0]
+
+
+@settings(deadline=None)
+@given(segments, st.floats(min_value=-0.95, max_value=0.95))
+def test_in_a_vacuum_a_ray_run_backwards_swaps_forward_and_backward(segment, g):
+    foot, height, x0, length, _, _ = segment
+    forward, _ = airlight_segments(foot, height, x0, x0 + length, 0.0, PhaseFunction("hg", g=g))
+    mirrored = 2 * foot - x0
+    backward, _ = airlight_segments(foot, height, mirrored - length, mirrored, 0.0, PhaseFunction("hg", g=-g))
+    # 2 foot - x0 - length is rounded, which moves the ends by an ulp of 150 in a segment of 1e-3 at the least
+    assert close(forward, backward, relative=1e-9)
+
+
+@settings(deadline=None)
+@given(segments)
+def test_vacuum_limit_is_the_angle_at_the_light(segment):
+    foot, height, x0, length, _, _ = segment
+    s0, s1 = x0 - foot, x0 + length - foot
+    angle = np.arctan2(height * length, height**2 + s0 * s1)  # the subtended angle, without cancellation
+    vacuum, _ = airlight_segments(foot, height, x0, x0 + length, 0.0, ISOTROPIC)
+    assert close(vacuum, angle / height, relative=1e-11)
+    # first order in sigma_t: J changes by less than sigma_t times the longest path
+    thin, _ = airlight_segments(foot, height, x0, x0 + length, 1e-9, ISOTROPIC)
+    path = x0 + length + max(np.hypot(height, s0), np.hypot(height, s1))
+    assert (1 - 1e-9 * path) * vacuum * (1 - 1e-10) <= thin <= vacuum * (1 + 1e-10)
+
+
+@pytest.mark.parametrize("phase", PHASES, ids=lambda p: f"{p.name}{p.g or ''}")
+@pytest.mark.parametrize("shadow_scale", [0.0, 0.999, 1.0])
+def test_shadow_scale_and_weight_against_plain_quadrature(phase, shadow_scale):
+    from scipy.integrate import quad
+
+    foot, height, x0, x1, sigma_t = 2.3, 0.4, 0.5, 6.1, 0.7
+
+    def profile(x):
+        return 1 / (1 + 0.1 * x * x)
+
+    def integrand(x):
+        s = x - foot
+        r = np.hypot(height, s)
+        return np.exp(-sigma_t * (x + shadow_scale * r)) * float(phase(-s / r)) / r**2 * profile(x)
+
+    kinks = [foot - height * c / np.sqrt(1 - c * c) for c in phase.kinks]
+    ends = [x0, *sorted(k for k in [*kinks, foot] if x0 < k < x1), x1]
+    expected = sum(quad(integrand, a, b, epsabs=0, epsrel=1e-11, limit=200)[0] for a, b in itertools.pairwise(ends))
+    value, error = airlight_segments(
+        foot, height, x0, x1, sigma_t, phase, shadow_scale=shadow_scale, weight=lambda x, index: profile(x)
+    )
+    assert value[0] == pytest.approx(expected, rel=1e-10)  # both to 1e-11
+    assert error[0] < 1.01e-10 * value[0]
+
+
+def test_weight_gets_the_rows_of_the_input():
+    # Rows 1 and 3 are empty or on the light and never asked for; each other row has its own factor.
+    factor = np.array([1.0, 1e9, 3.0, 1e9, 7.0])
+    asked = set()
+
+    def weight(x, index):
+        assert x.shape == (len(index), 21)
+        asked.update(index.tolist())
+        assert (x >= 1.0).all()
+        return np.broadcast_to(factor[index, None], x.shape)
+
+    height = np.array([0.3, 0.3, 0.3, 0.0, 0.3])
+    x1 = np.array([4.0, 1.0, 4.0, 4.0, 4.0])
+    value, _ = airlight_segments(2.0, height, 1.0, x1, 0.1, ISOTROPIC, weight=weight)
+    assert asked == {0, 2, 4}
+    assert value[1] == 0
+    assert np.isposinf(value[3])
+    np.testing.assert_allclose(value[[2, 4]] / value[0], [3.0, 7.0], rtol=1e-14)
+
+
+def test_a_kink_in_the_weight_is_found_by_halving():
+    value, error = airlight_segments(
+        2.0, 1.0, 0.0, 5.0, 0.0, ISOTROPIC, weight=lambda x, index: (x > 3.3).astype(float)
+    )
+    expected = np.arctan(3.0) - np.arctan(1.3)
+    assert abs(value[0] - expected) <= error[0]
+    assert error[0] <= 1e-9 * expected  # a jump is located to the last of the halvings
+
+
+def test_corners():
+    through_light = {"foot": 5.0, "height": 0.0}
+    empty, _ = airlight_segments(5.0, 0.0, 5.0, 5.0, 0.3, ISOTROPIC)
+    assert empty.tolist() == [0.0]
+    on_segment, error = airlight_segments(**through_light, x0=0.0, x1=9.0, sigma_t=0.3, phase=ISOTROPIC)
+    assert np.isposinf(on_segment[0])
+    assert np.isposinf(error[0])
+    # before the light the path is `foot` all along: J = exp(-sigma_t foot) p(1) (1/1 - 1/5)
+    before, _ = airlight_segments(**through_light, x0=0.0, x1=4.0, sigma_t=0.3, phase=PhaseFunction("hazy"))
+    assert before[0] == pytest.approx(np.exp(-1.5) * 5.0 * 0.8, rel=1e-13)
+    behind, _ = airlight_segments(**through_light, x0=6.0, x1=np.inf, sigma_t=0.3, phase=PhaseFunction("hazy"))
+    assert behind[0] == pytest.approx(integrate_distance(5.0, 0.0, 6.0, np.inf, 0.3, PhaseFunction("hazy")).value)
+    # a ray without end in a vacuum sees half the sphere of angles behind the foot, all of it from far enough before
+    endless, _ = airlight_segments(np.array([0.0, 1e9]), 1.0, 0.0, np.inf, 0.0, ISOTROPIC)
+    np.testing.assert_allclose(endless, [np.pi / 2, np.pi - 1e-9], rtol=1e-12)
+    # so thick that nothing is left: no NaN, no warning
+    dark, error = airlight_segments(1e4, 1.0, 0.0, np.inf, 50.0, PhaseFunction("hg", g=-0.99))
+    assert dark.tolist() == [0.0]
+    assert np.isfinite(error).all()
+
+
+def test_chunks_do_not_show():
+    rng = np.random.default_rng(5)
+    n = 20_000
+    columns = (rng.uniform(-3, 30, n), 10 ** rng.uniform(-3, 1, n), rng.uniform(0, 5, n), rng.uniform(5, 40, n))
+    value, _ = airlight_segments(*columns, 0.13, ISOTROPIC)
+    pick = rng.integers(0, n, 50)
+    alone = [airlight_segments(*(c[i] for c in columns), 0.13, ISOTROPIC)[0][0] for i in pick]
+    np.testing.assert_allclose(value[pick], alone, rtol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"foot": np.nan}, "foot of row 0 is nan; wanted a finite number"),
+        ({"height": [1.0, -1.0]}, "height of row 1 is -1.0; wanted a number >= 0"),
+        ({"x1": -1.0}, "x1 of row 0 is -1.0; wanted a number >= x0"),
+        ({"x0": np.inf, "x1": np.inf}, "x0 of row 0 is inf"),
+        ({"sigma_t": -0.1}, "sigma_t of row 0 is -0.1"),
+        ({"foot": [1.0, 2.0], "height": [1.0, 2.0, 3.0]}, "do not fit together"),
+        ({"foot": [[1.0]]}, "wanted one column each"),
+        ({"shadow_scale": 1.5}, "shadow_scale is 1.5; wanted a number from 0 to 1"),
+        ({"rtol": 1e-16}, "rtol is 1e-16"),
+    ],
+)
+def test_refusals(change, message):
+    arguments = {"foot": 1.0, "height": 1.0, "x0": 0.0, "x1": 2.0, "sigma_t": 0.1, "phase": ISOTROPIC}
+    with pytest.raises(InputError, match=message):
+        airlight_segments(**(arguments | change))
+
+
+def test_the_pair_of_rules_is_exact_for_polynomials():
+    from analytic.kronrod import KRONROD_AND_GAUSS, NODES
+
+    for degree in range(0, 32, 2):
+        kronrod, gauss = NODES**degree @ KRONROD_AND_GAUSS
+        assert kronrod == pytest.approx(2 / (degree + 1), rel=1e-14)
+        if degree <= 18:
+            assert gauss == pytest.approx(2 / (degree + 1), rel=1e-14)
+    assert NODES**20 @ KRONROD_AND_GAUSS[:, 1] != pytest.approx(2 / 21, rel=1e-9)  # beyond its degree

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The power series: against mpmath's Taylor coefficients and the derived column of the list of misprints."""
+
+import numpy as np
+import pytest
+
+from analytic import InputError, PhaseFunction, taylor_coefficients
+
+PHASES = [
+    PhaseFunction("isotropic"),
+    PhaseFunction("rayleigh"),
+    PhaseFunction("hazy"),
+    PhaseFunction("murky"),
+    PhaseFunction("hg", g=0.57),
+    PhaseFunction("hg", g=-0.88),
+]
+
+
+@pytest.mark.parametrize("phase", PHASES, ids=lambda p: f"{p.name}{p.g or ''}")
+@pytest.mark.parametrize("a", [0.0, 0.31, 4.7])
+def test_against_mpmath(phase, a):
+    import mpmath
+
+    with mpmath.workdps(40):
+        expected = mpmath.taylor(
+            lambda theta: mpmath.exp(a - a * mpmath.tan(theta / 2 + mpmath.pi / 4)) * phase.mp(-mpmath.sin(theta)),
+            0,
+            9,
+        )
+    # coefficients are sums of terms up to a^9/9!, of both signs
+    np.testing.assert_allclose(taylor_coefficients(a, phase, 9), [float(c) for c in expected], rtol=1e-12, atol=1e-13)
+
+
+A = np.array([0.0, 0.13, 1.9])
+
+
+@pytest.mark.parametrize(
+    ("name", "mean", "order", "derived"),
+    [
+        ("isotropic", 1, 2, (A**2 - A) / 2),
+        ("isotropic", 1, 3, -(A**3) / 6 + A**2 / 2 - A / 3),
+        ("isotropic", 1, 4, A**4 / 24 - A**3 / 4 + 11 * A**2 / 24 - 5 * A / 24),
+        ("rayleigh", 1, 2, 3 * A**2 / 8 - 3 * A / 8 + 3 / 4),
+        ("hazy", 2, 1, -265 * A / 256 - 9 / 32),
+        ("hazy", 2, 2, 265 * A**2 / 512 - 121 * A / 512 + 63 / 64),
+        ("murky", 83 / 33, 1, -2147483673 * A / 2**31 - 25 / 67108864),
+    ],
+)
+def test_derived_forms_of_what_is_printed_wrong(name, mean, order, derived):
+    # Biri 2006, annex, as corrected in DESIGN section 3; hazy and murky there are not divided by their means.
+    ours = taylor_coefficients(A, PhaseFunction(name)) * mean
+    assert ours.shape == (3, 5)
+    np.testing.assert_allclose(ours[:, order], derived, rtol=1e-14, atol=1e-15)
+
+
+def test_the_series_converges_to_the_integrand():
+    theta, a = 0.3, 0.8
+    phase = PhaseFunction("hazy")
+    exact = np.exp(a - a * np.tan(theta / 2 + np.pi / 4)) * phase(-np.sin(theta))
+    errors = [abs(np.polyval(taylor_coefficients(a, phase, n)[::-1], theta) / exact - 1) for n in (4, 8, 16)]
+    assert errors[0] > errors[1] > errors[2]
+    assert errors[2] < 1e-8
+
+
+def test_refusals():
+    with pytest.raises(InputError, match="no power series"):
+        taylor_coefficients(1.0, PhaseFunction("tabulated", table=[1, 2]))
+    with pytest.raises(InputError, match="degree is -1"):
+        taylor_coefficients(1.0, PhaseFunction("hazy"), -1)
+    with pytest.raises(InputError, match="wanted optical thicknesses"):
+        taylor_coefficients([1.0, np.nan], PhaseFunction("hazy"))
