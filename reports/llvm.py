@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Find a libLLVM that works, before Dr.Jit picks one that does not.
+
+Dr.Jit 1.5 compiles its kernels with whatever libLLVM it meets first: the file named by `DRJIT_LIBLLVM_PATH`, else
+`libLLVM.so` as the dynamic linker finds it, else the newest of `/usr/lib/<multiarch>/libLLVM*.so.*` (drjit-core,
+`src/llvm_api.cpp`). It accepts version 11 and newer, but 14 and 15, Debian 12's default, abort the process in the
+kernels of Mitsuba's volumetric path tracer. So the choice is made here, from file names alone: nothing is loaded,
+because a library that is loaded wins over any later setting.
+"""
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+OLDEST_LLVM = 17
+LLVM_VARIABLE = "DRJIT_LIBLLVM_PATH"
+
+# libLLVM-14.so.1, libLLVM-14.0.6.so, libLLVM.so.19.1, and without a version libLLVM.so, libLLVM.dylib; not the
+# libraries of single components, such as libLLVMCore.so.19.1.
+_LIBRARY = re.compile(
+    r"libLLVM(?:-(\d+)(?:\.(\d+))?[^/]*\.(?:so|dylib)[^/]*|\.so\.(\d+)(?:\.(\d+))?[^/]*|\.so|\.dylib)"
+)
+# Homebrew names the version in a folder: /opt/homebrew/Cellar/llvm/19.1.7/lib, /usr/local/opt/llvm@18/lib
+_FOLDER = re.compile(r"/llvm(?:@|/|-)(\d+)(?:\.(\d+))?[^/]*/lib")
+_ASK_VERSION = (
+    "import ctypes, sys\n"
+    "numbers = [ctypes.c_uint() for _ in range(3)]\n"
+    "ctypes.CDLL(sys.argv[1]).LLVMGetVersion(*[ctypes.byref(number) for number in numbers])\n"
+    "print(*[number.value for number in numbers[:2]])\n"
+)
+
+
+@dataclass(frozen=True)
+class Llvm:
+    """A libLLVM, and whether it can be used."""
+
+    path: str  #: as Dr.Jit would be told
+    version: tuple[int, int] | None  #: major and minor, None if the file does not tell
+    works: bool
+    reason: str  #: why it works or not, in words
+
+    @property
+    def label(self) -> str:
+        """The version in words."""
+        return "version unknown" if self.version is None else f"LLVM {self.version[0]}.{self.version[1]}"
+
+
+def llvm_folders() -> list[Path]:
+    """Return the folders in which a libLLVM may lie, the most particular first."""
+    folders = [Path(folder) for folder in os.environ.get("LD_LIBRARY_PATH", "").split(":") if folder]
+    folders.append(Path(sys.prefix, "lib"))  # a conda environment
+    if sys.platform == "darwin":
+        for root in ("/opt/homebrew", "/usr/local"):
+            folders += sorted(Path(root, "opt").glob("llvm*/lib")) + sorted(Path(root, "Cellar/llvm").glob("*/lib"))
+    else:
+        folders.append(Path("/usr/lib", f"{os.uname().machine}-linux-gnu"))
+        folders += [*sorted(Path("/usr/lib").glob("llvm-*/lib")), *sorted(Path("/usr/lib64").glob("llvm*/lib*"))]
+        folders += [Path("/usr/lib64"), Path("/usr/lib")]
+    return [*folders, Path("/usr/local/lib")]
+
+
+def find_llvm(folders: Iterable[Path] | None = None) -> list[Llvm]:
+    """List every libLLVM of this machine, the one to use first.
+
+    Parameters
+    ----------
+    folders
+        Where to look; `llvm_folders` by default. The file named by ``DRJIT_LIBLLVM_PATH`` is always looked at.
+
+    Returns
+    -------
+    list of Llvm
+        The user's own setting first, then those that work, then the newest.
+    """
+    setting = os.environ.get(LLVM_VARIABLE)
+    seen: dict[str, Llvm] = {}
+    for path in _libraries(llvm_folders() if folders is None else folders):
+        seen.setdefault(os.path.realpath(path), examine_llvm(str(path)))
+    found = sorted(seen.values(), key=lambda llvm: (llvm.works, llvm.version or (0, 0)), reverse=True)
+    if setting:
+        own = examine_llvm(setting)
+        found = [own, *(llvm for llvm in found if os.path.realpath(llvm.path) != os.path.realpath(setting))]
+    return found
+
+
+def examine_llvm(path: str) -> Llvm:
+    """Say what a libLLVM is and whether it works, if possible without loading it."""
+    if "/" in path and not os.path.isfile(path):
+        return Llvm(path, None, False, "there is no such file")
+    wrong = _wrong_binary(path)
+    if wrong:
+        return Llvm(path, None, False, wrong)
+    version = _version_of_name(path) or _version_asked(path)
+    if version is None:
+        return Llvm(path, None, False, "its version is unknown: it has no LLVMGetVersion, so it is older than 16")
+    if version[0] < OLDEST_LLVM:
+        return Llvm(path, version, False, f"too old: {OLDEST_LLVM} or newer is needed, 14 and 15 abort the process")
+    return Llvm(path, version, True, "works")
+
+
+def _libraries(folders: Iterable[Path]) -> Iterator[str]:
+    for folder in folders:
+        try:
+            names = sorted(os.listdir(folder))
+        except OSError:
+            continue
+        yield from (os.path.join(folder, name) for name in names if _LIBRARY.fullmatch(name))
+
+
+def _version_of_name(path: str) -> tuple[int, int] | None:
+    real = os.path.realpath(path)
+    name = _LIBRARY.fullmatch(os.path.basename(real))
+    groups = [group for group in name.groups() if group] if name else []
+    if not groups:
+        folder = _FOLDER.search(os.path.dirname(real)) or _FOLDER.search(os.path.dirname(path))
+        groups = [group for group in folder.groups() if group] if folder else []
+    return (int(groups[0]), int(groups[1]) if len(groups) > 1 else 0) if groups else None
+
+
+def _version_asked(path: str) -> tuple[int, int] | None:
+    """Load the library in a process of its own and ask it; slow, for names that do not tell."""
+    command = [sys.executable, "-c", _ASK_VERSION, path]
+    try:
+        answer = subprocess.run(command, capture_output=True, text=True, timeout=30, check=True).stdout.split()
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return (int(answer[0]), int(answer[1])) if len(answer) == 2 else None
+
+
+def _wrong_binary(path: str) -> str:
+    """Say what is wrong with the file as a shared library of this machine; nothing wrong gives an empty string."""
+    if sys.platform != "linux" or "/" not in path:
+        return ""
+    try:
+        with open(path, "rb") as file, open(sys.executable, "rb") as own:
+            header, expected = file.read(20), own.read(20)
+    except OSError as error:
+        return f"cannot be read: {error.strerror}"
+    if header[:4] != b"\x7fELF":
+        return "not a shared library"
+    # Bytes 4 and 5: word size and byte order; 18 and 19: the machine (ELF specification, figure 1-3).
+    if expected[:4] == b"\x7fELF" and (header[4:6], header[18:]) != (expected[4:6], expected[18:]):
+        return "built for another kind of processor"
+    return ""
