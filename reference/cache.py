@@ -10,7 +10,9 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Mapping
+import zipfile
+import zlib
+from collections.abc import Iterator, Mapping
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -20,7 +22,10 @@ import numpy as np
 from reference.files import write_bytes
 
 #: Raise this when the meaning or the accuracy of a cached number changes.
-GENERATION = 1
+GENERATION = 2
+
+#: Plugins without an id are named by their address, which differs from run to run.
+_ADDRESS = re.compile(r"object_\d+|0x[0-9a-f]+")
 
 
 def cache_folder() -> Path:
@@ -38,17 +43,30 @@ def scene_digest(scene) -> str:
 
     digest = hashlib.sha256()
     parameters = mi.traverse(scene)
-    for plugin in (*scene.sensors(), *scene.emitters(), *scene.shapes()):
-        digest.update(plugin.class_name().encode())
+    for words in _kinds(scene):
+        digest.update(_ADDRESS.sub("", words).encode())
     for key in parameters.keys():  # noqa: SIM118 - SceneParameters iterates over items
-        # Plugins without an id are named by their address, which differs from run to run.
-        digest.update(re.sub(r"object_\d+|0x[0-9a-f]+", "", key).encode())
+        digest.update(_ADDRESS.sub("", key).encode())
         digest.update(_value_bytes(parameters[key]))
     return digest.hexdigest()
 
 
+def _kinds(scene) -> Iterator[str]:
+    """Yield what decides the numbers but is no parameter: the kinds of the plugins, and which way surfaces face."""
+    for sensor in scene.sensors():
+        medium = sensor.get_medium()
+        # An isotropic and a Rayleigh phase function have no parameters: they differ by their names alone.
+        yield sensor.class_name()
+        yield "no medium" if medium is None else f"{medium} {medium.phase_function()}"
+    for emitter in scene.emitters():
+        yield emitter.class_name()
+    for shape in scene.shapes():
+        yield f"{shape.class_name()} {shape.has_flipped_normals()} {shape.bsdf()}"
+
+
 def _value_bytes(value: Any) -> bytes:
-    matrix = getattr(value, "matrix", value)
+    # By the name of the type: a colour has a `matrix` too, a swizzle that holds its first channel six times.
+    matrix = value.matrix if "Transform" in type(value).__name__ else value
     try:
         return np.array(matrix, dtype=np.float64).tobytes()
     except (TypeError, ValueError):
@@ -73,19 +91,18 @@ def load_arrays(key: str) -> dict[str, Any] | None:
     """Return the arrays kept under a key, or None where there are none or the file is damaged."""
     path = cache_folder() / f"{key}.npz"
     try:
-        with np.load(path, allow_pickle=False) as stored:
+        # Opened here, since `np.load` leaves a file that it cannot read open.
+        with open(path, "rb") as file, np.load(file, allow_pickle=False) as stored:
             return {name: stored[name] for name in stored.files}
     except FileNotFoundError:
         return None
-    except (OSError, ValueError, KeyError, EOFError):
+    except (OSError, ValueError, KeyError, EOFError, AttributeError, TypeError, zipfile.BadZipFile, zlib.error):
         # Not ours, or cut short by a full disk: compute it again and replace it.
         return None
 
 
 def store_arrays(key: str, arrays: Mapping[str, Any]) -> None:
     """Keep arrays under a key, replacing what is there."""
-    folder = cache_folder()
-    folder.mkdir(parents=True, exist_ok=True)
     buffer = BytesIO()
-    np.savez(buffer, **{name: np.asarray(value) for name, value in arrays.items()})
-    write_bytes(folder / f"{key}.npz", buffer.getvalue())
+    np.savez(buffer, **{name: np.asarray(value) for name, value in arrays.items()})  # type: ignore[arg-type]
+    write_bytes(cache_folder() / f"{key}.npz", buffer.getvalue())
