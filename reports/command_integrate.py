@@ -31,7 +31,7 @@ def integrate(
     activate()
     results = integrate_cases(read, kernel, precision)
     if output is not None:
-        write_results(cases, results, output)
+        write_results(read, results, output)
     found = summary(read, results)
     if json:
         print_json(found)

@@ -47,7 +47,7 @@ def _number(value: float | None, digits: int = 3) -> str:
     """Return a number with some significant digits, an en dash for none."""
     if value is None:
         return "\N{EN DASH}"
-    text = f"{value:.{digits}g}"
+    text = f"{value:.{digits - 1}e}" if 0 < abs(value) < 1e-3 else f"{value:.{digits}g}"
     if "e" in text:
         mantissa, exponent = text.split("e")
         return f"{mantissa}·10{_superscript(int(exponent))}"

@@ -40,6 +40,8 @@ def integrate_cases(cases: Cases, kernel: str, precision: str) -> Array:
 
 def _evaluate(cases: Cases, rows: NDArray[np.int64], name: str, function, precision: str) -> Array:
     """Evaluate the cases of one phase function."""
+    import drjit as dr
+
     from realtime.arrays import array_types
     from realtime.geometry import RayGeometry, ray_geometry
     from realtime.lights import Light
@@ -57,7 +59,12 @@ def _evaluate(cases: Cases, rows: NDArray[np.int64], name: str, function, precis
         geometry = RayGeometry(types.scalar(cases.foot[rows]), types.scalar(cases.height[rows]), None, None)
     else:
         light = Light("point", False, types.vector(cases.light[rows].T), types.color(1))
-        geometry = ray_geometry(types.vector(cases.origin[rows].T), types.vector(cases.direction[rows].T), light)
+        # A file's directions have unit length to the digits they are written with.
+        given = types.vector(cases.direction[rows].T)
+        scale = dr.rsqrt(dr.squared_norm(given))
+        direction = given * scale
+        low = dr.fma(given, scale, -direction)
+        geometry = ray_geometry(types.vector(cases.origin[rows].T), direction, light, low=low)
     x0, x1 = types.scalar(cases.x0[rows]), types.scalar(cases.x1[rows])
     return np.array(function(geometry, x0, x1, medium, light), dtype=np.float64)
 
@@ -77,13 +84,12 @@ def summary(cases: Cases, results: Array) -> dict[str, Any]:
     return found | {"compared": int(finite.sum()), "p50": p50, "p99": p99, "max": largest, "worst_row": worst + 2}
 
 
-def write_results(source: Path, results: Array, target: Path) -> None:
+def write_results(cases: Cases, results: Array, target: Path) -> None:
     """Write the rows of a file with a column `result`, whole or not at all."""
-    with open(source, newline="", encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
+    kept = [k for k, name in enumerate(cases.header) if name != "result"]
     buffer = io.StringIO()
-    writer = csv.DictWriter(buffer, [*(name for name in rows[0] if name != "result"), "result"], lineterminator="\n")
-    writer.writeheader()
-    for row, result in zip(rows, results):
-        writer.writerow(row | {"result": repr(float(result))})
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow([*(cases.header[k] for k in kept), "result"])
+    for row, result in zip(cases.rows, results):
+        writer.writerow([*(row[k] for k in kept), repr(float(result))])
     write_text(target, buffer.getvalue())

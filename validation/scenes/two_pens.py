@@ -17,12 +17,12 @@ def two_pens() -> dict[str, Any]:
     flag: Mesh = (np.array([[0.71, 0.53, 0.03], [1.13, 0.67, 0.03], [0.87, 0.59, 0.61]]), np.array([[0, 1, 2]]))
     return {
         "type": "scene",
-        "fog": fog((0.131, 0.149, 0.173), (0.83, 0.87, 0.91), {"type": "rayleigh"}),
+        "fog": fog((0.331, 0.349, 0.373), (0.83, 0.87, 0.91), {"type": "rayleigh"}),
         "sensor": camera((0.47, -3.71, 1.37), (0.03, 0.07, 0.89), fov=43.9, size=(800, 600)),
         "lamp": {
             "type": "point",
             "position": [-1.43, 1.31, 1.97],
-            "intensity": {"type": "rgb", "value": [17.3, 16.1, 14.9]},
+            "intensity": {"type": "rgb", "value": [11.3, 10.7, 9.9]},
         },
         "pens": mitsuba_mesh("pens", joined([first, second]), (0.19, 0.27, 0.59)),
         "table": mitsuba_mesh("table", grid((-3.1, -1.7, 0.0), (6.1, 0, 0), (0, 4.9, 0), (31, 6)), (0.57, 0.51, 0.43)),
