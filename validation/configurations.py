@@ -99,11 +99,14 @@ def kernel_function(name: str):
     if ":" in name:
         module, _, function = name.partition(":")
         try:
-            return getattr(importlib.import_module(module), function)
-        except (ImportError, AttributeError) as error:
+            found = getattr(importlib.import_module(module), function)
+        except (ImportError, AttributeError, ValueError) as error:
             raise InputError(
                 f"kernel: cannot load {name!r}: {error}; wanted an importable 'module:function'"
             ) from error
+        if not callable(found):
+            raise InputError(f"kernel: {name!r} is a {type(found).__name__}; wanted an importable 'module:function'")
+        return found
     raise InputError(f"kernel: got {name!r}, wanted one of {', '.join(KERNELS)}" + nearest(name, KERNELS))
 
 
@@ -122,7 +125,10 @@ def _converted(record, name: str, value: Any) -> int | str:
     default = record.parameters[name]
     if isinstance(default, int):
         try:
+            # int() would cut off what stands behind the point, and take True for 1.
+            if isinstance(value, float | bool):
+                raise TypeError
             return int(value)
-        except ValueError:
+        except (TypeError, ValueError):
             raise InputError(f"method {record.name}: {name} got {value!r}, wanted a whole number") from None
     return str(value)
