@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: BSD-3-Clause
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from realtime.plan import Plan
+from tests.scenes_for_tests import tiny_scene
+from validation.bench import bench, configurations_for, knows_shadows, measure
+from validation.configurations import STANDARD, Configuration
+from validation.load import LoadedScene
+
+MARCH = Configuration("ray-march", None, (("steps", 200),))
+UNSHADOWED = Configuration("unshadowed", "quadrature")
+PLAN = Plan(
+    shadows=True,
+    surfaces=True,
+    extinctions=1,
+    isotropic=True,
+    bounded=False,
+    vacuum=False,
+    point_lights=1,
+    spot_lights=0,
+    soft_spots=False,
+)
+
+
+@pytest.fixture(scope="module")
+def loaded(variant):
+    import mitsuba as mi
+
+    return LoadedScene("tiny", mi.load_dict(tiny_scene(size=(16, 12))), "A tiny scene.", "")
+
+
+@pytest.fixture(scope="module")
+def measured(loaded):
+    from realtime.scene import read_scene
+    from validation.truth import truth_image
+
+    scene, truth = read_scene(loaded.scene), truth_image(loaded.scene)
+    return {chosen: measure(scene, chosen, truth=truth, seconds=0.01) for chosen in (MARCH, UNSHADOWED)}
+
+
+def test_marching_with_visibility_is_near_the_truth(measured):
+    error = measured[MARCH].error
+    # Every step that straddles the edge of a shadow is wrong by up to half of itself: 200 steps leave a few per mille.
+    assert error.relative_rmse < 0.02
+    assert error.nonfinite == error.negative == 0
+    assert error.pixels == 16 * 12
+
+
+def test_method_without_shadows_is_too_bright_by_what_shadows_take_away(measured):
+    error = measured[UNSHADOWED].error
+    assert error.relative_bias > 0.003
+    assert error.relative_rmse > 3 * measured[MARCH].error.relative_rmse
+
+
+def test_error_is_that_of_the_frame_against_the_truth(loaded, measured):
+    from validation.truth import truth_image
+
+    truth, frame = truth_image(loaded.scene).airlight, measured[MARCH].frame.airlight
+    difference = np.asarray(frame, dtype=np.float64) - truth
+    assert measured[MARCH].error.rmse == pytest.approx(np.sqrt(np.mean(difference**2)), rel=1e-9)
+    assert measured[MARCH].error.relative_bias == pytest.approx(difference.mean() / truth.mean(), rel=1e-9)
+
+
+def test_surface_is_compared_too(measured):
+    # A pixel at the rim of the ball may see it with one method's rays and the floor with the other's.
+    assert measured[MARCH].surface_error.p50 < 1e-4
+    assert measured[MARCH].surface_error.relative_bias == pytest.approx(0, abs=0.02)
+
+
+def test_other_size_is_timed_without_changing_what_is_compared(loaded, measured, variant):
+    import mitsuba as mi
+
+    from realtime.scene import read_scene
+    from validation.truth import truth_image
+
+    large = read_scene(mi.load_dict(tiny_scene(size=(160, 120))))
+    scene, truth = read_scene(loaded.scene), truth_image(loaded.scene)
+    found = measure(scene, MARCH, truth=truth, timed=large, seconds=0.02)
+    assert found.frame.airlight.shape == (12, 16, 3)
+    assert found.error == measured[MARCH].error
+    # A hundred times the pixels; small frames cost a constant, so that much less than 100 is left of it.
+    assert found.times.airlight.median_ms > 2 * measured[MARCH].times.airlight.median_ms
+
+
+def test_refusal_is_kept_and_not_raised(variant):
+    """What a method cannot do is a line of the table; one bad configuration must not end a report."""
+    import mitsuba as mi
+
+    from realtime.scene import read_scene
+    from validation.truth import truth_image
+
+    scene = mi.load_dict(
+        tiny_scene(
+            size=(4, 3), fog=tiny_scene()["fog"] | {"phase": {"type": "tabphase", "values": "0.3, 0.2, 0.4, 0.9, 2.0"}}
+        )
+    )
+    found = measure(read_scene(scene), Configuration("unshadowed", "taylor"), truth=truth_image(scene, samples=16))
+    assert found.frame is None
+    assert found.times is None
+    assert found.error is None
+    assert "tab" in found.refused
+    assert "\n" not in found.refused
+
+
+def test_bench_measures_one_after_the_other_and_tells(loaded):
+    told = []
+    found = list(bench(loaded, [UNSHADOWED, MARCH], progress=lambda *args: told.append(args)))
+    assert [one.configuration for _, one in found] == [UNSHADOWED, MARCH]
+    assert told == [(1, 2, "tiny"), (2, 2, "tiny")]
+    assert found[0][0].camera.width == 16
+
+
+def test_variants_of_shadows_are_left_out_where_nothing_casts_one():
+    assert configurations_for(PLAN) == STANDARD
+    left = configurations_for(replace(PLAN, shadows=False))
+    assert 0 < len(left) < len(STANDARD)
+    assert all("shadow" not in dict(one.parameters) for one in left)
+    assert {one.method for one in left} == {one.method for one in STANDARD}
+
+
+def test_configuration_says_whether_it_knows_shadows():
+    assert not knows_shadows(UNSHADOWED)
+    assert knows_shadows(MARCH)
+    assert knows_shadows(Configuration("ray-march", None, (("shadow", "map"),)))
+    assert not knows_shadows(Configuration("ray-march", None, (("shadow", "none"),)))

@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import time
+from types import SimpleNamespace
+
+import pytest
+
+from tests.scenes_for_tests import tiny_scene
+from validation.timing import _touch_geometry, time_frame, time_repeated
+
+
+def test_median_is_the_time_of_the_work(variant):
+    """A sleep that is known; the sleeps of a busy machine are longer, never shorter."""
+    timing = time_repeated(lambda: time.sleep(0.01), seconds=0.0, least=5)
+    assert timing.repetitions == 5
+    assert 10 <= timing.low_ms <= timing.median_ms <= timing.high_ms
+    assert timing.median_ms < 200
+
+
+def test_warm_up_is_not_timed(variant):
+    calls = []
+
+    def work():
+        calls.append(len(calls))
+        time.sleep(0.3 if len(calls) <= 2 else 0.0)
+
+    timing = time_repeated(work, seconds=0.0, least=3)
+    assert len(calls) == 5
+    assert timing.high_ms < 100
+
+
+def test_number_of_repetitions_is_bounded(variant):
+    assert time_repeated(lambda: None, seconds=10.0, most=17).repetitions == 17
+    assert time_repeated(lambda: None, seconds=0.0, least=3).repetitions == 3
+
+
+def test_one_outlier_does_not_move_the_median(variant):
+    calls = []
+
+    def work():
+        calls.append(0)
+        if len(calls) == 4:
+            time.sleep(0.2)
+
+    timing = time_repeated(work, seconds=0.0, least=21)
+    assert timing.median_ms < 20
+
+
+def test_quartiles_are_those_of_the_times(variant, monkeypatch):
+    """A clock of our own: repetitions of 1, 2, 3, 4 and 5 ms."""
+    # One reading for the end of the time, then: is there time left (not asked below `least`), start, stop.
+    readings = iter([0.0, *(value for n in range(1, 6) for value in (n, n + n / 1000)), 100.0])
+    monkeypatch.setattr("validation.timing.time", SimpleNamespace(perf_counter=lambda: next(readings)))
+    timing = time_repeated(lambda: None, seconds=1.0, least=5)
+    assert (timing.low_ms, timing.median_ms, timing.high_ms) == pytest.approx((2, 3, 4))
+
+
+@pytest.fixture(scope="module")
+def renderer(variant):
+    import mitsuba as mi
+
+    from realtime.frame import frame_renderer
+    from realtime.methods import METHODS
+    from realtime.scene import read_scene
+
+    scene = read_scene(mi.load_dict(tiny_scene(size=(16, 12))))
+    return frame_renderer(scene, METHODS["ray-march"], steps=8, shadow="map", map=16)
+
+
+def test_every_stage_of_a_frame_is_timed(renderer):
+    times = time_frame(renderer, seconds=0.02)
+    for name in ("frame", "surface", "airlight", "rebuild"):
+        timing = getattr(times, name)
+        assert 0 < timing.low_ms <= timing.median_ms <= timing.high_ms, name
+        assert timing.repetitions >= 3
+
+
+def test_timing_does_not_change_the_frame(renderer):
+    import numpy as np
+
+    from realtime.frame import render_frame
+
+    before = render_frame(renderer)
+    time_frame(renderer, seconds=0.01)
+    after = render_frame(renderer)
+    np.testing.assert_array_equal(before.airlight, after.airlight)
+    np.testing.assert_array_equal(before.surface, after.surface)
+
+
+def test_scene_without_anything_to_move_can_be_rebuilt(variant):
+    import mitsuba as mi
+
+    _touch_geometry(mi.load_dict(tiny_scene(ball=None, floor=None)))
+
+
+def test_touched_meshes_are_built_again(variant):
+    """The acceleration structure follows vertices that were moved before, so `rebuild` does what it says."""
+    import drjit as dr
+    import mitsuba as mi
+
+    from validation.load import load_scene
+
+    scene = load_scene("sphere-spot", (8, 6)).scene
+    ray = mi.Ray3f([0.11, -0.07, 9.0], [0, 0, -1])
+    before = float(scene.ray_intersect(ray).t[0])
+    parameters = mi.traverse(scene)
+    moved = dr.unravel(mi.Point3f, parameters["sphere.vertex_positions"]) + mi.Point3f(0, 0, 1.5)
+    parameters["sphere.vertex_positions"] = dr.ravel(moved)
+    parameters.update()
+    _touch_geometry(scene)
+    # Positions are float32 of a few metres: 1e-6.
+    assert float(scene.ray_intersect(ray).t[0]) == pytest.approx(before - 1.5, abs=1e-5)
