@@ -12,6 +12,7 @@ def bench(
     size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels; the scene's own by default.")] = None,
     truth: Annotated[bool, typer.Option(help="Also compare the truth with volpath.")] = True,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    markdown: Annotated[bool, typer.Option("--markdown", help="Print tables for a README, dated.")] = False,
 ) -> None:
     """Time every method in every scene and compare it with the quadrature truth.
 
@@ -20,6 +21,7 @@ def bench(
     """
     from realtime.methods import METHODS
     from realtime.scene import read_scene
+    from reports.bench_tables import print_bench
     from reports.environment import activate
     from reports.progress import progress_bar
     from reports.tables import print_json
@@ -47,7 +49,7 @@ def bench(
 
         print_json({"environment": describe_environment(), "scenes": found})
     else:
-        _print(found)
+        print_bench(found, markdown=markdown)
     if any(not one["statistics"]["equivalent"] for scene in found for one in scene["agreement"].values()):
         raise typer.Exit(1)
 
@@ -72,53 +74,3 @@ def _bench_scene(name: str, pixels, chosen, *, with_truth: bool, tell) -> dict:
         agreed = {layer: agreement_data(one) for layer, one in compared.items()}
     size = [camera.width, camera.height] if camera else None
     return {"name": loaded.name, "size": size, "methods": rows, "agreement": agreed}
-
-
-def _print(found: list[dict]) -> None:
-    from reports.tables import number, print_table
-
-    headers = ("method", "frame ms", "quartiles", "frames/s", "airlight ms", "airlight/s", "rebuilt ms", "rel. RMSE",
-               "rel. bias", "p99", "max")  # fmt: skip
-    for scene in found:
-        rows = []
-        for one in scene["methods"]:
-            if one["refused"]:
-                print(f"{one['label']}: refused: {one['refused']}")
-                continue
-            frame, airlight = one["times"]["frame"], one["times"]["airlight"]["median_ms"]
-            error = one["error"]
-            rows.append(
-                (
-                    one["label"],
-                    number(frame["median_ms"]),
-                    f"{number(frame['low_ms'])}..{number(frame['high_ms'])}",
-                    number(1000 / frame["median_ms"]),
-                    number(airlight),
-                    number(1000 / airlight),
-                    number(one["times"]["rebuild"]["median_ms"]),
-                    number(error["relative_rmse"], 2),
-                    number(error["relative_bias"], 2),
-                    number(error["p99"], 2),
-                    number(error["max"], 2),
-                )
-            )
-        print_table(headers, rows, title=f"{scene['name']}, {scene['size'][0]} x {scene['size'][1]}")
-    rows = [_agreement_row(scene["name"], one) for scene in found for one in scene["agreement"].values()]
-    if rows:
-        headers = ("truth against volpath", "samples", "bias", "95 % interval", "detectable", "uncorrected", "agree")
-        print_table(headers, rows, title="corrected for the shadow-ray epsilon; margin +-0.5 %")
-
-
-def _agreement_row(name: str, one: dict) -> tuple[str, ...]:
-    statistics = one["statistics"]
-    low, high = statistics["relative_bias_ci"]
-    samples = one["width"] * one["height"] * one["batches"] * one["samples"]
-    return (
-        f"{name}, {one['layer']}",
-        f"{samples / 1e6:.0f} M",
-        f"{100 * statistics['relative_bias']:+.3f} %",
-        f"{100 * low:+.3f} .. {100 * high:+.3f} %",
-        f"{100 * statistics['detectable_bias']:.2g} %",
-        f"{100 * one['uncorrected_bias']:+.3f} %",
-        "yes" if statistics["equivalent"] else "NO",
-    )

@@ -94,6 +94,8 @@ def claims(scenes: list[dict[str, Any]]) -> list[str]:
 
 def _trust(scenes: list[dict[str, Any]]) -> str:
     compared = [(scene["name"], one) for scene in scenes for one in scene["agreement"].values()]
+    if not compared:
+        return "There is no light to compare with Mitsuba's volpath: no airlight and no lit surface in any scene."
     failed = [f"{name} ({one['layer']})" for name, one in compared if not one["statistics"]["equivalent"]]
     detectable = max(one["statistics"]["detectable_bias"] for _, one in compared)
     margin = 100 * compared[0][1]["statistics"]["margin"]

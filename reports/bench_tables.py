@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The tables of `airlight bench`, for a terminal and for a README."""
+
+import time
+from collections.abc import Sequence
+from typing import Any
+
+from reports.tables import number, print_table
+
+_HEADERS = (
+    "method",
+    "frame ms",
+    "quartiles",
+    "frames/s",
+    "airlight ms",
+    "airlight/s",
+    "rebuilt ms",
+    "rel. RMSE",
+    "rel. bias",
+    "p99",
+    "max",
+)
+_TRUTH_HEADERS = ("volpath against the truth", "samples", "bias", "95 % interval", "detectable", "uncorrected", "agree")
+_TRUTH_TITLE = "volpath against the quadrature truth, corrected for the shadow-ray epsilon; margin +-0.5 %"
+
+
+def print_bench(found: list[dict[str, Any]], *, markdown: bool = False) -> None:
+    """Print what `bench` found: a table for each scene, and one for the truth.
+
+    Parameters
+    ----------
+    found
+        One dictionary for each scene, with `name`, `size`, `methods` and `agreement` as in report.json.
+    markdown
+        Print Markdown, with the date and the machine.
+    """
+    show = _print_markdown if markdown else print_table
+    if markdown:
+        from reports.environment import describe_environment
+
+        machine = describe_environment()
+        print(
+            f"{time.strftime('%Y-%m-%d')}, {machine['processor']}, {machine['threads']} threads, {machine['variant']}."
+        )
+    for scene in found:
+        for one in scene["methods"]:
+            if one["refused"]:
+                print(f"{scene['name']}, {one['label']}: refused: {one['refused']}")
+        rows = [_row(one) for one in scene["methods"] if not one["refused"]]
+        show(_HEADERS, rows, f"{scene['name']}, {scene['size'][0]} x {scene['size'][1]}")
+    rows = [_agreement_row(scene["name"], one) for scene in found for one in scene["agreement"].values()]
+    if rows:
+        show(_TRUTH_HEADERS, rows, _TRUTH_TITLE)
+
+
+def _row(one: dict[str, Any]) -> tuple[str, ...]:
+    frame, airlight, error = one["times"]["frame"], one["times"]["airlight"]["median_ms"], one["error"]
+    return (
+        one["label"],
+        number(frame["median_ms"]),
+        f"{number(frame['low_ms'])}..{number(frame['high_ms'])}",
+        rate(frame["median_ms"]),
+        number(airlight),
+        rate(airlight),
+        number(one["times"]["rebuild"]["median_ms"]),
+        number(error["relative_rmse"], 2),
+        number(error["relative_bias"], 2),
+        number(error["p99"], 2),
+        number(error["max"], 2),
+    )
+
+
+def rate(milliseconds: float) -> str:
+    """Return how often a second something that takes so long can be done."""
+    value = 1000 / milliseconds
+    return f"{value:.0f}" if value >= 10 else f"{value:.1f}"
+
+
+def _agreement_row(name: str, one: dict[str, Any]) -> tuple[str, ...]:
+    statistics = one["statistics"]
+    low, high = statistics["relative_bias_ci"]
+    samples = one["width"] * one["height"] * one["batches"] * one["samples"]
+    return (
+        f"{name}, {one['layer']}",
+        f"{samples / 1e6:.0f} M",
+        f"{100 * statistics['relative_bias']:+.3f} %",
+        f"{100 * low:+.3f} .. {100 * high:+.3f} %",
+        f"{100 * statistics['detectable_bias']:.2g} %",
+        f"{100 * one['uncorrected_bias']:+.3f} %",
+        "yes" if statistics["equivalent"] else "NO",
+    )
+
+
+def _print_markdown(headers: Sequence[str], rows: Sequence[Sequence[str]], title: str) -> None:
+    print(f"\n**{title}**\n")
+    print("| " + " | ".join(headers) + " |")
+    print("| --- |" + " ---: |" * (len(headers) - 1))
+    for row in rows:
+        print("| " + " | ".join(row) + " |")
