@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: BSD-3-Clause
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+from reference.cache import cache_folder
+from tests.scenes_for_tests import tiny_scene
+from validation.truth import truth_image, volpath_batches
+
+
+@pytest.fixture
+def scene(variant):
+    import mitsuba as mi
+
+    return mi.load_dict(tiny_scene(size=(8, 6)))
+
+
+@pytest.fixture
+def own_cache(monkeypatch, tmp_path):
+    monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+@pytest.fixture
+def computed(monkeypatch):
+    """Count how often a truth image is computed."""
+    import validation.truth
+
+    calls = []
+    compute = validation.truth.quadrature_image
+
+    def counted(*args, **kwargs):
+        calls.append(kwargs)
+        return compute(*args, **kwargs)
+
+    monkeypatch.setattr(validation.truth, "quadrature_image", counted)
+    return calls
+
+
+def assert_same(one, two):
+    for field in fields(one):
+        np.testing.assert_array_equal(getattr(one, field.name), getattr(two, field.name), err_msg=field.name)
+        assert type(getattr(one, field.name)) is type(getattr(two, field.name))
+
+
+def test_second_call_reads_the_same_numbers(scene, own_cache, computed):
+    first, second = truth_image(scene, samples=32), truth_image(scene, samples=32)
+    assert len(computed) == 1
+    assert_same(first, second)
+    assert first.airlight.shape == (6, 8, 3)
+    assert np.isfinite(first.airlight).all()
+
+
+def test_same_scene_loaded_again_is_found(scene, own_cache, computed):
+    import mitsuba as mi
+
+    truth_image(scene, samples=32)
+    truth_image(mi.load_dict(tiny_scene(size=(8, 6))), samples=32)
+    assert len(computed) == 1
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{"samples": 33}, {"samples": 32, "shadow_scale": 0.99}],
+)
+def test_other_settings_are_computed(scene, own_cache, computed, changes):
+    truth_image(scene, samples=32)
+    truth_image(scene, **changes)
+    assert len(computed) == 2
+
+
+def test_other_phase_function_has_another_truth(scene, own_cache, computed):
+    """The phase function has no parameters that a key could see; an isotropic truth would pass for it."""
+    import mitsuba as mi
+
+    fog = tiny_scene()["fog"] | {"phase": {"type": "rayleigh"}}
+    one = truth_image(scene, samples=32)
+    two = truth_image(mi.load_dict(tiny_scene(size=(8, 6), fog=fog)), samples=32)
+    assert len(computed) == 2
+    assert np.abs(two.airlight / one.airlight - 1).max() > 0.05
+
+
+@pytest.mark.parametrize("damage", ["truncated", "bit flipped", "other arrays"])
+def test_damaged_file_is_recomputed(scene, own_cache, computed, damage):
+    from reference.cache import store_arrays
+
+    first = truth_image(scene, samples=32)
+    (path,) = cache_folder().glob("quadrature-*.npz")
+    content = bytearray(path.read_bytes())
+    if damage == "truncated":
+        path.write_bytes(content[: len(content) // 2])
+    elif damage == "bit flipped":
+        content[len(content) // 2] ^= 4
+        path.write_bytes(content)
+    else:
+        store_arrays(path.stem, {"airlight": first.airlight})
+    assert_same(truth_image(scene, samples=32), first)
+    assert len(computed) == 2
+    truth_image(scene, samples=32)
+    assert len(computed) == 2  # and what was damaged has been replaced
+
+
+def test_progress_is_told(scene, own_cache):
+    told = []
+    truth_image(scene, samples=16, progress=lambda *args: told.append(args))
+    assert told == [(1, 1, "quadrature")]
+
+
+def interrupted_after(count):
+    def progress(done, total, what):
+        if done == count:
+            raise KeyboardInterrupt
+
+    return progress
+
+
+def test_interrupted_batches_go_on_where_they_stopped(scene, monkeypatch, tmp_path):
+    import validation.truth
+
+    monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path / "one"))
+    whole = volpath_batches(scene, batches=5, samples=4)
+    monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path / "two"))
+    with pytest.raises(KeyboardInterrupt):
+        volpath_batches(scene, batches=5, samples=4, progress=interrupted_after(3))
+    seeds = []
+    trace = validation.truth.volpath_batch
+
+    def counted(truth, seed, samples):
+        seeds.append(seed)
+        return trace(truth, seed, samples)
+
+    monkeypatch.setattr(validation.truth, "volpath_batch", counted)
+    resumed = volpath_batches(scene, batches=5, samples=4)
+    assert seeds == [3, 4]
+    assert_same(resumed, whole)
+
+
+def test_more_batches_add_to_those_that_are_there(scene, own_cache):
+    told = []
+    few = volpath_batches(scene, batches=2, samples=4)
+    more = volpath_batches(scene, batches=4, samples=4, progress=lambda *args: told.append(args))
+    assert told == [(3, 4, "volpath"), (4, 4, "volpath")]
+    assert (few.seeds, more.seeds) == ((0, 1), (0, 1, 2, 3))
+    np.testing.assert_array_equal(more.totals[:2], few.totals)
+
+
+def test_mean_and_standard_error_are_those_of_the_batches(scene, own_cache):
+    from reference.scene import read_truth
+    from reference.volpath import volpath_batch
+
+    found = volpath_batches(scene, batches=4, samples=4, first_seed=7)
+    means = np.stack([volpath_batch(read_truth(scene), seed, 4).mean for seed in range(7, 11)])
+    np.testing.assert_allclose(found.mean, means.mean(axis=0), rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(found.standard_error, means.std(axis=0, ddof=1) / 2, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(found.totals.mean(axis=0), found.mean.mean(axis=1), rtol=1e-12)
+
+
+def test_other_samples_and_seeds_are_kept_apart(scene, own_cache):
+    one = volpath_batches(scene, batches=2, samples=4)
+    two = volpath_batches(scene, batches=2, samples=5)
+    three = volpath_batches(scene, batches=2, samples=4, first_seed=2)
+    assert (one.samples, two.samples) == (4, 5)
+    assert three.seeds == (2, 3)
+    assert not np.array_equal(one.mean, three.mean)
+
+
+def test_enough_is_asked_at_every_eighth_batch(scene, own_cache):
+    asked = []
+
+    def enough(found):
+        asked.append(len(found.seeds))
+        return len(found.seeds) >= 16
+
+    assert len(volpath_batches(scene, batches=40, samples=1, enough=enough).seeds) == 16
+    assert asked == [8, 16]
+
+
+def test_damaged_batches_are_traced_again(scene, own_cache):
+    whole = volpath_batches(scene, batches=2, samples=4)
+    (path,) = cache_folder().glob("volpath-*.npz")
+    path.write_bytes(path.read_bytes()[:-40])
+    assert_same(volpath_batches(scene, batches=2, samples=4), whole)
+
+
+def test_one_batch_is_refused(scene):
+    with pytest.raises(ValueError, match="at least 2"):
+        volpath_batches(scene, batches=1, samples=4)
