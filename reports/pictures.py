@@ -45,7 +45,8 @@ def error_map(reference: NDArray[np.float64], test: NDArray[np.float64]) -> Pict
     mean = float(reference[finite].mean()) if finite.any() else 0.0
     with np.errstate(invalid="ignore", divide="ignore"):
         relative = (test - reference) / np.maximum(reference, 1e-3 * mean)
-    relative = np.where(finite, relative, 0)
+    # Equal values have no error, also where both are black and the mean is 0.
+    relative = np.where(finite & (test != reference), relative, 0)
     worst = np.take_along_axis(relative, np.abs(relative).argmax(axis=-1)[..., None], axis=-1)[..., 0]
     decades = np.log10(ERROR_CEILING / ERROR_FLOOR)
     size = np.clip(np.log10(np.maximum(np.abs(worst), 1e-30) / ERROR_FLOOR) / decades, 0, 1)
