@@ -40,7 +40,7 @@ def scene_data(study: SceneStudy) -> dict[str, Any]:
     truth = study.truth
     finite = np.isfinite(truth.airlight)
     height, width = truth.distance.shape
-    mean = float(truth.airlight[finite].mean())
+    mean = float(truth.airlight[finite].mean()) if finite.any() else float("nan")
     return {
         "name": study.loaded.name,
         "purpose": study.loaded.purpose,
@@ -49,12 +49,14 @@ def scene_data(study: SceneStudy) -> dict[str, Any]:
         "size": [width, height],
         "plan": describe(study.plan),
         "notes": list(study.plan.notes),
-        "truth": {
-            "mean": mean,
-            "relative_bound": float(truth.airlight_bound[finite].mean()) / mean if mean > 0 else None,
-            "transitions": truth.transitions,
-            "missed": truth.missed,
-        },
+        "truth": plain(
+            {
+                "mean": mean,
+                "relative_bound": float(truth.airlight_bound[finite].mean()) / mean if mean > 0 else None,
+                "transitions": truth.transitions,
+                "missed": truth.missed,
+            }
+        ),
         "agreement": {layer: agreement_data(one) for layer, one in study.agreement.items()},
         "methods": [measurement_data(one) for one in study.measurements],
     }
@@ -97,13 +99,13 @@ def _trust(scenes: list[dict[str, Any]]) -> str:
     if not compared:
         return "There is no light to compare with Mitsuba's volpath: no airlight and no lit surface in any scene."
     failed = [f"{name} ({one['layer']})" for name, one in compared if not one["statistics"]["equivalent"]]
-    detectable = max(one["statistics"]["detectable_bias"] for _, one in compared)
     margin = 100 * compared[0][1]["statistics"]["margin"]
     if failed:
         return (
             f"The truth is NOT confirmed within {margin:g} % in {', '.join(failed)}: there the 95 % interval of "
             "volpath's relative bias is not inside the margin."
         )
+    detectable = max(one["statistics"]["detectable_bias"] for _, one in compared)
     return (
         f"The truth is confirmed by Mitsuba's volpath in {len(compared)} of {len(compared)} comparisons: the 95 % "
         f"interval of the pooled relative bias lies within ±{margin:g} %; the least bias that would have been found is "
@@ -113,7 +115,8 @@ def _trust(scenes: list[dict[str, Any]]) -> str:
 
 def _fastest(scene: dict[str, Any], target: float) -> str:
     measured = [m for m in scene["methods"] if m["error"] and m["error"]["relative_rmse"] is not None]
-    good = [m for m in measured if m["error"]["relative_rmse"] <= target]
+    # Pixels that are not finite are left out of the RMSE: a method that has any must not win by it.
+    good = [m for m in measured if m["error"]["relative_rmse"] <= target and not m["error"].get("nonfinite")]
     if not good:
         return f"{scene['name']}: no method reaches a relative RMSE of {100 * target:g} %."
     best = min(good, key=lambda m: m["times"]["frame"]["median_ms"])
