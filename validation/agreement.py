@@ -84,7 +84,8 @@ def agreement(
     return {
         layer: Agreement(
             layer,
-            *plain.distance.shape[::-1],
+            plain.distance.shape[1],
+            plain.distance.shape[0],
             len(volpath.seeds),
             volpath.samples,
             epsilon,

@@ -54,7 +54,7 @@ def _evaluate(cases: Cases, rows: NDArray[np.int64], name: str, function, precis
         types.color(1),
         Phase(name, g=types.scalar(cases.g[rows]) if name == "hg" else None),
     )
-    if cases.light is None:
+    if cases.light is None or cases.origin is None or cases.direction is None:
         light = Light("point", False, types.vector(0), types.color(1))
         geometry = RayGeometry(types.scalar(cases.foot[rows]), types.scalar(cases.height[rows]), None, None)
     else:

@@ -51,7 +51,7 @@ def volpath_reference(loaded: LoadedScene, *, samples: int, seed: int = 0, progr
     for number, name in enumerate(LAYERS):
         layers[name] = found.mean[number].reshape(shape)
         layers[f"{name}_se"] = found.standard_error[number].reshape(shape)
-    attributes = {
+    attributes: dict[str, str | int | float] = {
         "airlight:scene": loaded.name,
         "airlight:estimator": "volpath",
         "airlight:spp": batch * len(found.seeds),

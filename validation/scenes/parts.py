@@ -5,14 +5,14 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Vertices = NDArray[np.float64]  #: (vertices, 3)
 Faces = NDArray[np.int64]  #: (faces, 3), counter-clockwise seen from outside
 Mesh = tuple[Vertices, Faces]
 
 
-def lathe(radius: Sequence[float], height: Sequence[float], sides: int) -> Mesh:
+def lathe(radius: ArrayLike, height: ArrayLike, sides: int) -> Mesh:
     """Return the closed surface of a profile turned about the z axis: 2 sides len(radius) triangles.
 
     Parameters
@@ -22,9 +22,10 @@ def lathe(radius: Sequence[float], height: Sequence[float], sides: int) -> Mesh:
     sides
         Corners of each ring.
     """
+    radius, height = np.asarray(radius, dtype=np.float64), np.asarray(height, dtype=np.float64)
     angle = 2 * np.pi * np.arange(sides) / sides
     circle = np.stack([np.cos(angle), np.sin(angle), np.zeros(sides)], axis=1)
-    rings = np.asarray(radius)[:, None, None] * circle + np.asarray(height)[:, None, None] * np.array([0.0, 0.0, 1.0])
+    rings = radius[:, None, None] * circle + height[:, None, None] * np.array([0.0, 0.0, 1.0])
     count = len(radius)
     i = np.arange(sides)
     j = (i + 1) % sides
@@ -94,12 +95,13 @@ def fog(
 ) -> dict[str, Any]:
     """Return a homogeneous medium with the id 'fog'; `sigma_t` is grey or RGB [1/m]."""
     grey = isinstance(sigma_t, float)
-    scale = sigma_t if grey else max(sigma_t)  # type: ignore[arg-type]
+    channels = [sigma_t] if isinstance(sigma_t, float) else list(sigma_t)
+    scale = max(channels)
     return {
         "type": "homogeneous",
         "id": "fog",
         # An rgb value of Mitsuba lies in [0, 1]; the scale takes the rest.
-        "sigma_t": 1.0 if grey else {"type": "rgb", "value": [s / scale for s in sigma_t]},  # type: ignore[union-attr]
+        "sigma_t": 1.0 if grey else {"type": "rgb", "value": [value / scale for value in channels]},
         "scale": scale,
         "has_spectral_extinction": not grey,
         "albedo": {"type": "rgb", "value": list(albedo)},
