@@ -58,9 +58,11 @@ def _percent(value: float | None, digits: int = 3) -> str:
     return "\N{EN DASH}" if value is None else f"{_number(100 * value, digits)} %"
 
 
-def _interval(pair: list[float] | None) -> str:
+def _interval(pair: list[float | None] | None) -> str:
     """Return an interval of relative values in per cent."""
-    return "\N{EN DASH}" if pair is None else f"{100 * pair[0]:+.3f} … {100 * pair[1]:+.3f} %"
+    if pair is None or pair[0] is None or pair[1] is None:
+        return "\N{EN DASH}"
+    return f"{100 * pair[0]:+.3f} … {100 * pair[1]:+.3f} %"
 
 
 def _superscript(value: int) -> str:
