@@ -3,6 +3,7 @@
 
 import json
 import time
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from analytic.errors import InputError
 from reference.exr import Image, write_exr
 from reference.files import ensure_folder, write_text
 from reports.data import SCHEMA, claims, scene_data
@@ -59,6 +61,7 @@ def write_report(
     """
     from reports.environment import describe_environment
 
+    _refuse_twins(scenes)
     target = ensure_folder(folder)
     start = time.monotonic()
     found = []
@@ -83,6 +86,13 @@ def write_report(
     write_text(target / "report.json", json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
     write_text(target / "report.html", render_page(data, target))
     return data
+
+
+def _refuse_twins(scenes: Sequence[str]) -> None:
+    """Refuse scenes whose images would lie in one folder."""
+    for name, count in Counter(Path(scene).stem for scene in scenes).items():
+        if count > 1:
+            raise InputError(f"scenes: two scenes are called {name}; give each once, or rename one of the files")
 
 
 def _write_scene(target: Path, study: SceneStudy) -> dict[str, Any]:

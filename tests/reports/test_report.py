@@ -1,0 +1,229 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import json
+import re
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from analytic.errors import InputError
+from reports.page import _number, _percent
+from reports.report import _file_stem, write_report
+from validation.configurations import STANDARD, Configuration
+from validation.study import EFFORTS, Effort
+
+SCENE = """<scene version="3.0.0">
+    <medium type="homogeneous" id="fog">
+        <float name="sigma_t" value="0.31"/>
+        <rgb name="albedo" value="0.9, 0.8, 0.7"/>
+        <phase type="tabphase"><string name="values" value="0.3, 0.2, 0.4, 0.9, 2.0"/></phase>
+    </medium>
+    <emitter type="point">
+        <point name="position" value="0.9, 0.7, 1.9"/>
+        <rgb name="intensity" value="5, 4, 3"/>
+    </emitter>
+    <sensor type="perspective">
+        <float name="fov" value="41.7"/>
+        <transform name="to_world"><lookat origin="0.2, -4.1, 1.3" target="0.1, 0, 0.6" up="0, 0, 1"/></transform>
+        <ref name="medium" id="fog"/>
+        <film type="hdrfilm"><integer name="width" value="16"/><integer name="height" value="12"/></film>
+    </sensor>
+    <shape type="sphere"><point name="center" value="0.1, 0.1, 0.7"/><float name="radius" value="0.41"/></shape>
+    <shape type="rectangle"><transform name="to_world"><scale value="6.3"/></transform></shape>
+</scene>
+"""
+TINY = Effort("tiny", (20, 15), (12, 9), (10, 8), 0.5, 0.01)
+MARCH = Configuration("ray-march", None, (("steps", 50),))
+CHOSEN = (Configuration("unshadowed", "taylor"), Configuration("unshadowed", "quadrature"), MARCH)
+
+
+@pytest.fixture(scope="module")
+def written(variant, tmp_path_factory):
+    """A report of one small scene; taylor refuses its tabulated phase function."""
+    folder = tmp_path_factory.mktemp("report")
+    (folder / "my <fog>.xml").write_text(SCENE)
+    told = []
+    data = write_report(
+        folder / "out" / "here",
+        scenes=[str(folder / "my <fog>.xml")],
+        effort=TINY,
+        configurations=CHOSEN,
+        command="airlight report --tiny",
+        progress=lambda share, what: told.append((share, what)),
+    )
+    return SimpleNamespace(folder=folder / "out" / "here", data=data, told=told)
+
+
+def test_json_file_is_what_is_returned(written):
+    def refuse(constant):
+        raise AssertionError(f"{constant} is not JSON")
+
+    text = (written.folder / "report.json").read_text(encoding="utf-8")
+    assert json.loads(text, parse_constant=refuse) == json.loads(json.dumps(written.data))
+
+
+def test_data_have_the_schema(written):
+    data = written.data
+    assert data["schema"] == "airlight-report/1"
+    assert re.fullmatch(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d [+-]\d{4}", data["created"])
+    assert data["command"] == "airlight report --tiny"
+    assert data["settings"]["name"] == "tiny"
+    assert data["environment"]["versions"]["mitsuba"]
+    (scene,) = data["scenes"]
+    assert scene["name"] == "my <fog>"
+    assert scene["path"].endswith("my <fog>.xml")
+    assert scene["size"] == [20, 15]
+    assert set(scene["agreement"]) == {"airlight", "surface"}
+    assert [one["label"] for one in scene["methods"]] == [one.label for one in CHOSEN]
+
+
+def test_claims_follow_from_the_numbers(written):
+    (scene,) = written.data["scenes"]
+    assert "confirmed by Mitsuba's volpath in 2 of 2 comparisons" in written.data["claims"][0]
+    assert written.data["claims"][-1] == "Refused, with the reason in the tables: unshadowed (taylor) in my <fog>."
+    rmse = {one["label"]: one["error"]["relative_rmse"] for one in scene["methods"] if one["error"]}
+    reached = min(rmse.values()) <= 0.01
+    assert ("no method reaches a relative RMSE of 1 %" in written.data["claims"][1]) is not reached
+
+
+def test_refused_method_has_its_reason_and_no_files(written):
+    taylor = written.data["scenes"][0]["methods"][0]
+    assert "tabulated" in taylor["refused"]
+    assert taylor["files"] == {}
+    assert taylor["times"] is taylor["error"] is None
+
+
+def test_every_file_that_is_named_is_there(written):
+    (scene,) = written.data["scenes"]
+    named = [*scene["files"].values(), *(name for one in scene["methods"] for name in one["files"].values())]
+    assert len(named) == len(set(named)) == 3 + 2 * 3
+    assert all((written.folder / name).stat().st_size > 0 for name in named)
+    there = {str(path.relative_to(written.folder)) for path in written.folder.rglob("*") if path.is_file()}
+    assert there == {*named, "report.json", "report.html"}
+
+
+def test_images_can_be_read_and_give_the_errors_of_the_table(written):
+    from reference.exr import read_exr
+    from validation.metrics import error_metrics
+
+    (scene,) = written.data["scenes"]
+    reference = read_exr(written.folder / scene["files"]["exr"])
+    assert set(reference.layers) >= {"airlight", "airlight_bound", "surface"}
+    assert reference.attributes["airlight:estimator"] == "quadrature"
+    assert reference.layers["airlight"].shape == (15, 20, 3)
+    for one in scene["methods"][1:]:
+        image = read_exr(written.folder / one["files"]["exr"])
+        found = error_metrics(reference.layers["airlight"], image.layers["airlight"])
+        # The file of the reference is rounded to float32: 6e-8 of the mean in each pixel.
+        assert found.relative_rmse == pytest.approx(one["error"]["relative_rmse"], abs=2e-7)
+        assert found.relative_bias == pytest.approx(one["error"]["relative_bias"], abs=2e-7)
+        assert image.attributes["airlight:method"] == one["method"]
+    assert image.attributes["airlight:steps"] == "50"
+
+
+def test_pictures_have_the_size_of_the_images(written):
+    from PIL import Image
+
+    (scene,) = written.data["scenes"]
+    for one in scene["methods"][1:]:
+        for kind in ("picture", "error"):
+            with Image.open(written.folder / one["files"][kind]) as picture:
+                assert picture.size == (20, 15)
+    with Image.open(written.folder / scene["files"]["picture"]) as picture:
+        pixels = np.asarray(picture)
+    # The exposure brings the 99th percentile to 0.9, sRGB 243.
+    assert 235 <= np.percentile(pixels, 99) <= 255
+
+
+def test_every_number_of_the_data_is_on_the_page(written):
+    page = (written.folder / "report.html").read_text(encoding="utf-8")
+    (scene,) = written.data["scenes"]
+    for one in scene["methods"][1:]:
+        for name in ("frame", "airlight", "surface", "rebuild"):
+            assert f">{_number(one['times'][name]['median_ms'])}<" in page
+        for name in ("relative_rmse", "relative_bias", "p50", "p99"):
+            assert f">{_percent(one['error'][name])}<" in page
+    for agreed in scene["agreement"].values():
+        assert _percent(agreed["statistics"]["relative_bias"]) in page
+        assert _percent(agreed["uncorrected_bias"]) in page
+    assert _number(scene["truth"]["mean"], 5) in page
+    assert str(scene["truth"]["transitions"]) in page
+    assert "my &lt;fog&gt;" in page
+    assert "my <fog>" not in page
+    assert not re.search(r"""(src|href)\s*=\s*["']?(https?:)?//""", page)
+
+
+def test_progress_rises_to_one(written):
+    shares = [share for share, _ in written.told]
+    assert shares == sorted(shares)
+    assert shares[0] == 0.0
+    assert shares[-1] == pytest.approx(1.0)
+    assert all(what.startswith("my <fog>: ") for _, what in written.told)
+
+
+def test_second_report_replaces_the_first(written, variant):
+    before = json.loads((written.folder / "report.json").read_text())
+    again = write_report(
+        written.folder,
+        scenes=[before["scenes"][0]["path"]],
+        effort=TINY,
+        configurations=CHOSEN,
+        command="airlight report --tiny",
+    )
+    # From the same truth and the same frames: all but the times.
+    for one, two in zip(before["scenes"][0]["methods"], again["scenes"][0]["methods"], strict=True):
+        assert one["error"] == two["error"]
+    assert before["scenes"][0]["agreement"] == again["scenes"][0]["agreement"]
+
+
+def test_folder_that_is_a_file_is_refused_before_the_work(variant, tmp_path):
+    (tmp_path / "taken").write_text("mine")
+    with pytest.raises(InputError, match="not a folder"):
+        write_report(tmp_path / "taken", scenes=["open-fog"], effort=TINY)
+    assert (tmp_path / "taken").read_text() == "mine"
+
+
+def test_scenes_of_one_name_are_refused_before_the_work(variant, tmp_path):
+    """Their images would lie in one folder, and the second would replace the first."""
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "x.xml").write_text(SCENE)
+    names = [str(tmp_path / folder / "x.xml") for folder in ("a", "b")]
+    with pytest.raises(InputError, match="two scenes are called x"):
+        write_report(tmp_path / "out", scenes=names, effort=TINY)
+
+
+def test_unknown_scene_leaves_no_page(variant, tmp_path):
+    with pytest.raises(InputError, match="did you mean 'open-fog'"):
+        write_report(tmp_path, scenes=["open-fg"], effort=TINY)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_files_of_configurations_do_not_collide():
+    stems = [_file_stem(one.label) for one in STANDARD]
+    assert len(set(stems)) == len(stems)
+    assert all(re.fullmatch(r"[a-z0-9-]+", stem) for stem in stems)
+    assert "reference" not in stems
+
+
+def test_efforts_cost_more_and_promise_more_in_turn():
+    quick, default, full = (EFFORTS[name] for name in ("quick", "default", "full"))
+    for less, more in ((quick, default), (default, full)):
+        assert less.margin > more.margin
+        assert less.volpath[0] < more.volpath[0]
+        assert less.image[0] < more.image[0]
+        assert less.seconds < more.seconds
+
+
+@pytest.mark.slow
+@pytest.mark.statistical
+def test_built_in_scene_with_all_standard_configurations(variant, tmp_path):
+    data = write_report(tmp_path, scenes=["open-fog", "sphere-spot"], effort=TINY)
+    fog, spot = data["scenes"]
+    assert fog["plan"]["shadows"].startswith("none")
+    assert set(fog["agreement"]) == {"airlight"}
+    assert len(fog["methods"]) < len(spot["methods"]) == len(STANDARD)
+    best = {one["label"]: one["error"]["relative_rmse"] for one in fog["methods"]}
+    # 16 nodes without any shadow are the integral itself; float32 and the light in view leave 1e-5.
+    assert best["unshadowed (quadrature)"] < 1e-4
+    assert not any(one["error"]["nonfinite"] for scene in data["scenes"] for one in scene["methods"])
