@@ -186,3 +186,75 @@ def test_damaged_batches_are_traced_again(scene, own_cache):
 def test_one_batch_is_refused(scene):
     with pytest.raises(ValueError, match="at least 2"):
         volpath_batches(scene, batches=1, samples=4)
+
+
+@pytest.fixture
+def loaded(scene):
+    from validation.load import LoadedScene
+
+    return LoadedScene("tiny", scene, "A tiny scene.", "")
+
+
+def test_quadrature_reference_is_the_truth_in_layers(loaded, own_cache):
+    from validation.references import quadrature_reference
+
+    told = []
+    image = quadrature_reference(loaded, progress=lambda *args: told.append(args))
+    truth = truth_image(loaded.scene)
+    assert set(image.layers) == {"airlight", "airlight_bound", "surface"}
+    for name, layer in image.layers.items():
+        np.testing.assert_array_equal(layer, getattr(truth, name))
+    np.testing.assert_array_equal(image.depth, truth.distance)
+    assert image.attributes["airlight:estimator"] == "quadrature"
+    assert told[-1] == (1.0, "quadrature")
+
+
+def test_volpath_reference_has_layers_with_standard_errors(loaded, own_cache):
+    from validation.references import volpath_reference
+
+    image = volpath_reference(loaded, samples=3, seed=5)
+    found = volpath_batches(loaded.scene, batches=3, samples=1, first_seed=5)
+    assert set(image.layers) == {"airlight", "airlight_se", "surface", "surface_se"}
+    np.testing.assert_array_equal(image.layers["surface"].reshape(-1, 3), found.mean[1])
+    np.testing.assert_array_equal(image.layers["airlight_se"].reshape(-1, 3), found.standard_error[0])
+    attributes = image.attributes
+    assert [attributes[f"airlight:{name}"] for name in ("estimator", "spp", "batches", "seed")] == ["volpath", 3, 3, 5]
+    np.testing.assert_array_equal(image.depth, truth_image(loaded.scene, samples=16).distance)
+
+
+@pytest.mark.parametrize("samples", [1, 2, 31, 64, 100, 8192, 8193, 100_000])
+def test_samples_are_split_into_batches_that_have_at_least_as_many(loaded, monkeypatch, samples):
+    import validation.references
+
+    asked = {}
+
+    def split(scene, **kwargs):
+        asked.update(kwargs)
+        raise KeyboardInterrupt  # the split is all that this test wants
+
+    monkeypatch.setattr(validation.references, "volpath_batches", split)
+    with pytest.raises(KeyboardInterrupt):
+        validation.references.volpath_reference(loaded, samples=samples)
+    batches, each = asked["batches"], asked["samples"]
+    assert batches >= min(32, max(2, samples))  # 32 give a standard error that is known to 13 %
+    assert 1 <= each <= 256
+    # Never less than asked for, and not a whole batch more, but for the two that a standard error needs.
+    assert samples <= batches * each < samples + max(each, 2)
+
+
+@pytest.mark.statistical
+def test_volpath_reference_compares_with_the_quadrature_by_its_standard_errors(loaded, own_cache):
+    """The two references go through the comparison of image files as a user's would."""
+    from validation.compare import compare_images
+    from validation.references import quadrature_reference, volpath_reference
+
+    found = compare_images(quadrature_reference(loaded), volpath_reference(loaded, samples=512), layer="surface")
+    assert found.statistics is not None
+    # 32 batches: the standard deviation of z is sqrt(31/29) = 1.03; some 60 values, so +-0.1.
+    assert found.statistics.z_std == pytest.approx(1.03, abs=0.35)
+    assert found.statistics.rejected == 0
+
+
+def test_fewer_batches_than_are_kept_are_at_least_those_asked_for(scene, own_cache):
+    more = volpath_batches(scene, batches=4, samples=4)
+    assert_same(volpath_batches(scene, batches=2, samples=4), more)
