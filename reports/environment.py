@@ -66,19 +66,21 @@ def prepare(variant: str | None = None) -> Prepared:
     variant = variant or os.environ.get(VARIANT_VARIABLE) or None
     if variant is not None:
         check_variant(variant)
-    problem = atomic_problem()
-    if problem:
-        raise MissingError(f"{problem}: install it with `{install_line(['libatomic1'])}`")
     if variant == "cuda_ad_rgb" or variant is None:
         reason = cuda_problem()
         if variant is not None and reason:
             raise MissingError(f"the variant cuda_ad_rgb does not work here: {reason}; use --variant llvm_ad_rgb")
         variant = "llvm_ad_rgb" if reason else "cuda_ad_rgb"
+    on_processor = variant == "llvm_ad_rgb"
+    if on_processor and not _has_fma():
+        raise MissingError("the processor has no fused multiply-add (FMA), which Dr.Jit needs: use another machine")
     llvm = next(iter(find_llvm()), None)
-    problem = llvm_problem(llvm)
-    if problem and variant == "llvm_ad_rgb":
-        raise MissingError(problem)
-    if problem or llvm is None:
+    problems = [problem for problem in (llvm_problem(llvm) if on_processor else "", atomic_problem()) if problem]
+    if problems:
+        packages = missing_packages()
+        install = f". Install what is missing with `{install_line(packages)}`" if packages else ""
+        raise MissingError("; ".join(problems) + install)
+    if llvm is None or not llvm.works:
         return Prepared(variant, None)
     os.environ[LLVM_VARIABLE] = llvm.path
     return Prepared(variant, llvm)
@@ -99,7 +101,10 @@ def activate(variant: str | None = None) -> str:
     except ImportError as error:
         raise MissingError(f"mitsuba cannot be imported ({error}): run `pip install mitsuba==3.9.1`") from error
 
-    mi.set_variant(chosen.variant)
+    try:
+        mi.set_variant(chosen.variant)
+    except ImportError as error:  # a library that is there and cannot be loaded
+        raise MissingError(f"{chosen.variant} does not start ({error}); see `airlight doctor`") from error
     return chosen.variant
 
 
@@ -134,23 +139,19 @@ def cuda_problem() -> str:
 
 
 def llvm_problem(llvm: Llvm | None) -> str:
-    """Say why no kernel can be compiled for the processor and what to type; an empty string if one can."""
-    if not _has_fma():
-        return "the processor has no fused multiply-add (FMA), which Dr.Jit's LLVM backend needs: use another machine"
-    if llvm is not None and llvm.works:
-        return ""
-    install = f"install LLVM with `{install_line(['libllvm19'])}`"
+    """Say what is wrong with the best libLLVM; nothing wrong gives an empty string."""
     if llvm is None:
-        return f"no libLLVM found, {OLDEST_LLVM} or newer is needed: {install}, or set {LLVM_VARIABLE}"
+        return f"no libLLVM found, {OLDEST_LLVM} or newer is needed (set {LLVM_VARIABLE} if it lies elsewhere)"
+    if llvm.works:
+        return ""
     if os.environ.get(LLVM_VARIABLE) == llvm.path:
-        return f"{LLVM_VARIABLE} names {llvm.path}, which does not work ({llvm.reason}): unset it, or {install}"
-    return f"the newest libLLVM here, {llvm.path}, does not work ({llvm.reason}): {install}"
+        return f"{LLVM_VARIABLE} names {llvm.path}, which does not work ({llvm.reason}); unset it or name another"
+    return f"the newest libLLVM here, {llvm.path}, does not work ({llvm.reason})"
 
 
 def missing_packages() -> list[str]:
     """Return Debian's names of the packages that are missing here."""
-    llvm = next(iter(find_llvm()), None)
-    missing = [] if llvm is not None and llvm.works else ["libllvm19"]
+    missing = [] if any(llvm.works for llvm in find_llvm()) else ["libllvm19"]
     return [*missing, "libatomic1"] if atomic_problem() else missing
 
 

@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`airlight test [PYTEST ARGUMENTS]`: the tests of this checkout."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+# Processes that share the tests; Dr.Jit's kernels already use every processor.
+_WORKERS = 2
+
+
+def run_tests(
+    context: typer.Context,
+    fast: Annotated[bool, typer.Option("--fast", help="Leave the statistical and the slow tests out.")] = False,
+    workers: Annotated[int, typer.Option(min=0, help="Processes that share the tests; 0 for this one.")] = _WORKERS,
+) -> None:
+    """Run the tests of the source checkout; other arguments go to pytest, paths are relative to the checkout."""
+    import os
+    import sys
+
+    from reports.environment import MissingError, prepare
+
+    root = Path(__file__).resolve().parent.parent
+    if not (root / "tests").is_dir():
+        raise MissingError(
+            f"there are no tests in {root}, they come with the source only: clone it and run `./airlight test` there"
+        )
+    prepare()
+    command = [sys.executable, "-m", "pytest"]
+    command += ["-n", str(workers)] if workers else []
+    command += ["-m", "not statistical and not slow"] if fast else []
+    os.chdir(root)
+    sys.stdout.flush()
+    os.execv(sys.executable, [*command, *context.args])
