@@ -1,0 +1,191 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The rules of the project as a whole: style, types, who may import whom, what a wheel holds."""
+
+import ast
+import subprocess
+import sys
+import tomllib
+import zipfile
+from contextlib import suppress
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+from packaging.version import Version
+
+ROOT = Path(__file__).parent.parent
+FOLDERS = ("analytic", "realtime", "reference", "validation", "reports")
+MODULES = sorted([ROOT / "airlight.py", *(path for folder in FOLDERS for path in (ROOT / folder).rglob("*.py"))])
+
+# The design's table: whom each may import. What a folder holds may import itself.
+ALLOWED = {
+    "analytic": set(),
+    "realtime": set(),
+    "reference": {"analytic"},
+    "validation": {"analytic", "realtime", "reference"},
+    "reports": {"analytic", "realtime", "reference", "validation"},
+    "airlight": set(FOLDERS),
+}
+# Within the side of truth, the volpath estimator and the integrals share none of their derivations.
+UNRELATED = [("reference/volpath.py", {"reference.quadrature", "reference.surface", "analytic"})]
+
+
+def _python(*arguments: str, **options) -> subprocess.CompletedProcess:
+    command = [sys.executable, *arguments]
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300, **options)
+
+
+@pytest.mark.parametrize("arguments", [("ruff", "check"), ("ruff", "format", "--check"), ("mypy",)], ids=" ".join)
+def test_style_and_types(arguments):
+    ran = _python("-m", *arguments)
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+
+
+def _imports(tree: ast.AST) -> list[str]:
+    """Return every module that a file imports, also inside functions."""
+    found = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            found += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, "relative imports hide who imports whom"
+            found += [f"{node.module}.{alias.name}" for alias in node.names]
+    return found
+
+
+def _forbidden(owner: str, source: str) -> list[str]:
+    ours = {name for name in _imports(ast.parse(source)) if name.split(".")[0] in ALLOWED}
+    return sorted(name for name in ours if name.split(".")[0] not in ALLOWED[owner] | {owner})
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_who_may_import_whom(path):
+    owner = path.relative_to(ROOT).parts[0].removesuffix(".py")
+    assert _forbidden(owner, path.read_text()) == []
+
+
+def test_the_walk_over_imports_finds_what_is_forbidden():
+    source = "def f():\n    from analytic import phase\n    import numpy\n    import validation.load\n"
+    assert _forbidden("realtime", source) == ["analytic.phase", "validation.load"]
+    assert _forbidden("reference", source) == ["validation.load"]
+
+
+@pytest.mark.parametrize(("path", "others"), UNRELATED, ids=lambda value: value if isinstance(value, str) else "")
+def test_estimators_of_the_truth_share_no_derivation(path, others):
+    # errors are words, no derivation
+    imported = [name for name in _imports(ast.parse((ROOT / path).read_text())) if "errors" not in name]
+    assert not [name for name in imported if any(name == other or name.startswith(f"{other}.") for other in others)]
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_modules_are_short_and_licensed(path):
+    lines = path.read_text().splitlines()
+    assert lines[0] == "# SPDX-License-Identifier: BSD-3-Clause"
+    assert len(lines) <= 400
+
+
+def test_only_one_place_sets_the_mitsuba_variant():
+    setters = {
+        str(path.relative_to(ROOT))
+        for path in MODULES
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.Attribute) and node.attr in ("set_variant", "scoped_set_variant", "variant_context")
+    }
+    assert setters == {"reports/environment.py"}
+
+
+def test_importing_everything_sets_no_variant():
+    names = [".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__") for path in MODULES]
+    code = f"import importlib\nfor name in {names!r}: importlib.import_module(name)\n"
+    code += "import mitsuba; assert mitsuba.variant() is None, mitsuba.variant()"
+    ran = _python("-W", "error", "-c", code)
+    assert ran.returncode == 0, ran.stderr
+
+
+def test_the_front_door_and_help_import_nothing_heavy():
+    heavy = ("mitsuba", "drjit", "numpy", "scipy", "mpmath", "matplotlib", "colour", "OpenEXR", "jinja2")
+    code = (
+        "import sys, airlight\n"
+        "sys.argv = ['airlight', '--help']\n"
+        "try: airlight.main()\n"
+        "except SystemExit as end: assert not end.code, end.code\n"
+        f"loaded = [name for name in {heavy!r} if name in sys.modules]\n"
+        "assert not loaded, loaded"
+    )
+    ran = _python("-c", code)
+    assert ran.returncode == 0, ran.stderr
+    assert "report" in ran.stdout
+
+
+def _locked() -> dict[str, str]:
+    lines = (ROOT / "requirements.lock").read_text().splitlines()
+    pairs = [line.split("==") for line in lines if line and not line.startswith("#")]
+    return {canonicalize_name(name): pinned for name, pinned in pairs}
+
+
+def _project() -> dict:
+    return tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+
+
+def test_the_lock_pins_what_the_project_asks_for_and_all_that_it_needs():
+    locked = _locked()
+    project = _project()
+    waiting = [Requirement(text) for text in project["dependencies"] + project["optional-dependencies"]["test"]]
+    checked = set()
+    while waiting:
+        wanted = waiting.pop()
+        name = canonicalize_name(wanted.name)
+        assert name in locked, f"{wanted} is not in requirements.lock"
+        assert wanted.specifier.contains(locked[name], prereleases=True), f"{wanted}, locked is {locked[name]}"
+        if name in checked:
+            continue
+        checked.add(name)
+        try:
+            needs = _requires(wanted.name)
+        except PackageNotFoundError:
+            pytest.skip(f"{wanted.name} is not installed here, so what it needs is unknown")
+        waiting += [need for need in needs if need.marker is None or need.marker.evaluate({"extra": ""})]
+    assert checked == set(locked), "requirements.lock holds what nothing needs"
+
+
+def _requires(name: str) -> list[Requirement]:
+    from importlib.metadata import requires
+
+    return [Requirement(text) for text in requires(name) or []]
+
+
+def test_citation_and_version_agree():
+    from reports import __version__
+
+    assert f"version: {__version__}\n" in (ROOT / "CITATION.cff").read_text()
+    with suppress(PackageNotFoundError):  # not installed where it runs from the source
+        assert version("airlight") == __version__
+
+
+@pytest.mark.slow
+def test_the_wheel_holds_the_packages_and_nothing_else(tmp_path):
+    if Version(version("setuptools")) < Version("77"):
+        pytest.skip("needs setuptools 77 or newer, which understands the licence field")
+    source, out = tmp_path / "source", tmp_path / "out"
+    source.mkdir()
+    # Built from a copy: setuptools writes its build folder beside the sources.
+    tracked = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True)
+    if tracked.returncode:
+        pytest.skip("not a git checkout, so what belongs to the project is unknown")
+    for name in tracked.stdout.splitlines():
+        if (ROOT / name).is_file():
+            (source / name).parent.mkdir(parents=True, exist_ok=True)
+            (source / name).write_bytes((ROOT / name).read_bytes())
+    build = ("-m", "pip", "wheel", "--no-deps", "--no-build-isolation", "--no-index", "-q", "-w", str(out), str(source))
+    ran = _python(*build)
+    assert ran.returncode == 0, ran.stderr
+    (wheel,) = out.iterdir()
+    with zipfile.ZipFile(wheel) as archive:
+        held = {name for name in archive.namelist() if not name.endswith("/")}
+        scripts = archive.read(next(name for name in held if name.endswith("entry_points.txt"))).decode()
+    assert "airlight = airlight:main" in scripts
+    content = {name for name in held if ".dist-info/" not in name}
+    expected = {name for name in tracked.stdout.splitlines() if name == "airlight.py" or name.startswith(FOLDERS)}
+    assert content == {name for name in expected if (ROOT / name).is_file()}
