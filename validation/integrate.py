@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from analytic.cases import Cases
 from reference.files import write_text
-from validation.configurations import kernel_function
+from validation.kernel_choice import find_kernel
+from validation.kernel_values import evaluate_rows
 
 Array = NDArray[np.float64]
 
@@ -26,47 +27,16 @@ def integrate_cases(cases: Cases, kernel: str, precision: str) -> Array:
     cases
         From `analytic.cases.read_cases`; where it has rays, foot and height are computed from them in `precision`.
     kernel
-        A name of `realtime.kernels.KERNELS` or 'module:function'.
+        See `validation.kernel_choice.find_kernel`.
     precision
         'single' or 'double'.
     """
-    function = kernel_function(kernel)
+    function = find_kernel(kernel)
     results = np.empty(len(cases.x0))
     for name in dict.fromkeys(cases.phase):
         rows = np.flatnonzero(np.asarray(cases.phase) == name)
-        results[rows] = _evaluate(cases, rows, str(name), function, precision)
+        results[rows] = evaluate_rows(cases, rows, function, precision)
     return results
-
-
-def _evaluate(cases: Cases, rows: NDArray[np.int64], name: str, function, precision: str) -> Array:
-    """Evaluate the cases of one phase function."""
-    import drjit as dr
-
-    from realtime.arrays import array_types
-    from realtime.geometry import RayGeometry, ray_geometry
-    from realtime.lights import Light
-    from realtime.medium import Medium
-    from realtime.phase import Phase
-
-    types = array_types(precision)
-    medium = Medium(
-        (types.scalar(cases.sigma_t[rows]),),
-        types.color(1),
-        Phase(name, g=types.scalar(cases.g[rows]) if name == "hg" else None),
-    )
-    if cases.light is None or cases.origin is None or cases.direction is None:
-        light = Light("point", False, types.vector(0), types.color(1))
-        geometry = RayGeometry(types.scalar(cases.foot[rows]), types.scalar(cases.height[rows]), None, None)
-    else:
-        light = Light("point", False, types.vector(cases.light[rows].T), types.color(1))
-        # A file's directions have unit length to the digits they are written with.
-        given = types.vector(cases.direction[rows].T)
-        scale = dr.rsqrt(dr.squared_norm(given))
-        direction = given * scale
-        low = dr.fma(given, scale, -direction)
-        geometry = ray_geometry(types.vector(cases.origin[rows].T), direction, light, low=low)
-    x0, x1 = types.scalar(cases.x0[rows]), types.scalar(cases.x1[rows])
-    return np.array(function(geometry, x0, x1, medium, light), dtype=np.float64)
 
 
 def summary(cases: Cases, results: Array) -> dict[str, Any]:
