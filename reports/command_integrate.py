@@ -11,7 +11,7 @@ def integrate(
     cases: Annotated[
         Path, typer.Argument(help="CSV with the columns of tests/data; x1 may be inf.", show_default=False)
     ],
-    kernel: Annotated[str, typer.Option(help="Airlight kernel, see `airlight kernels`.")] = "quadrature",
+    kernel: Annotated[str, typer.Option(help="Airlight kernel, see `airlight kernels`.")] = "exact",
     precision: Annotated[str, typer.Option(help="single or double.")] = "single",
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Write the rows with a column `result`.")

@@ -1,16 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Configurations: a method with a kernel and the values of its parameters, as a user names them."""
 
-import importlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from analytic.errors import InputError
 from realtime.frame import FrameRenderer, frame_renderer
-from realtime.kernels import KERNELS
 from realtime.methods import METHODS
 from realtime.scene import Scene
+from validation.kernel_choice import find_kernel
 from validation.load import nearest
 
 
@@ -34,6 +33,7 @@ class Configuration:
 STANDARD: tuple[Configuration, ...] = (
     Configuration("unshadowed", "taylor"),
     Configuration("unshadowed", "quadrature"),
+    Configuration("unshadowed", "exact"),
     Configuration("ray-march", None, (("steps", 16),)),
     Configuration("ray-march", None, (("steps", 100),)),
     Configuration("ray-march", None, (("steps", 100), ("spacing", "uniform"))),
@@ -50,8 +50,7 @@ def configuration(method: str, kernel: str | None = None, parameters: Mapping[st
     method
         A name of `realtime.methods.METHODS`.
     kernel
-        A name of `realtime.kernels.KERNELS`, or 'module:function' for one's own; 'quadrature' by default for methods
-        that call a kernel.
+        See `validation.kernel_choice.find_kernel`; 'exact' by default for methods that call a kernel.
     parameters
         Values of the method's parameters; words are converted to the type of the default.
 
@@ -66,7 +65,7 @@ def configuration(method: str, kernel: str | None = None, parameters: Mapping[st
     if not record.uses_kernel and kernel is not None:
         raise InputError(f"method {method}: got the kernel {kernel!r}, but this method calls no kernel: leave it out")
     if record.uses_kernel:
-        kernel = kernel or "quadrature"
+        kernel = kernel or "exact"
         kernel_function(kernel)
     values = [(name, _converted(record, name, value)) for name, value in (parameters or {}).items()]
     return Configuration(method, kernel, tuple(values))
@@ -93,21 +92,8 @@ def parse_settings(settings: Sequence[str]) -> dict[str, str]:
 
 
 def kernel_function(name: str):
-    """Return the kernel function of a name, or of 'module:function'."""
-    if name in KERNELS:
-        return KERNELS[name].function
-    if ":" in name:
-        module, _, function = name.partition(":")
-        try:
-            found = getattr(importlib.import_module(module), function)
-        except (ImportError, AttributeError, ValueError) as error:
-            raise InputError(
-                f"kernel: cannot load {name!r}: {error}; wanted an importable 'module:function'"
-            ) from error
-        if not callable(found):
-            raise InputError(f"kernel: {name!r} is a {type(found).__name__}; wanted an importable 'module:function'")
-        return found
-    raise InputError(f"kernel: got {name!r}, wanted one of {', '.join(KERNELS)}" + nearest(name, KERNELS))
+    """Return the kernel function of a name: see `validation.kernel_choice.find_kernel`."""
+    return find_kernel(name)
 
 
 def prepared(scene: Scene, chosen: Configuration) -> FrameRenderer:

@@ -17,7 +17,10 @@ from types import MappingProxyType
 from typing import Any
 
 from realtime.geometry import RayGeometry, clip_to_cone
+from realtime.kernels.exact import exact
+from realtime.kernels.marching import equiangular, uniform
 from realtime.kernels.quadrature import quadrature
+from realtime.kernels.quadrature_theta import quadrature_theta
 from realtime.kernels.taylor import taylor
 from realtime.lights import Light
 from realtime.medium import Medium
@@ -35,11 +38,17 @@ class Kernel:
 
 
 KERNELS: dict[str, Kernel] = {
+    "exact": Kernel(
+        "exact",
+        exact,
+        "the default: nodes placed by the phase function's lobe, accurate to float32",
+        "realtime/kernels/exact.py",
+    ),
     "quadrature": Kernel(
         "quadrature",
         quadrature,
         "Gauss-Legendre nodes in w = asinh(q/h)",
-        "DESIGN section 2; end points after notes on the path form",
+        "the path form of the airlight equation, realtime/kernels/quadrature.py",
         MappingProxyType({"nodes": 16}),
     ),
     "taylor": Kernel(
@@ -48,6 +57,27 @@ KERNELS: dict[str, Kernel] = {
         "polynomial in the angle theta about the foot, coefficients re-derived",
         "Biri, Arques, Michelin 2006, section 4.1 and annex",
         MappingProxyType({"degree": 4}),
+    ),
+    "quadrature-theta": Kernel(
+        "quadrature-theta",
+        quadrature_theta,
+        "Gauss-Legendre nodes in theta, the angle at the light",
+        "Biri, Arques, Michelin 2006, section 4.1 (the angle form)",
+        MappingProxyType({"nodes": 16}),
+    ),
+    "equiangular": Kernel(
+        "equiangular",
+        equiangular,
+        "midpoint steps in theta",
+        "Kulla, Fajardo 2012, section 4",
+        MappingProxyType({"steps": 16}),
+    ),
+    "uniform": Kernel(
+        "uniform",
+        uniform,
+        "midpoint steps in the distance: what most shaders do",
+        "Billeter, Sintorn, Assarsson 2010, section 2",
+        MappingProxyType({"steps": 100}),
     ),
 }
 

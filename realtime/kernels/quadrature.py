@@ -88,6 +88,28 @@ def _positive_nodes(nodes: int) -> tuple[tuple[float, float], ...]:
 def _panel(geometry: RayGeometry, x0, x1, sigma_t, medium: Medium, light: Light, nodes: int):
     import drjit as dr
 
+    h, e0, e1, difference = path_interval(geometry, x0, x1, sigma_t)
+    c0, c1 = dr.sqrt(dr.fma(e0, e0, 1)), dr.sqrt(dr.fma(e1, e1, 1))
+    half = 0.5 * dr.asinh(difference * ((e0 + e1) / dr.fma(e1, c0, e0 * c1)))
+    sinh, cosh = _sinh_cosh(half)
+    e_mid, c_mid = dr.fma(e0, cosh, c0 * sinh), dr.fma(c0, cosh, e0 * sinh)
+    return _pairs(
+        geometry,
+        (geometry.foot, h, sigma_t),
+        (half, e_mid, c_mid),
+        phase=medium.phase,
+        light=light,
+        nodes=_positive_nodes(nodes),
+    )
+
+
+def path_interval(geometry: RayGeometry, x0, x1, sigma_t):
+    """Return the height, E = q/h at both ends of a segment, and their difference without cancellation.
+
+    The far end is brought to where extinction or 1/(1 + E^2) have left nothing behind it.
+    """
+    import drjit as dr
+
     foot, h = geometry.foot, geometry.height
     Float = type(h)
     single = dr.itemsize_v(Float) == 4
@@ -95,7 +117,7 @@ def _panel(geometry: RayGeometry, x0, x1, sigma_t, medium: Medium, light: Light,
     s0, s1 = x0 - foot, x1 - foot
     h = dr.maximum(h, (1e-9 if single else 1e-17) * (dr.abs(s0) + dr.smallest(Float)))
     r0 = dr.sqrt(dr.fma(s0, s0, h * h))
-    e0, e1 = _path_over_height(s0, r0, h), None
+    e0 = _path_over_height(s0, r0, h)
     # Beyond the first term extinction has left e^-20 (e^-40); beyond the second, 1/(1+E^2) has.
     reach = dr.minimum((20.0 if single else 40.0) / (sigma_t * h), (1e7 if single else 1e16) * (1 + e0))
     s1 = dr.select(dr.isfinite(s1), s1, 0)
@@ -103,20 +125,7 @@ def _panel(geometry: RayGeometry, x0, x1, sigma_t, medium: Medium, light: Light,
     e1 = _path_over_height(s1, r1, h)
     clipped = dr.isinf(x1) | (e1 > e0 + reach)
     e1 = dr.select(clipped, e0 + reach, e1)
-    difference = dr.select(clipped, reach, (x1 - x0) * (e0 + e1) / (r0 + r1))
-
-    c0, c1 = dr.sqrt(dr.fma(e0, e0, 1)), dr.sqrt(dr.fma(e1, e1, 1))
-    half = 0.5 * dr.asinh(difference * ((e0 + e1) / dr.fma(e1, c0, e0 * c1)))
-    sinh, cosh = _sinh_cosh(half)
-    e_mid, c_mid = dr.fma(e0, cosh, c0 * sinh), dr.fma(c0, cosh, e0 * sinh)
-    return _pairs(
-        geometry,
-        (foot, h, sigma_t),
-        (half, e_mid, c_mid),
-        phase=medium.phase,
-        light=light,
-        nodes=_positive_nodes(nodes),
-    )
+    return h, e0, e1, dr.select(clipped, reach, (x1 - x0) * (e0 + e1) / (r0 + r1))
 
 
 def _path_over_height(s, r, h):

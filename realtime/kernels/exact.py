@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The default kernel: as few Gauss-Legendre nodes as float32 accuracy needs, placed by the phase function's own lobe.
+
+With E = q/h as in `realtime.kernels.quadrature`,
+
+    J = (2/h) exp(-sigma_t (x0 + r0)) int_{E0}^{E1} exp(-sigma_t h (E - E0)) p / (1 + E^2) dE,
+    sin^2(angle/2) = E^2/(1 + E^2),   cos^2(angle/2) = 1/(1 + E^2).
+
+The integrand varies on two scales: where the extinction and 1/(1 + E^2) do, E ~ 1, and where a forward lobe does. That
+of Henyey and Greenstein with g > 0 has the branch points E = +-i d, d = (1 - g)/(1 + g), so close to the real axis that
+nodes in asinh E, even below E = 1, step over it. The substitution
+
+    E = d sinh v,     dE = d cosh v dv
+
+is even where E < d and logarithmic above. It takes both pairs of singularities, +-i d and the poles +-i of 1/(1 + E^2)
+(and the branch points +-i/d of a backward lobe), to |Im v| = pi/2, whatever g is: one panel serves, and no cut at the
+foot point. For the lobes cos^16 and cos^64 of half the angle ("hazy", "murky"), whose poles lie at +-i already, d is
+their width.
+
+The numbers of nodes are the smallest with which the certified cases (tests/data, optical depths to 100, heights down to
+1e-7 of the distance) stay below 5e-6 in float32 and 3e-11 in float64, rounding left aside.
+
+From the near end on everything is a sum of positive terms: with F = E0/d, C = sqrt(1 + F^2) and the offset u from v0
+
+    E - E0 = d (F (cosh u - 1) + C sinh u),    cosh v = C cosh u + F sinh u,    cosh u - 1 = 2 sinh^2(u/2).
+
+The isotropic case has no lobe, and pairs of nodes about the centre share their exponentials: it is `quadrature` with 16
+nodes.
+"""
+
+from functools import lru_cache
+
+from realtime.exponential import exp_bounded
+from realtime.geometry import RayGeometry, clip_to_cone, falloff
+from realtime.kernels.quadrature import path_interval, quadrature
+from realtime.lights import Light
+from realtime.medium import Medium, per_extinction
+from realtime.phase import Phase, evaluate_half
+
+#: Nodes in float32 and float64, and the scale d of the substitution (Henyey-Greenstein: by g).
+_NODES = {
+    "isotropic": (16, 32),
+    "rayleigh": (24, 48),
+    "hazy": (32, 64),
+    "murky": (40, 96),
+    "hg": (30, 80),
+    "tabulated": (64, 96),
+}
+_SCALE = {"hazy": 0.7, "murky": 0.5}
+
+
+def exact(geometry: RayGeometry, x0, x1, medium: Medium, light: Light):
+    """Return the airlight integral J to the accuracy of the arithmetic [1/m].
+
+    Parameters
+    ----------
+    geometry, x0, x1, medium, light
+        See `realtime.kernels`.
+
+    Notes
+    -----
+    Valid for any extinction (vacuum included), any ray, the light beside the segment (height 0) included, any segment,
+    endless ones and those of length 0 included, and |g| < 1. A segment that holds the light at height 0 has an infinite
+    integral; the result is then a very large number or infinite.
+
+    Largest relative error found on the certified cases: see `airlight integrate`; in float32 below 3e-5 for |g| <= 0.9.
+    A tabulated phase function is integrated across its kinks: about 1e-4 for a coarse table. Where a spot's intensity
+    falls off between beam and cut-off, each of three panels has these nodes.
+    """
+    if medium.phase.name == "isotropic":
+        import drjit as dr
+
+        single = dr.itemsize_v(type(geometry.height)) == 4
+        return quadrature(geometry, x0, x1, medium, light, nodes=_NODES["isotropic"][0 if single else 1])
+    panels = [(x0, x1)]
+    if light.soft:
+        inner0, inner1 = clip_to_cone(geometry, light.cos_beam, x0, x1)
+        panels = [(x0, inner0), (inner0, inner1), (inner1, x1)]
+    return per_extinction(
+        medium, lambda sigma_t: sum(_panel(geometry, a, b, sigma_t, medium.phase, light) for a, b in panels)
+    )
+
+
+def _panel(geometry: RayGeometry, x0, x1, sigma_t, phase: Phase, light: Light):
+    import drjit as dr
+
+    Float = type(geometry.height)
+    h, e0, e1, difference = path_interval(geometry, x0, x1, sigma_t)
+    scale = _lobe_scale(phase, Float)
+    f0, f1 = e0 / scale, e1 / scale
+    c0, c1 = dr.sqrt(dr.fma(f0, f0, 1)), dr.sqrt(dr.fma(f1, f1, 1))
+    width = dr.asinh((difference / scale) * ((f0 + f1) / dr.fma(f1, c0, f0 * c1)))
+    decay = -sigma_t * h
+    total = Float(0)
+    for fraction, weight in _nodes(_NODES[phase.name][0 if dr.itemsize_v(Float) == 4 else 1]):
+        grown = exp_bounded(width * (0.5 * fraction))
+        shrunk = dr.rcp(grown)
+        sinh_half, cosh_half = 0.5 * (grown - shrunk), 0.5 * (grown + shrunk)
+        sinh, cosh_less = 2 * sinh_half * cosh_half, 2 * dr.square(sinh_half)
+        step = scale * dr.fma(f0, cosh_less, c0 * sinh)
+        e = e0 + step
+        up = dr.rcp(dr.fma(e, e, 1))
+        density = dr.fma(c0, cosh_less, dr.fma(f0, sinh, c0)) * up
+        value = exp_bounded(decay * step) * density * evaluate_half(phase, dr.square(e) * up, up)
+        if light.soft:
+            value *= falloff(geometry, light, geometry.foot + 0.5 * h * (e - dr.rcp(e)))
+        total += weight * value
+    r0 = dr.sqrt(dr.fma(x0 - geometry.foot, x0 - geometry.foot, h * h))
+    return total * (width * scale) * (2 / h) * dr.exp(-sigma_t * (x0 + r0))
+
+
+def _lobe_scale(phase: Phase, Float):
+    """Return the distance from the real axis of the singularity that is closest to forward scattering."""
+    import drjit as dr
+
+    if phase.name == "hg":
+        g = dr.maximum(Float(phase.g), 0)
+        return (1 - g) / (1 + g)
+    return Float(_SCALE.get(phase.name, 1.0))
+
+
+@lru_cache
+def _nodes(count: int) -> tuple[tuple[float, float], ...]:
+    """Return the Gauss-Legendre nodes and weights of [0, 1]."""
+    import numpy as np
+
+    xi, weight = np.polynomial.legendre.leggauss(count)
+    return tuple((float(0.5 + 0.5 * x), float(0.5 * w)) for x, w in zip(xi, weight))
