@@ -126,9 +126,7 @@ def _shift(tried: _Tried) -> tuple[Array, Array]:
     exact = _representable(
         tried.precision, (moved.foot, d, cases.foot), (moved.x0, d, cases.x0), (moved.x1, d, cases.x1)
     )
-    moved, cases = take(moved, exact), take(cases, exact)
-    before = tried.evaluate(cases)
-    return tried.evaluate(moved), before * np.exp(-cases.sigma_t * d[exact])
+    return tried.evaluate(take(moved, exact)), tried.J[exact] * np.exp(-cases.sigma_t * d)[exact]
 
 
 def _representable(precision: str, *sums: tuple[Array, Array, Array]) -> NDArray[np.bool_]:

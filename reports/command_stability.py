@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`airlight stability`: where kernels break."""
+
+from typing import Annotated
+
+import typer
+
+
+def stability(
+    kernels: Annotated[
+        str | None, typer.Option(help="Comma-separated: a kernel, 'name-N' or 'module:function'; all by default.")
+    ] = None,
+    rays: Annotated[int, typer.Option(min=64, max=1_000_000, help="Number of generated rays.")] = 100_000,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Try every kernel on certified values, on rays of every magnitude and against exact laws.
+
+    Errors come with the ray where they are largest, ready for `airlight integrate`. Exit status 1 if a kernel that
+    claims to be exact breaks its bar.
+    """
+    from reports.environment import activate, describe_environment
+    from reports.progress import progress_bar
+    from reports.stability_tables import print_stability
+    from reports.tables import print_json
+    from validation.stability import Bar, certified_files
+    from validation.stability import stability as run
+
+    names = None if kernels is None else [name.strip() for name in kernels.split(",") if name.strip()]
+    activate()
+    with progress_bar("stability") as tell:
+        found = run(names, count=rays, progress=lambda done, total, what: tell(done / total, what))
+    certified = [path.name for path in certified_files()]
+    if json:
+        from reports.data import plain
+
+        data = {"environment": describe_environment(), "certified": certified, "bar": Bar(), "kernels": found}
+        print_json(plain(data))
+    else:
+        print_stability(found, certified=bool(certified))
+    if any(kernel.broken for kernel in found):
+        raise typer.Exit(1)
