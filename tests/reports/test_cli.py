@@ -136,14 +136,13 @@ def test_tests_without_a_checkout_say_so(tmp_path, monkeypatch, capfd):
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
-        (["--fast", "-x"], ["-n", "2", "-m", "not statistical and not slow", "-x"]),
-        (["--workers", "0", "tests/test_project.py", "-k", "wheel"], ["tests/test_project.py", "-k", "wheel"]),
+        (["--fast", "-x"], ["-m", "not statistical and not slow", "-x"]),
+        (["--workers", "2", "tests/test_x.py", "-k", "wheel"], ["-n", "2", "tests/test_x.py", "-k", "wheel"]),
     ],
 )
 def test_tests_run_pytest_with_what_is_left(arguments, expected, monkeypatch, tmp_path):
     asked = {}
     monkeypatch.setattr(os, "execv", lambda program, command: asked.update(command=command))
-    monkeypatch.setattr("reports.command_test._WORKERS", 2)
     monkeypatch.chdir(tmp_path)
     assert cli.run(["test", *arguments]) == 0
     assert asked["command"] == [sys.executable, "-m", "pytest", *expected]
