@@ -26,7 +26,7 @@ the foot (E1 <= 1) takes two heads instead,
 where E/h = 1/(r - s), s = x - foot. So h = 0 beside the light is nothing special: there K = 1 - alpha exp(alpha)
 E1(alpha) or M = (1 - exp(-alpha))/alpha. Tabulated are (1 + alpha) K and (1 + alpha) M, which lie between 2/pi and 2
 for any extinction, over e or s in [0, 1] and b = alpha/(1 + alpha); over sqrt(b) for K, which has a term alpha log
-alpha.
+alpha. Interpolated bilinearly the relative error falls like log(size)/size^2.
 
 Both forms interpolate bilinearly, in software: the texture units of graphics hardware have 8-bit weights. A table holds
 the four corners of each cell side by side, one fetch a read.
@@ -64,15 +64,16 @@ def table(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, form: 
 
     Notes
     -----
-    Valid for x1 infinite, vacuum and segments of zero length (J = 0). Interpolation errs by about size^-2 of each read,
-    so a segment whose integral is small against the tails (slivers, and with 'sun' all that is beyond the light or far
-    before it) loses as much more as they are larger; small values can become negative.
+    Valid for x1 infinite, vacuum and segments of zero length (J = 0). Both forms are differences of reads, so where J
+    is small against them (slivers, and with 'sun' all that is flat: rays that leave the light behind, thick media)
+    errors grow as much, and small values can become negative.
 
-    'sun': sigma_t h > 10 is outside the table and reads its edge, u = 10, as published: the result is then wrong,
+    'sun': within 1 % for 64 entries where the ray passes near the light. sigma_t h > 10 is outside the table and reads its edge, u = 10, as published: the result is then wrong,
     mostly by orders of magnitude. A ray through the light's line, h = 0, gives NaN: the method divides by h. Where the
     light lies more than 88 optical depths behind the camera (709 in float64) exp(-sigma_t foot) overflows.
 
-    'tail': any extinction, h = 0 beside the light; a segment that holds the light gives +inf.
+    'tail': any extinction, h = 0 beside the light; a segment that holds the light gives +inf. With 64 entries the
+    largest relative error is about 3e-4, 1e-5 with 512; of slivers 1e-3, and 0.1 in float32.
 
     References
     ----------
@@ -101,8 +102,9 @@ def table(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, form: 
 def upload_table(Float, form: str, size: int):
     """Return a table on the device of `Float`, uploaded once and kept.
 
-    A frozen function can read an array that is there when it records, but cannot take one from the host: call this
-    first, or the kernel once, before anything that holds the kernel is frozen.
+    A frozen function cannot take an array from the host, and reads one on the device only if it is among its inputs.
+    So call the kernel once (or this) before anything that holds the kernel is frozen, and freeze with
+    ``state_fn=lambda *_, **__: resident``, where ``resident = resident_tables()``.
     """
     import drjit as dr
 
@@ -119,7 +121,12 @@ def upload_table(Float, form: str, size: int):
     return _UPLOADED[key]
 
 
-_UPLOADED: dict = {}
+def resident_tables() -> tuple:
+    """Return all tables that are on a device, for `drjit.freeze`'s `state_fn` (see `upload_table`)."""
+    return tuple(_UPLOADED.values())
+
+
+_UPLOADED: dict = {}  # (type, form, size) -> array
 
 
 def _sun(geometry: RayGeometry, ends, sigma_t, records, size: int):
@@ -133,7 +140,7 @@ def _sun(geometry: RayGeometry, ends, sigma_t, records, size: int):
         s = x - foot
         r = dr.sqrt(dr.fma(s, s, h * h))
         v = dr.select(s >= 0, dr.atan2(s + r, h), dr.atan2(h, r - s))
-        v = dr.select(dr.isinf(x), Float(dr.pi / 2), v)
+        v = dr.select(dr.isinf(r), Float(dr.pi / 2), v)
         reads.append(_read(records, (u, v * (2 / dr.pi)), size, 0))
     return 2 * dr.exp(-sigma_t * foot) / h * (reads[1] - reads[0])
 
@@ -158,7 +165,7 @@ def _tail(geometry: RayGeometry, ends, sigma_t, records, size: int):
         value = _read(records, (side, dr.select(head, b, dr.sqrt(b))), size, offset) / (1 + alpha)
         path = dr.select(head, foot, x + r)
         term = dr.exp(-sigma_t * path) * value / dr.select(head, r - s, chord)
-        terms.append(dr.select(dr.isinf(x), 0, term))
+        terms.append(dr.select(dr.isinf(r), 0, term))
     return 2 * dr.select(head, terms[1] - terms[0], terms[0] - terms[1])
 
 
