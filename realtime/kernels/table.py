@@ -41,7 +41,7 @@ from realtime.medium import Medium, per_extinction
 
 FORMS = ("sun", "tail")
 _LARGEST_U = 10.0  # of Sun's table
-_LARGEST_SIZE = 2048  # 64 MiB a table and float32; the quadratures below are good to this size
+_LARGEST_SIZE = 2048  # 128 MiB in float32 on the device; the quadratures below are good to this size
 
 
 def table(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, form: str = "sun", size: int = 64):
@@ -68,9 +68,10 @@ def table(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, form: 
     is small against them (slivers, and with 'sun' all that is flat: rays that leave the light behind, thick media)
     errors grow as much, and small values can become negative.
 
-    'sun': within 1 % for 64 entries where the ray passes near the light. sigma_t h > 10 is outside the table and reads its edge, u = 10, as published: the result is then wrong,
-    mostly by orders of magnitude. A ray through the light's line, h = 0, gives NaN: the method divides by h. Where the
-    light lies more than 88 optical depths behind the camera (709 in float64) exp(-sigma_t foot) overflows.
+    'sun': within 1 % for 64 entries where the ray passes near the light. sigma_t h > 10 is outside the table and reads
+    its edge, u = 10, as published: the result is then wrong, mostly by orders of magnitude. A ray through the light's
+    line, h = 0, gives NaN: the method divides by h. Where the light lies more than 88 optical depths behind the camera
+    (709 in float64) exp(-sigma_t foot) overflows.
 
     'tail': any extinction, h = 0 beside the light; a segment that holds the light gives +inf. With 64 entries the
     largest relative error is about 3e-4, 1e-5 with 512; of slivers 1e-3, and 0.1 in float32.
@@ -78,7 +79,7 @@ def table(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, form: 
     References
     ----------
     Sun, Ramamoorthi, Narasimhan, Nayar 2005, *A practical analytic single scattering model for real time rendering*,
-    ACM Transactions on Graphics 24(3), section 3.2.
+    ACM Transactions on Graphics 24(3).
     """
     if form not in FORMS:
         raise InputError(f"form: got {form!r}, wanted one of {', '.join(FORMS)}")
