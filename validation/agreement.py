@@ -75,12 +75,23 @@ def agreement(
     def compared(volpath: Batches, layer: str) -> Statistics:
         return _statistics(getattr(shortened, layer), volpath, layer, mask=masks[layer], margin=margin)
 
-    def enough(volpath: Batches) -> bool:
-        if len(volpath.seeds) < _LEAST_BATCHES:
-            return False
-        return all(_half_width(compared(volpath, layer)) < 0.4 * margin for layer in layers)
+    expected = _LEAST_BATCHES
 
-    volpath = volpath_batches(scene, batches=batches, samples=samples, enough=enough, progress=progress)
+    def enough(volpath: Batches) -> bool:
+        nonlocal expected
+        if not layers:
+            return True
+        widest = max(_half_width(compared(volpath, layer)) for layer in layers) / (0.4 * margin)
+        done = len(volpath.seeds)
+        # The width falls with the square root of the batches: that is when this will be over.
+        expected = max(_LEAST_BATCHES, round(done * widest**2) if np.isfinite(widest) else batches)
+        return done >= _LEAST_BATCHES and widest < 1
+
+    def tell(done: int, total: int, what: str) -> None:
+        if progress is not None:
+            progress(min(done, expected), min(total, expected), what)
+
+    volpath = volpath_batches(scene, batches=batches, samples=samples, enough=enough, progress=tell)
     return {
         layer: Agreement(
             layer,
