@@ -11,6 +11,7 @@ from typing import Any
 
 from realtime.camera import ray_directions, tiled_pixels
 from realtime.errors import InputError
+from realtime.kernels.table import resident_tables
 from realtime.methods import Method
 from realtime.scene import Scene
 from realtime.shadow_map import cast_shadow_map
@@ -106,7 +107,8 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
     # being recorded, which Dr.Jit 1.5 answers by aborting a later recording.
     one = type(camera.origin.x)(1)
     run_method(scene.geometry, mi.UInt32(0), camera, scene.medium, scene.lights, cast_maps(), one)
-    airlight = dr.freeze(run_method)
+    resident = resident_tables()
+    airlight = dr.freeze(run_method, state_fn=lambda *_, **__: resident)
     dr.eval(pixel)
     return FrameRenderer(scene, pixel, shadow_maps, surface if plan.surfaces else _no_surface, airlight)
 

@@ -13,14 +13,17 @@ kernel; where the intensity falls off inside the cone (``light.soft``), the kern
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from types import MappingProxyType
 from typing import Any
 
 from realtime.geometry import RayGeometry, clip_to_cone
+from realtime.kernels.closed_form import closed_form
 from realtime.kernels.exact import exact
 from realtime.kernels.marching import equiangular, uniform
 from realtime.kernels.quadrature import quadrature
 from realtime.kernels.quadrature_theta import quadrature_theta
+from realtime.kernels.table import table
 from realtime.kernels.taylor import taylor
 from realtime.lights import Light
 from realtime.medium import Medium
@@ -78,6 +81,26 @@ KERNELS: dict[str, Kernel] = {
         "midpoint steps in the distance: what most shaders do",
         "Billeter, Sintorn, Assarsson 2010, section 2",
         MappingProxyType({"steps": 100}),
+    ),
+    "table": Kernel(
+        "table",
+        table,
+        "two reads of F(u, v), bilinear; the edge is read beyond sigma_t h = 10",
+        "Sun, Ramamoorthi, Narasimhan, Nayar 2005",
+        MappingProxyType({"size": 64}),
+    ),
+    "table-tail": Kernel(
+        "table-tail",
+        partial(table, form="tail"),
+        "two reads of scaled tails and heads, bilinear",
+        "realtime/kernels/table.py",
+        MappingProxyType({"size": 64}),
+    ),
+    "closed-form": Kernel(
+        "closed-form",
+        closed_form,
+        "difference of complex exponential integrals",
+        "Pegoraro and Parker 2009; Pegoraro, Schott, Parker 2009",
     ),
 }
 
