@@ -8,10 +8,10 @@ Three sets, each the same on every machine:
   distances and endless ones, all phase functions.
 * `slivers` are short segments far from the camera and from the light: what a light volume adds up as differences of
   J(0, x).
-* `wide_rays` is the set W on which costs are compared: optical depth 1e-4 to 60 at the distance of the light (what
-  is dimmer than exp(-60) float32 flushes to zero on the way), angle to the light 1e-3 to 179.999 degrees, uniform,
-  length 1e-3 to 100 distances, from the camera on. With extinction 1 the optical depth is the distance itself: J obeys J(c lengths, sigma_t / c) =
-  J / c.
+* `wide_rays` is the set W on which costs are compared: optical depth 1e-4 to 60 at the distance of the light (what is
+  dimmer than exp(-60) float32 flushes to zero on the way), angle to the light 1e-3 to 179.999 degrees, uniform, length
+  1e-3 to 100 distances, from the camera on. With extinction 1 the optical depth is the distance itself: J obeys
+  J(c lengths, sigma_t / c) = J / c.
 """
 
 import hashlib
