@@ -21,10 +21,12 @@ from realtime.geometry import RayGeometry, clip_to_cone
 from realtime.kernels.closed_form import closed_form
 from realtime.kernels.exact import exact
 from realtime.kernels.marching import equiangular, uniform
+from realtime.kernels.polynomial import polynomial
 from realtime.kernels.quadrature import quadrature
 from realtime.kernels.quadrature_theta import quadrature_theta
 from realtime.kernels.table import table
 from realtime.kernels.taylor import taylor
+from realtime.kernels.taylor_printed import taylor_printed
 from realtime.lights import Light
 from realtime.medium import Medium
 
@@ -60,6 +62,20 @@ KERNELS: dict[str, Kernel] = {
         "polynomial in the angle theta about the foot, coefficients re-derived",
         "Biri, Arques, Michelin 2006, section 4.1 and annex",
         MappingProxyType({"degree": 4}),
+    ),
+    "taylor-printed": Kernel(
+        "taylor-printed",
+        taylor_printed,
+        "the same with the paper's coefficients as printed, misprints included",
+        "Biri, Arques, Michelin 2006, annex as transcribed",
+        MappingProxyType({"degree": 4}),
+    ),
+    "polynomial": Kernel(
+        "polynomial",
+        polynomial,
+        "Chebyshev polynomial fitted to each ray's range in w, integrated in closed form",
+        "realtime/kernels/polynomial.py; Trefethen 2013",
+        MappingProxyType({"degree": 15}),
     ),
     "quadrature-theta": Kernel(
         "quadrature-theta",

@@ -91,9 +91,14 @@ def _panel(geometry: RayGeometry, x0, x1, sigma_t, medium: Medium, light: Light,
     h, e0, e1, difference = path_interval(geometry, x0, x1, sigma_t)
     c0, c1 = dr.sqrt(dr.fma(e0, e0, 1)), dr.sqrt(dr.fma(e1, e1, 1))
     half = 0.5 * dr.asinh(difference * ((e0 + e1) / dr.fma(e1, c0, e0 * c1)))
-    sinh, cosh = _sinh_cosh(half)
-    e_mid, c_mid = dr.fma(e0, cosh, c0 * sinh), dr.fma(c0, cosh, e0 * sinh)
-    return _pairs(
+    grown = dr.exp(0.5 * half)
+    sinh_half, cosh_half = 0.5 * (grown - dr.rcp(grown)), 0.5 * (grown + dr.rcp(grown))
+    sinh, cosh_less = 2 * sinh_half * cosh_half, 2 * dr.square(sinh_half)
+    step = dr.fma(e0, cosh_less, c0 * sinh)
+    e_mid, c_mid = e0 + step, dr.fma(c0, cosh_less, dr.fma(e0, sinh, c0))
+    # The path camera - x - light up to the centre, without the cancellation of foot + h E behind the light.
+    path = x0 + dr.sqrt(dr.fma(x0 - geometry.foot, x0 - geometry.foot, h * h)) + h * step
+    total = _pairs(
         geometry,
         (geometry.foot, h, sigma_t),
         (half, e_mid, c_mid),
@@ -101,12 +106,14 @@ def _panel(geometry: RayGeometry, x0, x1, sigma_t, medium: Medium, light: Light,
         light=light,
         nodes=_positive_nodes(nodes),
     )
+    return total * half * (2 / h) * dr.exp(-sigma_t * path)
 
 
-def path_interval(geometry: RayGeometry, x0, x1, sigma_t):
+def path_interval(geometry: RayGeometry, x0, x1, sigma_t, *, tail=1.0):
     """Return the height, E = q/h at both ends of a segment, and their difference without cancellation.
 
-    The far end is brought to where extinction or 1/(1 + E^2) have left nothing behind it.
+    The far end is brought to where extinction or p/(1 + E^2) have left nothing behind it. `tail` is the E from which on
+    p/(1 + E^2) falls like 1/E^2: 1, or where a backward lobe ends.
     """
     import drjit as dr
 
@@ -118,8 +125,8 @@ def path_interval(geometry: RayGeometry, x0, x1, sigma_t):
     h = dr.maximum(h, (1e-9 if single else 1e-17) * (dr.abs(s0) + dr.smallest(Float)))
     r0 = dr.sqrt(dr.fma(s0, s0, h * h))
     e0 = _path_over_height(s0, r0, h)
-    # Beyond the first term extinction has left e^-20 (e^-40); beyond the second, 1/(1+E^2) has.
-    reach = dr.minimum((20.0 if single else 40.0) / (sigma_t * h), (1e7 if single else 1e16) * (1 + e0))
+    # Beyond the first term extinction has left e^-20 (e^-40); beyond the second, p/(1+E^2) has.
+    reach = dr.minimum((20.0 if single else 40.0) / (sigma_t * h), (1e7 if single else 1e12) * (tail + e0))
     s1 = dr.select(dr.isfinite(s1), s1, 0)
     r1 = dr.sqrt(dr.fma(s1, s1, h * h))
     e1 = _path_over_height(s1, r1, h)
@@ -132,14 +139,6 @@ def _path_over_height(s, r, h):
     import drjit as dr
 
     return dr.select(s >= 0, (s + r) / h, h / (r - s))
-
-
-def _sinh_cosh(u):
-    import drjit as dr
-
-    grown = dr.exp(u)
-    shrunk = dr.rcp(grown)
-    return 0.5 * (grown - shrunk), 0.5 * (grown + shrunk)
 
 
 def _pairs(geometry: RayGeometry, ray, panel, *, phase, light: Light, nodes):
@@ -170,4 +169,4 @@ def _pairs(geometry: RayGeometry, ray, panel, *, phase, light: Light, nodes):
                 e = dr.fma(sign * c_mid, sh, e_mid * ch)
                 value *= falloff(geometry, light, foot + 0.5 * h * (e - dr.rcp(e)))
             total += weight * value
-    return total * half * (2 / h) * dr.exp(-sigma_t * dr.fma(h, e_mid, foot))
+    return total

@@ -63,20 +63,64 @@ def test_limits(variant, name):
     assert value[1:] == pytest.approx(expected[1:], rel=1e-9)
 
 
-def test_nodes_are_no_more_than_needed(variant, data_folder, monkeypatch):
-    """Six nodes fewer and a lobe breaks the bar of 5e-6: the numbers are the smallest that will do, within a few."""
-    import sys
+def wide_rays(count):
+    """Random rays: optical depth 1e-6 to 50, height over distance 1e-7 to 1, before and behind the light."""
+    rng = np.random.default_rng(1)
+    distance, ratio = 10 ** rng.uniform(-1, 1, count), 10 ** rng.uniform(-7, 0, count)
+    height = (distance * ratio).astype(np.float32).astype(np.float64)
+    foot = rng.choice([-1, 1], count) * np.sqrt(np.maximum(distance**2 - height**2, 0))
+    foot = foot.astype(np.float32).astype(np.float64)
+    sigma_t = (10 ** rng.uniform(-6, 1.7, count) / distance).astype(np.float32).astype(np.float64)
+    length = (distance * 10 ** rng.uniform(-2, 2, count)).astype(np.float32).astype(np.float64)
+    return foot, height, np.where(rng.random(count) < 0.5, np.inf, length), sigma_t
 
-    import realtime.kernels.exact  # noqa: F401 - the package's attribute of this name is the function
 
-    module = sys.modules["realtime.kernels.exact"]
-    cases = read_cases(data_folder / "airlight_integral.csv")
-    for name in ("rayleigh", "hazy", "murky", "hg"):
-        rows = np.array([phase == name for phase in cases.phase])
-        assert errors(cases, "exact", "single")[rows].max() < 5e-6, name
-    fewer = {name: (single - 6, double) for name, (single, double) in module._NODES.items()}
-    monkeypatch.setattr(module, "_NODES", fewer)
-    error = errors(cases, "exact", "single")
-    for name in ("rayleigh", "hazy", "murky", "hg"):
-        rows = np.array([phase == name for phase in cases.phase])
-        assert error[rows].max() > 5e-6, name
+@pytest.mark.parametrize(
+    ("name", "g"),
+    [("isotropic", 0.0), ("rayleigh", 0.0), ("hazy", 0.0), ("murky", 0.0), ("hg", -0.95), ("hg", 0.5), ("hg", 0.95)],
+)
+def test_wide_rays(variant, name, g):
+    """Float32: the nodes leave 5e-6, and rounding of the exponent 6e-8 times an optical depth of up to 300."""
+    from analytic.panels import airlight_segments
+    from analytic.phase import PhaseFunction
+    from realtime.arrays import array_types
+    from realtime.geometry import RayGeometry
+    from realtime.kernels.exact import exact
+    from realtime.lights import Light
+    from realtime.medium import Medium
+    from realtime.phase import Phase
+
+    foot, height, x1, sigma_t = wide_rays(5000)
+    expected, _ = airlight_segments(foot, height, 0.0, x1, sigma_t, PhaseFunction(name, g=g))
+    for precision, bound in (("single", 3e-5), ("double", 1e-10)):
+        types = array_types(precision)
+        phase = Phase(name, g=types.scalar(g) if name == "hg" else None)
+        geometry = RayGeometry(types.scalar(foot), types.scalar(height), None, None)
+        medium = Medium((types.scalar(sigma_t),), types.color(1), phase)
+        light = Light("point", False, None, None)
+        value = np.array(exact(geometry, types.scalar(0), types.scalar(x1), medium, light), dtype=np.float64)
+        error = np.abs(value - expected) / np.maximum(expected, 1e-37)
+        assert error.max() < bound, (precision, foot[error.argmax()], height[error.argmax()], x1[error.argmax()])
+
+
+@pytest.mark.parametrize("g", [-0.95, -0.6, 0.95])
+def test_endless_rays_through_a_vacuum_with_sharp_lobes(variant, g):
+    """A backward lobe holds its light at large E: the far end must not be cut before it."""
+    from analytic.panels import airlight_segments
+    from analytic.phase import PhaseFunction
+    from realtime.arrays import array_types
+    from realtime.geometry import RayGeometry
+    from realtime.kernels.exact import exact
+    from realtime.lights import Light
+    from realtime.medium import Medium
+    from realtime.phase import Phase
+
+    foot, height = np.array([1.5, -2.0, 0.01, 3.0]), np.array([0.7, 0.3, 1e-3, 2.0])
+    for precision, bound in (("single", 5e-6), ("double", 1e-10)):
+        types = array_types(precision)
+        medium = Medium((types.scalar(0.0),), types.color(1), Phase("hg", g=types.scalar(g)))
+        geometry = RayGeometry(types.scalar(foot), types.scalar(height), None, None)
+        light = Light("point", False, None, None)
+        value = np.array(exact(geometry, types.scalar(0), types.scalar(np.inf), medium, light), dtype=np.float64)
+        expected, _ = airlight_segments(foot, height, 0.0, np.inf, 0.0, PhaseFunction("hg", g=g))
+        assert value == pytest.approx(expected, rel=bound)
