@@ -37,7 +37,7 @@ def print_kernel_bench(found: "KernelBench", *, show: Show = print_table) -> Non
         for statistic, words in _WORDS.items():
             levels = [one for one in found.levels if (one.phase, one.statistic) == (phase, statistic)]
             show(_LEVELS, [_level_row(one) for one in levels], f"{phase}: speed against error, {words}")
-    print("Times of fewer rays or steps than asked for fill the device; ~ is extrapolated from fewer steps.")
+    print("ns/ray: the kernel alone by Dr.Jit's history, median; ~ is extrapolated from fewer steps.")
 
 
 def print_convergence(found: "Sequence[Convergence]", *, show: Show = print_table) -> None:

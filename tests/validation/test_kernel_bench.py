@@ -127,6 +127,17 @@ def test_names_stand_for_all_sizes_or_one(variant, monkeypatch):
     assert {total for _, total, _ in told} == {4}
 
 
+def test_sizes_that_a_kernel_does_not_have_are_left_out(variant, monkeypatch):
+    monkeypatch.setitem(kernel_bench.SIZES, "degree", (4, 6))
+    monkeypatch.setattr(kernel_bench, "ERROR_RAYS", 64)
+    found = bench_kernels(["taylor-printed"], phases=(("isotropic", 0.0), ("hg", 0.5)), rays=256, seconds=0.01)
+    assert [(one.kernel, one.phase) for one in found.costs] == [
+        ("taylor-printed-4", "isotropic"),
+        ("taylor-printed-4", "hg"),
+    ]
+    assert [one.refused is None for one in found.costs] == [True, False]
+
+
 def test_unknown_kernel_is_refused_before_any_work(monkeypatch):
     monkeypatch.setattr(kernel_bench, "wide_rays", None)
     with pytest.raises(InputError, match="wanted one of"):
