@@ -34,14 +34,9 @@ def print_bench(found: list[dict[str, Any]], *, markdown: bool = False) -> None:
     markdown
         Print Markdown, with the date and the machine.
     """
-    show = _print_markdown if markdown else print_table
+    show = print_markdown if markdown else print_table
     if markdown:
-        from reports.environment import describe_environment
-
-        machine = describe_environment()
-        print(
-            f"{time.strftime('%Y-%m-%d')}, {machine['processor']}, {machine['threads']} threads, {machine['variant']}."
-        )
+        print_heading()
     for scene in found:
         for one in scene["methods"]:
             if one["refused"]:
@@ -91,7 +86,17 @@ def _agreement_row(name: str, one: dict[str, Any]) -> tuple[str, ...]:
     )
 
 
-def _print_markdown(headers: Sequence[str], rows: Sequence[Sequence[str]], title: str) -> None:
+def print_heading() -> None:
+    """Print the date and the machine, the first line of tables in Markdown."""
+    from reports.environment import describe_environment
+
+    machine = describe_environment()
+    day = time.strftime("%Y-%m-%d")
+    print(f"{day}, {machine['processor']}, {machine['threads']} threads, {machine['variant']}.")
+
+
+def print_markdown(headers: Sequence[str], rows: Sequence[Sequence[str]], title: str) -> None:
+    """Print a table as Markdown."""
     print(f"\n**{title}**\n")
     print("| " + " | ".join(headers) + " |")
     print("| --- |" + " ---: |" * (len(headers) - 1))

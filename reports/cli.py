@@ -24,13 +24,14 @@ from reports.command_list import kernels, methods, scenes
 from reports.command_reference import reference
 from reports.command_render import render
 from reports.command_report import report
+from reports.command_stability import stability
 from reports.command_test import run_tests
 from reports.environment import VARIANT_VARIABLE, MissingError, check_variant, install_line, missing_packages
 
 DONE, FAILED, WRONG_INPUT, MISSING, INTERRUPTED = 0, 1, 2, 3, 130
 
 # In the order of --help.
-_COMMANDS = (report, doctor, scenes, methods, kernels, render, reference, compare, integrate, bench)
+_COMMANDS = (report, doctor, scenes, methods, kernels, render, reference, compare, integrate, bench, stability)
 
 app = typer.Typer(
     name="airlight",

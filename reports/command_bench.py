@@ -7,18 +7,24 @@ import typer
 
 
 def bench(
-    scenes: Annotated[list[str] | None, typer.Argument(help="Scenes; all built-in ones by default.")] = None,
+    scenes: Annotated[
+        list[str] | None, typer.Argument(help="Scenes, or with --kernels kernels; all built-in ones by default.")
+    ] = None,
+    kernels: Annotated[bool, typer.Option("--kernels", help="Time the kernels alone, on 480 000 rays.")] = False,
     methods: Annotated[str | None, typer.Option(help="Comma-separated methods; all by default.")] = None,
     size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels; the scene's own by default.")] = None,
     truth: Annotated[bool, typer.Option(help="Also compare the truth with volpath.")] = True,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
     markdown: Annotated[bool, typer.Option("--markdown", help="Print tables for a README, dated.")] = False,
 ) -> None:
-    """Time every method in every scene and compare it with the quadrature truth.
+    """Time every method in every scene, or every kernel on many rays, and compare it with the truth.
 
     `airlight` is the airlight alone (the kernel with its ray set-up), `frame` a frame with static geometry, `rebuilt` a
     frame after everything moved. Exit status 1 if volpath does not confirm the truth within +-0.5 %.
     """
+    if kernels:
+        _bench_kernels(scenes, json=json, markdown=markdown)
+        return
     from realtime.methods import METHODS
     from realtime.scene import read_scene
     from reports.bench_tables import print_bench
@@ -74,3 +80,32 @@ def _bench_scene(name: str, pixels, chosen, *, with_truth: bool, tell) -> dict:
         agreed = {layer: agreement_data(one) for layer, one in compared.items()}
     size = [camera.width, camera.height] if camera else None
     return {"name": loaded.name, "size": size, "methods": rows, "agreement": agreed}
+
+
+def _bench_kernels(names: list[str] | None, *, json: bool, markdown: bool) -> None:
+    from realtime.kernels import KERNELS
+    from reports.bench_tables import print_heading, print_markdown
+    from reports.environment import activate, describe_environment
+    from reports.kernel_tables import print_convergence, print_kernel_bench
+    from reports.progress import progress_bar
+    from reports.tables import print_json, print_table
+    from validation.convergence import convergence, declared
+    from validation.kernel_bench import bench_kernels
+    from validation.kernel_choice import split_name
+
+    wanted = [split_name(name)[0].name for name in names] if names else list(KERNELS)
+    activate()
+    with progress_bar("bench") as tell:
+        found = bench_kernels(names, progress=lambda done, total, what: tell(done / total, what))
+        rates = [convergence(name) for name in declared() if name in wanted]
+    if json:
+        from reports.data import plain
+
+        print_json({"environment": describe_environment(), "kernels": plain(found), "convergence": plain(rates)})
+        return
+    if markdown:
+        print_heading()
+    show = print_markdown if markdown else print_table
+    print_kernel_bench(found, show=show)
+    if rates:
+        print_convergence(rates, show=show)

@@ -26,6 +26,7 @@ def render(
     from realtime.plan import describe
     from realtime.scene import read_scene
     from reference.files import ensure_writable
+    from reports.bench_tables import rate
     from reports.environment import activate
     from reports.tables import print_json
     from validation.configurations import configuration, parse_settings
@@ -51,7 +52,7 @@ def render(
         print_json(times)
     else:
         stages = ", ".join(f"{stage['name']} {stage['ms']:.3g} ms" for stage in times["stages"])
-        print(f"{loaded.name}, {chosen.label}: {times['frame_ms']:.3g} ms a frame ({times['fps']:.0f} frames/s)")
+        print(f"{loaded.name}, {chosen.label}: {times['frame_ms']:.3g} ms a frame ({rate(times['frame_ms'])} frames/s)")
         print(
             f"  {stages}; {times['rebuild_ms']:.3g} ms with everything rebuilt; {variant}, {times['threads']} threads"
         )
