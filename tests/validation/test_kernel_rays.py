@@ -62,7 +62,8 @@ def test_table_has_mean_one_and_is_exact_in_float32():
     np.testing.assert_array_equal(values, values.astype(np.float32))
 
 
-def test_truth_is_kept_and_found_again(monkeypatch):
+def test_truth_is_kept_and_found_again(monkeypatch, tmp_path):
+    monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path))  # other tests ask for other truths
     first = wide_rays(64)
 
     def fail(cases):

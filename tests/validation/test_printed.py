@@ -14,7 +14,7 @@ def test_every_phase_function_region_and_kernel_is_there(found):
     assert len(found) == 4 * 3 * 3
     assert {key[1] for key in found} == {"all", "moderate", "near-foot"}
     for (_, region, _), accuracy in found.items():
-        assert accuracy.rays == 2048 if region == "all" else 50 < accuracy.rays < 600
+        assert accuracy.rays == 2048 if region == "all" else 50 < accuracy.rays < 1024  # a fair part of them
         assert len(accuracy.quantiles) == len(PERCENTS)
         assert list(accuracy.quantiles) == sorted(accuracy.quantiles)
         assert 0 <= accuracy.within_1_percent <= accuracy.within_10_percent <= 1
