@@ -39,3 +39,20 @@ def array_types(precision: str = "single") -> ArrayTypes:
     if precision == "double":
         return ArrayTypes(mi.Float64, mi.Vector3d, mi.Color3d)
     raise InputError(f"precision: got {precision!r}, wanted one of {', '.join(PRECISIONS)}")
+
+
+def is_single(Float) -> bool:
+    """Return whether a number type is float32; Python's float, the number of the scalar backend, is not."""
+    import drjit as dr
+
+    return dr.is_array_v(Float) and dr.itemsize_v(Float) == 4
+
+
+def smallest(Float) -> float:
+    """Return the smallest normal number of a type."""
+    return 2.0**-126 if is_single(Float) else 2.0**-1022
+
+
+def largest(Float) -> float:
+    """Return the largest number of a type."""
+    return (2 - 2.0**-23) * 2.0**127 if is_single(Float) else (2 - 2.0**-52) * 2.0**1023

@@ -6,6 +6,8 @@ take 3.0 ms for 480 000 lanes on two AVX-512 cores, 24 of these 1.9 ms. The quad
 here.
 """
 
+from realtime.arrays import is_single
+
 #: Coefficients of 2^f on [-1/2, 1/2], highest power first: a Remez fit of degree 6 with relative error below 1.5e-8;
 #: `tests/realtime/test_exponential.py` fits them again.
 _EXP2 = (
@@ -32,7 +34,7 @@ def exp_bounded(x):
     import drjit as dr
 
     Float = type(x)
-    if dr.itemsize_v(Float) != 4 or dr.backend_v(Float) != dr.JitBackend.LLVM:
+    if not is_single(Float) or dr.backend_v(Float) != dr.JitBackend.LLVM:
         return dr.exp(x)
     # 2^n 2^f with n an integer and |f| <= 1/2; the fused steps keep f exact up to the rounding of log2(e) in two parts.
     clamped = dr.maximum(x, -87.0)

@@ -121,6 +121,18 @@ KERNELS: dict[str, Kernel] = {
 }
 
 
+def gamma(kernel, geometry: RayGeometry, x, *, medium: Medium, light: Light):
+    """Return Gamma(x) = J(0, x), the airlight from the camera to a point, which shadow planes and volumes add up [1/m].
+
+    A difference of two Gammas carries the rounding of both: J(x0, x1) itself is better where it can be had.
+
+    References
+    ----------
+    Biri, Arques, Michelin 2006, section 4.2.
+    """
+    return airlight_integral(kernel, geometry, type(x)(0), x, medium=medium, light=light)
+
+
 def airlight_integral(kernel, geometry: RayGeometry, x0, x1, *, medium: Medium, light: Light):
     """Return J over the part of [x0, x1] that the light's cone reaches [1/m].
 

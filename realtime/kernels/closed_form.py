@@ -33,6 +33,7 @@ the error that they leave there; a test on the change from one level to the next
 fraction all terms that make Im w agree in sign, so Im S keeps its relative accuracy where it is tiny.
 """
 
+from realtime.arrays import is_single, smallest
 from realtime.errors import InputError
 from realtime.geometry import RayGeometry
 from realtime.lights import Light
@@ -99,8 +100,8 @@ def closed_form(geometry: RayGeometry, x0, x1, medium: Medium, light: Light):
     polynomial = _POLYNOMIALS[medium.phase.name]
     foot, h = geometry.foot, geometry.height
     Float = type(h)
-    floor = 1e-9 if dr.itemsize_v(Float) == 4 else 1e-17
-    h = dr.maximum(h, floor * (dr.abs(x0 - foot) + dr.smallest(Float)))
+    floor = 1e-9 if is_single(Float) else 1e-17
+    h = dr.maximum(h, floor * (dr.abs(x0 - foot) + smallest(Float)))
 
     def integral(sigma_t):
         return (2 / h) * (_tail(foot, h, x0, sigma_t, polynomial) - _tail(foot, h, x1, sigma_t, polynomial))
@@ -147,7 +148,7 @@ def scaled_e1(e, a):
     """
     import drjit as dr
 
-    radius, terms, levels = _REGIONS[dr.itemsize_v(type(a))]
+    radius, terms, levels = _REGIONS[4 if is_single(type(a)) else 8]
     x, y = a * e, -a
     inside = dr.fma(x, x, y * y) < radius * radius
     near_x, near_y = dr.select(inside, x, 0), dr.select(inside, y, 0)
@@ -161,7 +162,7 @@ def _series(x, y, argument, terms: int):
     import drjit as dr
 
     Float = type(x)
-    magnitude = dr.maximum(dr.maximum(dr.abs(x), dr.abs(y)), dr.smallest(Float))
+    magnitude = dr.maximum(dr.maximum(dr.abs(x), dr.abs(y)), smallest(Float))
     ratio_x, ratio_y = x / magnitude, y / magnitude
     log_z = dr.log(magnitude) + 0.5 * dr.log(dr.maximum(dr.fma(ratio_x, ratio_x, ratio_y * ratio_y), 1))
     # Horner's scheme of -sum_{k>=1} (-z)^k/(k k!) = z (1 - z/4 (1 - 2 z/9 (1 - 3 z/16 ...))).

@@ -31,6 +31,7 @@ nodes.
 
 from functools import lru_cache
 
+from realtime.arrays import is_single
 from realtime.exponential import exp_bounded
 from realtime.geometry import RayGeometry, clip_to_cone, falloff
 from realtime.kernels.quadrature import path_interval, quadrature
@@ -56,26 +57,33 @@ def exact(geometry: RayGeometry, x0, x1, medium: Medium, light: Light):
     Notes
     -----
     Valid for any extinction (vacuum included), any ray, the light beside the segment (height 0) included, any segment,
-    endless ones and those of length 0 included, and |g| < 1. A segment that holds the light at height 0 has an infinite
-    integral; the result is then a very large number or infinite.
+    endless ones and those of length 0 included, and |g| < 1. Where the ray meets the light (height 0) on the segment,
+    its ends included, the integral is infinite, and so is the result.
 
     Largest relative error found on the certified cases: see `airlight integrate`; in float32 below 3e-5 for |g| <= 0.9.
     A tabulated phase function is integrated across its kinks: about 1e-4 for a coarse table. Where a spot's intensity
     falls off between beam and cut-off, each of three panels has these nodes.
     """
-    if medium.phase.name == "isotropic":
-        import drjit as dr
+    import drjit as dr
 
-        single = dr.itemsize_v(type(geometry.height)) == 4
-        nodes = _NODES["isotropic"] if single else _ISOTROPIC_DOUBLE
-        return quadrature(geometry, x0, x1, medium, light, nodes=nodes)
+    meets = (geometry.height == 0) & (x0 <= geometry.foot) & (geometry.foot <= x1) & (x0 < x1)
+    return per_extinction(
+        medium,
+        lambda sigma_t: dr.select(meets, dr.inf, _integral(geometry, (x0, x1), sigma_t, medium, light)),
+    )
+
+
+def _integral(geometry: RayGeometry, segment, sigma_t, medium: Medium, light: Light):
+    x0, x1 = segment
+    if medium.phase.name == "isotropic":
+        nodes = _NODES["isotropic"] if is_single(type(geometry.height)) else _ISOTROPIC_DOUBLE
+        grey = Medium((sigma_t,), medium.albedo, medium.phase)
+        return quadrature(geometry, x0, x1, grey, light, nodes=nodes)
     panels = [(x0, x1)]
     if light.soft:
         inner0, inner1 = clip_to_cone(geometry, light.cos_beam, x0, x1)
         panels = [(x0, inner0), (inner0, inner1), (inner1, x1)]
-    return per_extinction(
-        medium, lambda sigma_t: sum(_panel(geometry, a, b, sigma_t, medium.phase, light) for a, b in panels)
-    )
+    return sum(_panel(geometry, a, b, sigma_t, medium.phase, light) for a, b in panels)
 
 
 def _panel(geometry: RayGeometry, x0, x1, sigma_t, phase: Phase, light: Light):
@@ -115,7 +123,7 @@ def _sum_nodes(node, phase: Phase, width):
     import mitsuba as mi
 
     Float = type(width)
-    if dr.itemsize_v(Float) == 4:
+    if is_single(Float):
         return sum(weight * node(fraction) for fraction, weight in _nodes(_NODES[phase.name]))
 
     def panel(index, total):

@@ -8,6 +8,7 @@
 Both are of order 2 in the number of steps once the steps resolve the integrand.
 """
 
+from realtime.arrays import smallest
 from realtime.errors import InputError
 from realtime.geometry import RayGeometry, distance_to_light, falloff
 from realtime.lights import Light
@@ -30,15 +31,15 @@ def uniform(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, step
     Notes
     -----
     Valid where a step is shorter than the distance to the light, everywhere on the ray. An endless ray is cut after 20
-    optical depths; through a vacuum it has no step length, and the result is not a number.
+    optical depths; through a vacuum it has no step length, and the result means nothing.
     """
     import drjit as dr
 
     _check(steps)
-    smallest = medium.sigma_t[0]
+    thinnest = dr.maximum(medium.sigma_t[0], smallest(type(x1)))
     for sigma_t in medium.sigma_t[1:]:
-        smallest = dr.minimum(smallest, sigma_t)
-    x1 = dr.select(dr.isinf(x1), x0 + _REACH / smallest, x1)
+        thinnest = dr.minimum(thinnest, dr.maximum(sigma_t, smallest(type(x1))))
+    x1 = dr.select(dr.isinf(x1), x0 + _REACH / thinnest, x1)
 
     def term(sigma_t, x):
         r = distance_to_light(geometry, x)

@@ -13,6 +13,7 @@ sums of positive terms. The far end is brought to where extinction or 1/(1 + E^2
 from dataclasses import dataclass, replace
 from typing import Any
 
+from realtime.arrays import is_single, smallest
 from realtime.exponential import exp_bounded
 from realtime.geometry import RayGeometry, clip_to_cone, falloff
 from realtime.lights import Light
@@ -64,7 +65,7 @@ def piece_of(geometry: RayGeometry, x0, x1, sigma_t, phase: Phase) -> Piece:
 
     foot = geometry.foot
     Float = type(geometry.height)
-    single = dr.itemsize_v(Float) == 4
+    single = is_single(Float)
     s0, s1 = x0 - foot, x1 - foot
     # J is even in h: with the light beside the segment, a height below rounding of its distance is as good as zero.
     beside = dr.maximum(dr.maximum(s0, -s1), 0)
@@ -88,7 +89,7 @@ def piece_of(geometry: RayGeometry, x0, x1, sigma_t, phase: Phase) -> Piece:
         scale,
         thickness,
         Place(x0, r0, start, dr.sqrt(dr.fma(start, start, 1))),
-        reach=dr.minimum((20.0 if single else 40.0) / thickness, negligible),
+        reach=dr.minimum((20.0 if single else 40.0) / dr.maximum(thickness, smallest(Float)), negligible),
         width=Float(0),
         factor=(2 / h) * scale * dr.exp(-sigma_t * (x0 + r0)),
     )

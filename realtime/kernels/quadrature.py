@@ -27,6 +27,7 @@ a spot falls off between beam and cut-off, it is split at the cone of the beam, 
 
 from functools import lru_cache
 
+from realtime.arrays import is_single, smallest
 from realtime.exponential import exp_bounded
 from realtime.geometry import RayGeometry, clip_to_cone, falloff
 from realtime.lights import Light
@@ -119,14 +120,15 @@ def path_interval(geometry: RayGeometry, x0, x1, sigma_t, *, tail=1.0):
 
     foot, h = geometry.foot, geometry.height
     Float = type(h)
-    single = dr.itemsize_v(Float) == 4
+    single = is_single(Float)
     # J is even in h, so a height below rounding of the distances is as good as zero, and this one keeps E finite.
     s0, s1 = x0 - foot, x1 - foot
-    h = dr.maximum(h, (1e-9 if single else 1e-17) * (dr.abs(s0) + dr.smallest(Float)))
+    h = dr.maximum(h, (1e-9 if single else 1e-17) * (dr.abs(s0) + smallest(Float)))
     r0 = dr.sqrt(dr.fma(s0, s0, h * h))
     e0 = _path_over_height(s0, r0, h)
     # Beyond the first term extinction has left e^-20 (e^-40); beyond the second, p/(1+E^2) has.
-    reach = dr.minimum((20.0 if single else 40.0) / (sigma_t * h), (1e7 if single else 1e12) * (tail + e0))
+    extinction = dr.maximum(sigma_t * h, smallest(Float))
+    reach = dr.minimum((20.0 if single else 40.0) / extinction, (1e7 if single else 1e12) * (tail + e0))
     s1 = dr.select(dr.isfinite(s1), s1, 0)
     r1 = dr.sqrt(dr.fma(s1, s1, h * h))
     e1 = _path_over_height(s1, r1, h)

@@ -109,6 +109,11 @@ def upload_table(Float, form: str, size: int):
     """
     import drjit as dr
 
+    if Float is float:
+        raise InputError(
+            "kernel table: the scalar backend has no arrays to hold a table; use an LLVM or CUDA variant, or another "
+            "kernel"
+        )
     key = (Float, form, size)
     if key not in _UPLOADED:
         if dr.flag(dr.JitFlag.FreezingScope):

@@ -23,6 +23,7 @@ The difference of powers is written (theta1 - theta0) sum_k theta1^k theta0^(n-k
 tangent, so that short segments and rays that pass the light do not cancel.
 """
 
+from realtime.arrays import largest
 from realtime.errors import InputError
 from realtime.geometry import RayGeometry, falloff
 from realtime.lights import Light
@@ -55,7 +56,7 @@ def taylor(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, degre
     if degree < 0:
         raise InputError(f"degree: got {degree}, wanted 0 or more")
     foot, h = geometry.foot, geometry.height
-    s0, s1 = x0 - foot, dr.minimum(x1 - foot, dr.largest(type(h)))
+    s0, s1 = x0 - foot, dr.minimum(x1 - foot, largest(type(h)))
     theta0, theta1 = dr.atan2(s0, h), dr.atan2(s1, h)
     series = _phase_series(medium.phase, degree, type(h))
 

@@ -23,6 +23,7 @@ Three choices let the kernel be compared with others:
 * The rest, the difference of powers without cancellation among it, is code of `taylor`.
 """
 
+from realtime.arrays import largest
 from realtime.errors import InputError
 from realtime.geometry import RayGeometry
 from realtime.kernels.taylor import _extinction_series, _integrated, _phase_series, _product, _weighted
@@ -68,7 +69,7 @@ def taylor_printed(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, 
     if not 0 <= degree <= HIGHEST_DEGREE:
         raise InputError(f"degree: got {degree}, wanted 0 to {HIGHEST_DEGREE}; for more use the kernel 'taylor'")
     foot, h = geometry.foot, geometry.height
-    s0, s1 = x0 - foot, dr.minimum(x1 - foot, dr.largest(type(h)))
+    s0, s1 = x0 - foot, dr.minimum(x1 - foot, largest(type(h)))
     theta0, theta1 = dr.atan2(s0, h), dr.atan2(s1, h)
     derived = _phase_series(medium.phase, degree, type(h))
 

@@ -124,3 +124,40 @@ def test_endless_rays_through_a_vacuum_with_sharp_lobes(variant, g):
         value = np.array(exact(geometry, types.scalar(0), types.scalar(np.inf), medium, light), dtype=np.float64)
         expected, _ = airlight_segments(foot, height, 0.0, np.inf, 0.0, PhaseFunction("hg", g=g))
         assert value == pytest.approx(expected, rel=bound)
+
+
+def test_rays_that_meet_the_light_are_infinite(variant):
+    from realtime.arrays import array_types
+    from realtime.geometry import RayGeometry
+    from realtime.kernels.exact import exact
+    from realtime.lights import Light
+    from realtime.medium import Medium
+    from realtime.phase import Phase
+
+    types = array_types()
+    for name in ("isotropic", "rayleigh"):
+        medium = Medium((types.scalar(0.5),), types.color(1), Phase(name))
+        geometry = RayGeometry(types.scalar([1.0, 0.0, 2.0, 3.0]), types.scalar(0.0), None, None)
+        light = Light("point", False, None, None)
+        value = np.array(exact(geometry, types.scalar(0.0), types.scalar(2.0), medium, light))
+        assert np.isinf(value[:3]).all()  # on it, camera at the light, surface at the light
+        assert np.isfinite(value[3])
+
+
+def test_gamma_is_the_integral_from_the_camera(variant):
+    from realtime.arrays import array_types
+    from realtime.geometry import RayGeometry
+    from realtime.kernels import airlight_integral, gamma
+    from realtime.kernels.exact import exact
+    from realtime.lights import Light
+    from realtime.medium import Medium
+    from realtime.phase import Phase
+
+    types = array_types("double")
+    medium = Medium((types.scalar(0.5),), types.color(1), Phase("rayleigh"))
+    geometry = RayGeometry(types.scalar(1.1), types.scalar(0.4), None, None)
+    light = Light("point", False, None, None)
+    ends = types.scalar(0.7), types.scalar(2.3)
+    difference = [float(gamma(exact, geometry, x, medium=medium, light=light)[0]) for x in ends]
+    direct = airlight_integral(exact, geometry, *ends, medium=medium, light=light)
+    assert difference[1] - difference[0] == pytest.approx(float(direct[0]), rel=1e-12)
