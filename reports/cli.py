@@ -19,6 +19,7 @@ from reports import __version__
 from reports.command_bench import bench
 from reports.command_compare import compare
 from reports.command_doctor import doctor
+from reports.command_figures import figures
 from reports.command_integrate import integrate
 from reports.command_list import kernels, methods, scenes
 from reports.command_reference import reference
@@ -31,7 +32,7 @@ from reports.environment import VARIANT_VARIABLE, MissingError, check_variant, i
 DONE, FAILED, WRONG_INPUT, MISSING, INTERRUPTED = 0, 1, 2, 3, 130
 
 # In the order of --help.
-_COMMANDS = (report, doctor, scenes, methods, kernels, render, reference, compare, integrate, bench, stability)
+_COMMANDS = (report, doctor, scenes, methods, kernels, render, reference, compare, integrate, bench, stability, figures)
 
 app = typer.Typer(
     name="airlight",

@@ -7,6 +7,7 @@ with `truth`, `agreement` by layer and `methods`, each of these with `times` [ms
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, is_dataclass
 from typing import Any
 
@@ -81,6 +82,11 @@ def measurement_data(measured: Measurement) -> dict[str, Any]:
         "surface_error": plain(measured.surface_error),
         "files": {},
     }
+
+
+def stability_data(kernels: Sequence[Any]) -> list[dict[str, Any]]:
+    """Return what `validation.stability.stability` found, in full."""
+    return plain(list(kernels))
 
 
 def claims(scenes: list[dict[str, Any]]) -> list[str]:

@@ -14,7 +14,7 @@ import numpy as np
 from analytic.errors import InputError
 from reference.exr import Image, write_exr
 from reference.files import ensure_folder, write_text
-from reports.data import SCHEMA, claims, scene_data
+from reports.data import SCHEMA, claims, scene_data, stability_data
 from reports.page import render_page
 from reports.pictures import error_map, exposure, tone_mapped, write_png
 from validation.configurations import STANDARD, Configuration
@@ -73,6 +73,11 @@ def write_report(
 
         study = study_scene(name, effort, configurations=configurations, progress=tell)
         found.append(_write_scene(target, study))
+    kernels = []
+    if effort.rays:
+        from validation.stability import stability
+
+        kernels = stability_data(stability(count=effort.rays))
     data = {
         "schema": SCHEMA,
         "created": time.strftime("%Y-%m-%d %H:%M:%S %z"),
@@ -82,6 +87,7 @@ def write_report(
         "environment": describe_environment(),
         "claims": claims(found),
         "scenes": found,
+        "kernels": kernels,
     }
     write_text(target / "report.json", json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
     write_text(target / "report.html", render_page(data, target))

@@ -26,14 +26,15 @@ class Effort:
     volpath: tuple[int, int]  #: width and height of the comparison with volpath [pixels]
     margin: float  #: of the relative bias of volpath
     seconds: float  #: spent on each timing
+    rays: int = 0  #: generated rays on which kernels are tried, besides the certified ones; 0 leaves this out
 
 
 EFFORTS: dict[str, Effort] = {
     effort.name: effort
     for effort in (
         Effort("quick", (320, 240), (320, 240), (120, 90), 0.01, 0.15),
-        Effort("default", (400, 300), (800, 600), (160, 120), 0.005, 0.4),
-        Effort("full", (800, 600), (800, 600), (240, 180), 0.002, 1.0),
+        Effort("default", (400, 300), (800, 600), (160, 120), 0.005, 0.4, 20_000),
+        Effort("full", (800, 600), (800, 600), (240, 180), 0.002, 1.0, 100_000),
     )
 }
 

@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The figure of the polynomials: the airlight kernel over the angle at the light, and what Biri's polynomials make of
+it.
+
+`compute` writes the data, `plot` only reads them. For each phase function of Biri 2006 and some a = sigma_t height:
+
+    f(theta) = exp(-a (tan(theta/2 + pi/4) - 1)) p(-sin theta),
+
+exact, by the derived Taylor polynomial of degree 4 and by the one printed in the annex; and the shares of rays that the
+three kernels integrate to within 1 % and 10 % (`validation.printed`).
+"""
+
+import csv
+import io
+from pathlib import Path
+
+from reference.files import ensure_folder, write_bytes, write_text
+
+NAME = "polynomials"
+THICKNESSES = (0.1, 0.5, 2.0)
+_PHASES = ("isotropic", "rayleigh", "hazy", "murky")
+_CURVES = ("exact", "taylor", "taylor-printed")
+
+
+def compute(folder: Path | str, *, rays: int = 100_000) -> None:
+    """Write `polynomials.csv` (the curves) and `polynomials-shares.csv` (the shares of rays) into a folder.
+
+    Parameters
+    ----------
+    folder
+        Where the files go.
+    rays
+        Quasi-random rays of which the shares are counted.
+    """
+    import numpy as np
+
+    from validation.printed import printed_against_derived
+
+    target = ensure_folder(folder)
+    theta = np.linspace(-1.5, 1.5, 301)
+    rows = []
+    for phase in _PHASES:
+        for a in THICKNESSES:
+            curves = _curves(phase, a, theta)
+            rows += [(phase, a, *values) for values in zip(theta, *(curves[name] for name in _CURVES))]
+    _write_csv(target / f"{NAME}.csv", ("phase", "a", "theta", *_CURVES), rows)
+    shares = [
+        (one.phase, one.region, one.kernel, one.rays, one.within_1_percent, one.within_10_percent)
+        for one in printed_against_derived(rays)
+    ]
+    header = ("phase", "region", "kernel", "rays", "within_1_percent", "within_10_percent")
+    _write_csv(target / f"{NAME}-shares.csv", header, shares)
+
+
+def _curves(phase: str, a: float, theta):
+    import numpy as np
+
+    from analytic.phase import PhaseFunction
+    from analytic.series import taylor_coefficients
+    from realtime.kernels.taylor_printed import printed_coefficients
+
+    function = PhaseFunction(phase)
+    exact = np.exp(-a * (np.tan(0.5 * theta + 0.25 * np.pi) - 1)) * function(-np.sin(theta))
+    derived = np.ravel(taylor_coefficients(a, function))
+    # The annex gives c0 to c2 and, for the isotropic case, c3 and c4; what it leaves out is taken from the derivation.
+    printed = [float(c) for c in printed_coefficients(a, phase)]
+    printed += list(derived[len(printed) :])
+    polynomials = {name: np.polyval(c[::-1], theta) for name, c in (("taylor", derived), ("taylor-printed", printed))}
+    return {"exact": exact, **polynomials}
+
+
+def plot(folder: Path | str) -> None:
+    """Draw `polynomials.pdf` and `.png` from the data in a folder."""
+    import matplotlib
+    import numpy as np
+    from matplotlib.figure import Figure
+
+    folder = Path(folder)
+    with open(folder / f"{NAME}.csv", newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    styles = {
+        "exact": {"color": "black", "linewidth": 1.6},
+        "taylor": {"color": "#0072b2", "linestyle": "--", "linewidth": 1.2},
+        "taylor-printed": {"color": "#d55e00", "linestyle": ":", "linewidth": 1.4},
+    }
+    with matplotlib.rc_context({"font.size": 8, "pdf.fonttype": 42}):
+        figure = Figure(figsize=(7.16, 6.8), layout="constrained")
+        panels = figure.subplots(len(_PHASES), len(THICKNESSES), sharex=True)
+        for line, phase in zip(panels, _PHASES):
+            for panel, a in zip(line, THICKNESSES):
+                chosen = [row for row in rows if row["phase"] == phase and float(row["a"]) == a]
+                theta = np.array([float(row["theta"]) for row in chosen])
+                exact = np.array([float(row["exact"]) for row in chosen])
+                for name, style in styles.items():
+                    panel.plot(theta, [float(row[name]) for row in chosen], label=name, **style)
+                panel.set_ylim(-0.25 * exact.max(), 1.25 * exact.max())
+                panel.set_title(f"{phase}, a = {a:g}", fontsize=8)
+                panel.grid(True, linewidth=0.3)
+        for panel in panels[-1]:
+            panel.set_xlabel("theta [rad]")
+        for line in panels:
+            line[0].set_ylabel("f(theta) [1]")
+        handles, labels = panels[0][0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False)
+        for suffix, metadata in ((".pdf", {"CreationDate": None}), (".png", {"Software": None})):
+            buffer = io.BytesIO()
+            figure.savefig(buffer, format=suffix[1:], dpi=200, metadata=metadata)
+            write_bytes(folder / f"{NAME}{suffix}", buffer.getvalue())
+
+
+def _write_csv(path: Path, header, rows) -> None:
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow(header)
+    writer.writerows([[f"{value:.9g}" if isinstance(value, float) else value for value in row] for row in rows])
+    write_text(path, buffer.getvalue())
