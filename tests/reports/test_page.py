@@ -333,3 +333,25 @@ def test_percent_and_interval():
 def test_same_picture_gives_the_same_bytes():
     picture = np.random.default_rng(0).integers(0, 255, (4, 5, 3), dtype=np.uint8)
     assert png_bytes(picture) == png_bytes(picture.copy())
+
+
+def test_kernels_have_a_table_where_they_were_tried(data, folder):
+    errors = {
+        "rays": 77,
+        "refused": 5,
+        "median": 1.5e-7,
+        "p99": 2.5e-6,
+        "max": 4.5e-6,
+        "nan": 0,
+        "infinite": 0,
+        "negative": 2,
+    }
+    kernel = {
+        "kernel": "my-kernel",
+        "sets": [{"name": "certified", "single": {"all": errors}, "double": {"all": errors}}],
+    }
+    page = render(data | {"kernels": [kernel]}, folder)
+    assert "my-kernel" in page.text
+    assert "4.5·10⁻⁶" in page.text
+    assert "bad" in [attributes.get("class") for attributes in page.attributes("td")]
+    assert "Where kernels break" not in render(data, folder).text
