@@ -11,7 +11,7 @@ import typer
 
 def report(
     quick: Annotated[bool, typer.Option("--quick", help="Small images, few samples: three minutes.")] = False,
-    full: Annotated[bool, typer.Option("--full", help="Large images, many samples: an hour.")] = False,
+    full: Annotated[bool, typer.Option("--full", help="Large images, many samples; much longer.")] = False,
     scenes: Annotated[
         str | None,
         typer.Option(help="Comma-separated built-in scenes and Mitsuba XML files; all built-in ones by default."),

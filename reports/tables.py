@@ -14,7 +14,6 @@ def print_json(data: Any) -> None:
 def print_table(headers: Sequence[str], rows: Sequence[Sequence[str]], title: str | None = None) -> None:
     """Print a table: the first column to the left, the others to the right; as wide as it needs where piped."""
     from rich import box
-    from rich.console import Console
     from rich.table import Table
 
     table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
@@ -22,16 +21,12 @@ def print_table(headers: Sequence[str], rows: Sequence[Sequence[str]], title: st
         table.add_column(header, justify="left" if number == 0 else "right", overflow="fold")
     for row in rows:
         table.add_row(*row)
-    console = Console(highlight=False)
-    if not console.is_terminal:
-        console = Console(highlight=False, width=240)
-    console.print(table)
+    _print(table)
 
 
 def print_words(rows: Sequence[Sequence[str]], headers: Sequence[str]) -> None:
     """Print a table of words, every column to the left."""
     from rich import box
-    from rich.console import Console
     from rich.table import Table
 
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
@@ -39,6 +34,13 @@ def print_words(rows: Sequence[Sequence[str]], headers: Sequence[str]) -> None:
         table.add_column(header, overflow="fold")
     for row in rows:
         table.add_row(*row)
+    _print(table)
+
+
+def _print(table) -> None:
+    """Print a table as wide as the terminal, or as it needs where piped."""
+    from rich.console import Console
+
     console = Console(highlight=False)
     if not console.is_terminal:
         console = Console(highlight=False, width=240)
