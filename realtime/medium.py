@@ -23,6 +23,16 @@ def per_extinction(medium: Medium, function: Callable[[Any], Any]):
     return values[0] if len(values) == 1 else type(medium.albedo)(*values)
 
 
+def least_extinction(medium: Medium):
+    """Return the smallest extinction of the channels [1/m]."""
+    import drjit as dr
+
+    least = medium.sigma_t[0]
+    for sigma_t in medium.sigma_t[1:]:
+        least = dr.minimum(least, sigma_t)
+    return least
+
+
 def transmittance(medium: Medium, distance):
     """Return exp(-sigma_t distance) [1], one value or a colour as in `per_extinction`."""
     import drjit as dr

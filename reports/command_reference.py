@@ -27,7 +27,7 @@ def reference(
     """Compute the ground truth of a scene and write it as layered EXR, with its error."""
     from reference.exr import write_exr
     from reference.files import ensure_writable
-    from reports.environment import activate, versions
+    from reports.environment import activate, stamped
     from reports.progress import progress_bar
     from reports.tables import print_json
     from validation.load import load_scene, parse_size
@@ -41,8 +41,7 @@ def reference(
             image = quadrature_reference(loaded, progress=tell)
         else:
             image = volpath_reference(loaded, samples=spp, seed=seed, progress=tell)
-    attributes = dict(image.attributes) | {f"airlight:version:{key}": value for key, value in versions().items()}
-    write_exr(output, type(image)(image.layers, image.depth, attributes))
+    write_exr(output, stamped(image))
     means = {name: layer.mean(axis=(0, 1)).tolist() for name, layer in image.layers.items()}
     if json:
         print_json({"scene": loaded.name, "output": str(output), "estimator": str(estimator), "means": means})

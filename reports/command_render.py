@@ -68,14 +68,11 @@ def _render(name: str, scene, chosen, *, output: Path | None, preview: Path | No
     renderer = prepared(scene, chosen)
     frame = render_frame(renderer)
     if output is not None:
-        from reference.exr import Image, write_exr
-        from reports.environment import versions
+        from reference.exr import write_exr
+        from reports.environment import stamped
+        from validation.references import layered_frame
 
-        attributes = {"airlight:scene": name, "airlight:method": chosen.method}
-        attributes |= {"airlight:kernel": chosen.kernel} if chosen.kernel else {}
-        attributes |= {f"airlight:{key}": str(value) for key, value in chosen.parameters}
-        attributes |= {f"airlight:version:{key}": value for key, value in versions().items()}
-        write_exr(output, Image({"airlight": frame.airlight, "surface": frame.surface}, frame.distance, attributes))
+        write_exr(output, stamped(layered_frame(name, chosen, frame)))
     if preview is not None:
         from reports.pictures import exposure, tone_mapped, write_png
 

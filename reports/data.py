@@ -6,7 +6,6 @@ with `truth`, `agreement` by layer and `methods`, each of these with `times` [ms
 `surface_error`, and the files written. Not-a-number is null.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import asdict, is_dataclass
 from typing import Any
@@ -14,6 +13,7 @@ from typing import Any
 from realtime.plan import describe
 from validation.agreement import Agreement
 from validation.bench import Measurement, knows_shadows
+from validation.metrics import plain as plain_value
 from validation.study import SceneStudy
 
 SCHEMA = "airlight-report/1"
@@ -27,11 +27,7 @@ def plain(value: Any) -> Any:
         return {str(key): plain(one) for key, one in value.items()}
     if isinstance(value, list | tuple):
         return [plain(one) for one in value]
-    if hasattr(value, "item"):
-        value = value.item()
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
+    return plain_value(value)
 
 
 def scene_data(study: SceneStudy) -> dict[str, Any]:

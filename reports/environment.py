@@ -9,11 +9,15 @@ import difflib
 import os
 import shutil
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 from reports import __version__
 from reports.gpu import cuda_status, optix_status
 from reports.llvm import LLVM_VARIABLE, OLDEST_LLVM, Llvm, find_llvm
+
+if TYPE_CHECKING:
+    from reference.exr import Image
 
 #: Mitsuba variants that airlight runs in: vectorised, in colour.
 VARIANTS = ("cuda_ad_rgb", "llvm_ad_rgb")
@@ -188,6 +192,12 @@ def versions() -> dict[str, str]:
         except PackageNotFoundError:
             found[package] = "missing"
     return found
+
+
+def stamped(image: "Image") -> "Image":
+    """Return a layered image whose header names the versions that made it."""
+    named = {f"airlight:version:{key}": value for key, value in versions().items()}
+    return replace(image, attributes=dict(image.attributes) | named)
 
 
 def describe_environment() -> dict[str, object]:

@@ -12,12 +12,14 @@ from typing import Any
 import numpy as np
 
 from analytic.errors import InputError
-from reference.exr import Image, write_exr
+from reference.exr import write_exr
 from reference.files import ensure_folder, write_text
 from reports.data import SCHEMA, claims, scene_data, stability_data
+from reports.environment import describe_environment, stamped
 from reports.page import render_page
 from reports.pictures import error_map, exposure, tone_mapped, write_png
 from validation.configurations import STANDARD, Configuration
+from validation.references import layered_frame, layered_truth
 from validation.study import Effort, SceneStudy, study_scene
 
 Progress = Callable[[float, str], None]
@@ -59,8 +61,6 @@ def write_report(
     InputError
         If the folder cannot be written or a scene cannot be used; nothing that was there before is damaged.
     """
-    from reports.environment import describe_environment
-
     _refuse_twins(scenes)
     target = ensure_folder(folder)
     start = time.monotonic()
@@ -108,9 +108,7 @@ def _write_scene(target: Path, study: SceneStudy) -> dict[str, Any]:
     truth = study.truth
     factor = exposure(truth.airlight + truth.surface)
     data["exposure"] = factor
-    layers = {"airlight": truth.airlight, "airlight_bound": truth.airlight_bound, "surface": truth.surface}
-    attributes = {"airlight:estimator": "quadrature", "airlight:scene": study.loaded.name}
-    write_exr(folder / "reference.exr", Image(layers, truth.distance, attributes))
+    write_exr(folder / "reference.exr", stamped(layered_truth(study.loaded.name, truth)))
     write_png(folder / "reference.png", tone_mapped(truth.airlight + truth.surface, factor))
     write_png(folder / "reference-airlight.png", tone_mapped(truth.airlight, factor))
     data["files"] = {
@@ -121,11 +119,8 @@ def _write_scene(target: Path, study: SceneStudy) -> dict[str, Any]:
         if measured.frame is None:
             continue
         frame, stem = measured.frame, _file_stem(one["label"])
-        layers = {"airlight": frame.airlight, "surface": frame.surface}
-        attributes = {"airlight:method": one["method"], "airlight:scene": study.loaded.name}
-        attributes |= {"airlight:kernel": one["kernel"]} if one["kernel"] else {}
-        attributes |= {f"airlight:{key}": str(value) for key, value in one["parameters"].items()}
-        write_exr(folder / f"{stem}.exr", Image(layers, frame.distance, attributes))
+        image = layered_frame(study.loaded.name, measured.configuration, frame)
+        write_exr(folder / f"{stem}.exr", stamped(image))
         write_png(folder / f"{stem}.png", tone_mapped(np.asarray(frame.airlight) + frame.surface, factor))
         write_png(folder / f"{stem}-error.png", error_map(truth.airlight, np.asarray(frame.airlight, dtype=np.float64)))
         one["files"] = {

@@ -3,8 +3,11 @@
 
 from collections.abc import Callable
 
+from realtime.frame import Frame
 from reference.exr import Image
+from reference.quadrature import TruthImage
 from reference.volpath import LARGEST_BATCH, LAYERS
+from validation.configurations import Configuration
 from validation.load import LoadedScene
 from validation.truth import truth_image, volpath_batches
 
@@ -18,9 +21,21 @@ def quadrature_reference(loaded: LoadedScene, *, progress: Progress | None = Non
         if progress is not None:
             progress(done / total, what)
 
-    truth = truth_image(loaded.scene, progress=tell)
+    return layered_truth(loaded.name, truth_image(loaded.scene, progress=tell))
+
+
+def layered_truth(name: str, truth: TruthImage) -> Image:
+    """Return the quadrature truth of the scene of that name as layers."""
     layers = {"airlight": truth.airlight, "airlight_bound": truth.airlight_bound, "surface": truth.surface}
-    return Image(layers, truth.distance, {"airlight:scene": loaded.name, "airlight:estimator": "quadrature"})
+    return Image(layers, truth.distance, {"airlight:scene": name, "airlight:estimator": "quadrature"})
+
+
+def layered_frame(name: str, chosen: Configuration, frame: Frame) -> Image:
+    """Return a frame of the scene of that name as layers; the header says what rendered it."""
+    attributes = {"airlight:scene": name, "airlight:method": chosen.method}
+    attributes |= {"airlight:kernel": chosen.kernel} if chosen.kernel else {}
+    attributes |= {f"airlight:{key}": str(value) for key, value in chosen.parameters}
+    return Image({"airlight": frame.airlight, "surface": frame.surface}, frame.distance, attributes)
 
 
 def volpath_reference(loaded: LoadedScene, *, samples: int, seed: int = 0, progress: Progress | None = None) -> Image:

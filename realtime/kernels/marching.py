@@ -12,7 +12,7 @@ from realtime.arrays import smallest
 from realtime.errors import InputError
 from realtime.geometry import RayGeometry, distance_to_light, falloff
 from realtime.lights import Light
-from realtime.medium import Medium, per_extinction
+from realtime.medium import Medium, least_extinction, per_extinction
 from realtime.phase import evaluate
 
 _REACH = 20.0  # optical depths after which uniform steps end an endless ray: e^-20 = 2e-9
@@ -36,9 +36,7 @@ def uniform(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, step
     import drjit as dr
 
     _check(steps)
-    thinnest = dr.maximum(medium.sigma_t[0], smallest(type(x1)))
-    for sigma_t in medium.sigma_t[1:]:
-        thinnest = dr.minimum(thinnest, dr.maximum(sigma_t, smallest(type(x1))))
+    thinnest = dr.maximum(least_extinction(medium), smallest(type(x1)))
     x1 = dr.select(dr.isinf(x1), x0 + _REACH / thinnest, x1)
 
     def term(sigma_t, x):

@@ -28,6 +28,7 @@ a spot falls off between beam and cut-off, it is split at the cone of the beam, 
 from functools import lru_cache
 
 from realtime.arrays import is_single, smallest
+from realtime.errors import InputError
 from realtime.exponential import exp_bounded
 from realtime.geometry import RayGeometry, clip_to_cone, falloff
 from realtime.lights import Light
@@ -79,8 +80,6 @@ def _positive_nodes(nodes: int) -> tuple[tuple[float, float], ...]:
     import numpy as np
 
     if nodes < 2 or nodes % 2:
-        from realtime.errors import InputError
-
         raise InputError(f"nodes: got {nodes}, wanted a positive even number of quadrature nodes")
     xi, weight = np.polynomial.legendre.leggauss(nodes)
     return tuple((float(x), float(w)) for x, w in zip(xi, weight) if x > 0)

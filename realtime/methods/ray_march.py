@@ -15,7 +15,7 @@ steps.
 from realtime.errors import InputError
 from realtime.geometry import RayGeometry, clip_to_cone, distance_to_light, falloff, ray_geometry
 from realtime.lights import Light
-from realtime.medium import per_extinction
+from realtime.medium import least_extinction, per_extinction
 from realtime.phase import evaluate
 from realtime.shadow_map import lit_in_map
 from realtime.view import View, radiance
@@ -65,7 +65,7 @@ def ray_march(
         if light.kind == "spot":
             x0, x1 = clip_to_cone(geometry, light.cos_cutoff, x0, x1)
         if spacing == "uniform":
-            x1 = dr.minimum(x1, x0 + _OPTICAL_REACH / dr.minimum(*_two(view.medium.sigma_t)))
+            x1 = dr.minimum(x1, x0 + _OPTICAL_REACH / least_extinction(view.medium))
         shadow_map = view.shadow_maps[number] if shadow == "map" and view.plan.shadows else None
         lit = _visibility(view, light, shadow, shadow_map)
         integral = _march(view, light, geometry, (x0, x1), steps=steps, spacing=spacing, lit=lit)
@@ -81,13 +81,6 @@ def _check(steps: int, spacing: str, shadow: str, view: View) -> None:
         raise InputError(f"steps: got {steps!r}, wanted a whole number of at least 1")
     if spacing == "uniform" and view.plan.vacuum:
         raise InputError("spacing=uniform: an endless ray through a vacuum has no step length; use spacing=equiangular")
-
-
-def _two(values):
-    """Return the smallest candidates of one or three extinctions as two arguments."""
-    import drjit as dr
-
-    return (values[0], values[0]) if len(values) == 1 else (dr.minimum(values[0], values[1]), values[2])
 
 
 def _visibility(view: View, light: Light, shadow: str, shadow_map):
