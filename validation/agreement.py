@@ -68,7 +68,7 @@ def agreement(
     epsilon = measure_shadow_epsilon()
     plain = truth_image(scene)
     shortened = truth_image(scene, shadow_scale=1 - epsilon)
-    near = plain.light_angle <= MASK_PIXELS * _pixel_angle(scene)
+    near = plain.light_angle <= MASK_PIXELS * pixel_angle(scene)
     masks = {"airlight": ~near & np.all(np.isfinite(plain.airlight), axis=2), "surface": np.ones_like(near)}
     layers = [layer for layer in LAYERS if np.any(getattr(plain, layer) > 0)]
 
@@ -130,7 +130,7 @@ def _bias(expected, volpath: Batches, layer: str, mask) -> float:
     return float(mean[mask].sum() / expected[mask].sum() - 1)
 
 
-def _pixel_angle(scene) -> float:
+def pixel_angle(scene) -> float:
     """Return the angle between the two pixels in the middle of the image [rad]."""
     truth = read_truth(scene)
     middle = (truth.height // 2) * truth.width + truth.width // 2
