@@ -22,6 +22,7 @@ from reports.command_doctor import doctor
 from reports.command_figures import figures
 from reports.command_integrate import integrate
 from reports.command_list import kernels, methods, scenes
+from reports.command_mutations import mutations
 from reports.command_reference import reference
 from reports.command_render import render
 from reports.command_report import report
@@ -32,7 +33,21 @@ from reports.environment import VARIANT_VARIABLE, MissingError, check_variant, i
 DONE, FAILED, WRONG_INPUT, MISSING, INTERRUPTED = 0, 1, 2, 3, 130
 
 # In the order of --help.
-_COMMANDS = (report, doctor, scenes, methods, kernels, render, reference, compare, integrate, bench, stability, figures)
+_COMMANDS = (
+    report,
+    doctor,
+    scenes,
+    methods,
+    kernels,
+    render,
+    reference,
+    compare,
+    integrate,
+    bench,
+    stability,
+    mutations,
+    figures,
+)
 
 app = typer.Typer(
     name="airlight",

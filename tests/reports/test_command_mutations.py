@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import json
+
+import pytest
+
+from reports.cli import run
+from validation.mutation_catalogue import MUTATIONS
+from validation.mutations import MutationStudy, Sighting, judged
+
+RIGHT = Sighting(
+    "open-fog",
+    True,
+    "airlight",
+    "volpath",
+    0.005,
+    0.0003,
+    (-0.0015, 0.0021),
+    0.003,
+    0,
+    0,
+    expected_rejections=0.01,
+    agrees=True,
+)
+WRONG = Sighting(
+    "open-fog",
+    True,
+    "airlight",
+    "volpath",
+    0.005,
+    0.31,
+    (0.30, 0.32),
+    0.003,
+    0,
+    7,
+    expected_rejections=0.01,
+    agrees=False,
+)
+
+
+@pytest.fixture
+def study(monkeypatch, variant):
+    """Let the command find what a test wants it to find; returns the arguments that it asked with."""
+    asked = {}
+
+    def replace_by(*seen):
+        def found(mutations, **arguments):
+            asked.update(arguments, mutations=[mutation.name for mutation in mutations])
+            results = tuple(judged(mutation, [one]) for mutation, one in zip(mutations, seen, strict=True))
+            return MutationStudy((RIGHT,), results)
+
+        monkeypatch.setattr("validation.mutations.study_mutations", found)
+        return asked
+
+    return replace_by
+
+
+def test_the_table_names_every_mutation_and_says_why_one_was_missed(study, capsys):
+    names = [mutation.name for mutation in MUTATIONS[:10]]
+    asked = study(*(WRONG,) * 9, RIGHT)
+    assert run(["mutations", *names, "--size", "24x18", "--margin", "0.01"]) == 0
+    assert (asked["mutations"], asked["size"], asked["margin"]) == (names, (24, 18), 0.01)
+    printed = capsys.readouterr().out
+    assert all(name in printed for name in names)
+    assert "open-fog, airlight, volpath" in printed
+    assert f"{names[9]}: NOT CAUGHT: the largest bias is +0.03 %" in printed
+    assert "9 of 10 mutations caught" in printed
+
+
+def test_too_few_caught_is_a_failure(study, capsys):
+    study(WRONG, RIGHT)
+    assert run(["mutations", "no-four-pi", "near-clip", "--json"]) == 1
+    data = json.loads(capsys.readouterr().out)
+    assert (data["caught"], data["mutations"], data["passed"]) == (1, 2, False)
+    assert [result["caught"] for result in data["results"]] == [True, False]
+    assert data["results"][0]["clearest"]["interval"] == [0.30, 0.32]
+    assert data["control"][0]["agrees"] is True
+
+
+def test_an_unknown_name_is_wrong_input(capsys):
+    assert run(["mutations", "near-clop"]) == 2
+    assert "did you mean 'near-clip'" in capsys.readouterr().err

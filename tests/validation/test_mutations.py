@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import ast
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analytic.errors import InputError
+from reference.quadrature import quadrature_image
+from reference.scene import read_truth
+from tests.scenes_for_tests import tiny_scene
+from validation.module_copies import replaced_once
+from validation.mutation_catalogue import MUTATIONS, Mutation, chosen_mutations
+from validation.mutations import (
+    LEAST_CAUGHT,
+    SCENES,
+    MutationStudy,
+    copies_with,
+    judged,
+    loaded_stage,
+    seen,
+    stage_of,
+    study_mutations,
+)
+from validation.probe_scenes import PROBES
+
+BY_NAME = {mutation.name: mutation for mutation in MUTATIONS}
+QUADRATURE = [mutation for mutation in MUTATIONS if mutation.estimator == "quadrature"]
+
+
+@pytest.mark.parametrize("mutation", MUTATIONS, ids=lambda mutation: mutation.name)
+def test_every_text_is_there_exactly_once(mutation):
+    """Who moves or rewrites a formula must move its mutation: it must not vanish unnoticed."""
+    assert mutation.old != mutation.new
+    ast.parse(replaced_once(mutation.module, mutation.old, mutation.new))
+
+
+def test_the_catalogue_is_large_enough_and_its_names_are_its_own():
+    assert len(MUTATIONS) == len(BY_NAME) >= 20
+    assert all(mutation.meaning for mutation in MUTATIONS)
+
+
+def test_mutations_are_chosen_by_name():
+    assert chosen_mutations(None) == MUTATIONS
+    assert [one.name for one in chosen_mutations(["near-clip", "no-four-pi"])] == ["near-clip", "no-four-pi"]
+    with pytest.raises(InputError, match="did you mean 'near-clip'"):
+        chosen_mutations(["near-clop"])
+
+
+@pytest.fixture(scope="module")
+def images(variant):
+    """Scenes of the standard run at a tiny size, with their quadrature images."""
+    loaded = {name: loaded_stage(name, (12, 9)) for name in (*SCENES, *PROBES)}
+    return {name: (scene, quadrature_image(read_truth(scene))) for name, scene in loaded.items()}
+
+
+def _image(mutation: Mutation | None, scene):
+    copies = copies_with(mutation)
+    with np.errstate(all="ignore"):
+        return copies["reference.quadrature"].quadrature_image(copies["reference.scene"].read_truth(scene))
+
+
+def test_the_copy_without_a_mutation_gives_the_same_image(images):
+    for scene, truth in images.values():
+        image = _image(None, scene)
+        assert np.array_equal(image.airlight, truth.airlight)
+        assert np.array_equal(image.surface, truth.surface)
+
+
+@pytest.mark.parametrize("mutation", QUADRATURE, ids=lambda mutation: mutation.name)
+def test_every_mutation_changes_an_image(images, mutation):
+    changes = []
+    for scene, truth in images.values():
+        image = _image(mutation, scene)
+        for layer in ("airlight", "surface"):
+            one, other = getattr(image, layer), getattr(truth, layer)
+            if other.any():
+                changes.append(np.abs(one - other).sum() / other.sum())
+    # The least of them is a factor of 1.001; rounding is worth 1e-10.
+    assert max(changes) > 9e-4
+
+
+@pytest.fixture(scope="module")
+def stage(variant):
+    import mitsuba as mi
+
+    # 2 % is what 32 batches of 128 samples reach on 24 x 18 pixels.
+    return stage_of("tiny", mi.load_dict(tiny_scene(size=(24, 18))), margin=0.02, samples=128)
+
+
+@pytest.mark.statistical
+def test_the_control_agrees(stage):
+    control = seen(None, [stage])
+    assert [one.layer for one in control] == ["airlight", "surface"]
+    for one in control:
+        assert one.agrees
+        assert not one.built_in
+        assert (one.nonfinite, one.against, one.margin) == (0, "volpath", 0.02)
+        assert -0.02 < one.interval[0] < one.relative_bias < one.interval[1] < 0.02
+        assert one.interval[1] - one.interval[0] < 0.8 * 0.02
+
+
+@pytest.mark.statistical
+@pytest.mark.parametrize(
+    ("name", "layer", "bias"),
+    [("no-four-pi", "airlight", 4 * np.pi - 1), ("surface-without-shadows", "surface", None)],
+)
+def test_mutations_are_caught(stage, name, layer, bias):
+    result = judged(BY_NAME[name], seen(BY_NAME[name], [stage]))
+    assert result.caught
+    assert not result.caught_by_built_in  # the only stage is no built-in scene
+    assert result.clearest.layer == layer
+    assert result.clearest.agrees is False
+    if bias is not None:
+        assert result.clearest.relative_bias == pytest.approx(bias, rel=0.02)  # the margin of the stage
+
+
+@pytest.mark.statistical
+def test_a_fault_inside_the_margin_is_not_caught_and_the_reason_says_so(stage):
+    result = judged(BY_NAME["one-per-mille"], seen(BY_NAME["one-per-mille"], [stage]))
+    assert not result.caught
+    assert "inside the margin counts as agreement" in result.reason
+    assert "±2 %" in result.reason
+
+
+@pytest.mark.statistical
+def test_what_becomes_infinite_is_caught(stage):
+    whole = BY_NAME["no-four-pi"]
+    infinite = replace(whole, new=f"{whole.old} * np.where(light.intensity > 0, np.inf, 1.0)")
+    result = judged(infinite, seen(infinite, [stage]))
+    assert result.caught
+    assert result.clearest.nonfinite == 24 * 18 - int((~stage.masks["airlight"]).sum())
+
+
+@pytest.mark.statistical
+def test_a_study_passes_only_if_the_control_agrees_and_nine_in_ten_are_caught(stage):
+    control = seen(None, [stage])
+    one = judged(BY_NAME["no-four-pi"], seen(BY_NAME["no-four-pi"], [stage]))
+    missed = replace(one, caught=False)
+    assert LEAST_CAUGHT == 0.9
+    assert MutationStudy(control, (one,) * 18 + (missed,) * 2).passed
+    assert not MutationStudy(control, (one,) * 17 + (missed,) * 3).passed
+    assert not MutationStudy((replace(control[0], agrees=False),), (one,) * 20).passed
+
+
+@pytest.mark.slow
+@pytest.mark.statistical
+def test_the_standard_run_catches_nine_in_ten(variant):
+    # Twice the margin of a default report: a quarter of the samples.
+    found = study_mutations(margin=0.01)
+    assert found.passed
+    missed = {result.name for result in found.results if not result.caught}
+    assert missed <= {"one-per-mille", "three-per-mille", "one-per-cent", "short-shadow-rays"}
+    assert all(result.reason for result in found.results if not result.caught_by_built_in)
