@@ -53,10 +53,24 @@ def mutations(
 def _print_results(found) -> None:
     from reports.tables import print_table
 
-    headers = ("mutation", "caught", "by", "bias", "95 % interval", "margin", "what it stands for")
+    headers = (
+        "mutation",
+        "caught",
+        "chance",
+        "by",
+        "true bias",
+        "bias seen",
+        "95 % interval",
+        "margin",
+        "what it stands for",
+    )
     print_table(headers, [_row(result) for result in found.results])
-    rows = [(f"{one.scene}, {one.layer}", *_numbers(one), "" if one.agrees else "NO") for one in found.control]
-    print_table(("control", "bias", "95 % interval", "margin", "agrees"), rows, "without a mutation")
+    controls = [
+        (f"{one.scene}, {one.layer}", *_numbers(one)[1:], f"{100 * one.chance:.2g} %", "yes" if one.agrees else "NO")
+        for one in found.control
+    ]
+    control_headers = ("control", "bias seen", "95 % interval", "margin", "false alarms", "agrees")
+    print_table(control_headers, controls, "without a mutation")
     for result in found.results:
         if result.reason:
             seen = "seen by a probe alone" if result.caught else "NOT CAUGHT"
@@ -67,12 +81,14 @@ def _print_results(found) -> None:
 def _row(result: "MutationResult") -> tuple[str, ...]:
     one = result.clearest
     by = f"{one.scene}, {one.layer}, {one.against}"
-    return (result.name, "yes" if result.caught else "NO", by if result.caught else "", *_numbers(one), result.meaning)
+    caught, chance = ("yes" if result.caught else "NO"), f"{100 * result.chance:.0f} %"
+    return (result.name, caught, chance, by if result.caught else "", *_numbers(one), result.meaning)
 
 
-def _numbers(one: "Sighting") -> tuple[str, str, str]:
+def _numbers(one: "Sighting") -> tuple[str, str, str, str]:
     low, high = one.interval
     return (
+        f"{100 * one.true_bias:+.3g} %",
         f"{100 * one.relative_bias:+.3g} %",
         f"{100 * low:+.3g} to {100 * high:+.3g} %",
         f"±{100 * one.margin:g} %",

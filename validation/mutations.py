@@ -41,6 +41,7 @@ class Opponent:
 
     estimator: str
     batches: Batches
+    image: TruthImage  #: what the unchanged quadrature expects of it
     shadow_scale: float  #: the share of the leg from the light that it attenuates over
     margin: float  #: of the relative bias against it
 
@@ -65,9 +66,11 @@ class Sighting:
     layer: str  #: 'airlight' or 'surface'
     against: str  #: the estimator that was left as it is
     margin: float
-    relative_bias: float  #: of the changed estimator
+    true_bias: float  #: relative change of the image by the fault, free of noise
+    relative_bias: float  #: of the changed estimator, as seen against the other one
     interval: tuple[float, float]  #: the wider of its 95 % intervals
     detectable_bias: float
+    chance: float  #: probability that a run with other seeds does not agree either
     nonfinite: int  #: pixels that the change made infinite or not a number
     rejected: int  #: pixels rejected at Sidak's level, for the record: the verdict is that of the bias
     expected_rejections: float
@@ -84,6 +87,7 @@ class MutationResult:
     module: str
     caught: bool
     caught_by_built_in: bool  #: whether a built-in scene caught it, not a probe alone
+    chance: float  #: probability that a run with other seeds catches it
     clearest: Sighting  #: the comparison that shows it best, in a built-in scene if one does
     sightings: tuple[Sighting, ...]
     reason: str  #: why it was not caught by the built-in scenes, empty where it was
@@ -159,14 +163,19 @@ def stage_of(name: str, scene, *, margin: float, samples: int = _SAMPLES) -> Sta
     masks = {"airlight": ~near & np.isfinite(truth.airlight).all(axis=2), "surface": np.ones_like(near)}
     masks = {layer: mask for layer, mask in masks.items() if np.any(getattr(truth, layer) > 0)}
 
+    shadow_scale = 1 - measure_shadow_epsilon()
+    shortened = truth_image(scene, shadow_scale=shadow_scale)
+
     def opponent(found: Batches) -> Opponent:
-        return Opponent("volpath", found, 1 - measure_shadow_epsilon(), margin)
+        return Opponent("volpath", found, shortened, shadow_scale, margin)
 
     def enough(found: Batches) -> bool:
         """Look at the spread alone, as `validation.agreement` does: stopping favours no verdict."""
         if len(found.seeds) < _LEAST:
             return False
-        compared = (_statistics(opponent(found), layer, getattr(truth, layer), mask) for layer, mask in masks.items())
+        compared = (
+            _statistics(opponent(found), layer, getattr(shortened, layer), mask) for layer, mask in masks.items()
+        )
         return all(0.5 * np.ptp(_widest(one)) < 0.4 * margin for one in compared)
 
     found = volpath_batches(scene, batches=_BATCHES, samples=samples, enough=enough)
@@ -198,16 +207,23 @@ def copies_with(mutation: Mutation | None) -> ModuleCopies:
 def _sighting(stage: Stage, opponent: Opponent, layer: str, image: NDArray[np.float64]) -> Sighting:
     mask = stage.masks[layer]
     found = _statistics(opponent, layer, image, mask)
-    nonfinite = int((~np.isfinite(image).all(axis=2) & mask).sum())
+    finite = np.isfinite(image).all(axis=2) & mask
+    nonfinite = int(mask.sum() - finite.sum())
+    true_bias = (
+        float(image[finite].sum() / getattr(opponent.image, layer)[finite].sum() - 1) if finite.any() else np.nan
+    )
+    interval = _widest(found)
     return Sighting(
         stage.name,
         stage.name in SCENES,
         layer,
         opponent.estimator,
         opponent.margin,
+        true_bias,
         found.relative_bias,
-        _widest(found),
+        interval,
         found.detectable_bias,
+        1.0 if nonfinite else _chance(true_bias, interval, opponent.margin),
         nonfinite,
         found.rejected,
         found.expected_rejections,
@@ -233,6 +249,22 @@ def _widest(found: Statistics) -> tuple[float, float]:
     return max((pair for pair in intervals if pair is not None), key=lambda pair: pair[1] - pair[0])
 
 
+def _chance(bias: float, interval: tuple[float, float], margin: float) -> float:
+    """Return the probability that an interval of this width about a bias b plus noise leaves the margin m.
+
+    The noise is normal with the standard error s, the half width H = 1.96 s: agreement needs |b + noise| < m - H, which
+    happens with the probability Phi((m - H - b)/s) - Phi((-m + H - b)/s), never where H > m.
+    """
+    from scipy.special import ndtr
+
+    half = 0.5 * (interval[1] - interval[0])
+    error, room = half / 1.96, margin - half
+    if error <= 0:
+        return float(abs(bias) >= margin)
+    agrees = ndtr((room - bias) / error) - ndtr((-room - bias) / error) if room > 0 else 0.0
+    return float(1 - agrees)
+
+
 def judged(mutation: Mutation, sightings: Sequence[Sighting]) -> MutationResult:
     """Sum up what was seen of one mutation."""
     by_built_in = any(not one.agrees for one in sightings if one.built_in)
@@ -246,6 +278,8 @@ def judged(mutation: Mutation, sightings: Sequence[Sighting]) -> MutationResult:
         mutation.module,
         caught,
         by_built_in,
+        # The scenes have seeds of their own; so have the two layers of one.
+        float(1 - np.prod([1 - one.chance for one in sightings])),
         clearest,
         tuple(sightings),
         reason,
@@ -263,9 +297,10 @@ def _clearness(one: Sighting) -> tuple[bool, bool, float]:
 
 
 def _reason(mutation: Mutation, sightings: Sequence[Sighting]) -> str:
-    most = max(sightings, key=lambda one: abs(one.relative_bias))
+    most = max(sightings, key=lambda one: abs(one.true_bias))
     measured = (
-        f"the largest bias is {100 * most.relative_bias:+.3g} % ({most.scene}, {most.layer}), its interval inside "
-        f"±{100 * most.margin:g} %"
+        f"the fault changes {most.scene}, {most.layer}, by {100 * most.true_bias:+.3g} %, no other more"
+        if most.true_bias
+        else "no image of theirs changes"
     )
     return f"{mutation.remark}; {measured}" if mutation.remark else measured

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import json
+from dataclasses import replace
 
 import pytest
 
@@ -7,34 +8,23 @@ from reports.cli import run
 from validation.mutation_catalogue import MUTATIONS
 from validation.mutations import MutationStudy, Sighting, judged
 
-RIGHT = Sighting(
-    "open-fog",
-    True,
-    "airlight",
-    "volpath",
-    0.005,
-    0.0003,
-    (-0.0015, 0.0021),
-    0.003,
-    0,
-    0,
-    expected_rejections=0.01,
-    agrees=True,
-)
 WRONG = Sighting(
-    "open-fog",
-    True,
-    "airlight",
-    "volpath",
-    0.005,
-    0.31,
-    (0.30, 0.32),
-    0.003,
-    0,
-    7,
+    scene="open-fog",
+    built_in=True,
+    layer="airlight",
+    against="volpath",
+    margin=0.005,
+    true_bias=0.309,
+    relative_bias=0.31,
+    interval=(0.30, 0.32),
+    detectable_bias=0.003,
+    chance=1.0,
+    nonfinite=0,
+    rejected=7,
     expected_rejections=0.01,
     agrees=False,
 )
+RIGHT = replace(WRONG, true_bias=0.001, relative_bias=0.0003, interval=(-0.0015, 0.0021), chance=0.25, agrees=True)
 
 
 @pytest.fixture
@@ -62,7 +52,8 @@ def test_the_table_names_every_mutation_and_says_why_one_was_missed(study, capsy
     printed = capsys.readouterr().out
     assert all(name in printed for name in names)
     assert "open-fog, airlight, volpath" in printed
-    assert f"{names[9]}: NOT CAUGHT: the largest bias is +0.03 %" in printed
+    assert f"{names[9]}: NOT CAUGHT: the fault changes open-fog, airlight, by +0.1 %" in printed
+    assert "25 %" in printed
     assert "9 of 10 mutations caught" in printed
 
 

@@ -120,7 +120,24 @@ def test_a_fault_inside_the_margin_is_not_caught_and_the_reason_says_so(stage):
     result = judged(BY_NAME["one-per-mille"], seen(BY_NAME["one-per-mille"], [stage]))
     assert not result.caught
     assert "inside the margin counts as agreement" in result.reason
-    assert "±2 %" in result.reason
+    assert "airlight, by +0.1 %" in result.reason
+    # 0.1 % moves the bias by a tenth of what the interval leaves of the margin: hardly ever caught, by calculation too.
+    assert result.chance < 0.05
+    assert [one.true_bias for one in result.sightings] == pytest.approx([0.001, 0.0], abs=1e-9)
+
+
+@pytest.mark.statistical
+def test_the_chance_is_that_of_the_rule(stage):
+    """Against a simulation of the rule: noise of the size seen, and an interval of the width seen."""
+    whole = BY_NAME["one-per-cent"]
+    one = seen(replace(whole, new=f"{whole.old} * 1.015"), [stage])[0]
+    half = 0.5 * (one.interval[1] - one.interval[0])
+    noise = np.random.default_rng(5).normal(0.015, half / 1.96, 40_000)
+    agrees = (noise - half > -0.02) & (noise + half < 0.02)
+    assert one.true_bias == pytest.approx(0.015, abs=1e-9)
+    # The standard deviation of the simulated share is at most 0.0025.
+    assert one.chance == pytest.approx(1 - agrees.mean(), abs=0.01)
+    assert 0.2 < one.chance < 0.8  # neither certain: the formula is tested where it matters
 
 
 @pytest.mark.statistical
