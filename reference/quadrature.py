@@ -21,16 +21,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.geometry import foot_and_height
-from analytic.panels import airlight_segments
-from reference.cone import cone_interval, falloff, perpendicular
-from reference.scene import TruthLight, TruthMedium, TruthScene
+from reference.cone import cone_interval, perpendicular
+from reference.interval_sums import Rays, sum_intervals
+from reference.scene import TruthLight, TruthScene
 from reference.surface import lit_surface, surface_hits
-from reference.visibility import LitIntervals, lit_intervals
+from reference.visibility import lit_intervals
 
 Array = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]
-
-_EDGE = 2e-6  # relative uncertainty of the distance at which a float32 shadow ray changes its mind
 
 
 @dataclass(frozen=True)
@@ -115,85 +113,8 @@ def _light_airlight(
     cone = cone_interval(direction, normal, light, light.cutoff)
     ends = np.maximum(theta0, cone[0]), np.minimum(theta1, cone[1])
     lit = lit_intervals(truth, light, (direction, normal, height), ends=ends, samples=samples)
-    rays = _Rays(direction, normal, foot, height)
-    radiance, bound = _sum_intervals(truth.medium, light, rays, lit, shadow_scale)
+    rays = Rays(direction, normal, foot, height)
+    radiance, bound = sum_intervals(truth.medium, light, rays, lit, shadow_scale)
     in_front = (foot > 0) & (foot < distance)
     angle = np.where(in_front, np.arctan2(height, foot), np.pi)
     return _LightAirlight(radiance, bound, angle, lit.transitions, lit.missed)
-
-
-@dataclass(frozen=True)
-class _Rays:
-    direction: Array
-    normal: Array
-    foot: Array
-    height: Array
-
-
-def _sum_intervals(
-    medium: TruthMedium, light: TruthLight, rays: _Rays, lit: LitIntervals, shadow_scale: float
-) -> tuple[Array, Array]:
-    """Integrate every lit interval and add up the intervals of each ray."""
-    ray, low, high = _cut_at_beam(light, rays, lit)
-    foot, height = rays.foot[ray], rays.height[ray]
-    x0 = np.maximum(foot + height * np.tan(low), 0.0)
-    x1 = np.where(high >= np.pi / 2, np.inf, foot + height * np.tan(np.minimum(high, np.pi / 2)))
-    soft = light.axis is not None and light.beam < light.cutoff
-
-    def profile(x: Array, index: NDArray[np.int64]) -> Array:
-        rows = ray[index]
-        theta = np.arctan2(x - rays.foot[rows, None], rays.height[rows, None])
-        return falloff(theta, rays.direction[rows], rays.normal[rows], light)
-
-    values, errors = np.empty((3, len(ray))), np.empty((3, len(ray)))
-    for channel, sigma_t in enumerate(medium.sigma_t):
-        if channel and sigma_t == medium.sigma_t[0]:
-            values[channel], errors[channel] = values[0], errors[0]
-            continue
-        values[channel], errors[channel] = airlight_segments(
-            foot,
-            height,
-            x0,
-            np.maximum(x1, x0),
-            float(sigma_t),
-            medium.phase,
-            shadow_scale=shadow_scale,
-            weight=profile if soft else None,
-        )
-        errors[channel] += _edge_error(rays, ray, (x0, x1), float(sigma_t), medium)
-    factor = medium.albedo * medium.sigma_t * light.intensity / (4 * np.pi)
-    pixels = len(rays.foot)
-    total = np.stack([np.bincount(ray, values[c], pixels) for c in range(3)], axis=1) * factor
-    error = np.stack([np.bincount(ray, errors[c], pixels) for c in range(3)], axis=1) * factor
-    return total, error
-
-
-def _edge_error(
-    rays: _Rays, ray: NDArray[np.int64], ends: tuple[Array, Array], sigma_t: float, medium: TruthMedium
-) -> Array:
-    """Return what the float32 rounding of the ends of each interval is worth: integrand times rounding."""
-    total = np.zeros(len(ray))
-    for x in ends:
-        s = np.where(np.isfinite(x), x, 0) - rays.foot[ray]
-        r = np.hypot(rays.height[ray], s)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            strip = np.exp(-sigma_t * (rays.foot[ray] + s + r)) * medium.phase(-s / r) / r
-        total += _EDGE * np.where(np.isfinite(x) & (r > 0), strip, 0)
-    return total
-
-
-def _cut_at_beam(light: TruthLight, rays: _Rays, lit: LitIntervals) -> tuple[NDArray[np.int64], Array, Array]:
-    """Cut the intervals at the cone of full intensity, where the profile of a soft spot has its kinks."""
-    if light.axis is None or light.beam >= light.cutoff:
-        return lit.ray, lit.low, lit.high
-    inner0, inner1 = cone_interval(rays.direction[lit.ray], rays.normal[lit.ray], light, light.beam)
-    # Where the ray misses the beam the profile is smooth but for the middle of the cone, where it peaks: cut there.
-    middle = 0.5 * (inner0 + inner1)
-    misses = inner1 < inner0
-    inner0, inner1 = np.where(misses, middle, inner0), np.where(misses, middle, inner1)
-    cuts = np.clip(np.stack([inner0, inner1]), lit.low, lit.high)
-    low = np.concatenate([lit.low, cuts[0], cuts[1]])
-    high = np.concatenate([cuts[0], cuts[1], lit.high])
-    ray = np.tile(lit.ray, 3)
-    keep = high > low
-    return ray[keep], low[keep], high[keep]
