@@ -28,7 +28,7 @@ class Mutation:
 #: The modules that a run of the quadrature asks for.
 TOPS = ("reference.quadrature", "reference.scene")
 
-_SUMS = "reference.quadrature"
+_SUMS = "reference.interval_sums"
 _PANELS = "analytic.panels"
 _PHASE = "analytic.phase"
 _CONE = "reference.cone"
