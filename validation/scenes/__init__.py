@@ -5,25 +5,11 @@ Each is built procedurally with arbitrary, never round numbers, so that no const
 the scene. `SCENES` is the registry: add a `SceneRecord` to it and every command and report knows it.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
-
 from validation.scenes.colonnade import colonnade
 from validation.scenes.open_fog import open_fog
+from validation.scenes.record import SceneRecord
 from validation.scenes.sphere_spot import sphere_spot
 from validation.scenes.two_pens import two_pens
-
-
-@dataclass(frozen=True)
-class SceneRecord:
-    """A built-in scene."""
-
-    name: str
-    build: Callable[[], dict[str, Any]]  #: the dictionary for `mi.load_dict`; needs an active Mitsuba variant
-    purpose: str  #: what it is for, one sentence
-    published: str  #: the published figure that it answers to
-
 
 SCENES: dict[str, SceneRecord] = {
     record.name: record

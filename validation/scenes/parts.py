@@ -25,19 +25,36 @@ def lathe(radius: ArrayLike, height: ArrayLike, sides: int) -> Mesh:
     radius, height = np.asarray(radius, dtype=np.float64), np.asarray(height, dtype=np.float64)
     angle = 2 * np.pi * np.arange(sides) / sides
     circle = np.stack([np.cos(angle), np.sin(angle), np.zeros(sides)], axis=1)
-    rings = radius[:, None, None] * circle + height[:, None, None] * np.array([0.0, 0.0, 1.0])
-    count = len(radius)
+    return skin(radius[:, None, None] * circle + height[:, None, None] * np.array([0.0, 0.0, 1.0]))
+
+
+def skin(rings: ArrayLike, *, ring_of_rings: bool = False) -> Mesh:
+    """Return the closed surface through rings of points: 2 k n triangles for n rings of k points, with or without ends.
+
+    Parameters
+    ----------
+    rings
+        Shape (n, k, 3) [m]. Each ring runs counter-clockwise for one who looks back at it from the next.
+    ring_of_rings
+        Join the last ring to the first; otherwise both ends are closed by fans about the mean of their ring.
+    """
+    rings = np.asarray(rings, dtype=np.float64)
+    count, sides = rings.shape[:2]
     i = np.arange(sides)
     j = (i + 1) % sides
     faces = []
-    for k in range(count - 1):
-        low, high = k * sides, (k + 1) * sides
+    for ring in range(count if ring_of_rings else count - 1):
+        low, high = ring * sides, (ring + 1) % count * sides
         faces += [np.stack([low + i, low + j, high + j], axis=1), np.stack([low + i, high + j, high + i], axis=1)]
-    bottom, top = count * sides, count * sides + 1
-    faces += [np.stack([np.full(sides, bottom), j, i], axis=1)]
-    faces += [np.stack([np.full(sides, top), (count - 1) * sides + i, (count - 1) * sides + j], axis=1)]
-    centres = np.array([[0.0, 0.0, height[0]], [0.0, 0.0, height[-1]]])
-    return np.concatenate([rings.reshape(-1, 3), centres]), np.concatenate(faces)
+    vertices = rings.reshape(-1, 3)
+    if not ring_of_rings:
+        first, last, end = count * sides, count * sides + 1, (count - 1) * sides
+        faces += [
+            np.stack([np.full(sides, first), j, i], axis=1),
+            np.stack([np.full(sides, last), end + i, end + j], 1),
+        ]
+        vertices = np.concatenate([vertices, rings[[0, -1]].mean(axis=1)])
+    return vertices, np.concatenate(faces)
 
 
 def grid(corner: Sequence[float], across: Sequence[float], up: Sequence[float], cells: tuple[int, int]) -> Mesh:
@@ -75,12 +92,21 @@ def joined(meshes: Sequence[Mesh]) -> Mesh:
 
 def mitsuba_mesh(name: str, mesh: Mesh, reflectance: Sequence[float]):
     """Return a Mitsuba mesh with flat shading and a two-sided diffuse material."""
+    diffuse = {"type": "diffuse", "reflectance": {"type": "rgb", "value": list(reflectance)}}
+    return _mesh(name, mesh, {"mesh_bsdf": {"type": "twosided", "bsdf": diffuse}})
+
+
+def medium_boundary(name: str, mesh: Mesh, medium: dict[str, Any]):
+    """Return a Mitsuba mesh that lets light pass and is filled with a medium."""
+    return _mesh(name, mesh, {"mesh_bsdf": {"type": "null"}, "interior": medium | {"id": f"{name}-medium"}})
+
+
+def _mesh(name: str, mesh: Mesh, plugins: dict[str, dict[str, Any]]):
     import mitsuba as mi
 
     properties = mi.Properties()
-    properties["mesh_bsdf"] = mi.load_dict(
-        {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": list(reflectance)}}}
-    )
+    for key, plugin in plugins.items():
+        properties[key] = mi.load_dict(plugin)
     vertices, faces = mesh
     result = mi.Mesh(name, vertex_count=len(vertices), face_count=len(faces), props=properties)
     parameters = mi.traverse(result)
@@ -110,19 +136,25 @@ def fog(
 
 
 def camera(
-    origin: Sequence[float], target: Sequence[float], *, fov: float, size: tuple[int, int], up=(0.0, 0.0, 1.0)
+    origin: Sequence[float],
+    target: Sequence[float],
+    *,
+    fov: float,
+    size: tuple[int, int],
+    up=(0.0, 0.0, 1.0),
+    in_fog: bool = True,
 ) -> dict[str, Any]:
-    """Return a perspective sensor in the medium 'fog'; `fov` is the horizontal field of view [degrees]."""
+    """Return a perspective sensor, in the medium 'fog' or in none; `fov` is the horizontal field of view [degrees]."""
     import mitsuba as mi
 
-    return {
+    medium = {"medium": {"type": "ref", "id": "fog"}} if in_fog else {}
+    return medium | {
         "type": "perspective",
         "fov": fov,
         "fov_axis": "x",
         "near_clip": 1e-5,
         "far_clip": 1e5,
         "to_world": mi.ScalarTransform4f().look_at(origin=list(origin), target=list(target), up=list(up)),
-        "medium": {"type": "ref", "id": "fog"},
         "film": {
             "type": "hdrfilm",
             "width": size[0],
