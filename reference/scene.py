@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from analytic.phase import PhaseFunction
+from reference.bounds import Bounds, holds, overlap, read_bounds
 
 Array = NDArray[np.float64]
 
@@ -31,25 +32,35 @@ class TruthLight:
 
 @dataclass(frozen=True)
 class TruthMedium:
-    """A homogeneous medium without bounds."""
+    """A homogeneous medium."""
 
     sigma_t: Array  #: extinction [1/m], RGB
     albedo: Array  #: RGB
     phase: PhaseFunction
-    plugin: Any  #: Mitsuba's medium
+    plugin: Any  #: Mitsuba's medium, None for a vacuum
+
+
+@dataclass(frozen=True)
+class BoundedMedium(TruthMedium):
+    """A homogeneous medium within convex bounds."""
+
+    bounds: Bounds  #: what it fills
+    name: str  #: the id of the shape that bounds it
 
 
 @dataclass(frozen=True)
 class TruthScene:
     """A scene as the truth sees it."""
 
-    scene: Any  #: the `mi.Scene`
+    scene: Any  #: the `mi.Scene`, whole
+    occluders: Any  #: an `mi.Scene` of the opaque shapes alone: cast rays here
     width: int
     height: int
     origin: Array  #: the pinhole [m], (3,)
     direction: Array  #: unit directions through the pixel centres, (pixels, 3), row by row
-    medium: TruthMedium
+    medium: TruthMedium  #: the medium without bounds, a vacuum of extinction 0 where there is none
     lights: tuple[TruthLight, ...]
+    media: tuple[BoundedMedium, ...] = ()  #: the media with bounds, disjoint
 
 
 def read_truth(scene) -> TruthScene:
@@ -64,15 +75,24 @@ def read_truth(scene) -> TruthScene:
         raise InputError("the scene has no camera; wanted a sensor of type 'perspective'")
     sensor = scene.sensors()[0]
     width, height = (int(n) for n in sensor.film().size())
-    medium = _read_medium(sensor)
     lights = tuple(_read_light(emitter) for emitter in scene.emitters())
     if not lights:
         raise InputError("the scene has no light; wanted at least one emitter of type 'point' or 'spot'")
-    for shape in scene.shapes():
-        if shape.interior_medium() is not None or shape.exterior_medium() is not None:
-            raise InputError(f"shape '{shape.id()}' bounds a medium; wanted one unbounded medium")
+    opaque, boundaries = _sorted_shapes(scene)
+    media = tuple(_read_bounded(shape) for shape in boundaries)
     origin, direction = _pixel_centres(sensor, width, height)
-    return TruthScene(scene, width, height, origin, direction, medium, lights)
+    _check_disjoint(media)
+    return TruthScene(
+        scene=scene,
+        occluders=_occluders(scene, opaque),
+        width=width,
+        height=height,
+        origin=origin,
+        direction=direction,
+        medium=_read_ambient(sensor, origin, media, boundaries),
+        lights=lights,
+        media=media,
+    )
 
 
 def _pixel_centres(sensor, width: int, height: int) -> tuple[Array, Array]:
@@ -95,14 +115,86 @@ def _pixel_centres(sensor, width: int, height: int) -> tuple[Array, Array]:
     return matrix[:3, 3], direction / np.linalg.norm(direction, axis=1, keepdims=True)
 
 
-def _read_medium(sensor) -> TruthMedium:
+def _sorted_shapes(scene) -> tuple[list[Any], list[Any]]:
+    """Return the opaque shapes and those that bound a medium; what is neither takes no part."""
     import mitsuba as mi
 
-    medium = sensor.get_medium()
-    if medium is None:
+    opaque, boundaries = [], []
+    for shape in scene.shapes():
+        inside, outside = shape.interior_medium(), shape.exterior_medium()
+        null = shape.bsdf().class_name() == "Null"
+        if not null and mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.Null):
+            raise InputError(f"shape '{shape.id()}' is partly transparent; wanted opaque surfaces, or material 'null'")
+        if not null and (inside is not None or outside is not None):
+            raise InputError(
+                f"shape '{shape.id()}' bounds a medium and has a {shape.bsdf().class_name()} material; wanted the "
+                "material 'null' on it, and no media on opaque shapes"
+            )
+        if not null:
+            opaque.append(shape)
+        elif inside is not None:
+            boundaries.append(shape)
+        elif outside is not None:
+            raise InputError(f"shape '{shape.id()}' is a hole in a medium; wanted media inside of convex bounds")
+    return opaque, boundaries
+
+
+def _occluders(scene, opaque: list[Any]):
+    """Return the scene itself where all its shapes are opaque, else a scene of those that are."""
+    import mitsuba as mi
+
+    if len(opaque) == len(scene.shapes()):
+        return scene
+    return mi.load_dict({"type": "scene"} | {f"shape{number}": shape for number, shape in enumerate(opaque)})
+
+
+def _check_disjoint(media: tuple[BoundedMedium, ...]) -> None:
+    for number, one in enumerate(media):
+        for other in media[:number]:
+            if overlap(one.bounds, other.bounds):
+                raise InputError(
+                    f"the media of shapes '{other.name}' and '{one.name}' overlap or one holds the other; wanted "
+                    "disjoint bounds"
+                )
+
+
+def _read_ambient(sensor, origin: Array, media: tuple[BoundedMedium, ...], boundaries: list[Any]) -> TruthMedium:
+    """Return the medium without bounds; refuse a camera or a boundary that says otherwise."""
+    own = sensor.get_medium()
+    ambient = own
+    for medium, shape in zip(media, boundaries, strict=True):
+        if holds(medium.bounds, origin):
+            if own != medium.plugin:
+                raise InputError(
+                    f"the camera is inside of shape '{medium.name}', but references another medium or none; "
+                    "reference that shape's interior medium in the sensor"
+                )
+            ambient = shape.exterior_medium()
+    for medium, shape in zip(media, boundaries, strict=True):
+        if shape.exterior_medium() != ambient:
+            raise InputError(
+                f"the exterior medium of shape '{medium.name}' is not what surrounds the others or the camera; wanted "
+                "the medium that the camera references as exterior of all shapes, or none at all"
+            )
+    if ambient is not None:
+        return _read_medium(ambient, "the medium")
+    if not media:
         raise InputError("the camera references no medium: it would be in a vacuum; reference the medium in the sensor")
+    return TruthMedium(np.zeros(3), np.zeros(3), PhaseFunction("isotropic"), None)
+
+
+def _read_bounded(shape) -> BoundedMedium:
+    inside = _read_medium(shape.interior_medium(), f"the medium of shape '{shape.id()}'")
+    return BoundedMedium(
+        inside.sigma_t, inside.albedo, inside.phase, inside.plugin, bounds=read_bounds(shape), name=shape.id()
+    )
+
+
+def _read_medium(medium, name: str) -> TruthMedium:
+    import mitsuba as mi
+
     if not medium.is_homogeneous():
-        raise InputError(f"the medium is a {medium.class_name()}; wanted a medium of type 'homogeneous'")
+        raise InputError(f"{name} is a {medium.class_name()}; wanted a medium of type 'homogeneous'")
     parameters = mi.traverse(medium)
     sigma_t = _rgb(parameters["sigma_t.value.value"]) * float(parameters["scale"])
     return TruthMedium(sigma_t, _rgb(parameters["albedo.value.value"]), _read_phase(medium.phase_function()), medium)

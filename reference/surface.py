@@ -32,7 +32,7 @@ def surface_hits(truth: TruthScene) -> SurfaceHits:
     import mitsuba as mi
 
     ray = mi.Ray3f(mi.Point3f(*(float(c) for c in truth.origin)), dr.normalize(mi.Vector3f(truth.direction.T)))
-    interaction = truth.scene.ray_intersect(ray, mi.RayFlags.All, coherent=True)
+    interaction = truth.occluders.ray_intersect(ray, mi.RayFlags.All, coherent=True)
     valid = np.array(interaction.is_valid(), dtype=bool)
     return SurfaceHits(np.where(valid, np.array(interaction.t, dtype=np.float64), np.inf), interaction)
 
@@ -43,12 +43,12 @@ def lit_surface(truth: TruthScene, hits: SurfaceHits, *, shadow_scale: float = 1
 
     interaction = hits.interaction
     total = np.zeros((len(hits.distance), 3))
-    if not truth.scene.shapes():
+    if not truth.occluders.shapes():
         return total
     for emitter in truth.scene.emitters():
         towards, arriving = emitter.sample_direction(interaction, mi.Point2f(0.5))
         facing = interaction.is_valid()
-        blocked = truth.scene.ray_test(interaction.spawn_ray_to(towards.p), facing)
+        blocked = truth.occluders.ray_test(interaction.spawn_ray_to(towards.p), facing)
         reflected = interaction.bsdf().eval(mi.BSDFContext(), interaction, interaction.to_local(towards.d), facing)
         radiance = np.array(reflected * arriving, dtype=np.float64).T
         lit = np.array(facing & ~blocked, dtype=bool)
