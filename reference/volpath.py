@@ -14,40 +14,18 @@ Each batch has its own seed and at most 256 samples a pixel; means and standard 
 float64.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.batches import LARGEST_BATCH, Batches
 from reference.scene import TruthScene
 
 Array = NDArray[np.float64]
-Progress = Callable[[int, int, str], None]
 
-LARGEST_BATCH = 256  # samples a pixel: float32 sums of more lose digits (DESIGN section 6.2)
 _PATHS = 1 << 22  # paths traced at once
-
-
-@dataclass(frozen=True)
-class Batches:
-    """Running sums of the batch means; `merged` adds batches up in any order."""
-
-    seeds: tuple[int, ...]
-    samples: int  #: samples a pixel in each batch
-    mean: Array  #: mean of the batch means, (layers, pixels, 3)
-    squares: Array  #: sum of squared deviations from the mean, (layers, pixels, 3)
-    totals: Array  #: image means of every batch, (batches, layers, 3)
-
-    @property
-    def standard_error(self) -> Array:
-        """Standard error of `mean`, (layers, pixels, 3)."""
-        count = len(self.seeds)
-        return np.sqrt(self.squares / (count * (count - 1)))
-
-
-LAYERS = ("airlight", "surface")
 
 
 def volpath_batch(truth: TruthScene, seed: int, samples: int) -> Batches:
@@ -74,21 +52,6 @@ def volpath_batch(truth: TruthScene, seed: int, samples: int) -> Batches:
         surface = _trace(truth, integrator, np.zeros(3), 2 * seed + 1, samples)
     mean = np.stack([airlight, surface])
     return Batches((seed,), samples, mean, np.zeros_like(mean), mean.mean(axis=1)[None])
-
-
-def merged(one: Batches, other: Batches) -> Batches:
-    """Add up two sets of batches (Chan, Golub and LeVeque's update of mean and sum of squares)."""
-    if one.samples != other.samples or set(one.seeds) & set(other.seeds):
-        raise ValueError("batches to merge need the same samples a pixel and different seeds")
-    n, m = len(one.seeds), len(other.seeds)
-    difference = other.mean - one.mean
-    return Batches(
-        one.seeds + other.seeds,
-        one.samples,
-        one.mean + difference * (m / (n + m)),
-        one.squares + other.squares + difference**2 * (n * m / (n + m)),
-        np.concatenate([one.totals, other.totals]),
-    )
 
 
 @contextmanager

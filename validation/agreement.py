@@ -14,9 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from reference.batches import LAYERS, Batches
 from reference.epsilon import measure_shadow_epsilon
 from reference.scene import read_truth
-from reference.volpath import LAYERS, Batches
 from validation.statistics import Estimate, Statistics, compare_statistics
 from validation.truth import truth_image, volpath_batches
 

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.batches import LAYERS, Batches
 from reference.epsilon import measure_shadow_epsilon
 from reference.quadrature import TruthImage
-from reference.volpath import LAYERS, Batches
 from validation.agreement import MASK_PIXELS, pixel_angle
 from validation.load import load_scene
 from validation.module_copies import ModuleCopies, module_source, replaced_once

@@ -4,9 +4,9 @@
 from collections.abc import Callable
 
 from realtime.frame import Frame
+from reference.batches import LARGEST_BATCH, LAYERS
 from reference.exr import Image
 from reference.quadrature import TruthImage
-from reference.volpath import LARGEST_BATCH, LAYERS
 from validation.configurations import Configuration
 from validation.load import LoadedScene
 from validation.truth import truth_image, volpath_batches

@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from reference.batches import Batches, merged
 from reference.cache import cache_key, load_arrays, store_arrays
 from reference.quadrature import TruthImage, quadrature_image
 from reference.scene import read_truth
-from reference.volpath import Batches, merged, volpath_batch
+from reference.volpath import volpath_batch
 
 Progress = Callable[[int, int, str], None]
 

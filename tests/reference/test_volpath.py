@@ -15,7 +15,8 @@ def truth(variant):
 
 
 def test_batches_merge_to_the_plain_mean_and_error(truth):
-    from reference.volpath import merged, volpath_batch
+    from reference.batches import merged
+    from reference.volpath import volpath_batch
 
     batches = [volpath_batch(truth, seed, 8) for seed in range(5)]
     means = np.stack([batch.mean for batch in batches])
@@ -27,7 +28,8 @@ def test_batches_merge_to_the_plain_mean_and_error(truth):
 
 
 def test_same_batch_twice_is_refused(truth):
-    from reference.volpath import merged, volpath_batch
+    from reference.batches import merged
+    from reference.volpath import volpath_batch
 
     one = volpath_batch(truth, 3, 4)
     with pytest.raises(ValueError, match="different seeds"):
@@ -70,10 +72,11 @@ def test_agrees_with_the_quadrature(variant, colour):
     """
     import mitsuba as mi
 
+    from reference.batches import merged
     from reference.epsilon import measure_shadow_epsilon
     from reference.quadrature import quadrature_image
     from reference.scene import read_truth
-    from reference.volpath import merged, volpath_batch
+    from reference.volpath import volpath_batch
 
     fog = tiny_scene()["fog"]
     if colour == "coloured":
