@@ -5,6 +5,7 @@ An estimator traces one batch at a time, each with a seed of its own. The standa
 spread of the batch means, so nothing needs to be known of the law of a single sample.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 LAYERS = ("airlight", "surface")
+LARGEST_SEED = 1 << 20  #: seeds are below this: the streams of one batch are numbered in 32 bits
 LARGEST_BATCH = 256  #: samples a pixel: float32 sums of more lose digits (DESIGN section 6.2)
 
 
@@ -34,15 +36,49 @@ class Batches:
 
 
 def merged(one: Batches, other: Batches) -> Batches:
-    """Add up two sets of batches (Chan, Golub and LeVeque's update of mean and sum of squares)."""
+    """Add up two sets of batches."""
     if one.samples != other.samples or set(one.seeds) & set(other.seeds):
         raise ValueError("batches to merge need the same samples a pixel and different seeds")
-    n, m = len(one.seeds), len(other.seeds)
-    difference = other.mean - one.mean
-    return Batches(
-        one.seeds + other.seeds,
-        one.samples,
-        one.mean + difference * (m / (n + m)),
-        one.squares + other.squares + difference**2 * (n * m / (n + m)),
-        np.concatenate([one.totals, other.totals]),
-    )
+    mean, squares = pooled((len(one.seeds), one.mean, one.squares), (len(other.seeds), other.mean, other.squares))
+    return Batches(one.seeds + other.seeds, one.samples, mean, squares, np.concatenate([one.totals, other.totals]))
+
+
+def pooled(one: tuple[int, Array, Array], other: tuple[int, Array, Array]) -> tuple[Array, Array]:
+    """Return mean and sum of squared deviations of two sets together, each given as (count, mean, squares).
+
+    The squares are those within each set and those between their means (Chan, Golub and LeVeque 1983, eq. 2.1).
+    """
+    (n, mean, squares), (m, other_mean, other_squares) = one, other
+    difference = other_mean - mean
+    return mean + difference * (m / (n + m)), squares + other_squares + difference**2 * (n * m / (n + m))
+
+
+def seed_ranges(seeds: Iterable[int]) -> str:
+    """Return seeds in words, as '0-63,128-191'."""
+    ranges: list[list[int]] = []
+    for seed in sorted(seeds):
+        if ranges and seed == ranges[-1][1] + 1:
+            ranges[-1][1] = seed
+        else:
+            ranges.append([seed, seed])
+    return ",".join(f"{first}-{last}" if last > first else f"{first}" for first, last in ranges)
+
+
+def parse_seed_ranges(words: str) -> tuple[int, ...]:
+    """Return the seeds that `seed_ranges` named, ascending.
+
+    Raises
+    ------
+    ValueError
+        If the words name no seeds, the same one twice, or one that no batch has.
+    """
+    seeds: list[int] = []
+    for part in words.split(","):
+        first, _, last = part.partition("-")
+        start, end = int(first), int(last or first)
+        if not 0 <= start <= end < LARGEST_SEED:
+            raise ValueError(f"seeds {part!r}")
+        seeds += range(start, end + 1)
+    if len(set(seeds)) != len(seeds):
+        raise ValueError(f"seeds {words!r} name one twice")
+    return tuple(sorted(seeds))

@@ -3,16 +3,19 @@
 
 The key is a digest of everything that decides the numbers: the scene as Mitsuba holds it (every parameter of every
 plugin, every vertex), the estimator and its settings, the versions of what computes them. A file is written whole or
-not at all, so a killed run loses nothing that was finished and leaves nothing half-written.
+not at all, so a killed run loses nothing that was finished and leaves nothing half-written. Each file holds a digest of
+its own content and name: one that was damaged, edited or renamed counts as none.
 """
 
 import hashlib
 import json
 import os
 import re
+import time
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -26,6 +29,8 @@ GENERATION = 2
 
 #: Plugins without an id are named by their address, which differs from run to run.
 _ADDRESS = re.compile(r"object_\d+|0x[0-9a-f]+")
+_DIGEST = "digest"  # the name of the digest among the arrays
+_STALE = 3600.0  # seconds after which a half-written file belongs to nobody
 
 
 def cache_folder() -> Path:
@@ -89,20 +94,54 @@ def cache_key(scene, estimator: str, settings: Mapping[str, Any]) -> str:
 
 def load_arrays(key: str) -> dict[str, Any] | None:
     """Return the arrays kept under a key, or None where there are none or the file is damaged."""
-    path = cache_folder() / f"{key}.npz"
     try:
         # Opened here, since `np.load` leaves a file that it cannot read open.
-        with open(path, "rb") as file, np.load(file, allow_pickle=False) as stored:
-            return {name: stored[name] for name in stored.files}
+        with open(_path(key), "rb") as file, np.load(file, allow_pickle=False) as stored:
+            arrays = {name: stored[name] for name in stored.files}
     except FileNotFoundError:
         return None
     except (OSError, ValueError, KeyError, EOFError, AttributeError, TypeError, zipfile.BadZipFile, zlib.error):
         # Not ours, or cut short by a full disk: compute it again and replace it.
         return None
+    written = arrays.pop(_DIGEST, None)
+    return arrays if written is not None and str(written) == _content_digest(key, arrays) else None
+
+
+def is_kept(key: str) -> bool:
+    """Return whether there is a file under a key, damaged or not."""
+    return _path(key).exists()
 
 
 def store_arrays(key: str, arrays: Mapping[str, Any]) -> None:
-    """Keep arrays under a key, replacing what is there."""
+    """Keep arrays under a key, replacing what is there; a key may name a folder, as in 'volpath-0a1b/000017'."""
+    content = {name: np.asarray(value) for name, value in arrays.items()}
     buffer = BytesIO()
-    np.savez(buffer, **{name: np.asarray(value) for name, value in arrays.items()})  # type: ignore[arg-type]
-    write_bytes(cache_folder() / f"{key}.npz", buffer.getvalue())
+    np.savez(buffer, **content, **{_DIGEST: np.asarray(_content_digest(key, content))})  # type: ignore[arg-type]
+    write_bytes(_path(key), buffer.getvalue())
+
+
+def drop_arrays(key: str) -> None:
+    """Forget what is kept under a key."""
+    _path(key).unlink(missing_ok=True)
+
+
+def sweep(folder: Path) -> None:
+    """Remove what a killed run left half-written in a folder: hidden files older than an hour."""
+    for path in folder.glob(".*.npz"):
+        with suppress(OSError):  # another run may have removed it
+            if time.time() - path.stat().st_mtime > _STALE:
+                path.unlink()
+
+
+def _path(key: str) -> Path:
+    return cache_folder() / f"{key}.npz"
+
+
+def _content_digest(key: str, arrays: Mapping[str, Any]) -> str:
+    """Return a digest of the name and of every array: its name, kind, shape and bytes."""
+    digest = hashlib.blake2b(key.encode(), digest_size=16)
+    for name in sorted(arrays):
+        value = np.ascontiguousarray(arrays[name])
+        digest.update(f"|{name} {value.dtype.str} {np.shape(arrays[name])}|".encode())
+        digest.update(value.data if value.size and value.dtype.kind in "biufc" else value.tobytes())
+    return digest.hexdigest()

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
-from reference.files import atomic_path
+from reference.files import NO_SPACE, atomic_path
 
 TOTAL = "total"  #: the layer in the plain channels R, G, B
 NOTE = "airlight:read"  #: the attribute in which the reader says what it changed or left out
@@ -90,6 +90,8 @@ def write_exr(path: str | os.PathLike[str], image: Image) -> None:
     InputError
         If the layers are none, of two sizes, of another shape than (height, width, 3), or too large for float32; if a
         `total` is given that is not the sum; if the name of an attribute is one of the format's own.
+    OSError
+        If the disk is full; the file is as it was.
     """
     import OpenEXR
 
@@ -97,7 +99,7 @@ def write_exr(path: str | os.PathLike[str], image: Image) -> None:
     header: dict[str, Any] = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     for key, value in image.attributes.items():
         header[key] = _attribute(key, value)
-    with atomic_path(path) as temporary:
+    with atomic_path(path) as temporary, _system_errors():
         OpenEXR.File(header, channels).write(str(temporary))
 
 
@@ -201,6 +203,18 @@ def _check_kind(path: str | os.PathLike[str]) -> None:
     for bit, kind in reversed(_KINDS.items()):
         if flags & bit:
             raise InputError(f"{path} is a {kind} EXR file; save it as a single part of flat scan lines")
+
+
+@contextlib.contextmanager
+def _system_errors() -> Iterator[None]:
+    """Turn OpenEXR's words for a full disk back into the system's error."""
+    try:
+        yield
+    except RuntimeError as error:
+        for code in NO_SPACE:
+            if os.strerror(code) in str(error):
+                raise OSError(code, os.strerror(code)) from error
+        raise
 
 
 @contextlib.contextmanager

@@ -5,6 +5,7 @@ A file is first written under a hidden name in the folder where it belongs, flus
 final name, which POSIX and Windows both do in one step. Whoever is killed half-way leaves the old file as it was.
 """
 
+import errno
 import os
 import stat
 import tempfile
@@ -14,6 +15,9 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from analytic.errors import InputError
+
+#: What the system says when a disk is full, a quota used up, or a file larger than allowed.
+NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def ensure_folder(path: str | os.PathLike[str]) -> Path:
@@ -99,6 +103,8 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     ------
     InputError
         If `path` cannot be written.
+    OSError
+        If the disk is full; it names `path`, which is as it was.
 
     Examples
     --------
@@ -112,9 +118,12 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
         yield temporary
         _flush(temporary)
         os.replace(temporary, target)
-    except BaseException:
+    except BaseException as error:
         with suppress(OSError):
             temporary.unlink()
+        if isinstance(error, OSError) and error.errno in NO_SPACE:
+            # A failed write names no file of its own, and a failed flush the temporary one.
+            raise OSError(error.errno, error.strerror, str(path)) from error
         raise
 
 

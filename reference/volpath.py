@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 _PATHS = 1 << 22  # paths traced at once
 
 
-def volpath_batch(truth: TruthScene, seed: int, samples: int) -> Batches:
+def volpath_batch(truth: TruthScene, seed: int, samples: int, *, max_depth: int = 2) -> Batches:
     """Trace one batch.
 
     Parameters
@@ -39,17 +39,30 @@ def volpath_batch(truth: TruthScene, seed: int, samples: int) -> Batches:
         Seed of the batch; different seeds are independent.
     samples
         Samples a pixel, at most 256.
+    max_depth
+        Most edges of a path: 2 is one scattering. With more, `airlight` is the light that was scattered by the medium
+        alone, any number of times up to max_depth - 1, and `surface` all other light: what met a surface at least once.
+
+    Notes
+    -----
+    Batches of one seed but another `max_depth` are not independent: their airlight paths begin alike, so that the
+    difference of the two has less spread than either.
     """
     import mitsuba as mi
 
     if not 1 <= samples <= LARGEST_BATCH:
         raise ValueError(f"samples: got {samples}, wanted 1 to {LARGEST_BATCH}")
-    integrator = mi.load_dict({"type": "volpath", "max_depth": 2, "rr_depth": 1000})
+    if max_depth < 2:
+        raise ValueError(f"max_depth: got {max_depth}, wanted at least 2, one scattering")
+    integrator = mi.load_dict({"type": "volpath", "max_depth": max_depth, "rr_depth": 1000})
     with _black_surfaces(truth.scene):
         airlight = _trace(truth, integrator, truth.medium.albedo, 2 * seed, samples)
     surface = np.zeros_like(airlight)
-    if truth.scene.shapes():
+    if truth.scene.shapes() and max_depth == 2:
         surface = _trace(truth, integrator, np.zeros(3), 2 * seed + 1, samples)
+    elif truth.scene.shapes():
+        # The same paths once more, now with light from surfaces; the difference is what these add.
+        surface = _trace(truth, integrator, truth.medium.albedo, 2 * seed, samples) - airlight
     mean = np.stack([airlight, surface])
     return Batches((seed,), samples, mean, np.zeros_like(mean), mean.mean(axis=1)[None])
 
