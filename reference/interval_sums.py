@@ -8,12 +8,10 @@ from numpy.typing import NDArray
 
 from analytic.panels import airlight_segments
 from reference.cone import cone_interval, falloff
+from reference.intervals import LitIntervals
 from reference.scene import TruthLight, TruthMedium
-from reference.visibility import LitIntervals
 
 Array = NDArray[np.float64]
-
-_EDGE = 2e-6  # relative uncertainty of the distance at which a float32 shadow ray changes its mind
 
 
 @dataclass(frozen=True)
@@ -30,7 +28,7 @@ def sum_intervals(
     medium: TruthMedium, light: TruthLight, rays: Rays, lit: LitIntervals, shadow_scale: float
 ) -> tuple[Array, Array]:
     """Integrate every lit interval and add up the intervals of each ray."""
-    ray, low, high = _cut_at_beam(light, rays, lit)
+    ray, low, high = cut_at_beam(light, rays, lit)
     foot, height = rays.foot[ray], rays.height[ray]
     x0 = np.maximum(foot + height * np.tan(low), 0.0)
     x1 = np.where(high >= np.pi / 2, np.inf, foot + height * np.tan(np.minimum(high, np.pi / 2)))
@@ -56,7 +54,7 @@ def sum_intervals(
             shadow_scale=shadow_scale,
             weight=profile if soft else None,
         )
-        errors[channel] += _edge_error(rays, ray, (x0, x1), float(sigma_t), medium)
+        errors[channel] += lit.edge * _edge_worth(rays, ray, (x0, x1), float(sigma_t), medium)
     factor = medium.albedo * medium.sigma_t * light.intensity / (4 * np.pi)
     pixels = len(rays.foot)
     total = np.stack([np.bincount(ray, values[c], pixels) for c in range(3)], axis=1) * factor
@@ -64,21 +62,21 @@ def sum_intervals(
     return total, error
 
 
-def _edge_error(
+def _edge_worth(
     rays: Rays, ray: NDArray[np.int64], ends: tuple[Array, Array], sigma_t: float, medium: TruthMedium
 ) -> Array:
-    """Return what the float32 rounding of the ends of each interval is worth: integrand times rounding."""
+    """Return what a relative uncertainty of one of the distances of the ends of each interval is worth."""
     total = np.zeros(len(ray))
     for x in ends:
         s = np.where(np.isfinite(x), x, 0) - rays.foot[ray]
         r = np.hypot(rays.height[ray], s)
         with np.errstate(divide="ignore", invalid="ignore"):
             strip = np.exp(-sigma_t * (rays.foot[ray] + s + r)) * medium.phase(-s / r) / r
-        total += _EDGE * np.where(np.isfinite(x) & (r > 0), strip, 0)
+        total += np.where(np.isfinite(x) & (r > 0), strip, 0)
     return total
 
 
-def _cut_at_beam(light: TruthLight, rays: Rays, lit: LitIntervals) -> tuple[NDArray[np.int64], Array, Array]:
+def cut_at_beam(light: TruthLight, rays: Rays, lit: LitIntervals) -> tuple[NDArray[np.int64], Array, Array]:
     """Cut the intervals at the cone of full intensity, where the profile of a soft spot has its kinks."""
     if light.axis is None or light.beam >= light.cutoff:
         return lit.ray, lit.low, lit.high

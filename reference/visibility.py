@@ -1,40 +1,40 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lit intervals of camera rays by ray-traced visibility.
+"""Lit intervals of camera rays: by exact geometry where all shapes are polygons, by ray casting otherwise.
 
 Along a ray the angle theta at the light is the natural variable: the airlight integrand is bounded in it, an endless
 ray ends at pi/2, and the direction from the light to the point is simply ``sin(theta) direction + cos(theta) n`` (n the
 unit vector from the light to the foot point), at the distance height / cos(theta). Nothing cancels, however close the
 ray passes to the light.
 
-Every ray is sampled at `samples` angles, regularly between its ends, and at `checks` random ones. Wherever two
-neighbours disagree a transition lies between them, and is bisected to rounding. A shadow thinner than the sampling can
-be missed: the share of random samples that the regular ones predict wrongly says how much (`missed`).
+Exact geometry (`reference.lit_geometry`) misses nothing and is as fast as casting rays. Casting works for all shapes:
+every ray is sampled at `samples` angles; cells in which the light sees another shape at one end than at the other, or a
+surface that comes or goes too fast to be one, are cut further; wherever two neighbours disagree a transition lies
+between them, and is bisected to rounding.
+
+Whatever the route, fresh random shadow rays then check the intervals (`reference.certify`).
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from analytic.errors import InputError
+from reference.certify import Rounding, Toggles, certified_cast, certified_geometry
+from reference.intervals import LitIntervals
+from reference.lit_geometry import geometric_intervals, is_polygonal, scene_triangles
 from reference.scene import TruthLight, TruthScene
 
 Array = NDArray[np.float64]
-Visible = Callable[[NDArray[np.int64], Array], NDArray[np.bool_]]
+Bools = NDArray[np.bool_]
+Index = NDArray[np.int64]
+Visible = Callable[[Index, Array], Bools]
 
 _BISECTIONS = 26  # theta range / 256 / 2^26 < 1e-10 rad: below the float32 rounding of the rays that are cast
 _CHUNK = 1 << 22  # rays cast at once
-
-
-@dataclass(frozen=True)
-class LitIntervals:
-    """The lit parts of rays: one entry per interval."""
-
-    ray: NDArray[np.int64]  #: number of the ray
-    low: Array  #: angle at the light where the interval begins [rad]
-    high: Array  #: where it ends [rad]
-    transitions: int  #: edges between light and shadow that were bisected
-    missed: float  #: share of random samples that the regular ones predicted wrongly
+_PARTS = 4  # a suspicious cell is cut into so many
+_LEVELS = 2  # so many times
+_STEEP = 4.0  # a surface seen within atan(1/4) = 14 degrees of grazing, or a jump, may hide an edge
 
 
 def lit_intervals(
@@ -44,8 +44,9 @@ def lit_intervals(
     *,
     ends: tuple[Array, Array],
     samples: int = 256,
+    edges: str = "auto",
 ) -> LitIntervals:
-    """Find the lit intervals of rays between two angles.
+    """Find the lit intervals of rays between two angles, and have them checked.
 
     Parameters
     ----------
@@ -59,28 +60,39 @@ def lit_intervals(
         Angles at the light between which a ray is looked at [rad], each (n,); empty where the first is not below the
         second.
     samples
-        Regular samples of each ray; an eighth as many random ones check them.
+        Regular samples of each ray if rays are cast; an eighth as many random ones check either route, at least one.
+    edges
+        "geometry": exactly, from the triangles. "rays": by casting rays. "auto": by geometry where it can be.
+
+    Raises
+    ------
+    InputError
+        For another word in `edges`; for "geometry" in a scene with shapes that are no polygons.
 
     Notes
     -----
-    Valid where shadows along a ray are wider than (high - low)/samples in theta; `missed` measures what is not.
+    By geometry, valid for all scenes of opaque meshes and rectangles. By casting rays, valid where shadows along a ray
+    are wider than (high - low)/samples in theta; the certificate measures what is not.
     """
+    if edges not in ("auto", "geometry", "rays"):
+        raise InputError(f"edges is '{edges}'; wanted 'geometry', 'rays' or 'auto'")
     low, high = ends
     used = np.flatnonzero(high > low)
-    if not truth.scene.shapes() or not len(used):
-        return LitIntervals(used, low[used], high[used], 0, 0.0)
-    visible = visibility_test(truth.scene, light.position, rays)
-    per_chunk = max(1, _CHUNK // samples)
-    parts = [
-        _chunk(visible, ends, used[start : start + per_chunk], samples) for start in range(0, len(used), per_chunk)
+    if not truth.occluders.shapes() or not len(used):
+        return LitIntervals(used, low[used], high[used], 0, edge=0.0)
+    visible = visibility_test(truth.occluders, light.position, rays)
+    checks = max(1, samples // 8)
+    if edges == "geometry" or (edges == "auto" and is_polygonal(truth.occluders)):
+        triangles = scene_triangles(truth.occluders)
+        exact = geometric_intervals(truth, light, rays, ends=ends, triangles=triangles)
+        return certified_geometry(exact, visible, (light.position, rays, triangles), ends=ends, checks=checks)
+    hits = _first_hits(truth.occluders, light.position, rays)
+    per_chunk = max(1, _CHUNK // (samples + 2))
+    chunks = [
+        _toggles(visible, hits, ends, used[start : start + per_chunk], samples)
+        for start in range(0, len(used), per_chunk)
     ]
-    return LitIntervals(
-        np.concatenate([part.ray for part in parts]),
-        np.concatenate([part.low for part in parts]),
-        np.concatenate([part.high for part in parts]),
-        sum(part.transitions for part in parts),
-        float(np.mean([part.missed for part in parts])),
-    )
+    return certified_cast(Toggles.joined(chunks), Rounding(visible, _bisect), ends=ends, checks=checks)
 
 
 def visibility_test(scene, position: Array, rays: tuple[Array, Array, Array]) -> Visible:
@@ -89,6 +101,16 @@ def visibility_test(scene, position: Array, rays: tuple[Array, Array, Array]) ->
     The shadow rays start at the light, where nothing is close, and stop twenty float32 roundings before the point: a
     point on a surface must not be blocked by that surface.
     """
+    shadow = _shadow_rays(position, rays)
+
+    def visible(ray: Index, theta: Array) -> Bools:
+        shadow_ray = shadow(ray, theta)
+        return ~np.array(scene.ray_test(shadow_ray), dtype=bool)
+
+    return visible
+
+
+def _shadow_rays(position: Array, rays: tuple[Array, Array, Array]) -> Callable:
     import drjit as dr
     import mitsuba as mi
 
@@ -96,53 +118,70 @@ def visibility_test(scene, position: Array, rays: tuple[Array, Array, Array]) ->
     start = mi.Point3f(*(float(c) for c in position))
     dr.make_opaque(direction, normal, height, start)
 
-    def visible(ray: NDArray[np.int64], theta: Array) -> NDArray[np.bool_]:
+    def shadow(ray: Index, theta: Array):
         index = mi.UInt32(ray.astype(np.uint32))
         sine, cosine = dr.sincos(mi.Float64(theta))
         to_point = dr.gather(mi.Vector3d, direction, index) * sine + dr.gather(mi.Vector3d, normal, index) * cosine
         length = dr.gather(mi.Float64, height, index) / dr.maximum(cosine, 1e-300) * (1 - 2e-6)
-        shadow_ray = mi.Ray3f(start, dr.normalize(mi.Vector3f(to_point)), mi.Float(length), 0.0, [])
-        return ~np.array(scene.ray_test(shadow_ray), dtype=bool)
+        return mi.Ray3f(start, dr.normalize(mi.Vector3f(to_point)), mi.Float(length), 0.0, [])
 
-    return visible
+    return shadow
 
 
-def _chunk(visible: Visible, ends: tuple[Array, Array], used: NDArray[np.int64], samples: int) -> LitIntervals:
+def _first_hits(scene, position: Array, rays: tuple[Array, Array, Array]) -> Callable:
+    """Return a function (ray numbers, angles) -> (lit or not, logarithm of the first distance, number of the shape)."""
+    import drjit as dr
+    import mitsuba as mi
+
+    shadow = _shadow_rays(position, rays)
+
+    def hits(ray: Index, theta: Array) -> tuple[Bools, Array, Index]:
+        shadow_ray = shadow(ray, theta)
+        length = mi.Float(shadow_ray.maxt)
+        shadow_ray.maxt = dr.inf
+        found = scene.ray_intersect_preliminary(shadow_ray, coherent=True)
+        valid = found.is_valid()
+        lit = ~(valid & (found.t < length))
+        shape = dr.select(valid, dr.reinterpret_array(mi.UInt32, found.shape), 0)
+        distance = np.array(dr.log(dr.select(valid, found.t, 1.0)), dtype=np.float64)
+        return np.array(lit, dtype=bool), distance, np.array(shape, dtype=np.int64)
+
+    return hits
+
+
+def _toggles(visible: Visible, hits: Callable, ends: tuple[Array, Array], used: Index, samples: int) -> Toggles:
+    """Sample the rays of a chunk, cut suspicious cells further, and bisect every transition."""
     low, high = ends[0][used], ends[1][used]
     # Regular samples at the middles of equal cells, and one close to each end: a shadow that touches the surface.
     fractions = np.concatenate([[1e-4], (np.arange(samples) + 0.5) / samples, [1 - 1e-4]])
-    checks = max(1, samples // 8)
-    random = (np.arange(checks) + np.random.default_rng(int(used[0])).random((len(used), checks))) / checks
-    theta = np.concatenate([np.broadcast_to(fractions, (len(used), len(fractions))), random], axis=1)
-    theta = low[:, None] + (high - low)[:, None] * theta
-    lit = visible(np.repeat(used, theta.shape[1]), theta.ravel()).reshape(theta.shape)
-    missed = _mispredicted(lit[:, : len(fractions)], lit[:, len(fractions) :], random)
-
-    order = np.argsort(theta, axis=1)
-    theta, lit = np.take_along_axis(theta, order, axis=1), np.take_along_axis(lit, order, axis=1)
-    row, cell = np.nonzero(lit[:, 1:] != lit[:, :-1])
-    edge = _bisect(visible, used[row], (theta[row, cell], theta[row, cell + 1]), lit[row, cell])
-    # Beginnings and ends of the intervals: the transitions, and the ends of the ray where it is lit there. Sorted by
-    # ray, then by angle, the two lists match one to one.
-    rising = ~lit[row, cell]
-    first, last = np.flatnonzero(lit[:, 0]), np.flatnonzero(lit[:, -1])
-    begin_row, begin = np.concatenate([row[rising], first]), np.concatenate([edge[rising], low[first]])
-    end_row, end = np.concatenate([row[~rising], last]), np.concatenate([edge[~rising], high[last]])
-    by_begin, by_end = np.lexsort((begin, begin_row)), np.lexsort((end, end_row))
-    return LitIntervals(used[begin_row[by_begin]], begin[by_begin], end[by_end], len(row), missed)
-
-
-def _mispredicted(regular: NDArray[np.bool_], checks: NDArray[np.bool_], random: Array) -> float:
-    """Return the share of the random samples that differ from both regular neighbours."""
-    cells = regular.shape[1] - 2
-    cell = np.clip((random * cells + 0.5).astype(np.int64), 0, cells)  # the neighbours are columns cell and cell + 1
-    before, after = np.take_along_axis(regular, cell, axis=1), np.take_along_axis(regular, cell + 1, axis=1)
-    return float(np.mean((checks != before) & (checks != after)))
+    theta = low[:, None] + (high - low)[:, None] * fractions
+    row = np.repeat(np.arange(len(used)), len(fractions))
+    theta = theta.ravel()
+    lit, distance, shape = hits(used[row], theta)
+    for _ in range(_LEVELS):
+        cells = np.flatnonzero((row[1:] == row[:-1]) & _suspicious(theta, lit, distance, shape))
+        if not len(cells):
+            break
+        share = np.arange(1, _PARTS) / _PARTS
+        more = (theta[cells, None] + (theta[cells + 1] - theta[cells])[:, None] * share).ravel()
+        more_row = np.repeat(row[cells], _PARTS - 1)
+        found = hits(used[more_row], more)
+        at = np.repeat(cells + 1, _PARTS - 1)
+        row, theta = np.insert(row, at, more_row), np.insert(theta, at, more)
+        lit, distance, shape = (np.insert(old, at, new) for old, new in zip((lit, distance, shape), found, strict=True))
+    cells = np.flatnonzero((row[1:] == row[:-1]) & (lit[1:] != lit[:-1]))
+    edge = _bisect(visible, used[row[cells]], (theta[cells], theta[cells + 1]), lit[cells])
+    first = np.flatnonzero(np.append(True, row[1:] != row[:-1]))
+    return Toggles(used, lit[first], used[row[cells]], edge)
 
 
-def _bisect(
-    visible: Visible, ray: NDArray[np.int64], bracket: tuple[Array, Array], lit_low: NDArray[np.bool_]
-) -> Array:
+def _suspicious(theta: Array, lit: Bools, distance: Array, shape: Index) -> Bools:
+    """Return in which cells something may begin or end unseen: both ends alike, but not the same surface."""
+    steep = np.abs(np.diff(distance)) > _STEEP * np.diff(theta)
+    return (lit[1:] == lit[:-1]) & (steep | (shape[1:] != shape[:-1]))
+
+
+def _bisect(visible: Visible, ray: Index, bracket: tuple[Array, Array], lit_low: Bools) -> Array:
     low, high = bracket[0].copy(), bracket[1].copy()
     for _ in range(_BISECTIONS if len(ray) else 0):
         middle = 0.5 * (low + high)

@@ -2,7 +2,8 @@
 """The truth of a scene, from the cache where it was computed before."""
 
 from collections.abc import Callable
-from dataclasses import fields
+from dataclasses import Field, fields
+from typing import Any
 
 from reference.batches import Batches
 from reference.cache import cache_key, load_arrays, store_arrays
@@ -14,7 +15,12 @@ Progress = Callable[[int, int, str], None]
 
 
 def truth_image(
-    scene, *, samples: int = 256, shadow_scale: float = 1.0, progress: Progress | None = None
+    scene,
+    *,
+    samples: int = 256,
+    shadow_scale: float = 1.0,
+    pixel: str = "centre",
+    progress: Progress | None = None,
 ) -> TruthImage:
     """Return the quadrature truth of a Mitsuba scene at its own size.
 
@@ -22,18 +28,23 @@ def truth_image(
     ----------
     scene
         The `mi.Scene`.
-    samples, shadow_scale, progress
+    samples, shadow_scale, pixel, progress
         See `reference.quadrature.quadrature_image`.
     """
-    key = cache_key(scene, "quadrature", {"samples": samples, "shadow_scale": shadow_scale})
+    # Only what differs from the usual is named, so that images that were kept before are found.
+    settings = {"samples": samples, "shadow_scale": shadow_scale} | ({} if pixel == "centre" else {"pixel": pixel})
+    key = cache_key(scene, "quadrature", settings)
     stored = load_arrays(key)
-    names = {field.name for field in fields(TruthImage)}
-    if stored is not None and set(stored) == names:
-        scalars = {"transitions": int(stored["transitions"]), "missed": float(stored["missed"])}
-        return TruthImage(**({name: stored[name] for name in names} | scalars))
-    image = quadrature_image(read_truth(scene), samples=samples, shadow_scale=shadow_scale, progress=progress)
-    store_arrays(key, {name: getattr(image, name) for name in names})
+    if stored is not None and set(stored) == {field.name for field in fields(TruthImage)}:
+        return TruthImage(**{field.name: _as_kept(field, stored[field.name]) for field in fields(TruthImage)})
+    image = quadrature_image(read_truth(scene), **settings, progress=progress)
+    store_arrays(key, {field.name: getattr(image, field.name) for field in fields(TruthImage)})
     return image
+
+
+def _as_kept(field: Field, value: Any) -> Any:
+    """Return an array, or the number that was stored as an array without dimensions."""
+    return field.type(value) if field.type in (int, float) else value
 
 
 def volpath_batches(
