@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Walking through the boundaries of media: optical depth and visibility between a light and a point, in Dr.Jit.
+
+A bounded medium is a closed shape with the material `null` that names the media on both sides; it neither reflects nor
+refracts. A ray is followed from one such boundary to the next with `ray_intersect`, and the media are the scene's own
+pointers. Each stretch lies in the medium on the near side of the boundary at its end, so neither the light nor the
+camera need to say which medium they are in for the boundaries to be counted.
+
+Stretches are measured along the one straight ray, from the light to the point: what a continued ray is moved beyond a
+boundary, so that it does not meet it again, is never left out of the optical depth. Visibility rays stop a relative
+1e-5 before the point, since a point on a surface must not be hidden by that surface; the attenuation counts the whole
+distance (volpath's does not, DESIGN section 6.1).
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+from analytic.errors import InputError
+
+_SHORT_OF_POINT = 1e-5  # relative: a hundred roundings of single precision
+_BEYOND = 2e-5  # of the largest coordinate: how far beyond a boundary a ray goes on
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What rays can meet."""
+
+    scene: Any  #: the `mi.Scene`
+    surfaces: bool  #: there are shapes
+    bounded: bool  #: some of them are boundaries of media
+
+
+def read_surroundings(scene) -> tuple[Surroundings, list[Any]]:
+    """Read what rays can meet in a Mitsuba scene, and the media behind its boundaries.
+
+    Raises
+    ------
+    InputError
+        For a heterogeneous medium, a material that is transparent in part, or a medium behind an opaque material.
+    """
+    bounded = False
+    everywhere: list[Any] = []
+    for shape in scene.shapes():
+        see_through = _is_null(shape)
+        media = [medium for medium in (shape.interior_medium(), shape.exterior_medium()) if medium is not None]
+        for medium in media:
+            require_homogeneous(medium)
+        if media and not see_through:
+            raise InputError(
+                f"single-scatter: shape '{shape.id()}' bounds a medium with a material that stops or bends light; "
+                "wanted a bsdf of type 'null' there"
+            )
+        bounded |= see_through
+        everywhere += media
+    return Surroundings(scene, bool(scene.shapes()), bounded), everywhere
+
+
+def _is_null(shape) -> bool:
+    import mitsuba as mi
+
+    flags = int(shape.bsdf().flags())
+    null = bool(flags & int(mi.BSDFFlags.Null))
+    if null and flags & int(mi.BSDFFlags.All) & ~int(mi.BSDFFlags.Null):
+        raise InputError(
+            f"single-scatter: shape '{shape.id()}' has a material that is transparent in part; "
+            "wanted an opaque one or 'null'"
+        )
+    return null
+
+
+def require_homogeneous(medium) -> None:
+    """Raise InputError for a medium that is not homogeneous."""
+    if not medium.is_homogeneous():
+        raise InputError(f"single-scatter: got a {medium.class_name()}; wanted media of type 'homogeneous'")
+
+
+def coefficients(medium, active) -> tuple[Any, Any]:
+    """Return scattering and extinction of media by pointer [1/m]; 0 for a vacuum, the null pointer."""
+    import drjit as dr
+    import mitsuba as mi
+
+    sigma_s, _, sigma_t = medium.get_scattering_coefficients(dr.zeros(mi.MediumInteraction3f), active)
+    return sigma_s, sigma_t
+
+
+def is_boundary(interaction, active):
+    """Return where surface interactions are with the boundary of a medium rather than a surface."""
+    import mitsuba as mi
+
+    return active & mi.has_flag(interaction.bsdf().flags(), mi.BSDFFlags.Null)
+
+
+def step_beyond(point):
+    """Return how far beyond a boundary at `point` a ray goes on [m]."""
+    import drjit as dr
+
+    return _BEYOND * (1 + dr.max(dr.abs(point)))
+
+
+def transmittance(around: Surroundings, start, direction, distance, end_sigma_t, active):
+    """Return the transmittance from a light to points at a distance; 0 where something is in between.
+
+    Parameters
+    ----------
+    around
+        What rays can meet.
+    start, direction, distance
+        The light, the unit vector to the point, and how far it is [m].
+    end_sigma_t
+        Extinction of the medium at the point [1/m].
+    active
+        Mask.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    reach = distance * (1 - _SHORT_OF_POINT)
+    whole = dr.exp(-end_sigma_t * distance)
+    if not around.surfaces:
+        return whole
+    if not around.bounded:
+        blocked = around.scene.ray_test(mi.Ray3f(start, direction, reach, 0.0, []), active)
+        return dr.select(blocked, 0, whole)
+
+    def walk(walking, lit, done, boundary, depth):
+        """Go to the next thing on the way, `done` being where the ray starts, `boundary` the last change of medium."""
+        ray = mi.Ray3f(start + direction * done, direction, reach - done, 0.0, [])
+        hit = around.scene.ray_intersect(ray, walking)
+        met = walking & hit.is_valid()
+        passed = is_boundary(hit, met)
+        lit &= ~met | passed
+        changes = passed & hit.is_medium_transition()
+        _, sigma_t = coefficients(hit.target_medium(-direction), changes)
+        there = done + hit.t
+        depth = dr.select(changes, depth + sigma_t * (there - boundary), depth)
+        boundary = dr.select(changes, there, boundary)
+        done = dr.select(passed, there + step_beyond(hit.p), done)
+        return passed & (done < reach), lit, done, boundary, depth
+
+    zero = dr.zeros(mi.Float, dr.width(distance))
+    state = (mi.Bool(active), mi.Bool(active), zero, mi.Float(zero), dr.zeros(type(end_sigma_t)))
+    _, lit, _, boundary, depth = dr.while_loop(state, lambda walking, *_: walking, walk, label="leg through media")
+    return dr.select(lit, dr.exp(-depth - end_sigma_t * (distance - boundary)), 0)

@@ -1,0 +1,302 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Sampling distances along a camera ray, in Dr.Jit: equi-angular, free-flight, and the two combined.
+
+A *span* is a part of a ray between s0 and s1 = s0 + length, both measured from the foot of the perpendicular from the
+light, so that r^2 = h^2 + s^2; s1 may be infinite. Distances are sampled as y = s - s0 in [0, length].
+
+Equi-angular (Kulla and Fajardo 2012, section 4; densities there over the same span): the angle delta at the light from
+the start of the span is uniform, which gives a density proportional to 1/r^2. With r0 = sqrt(h^2 + s0^2) and the
+tangent of a difference of angles,
+
+    tan(delta) = h y / (r0^2 + s0 y)        the angle between s0 and s0 + y, by the cross and dot products
+    y = r0^2 sin(delta) / (h cos(delta) - s0 sin(delta))
+    pdf(y) = h / (range r^2),               range = delta(length).
+
+No angle is subtracted from another: the range of a short or distant span keeps all its digits, in single precision too.
+
+Free-flight: the exponential density sigma exp(-sigma y) / (1 - exp(-sigma length)), truncated to the span. With
+t = tanh(sigma length / 2), 1 - exp(-sigma length) = 2 t / (1 + t), and -log(1 - z) = 2 atanh(z / (2 - z)) gives
+
+    y = 2 atanh(u t / (1 + t (1 - u))) / sigma,
+
+again free of cancellation, down to sigma length = 0, the uniform density. Where the extinction depends on the channel,
+the density is the mean over the channels (spectral multiple importance sampling).
+
+Combined: the density is the mean of the two. The estimator f(y)/pdf(y) is then the balance heuristic with even odds
+(Veach 1997, theorem 9.4): sum over both techniques of the weight pdf_t/(pdf_1 + pdf_2) times f/pdf_t. Its variance is
+finite for every ray that does not meet the light: f r^2 is bounded (by sigma_s I max p) and pdf r^2 >= h/(2 range),
+whatever the free-flight density and whatever channel f is of.
+
+References
+----------
+C. Kulla and M. Fajardo 2012, Importance sampling techniques for path tracing in participating media.
+E. Veach 1997, Robust Monte Carlo methods for light transport simulation, chapter 9.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+_MEAN_FREE_PATHS = 60.0  # free flights are cut there: 1e-26 of them are longer, and the other technique goes on
+_CONE_MARGIN = 1e-4  # by how much samples may fall beside a spot's cone [rad]: far above single precision's rounding
+_FAR = 1e30  # where a sample at the very end of an endless ray goes; nothing is transmitted from there [m]
+_CDF_TOLERANCE = 3e-8  # how exactly the mixture is inverted: a rounding of what samplers draw
+_STEPS = 60  # most take five; every fourth halves the bracket
+_LEAST_DEPTH = 1e-12  # the exponential of a thinner span is uniform to the last bit
+
+
+@dataclass(frozen=True)
+class Approach:
+    """How a ray passes a light."""
+
+    foot: Any  #: distance along the ray of the foot of the perpendicular [m]
+    height: Any  #: distance of the light from the ray [m]
+    normal: Any  #: unit vector from the light to the foot
+
+
+@dataclass(frozen=True)
+class Span:
+    """A part of a ray as a light sees it."""
+
+    height: Any  #: distance of the light from the ray, above 0 [m]
+    start: Any  #: s0, from the foot [m]
+    length: Any  #: s1 - s0, may be infinite [m]
+
+
+def closest_approach(origin, direction, position) -> Approach:
+    """Return foot, height and normal of rays: computed in double precision, rounded to the variant's once.
+
+    Parameters
+    ----------
+    origin, direction
+        Rays, arrays of double precision; `direction` has unit length.
+    position
+        The light's position, of double precision.
+
+    Notes
+    -----
+    Valid for any ray; one that meets the light gets a height of 1e-30 and a normal near zero.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    offset = origin - position
+    foot = -dr.dot(offset, direction)
+    perpendicular = offset + direction * foot
+    height = dr.maximum(dr.norm(perpendicular), 1e-30)
+    return Approach(mi.Float(foot), mi.Float(height), mi.Vector3f(perpendicular / height))
+
+
+def cone_ends(approach: Approach, direction, axis, cutoff: float) -> tuple[Any, Any]:
+    """Return the ends of the part of a line inside a spot's cone, as distances from the foot; empty if they swap.
+
+    The direction from the light to the point s is w(theta) = sin(theta) direction + cos(theta) normal, with
+    tan(theta) = s/h, so that axis . w = m cos(theta - middle), with (m, middle) the polar form of
+    (axis . normal, axis . direction). It is above cos(cutoff) for |theta - middle| < acos(cos(cutoff)/m).
+
+    Parameters
+    ----------
+    approach
+        How the ray passes the light.
+    direction
+        The ray's direction.
+    axis
+        The cone's axis, a unit vector.
+    cutoff
+        The cone's half angle [rad].
+
+    Notes
+    -----
+    Valid for cones up to a half space; wider ones are answered by the whole line. The ends lie outside the cone by a
+    hair: they bound where samples are drawn, and what the light sends there is the emitter's own answer.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    infinity = dr.inf
+    if cutoff > 0.5 * math.pi:
+        return mi.Float(-infinity), mi.Float(infinity)
+    along, across = dr.dot(axis, direction), dr.dot(axis, approach.normal)
+    ratio = math.cos(cutoff) / dr.maximum(dr.sqrt(along * along + across * across), 1e-20)
+    half = dr.acos(dr.minimum(ratio, 1)) + _CONE_MARGIN
+    middle = dr.atan2(along, across)
+    low, high = middle - half, middle + half
+    right = 0.5 * math.pi - 1e-6  # beyond, the tangent in single precision has no digit or even the wrong sign
+    low_end = dr.select(low > -right, approach.height * dr.tan(dr.minimum(low, right)), -infinity)
+    high_end = dr.select(high < right, approach.height * dr.tan(dr.maximum(high, -right)), infinity)
+    outside = (ratio > 1 + _CONE_MARGIN) | (low > right) | (high < -right)
+    return low_end, dr.select(outside, -infinity, high_end)
+
+
+def equi_angular_range(span: Span):
+    """Return the angle that the light sees the span under [rad]."""
+    import drjit as dr
+
+    finite = span.length < dr.inf
+    return dr.select(finite, _angle(dr.select(finite, span.length, 1), span), dr.atan2(span.height, span.start))
+
+
+def equi_angular(u, span: Span):
+    """Return distances y from the start of the span [m], uniform in the angle at the light, for u in [0, 1)."""
+    return _distance(u * equi_angular_range(span), span)
+
+
+def equi_angular_pdf(y, span: Span):
+    """Return the density of `equi_angular` at y [1/m]."""
+    s = span.start + y
+    return span.height / (equi_angular_range(span) * (span.height * span.height + s * s))
+
+
+def _distance(angle, span: Span):
+    """Return how far from the start of the span the point is that the light sees at an angle from it [m]."""
+    import drjit as dr
+
+    s0, h = span.start, span.height
+    sine, cosine = dr.sincos(angle)
+    beyond = h * cosine - s0 * sine  # r0 cos(theta): above 0, and 0 at the far end of an endless ray
+    y = (h * h + s0 * s0) * sine / dr.maximum(beyond, 1e-30)
+    return dr.minimum(dr.select(beyond > 0, y, _FAR), span.length)
+
+
+def _angle(y, span: Span):
+    """Return the angle at the light between the start of the span and the point at y, the inverse of `_distance`."""
+    import drjit as dr
+
+    s0, h = span.start, span.height
+    return dr.atan2(h * y, h * h + s0 * (s0 + y))
+
+
+@dataclass(frozen=True)
+class FreeFlight:
+    """The truncated exponential distribution of one channel's free flights."""
+
+    cut: Any  #: length of the span, or where hardly any flight is longer [m]
+    rate: Any  #: extinction [1/m]
+    tanh: Any  #: tanh(rate cut / 2)
+
+
+def free_flights(length, sigma_t) -> FreeFlight:
+    """Return the free flights in a span of some length [m] and extinction [1/m].
+
+    Notes
+    -----
+    Valid for sigma_t > 0, and for sigma_t = 0 where the length is finite.
+    """
+    import drjit as dr
+
+    cut = dr.minimum(length, _MEAN_FREE_PATHS / sigma_t)
+    depth = dr.maximum(sigma_t * cut, _LEAST_DEPTH)
+    return FreeFlight(cut, depth / cut, dr.tanh(0.5 * depth))
+
+
+def free_flight(u, flight: FreeFlight):
+    """Return free-flight distances y from the start of the span [m], for u in [0, 1)."""
+    import drjit as dr
+
+    t = flight.tanh
+    return dr.minimum(2 * dr.atanh(u * t / (1 + t * (1 - u))) / flight.rate, flight.cut)
+
+
+def free_flight_pdf(y, flight: FreeFlight):
+    """Return the density of `free_flight` at y [1/m]."""
+    return _flight_cdf_and_pdf(y, flight)[1]
+
+
+def _flight_cdf_and_pdf(y, flight: FreeFlight) -> tuple[Any, Any]:
+    """Return the distribution function (whose absolute error is a rounding over rate cut) and the density."""
+    import drjit as dr
+
+    inside = y <= flight.cut
+    survival = dr.exp(-flight.rate * y)
+    scale = (1 + flight.tanh) / (2 * flight.tanh)
+    return dr.select(inside, scale * (1 - survival), 1), dr.select(inside, flight.rate * scale * survival, 0)
+
+
+@dataclass(frozen=True)
+class Mixture:
+    """Both techniques on one span, in double precision."""
+
+    span: Span
+    range: Any  #: the angle that the light sees the span under [rad]
+    flights: tuple[FreeFlight, ...]  #: one for each channel
+
+
+def mixture_of(span: Span, sigma_t: Sequence[Any]) -> Mixture:
+    """Return the mixture of both techniques; one extinction for all channels, or one for each [1/m]."""
+    import mitsuba as mi
+
+    span = Span(mi.Float64(span.height), mi.Float64(span.start), mi.Float64(span.length))
+    flights = tuple(free_flights(span.length, mi.Float64(rate)) for rate in sigma_t)
+    return Mixture(span, equi_angular_range(span), flights)
+
+
+def mixture_pdfs(y, mixture: Mixture) -> tuple[Any, Any]:
+    """Return what either technique adds to the density of the mixture at y [1/m]; their shares are the MIS weights."""
+    return tuple(pdf for _, pdf in _terms(y, mixture))
+
+
+def mixture_cdf(y, mixture: Mixture):
+    """Return the probability that `sample_distance` stays below y."""
+    return sum(cdf for cdf, _ in _terms(y, mixture))
+
+
+def _terms(y, mixture: Mixture) -> list[tuple[Any, Any]]:
+    """Return what equi-angular sampling and free flights add to the distribution function and to the density."""
+    h, s = mixture.span.height, mixture.span.start + y
+    flights = [_flight_cdf_and_pdf(y, flight) for flight in mixture.flights]
+    share = 0.5 / len(flights)
+    equi = 0.5 * _angle(y, mixture.span) / mixture.range, 0.5 * h / (mixture.range * (h * h + s * s))
+    return [equi, (share * sum(cdf for cdf, _ in flights), share * sum(pdf for _, pdf in flights))]
+
+
+def sample_distance(u, mixture: Mixture) -> tuple[Any, Any, Any]:
+    """Sample a distance from the mixture of both techniques by inverting its cumulative distribution.
+
+    Parameters
+    ----------
+    u
+        Uniform in [0, 1).
+    mixture
+        See `mixture_of`.
+
+    Returns
+    -------
+    tuple
+        The distances from the start of the span and from the foot [m], and the density [1/m].
+
+    Notes
+    -----
+    The distance grows with u, so that a regular grid of u, jittered, stratifies the distance. (Were u to choose the
+    technique, a lamp's peak would fall into few cells of the free flights: 50 times the variance at 64 samples.)
+
+    The mean of several cumulative distributions takes the value u between the places where they themselves do. Between
+    those, Newton's method in the angle delta, with d(y)/d(delta) = r^2/h, and a bisection where it leaves the bracket.
+    All this is in double precision: in single, the angle has no digits left for what lies far beyond a close light.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    span, u = mixture.span, mi.Float64(u)
+    low = high = u * mixture.range
+    for flight in mixture.flights:
+        angle = _angle(free_flight(u, flight), span)
+        low, high = dr.minimum(low, angle), dr.maximum(high, angle)
+
+    def improve(number, searching, low, high, angle):
+        y = _distance(angle, span)
+        (equi, density), (free, free_density) = _terms(y, mixture)
+        excess = equi + free - u
+        low, high = dr.select(excess < 0, angle, low), dr.select(excess < 0, high, angle)
+        s = span.start + y
+        newton = angle - excess / ((density + free_density) * (span.height + s * s / span.height))
+        # Every fourth step halves the bracket, whatever Newton's method would do.
+        use_newton = (newton > low) & (newton < high) & (number % 4 != 3)
+        better = dr.select(use_newton, newton, 0.5 * (low + high))
+        searching &= (dr.abs(excess) > _CDF_TOLERANCE) & (number < _STEPS)
+        return number + 1, searching, low, high, dr.select(searching, better, angle)
+
+    state = (mi.UInt32(0), dr.full(mi.Bool, True, dr.width(low)), low, high, 0.5 * (low + high))
+    angle = dr.while_loop(state, lambda number, searching, *_: searching, improve, label="inverse of the mixture")[-1]
+    y = _distance(angle, span)
+    return mi.Float(y), mi.Float(span.start + y), mi.Float(sum(mixture_pdfs(y, mixture)))

@@ -1,0 +1,292 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""What one scattering sends along camera rays: the estimator of the integrator `single-scatter`, in Dr.Jit.
+
+For each point or spot light and each medium that a ray crosses, from x0 to x1,
+
+    L = int_{x0}^{x1} T(0, x) sigma_s p(cos)/(4 pi) I/r^2 V T(x, light) dx
+
+(T transmittance, V visibility) is estimated at distances that `reference.distance_sampling` draws. A surface at the end
+of the ray adds f cos I/r^2 V T T, which needs no sampling. Intensity I, phase function, material f and the coefficients
+of the media are the answers of Mitsuba's own plugins, and only they.
+
+In a scene whose extinction depends on the channel all channels use the same distances, with the density of the mixture
+over the channels, so that no channel's variance can become infinite.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from analytic.errors import InputError
+from reference.boundary_walk import (
+    Surroundings,
+    coefficients,
+    is_boundary,
+    read_surroundings,
+    require_homogeneous,
+    step_beyond,
+    transmittance,
+)
+from reference.distance_sampling import Span, closest_approach, cone_ends, mixture_of, sample_distance
+
+
+@dataclass(frozen=True)
+class Light:
+    """A light as far as sampling must know it; what it sends where is the emitter's answer."""
+
+    emitter: Any  #: Mitsuba's emitter
+    position: Any  #: of double precision [m]
+    axis: Any = None  #: spot: unit vector
+    cutoff: float = math.pi  #: spot: half angle of the cone [rad]
+
+
+@dataclass(frozen=True)
+class Task:
+    """What is fixed while a scene is traced."""
+
+    around: Surroundings
+    lights: tuple[Light, ...]
+    samples: int  #: distances for each ray, light and medium
+    grey: bool  #: no medium's extinction depends on the channel
+
+
+@dataclass(frozen=True)
+class Ray:
+    """Camera rays in both precisions."""
+
+    origin: Any
+    direction: Any
+    origin_double: Any
+    direction_double: Any
+
+
+@dataclass(frozen=True)
+class _Stretch:
+    """The part of camera rays in one medium."""
+
+    start: Any  #: distance from the camera where it begins [m]
+    end: Any  #: where it ends, may be infinite [m]
+    depth: Any  #: optical depth from the camera to its start
+    medium: Any  #: pointer
+    sigma_s: Any  #: [1/m]
+    sigma_t: Any  #: [1/m]
+
+
+def double_ray(origin, direction) -> Ray:
+    """Return rays given in double precision; their directions need not have unit length."""
+    import drjit as dr
+    import mitsuba as mi
+
+    direction = dr.normalize(direction)
+    return Ray(mi.Point3f(origin), dr.normalize(mi.Vector3f(direction)), origin, direction)
+
+
+def read_task(scene, medium, samples: int) -> Task:
+    """Read what the estimator needs from a Mitsuba scene.
+
+    Parameters
+    ----------
+    scene
+        The `mi.Scene`.
+    medium
+        What camera rays start in: a Mitsuba medium, a pointer to one, or None for a vacuum.
+    samples
+        Distances for each ray, light and medium.
+
+    Raises
+    ------
+    InputError
+        For an emitter, a medium or a material that it has no answer for.
+    """
+    import mitsuba as mi
+
+    lights = tuple(_read_light(emitter) for emitter in scene.emitters())
+    around, media = read_surroundings(scene)
+    if isinstance(medium, mi.Medium):
+        require_homogeneous(medium)
+        media = [*media, medium]
+    known = medium is None or isinstance(medium, mi.Medium)
+    return Task(around, lights, samples, grey=known and all(_is_grey(one) for one in media))
+
+
+def _is_grey(medium) -> bool:
+    import mitsuba as mi
+
+    _, sigma_t = coefficients(mi.MediumPtr(medium), mi.Bool(True))
+    return len({float(np.ravel(channel)[0]) for channel in sigma_t}) == 1
+
+
+def _read_light(emitter) -> Light:
+    import drjit as dr
+    import mitsuba as mi
+
+    name = emitter.class_name()
+    if name not in ("PointLight", "SpotLight"):
+        raise InputError(f"single-scatter: the scene has an emitter of class {name}; wanted 'point' or 'spot' only")
+    sample, _ = emitter.sample_direction(dr.zeros(mi.Interaction3f), mi.Point2f(0.5))
+    position = mi.Point3d(sample.p)
+    if name == "PointLight":
+        return Light(emitter, position)
+    axis = dr.normalize(emitter.world_transform() @ mi.Vector3f(0, 0, 1))
+    cutoff = float(np.ravel(mi.traverse(emitter)["cutoff_angle"])[0])
+    return Light(emitter, position, axis, math.radians(cutoff))
+
+
+def ray_light(task: Task, sampler, ray: Ray, medium, active) -> tuple[Any, Any]:
+    """Return airlight and lit surface along camera rays [W/(m^2 sr)].
+
+    Parameters
+    ----------
+    task
+        See `read_task`.
+    sampler
+        Mitsuba's sampler, with one stream for each ray.
+    ray
+        The rays.
+    medium
+        What the rays start in: a Mitsuba medium, a pointer to one, or None for a vacuum.
+    active
+        Mask.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    if medium is None:
+        medium = dr.zeros(mi.MediumPtr)
+    elif isinstance(medium, mi.Medium):
+        medium = mi.MediumPtr(medium)
+    if task.around.bounded:
+        return _through_media(task, sampler, ray, medium, active)
+    nothing = dr.zeros(mi.Spectrum, dr.width(active))
+    stretch = _Stretch(mi.Float(0), mi.Float(dr.inf), nothing, medium, *coefficients(medium, active))
+    if not task.around.surfaces:
+        return _airlight(task, sampler, ray, stretch, active), nothing
+    hit = task.around.scene.ray_intersect(mi.Ray3f(ray.origin, ray.direction), active)
+    stretch = replace(stretch, end=dr.select(hit.is_valid(), hit.t, dr.inf))
+    airlight = _airlight(task, sampler, ray, stretch, active)
+    return airlight, _surface(task, hit, stretch, active & hit.is_valid())
+
+
+def _through_media(task: Task, sampler, ray: Ray, medium, active) -> tuple[Any, Any]:
+    """Follow camera rays from boundary to boundary, and add up what each stretch sends."""
+    import drjit as dr
+    import mitsuba as mi
+
+    def walk(walking, sampler, done, start, depth, medium, airlight, surface):
+        """Add the stretch to the next thing on the way, `done` being where the ray goes on, `start` the boundary."""
+        onward = mi.Ray3f(ray.origin + ray.direction * done, ray.direction)
+        hit = task.around.scene.ray_intersect(onward, walking)
+        met = walking & hit.is_valid()
+        end = dr.select(met, done + hit.t, dr.inf)
+        stretch = _Stretch(start, end, depth, medium, *coefficients(medium, walking))
+        airlight = airlight + _airlight(task, sampler, ray, stretch, walking)
+        passed = is_boundary(hit, met)
+        surface = surface + _surface(task, hit, stretch, met & ~passed)
+        depth = dr.select(passed, depth + stretch.sigma_t * (end - start), depth)
+        changes = passed & hit.is_medium_transition()
+        medium = dr.select(changes, hit.target_medium(ray.direction), medium)
+        done = dr.select(passed, end + step_beyond(hit.p), done)
+        return passed, sampler, done, dr.select(passed, end, start), depth, medium, airlight, surface
+
+    zero, nothing = dr.zeros(mi.Float, dr.width(active)), dr.zeros(mi.Spectrum, dr.width(active))
+    medium = dr.select(active, medium, dr.zeros(mi.MediumPtr))
+    state = (
+        mi.Bool(active),
+        sampler,
+        zero,
+        mi.Float(zero),
+        nothing,
+        medium,
+        mi.Spectrum(nothing),
+        mi.Spectrum(nothing),
+    )
+    final = dr.while_loop(state, lambda walking, *_: walking, walk, label="camera ray through media")
+    return final[-2], final[-1]
+
+
+def _airlight(task: Task, sampler, ray: Ray, stretch: _Stretch, active):
+    """Estimate what all lights send from a stretch of the ray."""
+    import drjit as dr
+    import mitsuba as mi
+
+    total = dr.zeros(mi.Spectrum, dr.width(active))
+    active = active & (dr.max(stretch.sigma_s) > 0)
+    for light in task.lights:
+        total += _light_airlight(task, light, sampler, ray, stretch, active)
+    return total
+
+
+def _light_airlight(task: Task, light: Light, sampler, ray: Ray, stretch: _Stretch, active):
+    """Estimate what one light sends from a stretch of the ray: a loop over the cells of the unit interval."""
+    import drjit as dr
+    import mitsuba as mi
+
+    approach = closest_approach(ray.origin_double, ray.direction_double, light.position)
+    first, last = stretch.start - approach.foot, stretch.end - approach.foot
+    start, end = first, last
+    if light.axis is not None:
+        low, high = cone_ends(approach, ray.direction, light.axis, light.cutoff)
+        start, end = dr.maximum(first, low), dr.minimum(last, high)
+    span = Span(approach.height, start, end - start)
+    active = active & (end > start)
+    mixture = mixture_of(span, [stretch.sigma_t[0]] if task.grey else list(stretch.sigma_t))
+
+    def add_sample(number, total, sampler):
+        u = (number + sampler.next_1d(active)) / task.samples
+        y, s, density = sample_distance(u, mixture)
+        r = dr.sqrt(span.height * span.height + s * s)
+        from_light = (approach.normal * span.height + ray.direction * s) / r
+        used = active & (density > 0)
+        sent = _scattered(task, light, ray, stretch, from_light, r, used)
+        camera_leg = stretch.depth + stretch.sigma_t * (span.start - first + y)
+        value = sent * dr.exp(-camera_leg) / (r * r * density)
+        return number + 1, total + dr.select(used, value, 0), sampler
+
+    state = (mi.UInt32(0), dr.zeros(mi.Spectrum, dr.width(active)), sampler)
+    _, total, _ = dr.while_loop(state, lambda number, *_: number < task.samples, add_sample, label="distances")
+    return total / task.samples
+
+
+def _scattered(task: Task, light: Light, ray: Ray, stretch: _Stretch, from_light, r, active):
+    """Return sigma_s p/(4 pi) I V T of points at a distance r from a light, in a unit direction from there."""
+    import drjit as dr
+    import mitsuba as mi
+
+    point = dr.zeros(mi.MediumInteraction3f)
+    position = mi.Point3f(light.position)
+    point.p = position + from_light * r
+    point.wi = -ray.direction
+    point.sh_frame = mi.Frame3f(ray.direction)
+    phase, _ = stretch.medium.phase_function().eval_pdf(mi.PhaseFunctionContext(), point, -from_light, active)
+    intensity = _intensity(light, point, active)
+    leg = transmittance(task.around, position, from_light, r, stretch.sigma_t, active)
+    return stretch.sigma_s * phase * intensity * leg
+
+
+def _surface(task: Task, hit, stretch: _Stretch, active):
+    """Return what all lights send by way of the surface at the end of a stretch."""
+    import drjit as dr
+    import mitsuba as mi
+
+    total = dr.zeros(mi.Spectrum, dr.width(active))
+    camera_leg = stretch.depth + stretch.sigma_t * dr.select(active, stretch.end - stretch.start, 0)
+    for light in task.lights:
+        position = mi.Point3f(light.position)
+        from_light = hit.p - position
+        r = dr.norm(from_light)
+        from_light = from_light / r
+        material = hit.bsdf().eval(mi.BSDFContext(), hit, hit.to_local(-from_light), active)
+        leg = transmittance(task.around, position, from_light, r, stretch.sigma_t, active)
+        sent = material * _intensity(light, hit, active) * leg / (r * r)
+        total += dr.select(active, sent * dr.exp(-camera_leg), 0)
+    return total
+
+
+def _intensity(light: Light, interaction, active):
+    """Return the radiant intensity towards a point [W/sr]: the emitter's irradiance there times squared distance."""
+    import mitsuba as mi
+
+    sample, irradiance = light.emitter.sample_direction(interaction, mi.Point2f(0.5), active)
+    return irradiance * sample.dist * sample.dist
