@@ -156,21 +156,22 @@ def crossings(bounds: Bounds, origin: Array, direction: Array) -> tuple[Array, A
     return enter, leave
 
 
-def crossed_facets(bounds: Polyhedron, origin: Array, direction: Array) -> tuple[Index, Index, NDArray[np.bool_]]:
-    """Return the facets at which rays from one point enter and leave a body, and whether they pass through it at all.
+def crossed_facets(bounds: Polyhedron, origin: Array, direction: Array) -> tuple[Index, Index, Array, Array]:
+    """Return the facets at which rays from one point, (3,), enter and leave a polyhedron, and the distances.
 
-    The arguments are those of `crossings`; the results have shape (n,), and mean nothing where the body is missed.
+    The results have shape (n,); a line misses the body where it leaves before it enters.
     """
     enter, leave = np.empty(len(direction), np.int64), np.empty(len(direction), np.int64)
-    hit = np.empty(len(direction), bool)
+    low, high = np.empty(len(direction)), np.empty(len(direction))
     step = max(1, _BLOCK // len(bounds.offset))
     for first in range(0, len(direction), step):
         block = slice(first, first + step)
         times, rate, missed = _plane_crossings(bounds, origin[None], direction[block])
         entering, leaving = np.where(rate < 0, times, -np.inf), np.where(rate > 0, times, np.inf)
         enter[block], leave[block] = np.argmax(entering, axis=1), np.argmin(leaving, axis=1)
-        hit[block] = ~missed & (np.max(entering, axis=1) < np.min(leaving, axis=1))
-    return enter, leave, hit
+        low[block] = np.where(missed, np.inf, np.max(entering, axis=1))
+        high[block] = np.where(missed, -np.inf, np.min(leaving, axis=1))
+    return enter, leave, low, high
 
 
 def _plane_crossings(bounds: Polyhedron, origin: Array, direction: Array) -> tuple[Array, Array, NDArray[np.bool_]]:

@@ -4,7 +4,7 @@
     L = f(w_i, w_o) cos I / r^2 exp(-sigma_t (distance + s r)),
 
 with f cos by `BSDF.eval` and I / r^2 by `Emitter.sample_direction`; s scales the shadow leg (see
-`reference.quadrature`).
+`reference.quadrature`). Through bounded media the optical depth is that of both legs piece by piece.
 """
 
 from dataclasses import dataclass
@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.media import optical_depth
 from reference.scene import TruthScene
 
 Array = NDArray[np.float64]
@@ -45,7 +46,7 @@ def lit_surface(truth: TruthScene, hits: SurfaceHits, *, shadow_scale: float = 1
     total = np.zeros((len(hits.distance), 3))
     if not truth.occluders.shapes():
         return total
-    for emitter in truth.scene.emitters():
+    for emitter, light in zip(truth.scene.emitters(), truth.lights, strict=True):
         towards, arriving = emitter.sample_direction(interaction, mi.Point2f(0.5))
         facing = interaction.is_valid()
         blocked = truth.occluders.ray_test(interaction.spawn_ray_to(towards.p), facing)
@@ -53,6 +54,18 @@ def lit_surface(truth: TruthScene, hits: SurfaceHits, *, shadow_scale: float = 1
         radiance = np.array(reflected * arriving, dtype=np.float64).T
         lit = np.array(facing & ~blocked, dtype=bool)
         path = np.where(lit, hits.distance, 0) + shadow_scale * np.array(towards.dist, dtype=np.float64)
-        transmitted = np.exp(-np.where(lit, path, 0)[:, None] * truth.medium.sigma_t)
-        total += np.where(lit[:, None], radiance * transmitted, 0.0)
+        depth = np.where(lit, path, 0)[:, None] * truth.medium.sigma_t
+        if truth.media:
+            depth = _depth_through_media(truth, np.where(lit, hits.distance, 0), light.position, shadow_scale)
+        total += np.where(lit[:, None], radiance * np.exp(-depth), 0.0)
     return total
+
+
+def _depth_through_media(truth: TruthScene, distance: Array, light: Array, shadow_scale: float) -> Array:
+    """Return the optical depth camera -> point -> light of points on the pixel-centre rays, (pixels, 3)."""
+    point = truth.origin + distance[:, None] * truth.direction
+    leg = point - light
+    length = np.linalg.norm(leg, axis=1)
+    leg /= np.maximum(length, np.finfo(float).tiny)[:, None]
+    to_camera = optical_depth(truth, truth.origin, truth.direction, np.zeros(len(distance)), distance)
+    return to_camera + optical_depth(truth, light, leg, (1 - shadow_scale) * length, length)

@@ -7,8 +7,9 @@ sums, nor the near clip plane come into play; what remains of Mitsuba's biases i
 (`reference.epsilon`).
 
 Airlight and surface come apart by two runs: with black surfaces only the medium scatters, with albedo 0 only surfaces
-do. Where the extinction depends on the channel, each channel has a run of its own in a grey medium, since a path that
-picks its channel at random may have infinite variance (DESIGN section 6.7).
+do. Where the extinction depends on the channel, each channel has a run of its own in grey media, since a path that
+picks its channel at random may have infinite variance (DESIGN section 6.7). Boundaries of media are of type 'null':
+paths go through them without counting an edge, and they stay as they are when surfaces turn black.
 
 Each batch has its own seed and at most 256 samples a pixel; means and standard errors are taken over the batches in
 float64.
@@ -16,16 +17,18 @@ float64.
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from reference.batches import LARGEST_BATCH, Batches
-from reference.scene import TruthScene
+from reference.scene import TruthMedium, TruthScene
 
 Array = NDArray[np.float64]
 
 _PATHS = 1 << 22  # paths traced at once
+_VALUES = ("sigma_t.value.value", "albedo.value.value")  # what decides the numbers among a medium's parameters
 
 
 def volpath_batch(truth: TruthScene, seed: int, samples: int, *, max_depth: int = 2) -> Batches:
@@ -55,14 +58,14 @@ def volpath_batch(truth: TruthScene, seed: int, samples: int, *, max_depth: int 
     if max_depth < 2:
         raise ValueError(f"max_depth: got {max_depth}, wanted at least 2, one scattering")
     integrator = mi.load_dict({"type": "volpath", "max_depth": max_depth, "rr_depth": 1000})
-    with _black_surfaces(truth.scene):
-        airlight = _trace(truth, integrator, truth.medium.albedo, 2 * seed, samples)
+    with _black_surfaces(truth.occluders):
+        airlight = _trace(truth, integrator, 2 * seed, samples)
     surface = np.zeros_like(airlight)
-    if truth.scene.shapes() and max_depth == 2:
-        surface = _trace(truth, integrator, np.zeros(3), 2 * seed + 1, samples)
-    elif truth.scene.shapes():
+    if truth.occluders.shapes() and max_depth == 2:
+        surface = _trace(truth, integrator, 2 * seed + 1, samples, scattering=False)
+    elif truth.occluders.shapes():
         # The same paths once more, now with light from surfaces; the difference is what these add.
-        surface = _trace(truth, integrator, truth.medium.albedo, 2 * seed, samples) - airlight
+        surface = _trace(truth, integrator, 2 * seed, samples) - airlight
     mean = np.stack([airlight, surface])
     return Batches((seed,), samples, mean, np.zeros_like(mean), mean.mean(axis=1)[None])
 
@@ -83,19 +86,20 @@ def _black_surfaces(scene) -> Iterator[None]:
             shape.set_bsdf(bsdf)
 
 
-def _trace(truth: TruthScene, integrator, albedo: Array, seed: int, samples: int) -> Array:
+def _trace(truth: TruthScene, integrator, seed: int, samples: int, *, scattering: bool = True) -> Array:
     """Return the mean radiance of every pixel, (pixels, 3)."""
     pixels = truth.width * truth.height
     rows = max(1, _PATHS // samples)
     image = np.zeros((pixels, 3))
-    for number, sigma_t in enumerate(dict.fromkeys(truth.medium.sigma_t)):
-        medium = _grey_medium(truth, float(sigma_t), albedo)
-        channels = truth.medium.sigma_t == sigma_t
-        for start in range(0, pixels, rows):
-            # Streams differ by seed; the chunk and the channel get seeds of their own.
-            stream = (seed * 3 + number) * (pixels // rows + 1) + start // rows
-            chunk = _trace_pixels(truth, integrator, medium, slice(start, min(start + rows, pixels)), stream, samples)
-            image[start : start + rows, channels] = chunk[:, channels]
+    extinctions = np.stack([medium.sigma_t for medium in (truth.medium, *truth.media)], axis=1)
+    for number, sigma_t in enumerate(dict.fromkeys(map(tuple, extinctions))):
+        channels = np.all(extinctions == sigma_t, axis=1)
+        with _grey_media(truth, int(np.argmax(channels)), scattering) as medium:
+            for start in range(0, pixels, rows):
+                # Streams differ by seed; the chunk and the channel get seeds of their own.
+                stream = (seed * 3 + number) * (pixels // rows + 1) + start // rows
+                part = slice(start, min(start + rows, pixels))
+                image[part, channels] = _trace_pixels(truth, integrator, medium, part, stream, samples)[:, channels]
     return image
 
 
@@ -115,15 +119,53 @@ def _trace_pixels(truth: TruthScene, integrator, medium, pixels: slice, seed: in
     return np.stack(means, axis=1)
 
 
-def _grey_medium(truth: TruthScene, sigma_t: float, albedo: Array):
+@contextmanager
+def _grey_media(truth: TruthScene, channel: int, scattering: bool) -> Iterator[Any]:
+    """Give all media the extinction of one channel for a while; yield the medium in which camera rays begin."""
+    import mitsuba as mi
+
+    if not truth.media:
+        yield _grey_medium(truth.medium, float(truth.medium.sigma_t[channel]), scattering)
+        return
+    own: list[tuple[Any, dict[str, Any]]] = []
+    try:
+        for medium in (truth.medium, *truth.media):
+            # Shapes may share a medium.
+            if medium.plugin is not None and all(medium.plugin != plugin for plugin, _ in own):
+                parameters = mi.traverse(medium.plugin)
+                own.append((medium.plugin, {key: type(parameters[key])(parameters[key]) for key in _VALUES}))
+                sigma_t = float(medium.sigma_t[channel]) / float(parameters["scale"] or 1.0)
+                _set_values(medium.plugin, sigma_t, medium.albedo if scattering else np.zeros(3))
+        yield truth.scene.sensors()[0].get_medium()
+    finally:
+        for plugin, values in own:
+            parameters = mi.traverse(plugin)
+            for key, value in values.items():
+                parameters[key] = value
+            parameters.update()
+
+
+def _set_values(plugin: Any, sigma_t: float, albedo: Array) -> None:
+    """Set the extinction, before the medium's scale, and the albedo."""
+    import mitsuba as mi
+
+    parameters = mi.traverse(plugin)
+    for key, value in zip(_VALUES, (np.full(3, sigma_t), albedo), strict=True):
+        kind = type(parameters[key])
+        # A grey number of Mitsuba is one value, a colour three.
+        parameters[key] = kind(*(float(v) for v in value)) if "Color" in kind.__name__ else kind(float(value[0]))
+    parameters.update()
+
+
+def _grey_medium(medium: TruthMedium, sigma_t: float, scattering: bool):
     import mitsuba as mi
 
     return mi.load_dict(
         {
             "type": "homogeneous",
             "sigma_t": sigma_t,
-            "albedo": {"type": "rgb", "value": [float(a) for a in albedo]},
+            "albedo": {"type": "rgb", "value": [float(a) if scattering else 0.0 for a in medium.albedo]},
             "has_spectral_extinction": False,
-            "phase": truth.medium.plugin.phase_function(),
+            "phase": medium.plugin.phase_function(),
         }
     )
