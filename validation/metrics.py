@@ -137,6 +137,21 @@ def compared(
     return ref.reshape(*ref.shape[:2], -1), tst.reshape(*tst.shape[:2], -1), chosen
 
 
+def colours(image: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return an image (height, width, channels) as one of three channels; one channel becomes grey.
+
+    Raises
+    ------
+    InputError
+        If it has neither one nor three channels: only these have a colour.
+    """
+    if image.shape[2] not in (1, 3):
+        raise InputError(
+            f"an image of {image.shape[2]} channels has no colour; wanted one (grey) or three (linear RGB)"
+        )
+    return np.repeat(image, 3, axis=2) if image.shape[2] == 1 else image
+
+
 def plain(value: Any) -> Any:
     """Return a number, a pair or a text as JSON holds it: no NumPy types, None for what is not finite."""
     if isinstance(value, tuple | list):
