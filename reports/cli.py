@@ -22,6 +22,7 @@ from reports.command_doctor import doctor
 from reports.command_figures import figures
 from reports.command_integrate import integrate
 from reports.command_list import kernels, methods, scenes
+from reports.command_merge import merge
 from reports.command_mutations import mutations
 from reports.command_reference import reference
 from reports.command_render import render
@@ -29,6 +30,7 @@ from reports.command_report import report
 from reports.command_stability import stability
 from reports.command_test import run_tests
 from reports.environment import VARIANT_VARIABLE, MissingError, check_variant, install_line, missing_packages
+from reports.progress import Interrupted
 
 DONE, FAILED, WRONG_INPUT, MISSING, INTERRUPTED = 0, 1, 2, 3, 130
 
@@ -41,6 +43,7 @@ _COMMANDS = (
     kernels,
     render,
     reference,
+    merge,
     compare,
     integrate,
     bench,
@@ -100,6 +103,9 @@ def run(arguments: Sequence[str]) -> int:
         return _drop_output(FAILED)
     except KeyboardInterrupt:
         status = INTERRUPTED
+    except Interrupted as stop:
+        print(f"interrupted: {stop}", file=sys.stderr)
+        return INTERRUPTED
     except MissingError as error:
         return _fail(str(error), MISSING)
     except OSError as error:

@@ -8,6 +8,11 @@ from contextlib import contextmanager
 
 Progress = Callable[[float, str], None]
 
+
+class Interrupted(Exception):
+    """Ctrl-C in a command that can say what is kept of the work."""
+
+
 _PATIENCE = 2.0  # seconds before anything is shown
 _PLAIN_EVERY = 10.0  # seconds between the lines of a plain stream
 

@@ -32,7 +32,8 @@ def truth_image(
         See `reference.quadrature.quadrature_image`.
     """
     # Only what differs from the usual is named, so that images that were kept before are found.
-    settings = {"samples": samples, "shadow_scale": shadow_scale} | ({} if pixel == "centre" else {"pixel": pixel})
+    settings: dict[str, Any] = {"samples": samples, "shadow_scale": shadow_scale}
+    settings |= {} if pixel == "centre" else {"pixel": pixel}
     key = cache_key(scene, "quadrature", settings)
     stored = load_arrays(key)
     if stored is not None and set(stored) == {field.name for field in fields(TruthImage)}:

@@ -228,11 +228,11 @@ def test_samples_are_split_into_batches_that_have_at_least_as_many(loaded, monke
 
     asked = {}
 
-    def split(scene, **kwargs):
+    def split(scene, estimator, **kwargs):
         asked.update(kwargs)
         raise KeyboardInterrupt  # the split is all that this test wants
 
-    monkeypatch.setattr(validation.references, "volpath_batches", split)
+    monkeypatch.setattr(validation.references, "monte_carlo_batches", split)
     with pytest.raises(KeyboardInterrupt):
         validation.references.volpath_reference(loaded, samples=samples)
     batches, each = asked["batches"], asked["samples"]
