@@ -59,14 +59,18 @@ def scene_digest(scene) -> str:
 def _kinds(scene) -> Iterator[str]:
     """Yield what decides the numbers but is no parameter: the kinds of the plugins, and which way surfaces face."""
     for sensor in scene.sensors():
-        medium = sensor.get_medium()
-        # An isotropic and a Rayleigh phase function have no parameters: they differ by their names alone.
         yield sensor.class_name()
-        yield "no medium" if medium is None else f"{medium} {medium.phase_function()}"
+        yield _medium_words(sensor.get_medium())
     for emitter in scene.emitters():
         yield emitter.class_name()
     for shape in scene.shapes():
         yield f"{shape.class_name()} {shape.has_flipped_normals()} {shape.bsdf()}"
+        yield f"inside {_medium_words(shape.interior_medium())}, outside {_medium_words(shape.exterior_medium())}"
+
+
+def _medium_words(medium: Any) -> str:
+    # An isotropic and a Rayleigh phase function have no parameters: they differ by their names alone.
+    return "no medium" if medium is None else f"{medium} {medium.phase_function()}"
 
 
 def _value_bytes(value: Any) -> bytes:
