@@ -14,8 +14,7 @@ from realtime.errors import InputError
 from realtime.kernels.table import resident_tables
 from realtime.methods import Method
 from realtime.scene import Scene
-from realtime.shadow_map import cast_shadow_map
-from realtime.surface import lit_surface, visible_surface
+from realtime.surface import lit_surface, visible_surface, visible_triangle
 from realtime.view import View
 
 
@@ -25,9 +24,9 @@ class FrameRenderer:
 
     scene: Scene
     pixel: Any  #: pixel numbers in the order of the lanes
-    shadow_maps: Callable[[], tuple[Any, ...]]  #: casts the maps that the method asks for
-    surface: Callable[..., Any]  #: -> distance, surface radiance
-    airlight: Callable[..., Any]  #: -> airlight radiance
+    prepare: Callable[[Scene], Any]  #: what the method needs before the frame: shadow maps, shadow planes
+    surface: Callable[..., Any]  #: -> distance, and surface radiance by light
+    airlight: Callable[..., Any]  #: -> airlight radiance, and by light whether it reaches the surface, if it says so
 
 
 @dataclass(frozen=True)
@@ -75,10 +74,11 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
     def surface(geometry, pixel, camera, medium, lights):
         direction, _ = ray_directions(camera, pixel)
         distance, interaction = visible_surface(geometry, camera.origin, direction)
-        color = lit_surface(geometry, direction, interaction, distance=distance, medium=medium, lights=lights)
-        return distance, color
+        arguments = {"distance": distance, "medium": medium, "shadows": not method.lights_surfaces}
+        colors = [lit_surface(geometry, direction, interaction, light=light, **arguments) for light in lights]
+        return distance, tuple(colors) if method.lights_surfaces else (sum(colors),)
 
-    def run_method(geometry, pixel, camera, medium, lights, maps, distance):
+    def run_method(geometry, pixel, camera, medium, lights, prepared, distance, by_light):
         direction, low = ray_directions(camera, pixel)
         view = View(
             origin=camera.origin,
@@ -89,34 +89,30 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
             medium=medium,
             plan=plan,
             visible=lambda point, light: _visible(geometry, point, light),
-            shadow_maps=maps,
+            rays=lambda lane: ray_directions(camera, dr.gather(mi.UInt32, pixel, lane)),
+            visible_triangle=lambda: visible_triangle(geometry, camera.origin, direction),
+            prepared=prepared,
         )
-        return method.function(view, kernel=kernel, **settings)
+        found = method.function(view, kernel=kernel, **settings)
+        if not method.lights_surfaces:
+            return found, None
+        airlight, lit = found
+        return airlight, sum(dr.select(reached, color, 0) for reached, color in zip(lit, by_light))
 
-    def cast_maps():
-        if not plan.shadows or settings.get("shadow") != "map":
-            return ()
-        return tuple(cast_shadow_map(scene.geometry, light, settings["map"]) for light in scene.lights)
-
-    def shadow_maps():
-        maps = cast_maps()
-        dr.eval(maps)
-        return maps
-
+    prepare = method.prepare(scene, **settings) if method.prepare and plan.shadows else _nothing
     # Trace one pixel without launching anything: what the method refuses must not be raised while a frozen function is
     # being recorded, which Dr.Jit 1.5 answers by aborting a later recording.
     one = type(camera.origin.x)(1)
-    run_method(scene.geometry, mi.UInt32(0), camera, scene.medium, scene.lights, cast_maps(), one)
+    run_method(scene.geometry, mi.UInt32(0), camera, scene.medium, scene.lights, prepare(scene), one, _no_light(scene))
     resident = resident_tables()
     airlight = dr.freeze(run_method, state_fn=lambda *_, **__: resident)
     dr.eval(pixel)
-    return FrameRenderer(scene, pixel, shadow_maps, surface if plan.surfaces else _no_surface, airlight)
+    return FrameRenderer(scene, pixel, prepare, surface if plan.surfaces else _no_surface, airlight)
 
 
 def render_frame(renderer: FrameRenderer) -> Frame:
     """Render one frame and bring it to the host in the order of the image."""
-    maps = renderer.shadow_maps()
-    distance, surface, airlight = run_stages(renderer, maps)
+    distance, surface, airlight = run_stages(renderer, renderer.prepare(renderer.scene))
     height, width = renderer.scene.camera.height, renderer.scene.camera.width
     return Frame(
         _image(renderer, airlight, (height, width, 3)),
@@ -125,15 +121,16 @@ def render_frame(renderer: FrameRenderer) -> Frame:
     )
 
 
-def run_stages(renderer: FrameRenderer, maps):
+def run_stages(renderer: FrameRenderer, prepared):
     """Run the stages on the device and return distance, surface and airlight, evaluated, in the order of the lanes."""
     import drjit as dr
 
     scene = renderer.scene
-    distance, surface = renderer.surface(scene.geometry, renderer.pixel, scene.camera, scene.medium, scene.lights)
-    airlight = renderer.airlight(
-        scene.geometry, renderer.pixel, scene.camera, scene.medium, scene.lights, maps, distance
+    distance, by_light = renderer.surface(scene.geometry, renderer.pixel, scene.camera, scene.medium, scene.lights)
+    airlight, lit_surface = renderer.airlight(
+        scene.geometry, renderer.pixel, scene.camera, scene.medium, scene.lights, prepared, distance, by_light
     )
+    surface = by_light[0] if lit_surface is None else lit_surface
     dr.eval(distance, surface, airlight)
     return distance, surface, airlight
 
@@ -150,11 +147,21 @@ def _visible(geometry, point, light):
     return ~geometry.ray_test(mi.Ray3f(start, direction / length, length * (1 - 2e-6), 0.0, []))
 
 
+def _nothing(scene: Scene) -> tuple[()]:
+    return ()
+
+
+def _no_light(scene: Scene):
+    import drjit as dr
+
+    return tuple(dr.zeros(type(scene.medium.albedo), 1) for _ in scene.lights)
+
+
 def _no_surface(geometry, pixel, camera, medium, lights):
     import drjit as dr
 
     Float, Color = type(camera.origin.x), type(medium.albedo)
-    return dr.full(Float, dr.inf, dr.width(pixel)), dr.zeros(Color, dr.width(pixel))
+    return dr.full(Float, dr.inf, dr.width(pixel)), tuple(dr.zeros(Color, dr.width(pixel)) for _ in lights)
 
 
 def _image(renderer: FrameRenderer, values, shape):

@@ -8,8 +8,6 @@ Biri, Arques, Michelin 2006, section 5.1.2, with the extinction to the eye of eq
 zero where a shadow ray is blocked. A one-sided surface is black from behind, as in Mitsuba's `diffuse`.
 """
 
-from typing import Any
-
 from realtime.geometry import falloff, ray_geometry
 from realtime.lights import Light
 from realtime.medium import Medium, transmittance
@@ -41,8 +39,35 @@ def visible_surface(scene, origin, direction):
     return dr.select(hit.is_valid(), type(origin.x)(hit.t), dr.inf), interaction
 
 
-def lit_surface(scene, view_direction, interaction, *, distance, medium: Medium, lights: tuple[Light, ...]):
-    """Return the radiance that the visible surface sends to the eye through the medium [W/(m^2 sr)].
+def visible_triangle(scene, origin, direction):
+    """Return the triangles that camera rays hit first.
+
+    Returns
+    -------
+    corners
+        Three positions [m].
+    weights
+        Barycentric coordinates of the hit in them.
+    seen
+        Whether a triangle is hit.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    ray = mi.Ray3f(mi.Point3f(origin), mi.Vector3f(direction))
+    hit = scene.ray_intersect_preliminary(ray, coherent=True)
+    mesh = mi.MeshPtr(hit.shape)
+    seen = hit.is_valid() & hit.shape.is_mesh()
+    mesh = dr.select(seen, mesh, dr.zeros(mi.MeshPtr))
+    face = mesh.face_indices(hit.prim_index, seen)
+    corners = [type(direction)(mesh.vertex_position(vertex, seen)) for vertex in (face.x, face.y, face.z)]
+    Float = type(direction.x)
+    u, v = Float(hit.prim_uv.x), Float(hit.prim_uv.y)
+    return corners, (1 - u - v, u, v), seen
+
+
+def lit_surface(scene, view_direction, interaction, *, distance, medium: Medium, light: Light, shadows: bool = True):
+    """Return the radiance that the visible surface sends to the eye through the medium, from one light [W/(m^2 sr)].
 
     Parameters
     ----------
@@ -52,8 +77,10 @@ def lit_surface(scene, view_direction, interaction, *, distance, medium: Medium,
         Unit directions of the camera rays.
     interaction, distance
         From `visible_surface`.
-    medium, lights
+    medium, light
         What the light crosses and where it comes from.
+    shadows
+        Whether to cast shadow rays; a method that finds out otherwise what is lit leaves them to that.
     """
     import drjit as dr
     import mitsuba as mi
@@ -67,19 +94,16 @@ def lit_surface(scene, view_direction, interaction, *, distance, medium: Medium,
     normal = dr.select(two_sided & (facing < 0), -normal, normal)
     seen = interaction.is_valid() & (two_sided | (facing > 0))
     point = Vector(interaction.p)
-    total: Any = Color(0)
-    for light in lights:
-        to_light = light.position - point
-        r = dr.norm(to_light)
-        cosine = dr.dot(normal, to_light) / r
-        arriving = light.intensity * _profile(light, point, -to_light / r)
-        blocked = scene.ray_test(interaction.spawn_ray_to(mi.Point3f(light.position)), seen & (cosine > 0))
-        lit = seen & (cosine > 0) & ~blocked
-        path = dr.select(lit, distance + r, 0)
-        total += dr.select(
-            lit, albedo * arriving * (dr.inv_pi * cosine / dr.square(r)) * transmittance(medium, path), Color(0)
-        )
-    return total
+    to_light = light.position - point
+    r = dr.norm(to_light)
+    cosine = dr.dot(normal, to_light) / r
+    arriving = light.intensity * _profile(light, point, -to_light / r)
+    lit = seen & (cosine > 0)
+    if shadows:
+        lit &= ~scene.ray_test(interaction.spawn_ray_to(mi.Point3f(light.position)), lit)
+    path = dr.select(lit, distance + r, 0)
+    reflected = albedo * arriving * (dr.inv_pi * cosine / dr.square(r))
+    return dr.select(lit, reflected * transmittance(medium, path), Color(0))
 
 
 def _profile(light: Light, point, away):

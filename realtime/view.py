@@ -26,7 +26,9 @@ class View:
     medium: Medium
     plan: Plan  #: what the scene needs; a method leaves out the rest
     visible: Callable[[Any, Light], Any]  #: (point, light) -> whether the light reaches the point
-    shadow_maps: tuple[Any, ...] = ()  #: one map a light, for methods that ask for them
+    rays: Callable[[Any], tuple[Any, Any]]  #: lanes -> the directions of their rays, and their low parts
+    visible_triangle: Callable[[], tuple[Any, Any, Any]]  #: -> corners [m], barycentric weights, whether there is one
+    prepared: tuple[Any, ...] = ()  #: by light what the method's `prepare` made: a shadow map, shadow planes
 
 
 def radiance(medium: Medium, light: Light, integral):

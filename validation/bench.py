@@ -35,7 +35,7 @@ def configurations_for(plan: Plan, configurations: Sequence[Configuration] = STA
     """Leave out what the scene does not need: variants that differ in their shadows where nothing casts one."""
     if plan.shadows:
         return tuple(configurations)
-    return tuple(chosen for chosen in configurations if "shadow" not in dict(chosen.parameters))
+    return tuple(chosen for chosen in configurations if not {"shadow", "order"} & set(dict(chosen.parameters)))
 
 
 def measure(

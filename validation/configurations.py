@@ -19,7 +19,7 @@ class Configuration:
 
     method: str
     kernel: str | None = None
-    parameters: tuple[tuple[str, int | str], ...] = ()
+    parameters: tuple[tuple[str, int | float | str], ...] = ()
 
     @property
     def label(self) -> str:
@@ -39,6 +39,10 @@ STANDARD: tuple[Configuration, ...] = (
     Configuration("ray-march", None, (("steps", 100), ("spacing", "uniform"))),
     Configuration("ray-march", None, (("steps", 100), ("shadow", "map"))),
     Configuration("ray-march", None, (("steps", 400), ("shadow", "map"), ("map", 1024))),
+    Configuration("shadow-planes", "exact"),
+    Configuration("shadow-planes", "taylor"),
+    Configuration("shadow-planes", "exact", (("order", "paper"),)),
+    Configuration("shadow-planes", "exact", (("order", "none"),)),
 )
 
 
@@ -102,13 +106,18 @@ def prepared(scene: Scene, chosen: Configuration) -> FrameRenderer:
     return frame_renderer(scene, METHODS[chosen.method], kernel=kernel, **dict(chosen.parameters))
 
 
-def _converted(record, name: str, value: Any) -> int | str:
+def _converted(record, name: str, value: Any) -> int | float | str:
     if name not in record.parameters:
         known = ", ".join(record.parameters) or "none"
         raise InputError(
             f"method {record.name}: got a parameter {name!r}, wanted one of: {known}" + nearest(name, record.parameters)
         )
     default = record.parameters[name]
+    if isinstance(default, float):
+        try:
+            return float(value)
+        except (TypeError, ValueError):
+            raise InputError(f"method {record.name}: {name} got {value!r}, wanted a number") from None
     if isinstance(default, int):
         try:
             # int() would cut off what stands behind the point, and take True for 1.

@@ -68,23 +68,25 @@ def time_frame(renderer: FrameRenderer, *, seconds: float = 0.6) -> FrameTimes:
     import drjit as dr
 
     scene = renderer.scene
-    maps = renderer.shadow_maps()
-    distance, _, _ = run_stages(renderer, maps)
+    prepared = renderer.prepare(scene)
+    distance, _, _ = run_stages(renderer, prepared)
+    _, by_light = renderer.surface(scene.geometry, renderer.pixel, scene.camera, scene.medium, scene.lights)
+    dr.eval(by_light)
     dr.sync_thread()
 
     def surface():
         dr.eval(renderer.surface(scene.geometry, renderer.pixel, scene.camera, scene.medium, scene.lights))
 
     def airlight():
-        arrays = (renderer.pixel, scene.camera, scene.medium, scene.lights, maps, distance)
+        arrays = (renderer.pixel, scene.camera, scene.medium, scene.lights, prepared, distance, by_light)
         dr.eval(renderer.airlight(scene.geometry, *arrays))
 
     def rebuild():
         _touch_geometry(scene.geometry)
-        run_stages(renderer, renderer.shadow_maps())
+        run_stages(renderer, renderer.prepare(scene))
 
     return FrameTimes(
-        frame=time_repeated(lambda: run_stages(renderer, maps), seconds=seconds),
+        frame=time_repeated(lambda: run_stages(renderer, prepared), seconds=seconds),
         surface=time_repeated(surface, seconds=seconds),
         airlight=time_repeated(airlight, seconds=seconds),
         rebuild=time_repeated(rebuild, seconds=0.5 * seconds, least=3),

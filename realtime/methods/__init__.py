@@ -10,8 +10,9 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
-from realtime.methods.ray_march import ray_march
+from realtime.methods.ray_march import prepare_maps, ray_march
 from realtime.methods.unshadowed import unshadowed
+from realtime.shadow_planes import prepare_shadow_planes, shadow_planes
 
 
 @dataclass(frozen=True)
@@ -23,8 +24,12 @@ class Method:
     summary: str
     source: str
     uses_kernel: bool = True
+    prepare: Callable[..., Any] | None = None  #: (scene, **parameters) -> function of the scene, run when things moved
+    lights_surfaces: bool = False  #: whether it returns, after the radiance, by light whether it reaches the surface
     shadows: bool = True  #: whether it knows shadows; one that does not is wrong where there are occluders
-    parameters: Mapping[str, int | str] = field(default_factory=lambda: MappingProxyType({}))  #: name -> default
+    parameters: Mapping[str, int | float | str] = field(
+        default_factory=lambda: MappingProxyType({})
+    )  #: name -> default
 
 
 METHODS: dict[str, Method] = {
@@ -41,6 +46,26 @@ METHODS: dict[str, Method] = {
         "midpoint steps with one visibility test each: the baseline to beat",
         "Billeter, Sintorn, Assarsson 2010, section 2; Kulla and Fajardo 2012 (equi-angular steps)",
         uses_kernel=False,
+        prepare=prepare_maps,
         parameters=MappingProxyType({"steps": 100, "spacing": "equiangular", "shadow": "ray", "map": 512}),
+    ),
+    "shadow-planes": Method(
+        "shadow-planes",
+        shadow_planes,
+        "silhouettes extruded to planes; lit segments between their crossings",
+        "Biri, Arques, Michelin 2006",
+        prepare=prepare_shadow_planes,
+        lights_surfaces=True,
+        parameters=MappingProxyType(
+            {
+                "order": "exact",
+                "evaluation": "pixel",
+                "sum": "segments",
+                "buffer": "float",
+                "white": 1.0,
+                "rows": 16,
+                "ambient": 0.0,
+            }
+        ),
     ),
 }

@@ -12,12 +12,15 @@ The order of convergence in the number of steps is 2 on a ray without shadows an
 steps.
 """
 
+from collections.abc import Callable
+
 from realtime.errors import InputError
 from realtime.geometry import RayGeometry, clip_to_cone, distance_to_light, falloff, ray_geometry
 from realtime.lights import Light
 from realtime.medium import least_extinction, per_extinction
 from realtime.phase import evaluate
-from realtime.shadow_map import lit_in_map
+from realtime.scene import Scene
+from realtime.shadow_map import ShadowMap, cast_shadow_map, lit_in_map
 from realtime.view import View, radiance
 
 SPACINGS = ("equiangular", "uniform")
@@ -66,11 +69,18 @@ def ray_march(
             x0, x1 = clip_to_cone(geometry, light.cos_cutoff, x0, x1)
         if spacing == "uniform":
             x1 = dr.minimum(x1, x0 + _OPTICAL_REACH / least_extinction(view.medium))
-        shadow_map = view.shadow_maps[number] if shadow == "map" and view.plan.shadows else None
+        shadow_map = view.prepared[number] if shadow == "map" and view.plan.shadows else None
         lit = _visibility(view, light, shadow, shadow_map)
         integral = _march(view, light, geometry, (x0, x1), steps=steps, spacing=spacing, lit=lit)
         total += radiance(view.medium, light, integral)
     return total
+
+
+def prepare_maps(scene: Scene, *, shadow: str, map: int, **_) -> Callable[[Scene], tuple[ShadowMap, ...]]:
+    """Return the function that casts a shadow map for every light of a frame, if they are asked for."""
+    if shadow != "map":
+        return lambda scene: ()
+    return lambda scene: tuple(cast_shadow_map(scene.geometry, light, map) for light in scene.lights)
 
 
 def _check(steps: int, spacing: str, shadow: str, view: View) -> None:

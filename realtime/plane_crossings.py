@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Gamma added up over the crossings of shadow planes one by one, as the paper does it.
+
+The stencil starts with the layers over the visible surface. Planes come towards the camera (order=paper): one that
+faces the camera, beyond which there is shadow, adds its Gamma if the stencil is one and takes its layers off; one that
+faces away subtracts its Gamma if the stencil is zero and puts its layers on (Biri 2006, section 5.1.5). From the camera
+on (order=exact) the same rule reads: a plane that brings the count from zero up adds, one that brings it back to zero
+subtracts. Without an order every plane counts.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+from realtime.plane_index import PlaneIndex
+from realtime.plane_sweep import RayPlanes, read_plane
+from realtime.plane_tiles import Lists
+
+
+@dataclass(frozen=True)
+class Buffer:
+    """A frame buffer of 8 bits a channel."""
+
+    white: float  #: radiance that fills it [W/(m^2 sr)]
+
+    def stored(self, value):
+        """Return what the buffer keeps of a radiance."""
+        import drjit as dr
+
+        return dr.round(dr.clip(value, 0, self.white) * (255 / self.white)) * (self.white / 255)
+
+
+@dataclass
+class _Draw:
+    """What has been drawn of a ray's planes."""
+
+    place: Any  #: next entry to read
+    stencil: Any
+    quotient: Any  #: of the plane to draw
+    number: Any  #: of the plane to draw
+    factor: Any  #: how often it counts; 0 if none is ready
+    total: Any
+
+
+def sum_crossings(
+    index: PlaneIndex, lists: Lists, ray: RayPlanes, distance, gammas, *, order: str, buffer: Buffer | None
+):
+    """Add up Gamma over the crossings of every ray.
+
+    Parameters
+    ----------
+    index, lists, ray
+        The planes and the rays.
+    distance
+        To the visible surface [m].
+    gammas
+        Functions (plane, ray, x) and (x) that give the radiance of Gamma at a crossing and at the surface.
+    order
+        'exact', 'paper' or 'none'.
+    buffer
+        What keeps the sum; None for float.
+
+    Returns
+    -------
+    total
+        The radiance.
+    lit
+        Whether the light reaches the visible surface.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    at_plane, at_surface = gammas
+    ray_end = ray.span / distance
+    width = dr.width(ray.x)
+    Float = type(ray.x)
+    over_surface = _layers_at_end(index, lists, ray, ray_end)
+    lit = over_surface <= 0
+    keep = buffer.stored if buffer else lambda value: value
+    total = keep(dr.select(lit, at_surface(distance), 0))
+    begin = Float(index.layers) + dr.zeros(Float, width) if order == "exact" else over_surface
+    draw = _Draw(
+        dr.zeros(mi.UInt32, width),
+        begin,
+        dr.zeros(Float, width),
+        dr.zeros(mi.UInt32, width),
+        dr.zeros(Float, width),
+        total,
+    )
+
+    def body(draw):
+        (draw,) = dr.while_loop(
+            state=(draw,),
+            cond=lambda draw: (draw.factor == 0) & (draw.place < ray.source.count),
+            body=lambda draw: (_next(index, lists, ray, ray_end, draw, order),),
+            labels=("draw",),
+        )
+        x = dr.minimum(ray.span / dr.select(draw.factor == 0, ray.span, draw.quotient), distance)
+        value = at_plane(draw.number, ray, x)
+        draw.total = dr.select(draw.factor == 0, draw.total, keep(draw.total + draw.factor * value))
+        draw.factor = Float(0)
+        return (draw,)
+
+    (draw,) = dr.while_loop(state=(draw,), cond=lambda draw: draw.place < ray.source.count, body=body, labels=("draw",))
+    return draw.total, lit
+
+
+def _next(index: PlaneIndex, lists: Lists, ray: RayPlanes, ray_end, draw: _Draw, order: str) -> _Draw:
+    """Read one plane."""
+    import drjit as dr
+
+    quotient, crossed, gain, number = read_plane(index, lists, ray, draw.place, draw.place < ray.source.count)
+    crossed &= quotient > ray_end
+    if order == "none":
+        factor, stencil = gain, draw.stencil
+    elif order == "paper":
+        passes = dr.select(gain > 0, draw.stencil == 1, draw.stencil == 0)
+        factor = dr.select(passes, dr.sign(gain), 0)
+        stencil = draw.stencil - gain
+    else:
+        stencil = draw.stencil + gain
+        begins, ends = (draw.stencil <= 0) & (stencil > 0), (draw.stencil > 0) & (stencil <= 0)
+        factor = dr.select(begins, 1, dr.select(ends, -1, 0))
+    return _Draw(
+        draw.place + 1,
+        dr.select(crossed, stencil, draw.stencil),
+        quotient,
+        number,
+        dr.select(crossed, type(gain)(factor), 0),
+        draw.total,
+    )
+
+
+def _layers_at_end(index: PlaneIndex, lists: Lists, ray: RayPlanes, ray_end):
+    """Return the layers over the visible surface."""
+    import drjit as dr
+    import mitsuba as mi
+
+    Float, width = type(ray.x), dr.width(ray.x)
+
+    def body(place, layers):
+        quotient, crossed, gain, _ = read_plane(index, lists, ray, place, place < ray.source.count)
+        return place + 1, layers + dr.select(crossed & (quotient > ray_end), gain, 0)
+
+    _, layers = dr.while_loop(
+        state=(dr.zeros(mi.UInt32, width), dr.zeros(Float, width) + Float(index.layers)),
+        cond=lambda place, layers: place < ray.source.count,
+        body=body,
+        labels=("place", "layers"),
+    )
+    return layers

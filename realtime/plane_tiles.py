@@ -1,0 +1,345 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which shadow planes can concern a tile of the image: short lists, so that a ray reads what it crosses and little
+else.
+
+A tile is sixteen rays that follow one another (4 x 4 pixels), a block sixteen tiles. Each has a box about the
+directions of its rays in the frame of the light, and the least quotient 1/x at which one of them ends. What decides
+whether a ray crosses a plane, D/x = A wx + B wy - wz and its like (`realtime.plane_index`), is linear in the direction,
+so its largest value over the box is the value at the centre plus |A| ex + |B| ey + ez. A plane stays on the list if
+some direction of the box could cross it; whether a ray does, the ray finds out.
+
+Blocks draw on the bins of azimuth, tiles on their block. Lists are counted, their places added up, then written; where
+the room for all of them is used up, a block or tile keeps the longer list that it drew on. The planes of a tile are put
+in the order in which its middle ray crosses them.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from realtime.diamond import diamond_angle
+from realtime.plane_index import BINS, FIRST, FULL, NUMBER, TURN, PlaneIndex
+
+TILE = 16  #: rays in a tile, and tiles in a block
+ROOM = 32  #: entries for each tile and, fourfold, for each block, on average
+
+_SLACK = 1e-5  # of the terms of a sum: float32 rounding, with room to spare
+
+
+@dataclass
+class Box:
+    """Boxes about directions, in the frame of the light."""
+
+    x: Any  #: centre
+    y: Any
+    z: Any
+    x_half: Any  #: half the width
+    y_half: Any
+    z_half: Any
+    ray_end: Any  #: least D/x at which a ray ends
+    azimuth: Any  #: of the centre, diamond angle
+    azimuth_half: Any
+
+
+@dataclass
+class Source:
+    """Where to read entries: a run of places."""
+
+    first: Any
+    count: Any
+    all_before: Any  #: places below this one count even where the entry is not the first of its plane
+
+
+def entry_at(entries, source: Source, k, active):
+    """Return the k-th entry of a source and whether it counts there."""
+    import drjit as dr
+    import mitsuba as mi
+
+    place = source.first + k
+    active = active & (k < source.count)
+    entry = dr.gather(mi.UInt32, entries, place, active)
+    return entry, active & (((entry & FIRST) != 0) | (place < source.all_before))
+
+
+def tile_lists(index: PlaneIndex, rays, count: int, *, order: str) -> "Lists":
+    """Return the lists of the tiles, each in order.
+
+    Parameters
+    ----------
+    index
+        The planes.
+    rays
+        (lane) -> direction in the frame of the light (three arrays), and the quotient D/x at its end.
+    count
+        How many rays there are.
+    order
+        See `listed`.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    tiles = tile_boxes(rays, count)
+    dr.eval(tiles)
+    blocks = block_boxes(tiles)
+    dr.eval(blocks)
+    room = 4 * ROOM * dr.width(blocks.x)
+    of_block = listed(index, blocks, index.entries, bin_source(index, blocks), room=room)
+    dr.eval(of_block)
+    block = dr.arange(mi.UInt32, dr.width(tiles.x)) // TILE
+    source = Source(*(dr.gather(mi.UInt32, getattr(of_block.source, name), block) for name in Source.__annotations__))
+    of_tile = listed(index, tiles, of_block.entries, source, room=ROOM * dr.width(tiles.x), order=order)
+    dr.eval(of_tile)
+    return of_tile
+
+
+def tile_boxes(rays: Callable[[Any], tuple[Any, Any, Any, Any]], count: int) -> Box:
+    """Return the boxes of the tiles.
+
+    Parameters
+    ----------
+    rays
+        (lane) -> direction in the frame of the light (three arrays), and the quotient D/x at its end.
+    count
+        How many rays there are.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    tiles = -(-count // TILE)
+    tile = dr.arange(mi.UInt32, tiles)
+
+    def member(k):
+        lane = tile * TILE + k
+        active = lane < count
+        # Beyond the last ray: the first of the tile again.
+        return rays(dr.select(active, lane, tile * TILE))
+
+    return _enclosed(member)
+
+
+def block_boxes(tile: Box) -> Box:
+    """Return the boxes of the blocks of tiles."""
+    import drjit as dr
+    import mitsuba as mi
+
+    count = dr.width(tile.x)
+    block = dr.arange(mi.UInt32, -(-count // TILE))
+    Float = type(tile.x)
+
+    def member(k, side):
+        number = block * TILE + k
+        number = dr.select(number < count, number, block * TILE)
+        read = lambda values: dr.gather(Float, values, number)  # noqa: E731
+        return (
+            read(tile.x) + side * read(tile.x_half),
+            read(tile.y) + side * read(tile.y_half),
+            read(tile.z) + side * read(tile.z_half),
+            read(tile.ray_end),
+        )
+
+    return _enclosed(lambda k: member(k, -1), lambda k: member(k, 1))
+
+
+def _enclosed(*members) -> Box:
+    """Return the box about sixteen members, each given by one or more functions of its number."""
+    import drjit as dr
+    import mitsuba as mi
+
+    def widened(bounds, k):
+        for member in members:
+            *w, end = member(k)
+            bounds = (
+                *(dr.minimum(old, new) for old, new in zip(bounds[:3], w)),
+                *(dr.maximum(old, new) for old, new in zip(bounds[3:6], w)),
+                dr.minimum(bounds[6], end),
+            )
+        return bounds
+
+    *w, end = members[0](mi.UInt32(0))
+    start = (*w, *w, end)
+    bounds = dr.while_loop(
+        state=(dr.zeros(mi.UInt32, dr.width(end)), *start),
+        cond=lambda k, *bounds: k < TILE,
+        body=lambda k, *bounds: (k + 1, *widened(bounds, k)),
+        labels=("k", "x0", "y0", "z0", "x1", "y1", "z1", "end"),
+    )[1:]
+    centre = [0.5 * (low + high) for low, high in zip(bounds[:3], bounds[3:6])]
+    half = [0.5 * (high - low) for low, high in zip(bounds[:3], bounds[3:6])]
+    azimuth, azimuth_half = _azimuths(centre, half)
+    return Box(centre[0], centre[1], centre[2], half[0], half[1], half[2], bounds[6], azimuth, azimuth_half)
+
+
+def _azimuths(centre, half):
+    """Return the azimuth of the centres and how far the corners are from it; a full turn where that is unclear."""
+    import drjit as dr
+
+    (x, y), (x_half, y_half) = centre[:2], half[:2]
+    azimuth = diamond_angle(x, y)
+    widest = type(x)(0)
+    for side_x in (-1, 1):
+        for side_y in (-1, 1):
+            turn = diamond_angle(x + side_x * x_half, y + side_y * y_half) - azimuth
+            turn = dr.abs(turn)
+            widest = dr.maximum(widest, dr.minimum(turn, TURN - turn))
+    holds_axis = (dr.abs(x) <= x_half) & (dr.abs(y) <= y_half)
+    return azimuth, dr.select(holds_axis | (widest > 1), TURN, widest + 1e-6)
+
+
+def touches(index: PlaneIndex, box: Box, entry, active):
+    """Return whether a ray of the box could cross a plane, whether all that reach it do, and D/x at the centre."""
+    import drjit as dr
+
+    Float = type(box.x)
+    number = (entry & NUMBER) * 4
+    a, b, p, q = (dr.gather(Float, index.lines, number + k, active) for k in range(4))
+    first, last = (dr.gather(Float, index.spans, number + k, active) for k in range(2))
+    quotient = dr.fma(a, box.x, dr.fma(b, box.y, -box.z))
+    reach = dr.fma(dr.abs(a), box.x_half, dr.fma(dr.abs(b), box.y_half, box.z_half))
+    reach += _SLACK * (dr.abs(a * box.x) + dr.abs(b * box.y) + 1)
+    pd, qd = p * index.distance, q * index.distance
+    margin = dr.fma(pd, box.x, qd * box.y) - quotient
+    margin_reach = dr.fma(dr.abs(pd - a), box.x_half, dr.fma(dr.abs(qd - b), box.y_half, box.z_half))
+    margin_reach += _SLACK * (dr.abs(a * box.x) + dr.abs(b * box.y) + dr.abs(pd * box.x) + dr.abs(qd * box.y) + 1)
+    low, high = box.azimuth - box.azimuth_half, box.azimuth + box.azimuth_half
+    overlaps = (first <= high) & (last >= low)
+    overlaps |= (first <= high - TURN) & (last >= low - TURN)
+    overlaps |= (first <= high + TURN) & (last >= low + TURN)
+    largest = quotient + reach
+    could = (largest > 0) & (largest >= box.ray_end) & (margin + margin_reach > 0)
+    full = (quotient > reach) & (margin > margin_reach) & (first <= low) & (high < last) & (low >= 0) & (high < TURN)
+    return active & overlaps & could, full, quotient
+
+
+def bin_source(index: PlaneIndex, box: Box) -> Source:
+    """Return where the bins of a box's azimuths are."""
+    import drjit as dr
+    import mitsuba as mi
+
+    everything = box.azimuth_half > TURN / 2
+    low, high = box.azimuth - box.azimuth_half, box.azimuth + box.azimuth_half
+    turned = dr.select(low < 0, TURN, 0)
+    begin = dr.select(everything, 0, mi.UInt32(dr.clip((low + turned) * (BINS / TURN), 0, BINS - 1)))
+    end = dr.select(everything, BINS - 1, mi.UInt32(dr.clip((high + turned) * (BINS / TURN), 0, 2 * BINS - 1)))
+
+    def start(number):
+        return dr.gather(mi.UInt32, index.start, number)
+
+    first = start(begin)
+    return Source(first, start(end + 1) - first, start(begin + 1))
+
+
+@dataclass
+class Lists:
+    """The planes that concern each box."""
+
+    entries: Any  #: what the sources read
+    source: Source
+    sorted: Any  #: whether the planes are in the order in which the middle ray crosses them
+
+
+def listed(index: PlaneIndex, box: Box, entries, source: Source, *, room: int, order: str | None = None) -> Lists:
+    """Return the lists of boxes, drawn from longer ones.
+
+    Parameters
+    ----------
+    index
+        The planes.
+    box
+        The boxes.
+    entries, source
+        Where each box finds the planes that may concern it.
+    room
+        Entries to make room for, for all boxes together.
+    order
+        'exact': in the order in which the middle ray crosses them; 'paper': towards the camera by the cosine of the
+        middle of the edge; None: any.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    count = _visit(index, box, entries, source, None)
+    offset = dr.prefix_sum(count) + 0
+    fits = offset + count <= room
+    # Lists stand behind the bins, so that a box without one reads on from the bins in the same array.
+    behind = dr.width(index.entries)
+    pool = dr.empty(mi.UInt32, behind + room)
+    dr.scatter(pool, index.entries, dr.arange(mi.UInt32, behind))
+    keys, owner = dr.empty(type(box.x), room), dr.empty(mi.UInt32, room)
+    dr.eval(pool, keys, owner, count, offset)
+
+    def write(place, entry, key, active):
+        active &= fits
+        dr.scatter(pool, entry, offset + place + behind, active)
+        if order is not None:
+            if order == "paper":
+                key = dr.gather(type(box.x), index.spans, (entry & NUMBER) * 4 + 3, active)
+            dr.scatter(keys, key, offset + place, active)
+            dr.scatter(owner, dr.arange(mi.UInt32, dr.width(box.x)), offset + place, active)
+
+    _visit(index, box, entries, source, write)
+    dr.eval(pool, keys, owner)
+    found = Source(
+        dr.select(fits, offset + behind, source.first),
+        dr.select(fits, count, source.count),
+        dr.select(fits, offset + count + behind, source.all_before),
+    )
+    if order is None:
+        return Lists(pool, found, fits)
+    total = dr.sum(dr.select(fits, count, 0))
+    return Lists(_ranked(pool, keys, owner, found, total, behind, order), found, fits)
+
+
+def _visit(index: PlaneIndex, box: Box, entries, source: Source, write):
+    """Count, and write if wanted, the planes of a source that touch the boxes."""
+    import drjit as dr
+    import mitsuba as mi
+
+    width = dr.width(box.x)
+
+    def body(k, found):
+        entry, counts = entry_at(entries, source, k, dr.full(mi.Bool, True, width))
+        hit, full, quotient = touches(index, box, entry, counts)
+        if write is not None:
+            marked = (entry & (FULL - 1)) | FIRST | dr.select(full, mi.UInt32(FULL), 0)
+            write(found, marked, quotient, hit)
+        return k + 1, found + dr.select(hit, mi.UInt32(1), mi.UInt32(0))
+
+    _, found = dr.while_loop(
+        state=(dr.zeros(mi.UInt32, width), dr.zeros(mi.UInt32, width)),
+        cond=lambda k, found: k < source.count,
+        body=body,
+        labels=("k", "found"),
+    )
+    return found
+
+
+def _ranked(pool, keys, owner, source: Source, total, behind: int, order: str):
+    """Sort every list: the rank of an entry is the number of entries of its list that come before it."""
+    import drjit as dr
+    import mitsuba as mi
+
+    room = dr.width(keys)
+    entry = dr.arange(mi.UInt32, room)
+    used = entry < total
+    tile = dr.gather(mi.UInt32, owner, entry, used)
+    first = dr.gather(mi.UInt32, source.first, tile, used) - behind
+    count = dr.gather(mi.UInt32, source.count, tile, used)
+    own = dr.gather(type(keys), keys, entry, used)
+
+    def body(k, rank):
+        other = dr.gather(type(keys), keys, first + k, used)
+        before = (other > own) if order == "exact" else (other < own)
+        before |= (other == own) & (first + k < entry)
+        return k + 1, rank + dr.select(before, mi.UInt32(1), mi.UInt32(0))
+
+    _, rank = dr.while_loop(
+        state=(dr.zeros(mi.UInt32, room), dr.zeros(mi.UInt32, room)),
+        cond=lambda k, rank: used & (k < count),
+        body=body,
+        labels=("k", "rank"),
+    )
+    result = dr.empty(mi.UInt32, behind + room)
+    dr.scatter(result, dr.gather(mi.UInt32, pool, dr.arange(mi.UInt32, behind)), dr.arange(mi.UInt32, behind))
+    dr.scatter(result, dr.gather(mi.UInt32, pool, entry + behind, used), first + rank + behind, used)
+    dr.eval(result)
+    return result
