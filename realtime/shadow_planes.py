@@ -132,6 +132,7 @@ def shadow_planes(
                 kernel, geometry, type(view.distance)(0), view.distance, medium=view.medium, light=light
             )
             total += radiance(view.medium, light, integral)
+            lit.append(True)
             continue
         index = view.prepared[number]
         lists = tile_planes(view, index, order=order)

@@ -39,7 +39,7 @@ from dataclasses import dataclass
 from typing import Any
 
 _MEAN_FREE_PATHS = 60.0  # free flights are cut there: 1e-26 of them are longer, and the other technique goes on
-_CONE_MARGIN = 1e-4  # by how much samples may fall beside a spot's cone [rad]: far above single precision's rounding
+_CONE_MARGIN = 1e-6  # by how much samples may fall beside a spot's cone [rad]: what single precision may make of it
 _FAR = 1e30  # where a sample at the very end of an endless ray goes; nothing is transmitted from there [m]
 _CDF_TOLERANCE = 3e-8  # how exactly the mixture is inverted: a rounding of what samplers draw
 _STEPS = 60  # most take five; every fourth halves the bracket
@@ -78,17 +78,23 @@ def closest_approach(origin, direction, position) -> Approach:
     -----
     Valid for any ray; one that meets the light gets a height of 1e-30 and a normal near zero.
     """
-    import drjit as dr
     import mitsuba as mi
+
+    foot, height, normal = _double_approach(origin, direction, position)
+    return Approach(mi.Float(foot), mi.Float(height), mi.Vector3f(normal))
+
+
+def _double_approach(origin, direction, position) -> tuple[Any, Any, Any]:
+    import drjit as dr
 
     offset = origin - position
     foot = -dr.dot(offset, direction)
     perpendicular = offset + direction * foot
     height = dr.maximum(dr.norm(perpendicular), 1e-30)
-    return Approach(mi.Float(foot), mi.Float(height), mi.Vector3f(perpendicular / height))
+    return foot, height, perpendicular / height
 
 
-def cone_ends(approach: Approach, direction, axis, cutoff: float) -> tuple[Any, Any]:
+def cone_ends(origin, direction, position, *, axis, cutoff: float) -> tuple[Any, Any]:
     """Return the ends of the part of a line inside a spot's cone, as distances from the foot; empty if they swap.
 
     The direction from the light to the point s is w(theta) = sin(theta) direction + cos(theta) normal, with
@@ -97,12 +103,10 @@ def cone_ends(approach: Approach, direction, axis, cutoff: float) -> tuple[Any, 
 
     Parameters
     ----------
-    approach
-        How the ray passes the light.
-    direction
-        The ray's direction.
+    origin, direction, position
+        As for `closest_approach`.
     axis
-        The cone's axis, a unit vector.
+        The cone's axis, a unit vector of double precision.
     cutoff
         The cone's half angle [rad].
 
@@ -117,16 +121,17 @@ def cone_ends(approach: Approach, direction, axis, cutoff: float) -> tuple[Any, 
     infinity = dr.inf
     if cutoff > 0.5 * math.pi:
         return mi.Float(-infinity), mi.Float(infinity)
-    along, across = dr.dot(axis, direction), dr.dot(axis, approach.normal)
+    _, height, normal = _double_approach(origin, direction, position)
+    along, across = dr.dot(axis, direction), dr.dot(axis, normal)
     ratio = math.cos(cutoff) / dr.maximum(dr.sqrt(along * along + across * across), 1e-20)
     half = dr.acos(dr.minimum(ratio, 1)) + _CONE_MARGIN
     middle = dr.atan2(along, across)
     low, high = middle - half, middle + half
-    right = 0.5 * math.pi - 1e-6  # beyond, the tangent in single precision has no digit or even the wrong sign
-    low_end = dr.select(low > -right, approach.height * dr.tan(dr.minimum(low, right)), -infinity)
-    high_end = dr.select(high < right, approach.height * dr.tan(dr.maximum(high, -right)), infinity)
+    right = 0.5 * math.pi - 1e-12  # beyond, the tangent would be that of the line's other end
+    low_end = dr.select(low > -right, height * dr.tan(dr.clip(low, -right, right)), -infinity)
+    high_end = dr.select(high < right, height * dr.tan(dr.clip(high, -right, right)), infinity)
     outside = (ratio > 1 + _CONE_MARGIN) | (low > right) | (high < -right)
-    return low_end, dr.select(outside, -infinity, high_end)
+    return mi.Float(low_end), mi.Float(dr.select(outside, -infinity, high_end))
 
 
 def equi_angular_range(span: Span):

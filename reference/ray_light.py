@@ -38,7 +38,7 @@ class Light:
 
     emitter: Any  #: Mitsuba's emitter
     position: Any  #: of double precision [m]
-    axis: Any = None  #: spot: unit vector
+    axis: Any = None  #: spot: unit vector of double precision
     cutoff: float = math.pi  #: spot: half angle of the cone [rad]
 
 
@@ -129,7 +129,7 @@ def _read_light(emitter) -> Light:
     position = mi.Point3d(sample.p)
     if name == "PointLight":
         return Light(emitter, position)
-    axis = dr.normalize(emitter.world_transform() @ mi.Vector3f(0, 0, 1))
+    axis = dr.normalize(mi.Vector3d(emitter.world_transform() @ mi.Vector3f(0, 0, 1)))
     cutoff = float(np.ravel(mi.traverse(emitter)["cutoff_angle"])[0])
     return Light(emitter, position, axis, math.radians(cutoff))
 
@@ -227,26 +227,45 @@ def _light_airlight(task: Task, light: Light, sampler, ray: Ray, stretch: _Stret
     first, last = stretch.start - approach.foot, stretch.end - approach.foot
     start, end = first, last
     if light.axis is not None:
-        low, high = cone_ends(approach, ray.direction, light.axis, light.cutoff)
+        line = ray.origin_double, ray.direction_double, light.position
+        low, high = cone_ends(*line, axis=light.axis, cutoff=light.cutoff)
         start, end = dr.maximum(first, low), dr.minimum(last, high)
     span = Span(approach.height, start, end - start)
     active = active & (end > start)
     mixture = mixture_of(span, [stretch.sigma_t[0]] if task.grey else list(stretch.sigma_t))
 
+    shift = sampler.next_1d(active)
+
     def add_sample(number, total, sampler):
-        u = (number + sampler.next_1d(active)) / task.samples
-        y, s, density = sample_distance(u, mixture)
+        cell, width = _cell(number, shift, task.samples)
+        y, s, density = sample_distance(cell + width * sampler.next_1d(active), mixture)
         r = dr.sqrt(span.height * span.height + s * s)
         from_light = (approach.normal * span.height + ray.direction * s) / r
         used = active & (density > 0)
         sent = _scattered(task, light, ray, stretch, from_light, r, used)
         camera_leg = stretch.depth + stretch.sigma_t * (span.start - first + y)
-        value = sent * dr.exp(-camera_leg) / (r * r * density)
+        value = sent * dr.exp(-camera_leg) * (width / (r * r * density))
         return number + 1, total + dr.select(used, value, 0), sampler
 
     state = (mi.UInt32(0), dr.zeros(mi.Spectrum, dr.width(active)), sampler)
-    _, total, _ = dr.while_loop(state, lambda number, *_: number < task.samples, add_sample, label="distances")
-    return total / task.samples
+    return dr.while_loop(state, lambda number, *_: number < task.samples, add_sample, label="distances")[1]
+
+
+def _cell(number, shift, count: int) -> tuple[Any, Any]:
+    """Return where a cell of the unit interval begins, and its width.
+
+    All cells are 1/(count - 1) wide but the first and the last, which share that width as `shift` in [0, 1) says. So
+    the edge of a shadow lies anywhere in its cell from batch to batch; in cells that stay, an edge close to the end of
+    one would be felt so rarely that no spread between batches could tell.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    if count == 1:
+        return mi.Float(0), mi.Float(1)
+    place = mi.Float(number) + shift
+    low, high = dr.maximum(place - 1, 0), dr.minimum(place, count - 1)
+    return low / (count - 1), (high - low) / (count - 1)
 
 
 def _scattered(task: Task, light: Light, ray: Ray, stretch: _Stretch, from_light, r, active):

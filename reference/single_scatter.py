@@ -5,9 +5,9 @@ The plugin and its batches; what is estimated along a ray, and how, is in `refer
 `reference.quadrature`: the two share the reading of the camera and Mitsuba's ray casting, and no derivation beyond the
 integral itself.
 
-The n samples of a ray lie in n equal cells of the unit interval, each at a random place of its cell, drawn anew for
-each light and medium. Their mean is unbiased, its error falls as n^-1.5 where the integrand is smooth, and batches of
-different seeds are independent.
+The n samples of a ray lie in n cells of the unit interval, each at a random place of its cell; the grid of cells is
+itself at a random place, drawn anew for each light and medium. The estimate is unbiased, its error falls as n^-1.5
+where the integrand is smooth and as 1/n at the edge of a shadow, and batches of different seeds are independent.
 
 Rounding: a ray's foot and height are computed in double precision; everything after that is relative to the light, in
 the variant's precision. Sums over at most 256 samples are single, over batches double.
@@ -18,9 +18,9 @@ import functools
 import numpy as np
 
 from analytic.errors import InputError
+from reference.batches import LARGEST_BATCH, Batches
 from reference.ray_light import double_ray, ray_light, read_task
 from reference.scene import TruthScene
-from reference.volpath import LARGEST_BATCH, Batches
 
 PLUGIN = "single-scatter"
 _RAYS = 1 << 20  # camera rays in one kernel
@@ -78,7 +78,7 @@ def single_scatter_batch(truth: TruthScene, seed: int, samples: int) -> Batches:
     seed
         Seed of the batch; different seeds are independent.
     samples
-        Distances sampled for each ray, light and medium, at most 256; even numbers serve both techniques alike.
+        Distances sampled for each ray, light and medium, at most 256.
 
     Returns
     -------

@@ -54,3 +54,22 @@ def spot(*, cutoff=33.0, beam=33.0) -> dict[str, Any]:
         "beam_width": beam,
         "intensity": {"type": "rgb", "value": [9.0, 7.0, 8.0]},
     }
+
+
+def body(shape: dict[str, Any], sigma_t: Any, albedo: tuple[float, float, float], **medium: Any) -> dict[str, Any]:
+    """Return a shape that lets light pass and is filled with a homogeneous medium; `sigma_t` is grey or RGB [1/m]."""
+    colour = not isinstance(sigma_t, float)
+    inside = {
+        "type": "homogeneous",
+        "sigma_t": {"type": "rgb", "value": list(sigma_t)} if colour else sigma_t,
+        "albedo": {"type": "rgb", "value": list(albedo)},
+        "has_spectral_extinction": colour,
+    }
+    return shape | {"bsdf": {"type": "null"}, "interior": inside | medium}
+
+
+def clear_scene(*, size=(16, 12), **changes: Any) -> dict[str, Any]:
+    """Return the tiny scene without fog and without surfaces: a camera and a lamp in a vacuum."""
+    scene = tiny_scene(size=size, fog=None, ball=None, floor=None)
+    scene["sensor"] = {key: entry for key, entry in scene["sensor"].items() if key != "medium"}
+    return {name: entry for name, entry in (scene | changes).items() if entry is not None}
