@@ -121,7 +121,8 @@ def test_the_front_door_and_help_import_nothing_heavy():
 
 def _locked() -> dict[str, str]:
     lines = (ROOT / "requirements.lock").read_text().splitlines()
-    pairs = [line.split("==") for line in lines if line and not line.startswith("#")]
+    # What stands after a semicolon says on which machines.
+    pairs = [line.split(";")[0].split("==") for line in lines if line and not line.startswith("#")]
     return {canonicalize_name(name): pinned for name, pinned in pairs}
 
 
