@@ -24,7 +24,8 @@ interval lies within +-margin, which is two one-sided tests at 2.5 % each (Schui
 
 **Detectable bias.** A two-sided test at the 5 % level rejects if |B| > q(0.975) se. With a true bias b it does so with
 probability P(B > q(0.975) se) = P((B - b)/se > q(0.975) - b/se), the other tail being negligible: that is 90 % if
-b = (q(0.975) + q(0.90)) se, q the quantiles of Student's law; 3.24 se for many degrees of freedom.
+b = (q(0.975) + q(0.90)) se, q the quantiles of Student's law; 3.24 se for many degrees of freedom. `validation.pvalues`
+has the power for any b, by the non-central law.
 """
 
 from dataclasses import dataclass
@@ -32,7 +33,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from validation.pvalues import satterthwaite, student_quantile
+from validation.pvalues import satterthwaite, student_quantile, two_sided_p
 
 Array = NDArray[np.float64]
 Interval = tuple[float, float]
@@ -59,6 +60,10 @@ class RelativeBias:
     value: float  #: sum(test) / sum(ref) - 1
     interval: Interval  #: 95 %, from the standard errors of the pixels
     interval_batches: Interval | None  #: 95 %, from the batch means
+    error: float  #: standard error of the value, from those of the pixels
+    freedom: float  #: degrees of freedom of `error`
+    p: float  #: two-sided p-value that there is no bias, from `error`; NaN without variance
+    reference_share: float  #: of the reference's errors in the variance; NaN without variance
     largest_share: float  #: of one pixel in the variance; NaN without variance
     detectable: float  #: found with 90 % power at the 5 % level, by the wider interval
 
@@ -81,21 +86,27 @@ def relative_bias(reference: Side, test: Side, pixels: int) -> RelativeBias:
     bright = float(reference.mean.sum())
     if not bright > 0:
         nan = float("nan")
-        return RelativeBias(nan, (nan, nan), None, nan, nan)
+        return RelativeBias(nan, (nan, nan), None, nan, nan, nan, nan, nan, nan)
     # From the difference, not from the ratio: no cancellation for images that nearly agree.
     value = float((test.mean - reference.mean).sum()) / bright
     sides = ((test, 1.0), (reference, (1 + value) ** 2))  # with the weight of its variance
     variance = np.zeros(reference.mean.shape[:2])
-    spread = 0.0
+    spread = of_reference = 0.0
     for side, weight in sides:
         part = weight * (side.error.sum(axis=2) / bright) ** 2
         variance += part
         spread += float(side.spread(part).sum())
+        of_reference = float(part.sum())  # the reference is the last
     total = float(variance.sum())
-    interval, reach = _interval(value, total, float(satterthwaite(total, spread)))
+    freedom = float(satterthwaite(total, spread))
+    error = float(np.sqrt(total))
+    interval, reach = _interval(value, total, freedom)
     interval_batches, reach_batches = _from_batches(value, sides, bright, pixels)
-    share = float(variance.max()) / total if total > 0 else float("nan")
-    return RelativeBias(value, interval, interval_batches, share, max(reach, reach_batches))
+    p = largest = share = float("nan")
+    if total > 0:
+        p = float(two_sided_p(np.asarray(value / error), np.asarray(freedom)))
+        share, largest = of_reference / total, float(variance.max()) / total
+    return RelativeBias(value, interval, interval_batches, error, freedom, p, share, largest, max(reach, reach_batches))
 
 
 def _from_batches(

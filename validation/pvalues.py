@@ -46,6 +46,22 @@ def student_quantile(probability: float, freedom: float) -> float:
     return float(stdtrit(freedom, probability) if np.isfinite(freedom) else ndtri(probability))
 
 
+def power(effect: float, freedom: float, level: float = 0.05) -> float:
+    """Return the probability that a two-sided test at a level finds an effect, given in standard errors.
+
+    The statistic (B - b)/se + b/se follows Student's non-central law with the parameter b/se, as se is itself estimated
+    with `freedom` degrees of freedom, and a shifted normal law for infinitely many. Both tails count, so an effect of
+    zero is found with the probability of the level.
+    """
+    from scipy.special import ndtr
+    from scipy.stats import nct
+
+    critical = student_quantile(1 - level / 2, freedom)
+    if np.isfinite(freedom):
+        return float(nct.sf(critical, freedom, effect) + nct.cdf(-critical, freedom, effect))
+    return float(ndtr(effect - critical) + ndtr(-effect - critical))
+
+
 def sidak(level: float, tests: int) -> float:
     """Return the level of each of m independent tests of which none rejects with probability 1 - level.
 

@@ -26,7 +26,9 @@ eight times as well as one pixel.
 bias that all pixels share shows here first: with 262 144 pixels 360 times better than in any one of them.
 
 Values without variance (s = 0: a pixel without light, one that no path reached, a reference without noise) have no z.
-They are counted and compared in absolute terms, and they do enter the relative bias.
+They are counted and compared in absolute terms, and they do enter the relative bias. So are values where the reference
+is zero, whose relative error does not exist: light where none should be shows there. Pixels that a mask leaves out (the
+light in their footprint) are counted, for a mask can hide what it should not.
 """
 
 from dataclasses import asdict, dataclass
@@ -73,8 +75,12 @@ class Statistics:
 
     Attributes
     ----------
+    masked
+        Pixels that the mask leaves out.
     tested
         Values with a z.
+    zero_reference, zero_reference_error
+        Values where the reference is zero, and the largest |test| among them over the mean of the reference.
     zero_variance, zero_variance_error
         Values without variance, and the largest |test - ref| among them over the mean of the reference.
     z_mean, z_std
@@ -90,6 +96,10 @@ class Statistics:
         p-value of the test that the p-values are uniform.
     relative_bias, relative_bias_ci, relative_bias_ci_batches
         sum(test) / sum(ref) - 1 with its 95 % intervals, from the standard errors and from the batch means.
+    relative_bias_se, relative_bias_freedom, relative_bias_p
+        Its standard error, from those of the pixels, the degrees of freedom of that, and the two-sided p-value.
+    reference_variance_share
+        Share of the reference's errors in the variance of `relative_bias`; the rest is the test image's.
     largest_share
         Share of one pixel in the variance of `relative_bias`; above 1 % its interval is doubtful.
     detectable_bias
@@ -100,7 +110,10 @@ class Statistics:
         Levels of the tests.
     """
 
+    masked: int
     tested: int
+    zero_reference: int
+    zero_reference_error: float
     zero_variance: int
     zero_variance_error: float
     z_mean: float
@@ -116,6 +129,10 @@ class Statistics:
     relative_bias: float
     relative_bias_ci: tuple[float, float]
     relative_bias_ci_batches: tuple[float, float] | None
+    relative_bias_se: float
+    relative_bias_freedom: float
+    relative_bias_p: float
+    reference_variance_share: float
     largest_share: float
     detectable_bias: float
     margin: float | None
@@ -179,11 +196,16 @@ def compare_statistics(
     two = _side("test", test, chosen, scale=scale, with_batches=whole)
     pooled = relative_bias(one, two, int(chosen.sum()))
     return Statistics(
+        masked=int((~asked).sum()),
         **_value_tests(one, two, chosen, family_level, plain_level),
         **_block_tests(one, two, family_level),
         relative_bias=pooled.value,
         relative_bias_ci=pooled.interval,
         relative_bias_ci_batches=pooled.interval_batches,
+        relative_bias_se=pooled.error,
+        relative_bias_freedom=pooled.freedom,
+        relative_bias_p=pooled.p,
+        reference_variance_share=pooled.reference_share,
         largest_share=pooled.largest_share,
         detectable_bias=pooled.detectable,
         margin=margin,
@@ -207,12 +229,14 @@ def _value_tests(
     by_channel = [p[channel == c] for c in np.unique(channel)]
     small = np.zeros(random.shape, dtype=bool)
     small[random] = p < sidak(family_level, z.size)
+    dark = chosen[:, :, None] & (one.mean == 0)
     mean = float(one.mean[chosen].mean()) if chosen.any() else 0.0
-    largest = float(np.abs(difference[fixed]).max(initial=0.0))
     return {
         "tested": z.size,
+        "zero_reference": int(dark.sum()),
+        "zero_reference_error": _largest(difference[dark], mean),
         "zero_variance": int(fixed.sum()),
-        "zero_variance_error": largest / mean if mean > 0 else float("nan"),
+        "zero_variance_error": _largest(difference[fixed], mean),
         "z_mean": float(z.mean()) if z.size else float("nan"),
         "z_std": float(z.std(ddof=1)) if z.size > 1 else float("nan"),
         "rejected": int(small.any(axis=2).sum()),
@@ -222,6 +246,11 @@ def _value_tests(
         "exceeding_p": bonferroni([binomial_p(int((q < plain_level).sum()), q.size, plain_level) for q in by_channel]),
         "uniformity_p": bonferroni([uniformity_p(q) for q in by_channel]),
     }
+
+
+def _largest(difference: Array, mean: float) -> float:
+    """Return the largest difference over a mean; NaN if that is not bright."""
+    return float(np.abs(difference).max(initial=0.0)) / mean if mean > 0 else float("nan")
 
 
 def _block_tests(one: Side, two: Side, family_level: float) -> dict[str, int]:

@@ -141,6 +141,40 @@ def test_values_without_variance_are_compared_in_absolute_terms():
     assert s.z_std == 0
 
 
+def test_light_where_the_reference_has_none_shows_in_absolute_terms():
+    reference = np.full((4, 4), 2.0)
+    reference[0] = 0.0  # mean 1.5
+    test = reference.copy()
+    test[0, 1:3] = [0.03, -0.06]
+    found = compare_statistics(Estimate(reference), Estimate(test, np.full((4, 4), 0.1)))
+    assert (found.zero_reference, found.tested) == (4, 16)
+    assert found.zero_reference_error == pytest.approx(0.04, rel=1e-12)
+    black = compare_statistics(Estimate(np.zeros((4, 4))), Estimate(test, np.full((4, 4), 0.1)))
+    assert black.zero_reference == 16
+    assert np.isnan(black.zero_reference_error)
+
+
+def test_the_variance_of_both_sides_counts_and_is_told_apart():
+    # Variances of 0.09 and of 0.16 a pixel at equal means: the reference has 9/25 of the sum.
+    found = compare_statistics(
+        Estimate(np.ones((3, 4)), np.full((3, 4), 0.3)), Estimate(np.ones((3, 4)), np.full((3, 4), 0.4))
+    )
+    assert found.reference_variance_share == pytest.approx(9 / 25, rel=1e-12)
+    assert found.relative_bias_se == pytest.approx(0.5 / np.sqrt(12), rel=1e-12)
+    assert (found.relative_bias_p, found.relative_bias_freedom) == (1, np.inf)
+    one = compare_statistics(Estimate(np.ones((3, 4))), Estimate(np.ones((3, 4)), np.full((3, 4), 0.4), 5))
+    assert one.reference_variance_share == 0
+    assert one.relative_bias_freedom == pytest.approx(12 * 4, rel=1e-12)
+
+
+def test_the_p_value_of_the_bias_is_below_five_percent_where_the_interval_leaves_zero_out():
+    for shift, inside in ((1.95, True), (1.97, False)):
+        test = Estimate(np.full((4, 4), 1 + shift * 0.01), np.full((4, 4), 0.04))
+        found = compare_statistics(Estimate(np.ones((4, 4))), test)
+        assert (found.relative_bias_p > 0.05) is inside
+        assert (found.relative_bias_ci[0] < 0) is inside
+
+
 def test_no_floor_under_the_variance():
     # Errors of 1e-9 of the radiance count in full.
     test = np.ones((8, 8)) + 1e-8
@@ -176,13 +210,14 @@ def test_mask_and_nonfinite_pixels_leave_no_trace():
     mask = np.arange(16) < 8
     alone = compare_statistics(Estimate(np.ones((8, 8, 3))), dataclasses.replace(estimate, batch_means=None))
     masked = Estimate(wide, error, BATCHES)
-    assert compare_statistics(Estimate(np.ones((8, 16, 3))), masked, mask=np.tile(mask, (8, 1))) == alone
+    found = compare_statistics(Estimate(np.ones((8, 16, 3))), masked, mask=np.tile(mask, (8, 1)))
+    assert found == dataclasses.replace(alone, masked=64)  # no trace but their number
     # Without the mask the same pixels fall away because they are not finite, and batch means with them.
     with_means = dataclasses.replace(masked, batch_means=estimate.batch_means)
     assert compare_statistics(Estimate(np.ones((8, 16, 3))), with_means) == alone
 
 
-@pytest.mark.parametrize("factor", [2.0**-300, 1e-12, 7e5, 2.0**300])
+@pytest.mark.parametrize("factor", [2.0**-300, 1e-30, 1e-12, 7e5, 1e30, 2.0**300])
 def test_numbers_have_no_unit(factor):
     rng = np.random.default_rng(4)
     profile = rng.gamma(0.5, 2.0, (16, 16, 3))
