@@ -224,26 +224,27 @@ def _light_airlight(task: Task, light: Light, sampler, ray: Ray, stretch: _Stret
     import mitsuba as mi
 
     approach = closest_approach(ray.origin_double, ray.direction_double, light.position)
+    height, normal = mi.Float(approach.height), mi.Vector3f(approach.normal)
     first, last = stretch.start - approach.foot, stretch.end - approach.foot
     start, end = first, last
     if light.axis is not None:
-        line = ray.origin_double, ray.direction_double, light.position
-        low, high = cone_ends(*line, axis=light.axis, cutoff=light.cutoff)
+        low, high = cone_ends(approach, ray.direction_double, axis=light.axis, cutoff=light.cutoff)
         start, end = dr.maximum(first, low), dr.minimum(last, high)
     span = Span(approach.height, start, end - start)
     active = active & (end > start)
     mixture = mixture_of(span, [stretch.sigma_t[0]] if task.grey else list(stretch.sigma_t))
 
+    before = mi.Float(start - first)  # from the start of the stretch to that of the span
     shift = sampler.next_1d(active)
 
     def add_sample(number, total, sampler):
         cell, width = _cell(number, shift, task.samples)
         y, s, density = sample_distance(cell + width * sampler.next_1d(active), mixture)
-        r = dr.sqrt(span.height * span.height + s * s)
-        from_light = (approach.normal * span.height + ray.direction * s) / r
+        r = dr.sqrt(height * height + s * s)
+        from_light = (normal * height + ray.direction * s) / r
         used = active & (density > 0)
         sent = _scattered(task, light, ray, stretch, from_light, r, used)
-        camera_leg = stretch.depth + stretch.sigma_t * (span.start - first + y)
+        camera_leg = stretch.depth + stretch.sigma_t * (before + y)
         value = sent * dr.exp(-camera_leg) * (width / (r * r * density))
         return number + 1, total + dr.select(used, value, 0), sampler
 

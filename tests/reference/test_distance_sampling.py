@@ -200,7 +200,7 @@ def test_spots_cone_is_covered(variant):
     """
     import mitsuba as mi
 
-    from reference.distance_sampling import cone_ends
+    from reference.distance_sampling import closest_approach, cone_ends
 
     rng = np.random.default_rng(11)
     n = 400
@@ -208,9 +208,9 @@ def test_spots_cone_is_covered(variant):
         origin, direction, axis = rng.normal(size=(3, n, 3))
         direction /= np.linalg.norm(direction, axis=1, keepdims=True)
         axis /= np.linalg.norm(axis, axis=1, keepdims=True)
-        line = mi.Point3d(origin.T), mi.Vector3d(direction.T), mi.Point3d(0, 0, 0)
+        approach = closest_approach(mi.Point3d(origin.T), mi.Vector3d(direction.T), mi.Point3d(0, 0, 0))
         cutoff = np.deg2rad(cutoff_degrees)
-        ends = cone_ends(*line, axis=mi.Vector3d(axis.T), cutoff=cutoff)
+        ends = cone_ends(approach, mi.Vector3d(direction.T), axis=mi.Vector3d(axis.T), cutoff=cutoff)
         low, high = (np.broadcast_to(np.array(end, dtype=np.float64), n) for end in ends)
         foot = -np.sum(origin * direction, axis=1)
         x = np.linspace(-30, 30, 2001)
