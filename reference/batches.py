@@ -74,8 +74,8 @@ def parse_seed_ranges(words: str) -> tuple[int, ...]:
     """
     seeds: list[int] = []
     for part in words.split(","):
-        first, _, last = part.partition("-")
-        start, end = int(first), int(last or first)
+        first, dash, last = part.partition("-")
+        start, end = int(first), int(last if dash else first)
         if not 0 <= start <= end < LARGEST_SEED:
             raise ValueError(f"seeds {part!r}")
         seeds += range(start, end + 1)

@@ -22,6 +22,7 @@ from reference.batches import LARGEST_SEED, Batches, merged
 from reference.cache import cache_folder, cache_key, drop_arrays, is_kept, load_arrays, store_arrays, sweep
 from reference.files import NO_SPACE
 from reference.scene import read_truth
+from reference.single_scatter import single_scatter_batch
 from reference.volpath import volpath_batch
 
 Progress = Callable[[int, int, str], None]
@@ -137,8 +138,6 @@ def _tracer(scene, estimator: str, samples: int, max_depth: int) -> Trace:
     if estimator == "volpath":
         return lambda seed: volpath_batch(truth, seed, samples, max_depth=max_depth)
     if estimator == "single-scatter" and max_depth == 2:
-        from reference.single_scatter import single_scatter_batch
-
         return lambda seed: single_scatter_batch(truth, seed, samples)
     raise ValueError(f"estimator: got {estimator!r} with max_depth {max_depth}, wanted one of {', '.join(ESTIMATORS)}")
 
