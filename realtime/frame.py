@@ -90,6 +90,7 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
             plan=plan,
             visible=lambda point, light: _visible(geometry, point, light),
             rays=lambda lane: ray_directions(camera, dr.gather(mi.UInt32, pixel, lane)),
+            square_tiles=camera.width % 4 == 0 and camera.height % 4 == 0 and dr.width(pixel) > 1,
             visible_triangle=lambda: visible_triangle(geometry, camera.origin, direction),
             prepared=prepared,
         )

@@ -239,7 +239,7 @@ def index_planes(casters: Casters, light: Array, camera: Array, *, used: NDArray
         y_axis,
         z_axis,
         Float(distance),
-        mi.UInt32(start),
+        mi.UInt32(_padded(start)),
         mi.UInt32(_padded(entries)),
         Float(_padded(planes.lines.astype(real).ravel())),
         Float(_padded(spans.astype(real).ravel())),
@@ -251,6 +251,13 @@ def index_planes(casters: Casters, light: Array, camera: Array, *, used: NDArray
 
 
 def _padded(values, multiple: int = 1):
-    """Return an array with zeros up to a power of two times `multiple`: frozen kernels then seldom meet a new size."""
+    """Return an array with zeros up to a power of two times `multiple`, aligned to 64 bytes.
+
+    A frozen function is recorded anew for arrays of another size, and for arrays of another alignment.
+    """
     size = multiple << max(6, int(-(-len(values) // multiple) - 1).bit_length())
-    return np.concatenate([values, np.zeros(size - len(values), dtype=values.dtype)])
+    room = np.zeros(size * values.itemsize + 64, dtype=np.uint8)
+    begin = -room.ctypes.data % 64
+    padded = room[begin : begin + size * values.itemsize].view(values.dtype)
+    padded[: len(values)] = values
+    return padded

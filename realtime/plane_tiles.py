@@ -21,6 +21,7 @@ from realtime.diamond import diamond_angle
 from realtime.plane_index import BINS, FIRST, FULL, NUMBER, TURN, PlaneIndex
 
 TILE = 16  #: rays in a tile, and tiles in a block
+SIDE = 4  #: of a tile [pixels], where it is a square
 ROOM = 32  #: entries for each tile and, fourfold, for each block, on average
 
 _SLACK = 1e-5  # of the terms of a sum: float32 rounding, with room to spare
@@ -61,24 +62,22 @@ def entry_at(entries, source: Source, k, active):
     return entry, active & (((entry & FIRST) != 0) | (place < source.all_before))
 
 
-def tile_lists(index: PlaneIndex, rays, count: int, *, order: str) -> "Lists":
+def tile_lists(index: PlaneIndex, rays, distance, *, order: str, square: bool) -> "Lists":
     """Return the lists of the tiles, each in order.
 
     Parameters
     ----------
     index
         The planes.
-    rays
-        (lane) -> direction in the frame of the light (three arrays), and the quotient D/x at its end.
-    count
-        How many rays there are.
+    rays, distance, square
+        See `tile_boxes`.
     order
         See `listed`.
     """
     import drjit as dr
     import mitsuba as mi
 
-    tiles = tile_boxes(rays, count)
+    tiles = tile_boxes(index, rays, distance, square=square)
     dr.eval(tiles)
     blocks = block_boxes(tiles)
     dr.eval(blocks)
@@ -92,29 +91,39 @@ def tile_lists(index: PlaneIndex, rays, count: int, *, order: str) -> "Lists":
     return of_tile
 
 
-def tile_boxes(rays: Callable[[Any], tuple[Any, Any, Any, Any]], count: int) -> Box:
+def tile_boxes(index: PlaneIndex, rays: Callable[[Any], tuple[Any, Any, Any]], distance, *, square: bool) -> Box:
     """Return the boxes of the tiles.
 
     Parameters
     ----------
+    index
+        The planes, for the frame of the light.
     rays
-        (lane) -> direction in the frame of the light (three arrays), and the quotient D/x at its end.
-    count
-        How many rays there are.
+        (lane) -> direction in that frame, three arrays.
+    distance
+        At which every ray ends [m].
+    square
+        Whether every tile is a square of 4 x 4 pixels: then its corners bound it, but for the curvature of the sphere
+        of directions, a share of 2e-6 that the slack of `touches` covers.
     """
     import drjit as dr
     import mitsuba as mi
 
+    count = dr.width(distance)
     tiles = -(-count // TILE)
     tile = dr.arange(mi.UInt32, tiles)
 
-    def member(k):
-        lane = tile * TILE + k
-        active = lane < count
+    def lane(k):
         # Beyond the last ray: the first of the tile again.
-        return rays(dr.select(active, lane, tile * TILE))
+        lane = tile * TILE + k
+        return dr.select(lane < count, lane, tile * TILE)
 
-    return _enclosed(member)
+    corners = (0, SIDE - 1, TILE - SIDE, TILE - 1) if square else range(TILE)
+    directions = [rays(lane(k)) for k in corners]
+    ends = [dr.gather(type(distance), distance, lane(k)) for k in range(TILE)]
+    low = [_fold(dr.minimum, [w[axis] for w in directions]) for axis in range(3)]
+    high = [_fold(dr.maximum, [w[axis] for w in directions]) for axis in range(3)]
+    return _box(low, high, index.distance / _fold(dr.maximum, ends))
 
 
 def block_boxes(tile: Box) -> Box:
@@ -126,54 +135,41 @@ def block_boxes(tile: Box) -> Box:
     block = dr.arange(mi.UInt32, -(-count // TILE))
     Float = type(tile.x)
 
-    def member(k, side):
+    def bounds(k):
         number = block * TILE + k
         number = dr.select(number < count, number, block * TILE)
-        read = lambda values: dr.gather(Float, values, number)  # noqa: E731
-        return (
-            read(tile.x) + side * read(tile.x_half),
-            read(tile.y) + side * read(tile.y_half),
-            read(tile.z) + side * read(tile.z_half),
-            read(tile.ray_end),
+        x, y, z, x_half, y_half, z_half, end = (
+            dr.gather(Float, values, number)
+            for values in (tile.x, tile.y, tile.z, tile.x_half, tile.y_half, tile.z_half, tile.ray_end)
         )
+        return [x - x_half, y - y_half, z - z_half], [x + x_half, y + y_half, z + z_half], end
 
-    return _enclosed(lambda k: member(k, -1), lambda k: member(k, 1))
+    members = [bounds(k) for k in range(TILE)]
+    low = [_fold(dr.minimum, [member[0][axis] for member in members]) for axis in range(3)]
+    high = [_fold(dr.maximum, [member[1][axis] for member in members]) for axis in range(3)]
+    return _box(low, high, _fold(dr.minimum, [member[2] for member in members]))
 
 
-def _enclosed(*members) -> Box:
-    """Return the box about sixteen members, each given by one or more functions of its number."""
-    import drjit as dr
-    import mitsuba as mi
+def _fold(function, values):
+    result = values[0]
+    for value in values[1:]:
+        result = function(result, value)
+    return result
 
-    def widened(bounds, k):
-        for member in members:
-            *w, end = member(k)
-            bounds = (
-                *(dr.minimum(old, new) for old, new in zip(bounds[:3], w)),
-                *(dr.maximum(old, new) for old, new in zip(bounds[3:6], w)),
-                dr.minimum(bounds[6], end),
-            )
-        return bounds
 
-    *w, end = members[0](mi.UInt32(0))
-    start = (*w, *w, end)
-    bounds = dr.while_loop(
-        state=(dr.zeros(mi.UInt32, dr.width(end)), *start),
-        cond=lambda k, *bounds: k < TILE,
-        body=lambda k, *bounds: (k + 1, *widened(bounds, k)),
-        labels=("k", "x0", "y0", "z0", "x1", "y1", "z1", "end"),
-    )[1:]
-    centre = [0.5 * (low + high) for low, high in zip(bounds[:3], bounds[3:6])]
-    half = [0.5 * (high - low) for low, high in zip(bounds[:3], bounds[3:6])]
-    azimuth, azimuth_half = _azimuths(centre, half)
-    return Box(centre[0], centre[1], centre[2], half[0], half[1], half[2], bounds[6], azimuth, azimuth_half)
+def _box(low, high, ray_end) -> Box:
+    """Return the box between two corners."""
+    x, y, z = (0.5 * (a + b) for a, b in zip(low, high))
+    x_half, y_half, z_half = (0.5 * (b - a) for a, b in zip(low, high))
+    azimuth, azimuth_half = _azimuths((x, y), (x_half, y_half))
+    return Box(x, y, z, x_half, y_half, z_half, ray_end, azimuth, azimuth_half)
 
 
 def _azimuths(centre, half):
     """Return the azimuth of the centres and how far the corners are from it; a full turn where that is unclear."""
     import drjit as dr
 
-    (x, y), (x_half, y_half) = centre[:2], half[:2]
+    (x, y), (x_half, y_half) = centre, half
     azimuth = diamond_angle(x, y)
     widest = type(x)(0)
     for side_x in (-1, 1):

@@ -157,14 +157,12 @@ def shadow_planes(
 
 def tile_planes(view: View, index: PlaneIndex, *, order: str) -> Lists:
     """Return the planes that concern each tile of the image."""
-    import drjit as dr
 
     def rays(lane):
-        direction, low = view.rays(lane)
-        distance = dr.gather(type(view.distance), view.distance, lane)
-        return *in_light_frame(index, direction, low), index.distance / distance
+        return in_light_frame(index, *view.rays(lane))
 
-    return tile_lists(index, rays, dr.width(view.distance), order="paper" if order == "paper" else "exact")
+    order = "paper" if order == "paper" else "exact"
+    return tile_lists(index, rays, view.distance, order=order, square=view.square_tiles)
 
 
 def _segments(view: View, index: PlaneIndex, lists: Lists, ray, *, kernel, differences: bool):

@@ -27,6 +27,7 @@ class View:
     plan: Plan  #: what the scene needs; a method leaves out the rest
     visible: Callable[[Any, Light], Any]  #: (point, light) -> whether the light reaches the point
     rays: Callable[[Any], tuple[Any, Any]]  #: lanes -> the directions of their rays, and their low parts
+    square_tiles: bool  #: whether every 16 rays that follow one another are 4 x 4 pixels
     visible_triangle: Callable[[], tuple[Any, Any, Any]]  #: -> corners [m], barycentric weights, whether there is one
     prepared: tuple[Any, ...] = ()  #: by light what the method's `prepare` made: a shadow map, shadow planes
 
