@@ -107,16 +107,14 @@ def moved(casters: Casters, vertices: Array) -> Casters:
 
 def _triangles(shape) -> tuple[Array, NDArray[np.int64]]:
     """Return vertices and triangles of a Mitsuba shape."""
+    import drjit as dr
     import mitsuba as mi
 
     if shape.is_mesh():
-        parameters = mi.traverse(shape)
-        vertices = np.array(parameters["vertex_positions"], dtype=np.float64).reshape(-1, 3)
-        return vertices, np.array(parameters["faces"], dtype=np.int64).reshape(-1, 3)
-    if shape.class_name() == "Rectangle":
-        matrix = np.array(mi.traverse(shape)["to_world"].matrix, dtype=np.float64).reshape(4, 4)
-        corners = np.array([[-1, -1, 0, 1], [1, -1, 0, 1], [1, 1, 0, 1], [-1, 1, 0, 1]]) @ matrix.T
-        return corners[:, :3], np.array([[0, 1, 2], [0, 2, 3]])
+        # Asked for one by one: `mi.traverse` shows the transform of a rectangle or a cube, not its vertices.
+        position = shape.vertex_position(dr.arange(mi.UInt32, shape.vertex_count()))
+        face = shape.face_indices(dr.arange(mi.UInt32, shape.face_count()))
+        return np.array(position, dtype=np.float64).T.copy(), np.array(face, dtype=np.int64).T.copy()
     raise InputError(
         f"shape '{shape.id()}' is a {shape.class_name()}, which has no triangles and so no silhouette edges; wanted "
         "meshes (obj, ply, cube, rectangle); replace it by a mesh, or use --method ray-march"
