@@ -8,53 +8,34 @@ without any mutation proves nothing, so the unchanged copy is run through the sa
 """
 
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.batches import LAYERS, Batches
-from reference.epsilon import measure_shadow_epsilon
-from reference.quadrature import TruthImage
-from validation.agreement import MASK_PIXELS, pixel_angle
-from validation.load import load_scene
 from validation.module_copies import ModuleCopies, module_source, replaced_once
-from validation.mutation_catalogue import MUTATIONS, TOPS, Mutation
+from validation.mutation import TOPS, Mutation
+from validation.mutation_catalogue import MUTATIONS
+from validation.mutation_stages import (
+    SCENES,
+    Stage,
+    batch_statistics,
+    distance_batches,
+    image_statistics,
+    layer_mean,
+    loaded_stage,
+    stage_of,
+    widest,
+)
 from validation.probe_scenes import PROBES
-from validation.statistics import Estimate, Statistics, compare_statistics
-from validation.truth import truth_image, volpath_batches
+from validation.statistics import Statistics
 
+Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
 
-#: Built-in scenes of the standard run.
-SCENES = ("open-fog", "sphere-spot", "colonnade", "two-pens")
 #: Share of the mutations that the standard run must catch: 18 of 20.
 LEAST_CAUGHT = 0.9
-_BATCHES, _SAMPLES, _LEAST = 4096, 256, 32
-
-
-@dataclass(frozen=True)
-class Opponent:
-    """The batches of an unchanged Monte Carlo estimator."""
-
-    estimator: str
-    batches: Batches
-    image: TruthImage  #: what the unchanged quadrature expects of it
-    shadow_scale: float  #: the share of the leg from the light that it attenuates over
-    margin: float  #: of the relative bias against it
-
-
-@dataclass(frozen=True)
-class Stage:
-    """A scene with the images that a changed estimator is compared with."""
-
-    name: str
-    scene: Any  #: the `mi.Scene`
-    truth: TruthImage
-    masks: dict[str, NDArray[np.bool_]]  #: pixels to compare, by layer
-    opponents: tuple[Opponent, ...]
 
 
 @dataclass(frozen=True)
@@ -66,7 +47,7 @@ class Sighting:
     layer: str  #: 'airlight' or 'surface'
     against: str  #: the estimator that was left as it is
     margin: float
-    true_bias: float  #: relative change of the image by the fault, free of noise
+    true_bias: float  #: relative change of the image by the fault, free of noise or with the same random numbers
     relative_bias: float  #: of the changed estimator, as seen against the other one
     interval: tuple[float, float]  #: the wider of its 95 % intervals
     detectable_bias: float
@@ -135,7 +116,7 @@ def study_mutations(
     names = (*SCENES, *PROBES)
     stages = []
     for number, name in enumerate(names):
-        tell(0.7 * number / len(names), f"volpath, {name}")
+        tell(0.7 * number / len(names), f"unchanged images, {name}")
         stages.append(stage_of(name, loaded_stage(name, size), margin=margin))
     control = seen(None, stages)
     results = []
@@ -145,108 +126,72 @@ def study_mutations(
     return MutationStudy(control, tuple(results))
 
 
-def loaded_stage(name: str, size: tuple[int, int]):
-    """Load a built-in scene or a probe of `validation.probe_scenes`, as a `mi.Scene` of a size [pixels]."""
-    import mitsuba as mi
-
-    if name not in PROBES:
-        return load_scene(name, size).scene
-    dictionary = PROBES[name]()
-    dictionary["sensor"]["film"] |= {"width": size[0], "height": size[1]}
-    return mi.load_dict(dictionary)
-
-
-def stage_of(name: str, scene, *, margin: float, samples: int = _SAMPLES) -> Stage:
-    """Return a Mitsuba scene with its unchanged images."""
-    truth = truth_image(scene)
-    near = truth.light_angle <= MASK_PIXELS * pixel_angle(scene)
-    masks = {"airlight": ~near & np.isfinite(truth.airlight).all(axis=2), "surface": np.ones_like(near)}
-    masks = {layer: mask for layer, mask in masks.items() if np.any(getattr(truth, layer) > 0)}
-
-    shadow_scale = 1 - measure_shadow_epsilon()
-    shortened = truth_image(scene, shadow_scale=shadow_scale)
-
-    def opponent(found: Batches) -> Opponent:
-        return Opponent("volpath", found, shortened, shadow_scale, margin)
-
-    def enough(found: Batches) -> bool:
-        """Look at the spread alone, as `validation.agreement` does: stopping favours no verdict."""
-        if len(found.seeds) < _LEAST:
-            return False
-        compared = (
-            _statistics(opponent(found), layer, getattr(shortened, layer), mask) for layer, mask in masks.items()
-        )
-        return all(0.5 * np.ptp(_widest(one)) < 0.4 * margin for one in compared)
-
-    found = volpath_batches(scene, batches=_BATCHES, samples=samples, enough=enough)
-    return Stage(name, scene, truth, masks, (opponent(found),))
-
-
 def seen(mutation: Mutation | None, stages: Sequence[Stage]) -> tuple[Sighting, ...]:
     """Compare a changed estimator with the unchanged ones on every stage; None changes nothing."""
     copies = copies_with(mutation)
-    sightings: list[Sighting] = []
-    for stage in stages:
-        for opponent in stage.opponents:
-            # A mutation may divide by zero or overflow: its image shows that.
-            with warnings.catch_warnings(), np.errstate(all="ignore"):
-                warnings.simplefilter("ignore")
-                truth = copies["reference.scene"].read_truth(stage.scene)
-                image = copies["reference.quadrature"].quadrature_image(truth, shadow_scale=opponent.shadow_scale)
-                sightings += [_sighting(stage, opponent, layer, getattr(image, layer)) for layer in stage.masks]
-    return tuple(sightings)
+    look = _single_scatter_seen if mutation is not None and mutation.estimator == "single-scatter" else _quadrature_seen
+    # A mutation may divide by zero or overflow: its image shows that.
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")
+        return tuple(sighting for stage in stages for sighting in look(copies, stage))
 
 
 def copies_with(mutation: Mutation | None) -> ModuleCopies:
     """Return copies of an estimator's modules with one mutation in them, or with none."""
     if mutation is None:
-        return ModuleCopies("analytic.panels", module_source("analytic.panels"), TOPS)
-    return ModuleCopies(mutation.module, replaced_once(mutation.module, mutation.old, mutation.new), TOPS)
+        return ModuleCopies("analytic.panels", module_source("analytic.panels"), TOPS["quadrature"])
+    source = replaced_once(mutation.module, mutation.old, mutation.new)
+    return ModuleCopies(mutation.module, source, TOPS[mutation.estimator])
 
 
-def _sighting(stage: Stage, opponent: Opponent, layer: str, image: NDArray[np.float64]) -> Sighting:
-    mask = stage.masks[layer]
-    found = _statistics(opponent, layer, image, mask)
+def _quadrature_seen(copies: ModuleCopies, stage: Stage) -> Iterator[Sighting]:
+    """Compare a changed quadrature with every opponent."""
+    truth = copies["reference.scene"].read_truth(stage.scene)
+    for opponent in stage.opponents:
+        images = copies["reference.quadrature"].quadrature_image(truth, shadow_scale=opponent.shadow_scale)
+        for layer, mask in stage.masks.items():
+            image, unchanged = getattr(images, layer), getattr(opponent.image, layer)
+            found = image_statistics(opponent, layer, image, mask)
+            yield _sighting(stage, layer, opponent.estimator, found, _change(image, unchanged, mask))
+
+
+def _single_scatter_seen(copies: ModuleCopies, stage: Stage) -> Iterator[Sighting]:
+    """Compare a changed single-scatter with the quadrature, by as many batches as the unchanged one has."""
+    opponent = next(one for one in stage.opponents if one.estimator == "single-scatter")
+    truth = copies["reference.scene"].read_truth(stage.scene)
+    batch = copies["reference.single_scatter"].single_scatter_batch
+    batches = distance_batches(batch, truth, len(opponent.batches.seeds))
+    for layer, mask in stage.masks.items():
+        # The same seeds: what differs is the mutation, but for noise where paths part.
+        change = _change(layer_mean(batches, layer, mask), layer_mean(opponent.batches, layer, mask), mask)
+        yield _sighting(stage, layer, "quadrature", batch_statistics(opponent, layer, batches, mask), change)
+
+
+def _change(image: Array, unchanged: Array, mask: NDArray[np.bool_]) -> tuple[float, int]:
+    """Return the relative change of the sum over the pixels that are finite, and how many are not."""
     finite = np.isfinite(image).all(axis=2) & mask
-    nonfinite = int(mask.sum() - finite.sum())
-    true_bias = (
-        float(image[finite].sum() / getattr(opponent.image, layer)[finite].sum() - 1) if finite.any() else np.nan
-    )
-    interval = _widest(found)
+    change = float(image[finite].sum() / unchanged[finite].sum() - 1) if finite.any() else float("nan")
+    return change, int(mask.sum() - finite.sum())
+
+
+def _sighting(stage: Stage, layer: str, against: str, found: Statistics, change: tuple[float, int]) -> Sighting:
+    (true_bias, nonfinite), interval, margin = change, widest(found), found.margin or 0.0
     return Sighting(
-        stage.name,
-        stage.name in SCENES,
-        layer,
-        opponent.estimator,
-        opponent.margin,
-        true_bias,
-        found.relative_bias,
-        interval,
-        found.detectable_bias,
-        1.0 if nonfinite else _chance(true_bias, interval, opponent.margin),
-        nonfinite,
-        found.rejected,
-        found.expected_rejections,
-        bool(found.equivalent) and nonfinite == 0,
+        scene=stage.name,
+        built_in=stage.name in SCENES,
+        layer=layer,
+        against=against,
+        margin=margin,
+        true_bias=true_bias,
+        relative_bias=found.relative_bias,
+        interval=interval,
+        detectable_bias=found.detectable_bias,
+        chance=1.0 if nonfinite else _chance(true_bias, interval, margin),
+        nonfinite=nonfinite,
+        rejected=found.rejected,
+        expected_rejections=found.expected_rejections,
+        agrees=bool(found.equivalent) and nonfinite == 0,
     )
-
-
-def _statistics(opponent: Opponent, layer: str, image: NDArray[np.float64], mask: NDArray[np.bool_]) -> Statistics:
-    """Compare an image without random error with the batches of an opponent."""
-    number, batches = LAYERS.index(layer), opponent.batches
-    estimate = Estimate(
-        batches.mean[number].reshape(image.shape),
-        batches.standard_error[number].reshape(image.shape),
-        len(batches.seeds),
-        # The batch means are those of whole images.
-        batches.totals[:, number] if mask.all() else None,
-    )
-    return compare_statistics(estimate, Estimate(image), mask=mask, margin=opponent.margin)
-
-
-def _widest(found: Statistics) -> tuple[float, float]:
-    intervals = [found.relative_bias_ci, found.relative_bias_ci_batches]
-    return max((pair for pair in intervals if pair is not None), key=lambda pair: pair[1] - pair[0])
 
 
 def _chance(bias: float, interval: tuple[float, float], margin: float) -> float:
@@ -297,9 +242,10 @@ def _clearness(one: Sighting) -> tuple[bool, bool, float]:
 
 
 def _reason(mutation: Mutation, sightings: Sequence[Sighting]) -> str:
-    most = max(sightings, key=lambda one: abs(one.true_bias))
+    most = max(sightings, key=lambda one: abs(one.true_bias) / one.margin)
     measured = (
-        f"the fault changes {most.scene}, {most.layer}, by {100 * most.true_bias:+.3g} %, no other more"
+        f"the fault changes {most.scene}, {most.layer}, by {100 * most.true_bias:+.3g} %, no other more; "
+        f"its margin there is ±{100 * most.margin:g} %"
         if most.true_bias
         else "no image of theirs changes"
     )

@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Where mutations are tried: small scenes with the unchanged images of every estimator."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.batches import LAYERS, Batches, merged
+from reference.epsilon import measure_shadow_epsilon
+from reference.quadrature import TruthImage
+from reference.scene import TruthScene
+from validation.agreement import MASK_PIXELS, pixel_angle
+from validation.load import load_scene
+from validation.monte_carlo import monte_carlo_batches
+from validation.probe_scenes import PROBES
+from validation.statistics import Estimate, Statistics, compare_statistics
+from validation.truth import truth_image
+
+Array = NDArray[np.float64]
+Batch = Callable[[TruthScene, int, int], Batches]
+
+#: Built-in scenes of the standard run.
+SCENES = ("open-fog", "sphere-spot", "colonnade", "two-pens")
+#: The margin against single-scatter is that against volpath over this: it has so much less noise.
+SHARPER = 10.0
+_LEAST, _MOST = 32, 4096  # batches
+_SAMPLES = 256  # of volpath, a pixel and batch
+_DISTANCES = 64  # of single-scatter, a pixel and batch
+
+
+@dataclass(frozen=True)
+class Opponent:
+    """The batches of an unchanged Monte Carlo estimator, and the unchanged quadrature image of the same integral."""
+
+    estimator: str
+    batches: Batches
+    image: TruthImage
+    shadow_scale: float  #: the share of the leg from the light that both attenuate over
+    margin: float  #: of the relative bias of one against the other
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A scene with the images that a changed estimator is compared with."""
+
+    name: str
+    scene: Any  #: the `mi.Scene`
+    masks: dict[str, NDArray[np.bool_]]  #: pixels to compare, by layer
+    opponents: tuple[Opponent, ...]
+
+
+def loaded_stage(name: str, size: tuple[int, int]):
+    """Load a built-in scene or a probe of `validation.probe_scenes`, as a `mi.Scene` of a size [pixels]."""
+    import mitsuba as mi
+
+    if name not in PROBES:
+        return load_scene(name, size).scene
+    dictionary = PROBES[name]()
+    dictionary["sensor"]["film"] |= {"width": size[0], "height": size[1]}
+    return mi.load_dict(dictionary)
+
+
+def stage_of(name: str, scene, *, margin: float) -> Stage:
+    """Return a Mitsuba scene with its unchanged images; `margin` is that against volpath.
+
+    Both Monte Carlo estimators run until the half width of their intervals is below 0.4 times the margin, as in
+    `validation.agreement`: a rule that looks at the spread alone, so that stopping favours no verdict.
+    """
+    truth = truth_image(scene)
+    near = truth.light_angle <= MASK_PIXELS * pixel_angle(scene)
+    masks = {"airlight": ~near & np.isfinite(truth.airlight).all(axis=2), "surface": np.ones_like(near)}
+    masks = {layer: mask for layer, mask in masks.items() if np.any(getattr(truth, layer) > 0)}
+
+    def volpath(found: Batches) -> Opponent:
+        return Opponent("volpath", found, shortened, shadow_scale, margin)
+
+    def single_scatter(found: Batches) -> Opponent:
+        return Opponent("single-scatter", found, truth, 1.0, margin / SHARPER)
+
+    def enough(opponent: Opponent) -> bool:
+        if len(opponent.batches.seeds) < _LEAST:
+            return False
+        compared = (image_statistics(opponent, layer, getattr(truth, layer), mask) for layer, mask in masks.items())
+        return all(0.5 * np.ptp(widest(one)) < 0.4 * opponent.margin for one in compared)
+
+    shadow_scale = 1 - measure_shadow_epsilon()
+    shortened = truth_image(scene, shadow_scale=shadow_scale)
+
+    def run(name: str, samples: int, opponent: Callable[[Batches], Opponent]) -> Opponent:
+        found = monte_carlo_batches(
+            scene, name, batches=_MOST, samples=samples, enough=lambda batches: enough(opponent(batches))
+        )
+        return opponent(found.batches)
+
+    opponents = run("volpath", _SAMPLES, volpath), run("single-scatter", _DISTANCES, single_scatter)
+    return Stage(name, scene, masks, opponents)
+
+
+def distance_batches(batch: Batch, truth: TruthScene, count: int) -> Batches:
+    """Return as many batches of a copy of single-scatter, with the seeds that the unchanged one has in a `Stage`.
+
+    Parameters
+    ----------
+    batch
+        The copy of `reference.single_scatter.single_scatter_batch`.
+    truth
+        The scene.
+    count
+        How many; seeds count up from 0.
+    """
+    done = batch(truth, 0, _DISTANCES)
+    for seed in range(1, count):
+        done = merged(done, batch(truth, seed, _DISTANCES))
+    return done
+
+
+def image_statistics(opponent: Opponent, layer: str, image: Array, mask: NDArray[np.bool_]) -> Statistics:
+    """Compare a quadrature image that may be changed with the batches of an opponent."""
+    estimate = _estimate(opponent.batches, layer, mask)
+    return compare_statistics(estimate, Estimate(image), mask=mask, margin=opponent.margin)
+
+
+def batch_statistics(opponent: Opponent, layer: str, batches: Batches, mask: NDArray[np.bool_]) -> Statistics:
+    """Compare batches that may be changed with the quadrature image of an opponent."""
+    image = getattr(opponent.image, layer)
+    return compare_statistics(Estimate(image), _estimate(batches, layer, mask), mask=mask, margin=opponent.margin)
+
+
+def layer_mean(batches: Batches, layer: str, mask: NDArray[np.bool_]) -> Array:
+    """Return the mean image of a layer, (height, width, 3)."""
+    return batches.mean[LAYERS.index(layer)].reshape(*mask.shape, 3)
+
+
+def _estimate(batches: Batches, layer: str, mask: NDArray[np.bool_]) -> Estimate:
+    number = LAYERS.index(layer)
+    return Estimate(
+        layer_mean(batches, layer, mask),
+        batches.standard_error[number].reshape(*mask.shape, 3),
+        len(batches.seeds),
+        # The batch means are those of whole images.
+        batches.totals[:, number] if mask.all() else None,
+    )
+
+
+def widest(found: Statistics) -> tuple[float, float]:
+    """Return the wider of the 95 % intervals of the relative bias."""
+    intervals = [found.relative_bias_ci, found.relative_bias_ci_batches]
+    return max((pair for pair in intervals if pair is not None), key=lambda pair: pair[1] - pair[0])
