@@ -156,7 +156,8 @@ def _print_summary(summary: dict[str, Any], *, json: bool) -> None:
     if summary["cached"]:
         print(f"  {summary['cached']} of {batches} batches from the cache")
     if summary["damaged"]:
-        print(f"  {summary['damaged']} damaged files of the cache traced again")
+        files = "file" if summary["damaged"] == 1 else "files"
+        print(f"  {summary['damaged']} damaged {files} of the cache traced again")
     left_out = f"; {summary['masked']} pixels beside a light left out" if summary["masked"] else ""
     worst = f"{100 * summary['worst_error']:.3g} % of the worst pixel"
     print(f"  standard error {100 * summary['pooled_error']:.3g} % of the image, {worst}{left_out}")
