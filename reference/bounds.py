@@ -59,7 +59,7 @@ def read_bounds(shape: Any) -> Bounds:
     parameters = mi.traverse(shape)
     if shape.class_name() == "Sphere":
         return _read_ball(shape, np.array(parameters["to_world"].matrix, dtype=np.float64).reshape(4, 4))
-    if not shape.is_mesh():
+    if not shape.is_mesh() or "vertex_positions" not in parameters:
         raise _refusal(shape, f"is a {shape.class_name()}", "a sphere, a cube or a closed convex mesh")
     vertices = np.array(parameters["vertex_positions"], dtype=np.float64).reshape(-1, 3)
     faces = np.array(parameters["faces"], dtype=np.int64).reshape(-1, 3)
