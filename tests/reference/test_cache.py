@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from reference.cache import cache_folder, cache_key, load_arrays, scene_digest, store_arrays
+from reference.cache import cache_folder, cache_key, drop_arrays, is_kept, load_arrays, scene_digest, store_arrays
 from tests.scenes_for_tests import spot, tiny_scene
 
 
@@ -238,3 +238,38 @@ def test_fields_of_a_truth_image_are_what_the_cache_keeps(variant):
     found = load_arrays(cache_key(scene, "quadrature", {"samples": 16, "shadow_scale": 1.0}))
     assert found is not None
     assert set(found) == {field.name for field in fields(TruthImage)}
+
+
+@pytest.mark.parametrize("change", ["a number", "a name", "a shape", "a kind", "one more", "no digest"])
+def test_content_that_is_not_what_was_stored_counts_as_none(change):
+    """Written by NumPy, so that the archive is whole in itself."""
+    store_arrays("edited", {"a": np.arange(6.0), "b": np.int64(3)})
+    path = cache_folder() / "edited.npz"
+    with np.load(path) as stored:
+        arrays = {name: stored[name] for name in stored.files}
+    if change == "a number":
+        arrays["a"][2] += 1e-12
+    elif change == "a name":
+        arrays["c"] = arrays.pop("b")
+    elif change == "a shape":
+        arrays["a"] = arrays["a"].reshape(2, 3)
+    elif change == "a kind":
+        arrays["a"] = arrays["a"].view(np.int64)
+    elif change == "one more":
+        arrays["c"] = np.zeros(1)
+    else:
+        del arrays["digest"]
+    np.savez(path, **arrays)
+    assert load_arrays("edited") is None
+    assert is_kept("edited")
+
+
+def test_a_file_under_another_name_counts_as_none():
+    """A copy of one scene's truth is not another's."""
+    store_arrays("folder/one", {"a": np.arange(6.0)})
+    (cache_folder() / "folder" / "two.npz").write_bytes((cache_folder() / "folder" / "one.npz").read_bytes())
+    assert load_arrays("folder/one") is not None
+    assert load_arrays("folder/two") is None
+    drop_arrays("folder/one")
+    drop_arrays("folder/one")
+    assert not is_kept("folder/one")

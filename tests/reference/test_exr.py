@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
+import resource
 import struct
 
 import numpy as np
@@ -228,3 +229,20 @@ def test_refuses_luminance_and_chroma(tmp_path):
 def test_magic_number_is_little_endian(tmp_path, image):
     write_exr(tmp_path / "a.exr", image)
     assert struct.unpack("<I", (tmp_path / "a.exr").read_bytes()[:4])[0] == 20000630
+
+
+def test_a_full_disk_names_the_file_and_leaves_it(tmp_path):
+    """OpenEXR says in words what the system said; a limit on the size of a file stands for the disk."""
+    write_exr(tmp_path / "a.exr", Image({"surface": np.zeros((2, 2, 3))}))
+    before = (tmp_path / "a.exr").read_bytes()
+    noise = np.random.default_rng(1).random((64, 64, 3))
+    old = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, old[1]))
+    try:
+        with pytest.raises(OSError, match="File too large") as caught:
+            write_exr(tmp_path / "a.exr", Image({"surface": noise}))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, old)
+    assert caught.value.filename == str(tmp_path / "a.exr")
+    assert [path.name for path in tmp_path.iterdir()] == ["a.exr"]
+    assert (tmp_path / "a.exr").read_bytes() == before

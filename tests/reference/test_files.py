@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import os
+import resource
 import subprocess
 import sys
 
@@ -116,3 +117,18 @@ def test_refuses_targets_that_are_no_files(tmp_path):
     assert not os.path.isfile("/dev/null")
     with pytest.raises(InputError, match="cannot write"):
         write_text("a\0b/c", "x")
+
+
+def test_a_full_disk_names_the_file_and_leaves_it(tmp_path):
+    """A limit on the size of a file stands for the disk; a failed write does not name a file by itself."""
+    write_bytes(tmp_path / "a.bin", b"old")
+    old = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, old[1]))
+    try:
+        with pytest.raises(OSError, match="File too large") as caught:
+            write_bytes(tmp_path / "a.bin", bytes(2000))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, old)
+    assert caught.value.filename == str(tmp_path / "a.bin")
+    assert [path.name for path in tmp_path.iterdir()] == ["a.bin"]
+    assert (tmp_path / "a.bin").read_bytes() == b"old"
