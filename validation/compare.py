@@ -5,12 +5,17 @@ import os
 from dataclasses import dataclass
 from typing import Any
 
-from numpy.typing import ArrayLike
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from analytic.errors import InputError
-from reference.exr import Image, read_exr
+from reference.exr import TOTAL, Image, read_exr
 from reference.exr import layer as image_layer
+from validation.colour_difference import ColourDifference, colour_difference
+from validation.compare_text import colour_lines, errors_lines, flip_line, percent, statistics_lines
+from validation.flip import Flip, flip_hdr
 from validation.metrics import Metrics, error_metrics
+from validation.relative_errors import PublishedErrors, published_errors
 from validation.statistics import Estimate, Statistics, compare_statistics
 
 BATCHES = "airlight:batches"  #: header attribute: how many batch means gave the standard errors
@@ -23,6 +28,11 @@ class Comparison:
     layer: str
     metrics: Metrics
     statistics: Statistics | None  #: None where neither image has standard errors
+    masked: int = 0  #: pixels that the mask leaves out
+    errors: PublishedErrors | None = None  #: as other tools print them
+    errors_normalised: PublishedErrors | None = None  #: the same with the mean of the reference as the unit
+    colour: ColourDifference | None = None
+    flip: Flip | None = None
 
     @property
     def failures(self) -> tuple[str, ...]:
@@ -39,22 +49,34 @@ class Comparison:
     def to_json(self) -> dict[str, Any]:
         """Return every number by name, those of the metrics first; what is not finite is None.
 
+        The metrics of other tools, the colour differences and FLIP are in objects of their own, where asked for.
         `relative_bias` is the same in the metrics and in the statistics, sum(test - ref) / sum(ref).
         """
         statistics = {} if self.statistics is None else self.statistics.to_json()
-        return {"layer": self.layer, **statistics, **self.metrics.to_json(), "failures": list(self.failures)}
+        extras = {
+            name: getattr(self, name).to_json()
+            for name in ("errors", "errors_normalised", "colour", "flip")
+            if getattr(self, name) is not None
+        }
+        flat = {"layer": self.layer, **statistics, **self.metrics.to_json(), "masked": self.masked}
+        return {**flat, **extras, "failures": list(self.failures)}
 
     def summary(self) -> str:
         """Return the numbers as text, a line for each group."""
         m = self.metrics
         lines = [
-            f"layer            {self.layer}, {m.pixels} pixels, {m.nonfinite} not finite, {m.negative} negative",
-            f"bias             {m.bias:.4g} W/(m^2 sr), relative {_percent(m.relative_bias)}",
-            f"rmse             {m.rmse:.4g} W/(m^2 sr), relative {_percent(m.relative_rmse)}",
+            f"layer            {self.layer}, {m.pixels} pixels, {self.masked} masked, {m.nonfinite} not finite, "
+            f"{m.negative} negative",
+            f"bias             {m.bias:.4g} W/(m^2 sr), relative {percent(m.relative_bias)}",
+            f"rmse             {m.rmse:.4g} W/(m^2 sr), relative {percent(m.relative_rmse)}",
             f"relative error   p50 {m.p50:.3g}, p99 {m.p99:.3g}, max {m.max:.3g}",
         ]
         if self.statistics is not None:
-            lines += _statistics_lines(self.statistics)
+            lines += statistics_lines(self.statistics)
+        for errors in (self.errors, self.errors_normalised):
+            lines += [] if errors is None else errors_lines(errors)
+        lines += [] if self.colour is None else colour_lines(self.colour)
+        lines += [] if self.flip is None else [flip_line(self.flip)]
         return "\n".join(lines + [f"failed           {reason}" for reason in self.failures])
 
 
@@ -65,6 +87,9 @@ def compare_images(
     layer: str = "airlight",
     mask: ArrayLike | None = None,
     margin: float | None = None,
+    all_metrics: bool = False,
+    flip: bool = False,
+    exposure: float | None = None,
 ) -> Comparison:
     """Compare a layer of two images.
 
@@ -81,13 +106,22 @@ def compare_images(
         Pixels to compare, (height, width) of truth values; all by default.
     margin
         Largest relative bias that counts as agreement, such as 0.005; wants standard errors.
+    all_metrics
+        Also the errors by the formulae of other tools (`published_errors`) and the colour differences.
+    flip
+        Also HDR-FLIP, in a child process; what goes wrong with it is a note.
+    exposure
+        Of the colour differences and of FLIP [stops]; each chooses its own from the reference by default.
 
     Raises
     ------
     InputError
-        If a layer is not there, the sizes differ, or a standard error is negative or not finite.
+        If a layer is not there, the sizes differ, a standard error is negative or not finite, or an exposure is given
+        for nothing.
     """
-    return _compare(("the reference", reference), ("the test image", test), name=layer, mask=mask, margin=margin)
+    extras = _Extras(all_metrics, flip, exposure)
+    names = ("the reference", reference), ("the test image", test)
+    return _compare(*names, name=layer, mask=mask, margin=margin, extras=extras)
 
 
 def compare_files(
@@ -95,9 +129,18 @@ def compare_files(
     test: str | os.PathLike[str],
     layer: str = "airlight",
     *,
+    mask: str | os.PathLike[str] | None = None,
     margin: float | None = None,
+    all_metrics: bool = False,
+    flip: bool = False,
+    exposure: float | None = None,
 ) -> Comparison:
     """Compare a layer of two EXR files (see `compare_images`); messages name the file.
+
+    Parameters
+    ----------
+    mask
+        An EXR file; pixels whose R, G and B (or Y) are all zero there are left out.
 
     Raises
     ------
@@ -105,13 +148,32 @@ def compare_files(
         Also if a file is missing, broken or of a kind that is not read.
     """
     one, two = read_exr(reference), read_exr(test)
-    return _compare((str(reference), one), (str(test), two), name=layer, mask=None, margin=margin)
+    chosen = None if mask is None else _read_mask(mask)
+    names = (str(reference), one), (str(test), two)
+    return _compare(*names, name=layer, mask=chosen, margin=margin, extras=_Extras(all_metrics, flip, exposure))
+
+
+@dataclass(frozen=True)
+class _Extras:
+    """What is computed beside the metrics and the statistics."""
+
+    all_metrics: bool
+    flip: bool
+    exposure: float | None
 
 
 def _compare(
-    one: tuple[str, Image], two: tuple[str, Image], *, name: str, mask: ArrayLike | None, margin: float | None
+    one: tuple[str, Image],
+    two: tuple[str, Image],
+    *,
+    name: str,
+    mask: ArrayLike | None,
+    margin: float | None,
+    extras: _Extras,
 ) -> Comparison:
     """Compare a layer of two images that have names."""
+    if extras.exposure is not None and not (extras.all_metrics or extras.flip):
+        raise InputError("an exposure is for the colour differences and FLIP; ask for all metrics or for FLIP too")
     reference, test = (_estimate(path, image, name) for path, image in (one, two))
     metrics = error_metrics(reference.mean, test.mean, mask=mask)
     statistics = None
@@ -122,7 +184,26 @@ def _compare(
             f"a margin wants standard errors, and neither {one[0]} nor {two[0]} has a layer '{name}_se'; "
             "leave the margin out, or make the reference by Monte Carlo"
         )
-    return Comparison(name, metrics, statistics)
+    images: tuple[ArrayLike, ArrayLike] = (reference.mean, test.mean)
+    wanted = extras.all_metrics
+    return Comparison(
+        name,
+        metrics,
+        statistics,
+        masked=0 if mask is None else int((~np.asarray(mask)).sum()),
+        errors=published_errors(*images, mask=mask) if wanted else None,
+        errors_normalised=published_errors(*images, mask=mask, unit=None) if wanted else None,
+        colour=colour_difference(*images, mask=mask, exposure=extras.exposure) if wanted else None,
+        flip=flip_hdr(*images, mask=mask, exposure=extras.exposure) if extras.flip else None,
+    )
+
+
+def _read_mask(path: str | os.PathLike[str]) -> NDArray[np.bool_]:
+    """Return where the plain channels of an EXR file are not zero."""
+    values = np.asarray(image_layer(read_exr(path), TOTAL, path))
+    if not np.isfinite(values).all():
+        raise InputError(f"{path} as a mask has values that are not finite; wanted 0 for out and 1 for in")
+    return (values != 0).any(axis=2)
 
 
 def _estimate(path: str, image: Image, name: str) -> Estimate:
@@ -132,30 +213,3 @@ def _estimate(path: str, image: Image, name: str) -> Estimate:
     if batches is not None and not isinstance(batches, int):
         raise InputError(f"{path} has the attribute {BATCHES} {batches!r}; wanted an integer; correct it or remove it")
     return Estimate(image_layer(image, name, path), error, batches)
-
-
-def _statistics_lines(s: Statistics) -> list[str]:
-    """Return the statistics as text."""
-    low, high = s.relative_bias_ci
-    lines = [
-        f"relative bias    95 % interval {_percent(low)} to {_percent(high)}; {_percent(s.detectable_bias)} would have "
-        "been found (90 % power, 5 % level)",
-    ]
-    if s.relative_bias_ci_batches is not None:
-        low, high = s.relative_bias_ci_batches
-        lines.append(f"  by batches     95 % interval {_percent(low)} to {_percent(high)}")
-    if s.equivalent is not None and s.margin is not None:
-        lines.append(f"margin           +-{_percent(s.margin)}: {'inside' if s.equivalent else 'NOT inside'}")
-    return [
-        *lines,
-        f"z                mean {s.z_mean:.3f}, standard deviation {s.z_std:.3f}, {s.tested} values; "
-        f"{s.zero_variance} without variance differ by up to {s.zero_variance_error:.3g} of the mean",
-        f"rejected         {s.rejected} pixels, {s.expected_rejections:.2g} expected (Sidak level {s.family_level:g}); "
-        f"{s.rejected_blocks} of {s.blocks} blocks",
-        f"exceeding        {s.exceeding} values, {s.expected_exceeding:.0f} expected (level {s.plain_level:g}), "
-        f"p = {s.exceeding_p:.3g}; p-values uniform: p = {s.uniformity_p:.3g}",
-    ]
-
-
-def _percent(value: float) -> str:
-    return f"{100 * value:.4g} %"

@@ -109,7 +109,7 @@ def test_many_null_comparisons(batches, noisy_reference):
 
 @pytest.mark.statistical
 def test_two_images_of_few_batches_are_judged_too_mildly():
-    """Welch's degrees of freedom are themselves estimated: with 4 batches on either side 0.7 % exceed instead of 1 %."""
+    """Welch's degrees of freedom are estimates too: with 4 batches on either side 0.7 % exceed instead of 1 %."""
     found = calibrate(runs=400, batches=4, noisy_reference=True, seed=34)
     assert 0.005 < found.exceeding < 0.008
     assert found.pixel_alarms <= share_interval(0.01, found.runs, 1e-4)[1]

@@ -6,8 +6,10 @@ import pytest
 
 from analytic.errors import InputError
 from reference.exr import Image, write_exr
+from validation.colour_difference import colour_difference
 from validation.compare import compare_files, compare_images
 from validation.metrics import error_metrics
+from validation.relative_errors import published_errors
 
 SHAPE = (9, 12, 3)
 # The keys that the design promises to scripts.
@@ -101,6 +103,8 @@ def test_mask(pair):
     comparison = compare_images(*pair, mask=mask)
     assert comparison.metrics.pixels == 24
     assert comparison.statistics.tested == 72
+    assert (comparison.masked, comparison.statistics.masked, comparison.to_json()["masked"]) == (84, 84, 84)
+    assert "24 pixels, 84 masked" in comparison.summary()
 
 
 def test_summary_is_plain_text(pair):
@@ -122,6 +126,59 @@ def test_files(pair, tmp_path):
     total = compare_files(tmp_path / "a.exr", tmp_path / "b.exr", "total")
     assert total.statistics is None
     assert total.metrics.pixels == 108
+
+
+def test_a_mask_from_a_file(pair, tmp_path):
+    mask = np.zeros(SHAPE, dtype=np.float32)
+    mask[3:5, :, 1] = 1
+    for name, image in zip("abm", (*pair, Image({"total": mask}))):
+        write_exr(tmp_path / f"{name}.exr", image)
+    comparison = compare_files(tmp_path / "a.exr", tmp_path / "b.exr", mask=tmp_path / "m.exr")
+    assert (comparison.metrics.pixels, comparison.masked) == (24, 84)
+    mask[0, 0, 0] = np.nan
+    write_exr(tmp_path / "m.exr", Image({"total": mask}))
+    with pytest.raises(InputError, match=r"m\.exr as a mask has values that are not finite"):
+        compare_files(tmp_path / "a.exr", tmp_path / "b.exr", mask=tmp_path / "m.exr")
+
+
+def test_zero_reference_and_both_variances_are_shown(pair):
+    reference, test = pair
+    dark = reference.layers["airlight"].copy()
+    dark[0] = 0
+    comparison = compare_images(Image({**reference.layers, "airlight": dark}), test)
+    assert comparison.to_json()["zero_reference"] == 36
+    assert "zero reference   36 values, the test image there up to" in comparison.summary()
+    assert "variance         100 % of it the reference's" in comparison.summary()
+
+
+def test_all_metrics_are_those_of_their_modules(pair):
+    comparison = compare_images(*pair, all_metrics=True, exposure=-1.0)
+    one, two = (image.layers["airlight"] for image in pair)
+    assert comparison.errors == published_errors(one, two)
+    assert comparison.errors_normalised == published_errors(one, two, unit=None)
+    assert comparison.colour == colour_difference(one, two, exposure=-1.0)
+    values = json.loads(json.dumps(comparison.to_json(), allow_nan=False))
+    assert values["errors"]["mrse_pbrt"] == comparison.errors.mrse_pbrt
+    assert values["colour"]["exposure"] == -1
+    assert "flip" not in values
+    assert set(METRIC_KEYS + STATISTIC_KEYS) <= values.keys()
+    text = comparison.summary()
+    for part in ("mrse_pbrt", "smape", "CIEDE2000", "Delta E ITP", "-1.00 stops", "dark values"):
+        assert part in text
+    assert max(map(len, text.splitlines())) <= 132
+
+
+def test_flip_that_fails_is_a_note_and_no_failure(pair):
+    comparison = compare_images(Image({"airlight": np.zeros(SHAPE)}), pair[1], flip=True)
+    assert comparison.flip.value is None
+    assert comparison.failures == ()
+    assert "HDR-FLIP         none: the reference is black" in comparison.summary()
+    assert comparison.to_json()["flip"]["note"].startswith("the reference is black")
+
+
+def test_an_exposure_for_nothing_is_refused(pair):
+    with pytest.raises(InputError, match="exposure is for the colour differences and FLIP"):
+        compare_images(*pair, exposure=1.0)
 
 
 def test_messages_name_the_file(pair, tmp_path):

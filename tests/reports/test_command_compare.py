@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import json
+
+import numpy as np
+import pytest
+
+from reference.exr import Image, write_exr
+from reports.cli import run
+
+SHAPE = (16, 20, 3)
+
+
+@pytest.fixture
+def files(tmp_path):
+    """Write a reference with standard errors of 2 %, a test image that is 1 % too bright, and a mask."""
+    rng = np.random.default_rng(4)
+    truth = rng.gamma(2.0, 0.3, SHAPE)
+    error = 0.02 * truth
+    layers = {"airlight": truth + error * rng.standard_normal(SHAPE), "airlight_se": error}
+    mask = np.ones(SHAPE)
+    mask[:2] = 0
+    for name, image in (
+        ("reference", Image(layers, attributes={"airlight:batches": 32})),
+        ("test", Image({"airlight": 1.01 * truth})),
+        ("mask", Image({"total": mask})),
+    ):
+        write_exr(tmp_path / f"{name}.exr", image)
+    return [str(tmp_path / "reference.exr"), str(tmp_path / "test.exr")], str(tmp_path / "mask.exr")
+
+
+def test_the_margin_decides(files, capsys):
+    images, _ = files
+    assert run(["compare", *images, "--margin", "0.03", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["equivalent"] is True
+    assert run(["compare", *images, "--margin", "0.001"]) == 1
+    assert "not shown to be within +-0.001" in capsys.readouterr().out
+    assert run(["compare", *images]) == 0
+
+
+def test_everything_at_once(files, capsys):
+    images, mask = files
+    assert run(["compare", *images, "--mask", mask, "--metrics", "all", "--flip", "--exposure", "-0.5", "--json"]) == 0
+    values = json.loads(capsys.readouterr().out)
+    assert (values["pixels"], values["masked"]) == (14 * 20, 2 * 20)
+    assert values["errors"]["values"] == 14 * 20 * 3
+    assert values["errors_normalised"]["unit"] != 1
+    assert values["colour"]["exposure"] == -0.5
+    # With a note where the package is missing, with a value where it is not.
+    assert (values["flip"]["value"] is None) == bool(values["flip"]["note"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--metrics", "some"], "--metrics some; wanted 'basic' or 'all'"),
+        (["--exposure", "1"], "an exposure is for the colour differences and FLIP"),
+        (["--margin", "0"], "margin: got 0.0, wanted a relative bias above 0"),
+        (["--mask", "nowhere.exr"], "nowhere.exr"),
+    ],
+)
+def test_wrong_options_are_refused(files, capsys, arguments, message):
+    assert run(["compare", *files[0], *arguments]) == 2
+    assert message in capsys.readouterr().err
