@@ -3,8 +3,9 @@
 
 A bounded medium is a closed shape with the material `null` that names the media on both sides; it neither reflects nor
 refracts. A ray is followed from one such boundary to the next with `ray_intersect`, and the media are the scene's own
-pointers. Each stretch lies in the medium on the near side of the boundary at its end, so neither the light nor the
-camera need to say which medium they are in for the boundaries to be counted.
+pointers. A boundary met a second time by rounding says the same again. One missed close to the end of a leg, where the
+point lies in or just beneath it, costs a stretch as short as that, since what is counted is the medium that the leg is
+in, from the light on, never the one that the point is thought to be in.
 
 Stretches are measured along the one straight ray, from the light to the point: what a continued ray is moved beyond a
 boundary, so that it does not meet it again, is never left out of the optical depth. Visibility rays stop a relative
@@ -18,7 +19,7 @@ from typing import Any
 from analytic.errors import InputError
 
 _SHORT_OF_POINT = 1e-5  # relative: a hundred roundings of single precision
-_BEYOND = 2e-5  # of the largest coordinate: how far beyond a boundary a ray goes on
+_BEYOND = 2e-6  # of the largest coordinate: how far beyond a boundary a ray goes on; thinner media are not seen
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,14 @@ class Surroundings:
     scene: Any  #: the `mi.Scene`
     surfaces: bool  #: there are shapes
     bounded: bool  #: some of them are boundaries of media
+
+
+@dataclass(frozen=True)
+class Leg:
+    """The media at the ends of legs from a light to points."""
+
+    start: Any  #: pointer to the medium at the light; what is beyond, the boundaries say
+    end_sigma_t: Any  #: extinction at the points [1/m], that of the whole leg where nothing bounds a medium
 
 
 def read_surroundings(scene) -> tuple[Surroundings, list[Any]]:
@@ -97,7 +106,37 @@ def step_beyond(point):
     return _BEYOND * (1 + dr.max(dr.abs(point)))
 
 
-def transmittance(around: Surroundings, start, direction, distance, end_sigma_t, active):
+def medium_at(around: Surroundings, position, known_position, known_medium, active):
+    """Return the medium at a point, a light's, from the one at another, a camera's: pointers.
+
+    The way to the other point is followed, through surfaces too, to the first boundary, which names the medium on its
+    near side; where there is none both points lie in the same medium.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    way = known_position - position
+    distance = dr.norm(way)
+    direction = way / dr.maximum(distance, 1e-30)
+
+    def walk(walking, done, medium):
+        ray = mi.Ray3f(position + direction * done, direction, distance - done, 0.0, [])
+        hit = around.scene.ray_intersect(ray, walking)
+        met = walking & hit.is_valid()
+        found = met & hit.is_medium_transition()
+        medium = dr.select(found, hit.target_medium(-direction), medium)
+        done = dr.select(met, done + hit.t + step_beyond(hit.p), done)
+        return met & ~found & (done < distance), done, medium
+
+    state = (
+        mi.Bool(active),
+        dr.zeros(mi.Float, dr.width(distance)),
+        dr.select(active, known_medium, dr.zeros(mi.MediumPtr)),
+    )
+    return dr.while_loop(state, lambda walking, *_: walking, walk, label="medium at a light")[-1]
+
+
+def transmittance(around: Surroundings, start, direction, distance, *, media: Leg, active):
     """Return the transmittance from a light to points at a distance; 0 where something is in between.
 
     Parameters
@@ -106,8 +145,8 @@ def transmittance(around: Surroundings, start, direction, distance, end_sigma_t,
         What rays can meet.
     start, direction, distance
         The light, the unit vector to the point, and how far it is [m].
-    end_sigma_t
-        Extinction of the medium at the point [1/m].
+    media
+        The media at both ends.
     active
         Mask.
     """
@@ -115,29 +154,33 @@ def transmittance(around: Surroundings, start, direction, distance, end_sigma_t,
     import mitsuba as mi
 
     reach = distance * (1 - _SHORT_OF_POINT)
-    whole = dr.exp(-end_sigma_t * distance)
-    if not around.surfaces:
-        return whole
     if not around.bounded:
+        whole = dr.exp(-media.end_sigma_t * distance)
+        if not around.surfaces:
+            return whole
         blocked = around.scene.ray_test(mi.Ray3f(start, direction, reach, 0.0, []), active)
         return dr.select(blocked, 0, whole)
 
-    def walk(walking, lit, done, boundary, depth):
+    def walk(walking, lit, done, boundary, medium, depth):
         """Go to the next thing on the way, `done` being where the ray starts, `boundary` the last change of medium."""
-        ray = mi.Ray3f(start + direction * done, direction, reach - done, 0.0, [])
+        ray = mi.Ray3f(start + direction * done, direction, distance - done, 0.0, [])
         hit = around.scene.ray_intersect(ray, walking)
         met = walking & hit.is_valid()
-        passed = is_boundary(hit, met)
-        lit &= ~met | passed
-        changes = passed & hit.is_medium_transition()
-        _, sigma_t = coefficients(hit.target_medium(-direction), changes)
         there = done + hit.t
+        passed = is_boundary(hit, met)
+        lit &= ~met | passed | (there > reach)
+        changes = passed & hit.is_medium_transition()
+        _, sigma_t = coefficients(medium, changes)
         depth = dr.select(changes, depth + sigma_t * (there - boundary), depth)
         boundary = dr.select(changes, there, boundary)
+        medium = dr.select(changes, hit.target_medium(direction), medium)
         done = dr.select(passed, there + step_beyond(hit.p), done)
-        return passed & (done < reach), lit, done, boundary, depth
+        return passed & (done < distance), lit, done, boundary, medium, depth
 
     zero = dr.zeros(mi.Float, dr.width(distance))
-    state = (mi.Bool(active), mi.Bool(active), zero, mi.Float(zero), dr.zeros(type(end_sigma_t)))
-    _, lit, _, boundary, depth = dr.while_loop(state, lambda walking, *_: walking, walk, label="leg through media")
-    return dr.select(lit, dr.exp(-depth - end_sigma_t * (distance - boundary)), 0)
+    medium = dr.select(active, media.start, dr.zeros(mi.MediumPtr))
+    state = (mi.Bool(active), mi.Bool(active), zero, mi.Float(zero), medium, dr.zeros(mi.Spectrum, dr.width(distance)))
+    final = dr.while_loop(state, lambda walking, *_: walking, walk, label="leg through media")
+    _, lit, _, boundary, medium, depth = final
+    _, sigma_t = coefficients(medium, lit)
+    return dr.select(lit, dr.exp(-depth - sigma_t * (distance - boundary)), 0)

@@ -13,43 +13,19 @@ In a scene whose extinction depends on the channel all channels use the same dis
 over the channels, so that no channel's variance can become infinite.
 """
 
-import math
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-
-from analytic.errors import InputError
 from reference.boundary_walk import (
-    Surroundings,
+    Leg,
     coefficients,
     is_boundary,
-    read_surroundings,
-    require_homogeneous,
+    medium_at,
     step_beyond,
     transmittance,
 )
 from reference.distance_sampling import Span, closest_approach, cone_ends, mixture_of, sample_distance
-
-
-@dataclass(frozen=True)
-class Light:
-    """A light as far as sampling must know it; what it sends where is the emitter's answer."""
-
-    emitter: Any  #: Mitsuba's emitter
-    position: Any  #: of double precision [m]
-    axis: Any = None  #: spot: unit vector of double precision
-    cutoff: float = math.pi  #: spot: half angle of the cone [rad]
-
-
-@dataclass(frozen=True)
-class Task:
-    """What is fixed while a scene is traced."""
-
-    around: Surroundings
-    lights: tuple[Light, ...]
-    samples: int  #: distances for each ray, light and medium
-    grey: bool  #: no medium's extinction depends on the channel
+from reference.scatter_task import Light, Task
 
 
 @dataclass(frozen=True)
@@ -72,6 +48,7 @@ class _Stretch:
     medium: Any  #: pointer
     sigma_s: Any  #: [1/m]
     sigma_t: Any  #: [1/m]
+    at_lights: tuple[Any, ...]  #: pointers to the media in which the lights are
 
 
 def double_ray(origin, direction) -> Ray:
@@ -83,64 +60,13 @@ def double_ray(origin, direction) -> Ray:
     return Ray(mi.Point3f(origin), dr.normalize(mi.Vector3f(direction)), origin, direction)
 
 
-def read_task(scene, medium, samples: int) -> Task:
-    """Read what the estimator needs from a Mitsuba scene.
-
-    Parameters
-    ----------
-    scene
-        The `mi.Scene`.
-    medium
-        What camera rays start in: a Mitsuba medium, a pointer to one, or None for a vacuum.
-    samples
-        Distances for each ray, light and medium.
-
-    Raises
-    ------
-    InputError
-        For an emitter, a medium or a material that it has no answer for.
-    """
-    import mitsuba as mi
-
-    lights = tuple(_read_light(emitter) for emitter in scene.emitters())
-    around, media = read_surroundings(scene)
-    if isinstance(medium, mi.Medium):
-        require_homogeneous(medium)
-        media = [*media, medium]
-    known = medium is None or isinstance(medium, mi.Medium)
-    return Task(around, lights, samples, grey=known and all(_is_grey(one) for one in media))
-
-
-def _is_grey(medium) -> bool:
-    import mitsuba as mi
-
-    _, sigma_t = coefficients(mi.MediumPtr(medium), mi.Bool(True))
-    return len({float(np.ravel(channel)[0]) for channel in sigma_t}) == 1
-
-
-def _read_light(emitter) -> Light:
-    import drjit as dr
-    import mitsuba as mi
-
-    name = emitter.class_name()
-    if name not in ("PointLight", "SpotLight"):
-        raise InputError(f"single-scatter: the scene has an emitter of class {name}; wanted 'point' or 'spot' only")
-    sample, _ = emitter.sample_direction(dr.zeros(mi.Interaction3f), mi.Point2f(0.5))
-    position = mi.Point3d(sample.p)
-    if name == "PointLight":
-        return Light(emitter, position)
-    axis = dr.normalize(mi.Vector3d(emitter.world_transform() @ mi.Vector3f(0, 0, 1)))
-    cutoff = float(np.ravel(mi.traverse(emitter)["cutoff_angle"])[0])
-    return Light(emitter, position, axis, math.radians(cutoff))
-
-
 def ray_light(task: Task, sampler, ray: Ray, medium, active) -> tuple[Any, Any]:
     """Return airlight and lit surface along camera rays [W/(m^2 sr)].
 
     Parameters
     ----------
     task
-        See `read_task`.
+        See `reference.scatter_task`.
     sampler
         Mitsuba's sampler, with one stream for each ray.
     ray
@@ -160,7 +86,8 @@ def ray_light(task: Task, sampler, ray: Ray, medium, active) -> tuple[Any, Any]:
     if task.around.bounded:
         return _through_media(task, sampler, ray, medium, active)
     nothing = dr.zeros(mi.Spectrum, dr.width(active))
-    stretch = _Stretch(mi.Float(0), mi.Float(dr.inf), nothing, medium, *coefficients(medium, active))
+    at_lights = (medium,) * len(task.lights)
+    stretch = _Stretch(mi.Float(0), mi.Float(dr.inf), nothing, medium, *coefficients(medium, active), at_lights)
     if not task.around.surfaces:
         return _airlight(task, sampler, ray, stretch, active), nothing
     hit = task.around.scene.ray_intersect(mi.Ray3f(ray.origin, ray.direction), active)
@@ -180,7 +107,7 @@ def _through_media(task: Task, sampler, ray: Ray, medium, active) -> tuple[Any, 
         hit = task.around.scene.ray_intersect(onward, walking)
         met = walking & hit.is_valid()
         end = dr.select(met, done + hit.t, dr.inf)
-        stretch = _Stretch(start, end, depth, medium, *coefficients(medium, walking))
+        stretch = _Stretch(start, end, depth, medium, *coefficients(medium, walking), at_lights)
         airlight = airlight + _airlight(task, sampler, ray, stretch, walking)
         passed = is_boundary(hit, met)
         surface = surface + _surface(task, hit, stretch, met & ~passed)
@@ -190,6 +117,8 @@ def _through_media(task: Task, sampler, ray: Ray, medium, active) -> tuple[Any, 
         done = dr.select(passed, end + step_beyond(hit.p), done)
         return passed, sampler, done, dr.select(passed, end, start), depth, medium, airlight, surface
 
+    places = [mi.Point3f(light.position) for light in task.lights]
+    at_lights = tuple(medium_at(task.around, place, ray.origin, medium, active) for place in places)
     zero, nothing = dr.zeros(mi.Float, dr.width(active)), dr.zeros(mi.Spectrum, dr.width(active))
     medium = dr.select(active, medium, dr.zeros(mi.MediumPtr))
     state = (
@@ -213,16 +142,17 @@ def _airlight(task: Task, sampler, ray: Ray, stretch: _Stretch, active):
 
     total = dr.zeros(mi.Spectrum, dr.width(active))
     active = active & (dr.max(stretch.sigma_s) > 0)
-    for light in task.lights:
-        total += _light_airlight(task, light, sampler, ray, stretch, active)
+    for number in range(len(task.lights)):
+        total += _light_airlight(task, number, sampler, ray, stretch, active)
     return total
 
 
-def _light_airlight(task: Task, light: Light, sampler, ray: Ray, stretch: _Stretch, active):
+def _light_airlight(task: Task, number: int, sampler, ray: Ray, stretch: _Stretch, active):
     """Estimate what one light sends from a stretch of the ray: a loop over the cells of the unit interval."""
     import drjit as dr
     import mitsuba as mi
 
+    light = task.lights[number]
     approach = closest_approach(ray.origin_double, ray.direction_double, light.position)
     height, normal = mi.Float(approach.height), mi.Vector3f(approach.normal)
     first, last = stretch.start - approach.foot, stretch.end - approach.foot
@@ -237,19 +167,19 @@ def _light_airlight(task: Task, light: Light, sampler, ray: Ray, stretch: _Stret
     before = mi.Float(start - first)  # from the start of the stretch to that of the span
     shift = sampler.next_1d(active)
 
-    def add_sample(number, total, sampler):
-        cell, width = _cell(number, shift, task.samples)
+    def add_sample(index, total, sampler):
+        cell, width = _cell(index, shift, task.samples)
         y, s, density = sample_distance(cell + width * sampler.next_1d(active), mixture)
         r = dr.sqrt(height * height + s * s)
         from_light = (normal * height + ray.direction * s) / r
         used = active & (density > 0)
-        sent = _scattered(task, light, ray, stretch, from_light, r, used)
+        sent = _scattered(task, number, ray, stretch, from_light, r, used)
         camera_leg = stretch.depth + stretch.sigma_t * (before + y)
         value = sent * dr.exp(-camera_leg) * (width / (r * r * density))
-        return number + 1, total + dr.select(used, value, 0), sampler
+        return index + 1, total + dr.select(used, value, 0), sampler
 
     state = (mi.UInt32(0), dr.zeros(mi.Spectrum, dr.width(active)), sampler)
-    return dr.while_loop(state, lambda number, *_: number < task.samples, add_sample, label="distances")[1]
+    return dr.while_loop(state, lambda index, *_: index < task.samples, add_sample, label="distances")[1]
 
 
 def _cell(number, shift, count: int) -> tuple[Any, Any]:
@@ -269,11 +199,12 @@ def _cell(number, shift, count: int) -> tuple[Any, Any]:
     return low / (count - 1), (high - low) / (count - 1)
 
 
-def _scattered(task: Task, light: Light, ray: Ray, stretch: _Stretch, from_light, r, active):
+def _scattered(task: Task, number: int, ray: Ray, stretch: _Stretch, from_light, r, active):
     """Return sigma_s p/(4 pi) I V T of points at a distance r from a light, in a unit direction from there."""
     import drjit as dr
     import mitsuba as mi
 
+    light = task.lights[number]
     point = dr.zeros(mi.MediumInteraction3f)
     position = mi.Point3f(light.position)
     point.p = position + from_light * r
@@ -281,7 +212,8 @@ def _scattered(task: Task, light: Light, ray: Ray, stretch: _Stretch, from_light
     point.sh_frame = mi.Frame3f(ray.direction)
     phase, _ = stretch.medium.phase_function().eval_pdf(mi.PhaseFunctionContext(), point, -from_light, active)
     intensity = _intensity(light, point, active)
-    leg = transmittance(task.around, position, from_light, r, stretch.sigma_t, active)
+    media = Leg(stretch.at_lights[number], stretch.sigma_t)
+    leg = transmittance(task.around, position, from_light, r, media=media, active=active)
     return stretch.sigma_s * phase * intensity * leg
 
 
@@ -292,13 +224,14 @@ def _surface(task: Task, hit, stretch: _Stretch, active):
 
     total = dr.zeros(mi.Spectrum, dr.width(active))
     camera_leg = stretch.depth + stretch.sigma_t * dr.select(active, stretch.end - stretch.start, 0)
-    for light in task.lights:
+    for light, medium in zip(task.lights, stretch.at_lights):
         position = mi.Point3f(light.position)
         from_light = hit.p - position
         r = dr.norm(from_light)
         from_light = from_light / r
         material = hit.bsdf().eval(mi.BSDFContext(), hit, hit.to_local(-from_light), active)
-        leg = transmittance(task.around, position, from_light, r, stretch.sigma_t, active)
+        media = Leg(medium, stretch.sigma_t)
+        leg = transmittance(task.around, position, from_light, r, media=media, active=active)
         sent = material * _intensity(light, hit, active) * leg / (r * r)
         total += dr.select(active, sent * dr.exp(-camera_leg), 0)
     return total

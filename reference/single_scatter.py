@@ -19,7 +19,8 @@ import numpy as np
 
 from analytic.errors import InputError
 from reference.batches import LARGEST_BATCH, Batches
-from reference.ray_light import double_ray, ray_light, read_task
+from reference.ray_light import double_ray, ray_light
+from reference.scatter_task import read_task
 from reference.scene import TruthScene
 
 PLUGIN = "single-scatter"
