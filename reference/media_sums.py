@@ -56,6 +56,11 @@ class _Setup:
     def medium(self, number: int) -> TruthMedium:
         return self.truth.medium if number == AMBIENT else self.truth.media[number]
 
+    def by_medium(self, name: str, numbers: Index) -> Array:
+        """Return a property of the media of these numbers, (n, 3)."""
+        media = (*self.truth.media, self.truth.medium)  # AMBIENT is the last
+        return np.stack([getattr(medium, name) for medium in media])[numbers]
+
 
 @dataclass(frozen=True)
 class _Pieces:
@@ -158,8 +163,11 @@ def _cut(setup: _Setup, parts: _Pieces) -> _Pieces:
     ends = np.append(owner[1:] != owner[:-1], True)[: len(owner)]
     end = np.where(ends, parts.x1[owner], np.append(start[1:], 0.0)[: len(owner)])
     begin = np.append(True, ends[:-1])[: len(owner)]
-    origin, direction = setup.truth.origin, rays.direction[parts.ray[owner]]
-    depth = optical_depth(setup.truth, origin, direction, np.zeros(len(owner)), start)
+    before = optical_depth(
+        setup.truth, setup.truth.origin, rays.direction[parts.ray], np.zeros(len(parts.ray)), parts.x0
+    )
+    sigma_t = setup.by_medium("sigma_t", parts.medium[owner])
+    depth = before[owner] + (start - parts.x0[owner])[:, None] * sigma_t
     pieces = _Pieces(
         parts.ray[owner],
         parts.medium[owner],
@@ -211,9 +219,8 @@ class _Sum:
         self.height = np.maximum(setup.rays.height[pieces.ray], np.maximum(_NEAR_ZERO * beside, _AT_LIGHT))
         self.start = np.arcsinh(s0 / self.height)
         self.width = np.arcsinh(s1 / self.height) - self.start
-        media = [*setup.truth.media, setup.truth.medium]  # AMBIENT is the last
-        self.sigma_t = np.stack([medium.sigma_t for medium in media])[pieces.medium]
-        self.factor = np.stack([medium.sigma_t * medium.albedo for medium in media])[pieces.medium]
+        self.sigma_t = setup.by_medium("sigma_t", pieces.medium)
+        self.factor = self.sigma_t * setup.by_medium("albedo", pieces.medium)
         self.chords = [_chord(setup, self, medium) for medium in setup.truth.media]
 
     def axes(self, rows: Index) -> tuple[Array, Array]:
