@@ -17,6 +17,7 @@ import typer
 
 from reports import __version__
 from reports.command_bench import bench
+from reports.command_certify import certify
 from reports.command_compare import compare
 from reports.command_doctor import doctor
 from reports.command_figures import figures
@@ -49,6 +50,7 @@ _COMMANDS = (
     bench,
     stability,
     mutations,
+    certify,
     figures,
 )
 
