@@ -95,7 +95,7 @@ def monte_carlo_reference(
     """
     near = near_light(loaded.scene)
     batches, samples = batch_plan(budget, len(near))
-    watch = _Watch(budget, near, batches, progress)
+    watch = _Watch(budget, near, progress)
     run = monte_carlo_batches(
         loaded.scene,
         estimator,
@@ -115,9 +115,9 @@ def monte_carlo_reference(
 class _Watch:
     """What a run knows of its own progress: the time that it took, and how its error fell."""
 
-    def __init__(self, budget: Budget, near: NDArray[np.bool_], batches: int, progress: Progress | None) -> None:
+    def __init__(self, budget: Budget, near: NDArray[np.bool_], progress: Progress | None) -> None:
         self._budget, self._near, self._progress = budget, near, progress
-        self._expected = batches
+        self._expected = 0  # batches until the target is reached; not known before the first error
         self._words = ""
         self._start = self._last = time.monotonic()
         self._step = 0.0
@@ -143,8 +143,10 @@ class _Watch:
             return
         if self._budget.seconds is not None:
             share = (now - self._start) / self._budget.seconds
+        elif self._budget.samples is not None:
+            share = done / total
         else:
-            share = done / min(total, max(self._expected, done))
+            share = done / max(self._expected, done + 1) if self._expected else 0.0
         self._progress(min(1.0, share), f"{estimator}, {done} batches{self._words}")
 
 
