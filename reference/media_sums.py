@@ -25,8 +25,9 @@ from reference.bounds import Ball, ball_crossings, crossed_facets
 from reference.cone import falloff
 from reference.interval_sums import Rays, cut_at_beam
 from reference.intervals import LitIntervals
-from reference.media import AMBIENT, Segments, leg_kinks, optical_depth
-from reference.scene import BoundedMedium, TruthLight, TruthMedium, TruthScene
+from reference.media import Segments
+from reference.media_pieces import Pieces, Setup, cut_pieces
+from reference.scene import BoundedMedium, TruthLight, TruthScene
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -35,47 +36,10 @@ Chord = Callable[[Index, Array, Array], tuple[Array, Array]]
 RTOL = 1e-9  #: relative tolerance of the sum of a ray and a light
 _PANEL = 2.4  # width in w of the first panels, as in `analytic.panels`
 _HALVINGS = 40
-_UNDERFLOW = 745.0  # optical depth after which nothing is left
 _AT_LIGHT = 1e-290  # height [m] below which a ray meets the light
 _NEAR_ZERO = 1e-15  # height over distance below which a light beside a piece may as well be at this height
 _RAYS = 4096  # rays at once
 _PANELS = 8192  # panels at once
-
-
-@dataclass(frozen=True)
-class _Setup:
-    """What all pieces share."""
-
-    truth: TruthScene
-    light: TruthLight
-    rays: Rays
-    segments: Segments
-    shadow_scale: float
-    edge: float  # relative uncertainty of the distance of an edge between light and shadow
-
-    def medium(self, number: int) -> TruthMedium:
-        return self.truth.medium if number == AMBIENT else self.truth.media[number]
-
-    def by_medium(self, name: str, numbers: Index) -> Array:
-        """Return a property of the media of these numbers, (n, 3)."""
-        media = (*self.truth.media, self.truth.medium)  # AMBIENT is the last
-        return np.stack([getattr(medium, name) for medium in media])[numbers]
-
-
-@dataclass(frozen=True)
-class _Pieces:
-    """Smooth pieces of rays, each in one medium; arrays of shape (n,) and one of (n, 3)."""
-
-    ray: Index
-    medium: Index
-    x0: Array
-    x1: Array
-    first: NDArray[np.bool_]  # begins where a lit interval does
-    last: NDArray[np.bool_]  # ends where a lit interval does
-    depth: Array  # optical depth between camera and x0
-
-    def __getitem__(self, rows) -> "_Pieces":
-        return _Pieces(*(getattr(self, f.name)[rows] for f in fields(self)))
 
 
 def sum_media(
@@ -100,7 +64,7 @@ def sum_media(
         Airlight [W/(m^2 sr)] and a bound of its error, (rays, 3) each; infinite where a ray meets the light inside a
         medium that scatters.
     """
-    setup = _Setup(truth, light, rays, segments, shadow_scale, lit.edge)
+    setup = Setup(truth, light, rays, segments, shadow_scale, lit.edge)
     ray, low, high = cut_at_beam(light, rays, lit)
     foot, height = rays.foot[ray], rays.height[ray]
     x0 = np.maximum(foot + height * np.tan(low), 0.0)
@@ -108,76 +72,12 @@ def sum_media(
     total, bound = np.zeros((len(rays.foot), 3)), np.zeros((len(rays.foot), 3))
     for first in range(0, len(rays.foot), _RAYS):
         chosen = (ray >= first) & (ray < first + _RAYS) & (x1 > x0)
-        pieces = _cut(setup, _parts(setup, ray[chosen], x0[chosen], x1[chosen]))
+        pieces = cut_pieces(setup, ray[chosen], x0[chosen], x1[chosen])
         if len(pieces.ray):
             block = slice(first, first + _RAYS)
             value, error = _Sum(setup, pieces, first, len(rays.foot[block])).adapt()
             total[block], bound[block] = value, error
     return total * light.intensity / (4 * np.pi), bound * light.intensity / (4 * np.pi)
-
-
-def _parts(setup: _Setup, ray: Index, x0: Array, x1: Array) -> _Pieces:
-    """Return what parts of lit intervals lie in each medium, by ray and distance."""
-    parts = []
-    for start, end, medium in zip(setup.segments.start, setup.segments.end, setup.segments.medium):
-        low, high = np.maximum(x0, start[ray]), np.minimum(x1, end[ray])
-        keep = high > low
-        rows, low, high = ray[keep], low[keep], high[keep]
-        parts.append((rows, medium[rows], low, high, low == x0[keep], (high == x1[keep]) & np.isfinite(high)))
-    ray, number, low, high, first, last = (np.concatenate(column) for column in zip(*parts))
-    if np.any(np.isinf(high)):
-        # Only what surrounds the bodies is endless, and only if its extinction is not zero does it scatter.
-        sigma_t = setup.truth.medium.sigma_t
-        reach = np.maximum(low, setup.rays.foot[ray]) + _UNDERFLOW / sigma_t[sigma_t > 0].min()
-        high = np.where(np.isinf(high), reach, high)
-    order = np.lexsort((low, ray))
-    return _Pieces(ray, number, low, high, first, last, np.zeros((len(ray), 3)))[order]
-
-
-def _cut(setup: _Setup, parts: _Pieces) -> _Pieces:
-    """Cut parts of rays, given by ray and distance, at the kinks of the leg from the light and of phase functions."""
-    rays, used = setup.rays, np.unique(parts.ray)
-    axes, height, foot = (rays.direction[used], rays.normal[used]), rays.height[used], rays.foot[used]
-    owners, offsets = [], []
-    for medium in setup.truth.media:
-        row, offset = leg_kinks(medium.bounds, setup.light.position, axes, height)
-        owners.append(row)
-        offsets.append(offset)
-    for phase in (setup.truth.medium.phase, *(medium.phase for medium in setup.truth.media)):
-        kinks = phase.kinks
-        owners.append(np.repeat(np.arange(len(used)), len(kinks)))
-        offsets.append(np.outer(height, -kinks / np.sqrt(1 - kinks**2)).ravel())
-    row = np.concatenate(owners)
-    ray, x = used[row], foot[row] + np.concatenate(offsets)
-    # The part in which each kink lies is the last one that begins before it.
-    everything = np.lexsort((np.concatenate([parts.x0, x]), np.concatenate([parts.ray, ray])))
-    begins = everything < len(parts.ray)
-    part = np.cumsum(begins)[~begins] - 1
-    kink = everything[~begins] - len(parts.ray)
-    inside = (part >= 0) & (parts.ray[part] == ray[kink]) & (parts.x0[part] < x[kink]) & (x[kink] < parts.x1[part])
-    part, x = part[inside], x[kink[inside]]
-    owner = np.concatenate([np.arange(len(parts.ray)), part])
-    start = np.concatenate([parts.x0, x])
-    order = np.lexsort((start, owner))
-    owner, start = owner[order], start[order]
-    ends = np.append(owner[1:] != owner[:-1], True)[: len(owner)]
-    end = np.where(ends, parts.x1[owner], np.append(start[1:], 0.0)[: len(owner)])
-    begin = np.append(True, ends[:-1])[: len(owner)]
-    before = optical_depth(
-        setup.truth, setup.truth.origin, rays.direction[parts.ray], np.zeros(len(parts.ray)), parts.x0
-    )
-    sigma_t = setup.by_medium("sigma_t", parts.medium[owner])
-    depth = before[owner] + (start - parts.x0[owner])[:, None] * sigma_t
-    pieces = _Pieces(
-        parts.ray[owner],
-        parts.medium[owner],
-        start,
-        end,
-        parts.first[owner] & begin,
-        parts.last[owner] & ends,
-        depth,
-    )
-    return pieces[end > start]
 
 
 @dataclass(frozen=True)
@@ -199,8 +99,8 @@ class _Panels:
 class _Sum:
     """The sums of one block of rays."""
 
-    setup: _Setup
-    pieces: _Pieces
+    setup: Setup
+    pieces: Pieces
     first: int  # number of the first ray
     count: int
     foot: Array = field(init=False)
@@ -317,7 +217,7 @@ class _Sum:
         return total
 
 
-def _chord(setup: _Setup, block: _Sum, medium: BoundedMedium) -> Chord:
+def _chord(setup: Setup, block: _Sum, medium: BoundedMedium) -> Chord:
     """Return a function (pieces, sin, cos of the angle at the light) -> where the leg enters and leaves a medium."""
     bounds, light = medium.bounds, setup.light.position
     every = np.arange(len(block.width))

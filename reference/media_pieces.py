@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Smooth pieces of lit intervals in scenes with bounded media.
+
+A piece lies inside of one medium, and the leg from the light passes no corner of a body while the point moves along it
+(`reference.media`); nor does the scattering angle pass a kink of a tabulated phase function.
+"""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.interval_sums import Rays
+from reference.media import AMBIENT, Segments, leg_kinks, optical_depth
+from reference.scene import TruthLight, TruthMedium, TruthScene
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+_UNDERFLOW = 745.0  # optical depth after which nothing is left
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What all pieces share."""
+
+    truth: TruthScene
+    light: TruthLight
+    rays: Rays
+    segments: Segments
+    shadow_scale: float
+    edge: float  # relative uncertainty of the distance of an edge between light and shadow
+
+    def medium(self, number: int) -> TruthMedium:
+        """Return the medium of this number."""
+        return self.truth.medium if number == AMBIENT else self.truth.media[number]
+
+    def by_medium(self, name: str, numbers: Index) -> Array:
+        """Return a property of the media of these numbers, (n, 3)."""
+        media = (*self.truth.media, self.truth.medium)  # AMBIENT is the last
+        return np.stack([getattr(medium, name) for medium in media])[numbers]
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Smooth pieces of rays, each in one medium; arrays of shape (n,) and one of (n, 3)."""
+
+    ray: Index
+    medium: Index
+    x0: Array
+    x1: Array
+    first: NDArray[np.bool_]  # begins where a lit interval does
+    last: NDArray[np.bool_]  # ends where a lit interval does
+    depth: Array  # optical depth between camera and x0
+
+    def __getitem__(self, rows) -> "Pieces":
+        return Pieces(*(getattr(self, f.name)[rows] for f in fields(self)))
+
+
+def cut_pieces(setup: Setup, ray: Index, x0: Array, x1: Array) -> Pieces:
+    """Cut lit intervals [x0, x1] of rays at the bounds of media and at every kink of the integrand."""
+    return _cut(setup, _parts(setup, ray, x0, x1))
+
+
+def _parts(setup: Setup, ray: Index, x0: Array, x1: Array) -> Pieces:
+    """Return what parts of lit intervals lie in each medium, by ray and distance."""
+    parts = []
+    for start, end, medium in zip(setup.segments.start, setup.segments.end, setup.segments.medium):
+        low, high = np.maximum(x0, start[ray]), np.minimum(x1, end[ray])
+        keep = high > low
+        rows, low, high = ray[keep], low[keep], high[keep]
+        parts.append((rows, medium[rows], low, high, low == x0[keep], (high == x1[keep]) & np.isfinite(high)))
+    ray, number, low, high, first, last = (np.concatenate(column) for column in zip(*parts))
+    if np.any(np.isinf(high)):
+        # Only what surrounds the bodies is endless, and only if its extinction is not zero does it scatter.
+        sigma_t = setup.truth.medium.sigma_t
+        reach = np.maximum(low, setup.rays.foot[ray]) + _UNDERFLOW / sigma_t[sigma_t > 0].min()
+        high = np.where(np.isinf(high), reach, high)
+    order = np.lexsort((low, ray))
+    return Pieces(ray, number, low, high, first, last, np.zeros((len(ray), 3)))[order]
+
+
+def _cut(setup: Setup, parts: Pieces) -> Pieces:
+    """Cut parts of rays, given by ray and distance, at the kinks of the leg from the light and of phase functions."""
+    rays, used = setup.rays, np.unique(parts.ray)
+    axes, height, foot = (rays.direction[used], rays.normal[used]), rays.height[used], rays.foot[used]
+    owners, offsets = [], []
+    for medium in setup.truth.media:
+        row, offset = leg_kinks(medium.bounds, setup.light.position, axes, height)
+        owners.append(row)
+        offsets.append(offset)
+    for phase in (setup.truth.medium.phase, *(medium.phase for medium in setup.truth.media)):
+        kinks = phase.kinks
+        owners.append(np.repeat(np.arange(len(used)), len(kinks)))
+        offsets.append(np.outer(height, -kinks / np.sqrt(1 - kinks**2)).ravel())
+    row = np.concatenate(owners)
+    ray, x = used[row], foot[row] + np.concatenate(offsets)
+    # The part in which each kink lies is the last one that begins before it.
+    everything = np.lexsort((np.concatenate([parts.x0, x]), np.concatenate([parts.ray, ray])))
+    begins = everything < len(parts.ray)
+    part = np.cumsum(begins)[~begins] - 1
+    kink = everything[~begins] - len(parts.ray)
+    inside = (part >= 0) & (parts.ray[part] == ray[kink]) & (parts.x0[part] < x[kink]) & (x[kink] < parts.x1[part])
+    part, x = part[inside], x[kink[inside]]
+    owner = np.concatenate([np.arange(len(parts.ray)), part])
+    start = np.concatenate([parts.x0, x])
+    order = np.lexsort((start, owner))
+    owner, start = owner[order], start[order]
+    ends = np.append(owner[1:] != owner[:-1], True)[: len(owner)]
+    end = np.where(ends, parts.x1[owner], np.append(start[1:], 0.0)[: len(owner)])
+    begin = np.append(True, ends[:-1])[: len(owner)]
+    before = optical_depth(
+        setup.truth, setup.truth.origin, rays.direction[parts.ray], np.zeros(len(parts.ray)), parts.x0
+    )
+    sigma_t = setup.by_medium("sigma_t", parts.medium[owner])
+    depth = before[owner] + (start - parts.x0[owner])[:, None] * sigma_t
+    pieces = Pieces(
+        parts.ray[owner],
+        parts.medium[owner],
+        start,
+        end,
+        parts.first[owner] & begin,
+        parts.last[owner] & ends,
+        depth,
+    )
+    return pieces[end > start]
