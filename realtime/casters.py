@@ -139,10 +139,15 @@ def _mesh_part(name: str, vertices: Array, triangles: NDArray[Any]) -> tuple[dic
             f"shape '{name}' has {int(np.sum(met > 2))} edges at which more than two triangles meet: right with "
             "order=exact; order=none and order=paper may count planes twice"
         )
-    if not np.all(closed):
+    if np.any(right == len(triangles)):
         warnings.append(
             f"shape '{name}' is open: its border casts shadow planes too; right with order=exact; order=none and "
             "order=paper count its folds twice"
+        )
+    elif not np.all(closed):
+        warnings.append(
+            f"shape '{name}' has triangles that run both ways round: each is turned to the light; right with "
+            "order=exact; order=none and order=paper count its folds twice"
         )
     part = {
         "vertices": vertices,
