@@ -187,7 +187,7 @@ def _differ(rays: RayValues, of_point: Index) -> Bools:
     nearest, furthest = distance.min(axis=0), np.where(seen, distance, 0).max(axis=0)
     differ = (intervals != intervals[0]).any(axis=0)
     differ |= seen.any(axis=0) & ((furthest > (1 + _DEPTH) * nearest) | ~seen.all(axis=0))
-    return differ | (lit.any(axis=0) & ~lit.all(axis=0))
+    return np.asarray(differ | (lit.any(axis=0) & ~lit.all(axis=0)), dtype=np.bool_)
 
 
 def _to_cut(all_squares: _Squares, found: _Squares, floor: Array, tolerance: float, pixels: int) -> Bools:
@@ -197,7 +197,7 @@ def _to_cut(all_squares: _Squares, found: _Squares, floor: Array, tolerance: flo
     count = np.bincount(all_squares.pixel, minlength=pixels)[found.pixel, None]
     share = np.where(found.edge[:, None], 1 / (_SIGMAS * np.sqrt(count)), 1 / count)
     above = (error > allowed)[found.pixel] & (found.error > share * allowed[found.pixel])
-    return above.any(axis=1)
+    return np.asarray(above.any(axis=1), dtype=np.bool_)
 
 
 def _summed(squares: _Squares, pixels: int) -> tuple[Array, Array, Array]:
