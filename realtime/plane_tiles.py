@@ -256,10 +256,10 @@ def listed(index: PlaneIndex, box: Box, entries, source: Source, *, room: int, o
     count = _visit(index, box, entries, source, None)
     offset = dr.prefix_sum(count) + 0
     fits = offset + count <= room
-    # Lists stand behind the bins, so that a box without one reads on from the bins in the same array.
-    behind = dr.width(index.entries)
+    # Lists stand behind what they were drawn from, so that a box without one reads on from there in the same array.
+    behind = dr.width(entries)
     pool = dr.empty(mi.UInt32, behind + room)
-    dr.scatter(pool, index.entries, dr.arange(mi.UInt32, behind))
+    dr.scatter(pool, entries, dr.arange(mi.UInt32, behind))
     keys, owner = dr.empty(type(box.x), room), dr.empty(mi.UInt32, room)
     dr.eval(pool, keys, owner, count, offset)
 
