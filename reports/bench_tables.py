@@ -20,8 +20,18 @@ _HEADERS = (
     "p99",
     "max",
 )
-_TRUTH_HEADERS = ("volpath against the truth", "samples", "bias", "95 % interval", "detectable", "uncorrected", "agree")
-_TRUTH_TITLE = "volpath against the quadrature truth, corrected for the shadow-ray epsilon; margin +-0.5 %"
+_TRUTH_HEADERS = (
+    "the truth of",
+    "checked by",
+    "samples",
+    "bias",
+    "95 % interval",
+    "margin",
+    "detectable",
+    "uncorrected",
+    "agree",
+)
+_TRUTH_TITLE = "Monte Carlo against the quadrature truth; volpath corrected for its shadow-ray epsilon"
 
 
 def print_bench(found: list[dict[str, Any]], *, markdown: bool = False) -> None:
@@ -77,9 +87,11 @@ def _agreement_row(name: str, one: dict[str, Any]) -> tuple[str, ...]:
     samples = one["width"] * one["height"] * one["batches"] * one["samples"]
     return (
         f"{name}, {one['layer']}",
+        one["estimator"],
         f"{samples / 1e6:.0f} M",
         f"{100 * statistics['relative_bias']:+.3f} %",
         f"{100 * low:+.3f} .. {100 * high:+.3f} %",
+        f"+-{100 * statistics['margin']:g} %",
         f"{100 * statistics['detectable_bias']:.2g} %",
         f"{100 * one['uncorrected_bias']:+.3f} %",
         "yes" if statistics["equivalent"] else "NO",

@@ -13,14 +13,15 @@ def bench(
     kernels: Annotated[bool, typer.Option("--kernels", help="Time the kernels alone, on 480 000 rays.")] = False,
     methods: Annotated[str | None, typer.Option(help="Comma-separated methods; all by default.")] = None,
     size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels; the scene's own by default.")] = None,
-    truth: Annotated[bool, typer.Option(help="Also compare the truth with volpath.")] = True,
+    truth: Annotated[bool, typer.Option(help="Also compare the truth with single-scatter and volpath.")] = True,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
     markdown: Annotated[bool, typer.Option("--markdown", help="Print tables for a README, dated.")] = False,
 ) -> None:
     """Time every method in every scene, or every kernel on many rays, and compare it with the truth.
 
     `airlight` is the airlight alone (the kernel with its ray set-up), `frame` a frame with static geometry, `rebuilt` a
-    frame after everything moved. Exit status 1 if volpath does not confirm the truth within +-0.5 %.
+    frame after everything moved. Exit status 1 if single-scatter does not confirm the truth within
+    +-0.05 %, or volpath within +-0.5 %.
     """
     if kernels:
         _bench_kernels(scenes, json=json, markdown=markdown)
@@ -62,9 +63,10 @@ def bench(
 
 def _bench_scene(name: str, pixels, chosen, *, with_truth: bool, tell) -> dict:
     from reports.data import agreement_data, measurement_data
-    from validation.agreement import agreement
+    from validation.agreement import agreements
     from validation.bench import bench as run
     from validation.load import load_scene
+    from validation.study import EFFORTS
 
     loaded = load_scene(name, pixels)
     share = 0.6 if with_truth else 1.0
@@ -76,8 +78,10 @@ def _bench_scene(name: str, pixels, chosen, *, with_truth: bool, tell) -> dict:
     agreed = {}
     if with_truth:
         small = load_scene(name, (160, 120)).scene
-        compared = agreement(small, progress=lambda done, total, what: tell(share + (1 - share) * done / total, what))
-        agreed = {layer: agreement_data(one) for layer, one in compared.items()}
+        compared = agreements(
+            small, EFFORTS["default"].margins, progress=lambda done, what: tell(share + (1 - share) * done, what)
+        )
+        agreed = {name: agreement_data(one) for name, one in compared.items()}
     size = [camera.width, camera.height] if camera else None
     return {"name": loaded.name, "size": size, "methods": rows, "agreement": agreed}
 

@@ -22,7 +22,7 @@ def report(
 ) -> None:
     """Measure every method in every scene and write the report: one HTML page, report.json, EXR and PNG files.
 
-    Exit status 1 if volpath does not confirm the truth within the margin.
+    Exit status 1 if single-scatter or volpath does not confirm the truth within the margin.
     """
     from analytic.errors import InputError
     from realtime.methods import METHODS

@@ -2,8 +2,8 @@
 """The data of a report: plain numbers and words, ready for JSON.
 
 `report.json` has the schema "airlight-report/1": `environment`, `settings`, `claims` (sentences) and `scenes`, each
-with `truth`, `agreement` by layer and `methods`, each of these with `times` [ms], `error` (airlight) and
-`surface_error`, and the files written. Not-a-number is null.
+with `truth`, `agreement` by estimator and layer, `multiple` (what single scattering leaves out) and `methods`, each of
+these with `times` [ms], `error` (airlight) and `surface_error`, and the files written. Not-a-number is null.
 """
 
 from collections.abc import Sequence
@@ -52,15 +52,20 @@ def scene_data(study: SceneStudy) -> dict[str, Any]:
                 "relative_bound": float(truth.airlight_bound[finite].mean()) / mean if mean > 0 else None,
                 "transitions": truth.transitions,
                 "missed": truth.missed,
+                "checked": truth.checked,
+                "disagreements": truth.disagreements,
+                "refined": truth.refined,
+                "left": truth.left,
             }
         ),
-        "agreement": {layer: agreement_data(one) for layer, one in study.agreement.items()},
+        "agreement": {name: agreement_data(one) for name, one in study.agreement.items()},
+        "multiple": plain(study.multiple),
         "methods": [measurement_data(one) for one in study.measurements],
     }
 
 
 def agreement_data(agreed: Agreement) -> dict[str, Any]:
-    """Return the comparison of one layer with volpath."""
+    """Return the comparison of one layer with one estimator."""
     return plain(agreed)
 
 
@@ -90,28 +95,40 @@ def claims(scenes: list[dict[str, Any]]) -> list[str]:
     sentences = [_trust(scenes)] if scenes else []
     for target in (0.01, 0.001):
         sentences += [_fastest(scene, target) for scene in scenes]
+    sentences += [_left_out(scenes)] if scenes else []
     refused = [f"{m['label']} in {scene['name']}" for scene in scenes for m in scene["methods"] if m["refused"]]
     if refused:
         sentences.append("Refused, with the reason in the tables: " + "; ".join(refused) + ".")
     return sentences
 
 
+_WORDS = {"volpath": "Mitsuba's volpath", "single-scatter": "our own Mitsuba integrator"}
+
+
 def _trust(scenes: list[dict[str, Any]]) -> str:
+    """Return a sentence for each estimator that checked the truth."""
     compared = [(scene["name"], one) for scene in scenes for one in scene["agreement"].values()]
     if not compared:
         return "There is no light to compare with Mitsuba's volpath: no airlight and no lit surface in any scene."
+    estimators = dict.fromkeys(one["estimator"] for _, one in compared)
+    return " ".join(
+        _verdict(_WORDS[name], [pair for pair in compared if pair[1]["estimator"] == name]) for name in estimators
+    )
+
+
+def _verdict(words: str, compared: list[tuple[str, dict[str, Any]]]) -> str:
     failed = [f"{name} ({one['layer']})" for name, one in compared if not one["statistics"]["equivalent"]]
     margin = 100 * compared[0][1]["statistics"]["margin"]
     if failed:
         return (
-            f"The truth is NOT confirmed within {margin:g} % in {', '.join(failed)}: there the 95 % interval of "
-            "volpath's relative bias is not inside the margin."
+            f"The truth is NOT confirmed within {margin:g} % by {words} in {', '.join(failed)}: there the 95 % "
+            "interval of the relative bias is not inside the margin."
         )
     detectable = max(one["statistics"]["detectable_bias"] for _, one in compared)
     return (
-        f"The truth is confirmed by Mitsuba's volpath in {len(compared)} of {len(compared)} comparisons: the 95 % "
-        f"interval of the pooled relative bias lies within ±{margin:g} %; the least bias that would have been found is "
-        f"at worst {100 * detectable:.2g} %."
+        f"The truth is confirmed by {words} in {len(compared)} of {len(compared)} comparisons: the 95 % interval of "
+        f"the pooled relative bias lies within ±{margin:g} %; the least bias that would have been found is at worst "
+        f"{100 * detectable:.2g} %."
     )
 
 
@@ -127,3 +144,8 @@ def _fastest(scene: dict[str, Any], target: float) -> str:
         f"{scene['name']}: the fastest method within {100 * target:g} % relative RMSE is {best['label']}: "
         f"{milliseconds:.3g} ms a frame ({1000 / milliseconds:.0f} frames/s)."
     )
+
+
+def _left_out(scenes: list[dict[str, Any]]) -> str:
+    shares = "; ".join(f"{scene['name']} {100 * scene['multiple']['medium']['value']:.2g} %" for scene in scenes)
+    return f"Every method here scatters once. The share of the airlight that this leaves out: {shares}."

@@ -1,19 +1,23 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The study of one scene: its truth, how far that can be trusted, and every configuration measured against it."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 from realtime.plan import Plan
 from realtime.scene import read_scene
 from reference.quadrature import TruthImage
-from validation.agreement import Agreement, agreement
+from validation.agreement import Agreement, agreements
 from validation.bench import Measurement, configurations_for, measure
 from validation.configurations import STANDARD, Configuration
 from validation.load import LoadedScene, load_scene
+from validation.multiple import MultipleScattering, multiple_scattering_share
 from validation.truth import truth_image
 
 Progress = Callable[[float, str], None]
+
+_MULTIPLE = (64, 48)  # pixels of the image whose multiple scattering is measured: one share, of the whole image
 
 
 @dataclass(frozen=True)
@@ -23,18 +27,22 @@ class Effort:
     name: str
     image: tuple[int, int]  #: width and height of the images that are compared and shown [pixels]
     timed: tuple[int, int]  #: width and height of the frames that are timed [pixels]
-    volpath: tuple[int, int]  #: width and height of the comparison with volpath [pixels]
-    margin: float  #: of the relative bias of volpath
+    checked: tuple[int, int]  #: width and height of the comparisons of the truth [pixels]
+    margins: Mapping[str, float]  #: by estimator, of its relative bias
     seconds: float  #: spent on each timing
     rays: int = 0  #: generated rays on which kernels are tried, besides the certified ones; 0 leaves this out
+
+
+def _margins(single_scatter: float, volpath: float) -> Mapping[str, float]:
+    return MappingProxyType({"single-scatter": single_scatter, "volpath": volpath})
 
 
 EFFORTS: dict[str, Effort] = {
     effort.name: effort
     for effort in (
-        Effort("quick", (320, 240), (320, 240), (120, 90), 0.01, 0.15),
-        Effort("default", (400, 300), (800, 600), (160, 120), 0.005, 0.4, 20_000),
-        Effort("full", (800, 600), (800, 600), (240, 180), 0.002, 1.0, 100_000),
+        Effort("quick", (320, 240), (320, 240), (120, 90), _margins(0.002, 0.01), 0.15),
+        Effort("default", (400, 300), (800, 600), (160, 120), _margins(0.0005, 0.005), 0.4, 20_000),
+        Effort("full", (800, 600), (800, 600), (240, 180), _margins(0.0005, 0.002), 1.0, 100_000),
     )
 }
 
@@ -46,7 +54,8 @@ class SceneStudy:
     loaded: LoadedScene
     plan: Plan
     truth: TruthImage
-    agreement: dict[str, Agreement]  #: by layer
+    agreement: dict[str, Agreement]  #: by estimator and layer
+    multiple: MultipleScattering  #: what single scattering leaves out
     measurements: tuple[Measurement, ...]
 
 
@@ -75,13 +84,11 @@ def study_scene(
     tell(0.0, "the quadrature truth")
     scene = read_scene(loaded.scene)
     truth = truth_image(loaded.scene)
-    tell(0.1, "volpath")
-
-    def batch_done(done: int, total: int, what: str) -> None:
-        tell(0.1 + 0.4 * done / total, what)
-
-    small = load_scene(name_or_path, effort.volpath)
-    agreed = agreement(small.scene, margin=effort.margin, progress=batch_done)
+    tell(0.1, "single-scatter")
+    small = load_scene(name_or_path, effort.checked)
+    agreed = agreements(small.scene, effort.margins, progress=lambda share, what: tell(0.1 + 0.35 * share, what))
+    tell(0.45, "multiple scattering")
+    multiple = multiple_scattering_share(load_scene(name_or_path, _MULTIPLE).scene)
     timed = None
     if effort.timed != effort.image:
         timed = read_scene(load_scene(name_or_path, effort.timed).scene)
@@ -91,4 +98,4 @@ def study_scene(
         tell(0.5 + 0.5 * number / len(chosen), one.label)
         measurements.append(measure(scene, one, truth=truth, timed=timed, seconds=effort.seconds))
     tell(1.0, "done")
-    return SceneStudy(loaded, scene.plan, truth, agreed, tuple(measurements))
+    return SceneStudy(loaded, scene.plan, truth, agreed, multiple, tuple(measurements))

@@ -23,22 +23,27 @@ def method(label, rmse, median, *, refused=None):
     return {"label": label, "refused": None, "error": {"relative_rmse": rmse}, "times": times}
 
 
-def agreed(equivalent, detectable, *, layer="airlight", margin=0.005):
+def agreed(equivalent, detectable, *, layer="airlight", margin=0.005, estimator="volpath"):
     return {
+        "estimator": estimator,
         "layer": layer,
         "statistics": {"equivalent": equivalent, "detectable_bias": detectable, "margin": margin},
     }
 
 
+MULTIPLE = {"medium": {"value": 0.123, "interval": [0.12, 0.126]}, "everything": {"value": 0.2, "interval": [0.1, 0.3]}}
+
 SCENES = [
     {
         "name": "fog",
         "agreement": {"airlight": agreed(True, 0.0031)},
+        "multiple": MULTIPLE,
         "methods": [method("fast", 0.02, 1.0), method("good", 0.004, 2.0), method("slow", 0.0001, 8.0)],
     },
     {
         "name": "hall",
         "agreement": {"airlight": agreed(True, 0.0042), "surface": agreed(True, 0.0007, layer="surface")},
+        "multiple": MULTIPLE,
         "methods": [method("fast", 0.2, 1.0), method("good", 0.005, 40.0), method("slow", 0.004, 80.0)],
     },
 ]
@@ -49,7 +54,7 @@ def scenes():
 
 
 def test_claims_on_a_truth_that_is_confirmed():
-    trust, *fastest = claims(scenes())
+    trust, *fastest, left_out = claims(scenes())
     assert "confirmed by Mitsuba's volpath in 3 of 3 comparisons" in trust
     assert "±0.5 %" in trust
     assert "at worst 0.42 %" in trust
@@ -60,13 +65,22 @@ def test_claims_on_a_truth_that_is_confirmed():
         "fog: the fastest method within 0.1 % relative RMSE is slow: 8 ms a frame (125 frames/s).",
         "hall: no method reaches a relative RMSE of 0.1 %.",
     ]
+    assert left_out.endswith("The share of the airlight that this leaves out: fog 12 %; hall 12 %.")
+
+
+def test_each_estimator_that_checked_the_truth_has_a_sentence():
+    data = scenes()
+    data[0]["agreement"]["single-scatter airlight"] = agreed(False, 1e-4, margin=5e-4, estimator="single-scatter")
+    trust = claims(data)[0]
+    assert "confirmed by Mitsuba's volpath in 3 of 3 comparisons" in trust
+    assert "NOT confirmed within 0.05 % by our own Mitsuba integrator in fog (airlight)" in trust
 
 
 def test_claims_on_a_truth_that_is_not_confirmed():
     data = scenes()
     data[1]["agreement"]["surface"]["statistics"]["equivalent"] = False
     trust = claims(data)[0]
-    assert "NOT confirmed within 0.5 % in hall (surface)" in trust
+    assert "NOT confirmed within 0.5 % by Mitsuba's volpath in hall (surface)" in trust
     assert "fog" not in trust
 
 
@@ -161,12 +175,14 @@ def test_scene_without_light_that_is_finite_has_no_numbers_rather_than_nan(airli
     from reports.data import scene_data
     from tests.validation.test_bench import PLAN
     from validation.load import LoadedScene
+    from validation.multiple import MultipleScattering, Share
     from validation.study import SceneStudy
 
     truth = TruthImage(
         airlight, np.zeros_like(airlight), np.zeros_like(airlight), np.ones((2, 3)), np.ones((2, 3)), 0, float("nan")
     )
-    study = SceneStudy(LoadedScene("x", SimpleNamespace(), "p", ""), PLAN, truth, {}, ())
+    multiple = MultipleScattering(Share(0.0, (0.0, 0.0)), Share(0.0, (0.0, 0.0)), 64, 32, 16)
+    study = SceneStudy(LoadedScene("x", SimpleNamespace(), "p", ""), PLAN, truth, {}, multiple, ())
     data = scene_data(study)
     json.dumps(data, allow_nan=False)
     assert data["size"] == [3, 2]

@@ -79,6 +79,8 @@ STATISTICS = {
     "expected_rejections": 0.01,
 }
 AGREEMENT = {
+    "estimator": "volpath",
+    "layer": "airlight",
     "width": 160,
     "height": 120,
     "batches": 48,
@@ -105,8 +107,22 @@ DATA = {
             "size": [32, 24],
             "plan": {"shadows": "visibility tests", "medium": "unbounded"},
             "notes": [],
-            "truth": {"mean": 0.98765, "relative_bound": 1.2e-6, "transitions": 4321, "missed": 0.0007},
-            "agreement": {"airlight": AGREEMENT, "surface": dict(AGREEMENT)},
+            "truth": {
+                "mean": 0.98765,
+                "relative_bound": 1.2e-6,
+                "transitions": 4321,
+                "missed": 0.0007,
+                "checked": 98765,
+                "disagreements": 12,
+                "refined": 11,
+                "left": 1,
+            },
+            "multiple": {
+                "medium": {"value": 0.123, "interval": [0.12, 0.126]},
+                "everything": {"value": 0.21, "interval": [0.2, 0.22]},
+                "max_depth": 64,
+            },
+            "agreement": {"airlight": AGREEMENT, "surface": AGREEMENT | {"layer": "surface"}},
             "methods": [method("good (k)"), method("flat", knows_shadows=False)],
             "exposure": 2.5,
             "files": {"picture": "s/a.png"},

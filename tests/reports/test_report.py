@@ -32,7 +32,7 @@ SCENE = """<scene version="3.0.0">
     <shape type="rectangle"><transform name="to_world"><scale value="6.3"/></transform></shape>
 </scene>
 """
-TINY = Effort("tiny", (20, 15), (12, 9), (10, 8), 0.5, 0.01)
+TINY = Effort("tiny", (20, 15), (12, 9), (10, 8), {"single-scatter": 0.2, "volpath": 0.5}, 0.01)
 MARCH = Configuration("ray-march", None, (("steps", 50),))
 CHOSEN = (Configuration("unshadowed", "taylor"), Configuration("unshadowed", "quadrature"), MARCH)
 
@@ -73,13 +73,16 @@ def test_data_have_the_schema(written):
     assert scene["name"] == "my <fog>"
     assert scene["path"].endswith("my <fog>.xml")
     assert scene["size"] == [20, 15]
-    assert set(scene["agreement"]) == {"airlight", "surface"}
+    checks = {f"{estimator} {layer}" for estimator in TINY.margins for layer in ("airlight", "surface")}
+    assert set(scene["agreement"]) == checks
+    assert 0 < scene["multiple"]["medium"]["value"] < 1
     assert [one["label"] for one in scene["methods"]] == [one.label for one in CHOSEN]
 
 
 def test_claims_follow_from_the_numbers(written):
     (scene,) = written.data["scenes"]
     assert "confirmed by Mitsuba's volpath in 2 of 2 comparisons" in written.data["claims"][0]
+    assert "confirmed by our own Mitsuba integrator in 2 of 2 comparisons" in written.data["claims"][0]
     assert written.data["claims"][-1] == "Refused, with the reason in the tables: unshadowed (taylor) in my <fog>."
     rmse = {one["label"]: one["error"]["relative_rmse"] for one in scene["methods"] if one["error"]}
     reached = min(rmse.values()) <= 0.01
@@ -209,8 +212,9 @@ def test_files_of_configurations_do_not_collide():
 def test_efforts_cost_more_and_promise_more_in_turn():
     quick, default, full = (EFFORTS[name] for name in ("quick", "default", "full"))
     for less, more in ((quick, default), (default, full)):
-        assert less.margin > more.margin
-        assert less.volpath[0] < more.volpath[0]
+        assert all(less.margins[name] >= more.margins[name] for name in less.margins)
+        assert less.margins["volpath"] > more.margins["volpath"]
+        assert less.checked[0] < more.checked[0]
         assert less.image[0] < more.image[0]
         assert less.seconds < more.seconds
 
@@ -221,7 +225,7 @@ def test_built_in_scene_with_all_standard_configurations(variant, tmp_path):
     data = write_report(tmp_path, scenes=["open-fog", "sphere-spot"], effort=TINY)
     fog, spot = data["scenes"]
     assert fog["plan"]["shadows"].startswith("none")
-    assert set(fog["agreement"]) == {"airlight"}
+    assert set(fog["agreement"]) == {"single-scatter airlight", "volpath airlight"}
     assert len(fog["methods"]) < len(spot["methods"]) == len(STANDARD)
     best = {one["label"]: one["error"]["relative_rmse"] for one in fog["methods"]}
     # 16 nodes without any shadow are the integral itself; float32 and the light in view leave 1e-5.
