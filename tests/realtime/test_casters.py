@@ -150,7 +150,7 @@ def test_triangles_of_mitsuba_shapes(variant):
 def test_shapes_without_triangles_are_refused_by_name(variant):
     import mitsuba as mi
 
-    with pytest.raises(InputError, match="shape 'ball' is a Sphere.*replace it by a mesh"):
+    with pytest.raises(InputError, match=r"shape 'ball' is a Sphere.*replace it by a mesh"):
         read_casters(mi.load_dict(tiny_scene()))
 
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 from collections import Counter
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -61,7 +62,7 @@ def assert_counts_layers(casters, light, *, seed=3, count=12):
     light = np.asarray(light, dtype=float)
     found = silhouette(casters, light)
     ways = random_directions(seed, count)
-    for start, end in zip(ways[:-1], ways[1:]):
+    for start, end in pairwise(ways):
         change = layers_over(casters, light, end) - layers_over(casters, light, start)
         assert layers_gained(casters, found, light, start, end) == change
 
