@@ -233,11 +233,20 @@ def _read_light(emitter) -> TruthLight:
     interaction = dr.zeros(mi.Interaction3f)
     interaction.p = mi.Point3f(*(float(c) for c in position + distance * axis))
     _, arriving = emitter.sample_direction(interaction, mi.Point2f(0.5))
-    intensity = _rgb(arriving) * distance**2
+    intensity = _as_given(parameters, _rgb(arriving) * distance**2)
     if not spot:
         return TruthLight(position, intensity)
     cutoff = np.deg2rad(float(parameters["cutoff_angle"][0]))
     return TruthLight(position, intensity, axis, cutoff, min(np.deg2rad(float(parameters["beam_width"][0])), cutoff))
+
+
+def _as_given(parameters, measured: Array) -> Array:
+    """Return the intensity as the scene gives it, where that is what was measured: measuring rounds it to float32."""
+    if "intensity.value" not in parameters:
+        return measured
+    texture = _rgb(parameters["texture.value"]) if "texture.value" in parameters else np.ones(3)
+    given = _rgb(parameters["intensity.value"]) * texture
+    return given if given.shape == measured.shape and np.allclose(given, measured, rtol=1e-5, atol=0) else measured
 
 
 def _rgb(value) -> Array:
