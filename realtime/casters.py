@@ -11,6 +11,7 @@ first, and each pair is one entry of `Casters.edges`; one that finds no partner 
 triangles meet two entries: their sum is the same whichever way they are paired.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -38,6 +39,7 @@ class Casters:
     body: Index  #: connected part that each triangle belongs to
     closed: NDArray[np.bool_]  #: by body: whether every edge is met as often one way as the other
     boxes: Array  #: by body: lower and upper corner of its bounding box [m], (bodies, 2, 3)
+    shapes: tuple[tuple[str, int, Index], ...]  #: name, its first vertex, and which of the shape's own each one is
     warnings: tuple[str, ...] = ()  #: what is odd about the meshes, by name
 
     @property
@@ -78,9 +80,10 @@ def make_casters(meshes) -> Casters:
         (name, vertices (n, 3) [m], triangles (m, 3)) each. Triangles without area and repeated ones are left out, the
         latter with a warning.
     """
-    parts, warnings, first_vertex, first_body = [], [], 0, 0
+    parts, warnings, shapes, first_vertex, first_body = [], [], [], 0, 0
     for name, vertices, triangles in meshes:
-        part, remarks = _mesh_part(name, vertices, triangles)
+        part, remarks, own = _mesh_part(name, vertices, triangles)
+        shapes.append((name, first_vertex, own))
         parts.append(_shifted(part, first_vertex, first_body))
         first_vertex += len(part["vertices"])
         first_body += len(part["closed"])
@@ -95,7 +98,7 @@ def make_casters(meshes) -> Casters:
     joined = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
     for key in ("triangles", "edges", "left", "right", "body"):
         joined[key] = np.ascontiguousarray(joined[key], dtype=np.int32)
-    return Casters(**joined, warnings=tuple(warnings))
+    return Casters(**joined, shapes=tuple(shapes), warnings=tuple(warnings))
 
 
 def moved(casters: Casters, vertices: Array) -> Casters:
@@ -103,6 +106,15 @@ def moved(casters: Casters, vertices: Array) -> Casters:
     normals, offsets = _planes(vertices, casters.triangles)
     boxes = _boxes(vertices, casters.triangles, casters.body, len(casters.closed))
     return replace(casters, vertices=vertices, normals=normals, offsets=offsets, boxes=boxes)
+
+
+def with_positions(casters: Casters, positions: Mapping[str, Array]) -> Casters:
+    """Return the casters with the vertices of some shapes elsewhere; `positions` are those of the shapes [m]."""
+    vertices = casters.vertices.copy()
+    for name, first, own in casters.shapes:
+        if name in positions:
+            vertices[first : first + len(own)] = positions[name][own]
+    return moved(casters, vertices)
 
 
 def _triangles(shape) -> tuple[Array, NDArray[np.int64]]:
@@ -121,9 +133,10 @@ def _triangles(shape) -> tuple[Array, NDArray[np.int64]]:
     )
 
 
-def _mesh_part(name: str, vertices: Array, triangles: NDArray[Any]) -> tuple[dict[str, Any], list[str]]:
+def _mesh_part(name: str, vertices: Array, triangles: NDArray[Any]) -> tuple[dict[str, Any], list[str], Index]:
     warnings = []
-    vertices, inverse = np.unique(np.asarray(vertices, dtype=np.float64).reshape(-1, 3), axis=0, return_inverse=True)
+    vertices = np.asarray(vertices, dtype=np.float64).reshape(-1, 3)
+    vertices, own, inverse = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
     triangles = inverse.reshape(-1)[np.asarray(triangles, dtype=np.int64).reshape(-1, 3)]
     normals, _ = _planes(vertices, triangles)
     triangles = triangles[np.any(normals != 0, axis=1)]
@@ -162,7 +175,7 @@ def _mesh_part(name: str, vertices: Array, triangles: NDArray[Any]) -> tuple[dic
         "closed": closed,
         "boxes": _boxes(vertices, triangles, body, len(closed)),
     }
-    return part, warnings
+    return part, warnings, own.astype(np.int32)
 
 
 def _shifted(part: dict[str, Any], vertex: int, body: int) -> dict[str, Any]:

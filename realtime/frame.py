@@ -113,7 +113,12 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
 
 def render_frame(renderer: FrameRenderer) -> Frame:
     """Render one frame and bring it to the host in the order of the image."""
-    distance, surface, airlight = run_stages(renderer, renderer.prepare(renderer.scene))
+    return image_frame(renderer, run_stages(renderer, renderer.prepare(renderer.scene)))
+
+
+def image_frame(renderer: FrameRenderer, stages) -> Frame:
+    """Bring what `run_stages` returned to the host in the order of the image."""
+    distance, surface, airlight = stages
     height, width = renderer.scene.camera.height, renderer.scene.camera.width
     return Frame(
         _image(renderer, airlight, (height, width, 3)),

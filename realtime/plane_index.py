@@ -240,10 +240,10 @@ def index_planes(casters: Casters, light: Array, camera: Array, *, used: NDArray
         z_axis,
         Float(distance),
         mi.UInt32(_padded(start)),
-        mi.UInt32(_padded(entries)),
-        Float(_padded(planes.lines.astype(real).ravel())),
-        Float(_padded(spans.astype(real).ravel())),
-        Float(_padded(planes.ends.astype(real).ravel(), multiple=6)),
+        mi.UInt32(_padded(entries, 7)),
+        Float(_padded(planes.lines.astype(real).ravel(), 5)),
+        Float(_padded(spans.astype(real).ravel(), 5)),
+        Float(_padded(planes.ends.astype(real).ravel(), 6)),
         Float(layers_between(casters, light, axes, distance, used=used)),
     )
     dr.make_opaque(index)
@@ -253,7 +253,8 @@ def index_planes(casters: Casters, light: Array, camera: Array, *, used: NDArray
 def _padded(values, multiple: int = 1):
     """Return an array with zeros up to a power of two times `multiple`, aligned to 64 bytes.
 
-    A frozen function is recorded anew for arrays of another size, and for arrays of another alignment.
+    A frozen function is recorded anew where arrays that had one size have two or the other way round, so that each kind
+    has a multiple of its own, and where the alignment of an array is another.
     """
     size = multiple << max(6, int(-(-len(values) // multiple) - 1).bit_length())
     room = np.zeros(size * values.itemsize + 64, dtype=np.uint8)

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`airlight render SCENE`: a frame by a real-time method, with what it costs."""
+"""`airlight render SCENE`: a frame or an animation by a real-time method, with what it costs."""
 
+import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -19,65 +20,102 @@ def render(
     precision: Annotated[str, typer.Option(help="single or double.")] = "single",
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Write layered EXR here.")] = None,
     preview: Annotated[Path | None, typer.Option(help="Write a PNG picture here.")] = None,
+    frames: Annotated[
+        int | None, typer.Option(min=1, help="Render an animation of so many frames, as name-0001.exr and so on.")
+    ] = None,
+    animate: Annotated[
+        str | None,
+        typer.Option(
+            help="What moves: light, objects, medium, colour, or several with commas; the scene's by default."
+        ),
+    ] = None,
     plan: Annotated[bool, typer.Option("--plan", help="Print what the scene needs of a method, and stop.")] = False,
     json: Annotated[bool, typer.Option("--json", help="Print times as JSON.")] = False,
 ) -> None:
-    """Render a frame with a real-time method and print what it costs."""
-    from realtime.plan import describe
+    """Render a frame, or an animation, with a real-time method and print what it costs.
+
+    An animation is one turn: lights circle, objects turn, the medium's density swings, colours go round. Only what
+    moves is made anew. Ctrl-C keeps the frames that are finished.
+    """
     from realtime.scene import read_scene
-    from reference.files import ensure_writable
-    from reports.bench_tables import rate
     from reports.environment import activate
-    from reports.tables import print_json
     from validation.configurations import configuration, parse_settings
     from validation.load import load_scene, parse_size
 
     chosen = configuration(method, kernel, parse_settings(set_ or []))
-    for path in (output, preview):
-        if path is not None:
-            ensure_writable(path)
+    outputs = {"exr": output, "png": preview}
+    _check_outputs(outputs, frames, animate)
     variant = activate()
     loaded = load_scene(scene, parse_size(size) if size else None)
     read = read_scene(loaded.scene, precision)
     if plan:
-        words = describe(read.plan)
-        if json:
-            print_json({"plan": words, "notes": list(read.plan.notes)})
-        else:
-            print("\n".join([f"{name}: {value}" for name, value in words.items()] + list(read.plan.notes)))
-        return
-    times = _render(loaded.name, read, chosen, output=output, preview=preview)
-    times |= {"device": variant}
-    if json:
-        print_json(times)
+        _print_plan(read, chosen, json=json)
+    elif frames is None:
+        _print_times(_render(loaded.name, read, chosen, outputs=outputs), variant, json=json)
     else:
-        stages = ", ".join(f"{stage['name']} {stage['ms']:.3g} ms" for stage in times["stages"])
-        print(f"{loaded.name}, {chosen.label}: {times['frame_ms']:.3g} ms a frame ({rate(times['frame_ms'])} frames/s)")
-        print(
-            f"  {stages}; {times['rebuild_ms']:.3g} ms with everything rebuilt; {variant}, {times['threads']} threads"
-        )
+        found = _render_frames(loaded, read, chosen, frames=frames, animate=animate, outputs=outputs)
+        _print_frames(found, variant, json=json)
 
 
-def _render(name: str, scene, chosen, *, output: Path | None, preview: Path | None) -> dict:
+def _check_outputs(outputs: dict[str, Path | None], frames: int | None, animate: str | None) -> None:
+    """Refuse what could not be written, before any work."""
+    from analytic.errors import InputError
+    from reference.files import ensure_writable
+    from reports.frame_files import numbered
+
+    if animate is not None and frames is None:
+        raise InputError("--animate: got no number of frames; add --frames N")
+    if frames is not None and not any(outputs.values()):
+        raise InputError("--frames: got no place for the files; add --output NAME.exr or --preview NAME.png")
+    for path in outputs.values():
+        if path is not None:
+            ensure_writable(path if frames is None else numbered(path, 1, frames))
+
+
+def _print_plan(scene, chosen, *, json: bool) -> None:
+    from realtime.caster_plan import caster_plan, describe_casters
+    from realtime.methods import METHODS
+    from realtime.plan import describe
+    from realtime.shadow_planes import prepare_shadow_planes
+    from reports.tables import print_json
+
+    words, notes = describe(scene.plan), list(scene.plan.notes)
+    if METHODS[chosen.method].prepare is prepare_shadow_planes:
+        casters = caster_plan(scene)
+        words |= describe_casters(casters)
+        _warn(casters.warnings)
+    if json:
+        print_json({"plan": words, "notes": notes})
+    else:
+        print("\n".join([f"{name}: {value}" for name, value in words.items()] + notes))
+
+
+def _warn(warnings) -> None:
+    """Print what is odd about the casters on the error stream, once a command."""
+    for warning in warnings:
+        print(f"airlight: warning: {warning}", file=sys.stderr)
+
+
+def _prepared(scene, chosen):
+    """Return the frame renderer, the warnings of its casters printed."""
+    from validation.configurations import prepared
+
+    renderer = prepared(scene, chosen)
+    casters = getattr(renderer.prepare, "casters", None)
+    if casters is not None:
+        _warn(casters.warnings)
+    return renderer
+
+
+def _render(name: str, scene, chosen, *, outputs: dict[str, Path | None]) -> dict[str, Any]:
     import drjit as dr
 
     from realtime.frame import render_frame
-    from validation.configurations import prepared
+    from reports.frame_files import write_frame
     from validation.timing import time_frame
 
-    renderer = prepared(scene, chosen)
-    frame = render_frame(renderer)
-    if output is not None:
-        from reference.exr import write_exr
-        from reports.environment import stamped
-        from validation.references import layered_frame
-
-        write_exr(output, stamped(layered_frame(name, chosen, frame)))
-    if preview is not None:
-        from reports.pictures import exposure, tone_mapped, write_png
-
-        total = frame.airlight + frame.surface
-        write_png(preview, tone_mapped(total, exposure(total)))
+    renderer = _prepared(scene, chosen)
+    write_frame(name, chosen, render_frame(renderer), outputs=outputs)
     times = time_frame(renderer)
     return {
         "scene": name,
@@ -90,5 +128,55 @@ def _render(name: str, scene, chosen, *, output: Path | None, preview: Path | No
             {"name": "airlight", "ms": times.airlight.median_ms},
         ],
         "rebuild_ms": times.rebuild.median_ms,
+        "moved_ms": times.moved.median_ms,
         "threads": dr.thread_count(),
     }
+
+
+def _render_frames(loaded, scene, chosen, *, frames: int, animate: str | None, outputs) -> dict[str, Any]:
+    from dataclasses import replace
+
+    from reports.frame_files import write_frames
+    from reports.progress import progress_bar
+    from validation.animation import parse_moves
+
+    animation = loaded.animation
+    if animate is not None:
+        animation = replace(animation, moves=parse_moves(animate))
+    renderer = _prepared(scene, chosen)
+    with progress_bar(f"{loaded.name}: {frames} frames") as tell:
+        found = write_frames(loaded.name, renderer, chosen, animation, frames=frames, outputs=outputs, tell=tell)
+    size = [scene.camera.width, scene.camera.height]
+    return {"scene": loaded.name, "method": chosen.label, "size": size} | found
+
+
+def _print_times(times: dict[str, Any], variant: str, *, json: bool) -> None:
+    from reports.bench_tables import rate
+    from reports.tables import print_json
+
+    if json:
+        print_json(times | {"device": variant})
+        return
+    stages = ", ".join(f"{stage['name']} {stage['ms']:.3g} ms" for stage in times["stages"])
+    rebuild, moved = times["rebuild_ms"], times["moved_ms"]
+    print(
+        f"{times['scene']}, {times['method']}: {times['frame_ms']:.3g} ms a frame ({rate(times['frame_ms'])} frames/s)"
+    )
+    print(f"  {stages}; {rebuild:.3g} ms after the light moved, {moved:.3g} ms after objects moved")
+    print(f"  {variant}, {times['threads']} threads")
+
+
+def _print_frames(found: dict[str, Any], variant: str, *, json: bool) -> None:
+    from reports.bench_tables import rate
+    from reports.tables import print_json
+
+    if json:
+        print_json(found | {"device": variant})
+        return
+    move, prepare, stages = (found[f"{name}_ms"] for name in ("move", "prepare", "stages"))
+    print(f"{found['scene']}, {found['method']}: {found['frames']} frames, {' and '.join(found['moves'])} moving")
+    print(f"  {found['files'][0]} to {found['files'][-1]}")
+    print(
+        f"  {found['frame_ms']:.3g} ms a frame ({rate(found['frame_ms'])} frames/s): {move:.3g} ms to move, "
+        f"{prepare:.3g} ms to prepare, {stages:.3g} ms to render; {variant}"
+    )

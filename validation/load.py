@@ -4,12 +4,13 @@
 import difflib
 import os
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from analytic.errors import InputError
 from validation.scenes import SCENES
+from validation.scenes.record import Animation
 
 _LARGEST = 16384
 
@@ -23,6 +24,7 @@ class LoadedScene:
     purpose: str
     published: str
     path: Path | None = None
+    animation: Animation = field(default_factory=Animation)
 
 
 def load_scene(name_or_path: str, size: tuple[int, int] | None = None) -> LoadedScene:
@@ -45,7 +47,8 @@ def load_scene(name_or_path: str, size: tuple[int, int] | None = None) -> Loaded
 
     if name_or_path in SCENES:
         record = SCENES[name_or_path]
-        loaded = LoadedScene(record.name, mi.load_dict(record.build()), record.purpose, record.published)
+        built = mi.load_dict(record.build())
+        loaded = LoadedScene(record.name, built, record.purpose, record.published, animation=record.animation)
     else:
         path = _existing(name_or_path)
         loaded = LoadedScene(path.stem, _parse(path), f"The user's own scene, {path.name}.", "", path)

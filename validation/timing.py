@@ -7,12 +7,14 @@ recorded before. The wall clock is used on purpose: launch and replay are part o
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from realtime.frame import FrameRenderer, run_stages
+from realtime.motion import Objects, read_objects, turned_objects
+from realtime.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,19 @@ def time_repeated(work: Callable[[], Any], *, seconds: float = 0.6, least: int =
     return Timing(float(median), float(low), float(high), len(times))
 
 
+def timed_frame(renderer: FrameRenderer, scene: Scene):
+    """Render a scene in which something moved, once; return the stages, and the times to prepare and to render [ms]."""
+    import drjit as dr
+
+    begin = time.perf_counter()
+    prepared = renderer.prepare(scene)
+    dr.sync_thread()
+    middle = time.perf_counter()
+    stages = run_stages(replace(renderer, scene=scene), prepared)
+    dr.sync_thread()
+    return stages, 1e3 * (middle - begin), 1e3 * (time.perf_counter() - middle)
+
+
 @dataclass(frozen=True)
 class FrameTimes:
     """What a frame costs [ms]."""
@@ -60,11 +75,12 @@ class FrameTimes:
     frame: Timing  #: everything but what is static: camera rays, lit surface, airlight
     surface: Timing  #: camera rays and lit surface
     airlight: Timing  #: the airlight alone: the kernel with its ray set-up, or the marching
-    rebuild: Timing  #: a frame after everything moved: acceleration structure, shadow maps, all stages
+    rebuild: Timing  #: a frame after the light moved: shadow maps or silhouettes and planes, all stages
+    moved: Timing  #: a frame after the objects moved too: acceleration structure, adjacent planes, all of the above
 
 
 def time_frame(renderer: FrameRenderer, *, seconds: float = 0.6) -> FrameTimes:
-    """Time the stages of a frame, the whole frame and a frame after everything moved."""
+    """Time the stages of a frame, the whole frame, a frame after the light moved and one after the objects moved."""
     import drjit as dr
 
     scene = renderer.scene
@@ -82,25 +98,30 @@ def time_frame(renderer: FrameRenderer, *, seconds: float = 0.6) -> FrameTimes:
         dr.eval(renderer.airlight(scene.geometry, *arrays))
 
     def rebuild():
-        _touch_geometry(scene.geometry)
         run_stages(renderer, renderer.prepare(scene))
+
+    objects = _objects(scene)
+
+    def moved():
+        # Where they stand: the work is that of any other place.
+        there = turned_objects(scene, objects, np.eye(3)) if objects else scene
+        run_stages(renderer, renderer.prepare(there))
 
     return FrameTimes(
         frame=time_repeated(lambda: run_stages(renderer, prepared), seconds=seconds),
         surface=time_repeated(surface, seconds=seconds),
         airlight=time_repeated(airlight, seconds=seconds),
         rebuild=time_repeated(rebuild, seconds=0.5 * seconds, least=3),
+        moved=time_repeated(moved, seconds=0.5 * seconds, least=3),
     )
 
 
-def _touch_geometry(scene) -> None:
-    """Tell Mitsuba that every shape moved, so that it builds its acceleration structure again."""
+def _objects(scene: Scene) -> Objects | None:
+    """Read all meshes of a scene whose vertices can be moved; None where there are none."""
     import mitsuba as mi
 
-    if not scene.shapes():
-        return
-    parameters = mi.traverse(scene)
-    for key in list(parameters.keys()):
-        if key.rsplit(".", 1)[-1] == "vertex_positions":
-            parameters[key] = parameters[key]
-    parameters.update()
+    if not scene.geometry.shapes():
+        return None
+    keys = list(mi.traverse(scene.geometry).keys())
+    names = [key.rsplit(".", 1)[0] for key in keys if key.endswith(".vertex_positions")]
+    return read_objects(scene, names) if names else None

@@ -86,7 +86,14 @@ def test_sphere_turns_its_axis_to_the_light_and_lies_in_the_cone():
 
 @pytest.mark.parametrize(
     ("name", "triangles"),
-    [("open-fog", 0), ("sphere-spot", 2 * 32 * 17 + 2), ("colonnade", 66_132), ("two-pens", 34_549)],
+    [
+        ("open-fog", 0),
+        ("sphere-spot", 2 * 32 * 17 + 2),
+        ("colonnade", 66_132),
+        ("two-pens", 34_549),
+        ("clutter", 20_747),
+        ("hall", 107_514),
+    ],
 )
 def test_triangle_counts(variant, name, triangles):
     from validation.load import load_scene

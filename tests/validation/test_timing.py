@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from tests.scenes_for_tests import tiny_scene
-from validation.timing import _touch_geometry, time_frame, time_repeated
+from validation.timing import time_frame, time_repeated
 
 
 def test_median_is_the_time_of_the_work(variant):
@@ -68,7 +68,7 @@ def renderer(variant):
 
 def test_every_stage_of_a_frame_is_timed(renderer):
     times = time_frame(renderer, seconds=0.02)
-    for name in ("frame", "surface", "airlight", "rebuild"):
+    for name in ("frame", "surface", "airlight", "rebuild", "moved"):
         timing = getattr(times, name)
         assert 0 < timing.low_ms <= timing.median_ms <= timing.high_ms, name
         assert timing.repetitions >= 3
@@ -86,26 +86,39 @@ def test_timing_does_not_change_the_frame(renderer):
     np.testing.assert_array_equal(before.surface, after.surface)
 
 
-def test_scene_without_anything_to_move_can_be_rebuilt(variant):
+def test_scene_without_anything_to_move_can_be_timed(variant):
     import mitsuba as mi
 
-    _touch_geometry(mi.load_dict(tiny_scene(ball=None, floor=None)))
+    from realtime.frame import frame_renderer
+    from realtime.methods import METHODS
+    from realtime.scene import read_scene
+
+    scene = read_scene(mi.load_dict(tiny_scene(ball=None, floor=None)))
+    times = time_frame(frame_renderer(scene, METHODS["ray-march"], steps=3), seconds=0.01)
+    assert times.moved.median_ms > 0
 
 
-def test_touched_meshes_are_built_again(variant):
-    """The acceleration structure follows vertices that were moved before, so `rebuild` does what it says."""
-    import drjit as dr
+def test_moved_builds_the_acceleration_structure_again_and_rebuild_does_not(variant, monkeypatch):
+    """What moves when only the light does must not cost what objects cost."""
     import mitsuba as mi
 
+    from realtime.scene import read_scene
+    from validation import timing
+    from validation.configurations import configuration, prepared
     from validation.load import load_scene
 
-    scene = load_scene("sphere-spot", (8, 6)).scene
-    ray = mi.Ray3f([0.11, -0.07, 9.0], [0, 0, -1])
-    before = float(scene.ray_intersect(ray).t[0])
-    parameters = mi.traverse(scene)
-    moved = dr.unravel(mi.Point3f, parameters["sphere.vertex_positions"]) + mi.Point3f(0, 0, 1.5)
-    parameters["sphere.vertex_positions"] = dr.ravel(moved)
-    parameters.update()
-    _touch_geometry(scene)
-    # Positions are float32 of a few metres: 1e-6.
-    assert float(scene.ray_intersect(ray).t[0]) == pytest.approx(before - 1.5, abs=1e-5)
+    renderer = prepared(read_scene(load_scene("sphere-spot", (8, 6)).scene), configuration("shadow-planes"))
+    updates = []
+    update = mi.SceneParameters.update
+    monkeypatch.setattr(mi.SceneParameters, "update", lambda self, *args: updates.append(1) or update(self, *args))
+    measured = {}
+
+    def counted(work, **_):
+        before = len(updates)
+        work()
+        measured[len(measured)] = len(updates) - before
+        return timing.Timing(1.0, 1.0, 1.0, 1)
+
+    monkeypatch.setattr(timing, "time_repeated", counted)
+    time_frame(renderer)
+    assert list(measured.values()) == [0, 0, 0, 0, 1]  # frame, surface, airlight, rebuild, moved

@@ -5,9 +5,11 @@ Each is built procedurally with arbitrary, never round numbers, so that no const
 the scene. `SCENES` is the registry: add a `SceneRecord` to it and every command and report knows it.
 """
 
+from validation.scenes.clutter import SCENE as CLUTTER
 from validation.scenes.colonnade import colonnade
+from validation.scenes.hall import SCENE as HALL
 from validation.scenes.open_fog import open_fog
-from validation.scenes.record import SceneRecord
+from validation.scenes.record import Animation, SceneRecord
 from validation.scenes.sphere_spot import sphere_spot
 from validation.scenes.two_pens import two_pens
 
@@ -19,24 +21,30 @@ SCENES: dict[str, SceneRecord] = {
             open_fog,
             "Fog and a lamp in view, nothing else: the airlight integral alone, with its peak near the light.",
             "Biri, Arques, Michelin 2006, section 4.1; Sun et al. 2005",
+            Animation(about=(0.11, 0.31, 1.57)),
         ),
         SceneRecord(
             "sphere-spot",
             sphere_spot,
             "A sphere below a spot light: one shadow in a cone of light, a silhouette of 32 edges.",
             "Biri, Arques, Michelin 2006, section 6: 120 frames/s at 800 x 600",
+            Animation(about=(0.11, -0.07, 1.93)),
         ),
         SceneRecord(
             "colonnade",
             colonnade,
             "A hall of fluted columns in fog, lit through them: many parallel shafts, thin shadows, 66 000 triangles.",
             "Billeter, Sintorn, Assarsson 2010, Fig. 7 (the Sponza atrium)",
+            Animation(about=(4.73, 1.57, 4.37)),
         ),
         SceneRecord(
             "two-pens",
             two_pens,
             "Two pens standing on a sheet before a lamp: smooth casters whose shadows cross, 34 549 triangles.",
             "Biri, Arques, Michelin 2006, Fig. 7a and Table 2: 23 frames/s",
+            Animation(("objects",), objects=("pens",)),
         ),
+        CLUTTER,
+        HALL,
     )
 }

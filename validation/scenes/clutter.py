@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from validation.scenes.parts import Mesh, camera, fog, grid, lathe, mitsuba_mesh, placed, rotation
-from validation.scenes.record import SceneRecord
+from validation.scenes.record import Animation, SceneRecord
 from validation.scenes.solids import arch, box, gable, gem, icosphere, prism, star, tetrahedron, torus
 
 _COUNT = 73
@@ -108,4 +108,5 @@ SCENE = SceneRecord(
     clutter,
     "A table of small things about a lamp: shadows within shadows wherever one looks, 20 747 triangles.",
     "Biri, Arques, Michelin 2006, Fig. 7c and Table 2: 25 frames/s; there other objects, about a moving light",
+    Animation(("light", "colour"), about=(0.19, 0.29, 0.91)),
 )

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from validation.scenes.parts import Mesh, camera, fog, grid, joined, lathe, mitsuba_mesh, placed, rotation, skin
-from validation.scenes.record import SceneRecord
+from validation.scenes.record import Animation, SceneRecord
 from validation.scenes.solids import arch, box, pierced, torus
 
 _BAYS = 5
@@ -116,4 +116,5 @@ SCENE = SceneRecord(
     hall,
     "A great hall lit through a wheel window: long shafts, columns in the shadow of columns, 107 514 triangles.",
     "Biri, Arques, Michelin 2006, Fig. 1 and Table 2: 12 frames/s; there another room, with a moving light",
+    Animation(about=(-0.31, 13.97, 6.47)),
 )

@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The frames of an animation as numbered files, each whole or not at all."""
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from reports.progress import Interrupted, Progress
+
+
+def numbered(path: Path, number: int, frames: int) -> Path:
+    """Return name-0001.exr for name.exr; the first frame has the number 1."""
+    digits = max(4, len(str(frames)))
+    return path.with_name(f"{path.stem}-{number:0{digits}d}{path.suffix}")
+
+
+def write_frames(
+    name: str, renderer, chosen, animation, *, frames: int, outputs: dict[str, Path | None], tell: Progress
+) -> dict[str, Any]:
+    """Render the frames of an animation, write them and return what they cost.
+
+    Parameters
+    ----------
+    name, renderer, chosen
+        The name of the scene, its frame renderer, and the configuration.
+    animation
+        What moves, a `validation.scenes.record.Animation`.
+    frames
+        How many.
+    outputs
+        The paths that were asked for, as 'exr' and 'png'; frames get their number before the suffix.
+    tell
+        Told the share done and what was written last.
+
+    Raises
+    ------
+    Interrupted
+        At Ctrl-C, with the frames that are finished.
+    """
+    import numpy as np
+
+    from realtime.frame import image_frame
+    from validation.animation import animate
+    from validation.timing import timed_frame
+
+    cost: list[tuple[float, float, float]] = []
+    factor: float | None = None  # the exposure of the first frame serves for all: a lamp that fades must look so
+    done = 0
+    try:
+        start = time.perf_counter()
+        for number, scene in enumerate(animate(renderer.scene, animation, frames), 1):
+            moved = 1e3 * (time.perf_counter() - start)
+            stages, prepare_ms, stages_ms = timed_frame(renderer, scene)
+            cost.append((moved, prepare_ms, stages_ms))
+            frame = image_frame(renderer, stages)
+            numbers = {kind: path and numbered(path, number, frames) for kind, path in outputs.items()}
+            factor = write_frame(name, chosen, frame, outputs=numbers, factor=factor)
+            done = number
+            tell(number / frames, f"frame {number} of {frames}")
+            start = time.perf_counter()
+    except KeyboardInterrupt:
+        raise Interrupted(_kept(outputs, done, frames)) from None
+    later = np.array(cost[1:] or cost)
+    moved, prepared, stages = (float(value) for value in np.median(later, axis=0))
+    return {
+        "frames": frames,
+        "moves": list(animation.moves),
+        "frame_ms": moved + prepared + stages,
+        "move_ms": moved,
+        "prepare_ms": prepared,
+        "stages_ms": stages,
+        "recordings": {name: getattr(getattr(renderer, name), "n_recordings", 0) for name in ("surface", "airlight")},
+        "files": [str(path) for path in _files(outputs, frames, frames)],
+    }
+
+
+def write_frame(
+    name: str, chosen, frame, *, outputs: dict[str, Path | None], factor: float | None = None
+) -> float | None:
+    """Write a frame where it is wanted, as EXR and as PNG; return the exposure of the picture, if there is one.
+
+    Parameters
+    ----------
+    name, chosen, frame
+        The name of the scene, the configuration, and the frame.
+    outputs
+        Paths or None, by 'exr' and 'png'.
+    factor
+        Exposure of the picture; by default one that suits it.
+    """
+    if outputs["exr"] is not None:
+        from reference.exr import write_exr
+        from reports.environment import stamped
+        from validation.references import layered_frame
+
+        write_exr(outputs["exr"], stamped(layered_frame(name, chosen, frame)))
+    if outputs["png"] is not None:
+        from reports.pictures import exposure, tone_mapped, write_png
+
+        total = frame.airlight + frame.surface
+        factor = exposure(total) if factor is None else factor
+        write_png(outputs["png"], tone_mapped(total, factor))
+    return factor
+
+
+def _files(outputs: dict[str, Path | None], done: int, frames: int) -> Sequence[Path]:
+    paths = [path for path in outputs.values() if path is not None]
+    return [numbered(path, number, frames) for path in paths for number in range(1, done + 1)]
+
+
+def _kept(outputs: dict[str, Path | None], done: int, frames: int) -> str:
+    if not done:
+        return f"none of {frames} frames is finished"
+    last = ", ".join(str(numbered(path, done, frames)) for path in outputs.values() if path is not None)
+    return f"{done} of {frames} frames are finished and kept, the last is {last}"
