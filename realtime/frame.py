@@ -74,7 +74,8 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
     def surface(geometry, pixel, camera, medium, lights):
         direction, _ = ray_directions(camera, pixel)
         distance, interaction = visible_surface(geometry, camera.origin, direction)
-        arguments = {"distance": distance, "medium": medium, "shadows": not method.lights_surfaces}
+        arguments = {"origin": camera.origin, "distance": distance, "medium": medium}
+        arguments |= {"shadows": not method.lights_surfaces}
         colors = [lit_surface(geometry, direction, interaction, light=light, **arguments) for light in lights]
         return distance, tuple(colors) if method.lights_surfaces else (sum(colors),)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A homogeneous medium as Dr.Jit values."""
+"""Homogeneous media as Dr.Jit values: what fills space, and bodies of other media in it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,6 +15,20 @@ class Medium:
     sigma_t: tuple[Any, ...]  #: extinction [1/m], one or three values
     albedo: Any  #: single-scattering albedo, RGB [1]
     phase: Phase
+    bodies: tuple["Body", ...] = ()  #: convex, disjoint bodies of other media, with as many extinctions
+    clear: bool = False  #: around the bodies nothing scatters or absorbs
+
+
+@dataclass(frozen=True)
+class Body:
+    """A homogeneous medium within convex bounds (`realtime.bounds`)."""
+
+    medium: Medium
+    planes: tuple[Any, ...] | None  #: components of the outward normals and offsets of the half spaces; None for a ball
+    count: int  #: half spaces
+    centre: Any  #: of the ball, or of one that holds the body [m]
+    radius: Any  #: of that ball [m]
+    mean_distance: Any  #: R, see `realtime.bounds.mean_distance` [m]
 
 
 def per_extinction(medium: Medium, function: Callable[[Any], Any]):

@@ -5,8 +5,7 @@ Mitsuba's own scene is the scene; nothing of ours is needed in it. What no metho
 """
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from realtime.arrays import ArrayTypes, array_types
@@ -14,27 +13,19 @@ from realtime.camera import Camera
 from realtime.errors import InputError
 from realtime.lights import Light
 from realtime.medium import Medium
-from realtime.phase import Phase
 from realtime.plan import Plan
-
-_PHASES = {
-    "IsotropicPhaseFunction": "isotropic",
-    "HGPhaseFunction": "hg",
-    "RayleighPhaseFunction": "rayleigh",
-    "TabulatedPhaseFunction": "tabulated",
-}
+from realtime.scene_media import opaque_scene, read_medium, sort_shapes
 
 
 @dataclass(frozen=True)
 class Scene:
     """A Mitsuba scene with what a real-time method reads from it."""
 
-    geometry: Any  #: the `mi.Scene`, for casting rays
+    geometry: Any  #: an `mi.Scene` of all opaque shapes, for casting rays
     camera: Camera
     medium: Medium
     lights: tuple[Light, ...]
     plan: Plan
-    positions: Mapping[str, Any] = field(default_factory=dict)  #: vertices of the shapes that moved, by name [m]
 
 
 def read_scene(scene, precision: str = "single") -> Scene:
@@ -54,11 +45,12 @@ def read_scene(scene, precision: str = "single") -> Scene:
     """
     types = array_types(precision)
     camera, sensor = _read_camera(scene, types)
-    medium = _read_medium(sensor, types)
+    opaque, boundaries = sort_shapes(scene)
+    medium = read_medium(sensor, boundaries, types)
     lights = tuple(_read_light(emitter, types) for emitter in scene.emitters())
     if not lights:
         raise InputError("the scene has no light; wanted at least one emitter of type 'point' or 'spot'")
-    return Scene(scene, camera, medium, lights, _make_plan(scene, medium, lights))
+    return Scene(opaque_scene(scene, opaque), camera, medium, lights, _make_plan(opaque, medium, lights))
 
 
 def _read_camera(scene, types: ArrayTypes):
@@ -87,56 +79,6 @@ def _read_camera(scene, types: ArrayTypes):
     vectors = [types.vector(*(float(c) for c in column)) for column in (matrix[:3, 3], *basis, *low)]
     dr.make_opaque(*vectors)
     return Camera(width, height, *vectors), sensor
-
-
-def _read_medium(sensor, types: ArrayTypes) -> Medium:
-    import drjit as dr
-    import mitsuba as mi
-    import numpy as np
-
-    medium = sensor.get_medium()
-    if medium is None:
-        raise InputError(
-            "the camera references no medium: it would be in a vacuum; declare the medium with an id and put "
-            '<ref name="medium" id="..."/> inside the sensor'
-        )
-    if not medium.is_homogeneous():
-        raise InputError(f"the medium is a {medium.class_name()}; wanted a medium of type 'homogeneous'")
-    sigma_s, _, sigma_t = medium.get_scattering_coefficients(dr.zeros(mi.MediumInteraction3f))
-    scattering = np.array(sigma_s, dtype=np.float64).reshape(-1)
-    extinction = np.array(sigma_t, dtype=np.float64).reshape(-1)
-    for name, values in (("sigma_t", extinction), ("sigma_s = albedo sigma_t", scattering)):
-        if not np.all(np.isfinite(values)) or np.any(values < 0):
-            raise InputError(f"the medium's {name} is {values.tolist()}; wanted finite values of 0 or more [1/m]")
-    albedo = np.divide(scattering, extinction, out=np.zeros(3), where=extinction > 0)
-    if np.any(albedo > 1 + 1e-6):
-        raise InputError(f"the medium's albedo is {albedo.tolist()}; wanted values from 0 to 1")
-    grey = extinction[0] == extinction[1] == extinction[2]
-    sigma = tuple(dr.opaque(types.scalar, float(value)) for value in (extinction[:1] if grey else extinction))
-    color = types.color(*(float(value) for value in albedo))
-    dr.make_opaque(color)
-    return Medium(sigma, color, _read_phase(medium.phase_function(), types))
-
-
-def _read_phase(phase, types: ArrayTypes) -> Phase:
-    import drjit as dr
-    import mitsuba as mi
-    import numpy as np
-
-    name = _PHASES.get(phase.class_name())
-    if name is None:
-        raise InputError(
-            f"the phase function is a {phase.class_name()}; wanted one of isotropic, hg, rayleigh, tabphase"
-        )
-    parameters = mi.traverse(phase)
-    if name == "hg":
-        return Phase(name, g=dr.opaque(types.scalar, float(parameters["g"][0])))
-    if name == "tabulated":
-        values = np.array(parameters["values"], dtype=np.float64)
-        # The mean over the sphere is half the integral over the cosine: the trapezoidal rule is exact on linear pieces.
-        mean = (values.sum() - 0.5 * (values[0] + values[-1])) / (len(values) - 1)
-        return Phase(name, values=types.scalar(values / mean))
-    return Phase(name)
 
 
 def _read_light(emitter, types: ArrayTypes) -> Light:
@@ -195,29 +137,23 @@ def _read_cone(parameters, matrix, types: ArrayTypes):
     return soft, cone
 
 
-def _make_plan(scene, medium: Medium, lights: tuple[Light, ...]) -> Plan:
+def _make_plan(opaque, medium: Medium, lights: tuple[Light, ...]) -> Plan:
     import mitsuba as mi
 
     notes = []
-    for shape in scene.shapes():
-        if shape.interior_medium() is not None or shape.exterior_medium() is not None:
-            raise InputError(
-                f"shape '{shape.id()}' bounds a medium; wanted one unbounded medium, referenced by the camera alone: "
-                "remove the medium from the shape"
-            )
-        bsdf = shape.bsdf()
-        if mi.has_flag(bsdf.flags(), mi.BSDFFlags.Null):
-            raise InputError(f"shape '{shape.id()}' is (partly) transparent; wanted opaque surfaces")
-        if bsdf.flags() & ~int(mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide) & 0x3FF:
+    for shape in opaque:
+        flags = shape.bsdf().flags()
+        if flags & ~int(mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide) & 0x3FF:
             notes.append(
                 f"shape '{shape.id()}' is not purely diffuse: shaded by its diffuse reflectance, airlight unaffected"
             )
+    media = [body.medium for body in medium.bodies] + [medium] * (not medium.clear)
     return Plan(
-        shadows=bool(scene.shapes()),
-        surfaces=bool(scene.shapes()),
+        shadows=bool(opaque),
+        surfaces=bool(opaque),
         extinctions=len(medium.sigma_t),
-        isotropic=medium.phase.name == "isotropic",
-        bounded=False,
+        isotropic=all(one.phase.name == "isotropic" for one in media),
+        bounded=bool(medium.bodies),
         vacuum=any(float(sigma_t[0]) == 0 for sigma_t in medium.sigma_t),
         point_lights=sum(light.kind == "point" for light in lights),
         spot_lights=sum(light.kind == "spot" for light in lights),

@@ -20,10 +20,13 @@ themselves in shadow. `order` chooses how that is decided:
 difference of the two Gammas instead, as the paper does.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 from realtime.arrays import array_types
-from realtime.casters import Casters, read_casters, with_positions
+from realtime.bounded_media import FORMS, MediaRay, ambient_radiance, bounded_airlight, check_form
+from realtime.casters import Casters, read_casters
 from realtime.errors import InputError
 from realtime.geometry import RayGeometry, clip_to_cone, ray_geometry
 from realtime.kernels import airlight_integral, gamma
@@ -35,7 +38,7 @@ from realtime.plane_sweep import in_light_frame, ray_planes, sum_lit_segments
 from realtime.plane_tiles import Lists, tile_lists
 from realtime.plane_view import bodies_in_view
 from realtime.scene import Scene
-from realtime.view import View, radiance
+from realtime.view import View, bounded_radiance, radiance, rays_in_media
 
 ORDERS = ("exact", "paper", "none")
 EVALUATIONS = ("pixel", "vertex")
@@ -43,23 +46,7 @@ SUMS = ("segments", "gamma")
 BUFFERS = ("float", "8bit")
 
 
-@dataclass(frozen=True)
-class PlanePreparation:
-    """The casters of a scene; called with the scene as it is now, returns the shadow planes of its lights."""
-
-    casters: Casters
-
-    def __call__(self, scene: Scene) -> tuple[PlaneIndex, ...]:
-        """Return the planes of every light of a scene."""
-        here = self.standing(scene)
-        return tuple(light_planes(here, scene, light) for light in scene.lights)
-
-    def standing(self, scene: Scene) -> Casters:
-        """Return the casters where they are in a scene."""
-        return with_positions(self.casters, scene.positions) if scene.positions else self.casters
-
-
-def prepare_shadow_planes(scene: Scene, **settings) -> PlanePreparation:
+def prepare_shadow_planes(scene: Scene, **settings) -> Callable[[Scene], tuple[PlaneIndex, ...]]:
     """Read the casters of a scene and return the function that finds the shadow planes of a frame.
 
     Raises
@@ -68,7 +55,8 @@ def prepare_shadow_planes(scene: Scene, **settings) -> PlanePreparation:
         For a parameter out of range and for casters without triangles.
     """
     _check(**settings)
-    return PlanePreparation(read_casters(scene.geometry))
+    casters = read_casters(scene.geometry)
+    return lambda moved: tuple(light_planes(casters, moved, light) for light in moved.lights)
 
 
 def light_planes(casters: Casters, scene: Scene, light: Light) -> PlaneIndex:
@@ -93,6 +81,7 @@ def shadow_planes(
     white: float = 1.0,
     rows: int = 16,
     ambient: float = 0.0,
+    media: str = "exact",
 ):
     """Return the airlight of every ray between shadow planes.
 
@@ -118,6 +107,8 @@ def shadow_planes(
     ambient
         Radiance of a constant light field in the medium, the paper's stand-in for multiple scattering [W/(m^2 sr)];
         adds albedo ambient (1 - exp(-sigma_t x)). The truth has none.
+    media
+        In bounded media 'exact' or 'paper', the constant R of section 4.2, see `realtime.bounded_media`.
 
     Returns
     -------
@@ -128,8 +119,9 @@ def shadow_planes(
 
     Notes
     -----
-    Valid for casters that are triangle meshes, closed or not, and a medium without bounds. Shadows are those of the
-    triangles, exact to rounding, with order=exact.
+    Valid for casters that are triangle meshes, closed or not. Shadows are those of the
+    triangles, exact to rounding, with order=exact. Bounded media have nodes of their own, the kernel is not asked;
+    they are for evaluation=pixel.
 
     References
     ----------
@@ -140,22 +132,23 @@ def shadow_planes(
 
     total = type(view.medium.albedo)(0)
     lit = []
+    if view.plan.bounded:
+        check_form(view.medium, media)
+        _check_bounded(evaluation)
+    in_media = rays_in_media(view) if view.plan.bounded else ()
     for number, light in enumerate(view.lights):
         geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
+        airlight = _Airlight(view, light, geometry, kernel, in_media[number] if in_media else None, media)
         if not view.plan.shadows:
-            integral = airlight_integral(
-                kernel, geometry, type(view.distance)(0), view.distance, medium=view.medium, light=light
-            )
-            total += radiance(view.medium, light, integral)
+            total += airlight.radiance(airlight.integral(type(view.distance)(0), view.distance))
             lit.append(True)
             continue
         index = view.prepared[number]
         lists = tile_planes(view, index, order=order)
         if order == "exact" and evaluation == "pixel" and buffer == "float":
-            value, reached = _segments(view, index, lists, (light, geometry), kernel=kernel, differences=sum == "gamma")
+            value, reached = _segments(index, lists, airlight, differences=sum == "gamma")
         else:
-            ray = (light, geometry)
-            at_plane, at_surface = _gammas(view, index, ray, kernel=kernel, evaluation=evaluation, rows=rows)
+            at_plane, at_surface = _gammas(index, airlight, evaluation=evaluation, rows=rows)
             levels = Buffer(white) if buffer == "8bit" else None
             rays = ray_planes(index, lists, view.direction, view.direction_low)
             value, reached = sum_crossings(
@@ -163,7 +156,9 @@ def shadow_planes(
             )
         total += value
         lit.append(reached)
-    if ambient:
+    if ambient and in_media:
+        total += ambient_radiance(in_media[0].pieces, view.distance, ambient)
+    elif ambient:
         distance = dr.minimum(view.distance, 1e30)
         for_channel = [1 - dr.exp(-sigma_t * distance) for sigma_t in view.medium.sigma_t]
         total += view.medium.albedo * ambient * type(total)(*for_channel)
@@ -180,34 +175,61 @@ def tile_planes(view: View, index: PlaneIndex, *, order: str) -> Lists:
     return tile_lists(index, rays, view.distance, order=order, square=view.square_tiles)
 
 
-def _segments(view: View, index: PlaneIndex, lists: Lists, ray, *, kernel, differences: bool):
+@dataclass(frozen=True)
+class _Airlight:
+    """The airlight of one light along the rays of a view."""
+
+    view: View
+    light: Light
+    geometry: RayGeometry
+    kernel: Any
+    media: MediaRay | None  #: where media are bounded
+    form: str
+
+    def integral(self, x0, x1):
+        """Return the integral over a segment; `radiance` knows its units."""
+        if self.media:
+            return bounded_airlight(self.media, x0, x1, form=self.form)
+        return airlight_integral(self.kernel, self.geometry, x0, x1, medium=self.view.medium, light=self.light)
+
+    def radiance(self, integral):
+        """Return the radiance of an integral [W/(m^2 sr)]."""
+        return (
+            bounded_radiance(self.light, integral) if self.media else radiance(self.view.medium, self.light, integral)
+        )
+
+    def gamma(self, x):
+        """Return the integral from the camera on."""
+        if self.media:
+            return self.integral(type(x)(0), x)
+        return gamma(self.kernel, self.geometry, x, medium=self.view.medium, light=self.light)
+
+
+def _segments(index: PlaneIndex, lists: Lists, airlight: _Airlight, *, differences: bool):
     """Sum the lit segments of one light."""
     import drjit as dr
 
-    light, geometry = ray
+    view, light = airlight.view, airlight.light
     x0, x1 = type(view.distance)(0), view.distance
     if light.kind == "spot":
-        x0, x1 = clip_to_cone(geometry, light.cos_cutoff, x0, x1)
+        x0, x1 = clip_to_cone(airlight.geometry, light.cos_cutoff, x0, x1)
 
     def integral(a, b):
-        if differences:
-            ends = [gamma(kernel, geometry, x, medium=view.medium, light=light) for x in (a, b)]
-            return ends[1] - ends[0]
-        return airlight_integral(kernel, geometry, a, b, medium=view.medium, light=light)
+        return airlight.gamma(b) - airlight.gamma(a) if differences else airlight.integral(a, b)
 
-    Value = type(view.distance) if len(view.medium.sigma_t) == 1 else type(view.medium.albedo)
+    grey = len(view.medium.sigma_t) == 1 and not airlight.media
     rays = ray_planes(index, lists, view.direction, view.direction_low)
-    zero = dr.zeros(Value, dr.width(view.distance))
+    zero = dr.zeros(type(view.distance) if grey else type(view.medium.albedo), dr.width(view.distance))
     value, reached = sum_lit_segments(index, lists, rays, (x0, x1), integral, zero)
-    return radiance(view.medium, light, value), reached
+    return airlight.radiance(value), reached
 
 
-def _gammas(view: View, index: PlaneIndex, ray: tuple[Light, RayGeometry], *, kernel, evaluation: str, rows: int):
+def _gammas(index: PlaneIndex, airlight: _Airlight, *, evaluation: str, rows: int):
     """Return the functions that give the radiance of Gamma at a crossing, and at the surface."""
-    light, geometry = ray
+    view, light, kernel = airlight.view, airlight.light, airlight.kernel
 
     def at(x):
-        return radiance(view.medium, light, gamma(kernel, geometry, x, medium=view.medium, light=light))
+        return airlight.radiance(airlight.gamma(x))
 
     if evaluation == "pixel":
         return lambda number, rays, x: at(x), at
@@ -217,12 +239,23 @@ def _gammas(view: View, index: PlaneIndex, ray: tuple[Light, RayGeometry], *, ke
     )
 
 
-def _check(*, order: str, evaluation: str, sum: str, buffer: str, white: float, rows: int, ambient: float) -> None:
+def _check_bounded(evaluation: str) -> None:
+    if evaluation == "vertex":
+        raise InputError(
+            "evaluation=vertex: Gamma has kinks where planes cross the bounds of a medium, between any vertices; use "
+            "evaluation=pixel in scenes with bounded media"
+        )
+
+
+def _check(
+    *, order: str, evaluation: str, sum: str, buffer: str, white: float, rows: int, ambient: float, media: str
+) -> None:
     words = (
         ("order", order, ORDERS),
         ("evaluation", evaluation, EVALUATIONS),
         ("sum", sum, SUMS),
         ("buffer", buffer, BUFFERS),
+        ("media", media, FORMS),
     )
     for name, value, allowed in words:
         if value not in allowed:

@@ -5,9 +5,11 @@ Biri, Arques, Michelin 2006, section 5.1.2, with the extinction to the eye of eq
 
     L = rho I cos(theta_p) / (pi r_p^2) exp(-sigma_t r_p) exp(-sigma_t distance),
 
-zero where a shadow ray is blocked. A one-sided surface is black from behind, as in Mitsuba's `diffuse`.
+zero where a shadow ray is blocked. With bounded media both exponents are sums over the media that the two legs cross
+(`realtime.bounded_media`). A one-sided surface is black from behind, as in Mitsuba's `diffuse`.
 """
 
+from realtime.bounded_media import path_transmittance
 from realtime.geometry import falloff, ray_geometry
 from realtime.lights import Light
 from realtime.medium import Medium, transmittance
@@ -66,7 +68,9 @@ def visible_triangle(scene, origin, direction):
     return corners, (1 - u - v, u, v), seen
 
 
-def lit_surface(scene, view_direction, interaction, *, distance, medium: Medium, light: Light, shadows: bool = True):
+def lit_surface(
+    scene, view_direction, interaction, *, origin, distance, medium: Medium, light: Light, shadows: bool = True
+):
     """Return the radiance that the visible surface sends to the eye through the medium, from one light [W/(m^2 sr)].
 
     Parameters
@@ -77,6 +81,8 @@ def lit_surface(scene, view_direction, interaction, *, distance, medium: Medium,
         Unit directions of the camera rays.
     interaction, distance
         From `visible_surface`.
+    origin
+        Where the rays start, one point for all [m].
     medium, light
         What the light crosses and where it comes from.
     shadows
@@ -101,9 +107,12 @@ def lit_surface(scene, view_direction, interaction, *, distance, medium: Medium,
     lit = seen & (cosine > 0)
     if shadows:
         lit &= ~scene.ray_test(interaction.spawn_ray_to(mi.Point3f(light.position)), lit)
-    path = dr.select(lit, distance + r, 0)
     reflected = albedo * arriving * (dr.inv_pi * cosine / dr.square(r))
-    return dr.select(lit, reflected * transmittance(medium, path), Color(0))
+    if medium.bodies:
+        kept = path_transmittance(medium, light, origin=origin, point=point, active=lit)
+    else:
+        kept = transmittance(medium, dr.select(lit, distance + r, 0))
+    return dr.select(lit, reflected * kept, Color(0))
 
 
 def _profile(light: Light, point, away):

@@ -5,6 +5,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from realtime.bounded_media import MediaRay, camera_pieces, media_ray
+from realtime.geometry import ray_geometry
 from realtime.lights import Light
 from realtime.medium import Medium
 from realtime.plan import Plan
@@ -38,3 +40,21 @@ def radiance(medium: Medium, light: Light, integral):
 
     sigma_t = medium.sigma_t[0] if len(medium.sigma_t) == 1 else type(medium.albedo)(*medium.sigma_t)
     return medium.albedo * light.intensity * (sigma_t * (integral * (0.25 * dr.inv_pi)))
+
+
+def rays_in_media(view: View) -> tuple[MediaRay, ...]:
+    """Return the rays of a view in bounded media, by light."""
+    pieces = camera_pieces(view.medium, view.origin, view.direction)
+    rays = []
+    for light in view.lights:
+        geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
+        ends = {"origin": view.origin, "direction": view.direction}
+        rays.append(media_ray(view.medium, light, geometry, **ends, pieces=pieces))
+    return tuple(rays)
+
+
+def bounded_radiance(light: Light, scattered):
+    """Return the radiance of what `realtime.bounded_media.bounded_airlight` returns [W/(m^2 sr)]."""
+    import drjit as dr
+
+    return light.intensity * (scattered * (0.25 * dr.inv_pi))

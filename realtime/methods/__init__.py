@@ -65,6 +65,7 @@ METHODS: dict[str, Method] = {
                 "white": 1.0,
                 "rows": 16,
                 "ambient": 0.0,
+                "media": "exact",
             }
         ),
     ),

@@ -14,6 +14,7 @@ steps.
 
 from collections.abc import Callable
 
+from realtime.bounded_media import MediaRay, bounded_source
 from realtime.errors import InputError
 from realtime.geometry import RayGeometry, clip_to_cone, distance_to_light, falloff, ray_geometry
 from realtime.lights import Light
@@ -21,7 +22,7 @@ from realtime.medium import least_extinction, per_extinction
 from realtime.phase import evaluate
 from realtime.scene import Scene
 from realtime.shadow_map import ShadowMap, cast_shadow_map, lit_in_map
-from realtime.view import View, radiance
+from realtime.view import View, bounded_radiance, radiance, rays_in_media
 
 SPACINGS = ("equiangular", "uniform")
 SHADOWS = ("ray", "map", "none")
@@ -62,17 +63,21 @@ def ray_march(
 
     _check(steps, spacing, shadow, view)
     total = type(view.medium.albedo)(0)
+    in_media = rays_in_media(view) if view.plan.bounded else ()
     for number, light in enumerate(view.lights):
         geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
         x0, x1 = type(view.distance)(0), view.distance
         if light.kind == "spot":
             x0, x1 = clip_to_cone(geometry, light.cos_cutoff, x0, x1)
-        if spacing == "uniform":
+        if spacing == "uniform" and not view.medium.clear:
             x1 = dr.minimum(x1, x0 + _OPTICAL_REACH / least_extinction(view.medium))
+        if view.medium.clear:
+            x0, x1 = _within(in_media[number], x0, x1)
         shadow_map = view.prepared[number] if shadow == "map" and view.plan.shadows else None
         lit = _visibility(view, light, shadow, shadow_map)
-        integral = _march(view, light, geometry, (x0, x1), steps=steps, spacing=spacing, lit=lit)
-        total += radiance(view.medium, light, integral)
+        media = in_media[number] if in_media else None
+        integral = _march(view, light, geometry, (x0, x1), steps=steps, spacing=spacing, lit=lit, media=media)
+        total += bounded_radiance(light, integral) if media else radiance(view.medium, light, integral)
     return total
 
 
@@ -89,7 +94,7 @@ def _check(steps: int, spacing: str, shadow: str, view: View) -> None:
             raise InputError(f"{name}: got {value!r}, wanted one of {', '.join(allowed)}")
     if not isinstance(steps, int) or steps < 1:
         raise InputError(f"steps: got {steps!r}, wanted a whole number of at least 1")
-    if spacing == "uniform" and view.plan.vacuum:
+    if spacing == "uniform" and view.plan.vacuum and not view.medium.clear:
         raise InputError("spacing=uniform: an endless ray through a vacuum has no step length; use spacing=equiangular")
 
 
@@ -101,7 +106,20 @@ def _visibility(view: View, light: Light, shadow: str, shadow_map):
     return lambda point: view.visible(point, light)
 
 
-def _march(view: View, light: Light, geometry: RayGeometry, segment, *, steps: int, spacing: str, lit):
+def _within(media: MediaRay, x0, x1):
+    """Return the part of a segment from the first to the last body."""
+    import drjit as dr
+
+    first, last = x1, x0
+    for piece in media.pieces:
+        first = dr.minimum(first, piece.begin)
+        last = dr.maximum(last, dr.select(dr.isfinite(piece.begin), piece.end, x0))
+    return dr.maximum(first, x0), dr.minimum(last, x1)
+
+
+def _march(
+    view: View, light: Light, geometry: RayGeometry, segment, *, steps: int, spacing: str, lit, media: MediaRay | None
+):
     """Sum the steps of every ray in one loop, so that the kernel does not grow with their number."""
     import drjit as dr
     import mitsuba as mi
@@ -119,14 +137,17 @@ def _march(view: View, light: Light, geometry: RayGeometry, segment, *, steps: i
         x = u if spacing == "uniform" else dr.fma(height, dr.tan(u), foot)
         r = distance_to_light(geometry, x)
         weight = dr.rcp(dr.square(r)) if spacing == "uniform" else dr.rcp(height)
+        point = view.origin + view.direction * x
+        if media:
+            term = weight * bounded_source(media, x)
+            return index + 1, total + dr.select((width > 0) & lit(point), term, 0)
         weight *= evaluate(medium.phase, (foot - x) / r)
         if light.soft:
             weight *= falloff(geometry, light, x)
-        point = view.origin + view.direction * x
         term = per_extinction(medium, lambda sigma_t: weight * dr.exp(-sigma_t * (x + r)))
         return index + 1, total + dr.select((width > 0) & lit(point), term, 0)
 
-    total = Float(0) if len(medium.sigma_t) == 1 else type(medium.albedo)(0)
+    total = Float(0) if len(medium.sigma_t) == 1 and not media else type(medium.albedo)(0)
     _, total = dr.while_loop(
         state=(mi.UInt32(0), total + dr.zeros(Float, dr.width(width))),
         cond=lambda index, total: index < steps,

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Airlight without volumetric shadows: one integral from the camera to the visible surface, for each light."""
 
+from realtime.bounded_media import bounded_airlight
 from realtime.geometry import ray_geometry
 from realtime.kernels import airlight_integral
-from realtime.view import View, radiance
+from realtime.view import View, bounded_radiance, radiance, rays_in_media
 
 
 def unshadowed(view: View, *, kernel):
@@ -19,7 +20,7 @@ def unshadowed(view: View, *, kernel):
     Notes
     -----
     Valid for any scene without occluders between a light and a visible part of the medium; elsewhere it shows how much
-    light the volumetric shadows take away.
+    light the volumetric shadows take away. Bounded media have nodes of their own, the kernel is not asked.
 
     References
     ----------
@@ -27,6 +28,9 @@ def unshadowed(view: View, *, kernel):
     """
     total = type(view.medium.albedo)(0)
     start = type(view.distance)(0)
+    if view.plan.bounded:
+        rays = rays_in_media(view)
+        return sum(bounded_radiance(ray.light, bounded_airlight(ray, start, view.distance)) for ray in rays)
     for light in view.lights:
         geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
         integral = airlight_integral(kernel, geometry, start, view.distance, medium=view.medium, light=light)
