@@ -45,9 +45,7 @@ def interpolated(module, rows, ratio, monkeypatch):
     medium, light = fog_and_lamp()
     vector = [mi.Float64(part) for part in np.ascontiguousarray(ways[ray].T)]
     # The mesh is given in the frame of the light, the light and the camera in the world's.
-    view = SimpleNamespace(
-        origin=mi.Vector3d(CAMERA.tolist()), direction=mi.Vector3d(0), distance=mi.Float64(0), medium=medium
-    )
+    view: Any = SimpleNamespace(**empty_view(), medium=medium)
     kernel = KERNELS["exact"].function
     at = mesh_gamma(view, index, light, kernel=kernel, rows=rows)
     mesh = np.array(at(mi.UInt32(plane), SimpleNamespace(x=vector[0], y=vector[1], z=vector[2]), mi.Float64(x)))
