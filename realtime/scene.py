@@ -5,7 +5,8 @@ Mitsuba's own scene is the scene; nothing of ours is needed in it. What no metho
 """
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 from realtime.arrays import ArrayTypes, array_types
@@ -26,6 +27,7 @@ class Scene:
     medium: Medium
     lights: tuple[Light, ...]
     plan: Plan
+    positions: Mapping[str, Any] = field(default_factory=dict)  #: vertices of the shapes that moved, by name [m]
 
 
 def read_scene(scene, precision: str = "single") -> Scene:

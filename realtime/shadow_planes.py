@@ -20,13 +20,12 @@ themselves in shadow. `order` chooses how that is decided:
 difference of the two Gammas instead, as the paper does.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 from realtime.arrays import array_types
 from realtime.bounded_media import FORMS, MediaRay, ambient_radiance, bounded_airlight, check_form
-from realtime.casters import Casters, read_casters
+from realtime.casters import Casters, read_casters, with_positions
 from realtime.errors import InputError
 from realtime.geometry import RayGeometry, clip_to_cone, ray_geometry
 from realtime.kernels import airlight_integral, gamma
@@ -46,7 +45,23 @@ SUMS = ("segments", "gamma")
 BUFFERS = ("float", "8bit")
 
 
-def prepare_shadow_planes(scene: Scene, **settings) -> Callable[[Scene], tuple[PlaneIndex, ...]]:
+@dataclass(frozen=True)
+class PlanePreparation:
+    """The casters of a scene; called with the scene as it is now, returns the shadow planes of its lights."""
+
+    casters: Casters
+
+    def __call__(self, scene: Scene) -> tuple[PlaneIndex, ...]:
+        """Return the planes of every light of a scene."""
+        here = self.standing(scene)
+        return tuple(light_planes(here, scene, light) for light in scene.lights)
+
+    def standing(self, scene: Scene) -> Casters:
+        """Return the casters where they are in a scene."""
+        return with_positions(self.casters, scene.positions) if scene.positions else self.casters
+
+
+def prepare_shadow_planes(scene: Scene, **settings) -> PlanePreparation:
     """Read the casters of a scene and return the function that finds the shadow planes of a frame.
 
     Raises
@@ -55,8 +70,7 @@ def prepare_shadow_planes(scene: Scene, **settings) -> Callable[[Scene], tuple[P
         For a parameter out of range and for casters without triangles.
     """
     _check(**settings)
-    casters = read_casters(scene.geometry)
-    return lambda moved: tuple(light_planes(casters, moved, light) for light in moved.lights)
+    return PlanePreparation(read_casters(scene.geometry))
 
 
 def light_planes(casters: Casters, scene: Scene, light: Light) -> PlaneIndex:
