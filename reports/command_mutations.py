@@ -12,8 +12,13 @@ if TYPE_CHECKING:
 def mutations(
     names: Annotated[list[str] | None, typer.Argument(metavar="[NAME]...", help="All by default.")] = None,
     margin: Annotated[
-        float, typer.Option(min=1e-4, max=0.1, help="Relative bias that counts as agreement with volpath.")
-    ] = 0.005,
+        float,
+        typer.Option(
+            min=1e-4,
+            max=0.1,
+            help="Relative bias that counts as agreement with volpath; with single-scatter, a twentieth.",
+        ),
+    ] = 0.01,
     size: Annotated[str, typer.Option(help="Size of the images, WIDTHxHEIGHT.")] = "48x36",
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
@@ -66,7 +71,12 @@ def _print_results(found) -> None:
     )
     print_table(headers, [_row(result) for result in found.results])
     controls = [
-        (f"{one.scene}, {one.layer}", *_numbers(one)[1:], f"{100 * one.chance:.2g} %", "yes" if one.agrees else "NO")
+        (
+            f"{one.scene}, {one.layer}, {one.against}",
+            *_numbers(one)[1:],
+            f"{100 * one.chance:.2g} %",
+            "yes" if one.agrees else "NO",
+        )
         for one in found.control
     ]
     control_headers = ("control", "bias seen", "95 % interval", "margin", "false alarms", "agrees")

@@ -25,7 +25,7 @@ Batch = Callable[[TruthScene, int, int], Batches]
 #: Built-in scenes of the standard run.
 SCENES = ("open-fog", "sphere-spot", "colonnade", "two-pens")
 #: The margin against single-scatter is that against volpath over this: it has so much less noise.
-SHARPER = 10.0
+SHARPER = 20.0
 _LEAST, _MOST = 32, 4096  # batches
 _SAMPLES = 256  # of volpath, a pixel and batch
 _DISTANCES = 64  # of single-scatter, a pixel and batch

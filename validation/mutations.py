@@ -96,7 +96,7 @@ def study_mutations(
     mutations: Sequence[Mutation] = MUTATIONS,
     *,
     size: tuple[int, int] = (48, 36),
-    margin: float = 0.005,
+    margin: float = 0.01,
     progress: Progress | None = None,
 ) -> MutationStudy:
     """Put every mutation through the standard run.
@@ -108,7 +108,8 @@ def study_mutations(
     size
         Width and height of the images [pixels].
     margin
-        Of the relative bias against volpath; volpath runs until its interval is narrow enough for it.
+        Of the relative bias against volpath; that against single-scatter is a twentieth of it. Both run until their
+        intervals are narrow enough.
     progress
         Called with (share done, what) now and then.
     """

@@ -70,6 +70,14 @@ _CONSTANTS = (
         _FACTOR,
         f"{_FACTOR} * 1.001",
     ),
+    _quadrature(
+        "three-in-ten-thousand",
+        "everything scattered in the medium 0.03 % too bright",
+        _SUMS,
+        _FACTOR,
+        f"{_FACTOR} * 1.0003",
+        "a bias inside the margin counts as agreement",
+    ),
 )
 
 _ATTENUATION = (

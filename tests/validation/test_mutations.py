@@ -77,8 +77,8 @@ def _change(image, truth) -> float:
 
 @pytest.mark.parametrize("mutation", QUADRATURE, ids=lambda mutation: mutation.name)
 def test_every_mutation_changes_an_image(images, mutation):
-    # The least of them is a factor of 1.001; rounding is worth 1e-10.
-    assert any(_change(_image(mutation, scene), truth) > 9e-4 for scene, truth in images.values())
+    # The least of them is a factor of 1.0003; rounding is worth 1e-10.
+    assert any(_change(_image(mutation, scene), truth) > 2e-4 for scene, truth in images.values())
 
 
 @pytest.fixture(scope="module")
@@ -98,7 +98,7 @@ def test_the_control_agrees(stage):
         assert one.agrees
         assert not one.built_in
         assert one.nonfinite == 0
-        assert one.margin == (0.02 if one.against == "volpath" else 0.002)
+        assert one.margin == (0.02 if one.against == "volpath" else 0.001)
         assert -one.margin < one.interval[0] <= one.relative_bias <= one.interval[1] < one.margin
         assert one.interval[1] - one.interval[0] < 0.8 * one.margin
         assert one.true_bias == 0
@@ -130,10 +130,12 @@ def test_mutations_are_caught(stage, name, layer, bias):
 
 @pytest.mark.statistical
 def test_a_fault_inside_the_margin_is_not_caught_and_the_reason_says_so(stage):
-    result = judged(BY_NAME["one-per-mille"], seen(BY_NAME["one-per-mille"], [stage]))
+    whole = BY_NAME["one-per-mille"]
+    small = replace(whole, new=f"{whole.old} * 1.0002")
+    result = judged(small, seen(small, [stage]))
     assert not result.caught
-    assert result.reason == "the fault changes tiny, airlight, by +0.1 %, no other more; its margin there is ±0.2 %"
-    assert [one.true_bias for one in result.sightings] == pytest.approx([0.001, 0.0] * 2, abs=1e-9)
+    assert result.reason == "the fault changes tiny, airlight, by +0.02 %, no other more; its margin there is ±0.1 %"
+    assert [one.true_bias for one in result.sightings] == pytest.approx([0.0002, 0.0] * 2, abs=1e-9)
 
 
 @pytest.mark.statistical
@@ -173,9 +175,8 @@ def test_a_study_passes_only_if_the_control_agrees_and_nine_in_ten_are_caught(st
 @pytest.mark.slow
 @pytest.mark.statistical
 def test_the_standard_run_catches_nine_in_ten(variant):
-    # Twice the margin of a default report: a quarter of the samples.
-    found = study_mutations(margin=0.01)
+    found = study_mutations()
     assert found.passed
-    missed = {result.name for result in found.results if not result.caught}
-    assert missed <= {"one-per-mille", "three-per-mille", "one-per-cent", "short-shadow-rays"}
+    # The margin against single-scatter is 0.05 %: one fault of the catalogue is smaller, on purpose.
+    assert [result.name for result in found.results if not result.caught] == ["three-in-ten-thousand"]
     assert all(result.reason for result in found.results if not result.caught_by_built_in)
