@@ -11,6 +11,9 @@ def bench(
         list[str] | None, typer.Argument(help="Scenes, or with --kernels kernels; all built-in ones by default.")
     ] = None,
     kernels: Annotated[bool, typer.Option("--kernels", help="Time the kernels alone, on 480 000 rays.")] = False,
+    estimators: Annotated[
+        bool, typer.Option("--estimators", help="Time single-scatter and volpath at equal error.")
+    ] = False,
     methods: Annotated[str | None, typer.Option(help="Comma-separated methods; all by default.")] = None,
     size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels; the scene's own by default.")] = None,
     truth: Annotated[bool, typer.Option(help="Also compare the truth with single-scatter and volpath.")] = True,
@@ -25,6 +28,9 @@ def bench(
     """
     if kernels:
         _bench_kernels(scenes, json=json, markdown=markdown)
+        return
+    if estimators:
+        _bench_estimators(scenes, size=size, json=json)
         return
     from realtime.methods import METHODS
     from realtime.scene import read_scene
@@ -113,3 +119,32 @@ def _bench_kernels(names: list[str] | None, *, json: bool, markdown: bool) -> No
     print_kernel_bench(found, show=show)
     if rates:
         print_convergence(rates, show=show)
+
+
+def _bench_estimators(scenes: list[str] | None, *, size: str | None, json: bool) -> None:
+    from reports.environment import activate, describe_environment
+    from reports.progress import progress_bar
+    from reports.tables import print_json
+    from validation.efficiency import efficiency_lines, scene_efficiency, thin_fog
+    from validation.load import load_scene, parse_size
+    from validation.scenes import SCENES
+
+    pixels = parse_size(size) if size else (160, 120)
+    activate()
+    names = list(scenes or SCENES)
+    loaded = {name: load_scene(name, pixels).scene for name in names}  # refuse before any work, not after
+    if not scenes:
+        loaded = {"open-fog, optical depth 0.2": thin_fog(pixels)} | loaded
+    found = {}
+    with progress_bar("bench") as tell:
+        for number, (name, scene) in enumerate(loaded.items()):
+            tell(number / len(loaded), name)
+            found[name] = scene_efficiency(scene)
+    if json:
+        from reports.data import plain
+
+        print_json({"environment": describe_environment(), "estimators": plain(found)})
+        return
+    for name, one in found.items():
+        print(f"{name}, {pixels[0]} x {pixels[1]}")
+        print("\n".join(f"  {line}" for line in efficiency_lines(one)))

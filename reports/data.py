@@ -81,6 +81,7 @@ def measurement_data(measured: Measurement) -> dict[str, Any]:
         "times": plain(measured.times),
         "error": plain(measured.error),
         "surface_error": plain(measured.surface_error),
+        "flip": measured.flip.to_json() if measured.flip else None,
         "files": {},
     }
 

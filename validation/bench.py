@@ -11,6 +11,7 @@ from realtime.plan import Plan
 from realtime.scene import Scene, read_scene
 from reference.quadrature import TruthImage
 from validation.configurations import STANDARD, Configuration, prepared
+from validation.flip import Flip, flip_hdr
 from validation.load import LoadedScene
 from validation.metrics import Metrics, error_metrics
 from validation.timing import FrameTimes, time_frame
@@ -28,6 +29,7 @@ class Measurement:
     times: FrameTimes | None
     error: Metrics | None  #: of the airlight
     surface_error: Metrics | None
+    flip: Flip | None = None  #: HDR-FLIP of all light, airlight and surface; None where it was not asked for
     refused: str | None = None  #: why this configuration cannot render this scene
 
 
@@ -39,7 +41,13 @@ def configurations_for(plan: Plan, configurations: Sequence[Configuration] = STA
 
 
 def measure(
-    scene: Scene, chosen: Configuration, *, truth: TruthImage, timed: Scene | None = None, seconds: float = 0.6
+    scene: Scene,
+    chosen: Configuration,
+    *,
+    truth: TruthImage,
+    timed: Scene | None = None,
+    seconds: float = 0.6,
+    with_flip: bool = False,
 ) -> Measurement:
     """Render, compare and time one configuration.
 
@@ -55,12 +63,14 @@ def measure(
         The scene at another size to time, where that differs from the size of the truth.
     seconds
         Time to spend on each timing.
+    with_flip
+        Also compute HDR-FLIP; where that cannot be had, it holds a note.
     """
     try:
         renderer = prepared(scene, chosen)
         frame = render_frame(renderer)
     except InputError as error:
-        return Measurement(chosen, None, None, None, None, str(error))
+        return Measurement(chosen, None, None, None, None, refused=str(error))
     times = time_frame(renderer if timed is None else prepared(timed, chosen), seconds=seconds)
     return Measurement(
         chosen,
@@ -68,6 +78,7 @@ def measure(
         times,
         error_metrics(truth.airlight, frame.airlight),
         error_metrics(truth.surface, frame.surface) if scene.plan.surfaces else None,
+        flip_hdr(truth.airlight + truth.surface, frame.airlight + frame.surface) if with_flip else None,
     )
 
 

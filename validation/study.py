@@ -30,6 +30,7 @@ class Effort:
     checked: tuple[int, int]  #: width and height of the comparisons of the truth [pixels]
     margins: Mapping[str, float]  #: by estimator, of its relative bias
     seconds: float  #: spent on each timing
+    flip: bool = False  #: compute HDR-FLIP of every image
     rays: int = 0  #: generated rays on which kernels are tried, besides the certified ones; 0 leaves this out
 
 
@@ -41,8 +42,8 @@ EFFORTS: dict[str, Effort] = {
     effort.name: effort
     for effort in (
         Effort("quick", (320, 240), (320, 240), (120, 90), _margins(0.002, 0.01), 0.15),
-        Effort("default", (400, 300), (800, 600), (160, 120), _margins(0.0005, 0.005), 0.4, 20_000),
-        Effort("full", (800, 600), (800, 600), (240, 180), _margins(0.0005, 0.002), 1.0, 100_000),
+        Effort("default", (400, 300), (800, 600), (160, 120), _margins(0.0005, 0.005), 0.4, True, 20_000),
+        Effort("full", (800, 600), (800, 600), (240, 180), _margins(0.0005, 0.002), 1.0, True, 100_000),
     )
 }
 
@@ -96,6 +97,8 @@ def study_scene(
     measurements = []
     for number, one in enumerate(chosen):
         tell(0.5 + 0.5 * number / len(chosen), one.label)
-        measurements.append(measure(scene, one, truth=truth, timed=timed, seconds=effort.seconds))
+        measurements.append(
+            measure(scene, one, truth=truth, timed=timed, seconds=effort.seconds, with_flip=effort.flip)
+        )
     tell(1.0, "done")
     return SceneStudy(loaded, scene.plan, truth, agreed, multiple, tuple(measurements))

@@ -158,7 +158,7 @@ def test_plain_makes_what_json_can_hold():
 
 
 def test_refused_measurement_has_every_entry():
-    refused = Measurement(Configuration("unshadowed", "taylor"), None, None, None, None, "no series")
+    refused = Measurement(Configuration("unshadowed", "taylor"), None, None, None, None, refused="no series")
     data = measurement_data(refused)
     assert (data["label"], data["refused"]) == ("unshadowed (taylor)", "no series")
     assert data["times"] is data["error"] is data["surface_error"] is None

@@ -63,6 +63,7 @@ def method(label, **changes):
         "knows_shadows": True,
         "times": {name: timing(3.21) for name in ("frame", "surface", "airlight", "rebuild")},
         "error": error,
+        "flip": {"value": 0.0321, "note": ""},
         "files": {"picture": "s/a.png", "error": "s/a.png", "exr": "s/a.exr"},
     } | changes
 
@@ -209,7 +210,7 @@ def test_rows_of_the_methods_are_as_wide_as_their_headers(data, folder):
             row = 0
         row += int(attributes.get("colspan", 1)) if tag in ("td", "th") else 0
     widths.append(row)
-    assert set(widths[1:]) == {11}
+    assert set(widths[1:]) == {12}
 
 
 def test_page_has_language_title_and_one_main_heading(page):
@@ -371,3 +372,10 @@ def test_kernels_have_a_table_where_they_were_tried(data, folder):
     assert "4.5·10⁻⁶" in page.text
     assert "bad" in [attributes.get("class") for attributes in page.attributes("td")]
     assert "Where kernels break" not in render(data, folder).text
+
+
+def test_missing_flip_is_a_note_and_a_dash(data, folder):
+    data["scenes"][0]["methods"][0]["flip"] = {"value": None, "note": "flip-evaluator is not installed"}
+    text = render(data, folder).text
+    assert "No HDR-FLIP for some of these: flip-evaluator is not installed." in text
+    assert text.count("No HDR-FLIP") == 1
