@@ -19,6 +19,7 @@ between P and P + v lies in the body: min(f_out, 1) - min(f_in, 1).
 from dataclasses import dataclass
 from typing import Any
 
+from realtime.arrays import is_single
 from realtime.medium import Body
 
 
@@ -28,25 +29,27 @@ class Seen:
 
     body: Body
     toward: Any  #: from the point to the centre of the body's ball [m]
-    gradient: tuple[Any, ...]  #: components of g, by plane [1/m]; none for a ball
-    outside: Any  #: by plane, whether the point is outside of the half space
+    planes: Any  #: four numbers a plane: g [1/m], and whether the point is outside of the half space; None for a ball
 
 
 def seen_from(body: Body, point) -> Seen:
     """Return what lines from a point, one for all lanes, need of a body."""
     import drjit as dr
+    import mitsuba as mi
 
     toward = body.centre - point
     if body.planes is None:
-        return Seen(body, toward, (), None)
+        return Seen(body, toward, None)
     *normal, offset = body.planes
     room = offset - (normal[0] * point.x + normal[1] * point.y + normal[2] * point.z)
     # A point in the plane itself counts as just outside: the line is in from next to nothing on, or never.
     room = dr.select(dr.abs(room) < 1e-7 * body.radius, -1e-7 * body.radius, room)
-    gradient = tuple(component / room for component in normal)
-    outside = room < 0
-    dr.eval(*gradient, outside, toward)
-    return Seen(body, toward, gradient, outside)
+    columns = (*(component / room for component in normal), dr.select(room < 0, type(room)(1), 0))
+    numbers = dr.zeros(type(room), 4 * body.count)
+    for place, column in enumerate(columns):
+        dr.scatter(numbers, column, 4 * dr.arange(mi.UInt32, body.count) + place)
+    dr.eval(numbers, toward)
+    return Seen(body, toward, numbers)
 
 
 def inverse_crossings(seen: Seen, start, direction, distances, active, *, leaves: bool = True):
@@ -77,14 +80,15 @@ def inverse_crossings(seen: Seen, start, direction, distances, active, *, leaves
     if seen.body.planes is None:
         found = [_ball_crossings(seen, start + direction * x) for x in distances]
         return [one for one, _ in found], [other for _, other in found]
-    Float = type(start.x)
+    Float, Vector4 = type(start.x), mi.Vector4f if is_single(type(start.x)) else mi.Vector4d
     width = dr.width(start, direction, active, *distances)
     enter = [dr.full(Float, dr.inf, width) for _ in distances]
     leave = [dr.full(Float, -dr.inf, width) for _ in distances] if leaves else []
 
     def plane(number, enter, leave):
-        g = type(start)(*(dr.gather(Float, component, number, active) for component in seen.gradient))
-        outside = dr.gather(dr.mask_t(Float), seen.outside, number, active)
+        # Four numbers at once: reading them is most of the work.
+        values = dr.gather(Vector4, seen.planes, number, active)
+        g, outside = values.xyz, values.w > 0
         constant, slope = dr.dot(g, start), dr.dot(g, direction)
         first, last = dr.select(outside, constant, dr.inf), dr.select(outside, -dr.inf, constant)
         enter = [dr.minimum(value, dr.fma(slope, x, first)) for value, x in zip(enter, distances)]
