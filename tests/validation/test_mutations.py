@@ -77,8 +77,8 @@ def _change(image, truth) -> float:
 
 @pytest.mark.parametrize("mutation", QUADRATURE, ids=lambda mutation: mutation.name)
 def test_every_mutation_changes_an_image(images, mutation):
-    # The least of them is a factor of 1.0003; rounding is worth 1e-10.
-    assert any(_change(_image(mutation, scene), truth) > 2e-4 for scene, truth in images.values())
+    # The least of them is a factor of 1.0001; rounding is worth 1e-10.
+    assert any(_change(_image(mutation, scene), truth) > 9e-5 for scene, truth in images.values())
 
 
 @pytest.fixture(scope="module")
@@ -178,5 +178,5 @@ def test_the_standard_run_catches_nine_in_ten(variant):
     found = study_mutations()
     assert found.passed
     # The margin against single-scatter is 0.05 %: one fault of the catalogue is smaller, on purpose.
-    assert [result.name for result in found.results if not result.caught] == ["three-in-ten-thousand"]
+    assert [result.name for result in found.results if not result.caught] == ["one-in-ten-thousand"]
     assert all(result.reason for result in found.results if not result.caught_by_built_in)
