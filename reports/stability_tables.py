@@ -7,6 +7,7 @@ from reports.tables import number, print_table
 
 if TYPE_CHECKING:
     from validation.kernel_errors import Errors
+    from validation.plane_stability import PlaneStability
     from validation.stability import KernelStability, SetStability
 
 _HEADERS = ("rays", "count", "refused", "float32", "median", "99 %", "NaN/Inf/<0", "float64", "NaN/Inf/<0", "32 vs 64")
@@ -40,6 +41,31 @@ def print_stability(found: "list[KernelStability]", *, certified: bool) -> None:
         _print_laws(kernel)
         for words in kernel.broken:
             print(f"BROKEN: {kernel.kernel}, {words}")
+
+
+def print_plane_stability(found: "list[PlaneStability]", broken: list[str]) -> None:
+    """Print what `validation.plane_stability.plane_stability` found, and what of it breaks the bar of the default."""
+    headers = ("shadow planes", "sum", "precision", "median", "99 %", "max", "beyond 1e-4", "negative", "NaN/Inf")
+    rows = [
+        (
+            one.case,
+            one.sum,
+            one.precision,
+            number(one.median),
+            number(one.p99),
+            number(one.max),
+            *(str(count) if count else "" for count in (one.beyond, one.negative, one.nonfinite)),
+        )
+        for one in found
+    ]
+    print()
+    print_table(headers, rows, "cancellation between shadow planes: errors relative to each pixel's true value")
+    print(
+        "segments: J of each lit segment (the default); gamma: differences of Gamma a segment; planes: Gamma plane by"
+    )
+    print("plane as published, float32 against float64 (its negative pixels are the artefact of Fig. 4)")
+    for words in broken:
+        print(f"BROKEN: shadow planes, {words}")
 
 
 def boost(errors: "Errors", precision: str) -> str:
