@@ -129,6 +129,7 @@ def sum_lit_segments(index: PlaneIndex, lists: Lists, ray: RayPlanes, segment, i
         value = integral(begin, dr.maximum(dr.minimum(ray.span / walk.closed, x1), begin))
         total = dr.select(again, zero, total) + dr.select(walk.ready, value, zero)
         walk.ready = mi.Bool(False)
+        walk.done |= (ray.source.count == 0) & ray.sorted
         return total, walk
 
     total, walk = dr.while_loop(
@@ -164,6 +165,8 @@ def _started(index: PlaneIndex, ray: RayPlanes, segment) -> _Walk:
     import mitsuba as mi
 
     Float, width = type(ray.x), dr.width(ray.x)
+    # Without planes the ray is lit as a whole, or dark.
+    alone = (ray.source.count == 0) & ray.sorted
     return _Walk(
         place=dr.zeros(mi.UInt32, width),
         layers=dr.zeros(Float, width) + Float(index.layers),
@@ -174,8 +177,8 @@ def _started(index: PlaneIndex, ray: RayPlanes, segment) -> _Walk:
         after_gain=dr.zeros(Float, width),
         opened=dr.full(Float, dr.inf, width),
         closed=dr.zeros(Float, width),
-        ready=dr.full(mi.Bool, False, width),
-        done=~(segment[1] > segment[0]),
+        ready=alone & (index.layers <= 0),
+        done=~(segment[1] > segment[0]) | (alone & (index.layers > 0)),
         selecting=~ray.sorted,
         started=dr.full(mi.Bool, False, width),
     )

@@ -260,29 +260,45 @@ def listed(index: PlaneIndex, box: Box, entries, source: Source, *, room: int, o
     behind = dr.width(entries)
     pool = dr.empty(mi.UInt32, behind + room)
     dr.scatter(pool, entries, dr.arange(mi.UInt32, behind))
-    keys, owner = dr.empty(type(box.x), room), dr.empty(mi.UInt32, room)
-    dr.eval(pool, keys, owner, count, offset)
-
-    def write(place, entry, key, active):
-        active &= fits
-        dr.scatter(pool, entry, offset + place + behind, active)
-        if order is not None:
-            if order == "paper":
-                key = dr.gather(type(box.x), index.spans, (entry & NUMBER) * 4 + 3, active)
-            dr.scatter(keys, key, offset + place, active)
-            dr.scatter(owner, dr.arange(mi.UInt32, dr.width(box.x)), offset + place, active)
-
-    _visit(index, box, entries, source, write)
-    dr.eval(pool, keys, owner)
     found = Source(
         dr.select(fits, offset + behind, source.first),
         dr.select(fits, count, source.count),
         dr.select(fits, offset + count + behind, source.all_before),
     )
+    dr.eval(pool, count, offset, found)
     if order is None:
+
+        def write(place, entry, key, active):
+            dr.scatter(pool, entry, offset + place + behind, active & fits)
+
+        _visit(index, box, entries, source, write)
+        dr.eval(pool)
         return Lists(pool, found, fits)
-    total = dr.sum(dr.select(fits, count, 0))
-    return Lists(_ranked(pool, keys, owner, found, total, behind, order), found, fits)
+
+    unsorted = _Unsorted(dr.empty(mi.UInt32, room), dr.empty(type(box.x), room), dr.empty(mi.UInt32, room))
+    dr.eval(unsorted)
+
+    def write_unsorted(place, entry, key, active):
+        active &= fits
+        if order == "paper":
+            key = -dr.gather(type(box.x), index.spans, (entry & NUMBER) * 4 + 3, active)
+        dr.scatter(unsorted.entry, entry, offset + place, active)
+        dr.scatter(unsorted.key, key, offset + place, active)
+        dr.scatter(unsorted.owner, dr.arange(mi.UInt32, dr.width(box.x)), offset + place, active)
+
+    _visit(index, box, entries, source, write_unsorted)
+    dr.eval(unsorted)
+    _write_sorted(pool, unsorted, found, behind, dr.sum(dr.select(fits, count, 0)))
+    return Lists(pool, found, fits)
+
+
+@dataclass
+class _Unsorted:
+    """Entries of lists that are not in order yet, list after list."""
+
+    entry: Any
+    key: Any  #: larger first
+    owner: Any  #: the box whose list it belongs to
 
 
 def _visit(index: PlaneIndex, box: Box, entries, source: Source, write):
@@ -309,33 +325,32 @@ def _visit(index: PlaneIndex, box: Box, entries, source: Source, write):
     return found
 
 
-def _ranked(pool, keys, owner, source: Source, total, behind: int, order: str):
-    """Sort every list: the rank of an entry is the number of entries of its list that come before it."""
+def _write_sorted(pool, unsorted: _Unsorted, source: Source, behind: int, total) -> None:
+    """Write every list in order: the rank of an entry is the number of entries of its list that come before it."""
     import drjit as dr
     import mitsuba as mi
 
-    room = dr.width(keys)
-    entry = dr.arange(mi.UInt32, room)
-    used = entry < total
-    tile = dr.gather(mi.UInt32, owner, entry, used)
-    first = dr.gather(mi.UInt32, source.first, tile, used) - behind
-    count = dr.gather(mi.UInt32, source.count, tile, used)
-    own = dr.gather(type(keys), keys, entry, used)
+    def placed(place):
+        box = dr.gather(mi.UInt32, unsorted.owner, place)
+        first = dr.gather(mi.UInt32, source.first, box) - behind
+        count = dr.gather(mi.UInt32, source.count, box)
+        own = dr.gather(type(unsorted.key), unsorted.key, place)
 
-    def body(k, rank):
-        other = dr.gather(type(keys), keys, first + k, used)
-        before = (other > own) if order == "exact" else (other < own)
-        before |= (other == own) & (first + k < entry)
-        return k + 1, rank + dr.select(before, mi.UInt32(1), mi.UInt32(0))
+        def body(k, rank):
+            other = dr.gather(type(own), unsorted.key, first + k)
+            before = (other > own) | ((other == own) & (first + k < place))
+            return k + 1, rank + dr.select(before, mi.UInt32(1), mi.UInt32(0))
 
-    _, rank = dr.while_loop(
-        state=(dr.zeros(mi.UInt32, room), dr.zeros(mi.UInt32, room)),
-        cond=lambda k, rank: used & (k < count),
-        body=body,
-        labels=("k", "rank"),
-    )
-    result = dr.empty(mi.UInt32, behind + room)
-    dr.scatter(result, dr.gather(mi.UInt32, pool, dr.arange(mi.UInt32, behind)), dr.arange(mi.UInt32, behind))
-    dr.scatter(result, dr.gather(mi.UInt32, pool, entry + behind, used), first + rank + behind, used)
-    dr.eval(result)
-    return result
+        _, rank = dr.while_loop(
+            state=(dr.zeros(mi.UInt32, dr.width(place)), dr.zeros(mi.UInt32, dr.width(place))),
+            cond=lambda k, rank: k < count,
+            body=body,
+            labels=("k", "rank"),
+        )
+        dr.scatter(pool, dr.gather(mi.UInt32, unsorted.entry, place), first + rank + behind)
+        return place
+
+    place = dr.arange(mi.UInt32, dr.width(unsorted.entry))
+    # Most of the room is empty: a branch steps over it without reading.
+    dr.if_stmt(args=(place,), cond=place < total, true_fn=placed, false_fn=lambda place: place)
+    dr.eval(pool)
