@@ -77,8 +77,8 @@ def make_casters(meshes) -> Casters:
     Parameters
     ----------
     meshes
-        (name, vertices (n, 3) [m], triangles (m, 3)) each. Triangles without area and repeated ones are left out, the
-        latter with a warning.
+        (name, vertices (n, 3) [m], triangles (m, 3)) each. Triangles with a vertex twice and repeated ones are left
+        out, the latter with a warning.
     """
     parts, warnings, shapes, first_vertex, first_body = [], [], [], 0, 0
     for name, vertices, triangles in meshes:
@@ -138,8 +138,8 @@ def _mesh_part(name: str, vertices: Array, triangles: NDArray[Any]) -> tuple[dic
     vertices = np.asarray(vertices, dtype=np.float64).reshape(-1, 3)
     vertices, own, inverse = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
     triangles = inverse.reshape(-1)[np.asarray(triangles, dtype=np.int64).reshape(-1, 3)]
-    normals, _ = _planes(vertices, triangles)
-    triangles = triangles[np.any(normals != 0, axis=1)]
+    # One that is a line stays: it closes the gap between a long edge and the two halves on its other side.
+    triangles = triangles[np.all(triangles != np.roll(triangles, 1, axis=1), axis=1)]
     _, kept = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)
     if len(kept) < len(triangles):
         warnings.append(f"shape '{name}' has {len(triangles) - len(kept)} repeated triangles: each is used once")

@@ -71,6 +71,7 @@ def test_sound_meshes_are_closed_and_in_silence(name):
         ("boxes sharing an edge", True, "1 edges at which more than two triangles meet"),
         ("doubled faces", True, "7 repeated triangles"),
         ("degenerate faces", True, None),
+        ("sliver", True, None),
         ("inside out", True, None),
     ],
 )

@@ -188,7 +188,7 @@ def test_order_none_shows_the_artefact(variant):
     assert error.min() < -0.05 * image.airlight.mean()
 
 
-@pytest.mark.parametrize("name", ["open grid", "doubled faces", "degenerate faces"])
+@pytest.mark.parametrize("name", ["open grid", "doubled faces", "degenerate faces", "sliver"])
 def test_what_the_warnings_say_of_order_none_is_true(variant, name):
     """A sheet without folds, and flaws that are mended, are right without an order too."""
     scene = scene_with(MESHES[name]())
@@ -197,7 +197,7 @@ def test_what_the_warnings_say_of_order_none_is_true(variant, name):
     assert np.sqrt(np.mean(error**2)) < 1e-4 * image.airlight.mean()
 
 
-@pytest.mark.parametrize("name", ["open cylinder", "mixed winding", "sliver"])
+@pytest.mark.parametrize("name", ["open cylinder", "mixed winding"])
 def test_folds_of_open_meshes_count_twice_without_an_order(variant, name):
     scene = scene_with(MESHES[name]())
     image = truth(scene)
