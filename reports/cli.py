@@ -25,6 +25,7 @@ from reports.command_integrate import integrate
 from reports.command_list import kernels, methods, scenes
 from reports.command_merge import merge
 from reports.command_mutations import mutations
+from reports.command_published import published
 from reports.command_reference import reference
 from reports.command_render import render
 from reports.command_report import report
@@ -48,6 +49,7 @@ _COMMANDS = (
     compare,
     integrate,
     bench,
+    published,
     stability,
     mutations,
     certify,

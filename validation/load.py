@@ -53,7 +53,7 @@ def load_scene(name_or_path: str, size: tuple[int, int] | None = None) -> Loaded
         path = _existing(name_or_path)
         loaded = LoadedScene(path.stem, _parse(path), f"The user's own scene, {path.name}.", "", path)
     if size is not None:
-        _resize(loaded.scene, size)
+        resize(loaded.scene, size)
     return loaded
 
 
@@ -101,7 +101,8 @@ def _parse(path: Path):
     return scene
 
 
-def _resize(scene, size: tuple[int, int]) -> None:
+def resize(scene, size: tuple[int, int]) -> None:
+    """Give the cameras of a Mitsuba scene images of another width and height [pixels]."""
     import mitsuba as mi
 
     if not all(1 <= n <= _LARGEST for n in size):

@@ -1,0 +1,223 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Tables 1 and 2 of Biri, Arques, Michelin 2006 again: share of time by stage, and frames a second, with the error.
+
+How each stage of Table 1 is measured, on the wall clock, medians:
+
+1. silhouettes: `realtime.silhouettes.silhouette` of the parts whose shadow can be seen, with the culling, on the host.
+2. the scene with surface shadows: camera rays and lit surface, one frozen function. Its shadows come out of stage 5,
+   which counts layers anyway.
+3. the medium's contribution of the scene, unshadowed: the airlight of the method `unshadowed` with the same kernel. The
+   method under test never computes it by itself, each lit segment has its part of it: this is what one evaluation a ray
+   costs, and stage 5 is lessened by it.
+4. sorting: the planes with their bins (the rest of what is prepared on the host) and the tile lists, a frozen function
+   of their own.
+5. shadow planes: what remains of the frame with the light moved.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from realtime.camera import ray_directions
+from realtime.frame import FrameRenderer, render_frame, run_stages
+from realtime.plane_view import bodies_in_view
+from realtime.scene import Scene, read_scene
+from realtime.shadow_planes import tile_planes
+from realtime.silhouettes import silhouette
+from validation.configurations import Configuration, prepared
+from validation.load import load_scene
+from validation.metrics import Metrics, error_metrics
+from validation.timing import Timing, time_repeated
+from validation.truth import truth_image
+
+STAGES = ("silhouettes", "scene", "airlight of the scene", "sorting", "shadow planes")
+KERNELS = ("exact", "taylor")
+
+
+@dataclass(frozen=True)
+class Published:
+    """What the paper says of a scene."""
+
+    scene: str
+    where: str
+    size: tuple[int, int]
+    fps: float
+    shares: tuple[float, ...] | None = None  #: of Table 1 [%]
+    note: str = ""
+
+
+PUBLISHED = (
+    Published("sphere-spot", "section 6", (800, 600), 120),
+    Published("sphere-spot", "section 6", (1024, 768), 107),
+    Published(
+        "two-pens",
+        "Fig. 7a",
+        (800, 600),
+        23,
+        (1, 8.7, 21.7, 9.6, 59),
+        "Table 2 says 23 frames/s, the prose of section 6 more than 35: the table may have 7a and 7b changed over",
+    ),
+    Published("three-media", "Fig. 7b", (800, 600), 35, None, "see Fig. 7a; Table 1 has no column for it"),
+    Published("clutter", "Fig. 7c", (800, 600), 25, (1.7, 14, 33.6, 16, 34.7)),
+    Published("hall", "Fig. 1", (800, 600), 12),
+)
+
+
+@dataclass(frozen=True)
+class TableRow:
+    """A scene at a size with a kernel, measured beside what was published."""
+
+    published: Published
+    kernel: str
+    size: tuple[int, int]  #: of the frame that was timed [pixels]
+    triangles: int
+    stages_ms: tuple[float, ...]  #: of Table 1, in the order of `STAGES`
+    rebuilt: Timing  #: a frame after the light moved: all stages
+    static: Timing  #: a frame with static light and geometry
+    error: Metrics  #: of the airlight at pixel centres, at `error_size`
+    error_size: tuple[int, int]
+
+    @property
+    def shares(self) -> tuple[float, ...]:
+        """Share of each stage in the frame after the light moved [%]."""
+        total = sum(self.stages_ms)
+        return tuple(100 * stage / total for stage in self.stages_ms)
+
+
+def biri_row(
+    published: Published, kernel: str, *, size: tuple[int, int], error_size: tuple[int, int], seconds: float = 0.6
+) -> TableRow:
+    """Measure one row.
+
+    Parameters
+    ----------
+    published
+        The entry of `PUBLISHED`.
+    kernel
+        Name of the airlight kernel.
+    size
+        Of the frame that is timed [pixels].
+    error_size
+        Of the frame that is compared with the truth [pixels].
+    seconds
+        Time to spend on each timing.
+    """
+    chosen = Configuration("shadow-planes", kernel)
+    small = load_scene(published.scene, error_size).scene
+    airlight = render_frame(prepared(read_scene(small), chosen)).airlight
+    error = error_metrics(truth_image(small).airlight, airlight)
+    loaded = load_scene(published.scene, size).scene
+    scene = read_scene(loaded)
+    renderer = prepared(scene, chosen)
+    ready = renderer.prepare(scene)
+    static = time_repeated(lambda: run_stages(renderer, ready), seconds=seconds)
+    rebuilt = time_repeated(lambda: run_stages(renderer, renderer.prepare(scene)), seconds=seconds)
+    return TableRow(
+        published,
+        kernel,
+        size,
+        sum(shape.face_count() for shape in loaded.shapes()),
+        _stages(renderer, kernel, rebuilt.median_ms, seconds=0.5 * seconds),
+        rebuilt,
+        static,
+        error,
+        error_size,
+    )
+
+
+def biri_rows(
+    published: Sequence[Published] = PUBLISHED,
+    kernels: Sequence[str] = KERNELS,
+    *,
+    scale: float = 1.0,
+    seconds: float = 0.6,
+    progress: Callable[[float, str], None] | None = None,
+) -> list[TableRow]:
+    """Measure the rows of both tables.
+
+    Parameters
+    ----------
+    published, kernels
+        What to measure; every entry with every kernel.
+    scale
+        Of the width and height of all images, for a quick look; 1 for the published sizes.
+    seconds
+        Time to spend on each timing.
+    progress
+        Told the share done and what comes next.
+    """
+    rows: list[TableRow] = []
+    total = len(published) * len(kernels)
+    for one in published:
+        size = (max(1, round(scale * one.size[0])), max(1, round(scale * one.size[1])))
+        for kernel in kernels:
+            if progress is not None:
+                progress(len(rows) / total, f"{one.scene}, {size[0]} x {size[1]}, {kernel}")
+            half = (max(1, size[0] // 2), max(1, size[1] // 2))
+            rows.append(biri_row(one, kernel, size=size, error_size=half, seconds=seconds))
+    return rows
+
+
+def _stages(renderer: FrameRenderer, kernel: str, total: float, *, seconds: float) -> tuple[float, ...]:
+    """Return what each stage costs [ms]; the last is the rest of the total."""
+    import drjit as dr
+
+    scene = renderer.scene
+    ready = renderer.prepare(scene)
+    distance, _, _ = run_stages(renderer, ready)
+    plain = prepared(scene, Configuration("unshadowed", kernel))
+    arguments = (renderer.pixel, scene.camera, scene.medium, scene.lights)
+
+    def surface():
+        dr.eval(renderer.surface(scene.geometry, *arguments))
+
+    def unshadowed():
+        dr.eval(plain.airlight(scene.geometry, *arguments, (), distance, _nothing(scene)))
+
+    lists = _sorting(renderer)
+    silhouettes = _median(lambda: _silhouettes(renderer, scene), seconds)
+    host = _median(lambda: renderer.prepare(scene), seconds)
+    in_tiles = _median(lambda: dr.eval(lists(renderer.pixel, scene.camera, distance, ready)), seconds)
+    first = (silhouettes, _median(surface, seconds), _median(unshadowed, seconds), host - silhouettes + in_tiles)
+    return (*first, max(0.0, total - sum(first)))
+
+
+def _median(work: Callable[[], object], seconds: float) -> float:
+    return time_repeated(work, seconds=seconds).median_ms
+
+
+def _silhouettes(renderer: FrameRenderer, scene: Scene) -> None:
+    casters = renderer.prepare.standing(scene)  # type: ignore[attr-defined]  # shadow planes prepare with casters
+    for light in scene.lights:
+        position = np.array(light.position, dtype=np.float64).ravel()
+        silhouette(casters, position, used=bodies_in_view(casters, scene.camera, position))
+
+
+def _sorting(renderer: FrameRenderer):
+    """Return the tile lists of a frame as a frozen function of their own."""
+    import drjit as dr
+    import mitsuba as mi
+
+    camera = renderer.scene.camera
+    square = camera.width % 4 == 0 and camera.height % 4 == 0
+
+    @dr.freeze
+    def lists(pixel, camera, distance, indices):
+        view: Any = SimpleNamespace(
+            rays=lambda lane: ray_directions(camera, dr.gather(mi.UInt32, pixel, lane)),
+            distance=distance,
+            square_tiles=square,
+        )
+        found = [tile_planes(view, index, order="exact") for index in indices]
+        return [(one.entries, one.source.first, one.source.count, one.sorted) for one in found]
+
+    return lists
+
+
+def _nothing(scene: Scene):
+    import drjit as dr
+
+    return tuple(dr.zeros(type(scene.medium.albedo), 1) for _ in scene.lights)
