@@ -17,6 +17,7 @@ class Plan:
     point_lights: int
     spot_lights: int
     soft_spots: bool  #: a spot's intensity falls off inside its cone
+    clear: bool = False  #: bounded: nothing fills the space between the media
     notes: tuple[str, ...] = ()  #: what the user should know of this scene
 
 
@@ -34,7 +35,9 @@ def describe(plan: Plan) -> dict[str, str]:
         "phase function": "isotropic: left out of the integrand"
         if plan.isotropic
         else "anisotropic: split at the foot point",
-        "medium": "bounded" if plan.bounded else "unbounded: every ray lies in it whole",
+        "medium": f"bounded, in {'clear air' if plan.clear else 'another medium'}: rays clipped, no kernel"
+        if plan.bounded
+        else "unbounded: every ray lies in it whole",
         "lights": " and ".join(lights),
         "spot falloff": "inside the cone: integrand weighted"
         if plan.soft_spots

@@ -156,6 +156,7 @@ def _make_plan(opaque, medium: Medium, lights: tuple[Light, ...]) -> Plan:
         extinctions=len(medium.sigma_t),
         isotropic=all(one.phase.name == "isotropic" for one in media),
         bounded=bool(medium.bodies),
+        clear=medium.clear,
         vacuum=any(float(sigma_t[0]) == 0 for sigma_t in medium.sigma_t),
         point_lights=sum(light.kind == "point" for light in lights),
         spot_lights=sum(light.kind == "spot" for light in lights),

@@ -34,10 +34,14 @@ class Measurement:
 
 
 def configurations_for(plan: Plan, configurations: Sequence[Configuration] = STANDARD) -> tuple[Configuration, ...]:
-    """Leave out what the scene does not need: variants that differ in their shadows where nothing casts one."""
-    if plan.shadows:
-        return tuple(configurations)
-    return tuple(chosen for chosen in configurations if not {"shadow", "order"} & set(dict(chosen.parameters)))
+    """Leave out what the scene does not need.
+
+    Variants that differ in their shadows need something that casts one, the paper's way with bounded media needs such
+    media, in clear air.
+    """
+    needless = set() if plan.shadows else {"shadow", "order"}
+    needless |= set() if plan.clear else {"media"}
+    return tuple(chosen for chosen in configurations if not needless & set(dict(chosen.parameters)))
 
 
 def measure(

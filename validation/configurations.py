@@ -43,6 +43,7 @@ STANDARD: tuple[Configuration, ...] = (
     Configuration("shadow-planes", "taylor"),
     Configuration("shadow-planes", "exact", (("order", "paper"),)),
     Configuration("shadow-planes", "exact", (("order", "none"),)),
+    Configuration("shadow-planes", "exact", (("media", "paper"),)),
 )
 
 
