@@ -91,6 +91,7 @@ def test_sphere_turns_its_axis_to_the_light_and_lies_in_the_cone():
         ("sphere-spot", 2 * 32 * 17 + 2),
         ("colonnade", 66_132),
         ("two-pens", 34_549),
+        ("three-media", 14_785),
         ("clutter", 20_747),
         ("hall", 107_514),
     ],

@@ -11,6 +11,7 @@ from validation.scenes.hall import SCENE as HALL
 from validation.scenes.open_fog import open_fog
 from validation.scenes.record import Animation, SceneRecord
 from validation.scenes.sphere_spot import sphere_spot
+from validation.scenes.three_media import SCENE as THREE_MEDIA
 from validation.scenes.two_pens import two_pens
 
 SCENES: dict[str, SceneRecord] = {
@@ -44,6 +45,7 @@ SCENES: dict[str, SceneRecord] = {
             "Biri, Arques, Michelin 2006, Fig. 7a and Table 2: 23 frames/s",
             Animation(("objects",), objects=("pens",)),
         ),
+        THREE_MEDIA,
         CLUTTER,
         HALL,
     )

@@ -21,7 +21,7 @@ from validation.scenes.parts import (
     placed,
     rotation,
 )
-from validation.scenes.record import SceneRecord
+from validation.scenes.record import Animation, SceneRecord
 from validation.scenes.solids import box, gable, gem, icosphere, prism, star, tetrahedron, torus
 
 
@@ -109,4 +109,5 @@ SCENE = SceneRecord(
     three_media,
     "Three bodies of coloured fog and casters at every position to their boundaries, 14 785 triangles.",
     "Biri, Arques, Michelin 2006, Fig. 7b and Table 2: 35 frames/s; there one box in red, blue and green, here a bar",
+    Animation(("objects",), objects=("bar",)),
 )
