@@ -3,7 +3,8 @@
 
 `report.json` has the schema "airlight-report/1": `environment`, `settings`, `claims` (sentences) and `scenes`, each
 with `truth`, `agreement` by estimator and layer, `multiple` (what single scattering leaves out) and `methods`, each of
-these with `times` [ms], `error` (airlight) and `surface_error`, and the files written. Not-a-number is null.
+these with `times` [ms], `error` (airlight) and `surface_error`, and the files written; `kernels` and `mutations`, where
+the effort includes them. Not-a-number is null.
 """
 
 from collections.abc import Sequence
@@ -89,6 +90,16 @@ def measurement_data(measured: Measurement) -> dict[str, Any]:
 def stability_data(kernels: Sequence[Any]) -> list[dict[str, Any]]:
     """Return what `validation.stability.stability` found, in full."""
     return plain(list(kernels))
+
+
+def mutations_data(study: Any) -> dict[str, Any]:
+    """Return what `validation.mutations.study_mutations` found, in full."""
+    return {
+        "caught": study.caught,
+        "count": len(study.results),
+        "passed": study.passed,
+        "results": plain(study.results),
+    }
 
 
 def claims(scenes: list[dict[str, Any]]) -> list[str]:

@@ -14,7 +14,7 @@ import numpy as np
 from analytic.errors import InputError
 from reference.exr import write_exr
 from reference.files import ensure_folder, write_text
-from reports.data import SCHEMA, claims, scene_data, stability_data
+from reports.data import SCHEMA, claims, mutations_data, scene_data, stability_data
 from reports.environment import describe_environment, stamped
 from reports.page import render_page
 from reports.pictures import error_map, exposure, tone_mapped, write_png
@@ -78,6 +78,11 @@ def write_report(
         from validation.stability import stability
 
         kernels = stability_data(stability(count=effort.rays))
+    mutations = None
+    if effort.mutations:
+        from validation.mutations import study_mutations
+
+        mutations = mutations_data(study_mutations())
     data = {
         "schema": SCHEMA,
         "created": time.strftime("%Y-%m-%d %H:%M:%S %z"),
@@ -88,6 +93,7 @@ def write_report(
         "claims": claims(found),
         "scenes": found,
         "kernels": kernels,
+        "mutations": mutations,
     }
     write_text(target / "report.json", json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
     write_text(target / "report.html", render_page(data, target))

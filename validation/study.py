@@ -3,7 +3,6 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
 
 from realtime.plan import Plan
 from realtime.scene import read_scene
@@ -31,19 +30,30 @@ class Effort:
     margins: Mapping[str, float]  #: by estimator, of its relative bias
     seconds: float  #: spent on each timing
     flip: bool = False  #: compute HDR-FLIP of every image
+    mutations: bool = False  #: count how many faults of the physics the checks of the truth find
     rays: int = 0  #: generated rays on which kernels are tried, besides the certified ones; 0 leaves this out
 
 
 def _margins(single_scatter: float, volpath: float) -> Mapping[str, float]:
-    return MappingProxyType({"single-scatter": single_scatter, "volpath": volpath})
+    return {"single-scatter": single_scatter, "volpath": volpath}
 
 
 EFFORTS: dict[str, Effort] = {
     effort.name: effort
     for effort in (
         Effort("quick", (320, 240), (320, 240), (120, 90), _margins(0.002, 0.01), 0.15),
-        Effort("default", (400, 300), (800, 600), (160, 120), _margins(0.0005, 0.005), 0.4, True, 20_000),
-        Effort("full", (800, 600), (800, 600), (240, 180), _margins(0.0005, 0.002), 1.0, True, 100_000),
+        Effort("default", (400, 300), (800, 600), (160, 120), _margins(0.0005, 0.005), 0.4, flip=True, rays=20_000),
+        Effort(
+            "full",
+            (800, 600),
+            (800, 600),
+            (240, 180),
+            _margins(0.0005, 0.002),
+            1.0,
+            flip=True,
+            mutations=True,
+            rays=100_000,
+        ),
     )
 }
 

@@ -379,3 +379,12 @@ def test_missing_flip_is_a_note_and_a_dash(data, folder):
     text = render(data, folder).text
     assert "No HDR-FLIP for some of these: flip-evaluator is not installed." in text
     assert text.count("No HDR-FLIP") == 1
+
+
+def test_mutations_have_a_table_where_they_were_tried(data, folder):
+    one = {"name": "no-falloff", "meaning": "1/r not squared", "estimator": "quadrature", "caught": False}
+    data["mutations"] = {"caught": 0, "count": 1, "passed": False, "results": [one | {"reason": "too small"}]}
+    text = render(data, folder).text
+    assert "0 of 1 faults of the physics" in text
+    assert "no-falloff" in text
+    assert "too small" in text
