@@ -50,13 +50,14 @@ def coloured_light(light: Light, share: float) -> Light:
 
 
 def thicker_medium(medium: Medium, factor: float) -> Medium:
-    """Return a medium with its extinction times a factor; the albedo stays."""
+    """Return a medium, with the bodies of others in it, with its extinction times a factor; the albedo stays."""
     import drjit as dr
 
     if not 0 <= factor < np.inf:
         raise InputError(f"factor of the extinction: got {factor!r}, wanted a finite value of 0 or more")
     sigma = tuple(dr.opaque(type(value), factor * float(value[0])) for value in medium.sigma_t)
-    return replace(medium, sigma_t=sigma)
+    bodies = tuple(replace(body, medium=thicker_medium(body.medium, factor)) for body in medium.bodies)
+    return replace(medium, sigma_t=sigma, bodies=bodies)
 
 
 @dataclass(frozen=True)

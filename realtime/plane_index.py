@@ -24,7 +24,7 @@ azimuth bit by bit, and an edge holds phi if first <= phi < last: no ray slips b
 counted twice.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 
 from realtime.casters import Casters
 from realtime.diamond import TURN
+from realtime.plane_cone import NEARNESS, is_outside, ring_edges
 from realtime.silhouettes import Silhouette, facing, silhouette
 
 Array = NDArray[np.float64]
@@ -98,7 +99,11 @@ def diamond_angle(x, y):
 
 def shadow_planes(casters: Casters, found: Silhouette, light: Array, axes: Array) -> Planes:
     """Return the shadow planes of silhouette edges in the frame of a light and a camera."""
-    vertices = (casters.vertices[found.edges] - light) @ axes.T
+    return edge_planes((casters.vertices[found.edges] - light) @ axes.T, found.coefficient)
+
+
+def edge_planes(vertices: Array, coefficient: NDArray[np.int8]) -> Planes:
+    """Return the shadow planes of edges in the frame, ends (edges, 2, 3), with their coefficients."""
     a, b = vertices[:, 0], vertices[:, 1]
     azimuth = diamond_angle(vertices[..., 0].astype(np.float32), vertices[..., 1].astype(np.float32))
     turn = azimuth[:, 1] - azimuth[:, 0]
@@ -108,7 +113,7 @@ def shadow_planes(casters: Casters, found: Silhouette, light: Array, axes: Array
     last = np.where(ahead, azimuth[:, 1], azimuth[:, 0])
     # As the light sees it, with the camera's end of the axis up, azimuth grows to the left and psi downwards: the
     # layers left of an edge that leads to the left lie below it, at larger psi.
-    gain = np.where(ahead, found.coefficient, -found.coefficient).astype(np.int8)
+    gain = np.where(ahead, coefficient, -coefficient).astype(np.int8)
     cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
     # An edge that meets the axis itself: any tiny number keeps the loop closed.
     cross = np.where(cross == 0, 1e-12 * np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1), cross)
@@ -165,6 +170,10 @@ def _parted(planes: Planes) -> Planes:
     )
 
 
+def _joined(one: Planes, other: Planes) -> Planes:
+    return Planes(*(np.concatenate([getattr(part, field.name) for part in (one, other)]) for field in fields(Planes)))
+
+
 def layers_between(casters: Casters, light: Array, axes: Array, distance: float, *, used: NDArray[np.bool_]) -> int:
     """Return how many layers lie between a light and a camera at a distance along the last of some axes.
 
@@ -209,7 +218,9 @@ def _crosses(casters: Casters, number, light: Array, camera: Array) -> NDArray[n
     return inside & (u > 0) & (u < 1)
 
 
-def index_planes(casters: Casters, light: Array, camera: Array, *, used: NDArray[np.bool_], types) -> PlaneIndex:
+def index_planes(
+    casters: Casters, light: Array, camera: Array, *, used: NDArray[np.bool_], types, ring: Array | None = None
+) -> PlaneIndex:
     """Find the shadow planes of a light and put them into bins for a camera.
 
     Parameters
@@ -222,13 +233,20 @@ def index_planes(casters: Casters, light: Array, camera: Array, *, used: NDArray
         By body, whether its shadow can be seen.
     types
         The array types to use, see `realtime.arrays`.
+    ring
+        Of a spot whose cone is a caster, see `realtime.plane_cone`.
     """
     import drjit as dr
     import mitsuba as mi
 
     axes, distance = light_frame(light, camera)
-    found = silhouette(casters, light, used=used)
-    planes = _parted(shadow_planes(casters, found, light, axes))
+    layers = layers_between(casters, light, axes, distance, used=used)
+    planes = shadow_planes(casters, silhouette(casters, light, used=used), light, axes)
+    if ring is not None:
+        edges = NEARNESS * distance * ring_edges(ring) @ axes.T
+        planes = _joined(planes, edge_planes(edges, np.full(len(ring), -1, dtype=np.int8)))
+        layers += is_outside(ring, axes[2])
+    planes = _parted(planes)
     start, entries = binned(planes)
     spans = np.stack([planes.first, planes.last, planes.gain, planes.centre], axis=1)
     Float = types.scalar
@@ -244,7 +262,7 @@ def index_planes(casters: Casters, light: Array, camera: Array, *, used: NDArray
         Float(_padded(planes.lines.astype(real).ravel(), 5)),
         Float(_padded(spans.astype(real).ravel(), 5)),
         Float(_padded(planes.ends.astype(real).ravel(), 6)),
-        Float(layers_between(casters, light, axes, distance, used=used)),
+        Float(layers),
     )
     dr.make_opaque(index)
     return index

@@ -20,7 +20,7 @@ themselves in shadow. `order` chooses how that is decided:
 difference of the two Gammas instead, as the paper does.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from realtime.arrays import array_types
@@ -30,6 +30,7 @@ from realtime.errors import InputError
 from realtime.geometry import RayGeometry, clip_to_cone, ray_geometry
 from realtime.kernels import airlight_integral, gamma
 from realtime.lights import Light
+from realtime.plane_cone import cone_ring
 from realtime.plane_crossings import Buffer, sum_crossings
 from realtime.plane_index import PlaneIndex, index_planes
 from realtime.plane_mesh import mesh_gamma, surface_gamma
@@ -50,11 +51,12 @@ class PlanePreparation:
     """The casters of a scene; called with the scene as it is now, returns the shadow planes of its lights."""
 
     casters: Casters
+    cone: int = 0  #: edges of the cone of a spot; 0: no planes for it
 
     def __call__(self, scene: Scene) -> tuple[PlaneIndex, ...]:
         """Return the planes of every light of a scene."""
         here = self.standing(scene)
-        return tuple(light_planes(here, scene, light) for light in scene.lights)
+        return tuple(light_planes(here, scene, light, cone=self.cone) for light in scene.lights)
 
     def standing(self, scene: Scene) -> Casters:
         """Return the casters where they are in a scene."""
@@ -70,18 +72,22 @@ def prepare_shadow_planes(scene: Scene, **settings) -> PlanePreparation:
         For a parameter out of range and for casters without triangles.
     """
     _check(**settings)
-    return PlanePreparation(read_casters(scene.geometry))
+    return PlanePreparation(read_casters(scene.geometry), settings["cone"])
 
 
-def light_planes(casters: Casters, scene: Scene, light: Light) -> PlaneIndex:
-    """Return the shadow planes of one light of a scene, as its camera needs them."""
+def light_planes(casters: Casters, scene: Scene, light: Light, *, cone: int = 0) -> PlaneIndex:
+    """Return the shadow planes of one light of a scene, as its camera needs them; `cone` edges bound a spot."""
     import mitsuba as mi
     import numpy as np
 
     position, camera = (np.array(point, dtype=np.float64).ravel() for point in (light.position, scene.camera.origin))
     used = bodies_in_view(casters, scene.camera, position)
     single = type(scene.camera.origin.x) is mi.Float
-    return index_planes(casters, position, camera, used=used, types=array_types("single" if single else "double"))
+    ring = None
+    if cone and light.kind == "spot":
+        ring = cone_ring(np.array(light.axis, dtype=np.float64).ravel(), float(light.cos_cutoff[0]), cone)
+    types = array_types("single" if single else "double")
+    return index_planes(casters, position, camera, used=used, types=types, ring=ring)
 
 
 def shadow_planes(
@@ -96,6 +102,7 @@ def shadow_planes(
     rows: int = 16,
     ambient: float = 0.0,
     media: str = "exact",
+    cone: int = 0,
 ):
     """Return the airlight of every ray between shadow planes.
 
@@ -123,6 +130,9 @@ def shadow_planes(
         adds albedo ambient (1 - exp(-sigma_t x)). The truth has none.
     media
         In bounded media 'exact' or 'paper', the constant R of section 4.2, see `realtime.bounded_media`.
+    cone
+        Edges of the cone of a spot, whose planes then bound its light, 32 in the paper: a pyramid inside the cone. 0
+        for the cone itself, as a scene without casters has it always.
 
     Returns
     -------
@@ -151,6 +161,8 @@ def shadow_planes(
         _check_bounded(evaluation)
     in_media = rays_in_media(view) if view.plan.bounded else ()
     for number, light in enumerate(view.lights):
+        if cone and light.kind == "spot" and not light.soft and view.plan.shadows:
+            light = replace(light, kind="point")  # planes bound it
         geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
         airlight = _Airlight(view, light, geometry, kernel, in_media[number] if in_media else None, media)
         if not view.plan.shadows:
@@ -262,7 +274,16 @@ def _check_bounded(evaluation: str) -> None:
 
 
 def _check(
-    *, order: str, evaluation: str, sum: str, buffer: str, white: float, rows: int, ambient: float, media: str
+    *,
+    order: str,
+    evaluation: str,
+    sum: str,
+    buffer: str,
+    white: float,
+    rows: int,
+    ambient: float,
+    media: str,
+    cone: int,
 ) -> None:
     words = (
         ("order", order, ORDERS),
@@ -280,6 +301,12 @@ def _check(
         raise InputError(f"ambient: got {ambient!r}, wanted a finite radiance of 0 or more [W/(m^2 sr)]")
     if rows < 2:
         raise InputError(f"rows: got {rows!r}, wanted at least 2 rows of vertices")
+    if cone and not 3 <= cone <= 4096:
+        raise InputError(f"cone: got {cone!r}, wanted 0 for the cone itself, or 3 to 4096 edges")
+    if cone and evaluation == "vertex":
+        raise InputError(
+            "cone: wanted evaluation=pixel; the planes of a cone begin too close to the light to be meshed"
+        )
     if sum == "gamma" and (order != "exact" or evaluation != "pixel" or buffer != "float"):
         raise InputError(
             "sum=gamma: wanted order=exact, evaluation=pixel and buffer=float; the others add Gammas anyway"

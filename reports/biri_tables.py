@@ -110,4 +110,5 @@ def _print_costs(costs: Sequence, show) -> None:
 
 def _name(row) -> str:
     width, height = row.size
-    return f"{row.published.scene}, {width} x {height} ({row.kernel})"
+    cone = f", cone={row.cone}" if row.cone else ""
+    return f"{row.published.scene}, {width} x {height} ({row.kernel}{cone})"

@@ -47,11 +47,12 @@ class Published:
     fps: float
     shares: tuple[float, ...] | None = None  #: of Table 1 [%]
     note: str = ""
+    cone: int = 0  #: edges of the paper's cone over the spot; 0: no spot
 
 
 PUBLISHED = (
-    Published("sphere-spot", "section 6", (800, 600), 120),
-    Published("sphere-spot", "section 6", (1024, 768), 107),
+    Published("sphere-spot", "section 6", (800, 600), 120, cone=32),
+    Published("sphere-spot", "section 6", (1024, 768), 107, cone=32),
     Published(
         "two-pens",
         "Fig. 7a",
@@ -72,6 +73,7 @@ class TableRow:
 
     published: Published
     kernel: str
+    cone: int  #: edges of the planes that bound the spot; 0: the cone itself
     size: tuple[int, int]  #: of the frame that was timed [pixels]
     triangles: int
     stages_ms: tuple[float, ...]  #: of Table 1, in the order of `STAGES`
@@ -88,7 +90,13 @@ class TableRow:
 
 
 def biri_row(
-    published: Published, kernel: str, *, size: tuple[int, int], error_size: tuple[int, int], seconds: float = 0.6
+    published: Published,
+    kernel: str,
+    *,
+    cone: int = 0,
+    size: tuple[int, int],
+    error_size: tuple[int, int],
+    seconds: float = 0.6,
 ) -> TableRow:
     """Measure one row.
 
@@ -98,6 +106,8 @@ def biri_row(
         The entry of `PUBLISHED`.
     kernel
         Name of the airlight kernel.
+    cone
+        Edges of the planes that bound a spot, see `realtime.shadow_planes`.
     size
         Of the frame that is timed [pixels].
     error_size
@@ -105,7 +115,7 @@ def biri_row(
     seconds
         Time to spend on each timing.
     """
-    chosen = Configuration("shadow-planes", kernel)
+    chosen = Configuration("shadow-planes", kernel, (("cone", cone),) if cone else ())
     small = load_scene(published.scene, error_size).scene
     airlight = render_frame(prepared(read_scene(small), chosen)).airlight
     error = error_metrics(truth_image(small).airlight, airlight)
@@ -118,6 +128,7 @@ def biri_row(
     return TableRow(
         published,
         kernel,
+        cone,
         size,
         sum(shape.face_count() for shape in loaded.shapes()),
         _stages(renderer, kernel, rebuilt.median_ms, seconds=0.5 * seconds),
@@ -141,7 +152,7 @@ def biri_rows(
     Parameters
     ----------
     published, kernels
-        What to measure; every entry with every kernel.
+        What to measure; every entry with every kernel, a spot by its cone itself and by the planes of the paper.
     scale
         Of the width and height of all images, for a quick look; 1 for the published sizes.
     seconds
@@ -149,15 +160,14 @@ def biri_rows(
     progress
         Told the share done and what comes next.
     """
+    wanted = [(one, kernel, cone) for one in published for kernel in kernels for cone in dict.fromkeys((0, one.cone))]
     rows: list[TableRow] = []
-    total = len(published) * len(kernels)
-    for one in published:
+    for one, kernel, cone in wanted:
         size = (max(1, round(scale * one.size[0])), max(1, round(scale * one.size[1])))
-        for kernel in kernels:
-            if progress is not None:
-                progress(len(rows) / total, f"{one.scene}, {size[0]} x {size[1]}, {kernel}")
-            half = (max(1, size[0] // 2), max(1, size[1] // 2))
-            rows.append(biri_row(one, kernel, size=size, error_size=half, seconds=seconds))
+        half = (max(1, size[0] // 2), max(1, size[1] // 2))
+        if progress is not None:
+            progress(len(rows) / len(wanted), f"{one.scene}, {size[0]} x {size[1]}, {kernel}")
+        rows.append(biri_row(one, kernel, cone=cone, size=size, error_size=half, seconds=seconds))
     return rows
 
 

@@ -66,6 +66,7 @@ METHODS: dict[str, Method] = {
                 "rows": 16,
                 "ambient": 0.0,
                 "media": "exact",
+                "cone": 0,
             }
         ),
     ),

@@ -31,13 +31,17 @@ def test_every_entry_is_measured_with_every_kernel(variant):
     rows = biri_rows(
         PUBLISHED[:2], ("exact", "taylor"), scale=0.02, seconds=0.0, progress=lambda *what: told.append(what)
     )
-    assert [(row.size, row.kernel) for row in rows] == [
-        ((16, 12), "exact"),
-        ((16, 12), "taylor"),
-        ((20, 15), "exact"),
-        ((20, 15), "taylor"),
+    assert [(row.size, row.kernel, row.cone) for row in rows] == [
+        ((16, 12), "exact", 0),
+        ((16, 12), "exact", 32),
+        ((16, 12), "taylor", 0),
+        ((16, 12), "taylor", 32),
+        ((20, 15), "exact", 0),
+        ((20, 15), "exact", 32),
+        ((20, 15), "taylor", 0),
+        ((20, 15), "taylor", 32),
     ]
-    assert [share for share, _ in told] == [0, 0.25, 0.5, 0.75]
+    assert [share for share, _ in told] == [number / 8 for number in range(8)]
 
 
 def test_command_prints_both_tables_beside_the_published_figures(variant, capfd):
