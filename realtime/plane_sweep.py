@@ -7,14 +7,16 @@ D (P wx + Q wy). The walk works with that quotient, which falls from the camera 
 
 A count holds how many layers lie between the light and the point: it starts with those between light and camera, and
 the point is lit where it is zero. Planes come in the order in which the middle ray of the tile crosses them. Two that
-cross within the tile can come in the wrong order for a ray; the ray notices, since its quotients must fall, and starts
-again by selection: each time the nearest of the crossings beyond the last. That needs a walk over the list for each
-crossing and is right for any order.
+cross within the tile can come in the wrong order for a ray, so a crossing waits in a queue of eight until eight more
+have been read. Where that is not enough the ray notices, since its quotients must fall, and starts again: it collects
+the eight nearest crossings from the whole list, goes over them, collects the next eight, and so on. That is right for
+any order.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
+from realtime.crossing_queue import Queue, filled, inserted, popped, pushed
 from realtime.diamond import diamond_angle
 from realtime.plane_index import FULL, GAIN_SHIFT, GAIN_ZERO, NUMBER, PlaneIndex
 from realtime.plane_tiles import TILE, Lists, Source, entry_at
@@ -116,15 +118,27 @@ def sum_lit_segments(index: PlaneIndex, lists: Lists, ray: RayPlanes, segment, i
     x0, x1 = segment
     ray_end = ray.span / x1
 
+    def loop(walk, cond, step):
+        (walk,) = dr.while_loop(state=(walk,), cond=cond, body=lambda walk: (step(walk),), labels=("walk",))
+        return walk
+
     def body(total, walk):
-        (walk,) = dr.while_loop(
-            state=(walk,),
-            cond=lambda walk: ~walk.ready & ~walk.done & ~walk.selecting,
-            body=lambda walk: (_step(index, lists, ray, ray_end, walk),),
-            labels=("walk",),
+        walk = loop(
+            walk,
+            lambda walk: (walk.place < ray.source.count) & ~walk.ready & ~walk.done & ~walk.selecting,
+            lambda walk: _read(index, lists, ray, ray_end, walk),
+        )
+        walk = loop(
+            walk,
+            lambda walk: ~walk.ready & ~walk.done & ~walk.selecting,
+            lambda walk: _drained(ray_end, walk),
         )
         again = walk.selecting & ~walk.started
-        walk = _selected(index, lists, ray, ray_end, walk)
+        walk = loop(
+            _from_the_start(index, walk),
+            lambda walk: walk.selecting & ~walk.ready & ~walk.done,
+            lambda walk: _collected(index, lists, ray, ray_end, walk),
+        )
         begin = dr.maximum(ray.span / walk.opened, x0)
         value = integral(begin, dr.maximum(dr.minimum(ray.span / walk.closed, x1), begin))
         total = dr.select(again, zero, total) + dr.select(walk.ready, value, zero)
@@ -148,16 +162,14 @@ class _Walk:
     place: Any  #: next entry to read
     layers: Any  #: layers over the point
     quotient: Any  #: of the last crossing
-    next: Any  #: the nearest of two crossings that wait, because the order is not quite right
-    next_gain: Any
-    after: Any  #: the other one
-    after_gain: Any
+    queue: Queue  #: crossings that wait
+    more: Any  #: collecting: the queue may have been too short
     opened: Any  #: where the light came back
     closed: Any  #: where it ended
     ready: Any  #: a segment has ended
     done: Any  #: there are no more
-    selecting: Any  #: the bin is not in order for this ray
-    started: Any  #: selecting has begun
+    selecting: Any  #: the list is too far from being in order for this ray: collect from the whole of it
+    started: Any  #: collecting has begun
 
 
 def _started(index: PlaneIndex, ray: RayPlanes, segment) -> _Walk:
@@ -171,10 +183,9 @@ def _started(index: PlaneIndex, ray: RayPlanes, segment) -> _Walk:
         place=dr.zeros(mi.UInt32, width),
         layers=dr.zeros(Float, width) + Float(index.layers),
         quotient=dr.full(Float, dr.inf, width),
-        next=dr.full(Float, dr.inf, width),
-        next_gain=dr.zeros(Float, width),
-        after=dr.full(Float, dr.inf, width),
-        after_gain=dr.zeros(Float, width),
+        # What comes out first has no place and no gain: nothing happens there.
+        queue=filled(dr.inf, Float, width),
+        more=dr.full(mi.Bool, False, width),
         opened=dr.full(Float, dr.inf, width),
         closed=dr.zeros(Float, width),
         ready=alone & (index.layers <= 0),
@@ -184,101 +195,79 @@ def _started(index: PlaneIndex, ray: RayPlanes, segment) -> _Walk:
     )
 
 
-def _step(index: PlaneIndex, lists: Lists, ray: RayPlanes, ray_end, walk: _Walk) -> _Walk:
-    """Read the next plane; of it and the two that wait, the nearest happens."""
+def _happened(walk: _Walk, quotient, gain, event) -> _Walk:
+    """Go over a crossing where `event` is true."""
     import drjit as dr
 
-    left = walk.place < ray.source.count
-    quotient, crossed, gain, _ = read_plane(index, lists, ray, walk.place, left)
-    crossed &= quotient > ray_end
-    quotient, gain = dr.select(crossed, quotient, 0), dr.select(crossed, gain, 0)
-    moves = crossed | ~left
-    # Behind the last plane two of quotient 0 drive out those that wait.
-    overtakes = quotient > walk.next
-    at, gained = dr.select(overtakes, quotient, walk.next), dr.select(overtakes, gain, walk.next_gain)
-    later, later_gain = dr.select(overtakes, walk.next, quotient), dr.select(overtakes, walk.next_gain, gain)
-    first = later > walk.after
-    disorder = moves & (at > walk.quotient)
-    event = moves & ~disorder
-    layers = walk.layers + dr.select(event, gained, 0)
+    layers = walk.layers + dr.select(event, gain, 0)
     closes = event & (walk.layers <= 0) & (layers > 0)
     opens = event & (walk.layers > 0) & (layers <= 0)
-    done = walk.place >= ray.source.count + 2
-    return _Walk(
-        place=walk.place + 1,
+    return replace(
+        walk,
         layers=layers,
-        quotient=dr.select(event, at, walk.quotient),
-        next=dr.select(moves, dr.select(first, later, walk.after), walk.next),
-        next_gain=dr.select(moves, dr.select(first, later_gain, walk.after_gain), walk.next_gain),
-        after=dr.select(moves, dr.select(first, walk.after, later), walk.after),
-        after_gain=dr.select(moves, dr.select(first, walk.after_gain, later_gain), walk.after_gain),
-        opened=dr.select(opens, at, walk.opened),
-        closed=dr.select(done, ray_end, at),
-        ready=closes | (done & (layers <= 0)),
-        done=done,
-        selecting=disorder,
-        started=walk.started,
+        quotient=dr.select(event, quotient, walk.quotient),
+        opened=dr.select(opens, quotient, walk.opened),
+        closed=dr.select(closes, quotient, walk.closed),
+        ready=closes,
     )
 
 
-def _selected(index: PlaneIndex, lists: Lists, ray: RayPlanes, ray_end, walk: _Walk) -> _Walk:
-    """Go on by selection to the end of the next lit segment, for rays whose bin is not in order."""
+def _ended(walk: _Walk, ray_end, ends) -> _Walk:
+    """End the walk where `ends` is true."""
+    import drjit as dr
+
+    lit = ends & (walk.layers <= 0)
+    return replace(walk, closed=dr.select(lit, ray_end, walk.closed), ready=walk.ready | lit, done=walk.done | ends)
+
+
+def _read(index: PlaneIndex, lists: Lists, ray: RayPlanes, ray_end, walk: _Walk) -> _Walk:
+    """Read the next plane; of it and those that wait, the nearest happens."""
+    quotient, crossed, gain, _ = read_plane(index, lists, ray, walk.place, walk.place < ray.source.count)
+    crossed &= quotient > ray_end
+    queue, at, gained = pushed(walk.queue, quotient, gain, crossed)
+    disorder = crossed & (at > walk.quotient)
+    walk = _happened(walk, at, gained, crossed & ~disorder)
+    return replace(walk, place=walk.place + 1, queue=queue, selecting=disorder)
+
+
+def _drained(ray_end, walk: _Walk) -> _Walk:
+    """Behind the last plane: the next of those that wait happens."""
+    queue, at, gained = popped(walk.queue, walk.place == walk.place)
+    walk = _happened(replace(walk, queue=queue), at, gained, at > 0)
+    return _ended(walk, ray_end, at <= 0)
+
+
+def _from_the_start(index: PlaneIndex, walk: _Walk) -> _Walk:
+    """Begin to collect, where a ray has just found that its list is not in order."""
     import drjit as dr
 
     fresh = walk.selecting & ~walk.started
-    Float = type(ray.x)
-    state = _Walk(
+    return replace(
+        walk,
         place=dr.select(fresh, 0, walk.place),
-        layers=dr.select(fresh, Float(index.layers), walk.layers),
+        layers=dr.select(fresh, type(walk.layers)(index.layers), walk.layers),
         quotient=dr.select(fresh, dr.inf, walk.quotient),
-        next=walk.next,
-        next_gain=walk.next_gain,
-        after=walk.after,
-        after_gain=walk.after_gain,
+        queue=Queue(
+            [dr.select(fresh, 0, q) for q in walk.queue.quotient], [dr.select(fresh, 0, g) for g in walk.queue.gain]
+        ),
         opened=dr.select(fresh, dr.inf, walk.opened),
-        closed=walk.closed,
-        ready=walk.ready,
-        done=walk.done,
-        selecting=walk.selecting,
         started=walk.selecting,
     )
 
-    def step(walk, best, best_gain):
-        left = walk.place < ray.source.count
-        quotient, crossed, gain, _ = read_plane(index, lists, ray, walk.place, left)
-        candidate = crossed & (quotient > ray_end) & (quotient < walk.quotient)
-        # Crossings at one place count together.
-        best_gain = dr.select(
-            candidate & (quotient > best), gain, best_gain + dr.select(candidate & (quotient == best), gain, 0)
-        )
-        best = dr.select(candidate, dr.maximum(quotient, best), best)
-        event = ~left & (best > 0)
-        finished = ~left & ~event
-        layers = walk.layers + dr.select(event, best_gain, 0)
-        closes = event & (walk.layers <= 0) & (layers > 0)
-        opens = event & (walk.layers > 0) & (layers <= 0)
-        next_walk = _Walk(
-            place=dr.select(left, walk.place + 1, 0),
-            layers=layers,
-            quotient=dr.select(event, best, walk.quotient),
-            next=walk.next,
-            next_gain=walk.next_gain,
-            after=walk.after,
-            after_gain=walk.after_gain,
-            opened=dr.select(opens, best, walk.opened),
-            closed=dr.select(event, best, ray_end),
-            ready=closes | (finished & (layers <= 0)),
-            done=finished,
-            selecting=walk.selecting,
-            started=walk.started,
-        )
-        return next_walk, dr.select(left, best, 0), best_gain
 
-    zero = dr.zeros(Float, dr.width(ray.x))
-    state, _, _ = dr.while_loop(
-        state=(state, zero, Float(zero)),
-        cond=lambda walk, best, best_gain: walk.selecting & ~walk.ready & ~walk.done,
-        body=step,
-        labels=("walk", "best", "best_gain"),
-    )
-    return state
+def _collected(index: PlaneIndex, lists: Lists, ray: RayPlanes, ray_end, walk: _Walk) -> _Walk:
+    """Collect the nearest crossings beyond the last one from the whole list; behind its end they happen, one by one."""
+    import drjit as dr
+
+    reading = walk.place < ray.source.count
+    quotient, crossed, gain, _ = read_plane(index, lists, ray, walk.place, reading)
+    found = crossed & (quotient > ray_end) & (quotient < walk.quotient)
+    queue = inserted(walk.queue, quotient, gain, found)
+    more = walk.more | (queue.quotient[-1] > 0)
+    queue, at, gained = popped(queue, ~reading)
+    event = ~reading & (at > 0)
+    walk = _happened(replace(walk, queue=queue), at, gained, event)
+    empty = ~reading & (at <= 0)
+    walk = _ended(walk, ray_end, empty & ~walk.more)
+    again = empty & walk.more
+    return replace(walk, place=dr.select(reading, walk.place + 1, dr.select(again, 0, walk.place)), more=more & ~again)
