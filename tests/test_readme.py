@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Every snippet of the README runs."""
+"""Every snippet of the README runs, and what the documents name exists."""
 
 import re
 import shlex
@@ -11,6 +11,10 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+DOCUMENTS = {
+    str(path.relative_to(ROOT)): path.read_text(encoding="utf-8")
+    for path in sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")])
+}
 
 
 def snippets(language):
@@ -32,7 +36,9 @@ def test_python_snippets(code, tmp_path):
     result = subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=300, check=True
     )
-    error, milliseconds = re.fullmatch(r"relative RMSE (\S+), (\S+) ms a frame\n", result.stdout).groups()
+    found = re.fullmatch(r"relative RMSE (\S+), (\S+) ms a frame\n", result.stdout)
+    assert found, result.stdout
+    error, milliseconds = found.groups()
     assert 0 < float(error) < 0.02  # 64 equi-angular steps against shadow edges
     assert float(milliseconds) > 0
 
@@ -61,18 +67,116 @@ def test_scene_with_a_mesh_of_the_users_own(tmp_path):
 def test_commands_of_the_table_exist():
     helped = run(["--help"], ROOT).stdout
     table = README.split("| command | what it does |")[1].split("\n\n")[0]
-    for name in ("report", "bench", "render", "reference", "compare", "integrate", "scenes", "doctor", "test"):
-        assert name in table
+    for name in commands():
+        assert re.search(rf"\b{name}\b", table), name
         assert re.search(rf"\b{name}\b", helped), name
 
 
 def test_the_table_of_costs_was_printed_by_bench():
-    """Dated, with all four scenes, and no number written by hand: the rows have the form that `bench` prints."""
+    """Dated, and no number written by hand: a table for each of its scenes, and every check of the truth agrees."""
     from reports.bench_tables import _HEADERS
+    from validation.scenes import SCENES
 
     table = README.split("<!-- bench: begin -->")[1].split("<!-- bench: end -->")[0]
     assert re.match(r"\n\d{4}-\d\d-\d\d, .*threads, (llvm|cuda)_ad_rgb\.\n", table)
-    for scene in ("open-fog", "sphere-spot", "colonnade", "two-pens"):
-        assert f"**{scene}, 800 x 600**" in table
-    assert table.count("| " + " | ".join(_HEADERS) + " |") == 4
-    assert table.count("| yes |") == 7  # airlight in four scenes, surface in three
+    scenes = re.findall(r"^\*\*(\S+), 800 x 600\*\*$", table, flags=re.MULTILINE)
+    assert {"open-fog", "sphere-spot", "colonnade", "two-pens"} <= set(scenes) <= set(SCENES)
+    assert table.count("| " + " | ".join(_HEADERS) + " |") == len(scenes) == len(set(scenes))
+    verdicts = re.findall(r"^\| \S+, (airlight|surface) .*\| (\w+) \|$", table, flags=re.MULTILINE)
+    assert [layer for layer, _ in verdicts].count("airlight") >= len(scenes)  # one for each estimator
+    assert {verdict for _, verdict in verdicts} == {"yes"}
+
+
+def commands() -> dict:
+    """Return by name the options of every command."""
+    import typer
+
+    from reports.cli import app
+
+    found = getattr(typer.main.get_command(app), "commands")  # noqa: B009
+    return {name: {option for one in command.params for option in one.opts} for name, command in found.items()}
+
+
+def named_commands(text: str) -> list[tuple[str, list[str]]]:
+    """Return the commands of a document with their options: in code, where it begins with `airlight`."""
+    blocks = re.findall(r"^```sh\n(.*?)^```", text, flags=re.DOTALL | re.MULTILINE)
+    lines = [line for block in blocks for line in block.splitlines()]
+    lines += re.findall(r"`([^`]+)`", re.sub(r"^```.*?^```", "", text, flags=re.DOTALL | re.MULTILINE))
+    lines += re.findall(r"^ {4}(airlight .*(?:\n {8,}[-\[].*)*)", text, flags=re.MULTILINE)
+    found = [re.match(r"(?:\./)?airlight\s+([a-z]+)\b(.*)", line, flags=re.DOTALL) for line in lines]
+    return [(one[1], re.findall(r"(?<!\w)--?[a-z][a-z-]*", one[2])) for one in found if one]
+
+
+@pytest.mark.parametrize("name", DOCUMENTS)
+def test_commands_and_options_that_documents_name_exist(name):
+    known = commands()
+    for command, options in named_commands(DOCUMENTS[name]):
+        assert command in known, command
+        given = {option for option in options if not (command == "test" and option == "-k")}
+        assert given <= known[command] | {"--help"}, (command, given - known[command])
+
+
+def test_commands_are_found_in_documents():
+    """The test above is about something: commands are read from tables, blocks of code and sentences."""
+    text = (
+        "`airlight bench --no-such [A\\|B]`\n```sh\n./airlight merge a.exr -o b.exr\n```\n    airlight doctor  what\n"
+    )
+    assert named_commands(text) == [("merge", ["-o"]), ("bench", ["--no-such"]), ("doctor", [])]
+    assert len(named_commands(README)) > 20
+    assert "--target" in dict(named_commands(DOCUMENTS["DESIGN.md"]))["reference"]
+
+
+@pytest.mark.parametrize("name", DOCUMENTS)
+def test_links_lead_somewhere(name):
+    for target in re.findall(r"\]\(([^)\s]+)\)", DOCUMENTS[name]):
+        if not re.match(r"https?:", target):
+            path, _, anchor = target.partition("#")
+            linked = (ROOT / name).parent / path
+            assert linked.exists(), target
+            headings = re.findall(r"^#+ (.*)", linked.read_text(encoding="utf-8"), flags=re.MULTILINE) if anchor else []
+            assert not anchor or anchor in [re.sub(r"[^\w -]", "", one.lower()).replace(" ", "-") for one in headings]
+
+
+def test_the_parameters_of_shadow_planes_are_explained():
+    from realtime import shadow_planes
+    from realtime.bounded_media import FORMS
+    from realtime.methods import METHODS
+
+    section = DOCUMENTS["docs/shadow-planes.md"].split("## The parameters")[1].split("**The three orders.**")[0]
+    rows = re.findall(r"^\| `(\w+)` \| ([^|]*) \|", section, flags=re.MULTILINE)
+    explained = {name: values.replace("`", "") for name, values in rows}
+    defaults = METHODS["shadow-planes"].parameters
+    assert set(explained) == set(defaults)
+    words = {"order": "ORDERS", "evaluation": "EVALUATIONS", "sum": "SUMS", "buffer": "BUFFERS"}
+    for name, default in defaults.items():
+        allowed = FORMS if name == "media" else getattr(shadow_planes, words[name]) if name in words else [str(default)]
+        assert explained[name].split(", ") == list(allowed), name
+        assert explained[name].split(", ")[0] == str(default), name
+
+
+def test_scenes_and_names_of_the_api_are_those_of_the_program():
+    import airlight
+    from validation.scenes import SCENES
+
+    for name in SCENES:
+        assert f"`{name}`" in DOCUMENTS["CHANGELOG.md"], name
+    said = README.split("A truth by samples is")[1].split("\n\n")[0]
+    for name in re.findall(r"\b([a-z]+_[a-z_]+|Budget)\b", said):
+        assert name in airlight.__all__, name
+
+
+def test_a_reference_by_samples_from_python(variant):
+    """What the README names in a sentence, put together."""
+    import numpy as np
+
+    import airlight
+
+    loaded = airlight.load_scene("open-fog", size=(16, 12))
+    parts = []
+    for seed in (0, 500):
+        budget = airlight.Budget(samples=64)
+        parts.append(airlight.monte_carlo_reference(loaded, "single-scatter", budget=budget, seed=seed).image)
+    files = [(f"{number}.exr", part) for number, part in enumerate(parts)]
+    merged = airlight.merged_references(files).layers["airlight"]
+    # Both have as many batches: the mean of all is the mean of the two.
+    np.testing.assert_allclose(merged, np.mean([part.layers["airlight"] for part in parts], axis=0), rtol=1e-6)
