@@ -38,21 +38,24 @@ References
 Biri, Arques, Michelin 2006, sections 4.2 and 5.2.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
 from realtime.arrays import is_single
+from realtime.body_tiles import PlaneLists, ball_range, plane_lists
 from realtime.clipping import Seen, inverse_crossings, near_line, passage, seen_from, share_inside
 from realtime.errors import InputError
 from realtime.exponential import exp_bounded
 from realtime.geometry import RayGeometry, clip_to_cone, distance_to_light, falloff
 from realtime.lights import Light
-from realtime.medium import Medium
+from realtime.medium import Body, Medium
 from realtime.phase import evaluate
 
 FORMS = ("exact", "paper")
 _NODES, _NODES_DOUBLE, _NODES_PAPER = 10, 24, 6
+_FEW_PLANES = 12  # which are read as fast as listed
+_RANGES = 5  # of a chord, in which a tile's list of planes for the legs from a light is made
 _OPTICAL_REACH = 18.0  # e^-18 = 1.5e-8 of the light is left
 
 
@@ -78,9 +81,10 @@ class MediaRay:
     direction: Any
     pieces: tuple[Piece, ...]
     seen: tuple[Seen, ...]  #: the bodies as the light sees them
+    lists: tuple[PlaneLists | None, ...]  #: by body, the planes where legs to points within it enter
 
 
-def camera_pieces(medium: Medium, origin, direction) -> tuple[Piece, ...]:
+def camera_pieces(medium: Medium, origin, direction, *, corners=None) -> tuple[Piece, ...]:
     """Return the pieces of the camera rays in which something scatters.
 
     Parameters
@@ -89,11 +93,13 @@ def camera_pieces(medium: Medium, origin, direction) -> tuple[Piece, ...]:
         The medium with its bodies.
     origin, direction
         The camera, one for all lanes [m], and unit directions.
+    corners
+        Directions at the corners of the tiles (`realtime.body_tiles`), if the rays come in tiles.
     """
     import drjit as dr
 
     Float = type(direction.x)
-    passages = [passage(seen_from(body, origin), direction) for body in medium.bodies]
+    passages = [_passage(seen_from(body, origin), direction, corners) for body in medium.bodies]
 
     def piece(own: Medium, number, begin, end):
         before = []
@@ -121,10 +127,38 @@ def camera_pieces(medium: Medium, origin, direction) -> tuple[Piece, ...]:
     return tuple(pieces)
 
 
-def media_ray(medium: Medium, light: Light, geometry: RayGeometry, *, origin, direction, pieces) -> MediaRay:
+def media_ray(
+    medium: Medium, light: Light, geometry: RayGeometry, *, origin, direction, pieces, corners=None
+) -> MediaRay:
     """Return what the integrals of one light need; `pieces` is from `camera_pieces`."""
     seen = tuple(seen_from(body, light.position) for body in medium.bodies)
-    return MediaRay(medium, light, geometry, origin - light.position, direction, pieces, seen)
+    start = origin - light.position
+    lists = tuple(_leg_lists(one, origin, start, corners) for one in seen)
+    return MediaRay(medium, light, geometry, start, direction, pieces, seen, lists)
+
+
+def _worth_lists(body: Body, corners) -> bool:
+    return corners is not None and body.count > _FEW_PLANES
+
+
+def _passage(seen: Seen, direction, corners):
+    """Return the passage of camera rays through a body, by lists of planes where there are many."""
+    lists = None
+    if _worth_lists(seen.body, corners):
+        _, _, near = ball_range(seen, corners)
+        lists = plane_lists(seen, [corners], near)
+    return passage(seen, direction, lists=lists)
+
+
+def _leg_lists(seen: Seen, origin, start, corners) -> PlaneLists | None:
+    """Return the planes at which legs from the light enter the body to reach the parts of the rays in it."""
+    if not _worth_lists(seen.body, corners):
+        return None
+    # The ball as the camera sees it.
+    low, high, near = ball_range(replace(seen, toward=seen.body.centre - origin), corners)
+    distances = [low + (high * (1 + 1e-4) - low) * (k / _RANGES) for k in range(_RANGES + 1)]
+    slices = [[start + corner * x for corner in corners] for x in distances]
+    return plane_lists(seen, slices, near, leaves=False)
 
 
 def bounded_airlight(ray: MediaRay, x0, x1, *, form: str = "exact"):
@@ -183,23 +217,46 @@ def bounded_source(ray: MediaRay, x):
     return total
 
 
-def path_transmittance(medium: Medium, light: Light, *, origin, point, active):
-    """Return the transmittance from the light to points and on to the camera, a colour [1]."""
+def camera_depths(medium: Medium, origin, direction, distance, *, corners=None) -> tuple[Any, ...]:
+    """Return the optical depth of camera rays up to a distance, by channel; arguments as in `camera_pieces`."""
     import drjit as dr
 
-    depths = [0] * len(medium.sigma_t)
-    for end in (origin, light.position):
-        vector = point - end
-        length = dr.norm(vector)
-        direction = vector / length
-        depths = [depth + sigma * length for depth, sigma in zip(depths, medium.sigma_t)]
-        for body in medium.bodies:
-            seen = seen_from(body, end)
-            near = active & near_line(seen, direction, length)
-            (enter,), (leave,) = inverse_crossings(seen, vector, dr.zeros(type(vector)), [type(length)(0)], near)
-            inside = dr.select(near, share_inside(enter, leave) * length, 0)
-            excess = [own - sigma for own, sigma in zip(body.medium.sigma_t, medium.sigma_t)]
-            depths = [depth + more * inside for depth, more in zip(depths, excess)]
+    depths = [type(distance)(0) if medium.clear else sigma * distance for sigma in medium.sigma_t]
+    for body in medium.bodies:
+        ends = _passage(seen_from(body, origin), direction, corners)
+        enter, leave = (dr.minimum(end, distance) for end in ends)
+        inside = dr.select(leave > enter, leave - enter, 0)
+        excess = [own - sigma for own, sigma in zip(body.medium.sigma_t, medium.sigma_t)]
+        depths = [dr.fma(more, inside, depth) for more, depth in zip(excess, depths)]
+    return tuple(depths)
+
+
+def path_transmittance(medium: Medium, light: Light, *, depths, point, active):
+    """Return the transmittance from the light to points and on to the camera, a colour [1].
+
+    Parameters
+    ----------
+    medium, light
+        What the light crosses and where it comes from.
+    depths
+        From `camera_depths`.
+    point
+        The points.
+    active
+        Lanes to compute.
+    """
+    import drjit as dr
+
+    vector = point - light.position
+    length = dr.norm(vector)
+    depths = [dr.fma(sigma, length, depth) for depth, sigma in zip(depths, medium.sigma_t)]
+    for body in medium.bodies:
+        seen = seen_from(body, light.position)
+        near = active & near_line(seen, vector / length, length)
+        (enter,), (leave,) = inverse_crossings(seen, vector, dr.zeros(type(vector)), [type(length)(0)], near)
+        inside = dr.select(near, share_inside(enter, leave) * length, 0)
+        excess = [own - sigma for own, sigma in zip(body.medium.sigma_t, medium.sigma_t)]
+        depths = [dr.fma(more, inside, depth) for more, depth in zip(excess, depths)]
     channels = [dr.exp(-depth) for depth in depths]
     return type(medium.albedo)(*(channels * 3)[:3])
 
@@ -287,7 +344,8 @@ def _light_leg(ray: MediaRay, piece: Piece, xs, rs) -> list[list[Any]]:
     for number, seen in enumerate(ray.seen):
         own = number == piece.number
         near = dr.full(dr.mask_t(xs[0]), True, dr.width(xs[0])) if own else _near_legs(ray, seen, xs, rs)
-        enter, leave = inverse_crossings(seen, ray.start, ray.direction, xs, near, leaves=not own)
+        lists = ray.lists[number] if own else None
+        enter, leave = inverse_crossings(seen, ray.start, ray.direction, xs, near, leaves=not own, lists=lists)
         ends = [None] * len(xs) if own else leave
         shares = [share_inside(one, other) for one, other in zip(enter, ends)]
         insides.append([dr.select(near, share * r, 0) for share, r in zip(shares, rs)])

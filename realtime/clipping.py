@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from realtime.arrays import is_single
+from realtime.body_tiles import PlaneLists, plane_number
 from realtime.medium import Body
 
 
@@ -52,7 +53,9 @@ def seen_from(body: Body, point) -> Seen:
     return Seen(body, toward, numbers)
 
 
-def inverse_crossings(seen: Seen, start, direction, distances, active, *, leaves: bool = True):
+def inverse_crossings(
+    seen: Seen, start, direction, distances, active, *, leaves: bool = True, lists: PlaneLists | None = None
+):
     """Return 1/f_in and 1/f_out for the lines from the point to start + distance direction.
 
     Parameters
@@ -67,6 +70,8 @@ def inverse_crossings(seen: Seen, start, direction, distances, active, *, leaves
         Lanes to compute.
     leaves
         Whether f_out is wanted.
+    lists
+        The planes that concern each ray; all by default.
 
     Returns
     -------
@@ -82,12 +87,13 @@ def inverse_crossings(seen: Seen, start, direction, distances, active, *, leaves
         return [one for one, _ in found], [other for _, other in found]
     Float, Vector4 = type(start.x), mi.Vector4f if is_single(type(start.x)) else mi.Vector4d
     width = dr.width(start, direction, active, *distances)
+    count = seen.body.count if lists is None else lists.count
     enter = [dr.full(Float, dr.inf, width) for _ in distances]
     leave = [dr.full(Float, -dr.inf, width) for _ in distances] if leaves else []
 
     def plane(number, enter, leave):
         # Four numbers at once: reading them is most of the work.
-        values = dr.gather(Vector4, seen.planes, number, active)
+        values = dr.gather(Vector4, seen.planes, plane_number(lists, number, active), active)
         g, outside = values.xyz, values.w > 0
         constant, slope = dr.dot(g, start), dr.dot(g, direction)
         first, last = dr.select(outside, constant, dr.inf), dr.select(outside, -dr.inf, constant)
@@ -97,7 +103,7 @@ def inverse_crossings(seen: Seen, start, direction, distances, active, *, leaves
 
     _, enter, leave = dr.while_loop(
         state=(mi.UInt32(0), enter, leave),
-        cond=lambda number, enter, leave: active & (number < seen.body.count),
+        cond=lambda number, enter, leave: active & (number < count),
         body=plane,
         labels=("number", "enter", "leave"),
     )
@@ -151,8 +157,17 @@ def near_line(seen: Seen, direction, length):
     return dr.squared_norm(dr.fma(-direction, nearest, seen.toward)) < reach * reach
 
 
-def passage(seen: Seen, direction):
+def passage(seen: Seen, direction, *, lists: PlaneLists | None = None):
     """Return where rays from the point enter and leave the body [m], both infinite where they miss it.
+
+    Parameters
+    ----------
+    seen
+        The body and the point.
+    direction
+        Of the rays.
+    lists
+        The planes that concern each ray; all by default.
 
     Notes
     -----
@@ -162,7 +177,8 @@ def passage(seen: Seen, direction):
 
     Float = type(direction.x)
     near = near_line(seen, direction, dr.inf)
-    (enter,), (leave,) = inverse_crossings(seen, direction, dr.zeros(type(direction)), [Float(0)], near)
+    still = dr.zeros(type(direction))
+    (enter,), (leave,) = inverse_crossings(seen, direction, still, [Float(0)], near, lists=lists)
     begin, end = dr.rcp(enter), dr.select(leave > 0, dr.rcp(leave), dr.inf)
     hit = near & (enter > 0) & (begin < end)
     return dr.select(hit, begin, dr.inf), dr.select(hit, end, dr.inf)

@@ -9,7 +9,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from realtime.camera import ray_directions, tiled_pixels
+from realtime.body_tiles import tile_corners
+from realtime.bounded_media import camera_depths
+from realtime.camera import Camera, ray_directions, tiled_pixels
 from realtime.errors import InputError
 from realtime.kernels.table import resident_tables
 from realtime.methods import Method
@@ -27,6 +29,12 @@ class FrameRenderer:
     prepare: Callable[[Scene], Any]  #: what the method needs before the frame: shadow maps, shadow planes
     surface: Callable[..., Any]  #: -> distance, and surface radiance by light
     airlight: Callable[..., Any]  #: -> airlight radiance, and by light whether it reaches the surface, if it says so
+    casts_rays: bool  #: whether the method casts rays of its own
+
+    @property
+    def geometry(self) -> Any:
+        """The Mitsuba scene if the method needs it: a frozen function reads all of its shapes anew at every call."""
+        return self.scene.geometry if self.casts_rays else None
 
 
 @dataclass(frozen=True)
@@ -74,8 +82,10 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
     def surface(geometry, pixel, camera, medium, lights):
         direction, _ = ray_directions(camera, pixel)
         distance, interaction = visible_surface(geometry, camera.origin, direction)
-        arguments = {"origin": camera.origin, "distance": distance, "medium": medium}
-        arguments |= {"shadows": not method.lights_surfaces}
+        arguments = {"distance": distance, "medium": medium, "shadows": not method.lights_surfaces}
+        if medium.bodies:
+            corners = _corners(camera, pixel)
+            arguments["depths"] = camera_depths(medium, camera.origin, direction, distance, corners=corners)
         colors = [lit_surface(geometry, direction, interaction, light=light, **arguments) for light in lights]
         return distance, tuple(colors) if method.lights_surfaces else (sum(colors),)
 
@@ -91,7 +101,7 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
             plan=plan,
             visible=lambda point, light: _visible(geometry, point, light),
             rays=lambda lane: ray_directions(camera, dr.gather(mi.UInt32, pixel, lane)),
-            square_tiles=camera.width % 4 == 0 and camera.height % 4 == 0 and dr.width(pixel) > 1,
+            square_tiles=_in_square_tiles(camera, pixel),
             visible_triangle=lambda: visible_triangle(geometry, camera.origin, direction),
             prepared=prepared,
         )
@@ -105,11 +115,13 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
     # Trace one pixel without launching anything: what the method refuses must not be raised while a frozen function is
     # being recorded, which Dr.Jit 1.5 answers by aborting a later recording.
     one = type(camera.origin.x)(1)
-    run_method(scene.geometry, mi.UInt32(0), camera, scene.medium, scene.lights, prepare(scene), one, _no_light(scene))
+    casts_rays = method.casts_rays(settings)
+    geometry = scene.geometry if casts_rays else None
+    run_method(geometry, mi.UInt32(0), camera, scene.medium, scene.lights, prepare(scene), one, _no_light(scene))
     resident = resident_tables()
     airlight = dr.freeze(run_method, state_fn=lambda *_, **__: resident)
     dr.eval(pixel)
-    return FrameRenderer(scene, pixel, prepare, surface if plan.surfaces else _no_surface, airlight)
+    return FrameRenderer(scene, pixel, prepare, surface if plan.surfaces else _no_surface, airlight, casts_rays)
 
 
 def render_frame(renderer: FrameRenderer) -> Frame:
@@ -135,11 +147,27 @@ def run_stages(renderer: FrameRenderer, prepared):
     scene = renderer.scene
     distance, by_light = renderer.surface(scene.geometry, renderer.pixel, scene.camera, scene.medium, scene.lights)
     airlight, lit_surface = renderer.airlight(
-        scene.geometry, renderer.pixel, scene.camera, scene.medium, scene.lights, prepared, distance, by_light
+        renderer.geometry, renderer.pixel, scene.camera, scene.medium, scene.lights, prepared, distance, by_light
     )
     surface = by_light[0] if lit_surface is None else lit_surface
     dr.eval(distance, surface, airlight)
     return distance, surface, airlight
+
+
+def _in_square_tiles(camera: Camera, pixel) -> bool:
+    import drjit as dr
+
+    return camera.width % 4 == 0 and camera.height % 4 == 0 and dr.width(pixel) > 1
+
+
+def _corners(camera: Camera, pixel):
+    """Return the directions at the corners of the tiles, or None where pixels do not come in tiles."""
+    import drjit as dr
+    import mitsuba as mi
+
+    if not _in_square_tiles(camera, pixel):
+        return None
+    return tile_corners(lambda lane: ray_directions(camera, dr.gather(mi.UInt32, pixel, lane))[0], dr.width(pixel))
 
 
 def _visible(geometry, point, light):

@@ -69,7 +69,7 @@ def visible_triangle(scene, origin, direction):
 
 
 def lit_surface(
-    scene, view_direction, interaction, *, origin, distance, medium: Medium, light: Light, shadows: bool = True
+    scene, view_direction, interaction, *, distance, medium: Medium, light: Light, depths=None, shadows: bool = True
 ):
     """Return the radiance that the visible surface sends to the eye through the medium, from one light [W/(m^2 sr)].
 
@@ -81,10 +81,10 @@ def lit_surface(
         Unit directions of the camera rays.
     interaction, distance
         From `visible_surface`.
-    origin
-        Where the rays start, one point for all [m].
     medium, light
         What the light crosses and where it comes from.
+    depths
+        With bounded media, the optical depths from `realtime.bounded_media.camera_depths`.
     shadows
         Whether to cast shadow rays; a method that finds out otherwise what is lit leaves them to that.
     """
@@ -109,7 +109,7 @@ def lit_surface(
         lit &= ~scene.ray_test(interaction.spawn_ray_to(mi.Point3f(light.position)), lit)
     reflected = albedo * arriving * (dr.inv_pi * cosine / dr.square(r))
     if medium.bodies:
-        kept = path_transmittance(medium, light, origin=origin, point=point, active=lit)
+        kept = path_transmittance(medium, light, depths=depths, point=point, active=lit)
     else:
         kept = transmittance(medium, dr.select(lit, distance + r, 0))
     return dr.select(lit, reflected * kept, Color(0))

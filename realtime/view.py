@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from realtime.body_tiles import tile_corners
 from realtime.bounded_media import MediaRay, camera_pieces, media_ray
 from realtime.geometry import ray_geometry
 from realtime.lights import Light
@@ -44,11 +45,15 @@ def radiance(medium: Medium, light: Light, integral):
 
 def rays_in_media(view: View) -> tuple[MediaRay, ...]:
     """Return the rays of a view in bounded media, by light."""
-    pieces = camera_pieces(view.medium, view.origin, view.direction)
+    import drjit as dr
+
+    width = dr.width(view.direction)
+    corners = tile_corners(lambda lane: view.rays(lane)[0], width) if view.square_tiles else None
+    pieces = camera_pieces(view.medium, view.origin, view.direction, corners=corners)
     rays = []
     for light in view.lights:
         geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
-        ends = {"origin": view.origin, "direction": view.direction}
+        ends = {"origin": view.origin, "direction": view.direction, "corners": corners}
         rays.append(media_ray(view.medium, light, geometry, **ends, pieces=pieces))
     return tuple(rays)
 
