@@ -185,9 +185,12 @@ def layers_between(casters: Casters, light: Array, axes: Array, distance: float,
     near = used & np.all((low <= np.maximum(light, camera)) & (high >= np.minimum(light, camera)), axis=1)
     if not near.any():
         return 0
-    # The axis runs through x = y = 0: most triangles lie aside.
-    aside = np.sign(casters.vertices @ axes[:2].T - axes[:2] @ light).astype(np.int8)[casters.triangles]
-    number = np.flatnonzero(near[casters.body] & np.all(np.abs(aside.sum(axis=1, dtype=np.int8)) < 3, axis=1))
+    # The axis runs through x = y = 0: most triangles lie aside, all three corners beyond it on one of four sides.
+    x, y = axes[:2] @ casters.vertices.T - (axes[:2] @ light)[:, None]
+    sides = (x > 0) | (x < 0).view(np.uint8) << 1 | (y > 0).view(np.uint8) << 2 | (y < 0).view(np.uint8) << 3
+    common = sides[casters.triangles[:, 0]] & sides[casters.triangles[:, 1]] & sides[casters.triangles[:, 2]]
+    number = np.flatnonzero(common == 0)
+    number = number[near[casters.body[number]]]
     crossed = number[_crosses(casters, number, light, camera)]
     sign = facing(casters, light)[crossed]
     body = casters.body[crossed]
