@@ -185,7 +185,7 @@ def _stages(renderer: FrameRenderer, kernel: str, total: float, *, seconds: floa
         dr.eval(renderer.surface(scene.geometry, *arguments))
 
     def unshadowed():
-        dr.eval(plain.airlight(scene.geometry, *arguments, (), distance, _nothing(scene)))
+        dr.eval(plain.airlight(plain.geometry, *arguments, (), distance, _nothing(scene)))
 
     lists = _sorting(renderer)
     silhouettes = _median(lambda: _silhouettes(renderer, scene), seconds)

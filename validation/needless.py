@@ -87,7 +87,7 @@ def _airlight(scene: Scene) -> Callable[[], Any]:
     distance, by_light = renderer.surface(scene.geometry, *arguments)
     dr.eval(distance, by_light)
     ready = renderer.prepare(scene)
-    return lambda: dr.eval(renderer.airlight(scene.geometry, *arguments, ready, distance, by_light))
+    return lambda: dr.eval(renderer.airlight(renderer.geometry, *arguments, ready, distance, by_light))
 
 
 def _compared(what: str, works: list[Callable[[], Any]], *, turns: int) -> Needless:

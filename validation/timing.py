@@ -95,7 +95,7 @@ def time_frame(renderer: FrameRenderer, *, seconds: float = 0.6) -> FrameTimes:
 
     def airlight():
         arrays = (renderer.pixel, scene.camera, scene.medium, scene.lights, prepared, distance, by_light)
-        dr.eval(renderer.airlight(scene.geometry, *arrays))
+        dr.eval(renderer.airlight(renderer.geometry, *arrays))
 
     def rebuild():
         run_stages(renderer, renderer.prepare(scene))

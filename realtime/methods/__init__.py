@@ -26,6 +26,7 @@ class Method:
     uses_kernel: bool = True
     prepare: Callable[..., Any] | None = None  #: (scene, **parameters) -> function of the scene, run when things moved
     lights_surfaces: bool = False  #: whether it returns, after the radiance, by light whether it reaches the surface
+    casts_rays: Callable[[Mapping[str, Any]], bool] = lambda settings: False  #: parameters -> whether it casts rays
     shadows: bool = True  #: whether it knows shadows; one that does not is wrong where there are occluders
     parameters: Mapping[str, int | float | str] = field(
         default_factory=lambda: MappingProxyType({})
@@ -47,6 +48,7 @@ METHODS: dict[str, Method] = {
         "Billeter, Sintorn, Assarsson 2010, section 2; Kulla and Fajardo 2012 (equi-angular steps)",
         uses_kernel=False,
         prepare=prepare_maps,
+        casts_rays=lambda settings: settings["shadow"] == "ray",
         parameters=MappingProxyType({"steps": 100, "spacing": "equiangular", "shadow": "ray", "map": 512}),
     ),
     "shadow-planes": Method(
@@ -55,6 +57,7 @@ METHODS: dict[str, Method] = {
         "silhouettes extruded to planes; lit segments between their crossings",
         "Biri, Arques, Michelin 2006",
         prepare=prepare_shadow_planes,
+        casts_rays=lambda settings: settings["evaluation"] == "vertex",  # to know the triangle of a surface
         lights_surfaces=True,
         parameters=MappingProxyType(
             {
