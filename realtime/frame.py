@@ -9,7 +9,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from realtime.camera import ray_directions, tiled_pixels
+from realtime.body_tiles import tile_corners
+from realtime.bounded_media import camera_depths
+from realtime.camera import Camera, ray_directions, tiled_pixels
 from realtime.errors import InputError
 from realtime.kernels.table import resident_tables
 from realtime.methods import Method
@@ -80,8 +82,10 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
     def surface(geometry, pixel, camera, medium, lights):
         direction, _ = ray_directions(camera, pixel)
         distance, interaction = visible_surface(geometry, camera.origin, direction)
-        arguments = {"origin": camera.origin, "distance": distance, "medium": medium}
-        arguments |= {"shadows": not method.lights_surfaces}
+        arguments = {"distance": distance, "medium": medium, "shadows": not method.lights_surfaces}
+        if medium.bodies:
+            corners = _corners(camera, pixel)
+            arguments["depths"] = camera_depths(medium, camera.origin, direction, distance, corners=corners)
         colors = [lit_surface(geometry, direction, interaction, light=light, **arguments) for light in lights]
         return distance, tuple(colors) if method.lights_surfaces else (sum(colors),)
 
@@ -97,7 +101,7 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
             plan=plan,
             visible=lambda point, light: _visible(geometry, point, light),
             rays=lambda lane: ray_directions(camera, dr.gather(mi.UInt32, pixel, lane)),
-            square_tiles=camera.width % 4 == 0 and camera.height % 4 == 0 and dr.width(pixel) > 1,
+            square_tiles=_in_square_tiles(camera, pixel),
             visible_triangle=lambda: visible_triangle(geometry, camera.origin, direction),
             prepared=prepared,
         )
@@ -148,6 +152,22 @@ def run_stages(renderer: FrameRenderer, prepared):
     surface = by_light[0] if lit_surface is None else lit_surface
     dr.eval(distance, surface, airlight)
     return distance, surface, airlight
+
+
+def _in_square_tiles(camera: Camera, pixel) -> bool:
+    import drjit as dr
+
+    return camera.width % 4 == 0 and camera.height % 4 == 0 and dr.width(pixel) > 1
+
+
+def _corners(camera: Camera, pixel):
+    """Return the directions at the corners of the tiles, or None where pixels do not come in tiles."""
+    import drjit as dr
+    import mitsuba as mi
+
+    if not _in_square_tiles(camera, pixel):
+        return None
+    return tile_corners(lambda lane: ray_directions(camera, dr.gather(mi.UInt32, pixel, lane))[0], dr.width(pixel))
 
 
 def _visible(geometry, point, light):
