@@ -8,7 +8,8 @@ finds nothing, or `_ROUNDS` have passed.
 Intervals that come from exact geometry need no mending, but a proof that they are right: they share no code with the
 shadow rays. Within float32 rounding of an edge the rays cannot be asked. Elsewhere a contradiction is judged by a third
 way, a float64 test of that one shadow ray against every triangle (Moeller and Trumbore 1997, Fast, minimum storage
-ray-triangle intersection, J. Graphics Tools 2(1)).
+ray-triangle intersection, J. Graphics Tools 2(1)) and every ball; of other shapes a ray that is cast at them alone
+tells.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,18 +18,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.intervals import Certificate, LitIntervals
+from reference.intervals import Certificate, LitIntervals, joined_doubt
+from reference.shapes import Shapes
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 Index = NDArray[np.int64]
 Visible = Callable[[Index, Array], Bools]
 Bisect = Callable[[Visible, Index, tuple[Array, Array], Bools], Array]
-Geometry = tuple[Array, tuple[Array, Array, Array], Array]
+Geometry = tuple[Array, tuple[Array, Array, Array], Shapes]
 
 _ROUNDS = 4
 _ROUNDING = 1e-5  # of the angle: float32 shadow rays end 2e-6 early, and start and direction are rounded to 1e-7
-_JUDGED = 256  # contradictions that are tested against every triangle; more than a few mean that something is wrong
+_JUDGED = 256  # contradictions that are tested against every shape; more than a few mean that something is wrong
 _CHUNK = 1 << 22  # rays cast at once
 
 
@@ -95,33 +97,45 @@ def certified_cast(toggles: Toggles, found_by: Rounding, *, ends: tuple[Array, A
 
 
 def certified_geometry(
-    exact: LitIntervals, visible: Visible, geometry: Geometry, *, ends: tuple[Array, Array], checks: int
+    exact: LitIntervals,
+    visible: Visible,
+    geometry: Geometry,
+    *,
+    ends: tuple[Array, Array],
+    checks: int,
+    others: Visible | None = None,
 ) -> LitIntervals:
     """Check intervals from exact geometry.
 
     Parameters
     ----------
     exact
-        The intervals.
+        The intervals, and what was said of the cast part of them.
     visible
         Shadow rays, (ray numbers, angles) -> whether the light reaches those points.
     geometry
-        Position of the light (3,), rays as in `reference.visibility.lit_intervals`, triangles (triangles, 3, 3) [m].
+        Position of the light (3,), rays as in `reference.visibility.lit_intervals`, and the shapes.
     ends
         Angles at the light between which the rays are looked at [rad].
     checks
         Random samples of each ray.
+    others
+        Shadow rays among the shapes that are neither triangles nor balls, if there are any.
     """
     toggles = _as_toggles(exact, ends)
     ray, theta = _random_samples(toggles.ray, ends, checks, 0)
     predicted, gap = _predicted(toggles, ray, theta)
     gap = np.minimum(gap, np.minimum(theta - ends[0][ray], ends[1][ray] - theta))
     wrong = np.flatnonzero((_cast(visible, ray, theta) != predicted) & (gap > _ROUNDING))
-    settled = [_lit_by_all_triangles(geometry, ray[k], theta[k]) == predicted[k] for k in wrong[:_JUDGED]]
-    unsettled = np.append(wrong[:_JUDGED][~np.array(settled, dtype=bool)], wrong[_JUDGED:])
+    judged = wrong[:_JUDGED]
+    lit = np.array([_lit_by_all_shapes(geometry, ray[k], theta[k]) for k in judged], dtype=bool)
+    if others is not None:
+        lit &= _cast(others, ray[judged], theta[judged])
+    unsettled = np.append(judged[lit != predicted[judged]], wrong[_JUDGED:])
     certificate = Certificate(
         len(ray), len(wrong), len(wrong) - len(unsettled), len(unsettled), len(wrong) / max(len(ray), 1)
     )
+    certificate = Certificate.of_all([exact.certificate, certificate])
     return _with_doubt(replace(exact, certificate=certificate), ray[unsettled], theta[unsettled], ends, checks)
 
 
@@ -204,13 +218,17 @@ def _as_toggles(intervals: LitIntervals, ends: tuple[Array, Array]) -> Toggles:
 def _with_doubt(
     intervals: LitIntervals, ray: Index, theta: Array, ends: tuple[Array, Array], checks: int
 ) -> LitIntervals:
-    """Attach the contradictions that are left: each stands for one of the parts of its ray."""
-    return replace(intervals, doubt=(ray, theta, (ends[1][ray] - ends[0][ray]) / checks)) if len(ray) else intervals
+    """Attach the contradictions that are left, after earlier ones: each stands for one of the parts of its ray."""
+    if not len(ray):
+        return intervals
+    new = ray, theta, (ends[1][ray] - ends[0][ray]) / checks
+    return replace(intervals, doubt=new if intervals.doubt is None else joined_doubt(intervals.doubt, new))
 
 
-def _lit_by_all_triangles(geometry: Geometry, ray: np.int64, theta: np.float64) -> bool:
-    """Test one shadow ray against every triangle in float64."""
-    position, (direction, normal, height), triangles = geometry
+def _lit_by_all_shapes(geometry: Geometry, ray: np.int64, theta: np.float64) -> bool:
+    """Test one shadow ray against every triangle and every ball in float64."""
+    position, (direction, normal, height), shapes = geometry
+    triangles = shapes.triangles
     way = (np.sin(theta) * direction[ray] + np.cos(theta) * normal[ray]) * height[ray] / np.cos(theta)
     edge1, edge2 = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     p = np.cross(way, edge2)
@@ -221,4 +239,18 @@ def _lit_by_all_triangles(geometry: Geometry, ray: np.int64, theta: np.float64) 
         u = np.einsum("ij,ij->i", from_corner, p) / determinant
         v = q @ way / determinant
         t = np.einsum("ij,ij->i", edge2, q) / determinant
-    return not bool(np.any((u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0) & (t < 1)))
+    hidden = bool(np.any((u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0) & (t < 1)))
+    return not (hidden or _meets_balls(position, way, (shapes.centre, shapes.radius)))
+
+
+def _meets_balls(position: Array, way: Array, balls: tuple[Array, Array]) -> bool:
+    """Return whether the surface of a ball lies between a point and the point `way` further on.
+
+    The ways to the surface are the roots of |position + t way - centre|^2 = R^2.
+    """
+    from_centre = position - balls[0]
+    square, half = way @ way, from_centre @ way
+    discriminant = half**2 - square * (np.sum(from_centre**2, axis=1) - balls[1] ** 2)
+    root = np.sqrt(np.maximum(discriminant, 0))
+    ways = (np.stack([-root, root]) - half) / square
+    return bool(np.any((discriminant > 0) & (ways > 0) & (ways < 1)))

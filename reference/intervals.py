@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+Doubt = tuple[Index, Array, Array]
 
 
 @dataclass(frozen=True)
@@ -17,7 +18,7 @@ class Certificate:
 
     checked: int = 0  #: shadow rays cast
     disagreements: int = 0  #: of these, how many contradicted the intervals further from an edge than rounding
-    refined: int = 0  #: disagreements that were settled: by a new bracket, or by testing every triangle in float64
+    refined: int = 0  #: disagreements that were settled: by a new bracket, or by testing every shape in float64
     left: int = 0  #: disagreements that were not
     missed: float = 0.0  #: share of the first round's shadow rays that contradicted the intervals
 
@@ -43,4 +44,35 @@ class LitIntervals:
     transitions: int  #: edges between light and shadow
     edge: float = 2e-6  #: relative uncertainty of the distance of an edge; the default is that of a float32 shadow ray
     certificate: Certificate = field(default_factory=Certificate)
-    doubt: tuple[Index, Array, Array] | None = None  #: what was left in doubt: rays, angles, widths [rad]
+    doubt: Doubt | None = None  #: what was left in doubt: rays, angles, widths [rad]
+
+
+def joined_doubt(one: Doubt, other: Doubt) -> Doubt:
+    """Put two lists of doubtful angles together."""
+    return np.append(one[0], other[0]), np.append(one[1], other[1]), np.append(one[2], other[2])
+
+
+def intersected(one: LitIntervals, other: LitIntervals, ends: tuple[Array, Array]) -> LitIntervals:
+    """Return what is lit in both; the edges are as uncertain as the worse of the two, and doubt and checks add up.
+
+    Parameters
+    ----------
+    one, other
+        The intervals; those of one ray neither overlap nor touch.
+    ends
+        Angles at the light between which the rays are looked at [rad].
+    """
+    count = len(one.ray), len(other.ray)
+    ray = np.concatenate([one.ray, one.ray, other.ray, other.ray])
+    angle = np.concatenate([one.low, one.high, other.low, other.high])
+    step = np.repeat([1, -1, 1, -1], [count[0], count[0], count[1], count[1]])
+    order = np.lexsort((step, angle, ray))  # what closes comes before what opens at the same angle
+    ray, angle = ray[order], angle[order]
+    both = np.flatnonzero(np.cumsum(step[order]) == 2)
+    ray, low, high = ray[both], angle[both], angle[both + 1]
+    doubt = None
+    for part in (one.doubt, other.doubt):
+        doubt = part if doubt is None else doubt if part is None else joined_doubt(doubt, part)
+    transitions = int(np.sum(low > ends[0][ray]) + np.sum(high < ends[1][ray]))
+    certificate = Certificate.of_all([one.certificate, other.certificate])
+    return LitIntervals(ray, low, high, transitions, max(one.edge, other.edge), certificate, doubt)

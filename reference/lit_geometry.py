@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lit intervals of camera rays by exact geometry: what every triangle takes from the light of every ray.
+"""Lit intervals of camera rays by exact geometry: what every triangle and ball takes from the light of every ray.
 
 A camera ray and a light span a plane. A triangle cuts that plane in a segment, and the segment hides from the light one
 interval of the angle theta along the ray. In the plane, relative to the light, let y be the component along n (towards
@@ -8,8 +8,9 @@ behind (y, z) as seen from the light is the one at theta = atan2(z, y), provided
 
     shadow of a segment = [atan2(z_a, y_a), atan2(z_b, y_b)],   the segment clipped to 0 < y <= height,
 
-and what is lit is what no triangle hides. No sampling, no rays cast, everything in float64: however thin a shadow, it
-is found. It shares nothing with the ray-traced visibility of `reference.visibility`, which checks it.
+and what is lit is what neither a triangle nor a ball (`reference.lit_balls`) hides. No sampling, no rays cast,
+everything in float64: however thin a shadow, it is found. It shares nothing with the ray-traced visibility of
+`reference.visibility`, which checks it.
 
 All camera rays start in one point, so their planes turn about one axis, from the camera to the light. A triangle can
 only matter to rays whose azimuth about that axis lies within its own, that pass beyond it as seen along the axis (the
@@ -19,14 +20,14 @@ bounded below by those of a sphere around it, which is what the tests use.
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.errors import InputError
 from reference.intervals import LitIntervals
+from reference.lit_balls import Shadows, ball_shadows
 from reference.scene import TruthLight, TruthScene
+from reference.shapes import Shapes, read_shapes
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -49,98 +50,13 @@ class _Cones:
     light: Array  #: smallest angle at the light, from the camera [rad]
 
 
-def scene_triangles(scene) -> Array:
-    """Return the triangles of a Mitsuba scene, (triangles, 3, 3) [m].
-
-    Raises
-    ------
-    InputError
-        For a shape that is neither a mesh nor a rectangle, with its name.
-    """
-    parts = [np.empty((0, 3, 3))]
-    for shape in scene.shapes():
-        if not _is_polygonal(shape):
-            raise InputError(
-                f"shape '{shape.id()}' is a {shape.class_name()}; wanted meshes and rectangles, whose lit intervals "
-                "are exact: replace it by a mesh, or take edges='rays'"
-            )
-        parts.append(_shape_triangles(shape))
-    return np.concatenate(parts)
-
-
-def is_polygonal(scene) -> bool:
-    """Return whether `scene_triangles` knows every shape of a scene."""
-    return all(_is_polygonal(shape) for shape in scene.shapes())
-
-
-def _is_polygonal(shape) -> bool:
-    return shape.is_mesh() or _is_rectangle(shape)
-
-
-def _is_rectangle(shape) -> bool:
-    return shape.class_name() == "Rectangle"  # has no vertices to ask for
-
-
-def _shape_triangles(shape) -> Array:
-    import mitsuba as mi
-
-    parameters = mi.traverse(shape)
-    if _is_rectangle(shape):
-        corners = np.array([[-1.0, -1, 0, 1], [1, -1, 0, 1], [1, 1, 0, 1], [-1, 1, 0, 1]])
-        matrix = np.array(parameters["to_world"].matrix, dtype=np.float64).reshape(4, 4)
-        return (corners @ matrix.T)[:, :3][np.array([[0, 1, 2], [0, 2, 3]])]
-    vertices = np.array(parameters["vertex_positions"], dtype=np.float64).reshape(-1, 3)
-    return vertices[np.array(parameters["faces"], dtype=np.int64).reshape(-1, 3)]
-
-
-def polygon_distance(truth: TruthScene, interaction: Any, distance: Array) -> Array:
-    """Return the distances to the visible surface again in float64, where that is a polygon.
-
-    Parameters
-    ----------
-    truth
-        The scene; its rays are those that were cast.
-    interaction
-        Mitsuba's surface interactions: which triangle each ray met.
-    distance
-        The distances that were found, (rays,), infinite where nothing is hit [m].
-
-    Notes
-    -----
-    Valid where the plane of the triangle is met within 1e-4 of the distance; elsewhere, on triangles seen edge-on, and
-    on other shapes, the distance stays what it was.
-    """
-    import drjit as dr
-    import mitsuba as mi
-
-    hit = np.isfinite(distance)
-    shape_of_hit = np.array(dr.reinterpret_array(mi.UInt32, interaction.shape))
-    primitive = np.array(interaction.prim_index, dtype=np.int64)
-    refined = distance.copy()
-    for shape in truth.occluders.shapes():
-        number = np.array(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))).item()
-        mine = np.flatnonzero(hit & (shape_of_hit == number))
-        if not len(mine) or not _is_polygonal(shape):
-            continue
-        triangles = _shape_triangles(shape)
-        # A rectangle counts as one primitive; both its triangles lie in one plane.
-        number_in_shape = 0 * mine if _is_rectangle(shape) else primitive[mine]
-        corner = triangles[number_in_shape] - truth.origin
-        normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-        with np.errstate(divide="ignore", invalid="ignore"):
-            exact = np.sum(normal * corner[:, 0], axis=1) / np.sum(normal * truth.direction[mine], axis=1)
-        close = np.abs(exact - distance[mine]) < 1e-4 * distance[mine]
-        refined[mine] = np.where(close, exact, distance[mine])
-    return refined
-
-
 def geometric_intervals(
     truth: TruthScene,
     light: TruthLight,
     rays: tuple[Array, Array, Array],
     *,
     ends: tuple[Array, Array],
-    triangles: Array | None = None,
+    shapes: Shapes | None = None,
 ) -> LitIntervals:
     """Find the lit intervals of camera rays between two angles, exactly.
 
@@ -155,20 +71,17 @@ def geometric_intervals(
     ends
         Angles at the light between which a ray is looked at [rad], each (n,); empty where the first is not below the
         second.
-    triangles
-        What `scene_triangles` returned, if known, (triangles, 3, 3) [m].
-
-    Raises
-    ------
-    InputError
-        For a shape that is neither a mesh nor a rectangle.
+    shapes
+        What `reference.shapes.read_shapes` returned, if known.
 
     Notes
     -----
-    Valid for opaque triangles. Touching triangles are assumed to share the coordinates of their vertices: a crack
-    between them is light.
+    Valid for opaque triangles and balls; what else hides the light is left out. Touching triangles are assumed to share
+    the coordinates of their vertices: a crack between them is light.
     """
-    corners = (scene_triangles(truth.occluders) if triangles is None else triangles) - light.position
+    shapes = read_shapes(truth.occluders) if shapes is None else shapes
+    corners = shapes.triangles - light.position
+    balls = shapes.centre - light.position, shapes.radius
     used = np.flatnonzero(ends[1] > ends[0])
     frame = _axis_frame(truth.origin - light.position)
     cones = _cones(corners, truth.origin - light.position, frame)
@@ -178,7 +91,11 @@ def geometric_intervals(
     for start in range(0, len(used), _RAYS):
         chosen = order[start : start + _RAYS]
         pairs = _pairs(azimuth[chosen], rays[0][used[chosen]] @ frame[0], ends[1][used[chosen]], cones)
-        parts.append(_lit_of_chunk(corners, rays, ends, used[chosen], pairs))
+        mine = used[chosen]
+        lines = rays[0][mine], rays[1][mine], rays[2][mine]
+        hidden = _shadows(corners, lines, pairs), ball_shadows(balls, *lines)
+        row, begin, end = (np.concatenate(both) for both in zip(*hidden, strict=True))
+        parts.append(_lit_of_chunk((row, begin, end), ends, mine))
     ray, low, high = (np.concatenate([part[i] for part in parts] or [np.empty(0)]) for i in range(3))
     by_ray = np.lexsort((low, ray))
     ray, low, high = ray[by_ray].astype(np.int64), low[by_ray], high[by_ray]
@@ -247,13 +164,10 @@ def _pairs(azimuth: Array, cosine: Array, end: Array, cones: _Cones) -> tuple[In
     return row, triangle[column]
 
 
-def _lit_of_chunk(
-    corners: Array, rays: tuple[Array, Array, Array], ends: tuple[Array, Array], used: Index, pairs: tuple[Index, Index]
-) -> tuple[Array, Array, Array]:
-    """Return rays, beginnings and ends of the lit intervals of a chunk of rays."""
-    direction, normal, height = (part[used] for part in rays)
+def _lit_of_chunk(shadows: Shadows, ends: tuple[Array, Array], used: Index) -> tuple[Array, Array, Array]:
+    """Return rays, beginnings and ends of the lit intervals of a chunk of rays, given what is hidden."""
     low, high = ends[0][used], ends[1][used]
-    row, begin, end = _shadows(corners, (direction, normal, height), pairs)
+    row, begin, end = shadows
     begin, end = np.maximum(begin, low[row]), np.minimum(end, high[row])
     # One number orders all: the ray's place in the chunk plus the share of the ray. Two shadows that meet within
     # `_MERGE` are one; the numbers keep 3e-14 of a ray. A shadow that is no wider than that is left out, so that none

@@ -4,7 +4,7 @@
 For each light and each ray, in float64:
 
 1. the visible surface ends the ray (cast in float32, as by every method, so that all share the same surface; where that
-   is a polygon its distance is computed again in float64);
+   is a polygon or a ball its distance is computed again in float64);
 2. the cone of a spot and the visible surface bound the angle theta at the light (`reference.cone`);
 3. that range is cut into lit intervals, by exact geometry or by ray casting, which random shadow rays then check
    (`reference.visibility`);
@@ -17,6 +17,7 @@ shadow rays left in doubt. One ray through its centre stands for a pixel, or the
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,10 +27,10 @@ from analytic.geometry import foot_and_height
 from reference.cone import cone_interval, perpendicular
 from reference.interval_sums import Rays, sum_intervals
 from reference.intervals import Certificate, LitIntervals
-from reference.lit_geometry import polygon_distance
 from reference.media import camera_segments, scattering_range
 from reference.media_sums import sum_media
 from reference.scene import TruthLight, TruthScene
+from reference.shapes import Shapes, exact_distance, read_shapes
 from reference.surface import lit_surface, surface_hits
 from reference.visibility import lit_intervals
 
@@ -140,16 +141,23 @@ def ray_values(
     shadow_scale: float = 1.0,
     edges: str = "auto",
     progress: Progress | None = None,
+    shapes: Shapes | None = None,
 ) -> RayValues:
-    """Compute what is found along every ray of `truth.direction`; the parameters are those of `quadrature_image`."""
+    """Compute what is found along every ray of `truth.direction`.
+
+    The parameters are those of `quadrature_image`, and what `reference.shapes.read_shapes` returned for the occluders,
+    if that is known.
+    """
+    shapes = read_shapes(truth.occluders) if shapes is None else shapes
     hits = surface_hits(truth)
     cast = hits.distance
-    hits = replace(hits, distance=polygon_distance(truth, hits.interaction, cast))
+    hits = replace(hits, distance=exact_distance(truth, hits.interaction, cast, shapes))
     count = len(truth.direction)
     airlight, bound, light_angle = np.zeros((count, 3)), np.zeros((count, 3)), np.full(count, np.pi)
     intervals, transitions, certificates = np.zeros(count, np.int64), 0, []
     for number, light in enumerate(truth.lights):
-        found = _light_airlight(truth, light, hits.distance, samples=samples, shadow_scale=shadow_scale, edges=edges)
+        how = {"samples": samples, "edges": edges, "shapes": shapes}
+        found = _light_airlight(truth, light, hits.distance, shadow_scale=shadow_scale, how=how)
         airlight += found.radiance
         bound += found.bound
         light_angle = np.minimum(light_angle, found.angle)
@@ -173,8 +181,9 @@ class _LightAirlight:
 
 
 def _light_airlight(
-    truth: TruthScene, light: TruthLight, distance: Array, *, samples: int, shadow_scale: float, edges: str
+    truth: TruthScene, light: TruthLight, distance: Array, *, shadow_scale: float, how: dict[str, Any]
 ) -> _LightAirlight:
+    """Compute the airlight of one light; `how` the lit intervals are found is what `lit_intervals` takes for it."""
     direction = truth.direction
     foot, height = foot_and_height(np.broadcast_to(truth.origin, direction.shape), direction, light.position)
     normal = perpendicular(truth.origin, direction, light)
@@ -187,7 +196,7 @@ def _light_airlight(
     if segments is not None:
         first, last = (np.arctan2(x - foot, height) for x in scattering_range(segments))
         ends = np.maximum(ends[0], first), np.minimum(ends[1], last)
-    lit = lit_intervals(truth, light, (direction, normal, height), ends=ends, samples=samples, edges=edges)
+    lit = lit_intervals(truth, light, (direction, normal, height), ends=ends, **how)
     rays = Rays(direction, normal, foot, height)
     if segments is None:
         radiance, bound = sum_intervals(truth.medium, light, rays, lit, shadow_scale)
@@ -208,7 +217,7 @@ def _worth_of_doubt(light: TruthLight, rays: Rays, lit: LitIntervals, truth: Tru
     if lit.doubt is None:
         return worth
     ray, _, width = lit.doubt
-    for medium in (truth.medium, *getattr(truth, "media", ())):
+    for medium in (truth.medium, *truth.media):
         strongest = medium.phase(np.linspace(-1, 1, 1001)).max()
         factor = medium.albedo * medium.sigma_t * light.intensity / (4 * np.pi) * strongest
         np.add.at(worth, ray, (width / rays.height[ray])[:, None] * factor)

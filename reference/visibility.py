@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lit intervals of camera rays: by exact geometry where all shapes are polygons, by ray casting otherwise.
+"""Lit intervals of camera rays: by exact geometry from polygons and balls, by ray casting from all other shapes.
 
 Along a ray the angle theta at the light is the natural variable: the airlight integrand is bounded in it, an endless
 ray ends at pi/2, and the direction from the light to the point is simply ``sin(theta) direction + cos(theta) n`` (n the
 unit vector from the light to the foot point), at the distance height / cos(theta). Nothing cancels, however close the
 ray passes to the light.
 
-Exact geometry (`reference.lit_geometry`) misses nothing and is as fast as casting rays. Casting works for all shapes:
-every ray is sampled at `samples` angles; cells in which the light sees another shape at one end than at the other, or a
-surface that comes or goes too fast to be one, are cut further; wherever two neighbours disagree a transition lies
-between them, and is bisected to rounding.
+Exact geometry (`reference.lit_geometry`) misses nothing and is as fast as casting rays. Casting works for all shapes.
+It is done in a scene of those that geometry leaves over, and what is lit is lit in both. Every ray is sampled at
+`samples` angles; cells in which the light sees another shape at one end than at the other, or a surface that comes or
+goes too fast to be one, are cut further; wherever two neighbours disagree a transition lies between them, and is
+bisected to rounding.
 
 Whatever the route, fresh random shadow rays then check the intervals (`reference.certify`).
 """
@@ -21,9 +22,10 @@ from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from reference.certify import Rounding, Toggles, certified_cast, certified_geometry
-from reference.intervals import LitIntervals
-from reference.lit_geometry import geometric_intervals, is_polygonal, scene_triangles
+from reference.intervals import LitIntervals, intersected
+from reference.lit_geometry import geometric_intervals
 from reference.scene import TruthLight, TruthScene
+from reference.shapes import Shapes, read_shapes, refuse_others
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -45,6 +47,7 @@ def lit_intervals(
     ends: tuple[Array, Array],
     samples: int = 256,
     edges: str = "auto",
+    shapes: Shapes | None = None,
 ) -> LitIntervals:
     """Find the lit intervals of rays between two angles, and have them checked.
 
@@ -62,17 +65,19 @@ def lit_intervals(
     samples
         Regular samples of each ray if rays are cast; an eighth as many random ones check either route, at least one.
     edges
-        "geometry": exactly, from the triangles. "rays": by casting rays. "auto": by geometry where it can be.
+        "geometry": exactly, from triangles and balls. "rays": by casting rays. "auto": by geometry where it can be.
+    shapes
+        What `reference.shapes.read_shapes` returned for the occluders, if known.
 
     Raises
     ------
     InputError
-        For another word in `edges`; for "geometry" in a scene with shapes that are no polygons.
+        For another word in `edges`; for "geometry" in a scene with shapes that are neither polygons nor spheres.
 
     Notes
     -----
-    By geometry, valid for all scenes of opaque meshes and rectangles. By casting rays, valid where shadows along a ray
-    are wider than (high - low)/samples in theta; the certificate measures what is not.
+    By geometry, valid for all scenes of opaque meshes, rectangles and spheres. By casting rays, valid where shadows
+    along a ray are wider than (high - low)/samples in theta; the certificate measures what is not.
     """
     if edges not in ("auto", "geometry", "rays"):
         raise InputError(f"edges is '{edges}'; wanted 'geometry', 'rays' or 'auto'")
@@ -80,18 +85,36 @@ def lit_intervals(
     used = np.flatnonzero(high > low)
     if not truth.occluders.shapes() or not len(used):
         return LitIntervals(used, low[used], high[used], 0, edge=0.0)
+    if edges == "rays":
+        return _cast_intervals(truth.occluders, light, rays, ends, samples)
+    shapes = read_shapes(truth.occluders) if shapes is None else shapes
+    if edges == "geometry":
+        refuse_others(shapes)
+    if shapes.others is not None and not shapes.single:
+        return _cast_intervals(shapes.others, light, rays, ends, samples)
+    exact = geometric_intervals(truth, light, rays, ends=ends, shapes=shapes)
+    others = None
+    if shapes.others is not None:
+        others = visibility_test(shapes.others, light.position, rays)
+        exact = intersected(exact, _cast_intervals(shapes.others, light, rays, ends, samples), ends)
     visible = visibility_test(truth.occluders, light.position, rays)
-    checks = max(1, samples // 8)
-    if edges == "geometry" or (edges == "auto" and is_polygonal(truth.occluders)):
-        triangles = scene_triangles(truth.occluders)
-        exact = geometric_intervals(truth, light, rays, ends=ends, triangles=triangles)
-        return certified_geometry(exact, visible, (light.position, rays, triangles), ends=ends, checks=checks)
-    hits = _first_hits(truth.occluders, light.position, rays)
+    geometry = light.position, rays, shapes
+    return certified_geometry(exact, visible, geometry, ends=ends, checks=max(1, samples // 8), others=others)
+
+
+def _cast_intervals(
+    scene, light: TruthLight, rays: tuple[Array, Array, Array], ends: tuple[Array, Array], samples: int
+) -> LitIntervals:
+    """Find lit intervals by casting rays in a scene, and have them checked and mended."""
+    used = np.flatnonzero(ends[1] > ends[0])
+    visible = visibility_test(scene, light.position, rays)
+    hits = _first_hits(scene, light.position, rays)
     per_chunk = max(1, _CHUNK // (samples + 2))
     chunks = [
         _toggles(visible, hits, ends, used[start : start + per_chunk], samples)
         for start in range(0, len(used), per_chunk)
     ]
+    checks = max(1, samples // 8)
     return certified_cast(Toggles.joined(chunks), Rounding(visible, _bisect), ends=ends, checks=checks)
 
 

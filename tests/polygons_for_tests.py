@@ -10,14 +10,14 @@ def rays_of(truth, light=0):
     """Return the rays of an image, and where they begin and end as angles at a light."""
     from analytic.geometry import foot_and_height
     from reference.cone import cone_interval, perpendicular
-    from reference.lit_geometry import polygon_distance
+    from reference.shapes import exact_distance
     from reference.surface import surface_hits
 
     lamp, direction = truth.lights[light], truth.direction
     foot, height = foot_and_height(np.broadcast_to(truth.origin, direction.shape), direction, lamp.position)
     normal = perpendicular(truth.origin, direction, lamp)
     hits = surface_hits(truth)
-    distance = polygon_distance(truth, hits.interaction, hits.distance)
+    distance = exact_distance(truth, hits.interaction, hits.distance)
     end = np.where(np.isfinite(distance), np.arctan2(distance - foot, height), np.pi / 2)
     cone = cone_interval(direction, normal, lamp, lamp.cutoff)
     return lamp, (direction, normal, height), (np.maximum(np.arctan2(-foot, height), cone[0]), np.minimum(end, cone[1]))

@@ -2,7 +2,6 @@
 import numpy as np
 import pytest
 
-from analytic.errors import InputError
 from tests.polygons_for_tests import box, box_scene, rays_of
 from tests.scenes_for_tests import spot, tiny_scene
 
@@ -110,6 +109,7 @@ def test_one_triangle_against_its_closed_form(variant):
 
     from reference.lit_geometry import geometric_intervals
     from reference.scene import read_truth
+    from reference.shapes import Shapes
 
     truth = read_truth(mi.load_dict(tiny_scene(ball=None, floor=None, size=(1, 1))))
     light, (direction, normal, height), ends = rays_of(truth)
@@ -117,13 +117,13 @@ def test_one_triangle_against_its_closed_form(variant):
     b = light.position + 0.4 * height[0] * (np.cos(0.5) * normal[0] + np.sin(0.5) * direction[0])
     across = np.cross(direction[0], normal[0])
     corners = np.array([[a + 0.3 * across, a - 0.3 * across, b]])  # the plane cuts it from a to b
-    found = geometric_intervals(truth, light, (direction, normal, height), ends=ends, triangles=corners)
+    found = geometric_intervals(truth, light, (direction, normal, height), ends=ends, shapes=Shapes(corners))
     assert found.low == pytest.approx([ends[0][0], 0.5], abs=1e-12)
     assert found.high == pytest.approx([0.2, ends[1][0]], abs=1e-12)
     # Behind the ray, as seen from the light, it hides nothing; on the other side of the light neither.
     for factor in (4.0, -1.0):
         moved = light.position + factor * (corners - light.position)
-        found = geometric_intervals(truth, light, (direction, normal, height), ends=ends, triangles=moved)
+        found = geometric_intervals(truth, light, (direction, normal, height), ends=ends, shapes=Shapes(moved))
         assert found.low == pytest.approx([ends[0][0]])
         assert found.high == pytest.approx([ends[1][0]])
 
@@ -131,48 +131,25 @@ def test_one_triangle_against_its_closed_form(variant):
 def test_order_of_triangles_and_rays_does_not_matter(variant):
     import mitsuba as mi
 
-    from reference.lit_geometry import geometric_intervals, scene_triangles
+    from reference.lit_geometry import geometric_intervals
     from reference.scene import read_truth
+    from reference.shapes import Shapes, read_shapes
 
     truth = read_truth(mi.load_dict(box_scene()))
     light, rays, ends = rays_of(truth)
-    triangles = scene_triangles(truth.occluders)
+    triangles = read_shapes(truth.occluders).triangles
     generator = np.random.default_rng(5)
-    plain = geometric_intervals(truth, light, rays, ends=ends, triangles=triangles)
-    mixed = geometric_intervals(truth, light, rays, ends=ends, triangles=generator.permutation(triangles)[:, ::-1])
+    plain = geometric_intervals(truth, light, rays, ends=ends, shapes=Shapes(triangles))
+    mixed = geometric_intervals(truth, light, rays, ends=ends, shapes=Shapes(generator.permutation(triangles)[:, ::-1]))
     assert np.array_equal(plain.ray, mixed.ray)
     assert plain.low == pytest.approx(mixed.low, abs=1e-13)
     turned = generator.permutation(len(ends[0]))
     other = geometric_intervals(
-        truth, light, tuple(part[turned] for part in rays), ends=(ends[0][turned], ends[1][turned]), triangles=triangles
+        truth,
+        light,
+        tuple(part[turned] for part in rays),
+        ends=(ends[0][turned], ends[1][turned]),
+        shapes=Shapes(triangles),
     )
     lit = np.bincount(plain.ray, plain.high - plain.low, len(turned))[turned]
     assert np.bincount(other.ray, other.high - other.low, len(turned)) == pytest.approx(lit, abs=1e-13)
-
-
-def test_distance_to_a_plane_is_exact(variant):
-    import mitsuba as mi
-
-    from reference.lit_geometry import polygon_distance
-    from reference.scene import read_truth
-    from reference.surface import surface_hits
-
-    truth = read_truth(mi.load_dict(tiny_scene(ball=None)))
-    hits = surface_hits(truth)
-    distance = polygon_distance(truth, hits.interaction, hits.distance)
-    met = np.isfinite(hits.distance)
-    assert met.sum() > 50
-    assert distance[met] == pytest.approx((-truth.origin[2] / truth.direction[:, 2])[met], rel=1e-14)
-    assert np.isinf(distance[~met]).all()
-
-
-def test_a_sphere_is_refused_by_name(variant):
-    import mitsuba as mi
-
-    from reference.lit_geometry import is_polygonal, scene_triangles
-
-    scene = mi.load_dict(tiny_scene())
-    assert not is_polygonal(scene)
-    with pytest.raises(InputError, match="'ball' is a Sphere; wanted meshes"):
-        scene_triangles(scene)
-    assert scene_triangles(mi.load_dict(tiny_scene(ball=None, lamp=spot()))).shape == (2, 3, 3)

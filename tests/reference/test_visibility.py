@@ -18,18 +18,81 @@ def setup(scene):
     return truth, *rays_of(truth)
 
 
-def test_spheres_are_cast_and_polygons_are_exact(variant):
+def cylinder(**changes):
+    """Return a pipe beside the ball."""
+    return {"type": "cylinder", "p0": [0.7, -0.2, 0.1], "p1": [0.8, 0.1, 1.3], "radius": 0.1} | changes
+
+
+def test_polygons_and_balls_are_exact_and_other_shapes_are_cast(variant):
     from reference.lit_geometry import EXACT_EDGE
     from reference.visibility import lit_intervals
 
-    truth, light, rays, ends = setup(tiny_scene())
-    assert lit_intervals(truth, light, rays, ends=ends).edge > EXACT_EDGE
-    with pytest.raises(InputError, match="'ball' is a Sphere"):
-        lit_intervals(truth, light, rays, ends=ends, edges="geometry")
+    for scene in (tiny_scene(), box_scene()):
+        truth, light, rays, ends = setup(scene)
+        assert lit_intervals(truth, light, rays, ends=ends).edge == EXACT_EDGE
     with pytest.raises(InputError, match="edges is 'both'; wanted 'geometry', 'rays' or 'auto'"):
         lit_intervals(truth, light, rays, ends=ends, edges="both")
-    truth, light, rays, ends = setup(box_scene())
-    assert lit_intervals(truth, light, rays, ends=ends).edge == EXACT_EDGE
+    truth, light, rays, ends = setup(tiny_scene(pipe=cylinder()))
+    assert lit_intervals(truth, light, rays, ends=ends).edge > EXACT_EDGE
+    with pytest.raises(InputError, match="'pipe' is a Cylinder; wanted meshes, rectangles and spheres"):
+        lit_intervals(truth, light, rays, ends=ends, edges="geometry")
+
+
+def lit_lengths(found, ends):
+    return np.bincount(found.ray, found.high - found.low, len(ends[0]))
+
+
+def test_mixed_scenes_keep_needles_exact_beside_shapes_that_are_cast(variant):
+    """A needle that few samples meet, a ball and a pipe: the intersection is what all three leave, needle and all."""
+    from reference.lit_geometry import geometric_intervals
+    from reference.visibility import lit_intervals
+
+    needle = box((0.5, -0.3, 0.9), (2e-4, 2e-4, 8.0))
+    truth, light, rays, ends = setup(tiny_scene(pipe=cylinder(), needle=needle))
+    found = lit_intervals(truth, light, rays, ends=ends, samples=32)
+    assert found.certificate.left == 0
+    assert found.doubt is None
+    # Cast densely, without the needle, whose shadow is narrower than what edges of cast rays leave open.
+    bare, *_ = setup(tiny_scene(pipe=cylinder()))
+    dense = lit_intervals(bare, light, rays, ends=ends, samples=1024, edges="rays")
+    lost = lit_lengths(dense, ends) - lit_lengths(found, ends)
+    assert lost.min() > -2e-5  # 2e-6 of the distance at each of a few edges, some of them grazing
+    alone, *_ = setup(tiny_scene(ball=None, floor=None, needle=needle))
+    of_needle = (ends[1] - ends[0]).clip(0) - lit_lengths(geometric_intervals(alone, light, rays, ends=ends), ends)
+    crossed = of_needle > 1e-5
+    assert crossed.sum() > 30
+    assert np.all(lost[crossed] < of_needle[crossed] + 2e-5)
+    assert np.mean(np.abs(lost - of_needle)[crossed] < 2e-5) > 0.7  # elsewhere the needle stands in a shadow
+    assert np.abs(lost[~crossed]).max() < 4e-5
+
+
+def test_only_shapes_that_are_cast(variant):
+    from reference.visibility import lit_intervals
+
+    truth, light, rays, ends = setup(tiny_scene(ball=None, floor=None, pipe=cylinder()))
+    auto, cast = (lit_intervals(truth, light, rays, ends=ends, edges=edges) for edges in ("auto", "rays"))
+    assert np.array_equal(auto.low, cast.low)
+    assert auto.transitions > 20
+
+
+def test_what_is_lit_in_both(variant):
+    """Two sets of intervals by hand: overlapping, nested, touching, missing; doubt and checks add up."""
+    from reference.intervals import Certificate, LitIntervals, intersected
+
+    ends = np.zeros(5), np.ones(5)
+    ray, low, high = np.array([0, 0, 1, 2, 4]), np.array([0.0, 0.5, 0.2, 0.0, 0.0]), np.array([0.4, 1, 0.8, 0.5, 1])
+    doubt = np.array([1]), np.array([0.3]), np.array([0.01])
+    one = LitIntervals(ray, low, high, 5, edge=1e-11, doubt=doubt)
+    ray, low, high = np.array([0, 1, 1, 2, 3]), np.array([0.3, 0.0, 0.6, 0.5, 0.0]), np.array([0.6, 0.4, 1.0, 1, 1])
+    other = LitIntervals(ray, low, high, 5, certificate=Certificate(7, 2, 1, 1, 0.1))
+    for pair in ((one, other), (other, one)):
+        found = intersected(*pair, ends)
+        assert found.ray.tolist() == [0, 0, 1, 1]
+        assert found.low.tolist() == [0.3, 0.5, 0.2, 0.6]
+        assert found.high.tolist() == [0.4, 0.6, 0.4, 0.8]
+        assert (found.transitions, found.edge) == (8, 2e-6)
+        assert found.certificate == Certificate(7, 2, 1, 1, 0.1)
+        assert [part.tolist() for part in found.doubt] == [[1], [0.3], [0.01]]
 
 
 def test_certificate_of_both_routes_is_clean(variant):
@@ -83,26 +146,27 @@ def test_intervals_stay_sorted_and_apart_after_mending(variant):
 def test_wrong_geometry_is_found_and_left_in_doubt(variant):
     """Intervals from which one box is missing contradict the shadow rays, and the test of all triangles."""
     from reference.certify import certified_geometry
-    from reference.lit_geometry import geometric_intervals, scene_triangles
+    from reference.lit_geometry import geometric_intervals
+    from reference.shapes import Shapes, read_shapes
     from reference.visibility import visibility_test
 
     truth, light, rays, ends = setup(box_scene())
-    triangles = scene_triangles(truth.occluders)
-    wrong = geometric_intervals(truth, light, rays, ends=ends, triangles=triangles[12:])
+    shapes = read_shapes(truth.occluders)
+    wrong = geometric_intervals(truth, light, rays, ends=ends, shapes=Shapes(shapes.triangles[12:]))
     visible = visibility_test(truth.occluders, light.position, rays)
-    found = certified_geometry(wrong, visible, (light.position, rays, triangles), ends=ends, checks=16)
+    found = certified_geometry(wrong, visible, (light.position, rays, shapes), ends=ends, checks=16)
     assert found.certificate.left > 20
     assert found.doubt is not None
     assert len(found.doubt[0]) == found.certificate.left
     # Shadow rays that are wrong themselves are overruled by the float64 test.
-    right = geometric_intervals(truth, light, rays, ends=ends, triangles=triangles)
+    right = geometric_intervals(truth, light, rays, ends=ends, shapes=shapes)
 
     def unreliable(ray, theta):
         lit = visible(ray, theta)
         lit[::701] ^= True
         return lit
 
-    found = certified_geometry(right, unreliable, (light.position, rays, triangles), ends=ends, checks=4)
+    found = certified_geometry(right, unreliable, (light.position, rays, shapes), ends=ends, checks=4)
     assert found.certificate.disagreements > 0
     assert found.certificate.left == 0
     assert found.doubt is None

@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What hides lights, as numbers: triangles of the polygons, balls, and the shapes that only casting rays can tell of.
+
+Mitsuba takes a `sphere` for the ball around the image of its centre whose radius is the length of the image of its
+first axis, whatever else the transform does to it: so does this module. Which side its normals point to matters to no
+shadow.
+"""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analytic.errors import InputError
+from reference.scene import TruthScene
+
+Array = NDArray[np.float64]
+
+Ball = tuple[Array, float]  # centre and radius [m]
+
+
+@dataclass(frozen=True)
+class Shapes:
+    """The opaque shapes of a scene."""
+
+    triangles: Array  #: those of meshes and rectangles, (triangles, 3, 3) [m]
+    centre: Array = field(default_factory=lambda: np.empty((0, 3)))  #: of the balls, (balls, 3) [m]
+    radius: Array = field(default_factory=lambda: np.empty(0))  #: of the balls, (balls,) [m]
+    others: Any = None  #: an `mi.Scene` of all other shapes, None where there are none
+    single: tuple[tuple[Any, Array | Ball], ...] = ()  #: meshes, rectangles and spheres one by one, each as numbers
+
+
+def read_shapes(scene) -> Shapes:
+    """Read the shapes of a Mitsuba scene, all of them opaque."""
+    import mitsuba as mi
+
+    single: list[tuple[Any, Array | Ball]] = []
+    others = []
+    for shape in scene.shapes():
+        if is_polygonal(shape):
+            single.append((shape, _shape_triangles(shape)))
+        elif shape.class_name() == "Sphere":
+            single.append((shape, _ball(shape)))
+        else:
+            others.append(shape)
+    triangles = [part for _, part in single if not isinstance(part, tuple)]
+    balls = [part for _, part in single if isinstance(part, tuple)]
+    rest = None
+    if others:
+        # The keys become the names of the shapes: they keep those they have, if these are keys at all.
+        names = {shape.id() for shape in others}
+        sound = len(names) == len(others) and not any("." in name or not name for name in names)
+        given = {shape.id() if sound else f"shape{number}": shape for number, shape in enumerate(others)}
+        rest = mi.load_dict({"type": "scene"} | given) if single else scene
+    return Shapes(
+        np.concatenate([np.empty((0, 3, 3)), *triangles]),
+        np.array([centre for centre, _ in balls]).reshape(-1, 3),
+        np.array([radius for _, radius in balls]),
+        rest,
+        tuple(single),
+    )
+
+
+def refuse_others(shapes: Shapes) -> None:
+    """Refuse shapes whose shadows are not exact.
+
+    Raises
+    ------
+    InputError
+        For a shape that is neither a mesh nor a rectangle nor a sphere, with its name.
+    """
+    if shapes.others is not None:
+        shape = next(one for one in shapes.others.shapes() if not is_polygonal(one) and one.class_name() != "Sphere")
+        raise InputError(
+            f"shape '{shape.id()}' is a {shape.class_name()}; wanted meshes, rectangles and spheres, whose lit "
+            "intervals are exact: replace it by a mesh, or take edges='auto'"
+        )
+
+
+def is_polygonal(shape) -> bool:
+    """Return whether a shape consists of triangles."""
+    return shape.is_mesh() or _is_rectangle(shape)
+
+
+def _is_rectangle(shape) -> bool:
+    return shape.class_name() == "Rectangle"  # has no vertices to ask for
+
+
+def _shape_triangles(shape) -> Array:
+    import mitsuba as mi
+
+    if _is_rectangle(shape):
+        corners = np.array([[-1.0, -1, 0, 1], [1, -1, 0, 1], [1, 1, 0, 1], [-1, 1, 0, 1]])
+        return (corners @ _matrix(shape).T)[:, :3][np.array([[0, 1, 2], [0, 2, 3]])]
+    parameters = mi.traverse(shape)
+    vertices = np.array(parameters["vertex_positions"], dtype=np.float64).reshape(-1, 3)
+    return vertices[np.array(parameters["faces"], dtype=np.int64).reshape(-1, 3)]
+
+
+def _ball(shape) -> Ball:
+    matrix = _matrix(shape)
+    return matrix[:3, 3], float(np.linalg.norm(matrix[:3, 0]))
+
+
+def _matrix(shape) -> Array:
+    import mitsuba as mi
+
+    return np.array(mi.traverse(shape)["to_world"].matrix, dtype=np.float64).reshape(4, 4)
+
+
+def exact_distance(truth: TruthScene, interaction: Any, distance: Array, shapes: Shapes | None = None) -> Array:
+    """Return the distances to the visible surface again in float64, where that is a polygon or a ball.
+
+    Parameters
+    ----------
+    truth
+        The scene; its rays are those that were cast.
+    interaction
+        Mitsuba's surface interactions: which triangle each ray met.
+    distance
+        The distances that were found, (rays,), infinite where nothing is hit [m].
+    shapes
+        What `read_shapes` returned, if known.
+
+    Notes
+    -----
+    Valid where the plane of the triangle is met within 1e-4 of the distance; elsewhere, on triangles seen edge-on, the
+    distance stays what it was. So it does on balls that a ray misses in float64, which happens where it touches them,
+    and on other shapes.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    hit = np.isfinite(distance)
+    shape_of_hit = np.array(dr.reinterpret_array(mi.UInt32, interaction.shape))
+    primitive = np.array(interaction.prim_index, dtype=np.int64)
+    refined = distance.copy()
+    for shape, part in (shapes or read_shapes(truth.occluders)).single:
+        number = np.array(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))).item()
+        mine = np.flatnonzero(hit & (shape_of_hit == number))
+        if not len(mine):
+            continue
+        if isinstance(part, tuple):
+            refined[mine] = _to_ball(part, truth.origin, truth.direction[mine], distance[mine])
+            continue
+        # A rectangle counts as one primitive; both its triangles lie in one plane.
+        number_in_shape = 0 * mine if _is_rectangle(shape) else primitive[mine]
+        refined[mine] = _to_plane(part[number_in_shape] - truth.origin, truth.direction[mine], distance[mine])
+    return refined
+
+
+def _to_plane(corner: Array, direction: Array, distance: Array) -> Array:
+    """Return how far rays from the origin go to the planes of triangles."""
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        exact = np.sum(normal * corner[:, 0], axis=1) / np.sum(normal * direction, axis=1)
+    return np.where(np.abs(exact - distance) < 1e-4 * distance, exact, distance)
+
+
+def _to_ball(ball: Ball, origin: Array, direction: Array, distance: Array) -> Array:
+    """Return how far rays go to where they enter a ball, or leave it if they start inside."""
+    centre, radius = ball
+    middle = direction @ (centre - origin)
+    miss = np.linalg.norm(centre - origin - middle[:, None] * direction, axis=1)
+    half = np.sqrt(np.maximum(radius - miss, 0) * (radius + miss))
+    inside = np.linalg.norm(centre - origin) < radius
+    return np.where(miss < radius, middle + half if inside else middle - half, distance)
