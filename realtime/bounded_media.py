@@ -38,130 +38,23 @@ References
 Biri, Arques, Michelin 2006, sections 4.2 and 5.2.
 """
 
-from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
 from realtime.arrays import is_single
-from realtime.body_tiles import PlaneLists, ball_range, plane_lists
-from realtime.clipping import Seen, inverse_crossings, near_line, passage, seen_from, share_inside
 from realtime.errors import InputError
 from realtime.exponential import exp_bounded
-from realtime.geometry import RayGeometry, clip_to_cone, distance_to_light, falloff
-from realtime.lights import Light
-from realtime.medium import Body, Medium
+from realtime.geometry import clip_to_cone, distance_to_light, falloff
+from realtime.media_rays import MediaRay, Piece, light_leg
+from realtime.medium import Medium
 from realtime.phase import evaluate
 
 FORMS = ("exact", "paper")
 _NODES, _NODES_DOUBLE, _NODES_PAPER = 10, 24, 6
-_FEW_PLANES = 12  # which are read as fast as listed
-_RANGES = 5  # of a chord, in which a tile's list of planes for the legs from a light is made
 _OPTICAL_REACH = 18.0  # e^-18 = 1.5e-8 of the light is left
 
 
-@dataclass(frozen=True)
-class Piece:
-    """A part of every ray that lies in one medium."""
-
-    medium: Medium
-    number: int | None  #: of the body; None between bodies
-    begin: Any  #: distances from the camera [m], equal or infinite where the ray misses it
-    end: Any
-    before: tuple[Any, ...]  #: optical depth from the camera to `begin`, by channel
-
-
-@dataclass(frozen=True)
-class MediaRay:
-    """Camera rays in bounded media, and one light."""
-
-    medium: Medium
-    light: Light
-    geometry: RayGeometry
-    start: Any  #: from the light to the camera [m]
-    direction: Any
-    pieces: tuple[Piece, ...]
-    seen: tuple[Seen, ...]  #: the bodies as the light sees them
-    lists: tuple[PlaneLists | None, ...]  #: by body, the planes where legs to points within it enter
-
-
-def camera_pieces(medium: Medium, origin, direction, *, corners=None) -> tuple[Piece, ...]:
-    """Return the pieces of the camera rays in which something scatters.
-
-    Parameters
-    ----------
-    medium
-        The medium with its bodies.
-    origin, direction
-        The camera, one for all lanes [m], and unit directions.
-    corners
-        Directions at the corners of the tiles (`realtime.body_tiles`), if the rays come in tiles.
-    """
-    import drjit as dr
-
-    Float = type(direction.x)
-    passages = [_passage(seen_from(body, origin), direction, corners) for body in medium.bodies]
-
-    def piece(own: Medium, number, begin, end):
-        before = []
-        for channel, around in enumerate(medium.sigma_t):
-            depth = Float(0) if medium.clear else around * begin
-            for body, (enter, leave) in zip(medium.bodies, passages):
-                excess = body.medium.sigma_t[channel] - around
-                depth += dr.select(leave <= begin, excess * (leave - enter), 0)
-            before.append(depth)
-        return Piece(own, number, begin, end, tuple(before))
-
-    pieces = [
-        piece(body.medium, number, *ends)
-        for number, (body, ends) in enumerate(zip(medium.bodies, passages, strict=True))
-    ]
-    if not medium.clear:
-        starts = [dr.zeros(Float, dr.width(direction)), *(leave for _, leave in passages)]
-        for begin in starts:
-            end = Float(dr.inf)
-            for enter, _ in passages:
-                end = dr.minimum(end, dr.select(enter >= begin, enter, dr.inf))
-            # A camera within a body has no gap before it.
-            inside = [(enter <= begin) & (begin < leave) for enter, leave in passages]
-            pieces.append(piece(medium, None, begin, dr.select(_any(inside), begin, end)))
-    return tuple(pieces)
-
-
-def media_ray(
-    medium: Medium, light: Light, geometry: RayGeometry, *, origin, direction, pieces, corners=None
-) -> MediaRay:
-    """Return what the integrals of one light need; `pieces` is from `camera_pieces`."""
-    seen = tuple(seen_from(body, light.position) for body in medium.bodies)
-    start = origin - light.position
-    lists = tuple(_leg_lists(one, origin, start, corners) for one in seen)
-    return MediaRay(medium, light, geometry, start, direction, pieces, seen, lists)
-
-
-def _worth_lists(body: Body, corners) -> bool:
-    return corners is not None and body.count > _FEW_PLANES
-
-
-def _passage(seen: Seen, direction, corners):
-    """Return the passage of camera rays through a body, by lists of planes where there are many."""
-    lists = None
-    if _worth_lists(seen.body, corners):
-        _, _, near = ball_range(seen, corners)
-        lists = plane_lists(seen, [corners], near)
-    return passage(seen, direction, lists=lists)
-
-
-def _leg_lists(seen: Seen, origin, start, corners) -> PlaneLists | None:
-    """Return the planes at which legs from the light enter the body to reach the parts of the rays in it."""
-    if not _worth_lists(seen.body, corners):
-        return None
-    # The ball as the camera sees it.
-    low, high, near = ball_range(replace(seen, toward=seen.body.centre - origin), corners)
-    distances = [low + (high * (1 + 1e-4) - low) * (k / _RANGES) for k in range(_RANGES + 1)]
-    slices = [[start + corner * x for corner in corners] for x in distances]
-    return plane_lists(seen, slices, near, leaves=False)
-
-
-def bounded_airlight(ray: MediaRay, x0, x1, *, form: str = "exact"):
+def bounded_airlight(ray: MediaRay, x0, x1):
     """Return sum_j albedo_j sigma_j J_j over the lit segment [x0, x1], RGB [1/m^2].
 
     Parameters
@@ -170,8 +63,6 @@ def bounded_airlight(ray: MediaRay, x0, x1, *, form: str = "exact"):
         The rays.
     x0, x1
         The segment [m]; `x1` may be infinite.
-    form
-        'exact', or 'paper' for the constant R.
 
     Notes
     -----
@@ -194,7 +85,7 @@ def bounded_airlight(ray: MediaRay, x0, x1, *, form: str = "exact"):
             total += dr.if_stmt(
                 args=(begin, end),
                 cond=end > begin,
-                true_fn=lambda begin, end, piece=piece: _integral(ray, piece, begin, end, form),
+                true_fn=lambda begin, end, piece=piece: _integral(ray, piece, begin, end),
                 false_fn=lambda begin, end: Color(Float(0)),
             )
     return total
@@ -215,50 +106,6 @@ def bounded_source(ray: MediaRay, x):
             false_fn=lambda x, r: Color(0),
         )
     return total
-
-
-def camera_depths(medium: Medium, origin, direction, distance, *, corners=None) -> tuple[Any, ...]:
-    """Return the optical depth of camera rays up to a distance, by channel; arguments as in `camera_pieces`."""
-    import drjit as dr
-
-    depths = [type(distance)(0) if medium.clear else sigma * distance for sigma in medium.sigma_t]
-    for body in medium.bodies:
-        ends = _passage(seen_from(body, origin), direction, corners)
-        enter, leave = (dr.minimum(end, distance) for end in ends)
-        inside = dr.select(leave > enter, leave - enter, 0)
-        excess = [own - sigma for own, sigma in zip(body.medium.sigma_t, medium.sigma_t)]
-        depths = [dr.fma(more, inside, depth) for more, depth in zip(excess, depths)]
-    return tuple(depths)
-
-
-def path_transmittance(medium: Medium, light: Light, *, depths, point, active):
-    """Return the transmittance from the light to points and on to the camera, a colour [1].
-
-    Parameters
-    ----------
-    medium, light
-        What the light crosses and where it comes from.
-    depths
-        From `camera_depths`.
-    point
-        The points.
-    active
-        Lanes to compute.
-    """
-    import drjit as dr
-
-    vector = point - light.position
-    length = dr.norm(vector)
-    depths = [dr.fma(sigma, length, depth) for depth, sigma in zip(depths, medium.sigma_t)]
-    for body in medium.bodies:
-        seen = seen_from(body, light.position)
-        near = active & near_line(seen, vector / length, length)
-        (enter,), (leave,) = inverse_crossings(seen, vector, dr.zeros(type(vector)), [type(length)(0)], near)
-        inside = dr.select(near, share_inside(enter, leave) * length, 0)
-        excess = [own - sigma for own, sigma in zip(body.medium.sigma_t, medium.sigma_t)]
-        depths = [dr.fma(more, inside, depth) for more, depth in zip(excess, depths)]
-    channels = [dr.exp(-depth) for depth in depths]
-    return type(medium.albedo)(*(channels * 3)[:3])
 
 
 def ambient_radiance(ray_pieces: tuple[Piece, ...], distance, ambient: float):
@@ -282,7 +129,7 @@ def check_form(medium: Medium, form: str) -> None:
         raise InputError("media=paper: wanted clear air around the bounded media; use media=exact")
 
 
-def _integral(ray: MediaRay, piece: Piece, x0, x1, form: str):
+def _integral(ray: MediaRay, piece: Piece, x0, x1):
     """Integrate one segment in one piece."""
     import drjit as dr
 
@@ -294,14 +141,14 @@ def _integral(ray: MediaRay, piece: Piece, x0, x1, form: str):
     s0, s1 = x0 - ray.geometry.foot, x1 - ray.geometry.foot
     width = dr.select(dr.isfinite(x1), dr.atan2(h * (s1 - s0), dr.fma(h, h, s0 * s1)), dr.atan2(h, s0))
     exact = _NODES if is_single(Float) else _NODES_DOUBLE
-    nodes = _nodes(_NODES_PAPER if form == "paper" else exact)
+    nodes = _nodes(_NODES_PAPER if ray.form == "paper" else exact)
     xs, rs = [], []
     for fraction, _ in nodes:
         sine, cosine = dr.sincos(width * fraction)
         s = h * dr.fma(s0, cosine, h * sine) / dr.fma(h, cosine, -s0 * sine)
         xs.append(ray.geometry.foot + s)
         rs.append(dr.sqrt(dr.fma(s, s, h * h)))
-    kept = _attenuation(ray, piece, xs, rs) if form == "exact" else _paper_attenuation(ray, piece, xs)
+    kept = _attenuation(ray, piece, xs, rs) if ray.form == "exact" else _paper_attenuation(ray, piece, xs)
     total = sum(
         weight * _scattered(ray, piece, value, x, r)
         for (_, weight), value, x, r in zip(nodes, kept, xs, rs, strict=True)
@@ -321,7 +168,7 @@ def _scattered(ray: MediaRay, piece: Piece, transmittance: list[Any], x, r):
 
 def _attenuation(ray: MediaRay, piece: Piece, xs, rs) -> list[list[Any]]:
     """Return exp(-tau) of both legs, by node and channel."""
-    insides = _light_leg(ray, piece, xs, rs)
+    insides = light_leg(ray, piece, xs, rs)
     result = []
     for node, (x, r) in enumerate(zip(xs, rs)):
         channels = []
@@ -334,44 +181,6 @@ def _attenuation(ray: MediaRay, piece: Piece, xs, rs) -> list[list[Any]]:
             channels.append(exp_bounded(-depth))
         result.append(channels)
     return result
-
-
-def _light_leg(ray: MediaRay, piece: Piece, xs, rs) -> list[list[Any]]:
-    """Return by body and node what of the leg from the light lies in it [m]."""
-    import drjit as dr
-
-    insides = []
-    for number, seen in enumerate(ray.seen):
-        own = number == piece.number
-        near = dr.full(dr.mask_t(xs[0]), True, dr.width(xs[0])) if own else _near_legs(ray, seen, xs, rs)
-        lists = ray.lists[number] if own else None
-        enter, leave = inverse_crossings(seen, ray.start, ray.direction, xs, near, leaves=not own, lists=lists)
-        ends = [None] * len(xs) if own else leave
-        shares = [share_inside(one, other) for one, other in zip(enter, ends)]
-        insides.append([dr.select(near, share * r, 0) for share, r in zip(shares, rs)])
-    return insides
-
-
-def _near_legs(ray: MediaRay, seen: Seen, xs, rs):
-    """Return whether legs from the light to points of a segment may come near a body.
-
-    In the plane of ray and light, with u along the ray and v to it, the legs fill a triangle with the corner at the
-    light and the others at (s_0, h) and (s_1, h); q is the distance of the body's centre from the plane. First and last
-    node stand for the ends.
-    """
-    import drjit as dr
-
-    geometry, radius = ray.geometry, seen.body.radius * 1.001
-    foot = dr.fma(ray.direction, geometry.foot, ray.start)
-    size = dr.norm(foot)
-    # A ray through the light has no such plane: all legs lie in the ray.
-    away = dr.select(size > 0, foot / size, 0)
-    u, v = dr.dot(seen.toward, ray.direction), dr.dot(seen.toward, away)
-    beside = dr.squared_norm(seen.toward - ray.direction * u - away * v) > dr.square(radius)
-    h, s0, s1 = geometry.height, xs[0] - geometry.foot, xs[-1] - geometry.foot
-    before = s0 * v - h * u > radius * rs[0]
-    behind = h * u - s1 * v > radius * rs[-1]
-    return ~(beside | before | behind | (v > h + radius))
 
 
 def _paper_attenuation(ray: MediaRay, piece: Piece, xs) -> list[list[Any]]:
@@ -389,13 +198,6 @@ def _least(medium: Medium):
     for sigma in medium.sigma_t[1:]:
         least = dr.minimum(least, sigma)
     return least
-
-
-def _any(conditions: list[Any]):
-    result: Any = False
-    for condition in conditions:
-        result = condition | result
-    return result
 
 
 @lru_cache

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from realtime.body_tiles import tile_corners
-from realtime.bounded_media import camera_depths
 from realtime.camera import Camera, ray_directions, tiled_pixels
 from realtime.errors import InputError
 from realtime.kernels.table import resident_tables
+from realtime.media_rays import camera_depths
 from realtime.methods import Method
 from realtime.scene import Scene
 from realtime.surface import lit_surface, visible_surface, visible_triangle

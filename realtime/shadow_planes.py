@@ -24,12 +24,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from realtime.arrays import array_types
-from realtime.bounded_media import FORMS, MediaRay, ambient_radiance, bounded_airlight, check_form
+from realtime.bounded_media import FORMS, ambient_radiance, bounded_airlight, check_form
 from realtime.casters import Casters, read_casters, with_positions
 from realtime.errors import InputError
 from realtime.geometry import RayGeometry, clip_to_cone, ray_geometry
 from realtime.kernels import airlight_integral, gamma
 from realtime.lights import Light
+from realtime.media_rays import MediaRay
 from realtime.plane_cone import cone_ring
 from realtime.plane_crossings import Buffer, sum_crossings
 from realtime.plane_index import PlaneIndex, index_planes
@@ -159,12 +160,12 @@ def shadow_planes(
     if view.plan.bounded:
         check_form(view.medium, media)
         _check_bounded(evaluation)
-    in_media = rays_in_media(view) if view.plan.bounded else ()
+    in_media = rays_in_media(view, media) if view.plan.bounded else ()
     for number, light in enumerate(view.lights):
         if cone and light.kind == "spot" and not light.soft and view.plan.shadows:
             light = replace(light, kind="point")  # planes bound it
         geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
-        airlight = _Airlight(view, light, geometry, kernel, in_media[number] if in_media else None, media)
+        airlight = _Airlight(view, light, geometry, kernel, in_media[number] if in_media else None)
         if not view.plan.shadows:
             total += airlight.radiance(airlight.integral(type(view.distance)(0), view.distance))
             lit.append(True)
@@ -210,12 +211,11 @@ class _Airlight:
     geometry: RayGeometry
     kernel: Any
     media: MediaRay | None  #: where media are bounded
-    form: str
 
     def integral(self, x0, x1):
         """Return the integral over a segment; `radiance` knows its units."""
         if self.media:
-            return bounded_airlight(self.media, x0, x1, form=self.form)
+            return bounded_airlight(self.media, x0, x1)
         return airlight_integral(self.kernel, self.geometry, x0, x1, medium=self.view.medium, light=self.light)
 
     def radiance(self, integral):

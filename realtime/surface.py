@@ -6,12 +6,12 @@ Biri, Arques, Michelin 2006, section 5.1.2, with the extinction to the eye of eq
     L = rho I cos(theta_p) / (pi r_p^2) exp(-sigma_t r_p) exp(-sigma_t distance),
 
 zero where a shadow ray is blocked. With bounded media both exponents are sums over the media that the two legs cross
-(`realtime.bounded_media`). A one-sided surface is black from behind, as in Mitsuba's `diffuse`.
+(`realtime.media_rays`). A one-sided surface is black from behind, as in Mitsuba's `diffuse`.
 """
 
-from realtime.bounded_media import path_transmittance
 from realtime.geometry import falloff, ray_geometry
 from realtime.lights import Light
+from realtime.media_rays import path_transmittance
 from realtime.medium import Medium, transmittance
 
 
@@ -84,7 +84,7 @@ def lit_surface(
     medium, light
         What the light crosses and where it comes from.
     depths
-        With bounded media, the optical depths from `realtime.bounded_media.camera_depths`.
+        With bounded media, the optical depths from `realtime.media_rays.camera_depths`.
     shadows
         Whether to cast shadow rays; a method that finds out otherwise what is lit leaves them to that.
     """

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from realtime.body_tiles import tile_corners
-from realtime.bounded_media import MediaRay, camera_pieces, media_ray
 from realtime.geometry import ray_geometry
 from realtime.lights import Light
+from realtime.media_rays import MediaRay, camera_pieces, media_ray
 from realtime.medium import Medium
 from realtime.plan import Plan
 
@@ -43,8 +43,8 @@ def radiance(medium: Medium, light: Light, integral):
     return medium.albedo * light.intensity * (sigma_t * (integral * (0.25 * dr.inv_pi)))
 
 
-def rays_in_media(view: View) -> tuple[MediaRay, ...]:
-    """Return the rays of a view in bounded media, by light."""
+def rays_in_media(view: View, form: str = "exact") -> tuple[MediaRay, ...]:
+    """Return the rays of a view in bounded media, by light; `form` is one of `realtime.bounded_media.FORMS`."""
     import drjit as dr
 
     width = dr.width(view.direction)
@@ -53,7 +53,7 @@ def rays_in_media(view: View) -> tuple[MediaRay, ...]:
     rays = []
     for light in view.lights:
         geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
-        ends = {"origin": view.origin, "direction": view.direction, "corners": corners}
+        ends = {"origin": view.origin, "direction": view.direction, "corners": corners, "form": form}
         rays.append(media_ray(view.medium, light, geometry, **ends, pieces=pieces))
     return tuple(rays)
 

@@ -14,10 +14,11 @@ steps.
 
 from collections.abc import Callable
 
-from realtime.bounded_media import MediaRay, bounded_source
+from realtime.bounded_media import bounded_source
 from realtime.errors import InputError
 from realtime.geometry import RayGeometry, clip_to_cone, distance_to_light, falloff, ray_geometry
 from realtime.lights import Light
+from realtime.media_rays import MediaRay
 from realtime.medium import least_extinction, per_extinction
 from realtime.phase import evaluate
 from realtime.scene import Scene
