@@ -54,12 +54,13 @@ def sort_shapes(scene):
 
 
 def opaque_scene(scene, opaque):
-    """Return the scene itself where all shapes are opaque, else a scene of those that are."""
+    """Return the scene itself where all shapes are opaque, else a scene of those that are, under their names."""
     import mitsuba as mi
 
     if len(opaque) == len(scene.shapes()):
         return scene
-    return mi.load_dict({"type": "scene"} | {f"shape-{number}": shape for number, shape in enumerate(opaque)})
+    # A key of Mitsuba's dictionaries becomes the shape's name, and holds no dots.
+    return mi.load_dict({"type": "scene"} | {shape.id().replace(".", "-"): shape for shape in opaque})
 
 
 def read_medium(sensor, boundaries, types: ArrayTypes) -> Medium:

@@ -108,3 +108,18 @@ def test_turning_objects_record_once_more_at_most(variant):
         run_stages(replace(renderer, scene=moved), renderer.prepare(moved))
     assert renderer.airlight.n_recordings <= 2
     assert renderer.surface.n_recordings <= 2
+
+
+def test_shapes_keep_their_names_beside_bounded_media(variant):
+    """What is opaque is rendered in a Mitsuba scene of its own: warnings and animations speak of its shapes."""
+    scene, _ = read("three-media")
+    names = [shape.id() for shape in scene.geometry.shapes()]
+    assert {"bar", "floor"} <= set(names)
+    assert not {"red", "green", "blue"} & set(names)
+    frames = animate(scene, Animation(("objects", "medium"), objects=("bar",)), 4)
+    base = [float(body.medium.sigma_t[0][0]) for body in scene.medium.bodies]
+    moved = [
+        (step.positions["bar"], [float(body.medium.sigma_t[0][0]) for body in step.medium.bodies]) for step in frames
+    ]
+    assert np.abs(moved[1][0] - moved[0][0]).max() > 1
+    np.testing.assert_allclose(moved[1][1], 1.5 * np.array(base), rtol=1e-6)
