@@ -239,12 +239,12 @@ _SHADOWS = (
         "return row, np.minimum(angle_a, angle_b) + 0.01, np.maximum(angle_a, angle_b) + 0.01",
     ),
     _quadrature(
-        "short-shadow-rays",
-        "shadow rays that reach half the way to the point",
-        "reference.visibility",
-        "(1 - 2e-6)",
-        "(1 - 0.5)",
-        "in scenes of meshes the intervals come from exact geometry and shadow rays only check them",
+        "no-ball-shadows",
+        "the fog lit through balls",
+        "reference.lit_balls",
+        "dark = (c_y - disk <= height) & (c_y + disk > 0)",
+        "dark = np.zeros(len(ray), dtype=bool)",
+        "the built-in scenes consist of meshes",
     ),
     _quadrature(
         "through-surfaces",
