@@ -312,3 +312,19 @@ def test_lists_of_planes_leave_nothing_out(variant, media, monkeypatch):
     # The same planes give the same sums, whatever else is read; compilers may fuse a step more or less.
     assert np.abs(listed.airlight - whole.airlight).max() < 1e-6 * whole.airlight.max()
     assert np.abs(listed.surface - whole.surface).max() < 1e-6 * whole.surface.max()
+
+
+def test_a_thicker_medium_has_thicker_bodies(variant):
+    import mitsuba as mi
+
+    from realtime.motion import thicker_medium
+    from realtime.scene import read_scene
+
+    medium = read_scene(mi.load_dict(clear_scene(ball=ball(), cube=cube())), "double").medium
+    thicker = thicker_medium(medium, 1.7)
+    assert all(float(value[0]) == 0 for value in thicker.sigma_t)
+    for one, other in zip(thicker.bodies, medium.bodies, strict=True):
+        # Mitsuba holds extinctions in float32.
+        expected = [1.7 * float(value[0]) for value in other.medium.sigma_t]
+        assert [float(value[0]) for value in one.medium.sigma_t] == pytest.approx(expected, rel=1e-12)
+        assert len(one.medium.sigma_t) == 3
