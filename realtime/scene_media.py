@@ -150,7 +150,13 @@ def _clear(types: ArrayTypes) -> Medium:
 
 def _in_channels(medium: Medium, channels: int) -> Medium:
     """Return a grey medium with its extinction repeated: media of one scene have equally many."""
-    return medium if len(medium.sigma_t) == channels else replace(medium, sigma_t=medium.sigma_t * channels)
+    import drjit as dr
+
+    if len(medium.sigma_t) == channels:
+        return medium
+    (grey,) = medium.sigma_t
+    # Each channel has an array of its own: a recorded frame tells arrays that are one from arrays that are equal.
+    return replace(medium, sigma_t=tuple(dr.opaque(type(grey), float(grey[0])) for _ in range(channels)))
 
 
 def _homogeneous(medium, types: ArrayTypes) -> Medium:
