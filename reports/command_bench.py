@@ -22,9 +22,9 @@ def bench(
 ) -> None:
     """Time every method in every scene, or every kernel on many rays, and compare it with the truth.
 
-    `airlight` is the airlight alone (the kernel with its ray set-up), `frame` a frame with static geometry, `rebuilt` a
-    frame after everything moved. Exit status 1 if single-scatter does not confirm the truth within
-    +-0.05 %, or volpath within +-0.5 %.
+    `airlight` is the airlight alone (the kernel with its ray set-up), `frame` a frame with static geometry and light,
+    `rebuilt` a frame after the light moved. Exit status 1 if single-scatter does not confirm the truth within +-0.05 %,
+    or volpath within +-0.5 %.
     """
     if kernels:
         _bench_kernels(scenes, json=json, markdown=markdown)
