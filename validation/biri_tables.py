@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Tables 1 and 2 of Biri, Arques, Michelin 2006 again: share of time by stage, and frames a second, with the error.
 
-How each stage of Table 1 is measured, on the wall clock, medians:
+How each stage of Table 1 is measured, on the wall clock, medians, all in turns with the whole frame:
 
 1. silhouettes: `realtime.silhouettes.silhouette` of the parts whose shadow can be seen, with the culling, on the host.
 2. the scene with surface shadows: camera rays and lit surface, one frozen function. Its shadows come out of stage 5,
@@ -30,7 +30,7 @@ from realtime.silhouettes import silhouette
 from validation.configurations import Configuration, prepared
 from validation.load import load_scene
 from validation.metrics import Metrics, error_metrics
-from validation.timing import Timing, time_repeated
+from validation.timing import Timing, time_in_turns
 from validation.truth import truth_image
 
 STAGES = ("silhouettes", "scene", "airlight of the scene", "sorting", "shadow planes")
@@ -113,7 +113,7 @@ def biri_row(
     error_size
         Of the frame that is compared with the truth [pixels].
     seconds
-        Time to spend on each timing.
+        Time to spend on each of five timings.
     """
     chosen = Configuration("shadow-planes", kernel, (("cone", cone),) if cone else ())
     small = load_scene(published.scene, error_size).scene
@@ -123,15 +123,19 @@ def biri_row(
     scene = read_scene(loaded)
     renderer = prepared(scene, chosen)
     ready = renderer.prepare(scene)
-    static = time_repeated(lambda: run_stages(renderer, ready), seconds=seconds)
-    rebuilt = time_repeated(lambda: run_stages(renderer, renderer.prepare(scene)), seconds=seconds)
+    works = [
+        lambda: run_stages(renderer, renderer.prepare(scene)),
+        lambda: run_stages(renderer, ready),
+        *_stages(renderer, kernel),
+    ]
+    rebuilt, static, *stages = time_in_turns(works, seconds=5 * seconds)
     return TableRow(
         published,
         kernel,
         cone,
         size,
         sum(shape.face_count() for shape in loaded.shapes()),
-        _stages(renderer, kernel, rebuilt.median_ms, seconds=0.5 * seconds),
+        _shared(rebuilt.median_ms, [stage.median_ms for stage in stages]),
         rebuilt,
         static,
         error,
@@ -156,7 +160,7 @@ def biri_rows(
     scale
         Of the width and height of all images, for a quick look; 1 for the published sizes.
     seconds
-        Time to spend on each timing.
+        Time to spend on each of five timings.
     progress
         Told the share done and what comes next.
     """
@@ -171,8 +175,15 @@ def biri_rows(
     return rows
 
 
-def _stages(renderer: FrameRenderer, kernel: str, total: float, *, seconds: float) -> tuple[float, ...]:
-    """Return what each stage costs [ms]; the last is the rest of the total."""
+def _shared(total: float, measured: Sequence[float]) -> tuple[float, ...]:
+    """Return what each stage of Table 1 costs [ms], from the times of `_stages`; the last is the rest of the total."""
+    silhouettes, surface, unshadowed, host, in_tiles = measured
+    first = (silhouettes, surface, unshadowed, max(0.0, host - silhouettes) + in_tiles)
+    return (*first, max(0.0, total - sum(first)))
+
+
+def _stages(renderer: FrameRenderer, kernel: str) -> list[Callable[[], Any]]:
+    """Return the work of silhouettes, scene, unshadowed airlight, all that is prepared on the host, and tile lists."""
     import drjit as dr
 
     scene = renderer.scene
@@ -188,15 +199,13 @@ def _stages(renderer: FrameRenderer, kernel: str, total: float, *, seconds: floa
         dr.eval(plain.airlight(plain.geometry, *arguments, (), distance, _nothing(scene)))
 
     lists = _sorting(renderer)
-    silhouettes = _median(lambda: _silhouettes(renderer, scene), seconds)
-    host = _median(lambda: renderer.prepare(scene), seconds)
-    in_tiles = _median(lambda: dr.eval(lists(renderer.pixel, scene.camera, distance, ready)), seconds)
-    first = (silhouettes, _median(surface, seconds), _median(unshadowed, seconds), host - silhouettes + in_tiles)
-    return (*first, max(0.0, total - sum(first)))
-
-
-def _median(work: Callable[[], object], seconds: float) -> float:
-    return time_repeated(work, seconds=seconds).median_ms
+    return [
+        lambda: _silhouettes(renderer, scene),
+        surface,
+        unshadowed,
+        lambda: renderer.prepare(scene),
+        lambda: dr.eval(lists(renderer.pixel, scene.camera, distance, ready)),
+    ]
 
 
 def _silhouettes(renderer: FrameRenderer, scene: Scene) -> None:

@@ -6,7 +6,7 @@ recorded before. The wall clock is used on purpose: launch and replay are part o
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -53,6 +53,39 @@ def time_repeated(work: Callable[[], Any], *, seconds: float = 0.6, least: int =
         times.append(1e3 * (time.perf_counter() - start))
     low, median, high = np.percentile(times, [25, 50, 75])
     return Timing(float(median), float(low), float(high), len(times))
+
+
+def time_in_turns(
+    works: Sequence[Callable[[], Any]], *, seconds: float = 3.0, least: int = 5, most: int = 200
+) -> list[Timing]:
+    """Time several pieces of work in turns, so that whatever else the machine does hits all of them alike.
+
+    Parameters
+    ----------
+    works
+        Each called with nothing; must leave its results evaluated.
+    seconds
+        Stop after about this long, but not before `least` turns.
+    least, most
+        Bounds of the number of turns.
+    """
+    import drjit as dr
+
+    times: list[list[float]] = []
+    stop = float("inf")
+    for turn in range(most + 2):
+        if turn == 2:  # the first two turns compile, record and replay
+            stop = time.perf_counter() + seconds
+        if turn >= least + 2 and time.perf_counter() > stop:
+            break
+        times.append([])
+        for work in works:
+            start = time.perf_counter()
+            work()
+            dr.sync_thread()
+            times[-1].append(1e3 * (time.perf_counter() - start))
+    quartiles = np.percentile(times[2:], [25, 50, 75], axis=0).T
+    return [Timing(float(median), float(low), float(high), len(times) - 2) for low, median, high in quartiles]
 
 
 def timed_frame(renderer: FrameRenderer, scene: Scene):

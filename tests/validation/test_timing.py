@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from tests.scenes_for_tests import tiny_scene
-from validation.timing import time_frame, time_repeated
+from validation.timing import time_frame, time_in_turns, time_repeated
 
 
 def test_median_is_the_time_of_the_work(variant):
@@ -52,6 +52,21 @@ def test_quartiles_are_those_of_the_times(variant, monkeypatch):
     monkeypatch.setattr("validation.timing.time", SimpleNamespace(perf_counter=lambda: next(readings)))
     timing = time_repeated(lambda: None, seconds=1.0, least=5)
     assert (timing.low_ms, timing.median_ms, timing.high_ms) == pytest.approx((2, 3, 4))
+
+
+def test_works_are_timed_in_turns(variant):
+    calls = []
+
+    def work(name, seconds):
+        calls.append(name)
+        time.sleep(seconds)
+
+    slow, fast = time_in_turns([lambda: work("slow", 0.02), lambda: work("fast", 0.005)], seconds=0.0, least=5)
+    assert calls == ["slow", "fast"] * 7  # two turns of warm-up
+    assert slow.repetitions == fast.repetitions == 5
+    assert slow.low_ms >= 20
+    assert fast.low_ms >= 5
+    assert fast.median_ms < slow.median_ms
 
 
 @pytest.fixture(scope="module")
