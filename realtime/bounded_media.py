@@ -51,6 +51,7 @@ from realtime.phase import evaluate
 
 FORMS = ("exact", "paper")
 _NODES, _NODES_DOUBLE, _NODES_PAPER = 10, 24, 6
+_NODES_BETWEEN = 24  # from where legs enter a body on their way, or not: the kinks are sharper there
 _OPTICAL_REACH = 18.0  # e^-18 = 1.5e-8 of the light is left
 
 
@@ -140,8 +141,7 @@ def _integral(ray: MediaRay, piece: Piece, x0, x1):
     h = dr.maximum(ray.geometry.height, 1e-15)
     s0, s1 = x0 - ray.geometry.foot, x1 - ray.geometry.foot
     width = dr.select(dr.isfinite(x1), dr.atan2(h * (s1 - s0), dr.fma(h, h, s0 * s1)), dr.atan2(h, s0))
-    exact = _NODES if is_single(Float) else _NODES_DOUBLE
-    nodes = _nodes(_NODES_PAPER if ray.form == "paper" else exact)
+    nodes = _nodes(_node_count(ray, piece, single=is_single(Float)))
     xs, rs = [], []
     for fraction, _ in nodes:
         sine, cosine = dr.sincos(width * fraction)
@@ -154,6 +154,14 @@ def _integral(ray: MediaRay, piece: Piece, x0, x1):
         for (_, weight), value, x, r in zip(nodes, kept, xs, rs, strict=True)
     )
     return total * (width / h)
+
+
+def _node_count(ray: MediaRay, piece: Piece, *, single: bool) -> int:
+    if ray.form == "paper":
+        return _NODES_PAPER
+    if piece.number is None:
+        return _NODES_BETWEEN if single else 2 * _NODES_BETWEEN
+    return _NODES if single else _NODES_DOUBLE
 
 
 def _scattered(ray: MediaRay, piece: Piece, transmittance: list[Any], x, r):
