@@ -32,7 +32,7 @@ def report(
     from reports.progress import progress_bar
     from reports.report import write_report
     from reports.tables import print_json
-    from validation.configurations import chosen_configurations
+    from validation.configurations import QUICK, chosen_configurations
     from validation.load import load_scene
     from validation.scenes import SCENES
     from validation.study import EFFORTS
@@ -40,7 +40,10 @@ def report(
     if quick and full:
         raise InputError("report: got both --quick and --full; give one of them, or neither for the default")
     effort = EFFORTS["quick" if quick else "full" if full else "default"]
-    chosen = chosen_configurations([name.strip() for name in (methods.split(",") if methods else METHODS)])
+    if quick and not methods:
+        chosen = QUICK
+    else:
+        chosen = chosen_configurations([name.strip() for name in (methods.split(",") if methods else METHODS)])
     names = [name.strip() for name in scenes.split(",")] if scenes else list(SCENES)
     ensure_folder(output)
     activate()

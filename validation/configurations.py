@@ -46,6 +46,15 @@ STANDARD: tuple[Configuration, ...] = (
     Configuration("shadow-planes", "exact", (("media", "paper"),)),
 )
 
+#: What `report --quick` measures: one of each kind.
+QUICK: tuple[Configuration, ...] = (
+    Configuration("unshadowed", "exact"),
+    Configuration("ray-march", None, (("steps", 100),)),
+    Configuration("ray-march", None, (("steps", 100), ("shadow", "map"))),
+    Configuration("shadow-planes", "exact"),
+    Configuration("shadow-planes", "taylor"),
+)
+
 
 def configuration(method: str, kernel: str | None = None, parameters: Mapping[str, Any] | None = None) -> Configuration:
     """Return a configuration, checked.

@@ -41,7 +41,7 @@ def _margins(single_scatter: float, volpath: float) -> Mapping[str, float]:
 EFFORTS: dict[str, Effort] = {
     effort.name: effort
     for effort in (
-        Effort("quick", (320, 240), (320, 240), (120, 90), _margins(0.002, 0.01), 0.15),
+        Effort("quick", (320, 240), (320, 240), (80, 60), _margins(0.002, 0.02), 0.15),
         Effort("default", (400, 300), (800, 600), (160, 120), _margins(0.0005, 0.005), 0.4, flip=True, rays=20_000),
         Effort(
             "full",

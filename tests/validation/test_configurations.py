@@ -9,6 +9,7 @@ from realtime.kernels import KERNELS
 from realtime.methods import METHODS
 from tests.scenes_for_tests import tiny_scene
 from validation.configurations import (
+    QUICK,
     STANDARD,
     Configuration,
     chosen_configurations,
@@ -93,6 +94,10 @@ def test_standard_configurations_are_valid_and_tell_apart():
 
 def test_every_method_has_a_standard_configuration():
     assert {one.method for one in STANDARD} == set(METHODS)
+    assert {one.method for one in QUICK} == set(METHODS)
+    assert set(QUICK) <= set(STANDARD)
+    assert {one.method for one in QUICK} == set(METHODS)
+    assert set(QUICK) <= set(STANDARD)
     assert {one.kernel for one in STANDARD} - {None} <= set(KERNELS)
 
 
