@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from tests.scenes_for_tests import tiny_scene
-from validation.agreement import MASK_PIXELS, pixel_angle, agreement
+from validation.agreement import MASK_PIXELS, agreement, pixel_angle
 
 pytestmark = pytest.mark.statistical
 
