@@ -124,7 +124,11 @@ def agreement(
 
 
 def agreements(
-    scene, margins: Mapping[str, float], *, progress: Callable[[float, str], None] | None = None
+    scene,
+    margins: Mapping[str, float],
+    *,
+    samples: int = 64,
+    progress: Callable[[float, str], None] | None = None,
 ) -> dict[str, Agreement]:
     """Compare several estimators with the quadrature image.
 
@@ -134,6 +138,8 @@ def agreements(
         The `mi.Scene`.
     margins
         By estimator, the margin.
+    samples
+        A pixel in each batch.
     progress
         Called with (share done, what).
 
@@ -149,7 +155,7 @@ def agreements(
         def told(done: int, total: int, what: str, first: int = number) -> None:
             tell((first + done / total) / len(margins), what)
 
-        for layer, one in agreement(scene, estimator=estimator, margin=margin, progress=told).items():
+        for layer, one in agreement(scene, estimator=estimator, margin=margin, samples=samples, progress=told).items():
             found[f"{estimator} {layer}"] = one
     return found
 

@@ -29,6 +29,7 @@ class Effort:
     checked: tuple[int, int]  #: width and height of the comparisons of the truth [pixels]
     margins: Mapping[str, float]  #: by estimator, of its relative bias
     seconds: float  #: spent on each timing
+    samples: int = 64  #: a pixel in each batch of these comparisons
     flip: bool = False  #: compute HDR-FLIP of every image
     mutations: bool = False  #: count how many faults of the physics the checks of the truth find
     rays: int = 0  #: generated rays on which kernels are tried, besides the certified ones; 0 leaves this out
@@ -41,7 +42,7 @@ def _margins(single_scatter: float, volpath: float) -> Mapping[str, float]:
 EFFORTS: dict[str, Effort] = {
     effort.name: effort
     for effort in (
-        Effort("quick", (320, 240), (320, 240), (80, 60), _margins(0.002, 0.02), 0.15),
+        Effort("quick", (320, 240), (320, 240), (80, 60), _margins(0.002, 0.02), 0.15, samples=16),
         Effort("default", (400, 300), (800, 600), (160, 120), _margins(0.0005, 0.005), 0.4, flip=True, rays=20_000),
         Effort(
             "full",
@@ -97,7 +98,9 @@ def study_scene(
     truth = truth_image(loaded.scene)
     tell(0.1, "single-scatter")
     small = load_scene(name_or_path, effort.checked)
-    agreed = agreements(small.scene, effort.margins, progress=lambda share, what: tell(0.1 + 0.35 * share, what))
+    agreed = agreements(
+        small.scene, effort.margins, samples=effort.samples, progress=lambda share, what: tell(0.1 + 0.35 * share, what)
+    )
     tell(0.45, "multiple scattering")
     multiple = multiple_scattering_share(load_scene(name_or_path, _MULTIPLE).scene)
     timed = None
