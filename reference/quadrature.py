@@ -155,6 +155,7 @@ def ray_values(
     count = len(truth.direction)
     airlight, bound, light_angle = np.zeros((count, 3)), np.zeros((count, 3)), np.full(count, np.pi)
     intervals, transitions, certificates = np.zeros(count, np.int64), 0, []
+    reached: list[NDArray[np.bool_] | None] = []
     for number, light in enumerate(truth.lights):
         how = {"samples": samples, "edges": edges, "shapes": shapes}
         found = _light_airlight(truth, light, hits.distance, shadow_scale=shadow_scale, how=how)
@@ -164,9 +165,10 @@ def ray_values(
         intervals += np.bincount(found.lit.ray, minlength=count)
         transitions += found.lit.transitions
         certificates.append(found.lit.certificate)
+        reached.append(found.reached)
         if progress is not None:
             progress(number + 1, len(truth.lights), "quadrature")
-    surface = lit_surface(truth, hits, shadow_scale=shadow_scale)
+    surface = lit_surface(truth, hits, reached=reached, shadow_scale=shadow_scale)
     return RayValues(
         airlight, bound, surface, cast, light_angle, intervals, transitions, Certificate.of_all(certificates)
     )
@@ -178,6 +180,7 @@ class _LightAirlight:
     bound: Array
     angle: Array
     lit: LitIntervals
+    reached: NDArray[np.bool_] | None  #: whether the light reaches the end of the ray; None if that was not looked at
 
 
 def _light_airlight(
@@ -204,7 +207,17 @@ def _light_airlight(
         radiance, bound = sum_media(truth, light, rays, lit, segments, shadow_scale=shadow_scale)
     in_front = (foot > 0) & (foot < distance)
     angle = np.where(in_front, np.arctan2(height, foot), np.pi)
-    return _LightAirlight(radiance, bound + _worth_of_doubt(light, rays, lit, truth), angle, lit)
+    bound += _worth_of_doubt(light, rays, lit, truth)
+    # Intervals end at a bound of the media, not at the surface, where there are any.
+    reached = None if segments is not None else _reach(lit, theta1)
+    return _LightAirlight(radiance, bound, angle, lit, reached)
+
+
+def _reach(lit: LitIntervals, end: Array) -> NDArray[np.bool_]:
+    """Return by ray whether its last lit interval goes on to an angle."""
+    last = np.full(len(end), -np.inf)
+    np.maximum.at(last, lit.ray, lit.high)
+    return last >= end - 1e-12
 
 
 def _worth_of_doubt(light: TruthLight, rays: Rays, lit: LitIntervals, truth: TruthScene) -> Array:

@@ -7,6 +7,7 @@ with f cos by `BSDF.eval` and I / r^2 by `Emitter.sample_direction`; s scales th
 `reference.quadrature`). Through bounded media the optical depth is that of both legs piece by piece.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -38,21 +39,41 @@ def surface_hits(truth: TruthScene) -> SurfaceHits:
     return SurfaceHits(np.where(valid, np.array(interaction.t, dtype=np.float64), np.inf), interaction)
 
 
-def lit_surface(truth: TruthScene, hits: SurfaceHits, *, shadow_scale: float = 1.0) -> Array:
-    """Return the radiance of the lit surface at each pixel centre, (pixels, 3) [W/(m^2 sr)]."""
+def lit_surface(
+    truth: TruthScene,
+    hits: SurfaceHits,
+    *,
+    reached: Sequence[NDArray[np.bool_] | None] | None = None,
+    shadow_scale: float = 1.0,
+) -> Array:
+    """Return the radiance of the lit surface at each pixel centre, (pixels, 3) [W/(m^2 sr)].
+
+    Parameters
+    ----------
+    truth, hits
+        The scene and what its rays hit.
+    reached
+        By light whether it reaches the surface at the end of each ray, as its lit intervals say. A shadow ray is cast
+        where that is not known; Mitsuba starts it 1e-4 off the surface, so that it can graze what the point itself is
+        clear of.
+    shadow_scale
+        See `reference.quadrature`.
+    """
     import mitsuba as mi
 
     interaction = hits.interaction
     total = np.zeros((len(hits.distance), 3))
     if not truth.occluders.shapes():
         return total
-    for emitter, light in zip(truth.scene.emitters(), truth.lights, strict=True):
+    known = reached or [None] * len(truth.lights)
+    for emitter, light, reaches in zip(truth.scene.emitters(), truth.lights, known, strict=True):
         towards, arriving = emitter.sample_direction(interaction, mi.Point2f(0.5))
         facing = interaction.is_valid()
-        blocked = truth.occluders.ray_test(interaction.spawn_ray_to(towards.p), facing)
+        if reaches is None:
+            reaches = ~np.array(truth.occluders.ray_test(interaction.spawn_ray_to(towards.p), facing), dtype=bool)
         reflected = interaction.bsdf().eval(mi.BSDFContext(), interaction, interaction.to_local(towards.d), facing)
         radiance = np.array(reflected * arriving, dtype=np.float64).T
-        lit = np.array(facing & ~blocked, dtype=bool)
+        lit = np.array(facing, dtype=bool) & reaches
         path = np.where(lit, hits.distance, 0) + shadow_scale * np.array(towards.dist, dtype=np.float64)
         depth = np.where(lit, path, 0)[:, None] * truth.medium.sigma_t
         if truth.media:

@@ -24,7 +24,7 @@ def bench(
 
     `airlight` is the airlight alone (the kernel with its ray set-up), `frame` a frame with static geometry and light,
     `rebuilt` a frame after the light moved. Exit status 1 if single-scatter does not confirm the truth within +-0.05 %,
-    or volpath within +-0.5 %.
+    or volpath within +-1 %.
     """
     if kernels:
         _bench_kernels(scenes, json=json, markdown=markdown)

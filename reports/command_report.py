@@ -14,7 +14,7 @@ def report(
     full: Annotated[bool, typer.Option("--full", help="Large images, many samples; much longer.")] = False,
     scenes: Annotated[
         str | None,
-        typer.Option(help="Comma-separated built-in scenes and Mitsuba XML files; all built-in ones by default."),
+        typer.Option(help="Comma-separated built-in scenes and Mitsuba XML files; by default all, three with --quick."),
     ] = None,
     methods: Annotated[str | None, typer.Option(help="Comma-separated methods; all by default.")] = None,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the report.")] = Path("airlight-report"),
@@ -35,7 +35,7 @@ def report(
     from validation.configurations import QUICK, chosen_configurations
     from validation.load import load_scene
     from validation.scenes import SCENES
-    from validation.study import EFFORTS
+    from validation.study import EFFORTS, QUICK_SCENES
 
     if quick and full:
         raise InputError("report: got both --quick and --full; give one of them, or neither for the default")
@@ -44,7 +44,8 @@ def report(
         chosen = QUICK
     else:
         chosen = chosen_configurations([name.strip() for name in (methods.split(",") if methods else METHODS)])
-    names = [name.strip() for name in scenes.split(",")] if scenes else list(SCENES)
+    built_in = QUICK_SCENES if quick else SCENES
+    names = [name.strip() for name in scenes.split(",")] if scenes else list(built_in)
     ensure_folder(output)
     activate()
     for name in names:  # refuse what cannot be used before the work begins

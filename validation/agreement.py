@@ -26,7 +26,8 @@ from validation.truth import truth_image
 Progress = Callable[[int, int, str], None]
 
 MASK_PIXELS = 2.0
-_LEAST_BATCHES = 32  # below that the standard error of a standard error exceeds 13 %
+#: Below 32 batches the standard error of a standard error exceeds 13 %; those of single-scatter cost little.
+_LEAST_BATCHES = {"volpath": 32, "single-scatter": 96}
 
 
 @dataclass(frozen=True)
@@ -87,7 +88,7 @@ def agreement(
     def compared(found: Batches, layer: str) -> Statistics:
         return _statistics(getattr(shortened, layer), found, layer, mask=masks[layer], margin=margin)
 
-    expected = _LEAST_BATCHES
+    expected = least = _LEAST_BATCHES[estimator]
 
     def enough(found: Batches) -> bool:
         nonlocal expected
@@ -96,8 +97,8 @@ def agreement(
         widest = max(_half_width(compared(found, layer)) for layer in layers) / (0.4 * margin)
         done = len(found.seeds)
         # The width falls with the square root of the batches: that is when this will be over.
-        expected = max(_LEAST_BATCHES, round(done * widest**2) if np.isfinite(widest) else batches)
-        return done >= _LEAST_BATCHES and widest < 1
+        expected = max(least, round(done * widest**2) if np.isfinite(widest) else batches)
+        return done >= least and widest < 1
 
     def tell(done: int, total: int, what: str) -> None:
         if progress is not None:

@@ -39,16 +39,19 @@ def _margins(single_scatter: float, volpath: float) -> Mapping[str, float]:
     return {"single-scatter": single_scatter, "volpath": volpath}
 
 
+#: What `report --quick` looks at unless told otherwise: scenes whose check by volpath takes seconds.
+QUICK_SCENES = ("open-fog", "sphere-spot", "two-pens")
+
 EFFORTS: dict[str, Effort] = {
     effort.name: effort
     for effort in (
         Effort("quick", (320, 240), (320, 240), (80, 60), _margins(0.002, 0.02), 0.15, samples=16),
-        Effort("default", (400, 300), (800, 600), (160, 120), _margins(0.0005, 0.005), 0.4, flip=True, rays=20_000),
+        Effort("default", (400, 300), (800, 600), (120, 90), _margins(0.0005, 0.01), 0.4, flip=True, rays=20_000),
         Effort(
             "full",
             (800, 600),
             (800, 600),
-            (240, 180),
+            (160, 120),
             _margins(0.0005, 0.002),
             1.0,
             flip=True,
