@@ -13,10 +13,10 @@ _WORKERS = 0
 
 def run_tests(
     context: typer.Context,
-    fast: Annotated[bool, typer.Option("--fast", help="Leave the statistical and the slow tests out.")] = False,
+    everything: Annotated[bool, typer.Option("--all", help="Also the statistical and the slow tests.")] = False,
     workers: Annotated[int, typer.Option(min=0, help="Processes that share the tests; 0 for this one.")] = _WORKERS,
 ) -> None:
-    """Run the tests of the source checkout; other arguments go to pytest, paths are relative to the checkout."""
+    """Run the fast tests of the source checkout, or all; other arguments go to pytest, paths are relative to it."""
     import os
     import sys
 
@@ -30,7 +30,7 @@ def run_tests(
     prepare()
     command = [sys.executable, "-m", "pytest"]
     command += ["-n", str(workers)] if workers else []
-    command += ["-m", "not statistical and not slow"] if fast else []
+    command += [] if everything else ["-m", "not statistical and not slow"]
     os.chdir(root)
     sys.stdout.flush()
     os.execv(sys.executable, [*command, *context.args])

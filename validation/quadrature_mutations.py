@@ -181,8 +181,8 @@ _LIGHTS = (
         "first-light-only",
         "all lights but the first ignored",
         "reference.quadrature",
-        "enumerate(truth.lights)",
-        "enumerate(truth.lights[:1])",
+        "airlight += found.radiance",
+        "airlight += found.radiance * (number == 0)",
         "the built-in scenes have one light each",
     ),
     _quadrature(
@@ -288,8 +288,8 @@ _SURFACES = (
         "surface-without-shadows",
         "the surface lit through everything",
         _SURFACE,
-        "facing & ~blocked",
-        "facing",
+        "np.array(facing, dtype=bool) & reaches",
+        "np.array(facing, dtype=bool)",
     ),
 )
 

@@ -136,8 +136,12 @@ def test_tests_without_a_checkout_say_so(tmp_path, monkeypatch, capfd):
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
-        (["--fast", "-x"], ["-m", "not statistical and not slow", "-x"]),
-        (["--workers", "2", "tests/test_x.py", "-k", "wheel"], ["-n", "2", "tests/test_x.py", "-k", "wheel"]),
+        (["-x"], ["-m", "not statistical and not slow", "-x"]),
+        (["--all", "-x"], ["-x"]),
+        (
+            ["--all", "--workers", "2", "tests/test_x.py", "-k", "wheel"],
+            ["-n", "2", "tests/test_x.py", "-k", "wheel"],
+        ),
     ],
 )
 def test_tests_run_pytest_with_what_is_left(arguments, expected, monkeypatch, tmp_path):
