@@ -80,7 +80,7 @@ def test_the_table_of_costs_was_printed_by_bench():
     table = README.split("<!-- bench: begin -->")[1].split("<!-- bench: end -->")[0]
     assert re.match(r"\n\d{4}-\d\d-\d\d, .*threads, (llvm|cuda)_ad_rgb\.\n", table)
     scenes = re.findall(r"^\*\*(\S+), 800 x 600\*\*$", table, flags=re.MULTILINE)
-    assert {"open-fog", "sphere-spot", "colonnade", "two-pens"} <= set(scenes) <= set(SCENES)
+    assert {"open-fog", "sphere-spot", "two-pens"} <= set(scenes) <= set(SCENES)
     assert table.count("| " + " | ".join(_HEADERS) + " |") == len(scenes) == len(set(scenes))
     verdicts = re.findall(r"^\| \S+, (airlight|surface) .*\| (\w+) \|$", table, flags=re.MULTILINE)
     assert [layer for layer, _ in verdicts].count("airlight") >= len(scenes)  # one for each estimator
