@@ -29,7 +29,7 @@ def published(
     from reports.progress import progress_bar
     from reports.tables import print_json
     from validation.biri_tables import PUBLISHED, biri_rows
-    from validation.configurations import kernel_function
+    from validation.kernel_choice import find_kernel
     from validation.needless import needless_costs
     from validation.scenes import SCENES
 
@@ -43,7 +43,7 @@ def published(
             raise InputError(f"--scenes: got {name!r}, wanted some of {', '.join(known)}")
     names = [name.strip() for name in kernels.split(",")]
     for name in names:
-        kernel_function(name)
+        find_kernel(name)
     activate()
     with progress_bar("published") as tell:
         chosen = [one for one in built_in if one.scene in wanted]

@@ -80,7 +80,7 @@ def configuration(method: str, kernel: str | None = None, parameters: Mapping[st
         raise InputError(f"method {method}: got the kernel {kernel!r}, but this method calls no kernel: leave it out")
     if record.uses_kernel:
         kernel = kernel or "exact"
-        kernel_function(kernel)
+        find_kernel(kernel)
     values = [(name, _converted(record, name, value)) for name, value in (parameters or {}).items()]
     return Configuration(method, kernel, tuple(values))
 
@@ -105,14 +105,9 @@ def parse_settings(settings: Sequence[str]) -> dict[str, str]:
     return pairs
 
 
-def kernel_function(name: str):
-    """Return the kernel function of a name: see `validation.kernel_choice.find_kernel`."""
-    return find_kernel(name)
-
-
 def prepared(scene: Scene, chosen: Configuration) -> FrameRenderer:
     """Return the frame renderer of a configuration for a scene."""
-    kernel = kernel_function(chosen.kernel) if chosen.kernel else None
+    kernel = find_kernel(chosen.kernel) if chosen.kernel else None
     return frame_renderer(scene, METHODS[chosen.method], kernel=kernel, **dict(chosen.parameters))
 
 

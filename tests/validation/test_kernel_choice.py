@@ -4,21 +4,19 @@ import pytest
 from analytic.errors import InputError
 from realtime.kernels import KERNELS
 from realtime.kernels.quadrature import quadrature
-from validation.configurations import kernel_function
 from validation.kernel_choice import find_kernel, sized, split_name
 
 
 def test_names_of_the_registry_are_their_functions():
     for name, record in KERNELS.items():
         assert find_kernel(name) is record.function
-        assert kernel_function(name) is record.function
 
 
 def test_number_behind_a_name_sets_the_first_parameter():
     found = find_kernel("quadrature-24")
     assert found.func is quadrature
     assert found.keywords == {"nodes": 24}
-    assert kernel_function("taylor-6").keywords == {"degree": 6}
+    assert find_kernel("taylor-6").keywords == {"degree": 6}
     # The longest name of the registry wins: 'quadrature-theta-8' is no 'quadrature' of size 'theta-8'.
     assert split_name("quadrature-theta-8") == (KERNELS["quadrature-theta"], 8)
 
