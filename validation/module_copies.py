@@ -11,6 +11,7 @@ import builtins
 import importlib
 import linecache
 from collections.abc import Mapping
+from functools import cache
 from itertools import count
 from pathlib import Path
 from types import ModuleType
@@ -45,7 +46,8 @@ def replaced_once(name: str, old: str, new: str) -> str:
     return source.replace(old, new)
 
 
-def imported_modules(source: str) -> set[str]:
+@cache
+def imported_modules(source: str) -> frozenset[str]:
     """Return the modules of `PACKAGES` that a source imports anywhere, in functions too."""
     names = set()
     for node in ast.walk(ast.parse(source)):
@@ -55,7 +57,7 @@ def imported_modules(source: str) -> set[str]:
             names |= {f"{node.module}.{alias.name}" for alias in node.names if node.module in PACKAGES}
         elif isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
-    return {name for name in names if name.split(".")[0] in PACKAGES and _exists(name)}
+    return frozenset(name for name in names if name.split(".")[0] in PACKAGES and _exists(name))
 
 
 def _exists(name: str) -> bool:
@@ -66,7 +68,7 @@ def _exists(name: str) -> bool:
 
 def users_of(module: str, tops: tuple[str, ...]) -> set[str]:
     """Return the modules among `tops` and all that they import which lead to `module`, itself included."""
-    imports: dict[str, set[str]] = {}
+    imports: dict[str, frozenset[str]] = {}
     waiting = list(tops)
     while waiting:
         name = waiting.pop()
@@ -95,7 +97,7 @@ class ModuleCopies(Mapping[str, ModuleType]):
     """
 
     def __init__(self, module: str, source: str, tops: tuple[str, ...]):
-        self._module, self._source, self._tops = module, source, tops
+        self._module, self._source = module, source
         self._copied = users_of(module, tops) - set(PACKAGES)
         self._built: dict[str, ModuleType] = {}
         self._builtins = {**vars(builtins), "__import__": self._import}
