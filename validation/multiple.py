@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from reference.batches import LAYERS
 from validation.monte_carlo import monte_carlo_batches
+from validation.pvalues import student_quantile
 
 Array = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]
@@ -103,12 +104,10 @@ def multiple_scattering_share(
 
 def left_out(part: Array, whole: Array) -> Share:
     """Return 1 - part/whole with its 95 % interval, from paired batch means; 0 of a whole without light."""
-    from scipy.stats import t
-
     count = len(whole)
     if not whole.mean() > 0:
         return Share(0.0, (0.0, 0.0))
     ratio = float(part.mean() / whole.mean())
     error = float((part - ratio * whole).std(ddof=1) / np.sqrt(count) / whole.mean())
-    half = float(t.ppf(0.975, count - 1)) * error
+    half = student_quantile(0.975, count - 1) * error
     return Share(1 - ratio, (1 - ratio - half, 1 - ratio + half))

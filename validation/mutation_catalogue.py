@@ -5,10 +5,10 @@ The text that a mutation replaces must occur exactly once in its module, which a
 formula moves its mutation too.
 """
 
-import difflib
 from collections.abc import Sequence
 
 from analytic.errors import InputError
+from validation.load import nearest
 from validation.mutation import Mutation
 from validation.quadrature_mutations import MUTATIONS as QUADRATURE
 from validation.single_scatter_mutations import MUTATIONS as SINGLE_SCATTER
@@ -27,7 +27,5 @@ def chosen_mutations(names: Sequence[str] | None) -> tuple[Mutation, ...]:
     known = {mutation.name: mutation for mutation in MUTATIONS}
     for name in names or ():
         if name not in known:
-            near = difflib.get_close_matches(name, known, n=1, cutoff=0.4)
-            hint = f"did you mean {near[0]!r}? " if near else ""
-            raise InputError(f"mutation: got {name!r}; {hint}wanted one of {', '.join(known)}")
+            raise InputError(f"mutation: got {name!r}, wanted one of {', '.join(known)}" + nearest(name, known))
     return tuple(known[name] for name in names) if names else MUTATIONS
