@@ -22,14 +22,14 @@ from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from analytic.geometry import foot_and_height
-from reference.batches import LARGEST_SEED, LAYERS, Batches
+from reference.batches import LAYERS, Batches
 from reference.scene import read_truth
 from reference.surface import surface_hits
 from validation.agreement import MASK_PIXELS, pixel_angle
 
 LEAST_BATCHES = 32  #: before a standard error is good enough to stop on
 USUAL_BATCH = 64  #: samples a pixel
-_MOST_BATCHES = 1 << 16  # of a run without a given number of samples
+_MOST_BATCHES = 1 << 16  # of a run without a given number of samples; there are more seeds
 _LARGEST_TRACE = 1 << 22  # samples of one batch of such a run: so that it ends near its target
 _FLOOR = 1e-3
 
@@ -72,7 +72,7 @@ def batch_plan(budget: Budget, pixels: int) -> tuple[int, int]:
     if budget.samples is not None:
         samples = _power_of_two(min(USUAL_BATCH, budget.samples // LEAST_BATCHES))
         return max(2, -(-budget.samples // samples)), samples
-    return min(_MOST_BATCHES, LARGEST_SEED), _power_of_two(min(USUAL_BATCH, _LARGEST_TRACE // pixels))
+    return _MOST_BATCHES, _power_of_two(min(USUAL_BATCH, _LARGEST_TRACE // pixels))
 
 
 def _power_of_two(number: int) -> int:
