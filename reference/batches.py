@@ -35,6 +35,17 @@ class Batches:
         return np.sqrt(self.squares / (count * (count - 1)))
 
 
+def check_samples(samples: int) -> None:
+    """Raise ValueError for more samples a pixel than a batch can add up, or none."""
+    if not 1 <= samples <= LARGEST_BATCH:
+        raise ValueError(f"samples: got {samples}, wanted 1 to {LARGEST_BATCH}")
+
+
+def single_batch(seed: int, samples: int, mean: Array) -> Batches:
+    """Return one batch, given its radiance of every pixel, (layers, pixels, 3)."""
+    return Batches((seed,), samples, mean, np.zeros_like(mean), mean.mean(axis=1)[None])
+
+
 def merged(one: Batches, other: Batches) -> Batches:
     """Add up two sets of batches."""
     if one.samples != other.samples or set(one.seeds) & set(other.seeds):

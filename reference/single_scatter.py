@@ -18,7 +18,7 @@ import functools
 import numpy as np
 
 from analytic.errors import InputError
-from reference.batches import LARGEST_BATCH, Batches
+from reference.batches import LARGEST_BATCH, Batches, check_samples, single_batch
 from reference.ray_light import double_ray, ray_light
 from reference.scatter_task import read_task
 from reference.scene import TruthScene
@@ -89,8 +89,7 @@ def single_scatter_batch(truth: TruthScene, seed: int, samples: int) -> Batches:
     import drjit as dr
     import mitsuba as mi
 
-    if not 1 <= samples <= LARGEST_BATCH:
-        raise ValueError(f"samples: got {samples}, wanted 1 to {LARGEST_BATCH}")
+    check_samples(samples)
     medium = truth.scene.sensors()[0].get_medium()
     task = read_task(truth.scene, medium, samples)
     sampler = mi.load_dict({"type": "independent"})
@@ -107,4 +106,4 @@ def single_scatter_batch(truth: TruthScene, seed: int, samples: int) -> Batches:
         dr.eval(layers)
         for layer, radiance in enumerate(layers):
             mean[layer, chunk] = np.stack([np.array(c, dtype=np.float64) for c in radiance], axis=1)
-    return Batches((seed,), samples, mean, np.zeros_like(mean), mean.mean(axis=1)[None])
+    return single_batch(seed, samples, mean)

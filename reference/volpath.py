@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.batches import LARGEST_BATCH, Batches
+from reference.batches import Batches, check_samples, single_batch
 from reference.scene import TruthMedium, TruthScene
 
 Array = NDArray[np.float64]
@@ -53,8 +53,7 @@ def volpath_batch(truth: TruthScene, seed: int, samples: int, *, max_depth: int 
     """
     import mitsuba as mi
 
-    if not 1 <= samples <= LARGEST_BATCH:
-        raise ValueError(f"samples: got {samples}, wanted 1 to {LARGEST_BATCH}")
+    check_samples(samples)
     if max_depth < 2:
         raise ValueError(f"max_depth: got {max_depth}, wanted at least 2, one scattering")
     integrator = mi.load_dict({"type": "volpath", "max_depth": max_depth, "rr_depth": 1000})
@@ -66,8 +65,7 @@ def volpath_batch(truth: TruthScene, seed: int, samples: int, *, max_depth: int 
     elif truth.occluders.shapes():
         # The same paths once more, now with light from surfaces; the difference is what these add.
         surface = _trace(truth, integrator, 2 * seed, samples) - airlight
-    mean = np.stack([airlight, surface])
-    return Batches((seed,), samples, mean, np.zeros_like(mean), mean.mean(axis=1)[None])
+    return single_batch(seed, samples, np.stack([airlight, surface]))
 
 
 @contextmanager

@@ -4,7 +4,7 @@ import time
 import numpy as np
 import pytest
 
-from reference.batches import Batches
+from reference.batches import single_batch
 from tests.scenes_for_tests import tiny_scene
 from validation.efficiency import efficiency, efficiency_lines, scene_efficiency, thin_fog
 
@@ -23,7 +23,7 @@ def _noise(deviation, seconds):
         time.sleep(seconds)
         rng = np.random.default_rng((seed, int(deviation * 1e6)))
         mean = 2.0 * (1 + deviation * rng.normal(size=(2, 600, 3)))
-        return Batches((seed,), samples, mean, np.zeros_like(mean), mean.mean(axis=1)[None])
+        return single_batch(seed, samples, mean)
 
     return batch
 

@@ -10,7 +10,7 @@ import pytest
 
 import validation.monte_carlo
 from analytic.errors import InputError
-from reference.batches import LARGEST_SEED, Batches, merged
+from reference.batches import LARGEST_SEED, merged, single_batch
 from reference.cache import cache_folder
 from reference.scene import read_truth
 from tests.scenes_for_tests import tiny_scene
@@ -38,7 +38,7 @@ def traced(monkeypatch, own_cache):
     def trace(truth, seed, samples, *, max_depth=2):
         seeds.append(seed)
         mean = np.random.default_rng([seed, samples, max_depth]).exponential(size=(2, 12, 3))
-        return Batches((seed,), samples, mean, np.zeros_like(mean), mean.mean(axis=1)[None])
+        return single_batch(seed, samples, mean)
 
     monkeypatch.setattr(validation.monte_carlo, "volpath_batch", trace)
     return seeds

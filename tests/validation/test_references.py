@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import validation.references
-from reference.batches import Batches
+from reference.batches import single_batch
 from tests.scenes_for_tests import tiny_scene
 from validation.budget import Budget
 from validation.load import LoadedScene
@@ -32,7 +32,7 @@ def loaded(variant, monkeypatch, tmp_path, clock):
     def trace(truth, seed, samples, **options):
         clock.now += 1.0
         mean = np.random.default_rng(seed).normal(1.0, 0.4, (2, 12, 3))
-        return Batches((seed,), samples, mean, np.zeros_like(mean), mean.mean(axis=1)[None])
+        return single_batch(seed, samples, mean)
 
     monkeypatch.setattr(validation.monte_carlo, "volpath_batch", trace)
     monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path))
