@@ -5,16 +5,29 @@ x/(|x| + |y|) and its like, continued round the square |x| + |y| = 1: 0 to 4 for
 y axis, monotone in the angle and exact to rounding.
 """
 
+import numpy as np
+
 TURN = 4.0  #: a full turn
 
 
 def diamond_angle(x, y):
-    """Return the azimuth of (x, y) in [0, 4) in diamond angles; 0 for the origin."""
+    """Return the azimuth of (x, y), Dr.Jit arrays, in [0, 4) in diamond angles; 0 for the origin."""
     import drjit as dr
 
-    total = dr.abs(x) + dr.abs(y)
+    return _diamond_angle(x, y, dr.select)
+
+
+def host_diamond_angle(x, y):
+    """Return the azimuth of (x, y), float32 NumPy arrays, as `diamond_angle` does."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return _diamond_angle(x, y, np.where)
+
+
+def _diamond_angle(x, y, select):
+    total = abs(x) + abs(y)
     share = y / total
-    upper = dr.select(x >= 0, share, 2 - share)
-    lower = dr.select(x < 0, 2 - share, 4 + share)
-    angle = dr.select(y >= 0, upper, lower)
-    return dr.select((total > 0) & (angle < TURN), angle, 0)
+    upper = select(x >= 0, share, 2 - share)
+    lower = select(x < 0, 2 - share, 4 + share)
+    angle = select(y >= 0, upper, lower)
+    # 4 + share rounds to 4 just below the axis: that is azimuth 0.
+    return select((total > 0) & (angle < TURN), angle, 0)

@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realtime.casters import Casters
-from realtime.diamond import TURN
+from realtime.diamond import TURN, host_diamond_angle
 from realtime.plane_cone import NEARNESS, is_outside, ring_edges
 from realtime.silhouettes import Silhouette, facing, silhouette
 
@@ -85,18 +85,6 @@ def light_frame(light: Array, camera: Array) -> tuple[Array, float]:
     return np.stack([x, np.cross(z, x), z]), distance
 
 
-def diamond_angle(x, y):
-    """Return the azimuth of (x, y) in [0, 4), float32 NumPy arrays; 0 for the origin."""
-    total = np.abs(x) + np.abs(y)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        share = y / total
-    upper = np.where(x >= 0, share, 2 - share)
-    lower = np.where(x < 0, 2 - share, 4 + share)
-    angle = np.where(y >= 0, upper, lower)
-    # 4 + share rounds to 4 just below the axis: that is azimuth 0.
-    return np.where((total > 0) & (angle < TURN), angle, 0).astype(np.float32)
-
-
 def shadow_planes(casters: Casters, found: Silhouette, light: Array, axes: Array) -> Planes:
     """Return the shadow planes of silhouette edges in the frame of a light and a camera."""
     return edge_planes((casters.vertices[found.edges] - light) @ axes.T, found.coefficient)
@@ -105,7 +93,7 @@ def shadow_planes(casters: Casters, found: Silhouette, light: Array, axes: Array
 def edge_planes(vertices: Array, coefficient: NDArray[np.int8]) -> Planes:
     """Return the shadow planes of edges in the frame, ends (edges, 2, 3), with their coefficients."""
     a, b = vertices[:, 0], vertices[:, 1]
-    azimuth = diamond_angle(vertices[..., 0].astype(np.float32), vertices[..., 1].astype(np.float32))
+    azimuth = host_diamond_angle(vertices[..., 0].astype(np.float32), vertices[..., 1].astype(np.float32))
     turn = azimuth[:, 1] - azimuth[:, 0]
     # The short way about the axis; `ahead` if azimuth grows from a to b along it.
     ahead = np.where(np.abs(turn) <= TURN / 2, turn > 0, turn < 0)

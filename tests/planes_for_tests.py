@@ -4,6 +4,7 @@
 import numpy as np
 
 from realtime.casters import make_casters
+from realtime.diamond import host_diamond_angle
 from realtime.plane_index import index_planes, light_frame
 from tests.casters_for_tests import AWKWARD, SOUND
 
@@ -61,8 +62,6 @@ def crossings(index, ways):
     three linear equations. A plane that is in the table twice, parted at azimuth 0, counts where its azimuths hold the
     ray's.
     """
-    from realtime.plane_index import diamond_angle
-
     ends, first, last, gain = plane_table(index)
     a, b = ends[:, 0], ends[:, 1]
     camera = np.array([0.0, 0.0, np.array(index.distance).item()])
@@ -74,7 +73,7 @@ def crossings(index, ways):
         p = np.einsum("rpk,pk->rp", np.cross(point, b), normal) / scale
         q = np.einsum("rpk,pk->rp", np.cross(a, point), normal) / scale
         crossed = (x > 0) & (p >= 0) & (q >= 0) & (p + q > 1)
-    azimuth = diamond_angle(*ways[:, :2].astype(np.float32).T)[:, None]
+    azimuth = host_diamond_angle(*ways[:, :2].astype(np.float32).T)[:, None]
     twice = (first < 0) | (last > 4)
     again = np.isin(np.arange(len(ends)), np.flatnonzero(twice)) | np.array(
         [np.any(twice & np.all(ends == end, axis=(1, 2))) for end in ends], dtype=bool

@@ -5,6 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from realtime.casters import make_casters
+from realtime.diamond import host_diamond_angle
 from realtime.plane_index import (
     BINS,
     FIRST,
@@ -12,7 +13,6 @@ from realtime.plane_index import (
     GAIN_ZERO,
     NUMBER,
     binned,
-    diamond_angle,
     layers_between,
     light_frame,
     shadow_planes,
@@ -59,11 +59,11 @@ def test_frame_is_right_handed_with_the_camera_on_the_last_axis():
 
 def test_diamond_angle_grows_with_the_azimuth_and_stays_below_a_turn():
     phi = np.linspace(0, 2 * np.pi, 4001)[:-1]
-    angle = diamond_angle(np.cos(phi).astype(np.float32), np.sin(phi).astype(np.float32))
+    angle = host_diamond_angle(np.cos(phi).astype(np.float32), np.sin(phi).astype(np.float32))
     assert np.all(np.diff(angle) > 0)
-    just_below = diamond_angle(np.array([1], np.float32), np.array([-1e-9], np.float32))
+    just_below = host_diamond_angle(np.array([1], np.float32), np.array([-1e-9], np.float32))
     assert angle[0] == just_below[0] == 0
-    assert diamond_angle(np.zeros(1, np.float32), np.zeros(1, np.float32))[0] == 0
+    assert host_diamond_angle(np.zeros(1, np.float32), np.zeros(1, np.float32))[0] == 0
     assert angle.max() < 4
 
 
@@ -74,7 +74,7 @@ def test_two_forms_of_a_crossing(variant, name):
     planes = planes_of(casters)
     _, distance = light_frame(LIGHT, CAMERA)
     ways = bundles(640, spread=0.1)
-    azimuth = diamond_angle(*ways[:, :2].astype(np.float32).T)[:, None]
+    azimuth = host_diamond_angle(*ways[:, :2].astype(np.float32).T)[:, None]
     quotient = ways[:, :2] @ planes.lines[:, :2].T - ways[:, 2:]
     crossed = (azimuth >= planes.first) & (azimuth < planes.last) & (quotient > 0)
     crossed &= quotient < distance * (ways[:, :2] @ planes.lines[:, 2:].T)
