@@ -44,7 +44,7 @@ from typing import Any
 from realtime.arrays import is_single
 from realtime.errors import InputError
 from realtime.exponential import exp_bounded
-from realtime.geometry import clip_to_cone, distance_to_light, falloff
+from realtime.geometry import clip_to_cone, distance_to_light, falloff, stretches
 from realtime.media_rays import MediaRay, Piece, light_leg
 from realtime.medium import Medium
 from realtime.phase import evaluate
@@ -73,10 +73,7 @@ def bounded_airlight(ray: MediaRay, x0, x1):
 
     if ray.light.kind == "spot":
         x0, x1 = clip_to_cone(ray.geometry, ray.light.cos_cutoff, x0, x1)
-    panels = [(x0, x1)]
-    if ray.light.soft:
-        inner0, inner1 = clip_to_cone(ray.geometry, ray.light.cos_beam, x0, x1)
-        panels = [(x0, inner0), (inner0, inner1), (inner1, x1)]
+    panels = stretches(ray.geometry, ray.light, x0, x1)
     Float, Color = type(ray.geometry.height), type(ray.medium.albedo)
     zero = dr.zeros(Color, dr.width(ray.geometry.height, x0, x1))
     total = zero

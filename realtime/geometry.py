@@ -138,6 +138,14 @@ def clip_to_cone(geometry: RayGeometry, cos_angle, x0, x1):
     return x0_clipped, dr.maximum(dr.clip(end, x0, x1), x0_clipped)
 
 
+def stretches(geometry: RayGeometry, light: Light, x0, x1):
+    """Cut [x0, x1] where a soft spot's `falloff` has kinks, at the cone of the beam; one stretch for other lights."""
+    if not light.soft:
+        return [(x0, x1)]
+    inner0, inner1 = clip_to_cone(geometry, light.cos_beam, x0, x1)
+    return [(x0, inner0), (inner0, inner1), (inner1, x1)]
+
+
 def falloff(geometry: RayGeometry, light: Light, x):
     """Return the relative intensity of a spot at the point at `x`: Mitsuba's profile, linear in the angle [1].
 

@@ -33,7 +33,7 @@ from functools import lru_cache
 
 from realtime.arrays import is_single
 from realtime.exponential import exp_bounded
-from realtime.geometry import RayGeometry, clip_to_cone, falloff
+from realtime.geometry import RayGeometry, falloff, stretches
 from realtime.kernels.quadrature import path_interval, quadrature
 from realtime.lights import Light
 from realtime.medium import Medium, per_extinction
@@ -79,10 +79,7 @@ def _integral(geometry: RayGeometry, segment, sigma_t, medium: Medium, light: Li
         nodes = _NODES["isotropic"] if is_single(type(geometry.height)) else _ISOTROPIC_DOUBLE
         grey = Medium((sigma_t,), medium.albedo, medium.phase)
         return quadrature(geometry, x0, x1, grey, light, nodes=nodes)
-    panels = [(x0, x1)]
-    if light.soft:
-        inner0, inner1 = clip_to_cone(geometry, light.cos_beam, x0, x1)
-        panels = [(x0, inner0), (inner0, inner1), (inner1, x1)]
+    panels = stretches(geometry, light, x0, x1)
     return sum(_panel(geometry, a, b, sigma_t, medium.phase, light) for a, b in panels)
 
 

@@ -43,8 +43,8 @@ from functools import lru_cache
 from typing import Any
 
 from realtime.errors import InputError
-from realtime.geometry import RayGeometry
-from realtime.kernels.polynomial_piece import Piece, integrand, offset, piece_of, place, stretches, with_limits
+from realtime.geometry import RayGeometry, stretches
+from realtime.kernels.polynomial_piece import Piece, integrand, offset, piece_of, place, with_limits
 from realtime.lights import Light
 from realtime.medium import Medium, per_extinction
 
@@ -82,7 +82,7 @@ def polynomial(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, d
 
     def integral(sigma_t):
         total = 0
-        for begin, end in stretches(geometry, x0, x1, light):
+        for begin, end in stretches(geometry, light, x0, x1):
             piece = piece_of(geometry, begin, end, sigma_t, medium.phase)
             weighted = sum(
                 w * integrand(piece, (0.5 + 0.5 * y) * piece.width, geometry, medium, light) for y, w in nodes
@@ -112,7 +112,7 @@ def polynomial_coefficients(
         values = [integrand(piece, (0.5 + 0.5 * y) * piece.width, geometry, medium, light) for y, _ in nodes]
         return replace(piece, coefficients=_antiderivative(values))
 
-    ends = stretches(geometry, x0, x1, light)
+    ends = stretches(geometry, light, x0, x1)
     pieces = tuple(tuple(fitted(begin, end, sigma_t) for begin, end in ends) for sigma_t in medium.sigma_t)
     return RayPolynomial(pieces, type(medium.albedo))
 

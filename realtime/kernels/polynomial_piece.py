@@ -15,7 +15,7 @@ from typing import Any
 
 from realtime.arrays import is_single, smallest
 from realtime.exponential import exp_bounded
-from realtime.geometry import RayGeometry, clip_to_cone, falloff
+from realtime.geometry import RayGeometry, falloff
 from realtime.lights import Light
 from realtime.medium import Medium
 from realtime.phase import Phase, evaluate_half
@@ -49,14 +49,6 @@ class Piece:
     width: Any  #: U
     factor: Any  #: (2 m/h) exp(-sigma_t (x0 + r0)) [1/m]
     coefficients: tuple[Any, ...] = ()  #: A_1, A_2, ... over U/2, see the module
-
-
-def stretches(geometry: RayGeometry, x0, x1, light: Light):
-    """Cut where the falloff of a soft spot has kinks."""
-    if not light.soft:
-        return [(x0, x1)]
-    inner0, inner1 = clip_to_cone(geometry, light.cos_beam, x0, x1)
-    return [(x0, inner0), (inner0, inner1), (inner1, x1)]
 
 
 def piece_of(geometry: RayGeometry, x0, x1, sigma_t, phase: Phase) -> Piece:

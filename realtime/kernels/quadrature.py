@@ -30,7 +30,7 @@ from functools import lru_cache
 from realtime.arrays import is_single, smallest
 from realtime.errors import InputError
 from realtime.exponential import exp_bounded
-from realtime.geometry import RayGeometry, clip_to_cone, falloff
+from realtime.geometry import RayGeometry, falloff, stretches
 from realtime.lights import Light
 from realtime.medium import Medium, per_extinction
 from realtime.phase import evaluate
@@ -65,13 +65,10 @@ def sum_panels(geometry: RayGeometry, panels, medium: Medium, light: Light, node
 def _panels(geometry: RayGeometry, x0, x1, medium: Medium, light: Light):
     import drjit as dr
 
-    if light.soft:
-        inner0, inner1 = clip_to_cone(geometry, light.cos_beam, x0, x1)
-        return [(x0, inner0), (inner0, inner1), (inner1, x1)]
-    if medium.phase.name != "isotropic":
+    if medium.phase.name != "isotropic" and not light.soft:
         split = dr.clip(geometry.foot, x0, x1)
         return [(x0, split), (split, x1)]
-    return [(x0, x1)]
+    return stretches(geometry, light, x0, x1)
 
 
 @lru_cache
