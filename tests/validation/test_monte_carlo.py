@@ -10,7 +10,7 @@ import pytest
 
 import validation.monte_carlo
 from analytic.errors import InputError
-from reference.batches import LARGEST_SEED, merged, single_batch
+from reference.batches import LARGEST_SEED, Batches, merged, single_batch
 from reference.cache import cache_folder
 from reference.scene import read_truth
 from tests.scenes_for_tests import tiny_scene
