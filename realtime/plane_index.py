@@ -24,7 +24,7 @@ azimuth bit by bit, and an edge holds phi if first <= phi < last: no ray slips b
 counted twice.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -118,7 +118,7 @@ def edge_planes(vertices: Array, coefficient: NDArray[np.int8]) -> Planes:
     middle = 0.5 * (a + b)
     centre = middle[:, 2] / np.maximum(np.linalg.norm(middle, axis=1), np.finfo(float).tiny)
     kept = (first != last) & np.all(np.isfinite(lines), axis=1)
-    return Planes(lines[kept], first[kept], last[kept], gain[kept], vertices[kept].reshape(-1, 6), centre[kept])
+    return _chosen(Planes(lines, first, last, gain, vertices.reshape(-1, 6), centre), kept)
 
 
 def binned(planes: Planes) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
@@ -148,14 +148,15 @@ def _parted(planes: Planes) -> Planes:
     around = planes.first > planes.last
     if not around.any():
         return planes
-    return Planes(
-        np.concatenate([planes.lines, planes.lines[around]]),
-        np.concatenate([np.where(around, np.float32(-1), planes.first), planes.first[around]]),
-        np.concatenate([planes.last, np.full(int(around.sum()), 5, dtype=np.float32)]),
-        np.concatenate([planes.gain, planes.gain[around]]),
-        np.concatenate([planes.ends, planes.ends[around]]),
-        np.concatenate([planes.centre, planes.centre[around]]),
+    above = _chosen(planes, around)
+    return _joined(
+        replace(planes, first=np.where(around, np.float32(-1), planes.first)),
+        replace(above, last=np.full_like(above.last, 5)),
     )
+
+
+def _chosen(planes: Planes, which: NDArray[np.bool_]) -> Planes:
+    return Planes(*(getattr(planes, field.name)[which] for field in fields(Planes)))
 
 
 def _joined(one: Planes, other: Planes) -> Planes:
