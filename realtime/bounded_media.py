@@ -38,15 +38,15 @@ References
 Biri, Arques, Michelin 2006, sections 4.2 and 5.2.
 """
 
-from functools import lru_cache
 from typing import Any
 
 from realtime.arrays import is_single
 from realtime.errors import InputError
 from realtime.exponential import exp_bounded
+from realtime.gauss import unit_nodes
 from realtime.geometry import clip_to_cone, distance_to_light, falloff, stretches
 from realtime.media_rays import MediaRay, Piece, light_leg
-from realtime.medium import Medium
+from realtime.medium import Medium, least_extinction
 from realtime.phase import evaluate
 
 FORMS = ("exact", "paper")
@@ -115,7 +115,7 @@ def ambient_radiance(ray_pieces: tuple[Piece, ...], distance, ambient: float):
         length = dr.maximum(dr.minimum(dr.minimum(piece.end, distance), 1e30) - piece.begin, 0)
         kept = [dr.exp(-tau) - dr.exp(-dr.fma(s, length, tau)) for s, tau in zip(piece.medium.sigma_t, piece.before)]
         channels = [dr.select(length > 0, value, 0) for value in kept]
-        total += piece.medium.albedo * (ambient * type(total)(*(channels * 3)[:3]))
+        total += piece.medium.albedo * (ambient * type(total)(*channels))
     return total
 
 
@@ -132,13 +132,12 @@ def _integral(ray: MediaRay, piece: Piece, x0, x1):
     import drjit as dr
 
     Float = type(ray.geometry.height)
-    least = _least(piece.medium)
-    x1 = dr.minimum(x1, x0 + _OPTICAL_REACH / least)
+    x1 = dr.minimum(x1, x0 + _OPTICAL_REACH / least_extinction(piece.medium))
     # A ray through the light itself: its integral is infinite, and so nearly is this.
     h = dr.maximum(ray.geometry.height, 1e-15)
     s0, s1 = x0 - ray.geometry.foot, x1 - ray.geometry.foot
     width = dr.select(dr.isfinite(x1), dr.atan2(h * (s1 - s0), dr.fma(h, h, s0 * s1)), dr.atan2(h, s0))
-    nodes = _nodes(_node_count(ray, piece, single=is_single(Float)))
+    nodes = unit_nodes(_node_count(ray, piece, single=is_single(Float)))
     xs, rs = [], []
     for fraction, _ in nodes:
         sine, cosine = dr.sincos(width * fraction)
@@ -168,7 +167,7 @@ def _scattered(ray: MediaRay, piece: Piece, transmittance: list[Any], x, r):
     if ray.light.soft:
         weight = weight * falloff(ray.geometry, ray.light, x)
     channels = [sigma * weight * value for sigma, value in zip(piece.medium.sigma_t, transmittance)]
-    return piece.medium.albedo * Color(*(channels * 3)[:3])
+    return piece.medium.albedo * Color(*channels)
 
 
 def _attenuation(ray: MediaRay, piece: Piece, xs, rs) -> list[list[Any]]:
@@ -194,21 +193,3 @@ def _paper_attenuation(ray: MediaRay, piece: Piece, xs) -> list[list[Any]]:
     distance = ray.medium.bodies[piece.number].mean_distance
     constants = [before + s * (distance - piece.begin) for before, s in zip(piece.before, piece.medium.sigma_t)]
     return [[exp_bounded(-(constant + s * x)) for constant, s in zip(constants, piece.medium.sigma_t)] for x in xs]
-
-
-def _least(medium: Medium):
-    import drjit as dr
-
-    least = medium.sigma_t[0]
-    for sigma in medium.sigma_t[1:]:
-        least = dr.minimum(least, sigma)
-    return least
-
-
-@lru_cache
-def _nodes(count: int) -> tuple[tuple[float, float], ...]:
-    """Return the Gauss-Legendre nodes and weights of [0, 1]."""
-    import numpy as np
-
-    xi, weight = np.polynomial.legendre.leggauss(count)
-    return tuple((float(0.5 + 0.5 * x), float(0.5 * w)) for x, w in zip(xi, weight))

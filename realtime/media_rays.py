@@ -169,8 +169,7 @@ def path_transmittance(medium: Medium, light: Light, *, depths, point, active):
         inside = dr.select(near, share_inside(enter, leave) * length, 0)
         excess = [own - sigma for own, sigma in zip(body.medium.sigma_t, medium.sigma_t)]
         depths = [dr.fma(more, inside, depth) for more, depth in zip(excess, depths)]
-    channels = [dr.exp(-depth) for depth in depths]
-    return type(medium.albedo)(*(channels * 3)[:3])
+    return type(medium.albedo)(*(dr.exp(-depth) for depth in depths))
 
 
 def light_leg(ray: MediaRay, piece: Piece, xs, rs) -> list[list[Any]]:

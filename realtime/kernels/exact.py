@@ -29,10 +29,9 @@ The isotropic case has no lobe, and pairs of nodes about the centre share their 
 nodes.
 """
 
-from functools import lru_cache
-
 from realtime.arrays import is_single
 from realtime.exponential import exp_bounded
+from realtime.gauss import unit_nodes
 from realtime.geometry import RayGeometry, falloff, stretches
 from realtime.kernels.quadrature import path_interval, quadrature
 from realtime.lights import Light
@@ -121,11 +120,11 @@ def _sum_nodes(node, phase: Phase, width):
 
     Float = type(width)
     if is_single(Float):
-        return sum(weight * node(fraction) for fraction, weight in _nodes(_NODES[phase.name]))
+        return sum(weight * node(fraction) for fraction, weight in unit_nodes(_NODES[phase.name]))
 
     def panel(index, total):
         start = Float(index)
-        part = sum(weight * node((start + fraction) * (1 / _PANELS)) for fraction, weight in _nodes(_PANEL_NODES))
+        part = sum(weight * node((start + fraction) * (1 / _PANELS)) for fraction, weight in unit_nodes(_PANEL_NODES))
         return index + 1, total + part * (1 / _PANELS)
 
     _, total = dr.while_loop(
@@ -145,12 +144,3 @@ def _lobe_scales(phase: Phase, Float):
         forward, backward = dr.maximum(Float(phase.g), 0), dr.maximum(-Float(phase.g), 0)
         return (1 - forward) / (1 + forward), (1 + backward) / (1 - backward)
     return Float(_SCALE.get(phase.name, 1.0)), 1.0
-
-
-@lru_cache
-def _nodes(count: int) -> tuple[tuple[float, float], ...]:
-    """Return the Gauss-Legendre nodes and weights of [0, 1]."""
-    import numpy as np
-
-    xi, weight = np.polynomial.legendre.leggauss(count)
-    return tuple((float(0.5 + 0.5 * x), float(0.5 * w)) for x, w in zip(xi, weight))

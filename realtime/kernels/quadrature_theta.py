@@ -9,6 +9,7 @@ has an essential singularity. `realtime.kernels.quadrature` avoids it.
 """
 
 from realtime.errors import InputError
+from realtime.gauss import unit_nodes
 from realtime.geometry import RayGeometry, distance_to_light, falloff
 from realtime.lights import Light
 from realtime.medium import Medium, per_extinction
@@ -45,18 +46,17 @@ def quadrature_theta(geometry: RayGeometry, x0, x1, medium: Medium, light: Light
 
 def _panel(geometry: RayGeometry, x0, x1, sigma_t, medium: Medium, light: Light, nodes: int):
     import drjit as dr
-    import numpy as np
 
     foot, h = geometry.foot, geometry.height
     s0, s1 = x0 - foot, dr.select(dr.isinf(x1), 0, x1 - foot)
     theta0 = dr.atan2(s0, h)
     width = dr.select(dr.isinf(x1), 0.5 * dr.pi - theta0, dr.atan2(h * (s1 - s0), dr.fma(s0, s1, h * h)))
     total = type(h)(0)
-    for xi, weight in zip(*np.polynomial.legendre.leggauss(nodes)):
-        x = dr.fma(h, dr.tan(dr.fma(width, float(0.5 + 0.5 * xi), theta0)), foot)
+    for fraction, weight in unit_nodes(nodes):
+        x = dr.fma(h, dr.tan(dr.fma(width, fraction, theta0)), foot)
         r = distance_to_light(geometry, x)
         value = dr.exp(-sigma_t * (x + r)) * evaluate(medium.phase, (foot - x) / r)
         if light.soft:
             value *= falloff(geometry, light, x)
-        total += float(0.5 * weight) * value
+        total += weight * value
     return total * (width / h)
