@@ -32,6 +32,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.camera import film_directions, pixel_centres
 from reference.intervals import Certificate
 from reference.quadrature import Progress, RayValues, TruthImage, image_of, ray_values
 from reference.scene import TruthScene
@@ -81,34 +82,6 @@ class _Film:
     rays: RayValues  #: what was found there, in that order
 
 
-def film_directions(sensor, positions: Array, size: tuple[int, int]) -> Array:
-    """Return the unit directions through positions on the film, (n, 3), in float64.
-
-    Parameters
-    ----------
-    sensor
-        A perspective sensor of Mitsuba.
-    positions
-        Columns and rows in units of pixels from the upper left corner, (n, 2): pixel centres end in one half.
-    size
-        Width and height of the film in pixels.
-
-    Notes
-    -----
-    Valid for positions outside of the film too. The derivation is that of the pixel centres in `reference.scene`.
-    """
-    import mitsuba as mi
-
-    width, height = size
-    half_width = np.tan(0.5 * np.deg2rad(float(mi.traverse(sensor)["x_fov"][0])))
-    matrix = np.array(sensor.world_transform().matrix, dtype=np.float64).reshape(4, 4)
-    # In the camera's own frame x points left and y up; the plane is where pixels are squares of size 1.
-    focal = np.full(len(positions), 0.5 * width / half_width)
-    plane = np.stack([0.5 * width - positions[:, 0], 0.5 * height - positions[:, 1], focal], axis=1)
-    direction = plane @ matrix[:3, :3].T
-    return direction / np.linalg.norm(direction, axis=1, keepdims=True)
-
-
 def area_image(
     truth: TruthScene,
     *,
@@ -141,8 +114,7 @@ def area_image(
         _traced, truth, samples=samples, shadow_scale=shadow_scale, edges=edges, shapes=read_shapes(truth.occluders)
     )
     pixels = truth.width * truth.height
-    row, column = np.divmod(np.arange(pixels), truth.width)
-    middle = np.stack([column + 0.5, row + 0.5], axis=1)
+    middle = pixel_centres((truth.width, truth.height))
     angle = _pixel_angle(truth)
     film, found = _on_grid(None, trace, (np.arange(pixels), middle, np.ones(pixels)), angle)
     centre = film.rays

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from analytic.errors import InputError
 from analytic.phase import PhaseFunction
 from reference.bounds import Bounds, holds, overlap, read_bounds
+from reference.camera import camera_matrix, film_directions, pixel_centres
 
 Array = NDArray[np.float64]
 
@@ -80,7 +81,7 @@ def read_truth(scene) -> TruthScene:
         raise InputError("the scene has no light; wanted at least one emitter of type 'point' or 'spot'")
     opaque, boundaries = _sorted_shapes(scene)
     media = tuple(_read_bounded(shape) for shape in boundaries)
-    origin, direction = _pixel_centres(sensor, width, height)
+    origin = camera_matrix(sensor)[:3, 3]
     _check_disjoint(media)
     return TruthScene(
         scene=scene,
@@ -88,31 +89,11 @@ def read_truth(scene) -> TruthScene:
         width=width,
         height=height,
         origin=origin,
-        direction=direction,
+        direction=film_directions(sensor, pixel_centres((width, height)), (width, height)),
         medium=_read_ambient(sensor, origin, media, boundaries),
         lights=lights,
         media=media,
     )
-
-
-def _pixel_centres(sensor, width: int, height: int) -> tuple[Array, Array]:
-    """Return the pinhole and the directions through the pixel centres.
-
-    Mitsuba's own `sample_ray` gives them in float32, and from the near clip plane on; near a light that rounding is
-    worth 1e-5 of the airlight. Here they are derived in float64, in units of a pixel on the plane where pixels are
-    squares of size 1; a test holds them against `sample_ray`.
-    """
-    import mitsuba as mi
-
-    parameters = mi.traverse(sensor)
-    half_width = np.tan(0.5 * np.deg2rad(float(parameters["x_fov"][0])))
-    matrix = np.array(sensor.world_transform().matrix, dtype=np.float64).reshape(4, 4)
-    row, column = np.divmod(np.arange(width * height), width)
-    pixel = 2 * half_width / width
-    # In the camera's own frame x points left and y up.
-    plane = np.stack([0.5 * (width - 1) - column, 0.5 * (height - 1) - row, np.full(width * height, 1 / pixel)], axis=1)
-    direction = plane @ matrix[:3, :3].T
-    return matrix[:3, 3], direction / np.linalg.norm(direction, axis=1, keepdims=True)
 
 
 def _sorted_shapes(scene) -> tuple[list[Any], list[Any]]:

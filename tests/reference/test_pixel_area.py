@@ -23,7 +23,7 @@ def brute_force(truth, n, regular=False):
     Regular points would all be wrong the same way where an edge runs along the rows; close to a light they are better,
     where a random one may come too close.
     """
-    from reference.pixel_area import film_directions
+    from reference.camera import film_directions
     from reference.quadrature import ray_values
 
     row, column = np.divmod(np.arange(truth.width * truth.height), truth.width)
@@ -38,7 +38,7 @@ def brute_force(truth, n, regular=False):
 
 
 def test_directions_through_the_middles_are_those_of_the_image(variant):
-    from reference.pixel_area import film_directions
+    from reference.camera import film_directions
 
     truth = truth_of(tiny_scene())
     row, column = np.divmod(np.arange(truth.width * truth.height), truth.width)
@@ -49,7 +49,8 @@ def test_directions_through_the_middles_are_those_of_the_image(variant):
 
 def test_smooth_fog_is_the_integral_over_the_pixel(variant):
     """Gauss's product rule with 12 x 12 points, converged for what is smooth: the light is out of view."""
-    from reference.pixel_area import area_image, film_directions
+    from reference.camera import film_directions
+    from reference.pixel_area import area_image
     from reference.quadrature import ray_values
 
     lamp = {"type": "point", "position": [3.9, 0.7, 3.9], "intensity": {"type": "rgb", "value": [5.0, 4.0, 3.0]}}
@@ -130,7 +131,7 @@ def test_another_word_is_refused(variant):
 
 def test_a_light_on_the_corner_of_four_pixels_has_a_finite_mean(variant):
     """An image with an even number of pixels whose camera aims at the light: a point of the grid meets it."""
-    from reference.pixel_area import film_directions
+    from reference.camera import film_directions
     from reference.quadrature import quadrature_image
 
     truth = truth_of(tiny_scene(ball=None, floor=None, size=(2, 2)))
