@@ -21,6 +21,13 @@ def variant() -> str:
 
 
 @pytest.fixture(autouse=True)
-def _own_cache(tmp_path_factory, monkeypatch):
+def _shared_cache(tmp_path_factory, monkeypatch):
     """Keep the tests away from the user's cache, and let them share one of their own."""
     monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path_factory.getbasetemp() / "airlight-cache"))
+
+
+@pytest.fixture
+def own_cache(monkeypatch, tmp_path) -> Path:
+    """An empty cache that this test shares with no other; where its folder will be."""
+    monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path / "cache"))
+    return tmp_path / "cache"

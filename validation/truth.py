@@ -5,11 +5,9 @@ from collections.abc import Callable
 from dataclasses import Field, fields
 from typing import Any
 
-from reference.batches import Batches
 from reference.cache import cache_key, load_arrays, store_arrays
 from reference.quadrature import TruthImage, quadrature_image
 from reference.scene import read_truth
-from validation.monte_carlo import monte_carlo_batches
 
 Progress = Callable[[int, int, str], None]
 
@@ -46,25 +44,3 @@ def truth_image(
 def _as_kept(field: Field, value: Any) -> Any:
     """Return an array, or the number that was stored as an array without dimensions."""
     return field.type(value) if field.type in (int, float) else value
-
-
-def volpath_batches(
-    scene,
-    *,
-    batches: int,
-    samples: int,
-    first_seed: int = 0,
-    enough: Callable[[Batches], bool] | None = None,
-    progress: Progress | None = None,
-) -> Batches:
-    """Return volpath's batches of a Mitsuba scene at its own size; see `validation.monte_carlo.monte_carlo_batches`."""
-    run = monte_carlo_batches(
-        scene,
-        "volpath",
-        batches=batches,
-        samples=samples,
-        first_seed=first_seed,
-        enough=enough,
-        progress=progress,
-    )
-    return run.batches

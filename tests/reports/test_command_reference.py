@@ -20,11 +20,7 @@ from reports import cli
 ROOT = Path(__file__).parent.parent.parent
 SCENE = ["sphere-spot", "--size", "8x6"]
 
-
-@pytest.fixture(autouse=True)
-def own_cache(monkeypatch, tmp_path):
-    monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path / "cache"))
-    return tmp_path / "cache"
+pytestmark = pytest.mark.usefixtures("own_cache")
 
 
 def run(output, *arguments, status=0, estimator="volpath"):

@@ -13,14 +13,9 @@ from analytic.errors import InputError
 from reference.batches import LARGEST_SEED, Batches, merged, single_batch
 from reference.cache import cache_folder
 from reference.scene import read_truth
+from reference.volpath import volpath_batch
 from tests.scenes_for_tests import tiny_scene
 from validation.monte_carlo import BLOCK, monte_carlo_batches
-
-
-@pytest.fixture
-def own_cache(monkeypatch, tmp_path):
-    monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path / "cache"))
-    return tmp_path / "cache"
 
 
 @pytest.fixture
@@ -51,6 +46,7 @@ def volpath(scene, **options):
 def assert_same(one, two):
     for field in fields(Batches):
         np.testing.assert_array_equal(getattr(one, field.name), getattr(two, field.name), err_msg=field.name)
+        assert type(getattr(one, field.name)) is type(getattr(two, field.name))
 
 
 @pytest.mark.parametrize(("first", "count"), [(0, 2), (0, 8), (0, 21), (5, 2), (5, 3), (5, 20), (8, 8), (1000, 9)])
@@ -243,3 +239,82 @@ def test_single_scatter_goes_the_same_way(scene, own_cache):
     batches = [single_scatter_batch(truth, seed, 4) for seed in (2, 3, 4)]
     assert_same(found.batches, merged(merged(batches[0], batches[1]), batches[2]))
     assert next(cache_folder().iterdir()).name.startswith("single-scatter-")
+
+
+# --- traced, not drawn -----------------------------------------------------------------------------------------------
+
+
+def interrupted_after(count):
+    def progress(done, total, what):
+        if done == count:
+            raise KeyboardInterrupt
+
+    return progress
+
+
+def test_interrupted_batches_go_on_where_they_stopped(scene, monkeypatch, tmp_path):
+    monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path / "one"))
+    whole = volpath(scene, batches=5).batches
+    monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path / "two"))
+    with pytest.raises(KeyboardInterrupt):
+        volpath(scene, batches=5, progress=interrupted_after(3))
+    seeds = []
+    trace = validation.monte_carlo.volpath_batch
+
+    def counted(truth, seed, samples, **kwargs):
+        seeds.append(seed)
+        return trace(truth, seed, samples, **kwargs)
+
+    monkeypatch.setattr(validation.monte_carlo, "volpath_batch", counted)
+    resumed = volpath(scene, batches=5).batches
+    assert seeds == [3, 4]
+    assert_same(resumed, whole)
+
+
+def test_more_batches_add_to_those_that_are_there(scene, own_cache):
+    told = []
+    few = volpath(scene, batches=2).batches
+    more = volpath(scene, batches=4, progress=lambda *args: told.append(args)).batches
+    assert told == [(3, 4, "volpath"), (4, 4, "volpath")]
+    assert (few.seeds, more.seeds) == ((0, 1), (0, 1, 2, 3))
+    np.testing.assert_array_equal(more.totals[:2], few.totals)
+
+
+def test_mean_and_standard_error_are_those_of_the_batches(scene, own_cache):
+    found = volpath(scene, batches=4, first_seed=7).batches
+    means = np.stack([volpath_batch(read_truth(scene), seed, 4).mean for seed in range(7, 11)])
+    np.testing.assert_allclose(found.mean, means.mean(axis=0), rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(found.standard_error, means.std(axis=0, ddof=1) / 2, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(found.totals.mean(axis=0), found.mean.mean(axis=1), rtol=1e-12)
+
+
+def test_other_samples_and_seeds_are_kept_apart(scene, own_cache):
+    one = volpath(scene, batches=2).batches
+    two = volpath(scene, batches=2, samples=5).batches
+    three = volpath(scene, batches=2, first_seed=2).batches
+    assert (one.samples, two.samples) == (4, 5)
+    assert three.seeds == (2, 3)
+    assert not np.array_equal(one.mean, three.mean)
+
+
+def test_enough_is_asked_at_every_eighth_batch(scene, own_cache):
+    asked = []
+
+    def enough(found):
+        asked.append(len(found.seeds))
+        return len(found.seeds) >= 16
+
+    assert len(volpath(scene, batches=40, samples=1, enough=enough).batches.seeds) == 16
+    assert asked == [8, 16]
+
+
+def test_damaged_batches_are_traced_again(scene, own_cache):
+    whole = volpath(scene, batches=2).batches
+    path = next(cache_folder().glob("volpath-*/000001.npz"))
+    path.write_bytes(path.read_bytes()[:-40])
+    assert_same(volpath(scene, batches=2).batches, whole)
+
+
+def test_one_batch_is_refused(scene):
+    with pytest.raises(ValueError, match="at least 2"):
+        volpath(scene, batches=1)

@@ -23,7 +23,7 @@ def clock(monkeypatch):
 
 
 @pytest.fixture
-def loaded(variant, monkeypatch, tmp_path, clock):
+def loaded(variant, monkeypatch, own_cache, clock):
     """A scene whose batches are random numbers of relative deviation 0.4, and take a second each."""
     import mitsuba as mi
 
@@ -35,7 +35,6 @@ def loaded(variant, monkeypatch, tmp_path, clock):
         return single_batch(seed, samples, mean)
 
     monkeypatch.setattr(validation.monte_carlo, "volpath_batch", trace)
-    monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path))
     lamp = {"type": "point", "position": [0.3, -9.0, 1.1]}  # behind the camera: no pixel is left out
     return LoadedScene("tiny", mi.load_dict(tiny_scene(size=(4, 3), lamp=lamp)), "", "")
 

@@ -6,7 +6,8 @@ import pytest
 
 from reference.cache import cache_folder
 from tests.scenes_for_tests import tiny_scene
-from validation.truth import truth_image, volpath_batches
+from validation.monte_carlo import monte_carlo_batches
+from validation.truth import truth_image
 
 
 @pytest.fixture
@@ -14,12 +15,6 @@ def scene(variant):
     import mitsuba as mi
 
     return mi.load_dict(tiny_scene(size=(8, 6)))
-
-
-@pytest.fixture
-def own_cache(monkeypatch, tmp_path):
-    monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path / "cache"))
-    return tmp_path / "cache"
 
 
 @pytest.fixture
@@ -107,87 +102,6 @@ def test_progress_is_told(scene, own_cache):
     assert told == [(1, 1, "quadrature")]
 
 
-def interrupted_after(count):
-    def progress(done, total, what):
-        if done == count:
-            raise KeyboardInterrupt
-
-    return progress
-
-
-def test_interrupted_batches_go_on_where_they_stopped(scene, monkeypatch, tmp_path):
-    import validation.monte_carlo
-
-    monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path / "one"))
-    whole = volpath_batches(scene, batches=5, samples=4)
-    monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path / "two"))
-    with pytest.raises(KeyboardInterrupt):
-        volpath_batches(scene, batches=5, samples=4, progress=interrupted_after(3))
-    seeds = []
-    trace = validation.monte_carlo.volpath_batch
-
-    def counted(truth, seed, samples, **kwargs):
-        seeds.append(seed)
-        return trace(truth, seed, samples, **kwargs)
-
-    monkeypatch.setattr(validation.monte_carlo, "volpath_batch", counted)
-    resumed = volpath_batches(scene, batches=5, samples=4)
-    assert seeds == [3, 4]
-    assert_same(resumed, whole)
-
-
-def test_more_batches_add_to_those_that_are_there(scene, own_cache):
-    told = []
-    few = volpath_batches(scene, batches=2, samples=4)
-    more = volpath_batches(scene, batches=4, samples=4, progress=lambda *args: told.append(args))
-    assert told == [(3, 4, "volpath"), (4, 4, "volpath")]
-    assert (few.seeds, more.seeds) == ((0, 1), (0, 1, 2, 3))
-    np.testing.assert_array_equal(more.totals[:2], few.totals)
-
-
-def test_mean_and_standard_error_are_those_of_the_batches(scene, own_cache):
-    from reference.scene import read_truth
-    from reference.volpath import volpath_batch
-
-    found = volpath_batches(scene, batches=4, samples=4, first_seed=7)
-    means = np.stack([volpath_batch(read_truth(scene), seed, 4).mean for seed in range(7, 11)])
-    np.testing.assert_allclose(found.mean, means.mean(axis=0), rtol=1e-12, atol=1e-15)
-    np.testing.assert_allclose(found.standard_error, means.std(axis=0, ddof=1) / 2, rtol=1e-9, atol=1e-12)
-    np.testing.assert_allclose(found.totals.mean(axis=0), found.mean.mean(axis=1), rtol=1e-12)
-
-
-def test_other_samples_and_seeds_are_kept_apart(scene, own_cache):
-    one = volpath_batches(scene, batches=2, samples=4)
-    two = volpath_batches(scene, batches=2, samples=5)
-    three = volpath_batches(scene, batches=2, samples=4, first_seed=2)
-    assert (one.samples, two.samples) == (4, 5)
-    assert three.seeds == (2, 3)
-    assert not np.array_equal(one.mean, three.mean)
-
-
-def test_enough_is_asked_at_every_eighth_batch(scene, own_cache):
-    asked = []
-
-    def enough(found):
-        asked.append(len(found.seeds))
-        return len(found.seeds) >= 16
-
-    assert len(volpath_batches(scene, batches=40, samples=1, enough=enough).seeds) == 16
-    assert asked == [8, 16]
-
-
-def test_damaged_batches_are_traced_again(scene, own_cache):
-    whole = volpath_batches(scene, batches=2, samples=4)
-    path = next(cache_folder().glob("volpath-*/000001.npz"))
-    path.write_bytes(path.read_bytes()[:-40])
-    assert_same(volpath_batches(scene, batches=2, samples=4), whole)
-
-
-def test_one_batch_is_refused(scene):
-    with pytest.raises(ValueError, match="at least 2"):
-        volpath_batches(scene, batches=1, samples=4)
-
-
 @pytest.fixture
 def loaded(scene):
     from validation.load import LoadedScene
@@ -213,7 +127,7 @@ def test_volpath_reference_has_layers_with_standard_errors(loaded, own_cache):
     from validation.references import volpath_reference
 
     image = volpath_reference(loaded, samples=3, seed=5)
-    found = volpath_batches(loaded.scene, batches=3, samples=1, first_seed=5)
+    found = monte_carlo_batches(loaded.scene, "volpath", batches=3, samples=1, first_seed=5).batches
     assert set(image.layers) == {"airlight", "airlight_se", "surface", "surface_se"}
     np.testing.assert_array_equal(image.layers["surface"].reshape(-1, 3), found.mean[1])
     np.testing.assert_array_equal(image.layers["airlight_se"].reshape(-1, 3), found.standard_error[0])
