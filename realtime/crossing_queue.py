@@ -52,7 +52,7 @@ def pushed(queue: Queue, quotient, gain, active):
         gains.append(dr.select(before, carried[1], g))
         carried = dr.select(before, q, carried[0]), dr.select(before, g, carried[1])
     moved = Queue([*quotients, carried[0]], [*gains, carried[1]])
-    return _either(active, moved, queue), *out
+    return dr.select(active, moved, queue), *out
 
 
 def inserted(queue: Queue, quotient, gain, active) -> Queue:
@@ -70,7 +70,7 @@ def inserted(queue: Queue, quotient, gain, active) -> Queue:
             dr.select(before, q, dr.select(same, 0, carried[0])),
             dr.select(before, g, dr.select(same, 0, carried[1])),
         )
-    return _either(active, Queue(quotients, gains), queue)
+    return dr.select(active, Queue(quotients, gains), queue)
 
 
 def popped(queue: Queue, active):
@@ -79,13 +79,4 @@ def popped(queue: Queue, active):
 
     zero = dr.zeros(type(queue.quotient[0]), 1)
     moved = Queue([*queue.quotient[1:], zero], [*queue.gain[1:], zero])
-    return _either(active, moved, queue), queue.quotient[0], queue.gain[0]
-
-
-def _either(active, one: Queue, other: Queue) -> Queue:
-    import drjit as dr
-
-    return Queue(
-        [dr.select(active, a, b) for a, b in zip(one.quotient, other.quotient)],
-        [dr.select(active, a, b) for a, b in zip(one.gain, other.gain)],
-    )
+    return dr.select(active, moved, queue), queue.quotient[0], queue.gain[0]

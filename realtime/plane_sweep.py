@@ -232,7 +232,9 @@ def _read(index: PlaneIndex, lists: Lists, ray: RayPlanes, ray_end, walk: _Walk)
 
 def _drained(ray_end, walk: _Walk) -> _Walk:
     """Behind the last plane: the next of those that wait happens."""
-    queue, at, gained = popped(walk.queue, walk.place == walk.place)
+    import mitsuba as mi
+
+    queue, at, gained = popped(walk.queue, mi.Bool(True))
     walk = _happened(replace(walk, queue=queue), at, gained, at > 0)
     return _ended(walk, ray_end, at <= 0)
 
@@ -241,15 +243,14 @@ def _from_the_start(index: PlaneIndex, walk: _Walk) -> _Walk:
     """Begin to collect, where a ray has just found that its list is not in order."""
     import drjit as dr
 
+    Float = type(walk.layers)
     fresh = walk.selecting & ~walk.started
     return replace(
         walk,
         place=dr.select(fresh, 0, walk.place),
-        layers=dr.select(fresh, type(walk.layers)(index.layers), walk.layers),
+        layers=dr.select(fresh, Float(index.layers), walk.layers),
         quotient=dr.select(fresh, dr.inf, walk.quotient),
-        queue=Queue(
-            [dr.select(fresh, 0, q) for q in walk.queue.quotient], [dr.select(fresh, 0, g) for g in walk.queue.gain]
-        ),
+        queue=dr.select(fresh, filled(0, Float, dr.width(fresh)), walk.queue),
         opened=dr.select(fresh, dr.inf, walk.opened),
         started=walk.selecting,
     )

@@ -15,6 +15,7 @@ in the order in which its middle ray crosses them.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any
 
 from realtime.diamond import diamond_angle
@@ -85,7 +86,7 @@ def tile_lists(index: PlaneIndex, rays, distance, *, order: str, square: bool) -
     of_block = listed(index, blocks, index.entries, bin_source(index, blocks), room=room)
     dr.eval(of_block)
     block = dr.arange(mi.UInt32, dr.width(tiles.x)) // TILE
-    source = Source(*(dr.gather(mi.UInt32, getattr(of_block.source, name), block) for name in Source.__annotations__))
+    source = dr.gather(Source, of_block.source, block)
     of_tile = listed(index, tiles, of_block.entries, source, room=ROOM * dr.width(tiles.x), order=order)
     dr.eval(of_tile)
     return of_tile
@@ -121,9 +122,9 @@ def tile_boxes(index: PlaneIndex, rays: Callable[[Any], tuple[Any, Any, Any]], d
     corners = (0, SIDE - 1, TILE - SIDE, TILE - 1) if square else range(TILE)
     directions = [rays(lane(k)) for k in corners]
     ends = [dr.gather(type(distance), distance, lane(k)) for k in range(TILE)]
-    low = [_fold(dr.minimum, [w[axis] for w in directions]) for axis in range(3)]
-    high = [_fold(dr.maximum, [w[axis] for w in directions]) for axis in range(3)]
-    return _box(low, high, index.distance / _fold(dr.maximum, ends))
+    low = [reduce(dr.minimum, [w[axis] for w in directions]) for axis in range(3)]
+    high = [reduce(dr.maximum, [w[axis] for w in directions]) for axis in range(3)]
+    return _box(low, high, index.distance / reduce(dr.maximum, ends))
 
 
 def block_boxes(tile: Box) -> Box:
@@ -133,28 +134,19 @@ def block_boxes(tile: Box) -> Box:
 
     count = dr.width(tile.x)
     block = dr.arange(mi.UInt32, -(-count // TILE))
-    Float = type(tile.x)
 
     def bounds(k):
         number = block * TILE + k
         number = dr.select(number < count, number, block * TILE)
-        x, y, z, x_half, y_half, z_half, end = (
-            dr.gather(Float, values, number)
-            for values in (tile.x, tile.y, tile.z, tile.x_half, tile.y_half, tile.z_half, tile.ray_end)
-        )
-        return [x - x_half, y - y_half, z - z_half], [x + x_half, y + y_half, z + z_half], end
+        box = dr.gather(Box, tile, number)
+        centre, half = (box.x, box.y, box.z), (box.x_half, box.y_half, box.z_half)
+        low, high = [c - h for c, h in zip(centre, half)], [c + h for c, h in zip(centre, half)]
+        return low, high, box.ray_end
 
     members = [bounds(k) for k in range(TILE)]
-    low = [_fold(dr.minimum, [member[0][axis] for member in members]) for axis in range(3)]
-    high = [_fold(dr.maximum, [member[1][axis] for member in members]) for axis in range(3)]
-    return _box(low, high, _fold(dr.minimum, [member[2] for member in members]))
-
-
-def _fold(function, values):
-    result = values[0]
-    for value in values[1:]:
-        result = function(result, value)
-    return result
+    low = [reduce(dr.minimum, [member[0][axis] for member in members]) for axis in range(3)]
+    high = [reduce(dr.maximum, [member[1][axis] for member in members]) for axis in range(3)]
+    return _box(low, high, reduce(dr.minimum, [member[2] for member in members]))
 
 
 def _box(low, high, ray_end) -> Box:
