@@ -70,7 +70,7 @@ def sum_crossings(
     import mitsuba as mi
 
     at_plane, at_surface = gammas
-    ray_end = ray.span / distance
+    ray_end = index.distance / distance
     width = dr.width(ray.x)
     Float = type(ray.x)
     over_surface = _layers_at_end(index, lists, ray, ray_end)
@@ -94,7 +94,7 @@ def sum_crossings(
             body=lambda draw: (_next(index, lists, ray, ray_end, draw, order),),
             labels=("draw",),
         )
-        x = dr.minimum(ray.span / dr.select(draw.factor == 0, ray.span, draw.quotient), distance)
+        x = dr.minimum(index.distance / dr.select(draw.factor == 0, index.distance, draw.quotient), distance)
         value = at_plane(draw.number, ray, x)
         draw.total = dr.select(draw.factor == 0, draw.total, keep(draw.total + draw.factor * value))
         draw.factor = Float(0)

@@ -26,7 +26,6 @@ from realtime.plane_tiles import TILE, Lists, Source, entry_at
 class RayPlanes:
     """A camera ray in the frame of an index of planes."""
 
-    span: Any  #: D [m]
     x: Any  #: direction
     y: Any
     z: Any
@@ -42,15 +41,14 @@ def in_light_frame(index: PlaneIndex, direction, low):
     return tuple(dr.dot(axis, direction) + dr.dot(axis, low) for axis in (index.x_axis, index.y_axis, index.z_axis))
 
 
-def ray_planes(index: PlaneIndex, lists: Lists, direction, low) -> RayPlanes:
-    """Return camera rays in the frame of a light, with the planes of their tiles."""
+def ray_planes(lists: Lists, x, y, z) -> RayPlanes:
+    """Return camera rays, directions in the frame of a light, with the planes of their tiles."""
     import drjit as dr
     import mitsuba as mi
 
-    x, y, z = in_light_frame(index, direction, low)
-    tile = dr.arange(mi.UInt32, dr.width(direction)) // TILE
-    source = Source(*(dr.gather(mi.UInt32, getattr(lists.source, name), tile) for name in Source.__annotations__))
-    return RayPlanes(index.distance, x, y, z, diamond_angle(x, y), source, dr.gather(mi.Bool, lists.sorted, tile))
+    tile = dr.arange(mi.UInt32, dr.width(x)) // TILE
+    source = dr.gather(Source, lists.source, tile)
+    return RayPlanes(x, y, z, diamond_angle(x, y), source, dr.gather(mi.Bool, lists.sorted, tile))
 
 
 def read_plane(index: PlaneIndex, lists: Lists, ray: RayPlanes, k, active):
@@ -116,7 +114,7 @@ def sum_lit_segments(index: PlaneIndex, lists: Lists, ray: RayPlanes, segment, i
     import mitsuba as mi
 
     x0, x1 = segment
-    ray_end = ray.span / x1
+    ray_end = index.distance / x1
 
     def loop(walk, cond, step):
         (walk,) = dr.while_loop(state=(walk,), cond=cond, body=lambda walk: (step(walk),), labels=("walk",))
@@ -139,8 +137,8 @@ def sum_lit_segments(index: PlaneIndex, lists: Lists, ray: RayPlanes, segment, i
             lambda walk: walk.selecting & ~walk.ready & ~walk.done,
             lambda walk: _collected(index, lists, ray, ray_end, walk),
         )
-        begin = dr.maximum(ray.span / walk.opened, x0)
-        value = integral(begin, dr.maximum(dr.minimum(ray.span / walk.closed, x1), begin))
+        begin = dr.maximum(index.distance / walk.opened, x0)
+        value = integral(begin, dr.maximum(dr.minimum(index.distance / walk.closed, x1), begin))
         total = dr.select(again, zero, total) + dr.select(walk.ready, value, zero)
         walk.ready = mi.Bool(False)
         walk.done |= (ray.source.count == 0) & ray.sorted

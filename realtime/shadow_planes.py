@@ -35,7 +35,7 @@ from realtime.plane_cone import cone_ring
 from realtime.plane_crossings import Buffer, sum_crossings
 from realtime.plane_index import PlaneIndex, index_planes
 from realtime.plane_mesh import mesh_gamma, surface_gamma
-from realtime.plane_sweep import in_light_frame, ray_planes, sum_lit_segments
+from realtime.plane_sweep import RayPlanes, in_light_frame, ray_planes, sum_lit_segments
 from realtime.plane_tiles import Lists, tile_lists
 from realtime.plane_view import bodies_in_view
 from realtime.scene import Scene
@@ -172,12 +172,12 @@ def shadow_planes(
             continue
         index = view.prepared[number]
         lists = tile_planes(view, index, order=order)
+        rays = ray_planes(lists, *in_light_frame(index, view.direction, view.direction_low))
         if order == "exact" and evaluation == "pixel" and buffer == "float":
-            value, reached = _segments(index, lists, airlight, differences=sum == "gamma")
+            value, reached = _segments(index, lists, rays, airlight, differences=sum == "gamma")
         else:
             at_plane, at_surface = _gammas(index, airlight, evaluation=evaluation, rows=rows)
             levels = Buffer(white) if buffer == "8bit" else None
-            rays = ray_planes(index, lists, view.direction, view.direction_low)
             value, reached = sum_crossings(
                 index, lists, rays, view.distance, (at_plane, at_surface), order=order, buffer=levels
             )
@@ -231,7 +231,7 @@ class _Airlight:
         return gamma(self.kernel, self.geometry, x, medium=self.view.medium, light=self.light)
 
 
-def _segments(index: PlaneIndex, lists: Lists, airlight: _Airlight, *, differences: bool):
+def _segments(index: PlaneIndex, lists: Lists, rays: RayPlanes, airlight: _Airlight, *, differences: bool):
     """Sum the lit segments of one light."""
     import drjit as dr
 
@@ -244,7 +244,6 @@ def _segments(index: PlaneIndex, lists: Lists, airlight: _Airlight, *, differenc
         return airlight.gamma(b) - airlight.gamma(a) if differences else airlight.integral(a, b)
 
     grey = len(view.medium.sigma_t) == 1 and not airlight.media
-    rays = ray_planes(index, lists, view.direction, view.direction_low)
     zero = dr.zeros(type(view.distance) if grey else type(view.medium.albedo), dr.width(view.distance))
     value, reached = sum_lit_segments(index, lists, rays, (x0, x1), integral, zero)
     return airlight.radiance(value), reached

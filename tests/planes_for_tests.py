@@ -118,9 +118,9 @@ def listed_planes(lists):
     """Return by tile the numbers of the planes that count, in order, and whether each is marked as full."""
     from realtime.plane_index import FIRST, FULL, NUMBER
 
-    entries = np.array(lists.entries)
+    entries, source = np.array(lists.entries), lists.source
     found = []
-    for first, count, before in zip(*(np.array(part) for part in _parts(lists.source))):
+    for first, count, before in zip(*(np.array(part) for part in (source.first, source.count, source.all_before))):
         place = np.arange(first, first + count)
         entry = entries[place]
         counts = ((entry & FIRST) != 0) | (place < before)
@@ -128,21 +128,9 @@ def listed_planes(lists):
     return found
 
 
-def _parts(source):
-    return source.first, source.count, source.all_before
-
-
 def rays_of(index, lists, ways):
     """Return the rays of a walk over lists."""
-    import drjit as dr
-    import mitsuba as mi
-
-    from realtime.diamond import diamond_angle
-    from realtime.plane_sweep import RayPlanes
-    from realtime.plane_tiles import TILE, Source
+    from realtime.plane_sweep import ray_planes
 
     Float = type(index.distance)
-    x, y, z = (Float(np.ascontiguousarray(part)) for part in ways.T)
-    tile = dr.arange(mi.UInt32, len(ways)) // TILE
-    source = Source(*(dr.gather(mi.UInt32, part, tile) for part in _parts(lists.source)))
-    return RayPlanes(index.distance, x, y, z, diamond_angle(x, y), source, dr.gather(mi.Bool, lists.sorted, tile))
+    return ray_planes(lists, *(Float(np.ascontiguousarray(part)) for part in ways.T))
