@@ -28,11 +28,7 @@ def sum_intervals(
     medium: TruthMedium, light: TruthLight, rays: Rays, lit: LitIntervals, shadow_scale: float
 ) -> tuple[Array, Array]:
     """Integrate every lit interval and add up the intervals of each ray."""
-    ray, low, high = cut_at_beam(light, rays, lit)
-    foot, height = rays.foot[ray], rays.height[ray]
-    x0 = np.maximum(foot + height * np.tan(low), 0.0)
-    x1 = np.where(high >= np.pi / 2, np.inf, foot + height * np.tan(np.minimum(high, np.pi / 2)))
-    soft = light.axis is not None and light.beam < light.cutoff
+    ray, x0, x1 = lit_stretches(light, rays, lit)
 
     def profile(x: Array, index: NDArray[np.int64]) -> Array:
         rows = ray[index]
@@ -45,21 +41,19 @@ def sum_intervals(
             values[channel], errors[channel] = values[0], errors[0]
             continue
         values[channel], errors[channel] = airlight_segments(
-            foot,
-            height,
+            rays.foot[ray],
+            rays.height[ray],
             x0,
             np.maximum(x1, x0),
             float(sigma_t),
             medium.phase,
             shadow_scale=shadow_scale,
-            weight=profile if soft else None,
+            weight=profile if light.is_soft else None,
         )
         errors[channel] += lit.edge * _edge_worth(rays, ray, (x0, x1), float(sigma_t), medium)
     factor = medium.albedo * medium.sigma_t * light.intensity / (4 * np.pi)
     pixels = len(rays.foot)
-    total = np.stack([np.bincount(ray, values[c], pixels) for c in range(3)], axis=1) * factor
-    error = np.stack([np.bincount(ray, errors[c], pixels) for c in range(3)], axis=1) * factor
-    return total, error
+    return sums_of(ray, values.T, pixels) * factor, sums_of(ray, errors.T, pixels) * factor
 
 
 def _edge_worth(
@@ -76,9 +70,23 @@ def _edge_worth(
     return total
 
 
-def cut_at_beam(light: TruthLight, rays: Rays, lit: LitIntervals) -> tuple[NDArray[np.int64], Array, Array]:
+def sums_of(owner: NDArray[np.int64], values: Array, count: int) -> Array:
+    """Add up the rows of values, (n, columns), that belong to each of so many owners, (count, columns)."""
+    return np.stack([np.bincount(owner, column, count) for column in values.T], axis=1)
+
+
+def lit_stretches(light: TruthLight, rays: Rays, lit: LitIntervals) -> tuple[NDArray[np.int64], Array, Array]:
+    """Return rays and distances of both ends of the lit intervals [m], cut where a soft spot has kinks."""
+    ray, low, high = _cut_at_beam(light, rays, lit)
+    foot, height = rays.foot[ray], rays.height[ray]
+    x0 = np.maximum(foot + height * np.tan(low), 0.0)
+    x1 = np.where(high >= np.pi / 2, np.inf, foot + height * np.tan(np.minimum(high, np.pi / 2)))
+    return ray, x0, x1
+
+
+def _cut_at_beam(light: TruthLight, rays: Rays, lit: LitIntervals) -> tuple[NDArray[np.int64], Array, Array]:
     """Cut the intervals at the cone of full intensity, where the profile of a soft spot has its kinks."""
-    if light.axis is None or light.beam >= light.cutoff:
+    if not light.is_soft:
         return lit.ray, lit.low, lit.high
     inner0, inner1 = cone_interval(rays.direction[lit.ray], rays.normal[lit.ray], light, light.beam)
     # Where the ray misses the beam the profile is smooth but for the middle of the cone, where it peaks: cut there.

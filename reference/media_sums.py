@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from analytic.kronrod import KRONROD_AND_GAUSS, NODES
 from reference.bounds import Ball, ball_crossings, crossed_facets
 from reference.cone import falloff
-from reference.interval_sums import Rays, cut_at_beam
+from reference.interval_sums import Rays, lit_stretches, sums_of
 from reference.intervals import LitIntervals
 from reference.media import Segments
 from reference.media_pieces import Pieces, Setup, cut_pieces
@@ -65,10 +65,7 @@ def sum_media(
         medium that scatters.
     """
     setup = Setup(truth, light, rays, segments, shadow_scale, lit.edge)
-    ray, low, high = cut_at_beam(light, rays, lit)
-    foot, height = rays.foot[ray], rays.height[ray]
-    x0 = np.maximum(foot + height * np.tan(low), 0.0)
-    x1 = np.where(high >= np.pi / 2, np.inf, foot + height * np.tan(np.minimum(high, np.pi / 2)))
+    ray, x0, x1 = lit_stretches(light, rays, lit)
     total, bound = np.zeros((len(rays.foot), 3)), np.zeros((len(rays.foot), 3))
     for first in range(0, len(rays.foot), _RAYS):
         chosen = (ray >= first) & (ray < first + _RAYS) & (x1 > x0)
@@ -133,8 +130,8 @@ class _Sum:
         panels = self.evaluate(*self.first_panels())
         for _ in range(_HALVINGS):
             ray = owner[panels.piece]
-            allowed = RTOL * self.by_ray(ray, panels.value)
-            missed = self.by_ray(ray, panels.error) > allowed
+            allowed = RTOL * sums_of(ray, panels.value, self.count)
+            missed = sums_of(ray, panels.error, self.count) > allowed
             share = allowed / np.maximum(np.bincount(ray, minlength=self.count), 1)[:, None]
             halve = np.any(missed[ray] & (panels.error > share[ray]) & (panels.error > panels.noise), axis=1)
             if not halve.any():
@@ -145,13 +142,10 @@ class _Sum:
             kept = panels[~halve]
             panels = _Panels(*(np.concatenate([getattr(p, f.name) for p in (kept, halves)]) for f in fields(_Panels)))
         ray = owner[panels.piece]
-        value = self.by_ray(ray, panels.value)
-        error = self.by_ray(ray, panels.error + panels.noise) + self.by_ray(owner, self.edge_error())
-        meets = self.by_ray(owner, np.repeat(self.meets_light()[:, None], 3, axis=1) * self.factor) > 0
+        value = sums_of(ray, panels.value, self.count)
+        error = sums_of(ray, panels.error + panels.noise, self.count) + sums_of(owner, self.edge_error(), self.count)
+        meets = sums_of(owner, self.meets_light()[:, None] * self.factor, self.count) > 0
         return np.where(meets, np.inf, value), np.where(meets, np.inf, error)
-
-    def by_ray(self, ray: Index, values: Array) -> Array:
-        return np.stack([np.bincount(ray, values[:, c], self.count) for c in range(3)], axis=1)
 
     def meets_light(self) -> NDArray[np.bool_]:
         near = self.setup.rays.height[self.pieces.ray] < _AT_LIGHT
@@ -203,7 +197,7 @@ class _Sum:
                 chosen = numbers == number
                 result[chosen] = phase(-sine[chosen])
         light = self.setup.light
-        if light.axis is not None and light.beam < light.cutoff:
+        if light.is_soft:
             result *= falloff(np.arctan2(s, self.height[rows, None]), *self.axes(rows), light)
         return result
 

@@ -33,6 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.camera import film_directions, pixel_centres
+from reference.interval_sums import sums_of
 from reference.intervals import Certificate
 from reference.quadrature import Progress, RayValues, TruthImage, image_of, ray_values
 from reference.scene import TruthScene
@@ -264,13 +265,11 @@ def _to_cut(all_squares: _Squares, found: _Squares, floor: Array, tolerance: flo
 
 def _summed(squares: _Squares, pixels: int) -> tuple[Array, Array, Array]:
     """Add up the squares of each pixel: values, errors, bounds."""
-
-    def summed(parts: Array) -> Array:
-        return np.stack([np.bincount(squares.pixel, column, pixels) for column in parts.T], axis=1)
-
-    edge = squares.edge[:, None]
-    smooth, open_edges = summed(np.where(edge, 0, squares.error)), summed(np.where(edge, squares.error, 0) ** 2)
-    return summed(squares.value), smooth + _SIGMAS * np.sqrt(open_edges), summed(squares.bound)
+    pixel, edge = squares.pixel, squares.edge[:, None]
+    smooth = sums_of(pixel, np.where(edge, 0, squares.error), pixels)
+    open_edges = sums_of(pixel, np.where(edge, squares.error, 0) ** 2, pixels)
+    error = smooth + _SIGMAS * np.sqrt(open_edges)
+    return sums_of(pixel, squares.value, pixels), error, sums_of(pixel, squares.bound, pixels)
 
 
 def _chosen(squares: _Squares, which: Bools) -> _Squares:

@@ -30,6 +30,11 @@ class TruthLight:
     cutoff: float = np.pi  #: spot: half angle of the cone [rad]
     beam: float = np.pi  #: spot: half angle of full intensity [rad]
 
+    @property
+    def is_soft(self) -> bool:
+        """Whether the intensity falls off between beam and cut-off."""
+        return self.axis is not None and self.beam < self.cutoff
+
 
 @dataclass(frozen=True)
 class TruthMedium:
