@@ -2,7 +2,6 @@
 """Tables 1 and 2 of Biri 2006 beside our own figures, for a terminal, a README and as JSON."""
 
 from collections.abc import Sequence
-from dataclasses import asdict
 from typing import Any
 
 from reports.bench_tables import print_heading, print_markdown, rate
@@ -16,8 +15,8 @@ def rows_data(rows: Sequence, costs: Sequence) -> dict[str, Any]:
 
     return {
         "stages": list(STAGES),
-        "rows": [plain(asdict(row)) | {"shares": [float(share) for share in row.shares]} for row in rows],
-        "needless": [plain(asdict(cost)) for cost in costs],
+        "rows": [plain(row) | {"shares": [float(share) for share in row.shares]} for row in rows],
+        "needless": plain(costs),
     }
 
 

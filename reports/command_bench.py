@@ -68,7 +68,7 @@ def bench(
 
 
 def _bench_scene(name: str, pixels, chosen, *, with_truth: bool, tell) -> dict:
-    from reports.data import agreement_data, measurement_data
+    from reports.data import measurement_data, plain
     from validation.agreement import agreements
     from validation.bench import bench as run
     from validation.load import load_scene
@@ -87,7 +87,7 @@ def _bench_scene(name: str, pixels, chosen, *, with_truth: bool, tell) -> dict:
         compared = agreements(
             small, EFFORTS["default"].margins, progress=lambda done, what: tell(share + (1 - share) * done, what)
         )
-        agreed = {name: agreement_data(one) for name, one in compared.items()}
+        agreed = plain(compared)
     size = [camera.width, camera.height] if camera else None
     return {"name": loaded.name, "size": size, "methods": rows, "agreement": agreed}
 

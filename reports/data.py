@@ -7,12 +7,10 @@ these with `times` [ms], `error` (airlight) and `surface_error`, and the files w
 the effort includes them. Not-a-number is null.
 """
 
-from collections.abc import Sequence
 from dataclasses import asdict, is_dataclass
 from typing import Any
 
 from realtime.plan import describe
-from validation.agreement import Agreement
 from validation.bench import Measurement, knows_shadows
 from validation.metrics import plain as plain_value
 from validation.study import SceneStudy
@@ -59,15 +57,10 @@ def scene_data(study: SceneStudy) -> dict[str, Any]:
                 "left": truth.left,
             }
         ),
-        "agreement": {name: agreement_data(one) for name, one in study.agreement.items()},
+        "agreement": plain(study.agreement),
         "multiple": plain(study.multiple),
         "methods": [measurement_data(one) for one in study.measurements],
     }
-
-
-def agreement_data(agreed: Agreement) -> dict[str, Any]:
-    """Return the comparison of one layer with one estimator."""
-    return plain(agreed)
 
 
 def measurement_data(measured: Measurement) -> dict[str, Any]:
@@ -85,11 +78,6 @@ def measurement_data(measured: Measurement) -> dict[str, Any]:
         "flip": measured.flip.to_json() if measured.flip else None,
         "files": {},
     }
-
-
-def stability_data(kernels: Sequence[Any]) -> list[dict[str, Any]]:
-    """Return what `validation.stability.stability` found, in full."""
-    return plain(list(kernels))
 
 
 def mutations_data(study: Any) -> dict[str, Any]:

@@ -71,7 +71,7 @@ def write_frames(
         "prepare_ms": prepared,
         "stages_ms": stages,
         "recordings": {name: getattr(getattr(renderer, name), "n_recordings", 0) for name in ("surface", "airlight")},
-        "files": [str(path) for path in _files(outputs, frames, frames)],
+        "files": [str(path) for path in _files(outputs, frames)],
     }
 
 
@@ -104,9 +104,9 @@ def write_frame(
     return factor
 
 
-def _files(outputs: dict[str, Path | None], done: int, frames: int) -> Sequence[Path]:
+def _files(outputs: dict[str, Path | None], frames: int) -> Sequence[Path]:
     paths = [path for path in outputs.values() if path is not None]
-    return [numbered(path, number, frames) for path in paths for number in range(1, done + 1)]
+    return [numbered(path, number, frames) for path in paths for number in range(1, frames + 1)]
 
 
 def _kept(outputs: dict[str, Path | None], done: int, frames: int) -> str:

@@ -4,7 +4,7 @@
 import json
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -14,15 +14,14 @@ import numpy as np
 from analytic.errors import InputError
 from reference.exr import write_exr
 from reference.files import ensure_folder, write_text
-from reports.data import SCHEMA, claims, mutations_data, scene_data, stability_data
+from reports.data import SCHEMA, claims, mutations_data, plain, scene_data
 from reports.environment import describe_environment, stamped
 from reports.page import render_page
 from reports.pictures import error_map, exposure, tone_mapped, write_png
+from reports.progress import Progress
 from validation.configurations import STANDARD, Configuration
 from validation.references import layered_frame, layered_truth
 from validation.study import Effort, SceneStudy, study_scene
-
-Progress = Callable[[float, str], None]
 
 
 def write_report(
@@ -77,7 +76,7 @@ def write_report(
     if effort.rays:
         from validation.stability import stability
 
-        kernels = stability_data(stability(count=effort.rays))
+        kernels = plain(stability(count=effort.rays))
     mutations = None
     if effort.mutations:
         from validation.mutations import study_mutations

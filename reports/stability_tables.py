@@ -4,14 +4,13 @@
 from typing import TYPE_CHECKING
 
 from reports.tables import number, print_table
+from validation.kernel_errors import EPSILON, Errors
 
 if TYPE_CHECKING:
-    from validation.kernel_errors import Errors
     from validation.plane_stability import PlaneStability
     from validation.stability import KernelStability, SetStability
 
 _HEADERS = ("rays", "count", "refused", "float32", "median", "99 %", "NaN/Inf/<0", "float64", "NaN/Inf/<0", "32 vs 64")
-_EPSILON = {"single": 2.0**-23, "double": 2.0**-52}
 
 
 def print_stability(found: "list[KernelStability]", *, certified: bool) -> None:
@@ -68,11 +67,11 @@ def print_plane_stability(found: "list[PlaneStability]", broken: list[str]) -> N
         print(f"BROKEN: shadow planes, {words}")
 
 
-def boost(errors: "Errors", precision: str) -> str:
+def boost(errors: Errors, precision: str) -> str:
     """Return 'Max = 3.2ε (Mean = 0.4ε)', a dash where nothing was compared."""
     if errors.max is None or errors.mean is None:
         return "-"
-    epsilon = _EPSILON[precision]
+    epsilon = EPSILON[precision]
     return f"Max = {number(errors.max / epsilon)}ε (Mean = {number(errors.mean / epsilon)}ε)"
 
 
@@ -92,7 +91,7 @@ def _row(one: "SetStability", group: str) -> tuple[str, ...]:
     )
 
 
-def _counts(errors: "Errors") -> str:
+def _counts(errors: Errors) -> str:
     counts = (errors.nan, errors.infinite, errors.negative)
     return "/".join(map(str, counts)) if any(counts) else ""
 
