@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.files import write_bytes
+from validation.colour_difference import auto_exposure
 
 Picture = NDArray[np.uint8]
 
@@ -15,10 +16,8 @@ ERROR_FLOOR, ERROR_CEILING = 1e-4, 1.0  #: relative errors where the scale of th
 
 
 def exposure(reference: NDArray[np.float64]) -> float:
-    """Return the factor that brings the 99th percentile of the finite pixels of a reference to 0.9."""
-    values = reference[np.isfinite(reference)]
-    bright = float(np.percentile(values, 99)) if values.size else 0.0
-    return 0.9 / bright if bright > 0 else 1.0
+    """Return the factor that brings the 99th percentile of the finite values of a reference to 0.9; 1 for black."""
+    return float(np.exp2(auto_exposure(reference)))
 
 
 def tone_mapped(radiance: NDArray[np.float64], factor: float) -> Picture:
