@@ -22,7 +22,6 @@ paper; the median is of the positive values, for half of an image may lie in the
 The number depends a little on the operating system (the project's note on precision): compare it to 1e-5, no closer.
 """
 
-import os
 import subprocess
 import sys
 import tempfile
@@ -194,7 +193,6 @@ def _in_child(inputs: dict[str, Any], timeout: float) -> NDArray[np.float32] | s
                 errors="replace",
                 stdin=subprocess.DEVNULL,
                 timeout=timeout,
-                env=dict(os.environ),
             )
         except subprocess.TimeoutExpired:
             return f"flip-evaluator did not answer within {timeout:g} s and was ended"
