@@ -155,12 +155,12 @@ def _integrals(scene: FogScene, light: FogLight, ray: tuple[Vector, Vector], par
     faint = plain
     if light.beam < light.cutoff:
         (axis, _), *_ = spot_cones(light)
-        normal = cross(d, across)  # from the light to the foot point: d x (t x d) = t - (t . d) d, sign turned below
+        normal = cross(across, d)  # from the light to the foot point: (t x d) x d = (t . d) d - t
         faint = SpotPhase(
             scene.phase,
             g=scene.g,
             axial=dot(axis, d),
-            across=-dot(axis, normal) / height,
+            across=dot(axis, normal) / height,
             angles=(light.beam, light.cutoff),
         )
     found: list[Number] = []
@@ -201,9 +201,8 @@ def _rounded(value: Number) -> tuple[str, str]:
     exponent = int(mp.floor(mp.log10(value)))
     bound = mpf(10) ** (exponent + 1 - DIGITS) / 2 + value * mpf("1e-14")
     mantissa = mp.ceil(bound * mpf(10) ** (1 - (exponent - DIGITS)))
-    return mp.nstr(
-        value, DIGITS, min_fixed=0, max_fixed=0, strip_zeros=False
-    ), f"{int(mantissa)}e{exponent - DIGITS - 1}"
+    word = mp.nstr(value, DIGITS, min_fixed=0, max_fixed=0, strip_zeros=False)
+    return word, f"{int(mantissa)}e{exponent - DIGITS - 1}"
 
 
 def certified_data(scenes: Sequence[FogScene] | None = None, *, progress: Progress | None = None) -> dict[str, Any]:

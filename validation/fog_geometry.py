@@ -159,7 +159,7 @@ def _crossed(shape: Occluder, start: Vector, step: Vector, longest: Number) -> t
     if isinstance(shape, FogBall):
         towards = minus(start, vector(shape.centre))
         half, length = dot(towards, step), dot(step, step)
-        inner = half * half - length * (dot(towards, towards) - shape.radius * mp.mpf(shape.radius))
+        inner = half * half - length * (dot(towards, towards) - mp.mpf(shape.radius) ** 2)
         if inner <= 0:
             return None
         low, high = (-half - mp.sqrt(inner)) / length, (-half + mp.sqrt(inner)) / length
@@ -193,9 +193,11 @@ def _coordinates(edges: Sequence[Vector], point: Vector) -> list[Number]:
 
 def _shadow_crossings(shape: Occluder, place: Vector, start: Vector, direction: Vector) -> list[Number]:
     """Return where a ray crosses the cone or the planes that bound a shadow; `start` is its origin from the light."""
+    from mpmath import mpf
+
     if isinstance(shape, FogBall):
         v = minus(vector(shape.centre), place)
-        return _cone_crossings(start, direction, v, dot(v, v) - vector([shape.radius] * 3)[0] ** 2)
+        return _cone_crossings(start, direction, v, dot(v, v) - mpf(shape.radius) ** 2)
     found = []
     for one, other in _edges(shape, place):
         normal = cross(one, other)

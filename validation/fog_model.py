@@ -126,9 +126,8 @@ def _shape_dict(shape: FogBall | FogBox | FogScreen) -> dict[str, Any]:
         return {"type": "sphere", "center": list(shape.centre), "radius": shape.radius, "bsdf": _BLACK}
     columns = [*shape.half_edges, shape.centre]
     if isinstance(shape, FogScreen):
-        u, v = shape.half_edges
-        normal = (u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0])
-        columns.insert(2, tuple(float(np.float32(value)) for value in unit(normal)))
+        normal = unit(np.cross(*shape.half_edges).tolist())
+        columns.insert(2, tuple(float(np.float32(value)) for value in normal))
     rows = [[column[axis] for column in columns] for axis in range(3)]
     kind = "cube" if isinstance(shape, FogBox) else "rectangle"
     return {"type": kind, "to_world": _transform([*rows, [0.0, 0.0, 0.0, 1.0]]), "bsdf": _BLACK}

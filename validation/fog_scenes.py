@@ -27,11 +27,7 @@ def _look(origin: Sequence[float], target: Sequence[float]) -> Matrix:
     place = _grid(origin)
     forward = unit([t - o for t, o in zip(target, place)])
     left = unit([-forward[1], forward[0], 0.0])  # +z cross forward
-    up = [
-        forward[1] * left[2] - forward[2] * left[1],
-        forward[2] * left[0] - forward[0] * left[2],
-        forward[0] * left[1] - forward[1] * left[0],
-    ]
+    up = np.cross(forward, left)
     rows = [[float(np.float32(column[axis])) for column in (left, up, forward, place)] for axis in range(3)]
     return (*(tuple(row) for row in rows), (0.0, 0.0, 0.0, 1.0))
 
