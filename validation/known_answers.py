@@ -230,10 +230,7 @@ def absorbing_ball(estimator: str = "quadrature") -> KnownAnswer:
     images = []
     for one in (empty, ball):
         truth = read_truth(load_fog(clear | {"ball": one}))
-        if estimator == "quadrature":
-            images.append(quadrature_image(truth).surface.reshape(-1, 3))
-        else:
-            images.append(single_scatter_batch(truth, 1, _SAMPLES).mean[1])
+        images.append(_layers(truth, estimator)[1])
     towards = centre - truth.origin
     closest = np.linalg.norm(np.cross(towards, truth.direction), axis=1)
     chord = 2 * np.sqrt(np.maximum(radius**2 - closest**2, 0))
@@ -247,13 +244,7 @@ def enclosed(estimator: str = "quadrature") -> KnownAnswer:
     light = FogLight((0.125, 0.25, 1.0), (8.0, 8.0, 8.0))
     box = FogBox((0.125, 0.25, 1.0), ((0.25, 0.0625, 0.0), (-0.0625, 0.25, 0.03125), (0.0, 0.0, 0.25)))
     scene = replace(base_scene(), lights=(light,), occluders=(*base_scene().occluders[:1], box))
-    truth = read_truth(load_fog(_white(mitsuba_dict(scene))))
-    if estimator == "quadrature":
-        image = quadrature_image(truth)
-        most = max(image.airlight.max(), image.surface.max())
-    else:
-        batch = single_scatter_batch if estimator == "single-scatter" else volpath_batch
-        most = np.abs(batch(truth, 1, _SAMPLES).mean).max()
+    most = np.abs(_layers(read_truth(load_fog(_white(mitsuba_dict(scene)))), estimator)).max()
     return KnownAnswer("a light in a closed box", estimator, float(most), 0.0, "exactly zero, surfaces included")
 
 
@@ -263,11 +254,16 @@ def _compared(name: str, estimator: str, one: FogScene, other: FogScene, *, fact
 
 
 def _airlight(scene: FogScene, estimator: str) -> Array:
-    truth = read_truth(load_fog(mitsuba_dict(scene)))
+    return _layers(read_truth(load_fog(mitsuba_dict(scene))), estimator)[0]
+
+
+def _layers(truth: TruthScene, estimator: str) -> Array:
+    """Return airlight and surface by an estimator, (2, pixels, 3)."""
     if estimator == "quadrature":
-        return quadrature_image(truth).airlight.reshape(-1, 3)
+        image = quadrature_image(truth)
+        return np.stack([image.airlight, image.surface]).reshape(2, -1, 3)
     batch = single_scatter_batch if estimator == "single-scatter" else volpath_batch
-    return batch(truth, 1, _SAMPLES).mean[0]
+    return batch(truth, 1, _SAMPLES).mean
 
 
 def _difference(found: Array, expected: Array) -> float:
