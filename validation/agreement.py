@@ -15,14 +15,18 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from reference.batches import LAYERS, Batches
 from reference.epsilon import measure_shadow_epsilon
-from reference.scene import read_truth
+from reference.quadrature import TruthImage
+from reference.scene import TruthScene, read_truth
 from validation.monte_carlo import monte_carlo_batches
 from validation.statistics import Estimate, Statistics, compare_statistics
 from validation.truth import truth_image
 
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 Progress = Callable[[int, int, str], None]
 
 MASK_PIXELS = 2.0
@@ -81,12 +85,13 @@ def agreement(
     epsilon = measure_shadow_epsilon() if estimator == "volpath" else 0.0
     plain = truth_image(scene)
     shortened = truth_image(scene, shadow_scale=1 - epsilon) if epsilon else plain
-    near = plain.light_angle <= MASK_PIXELS * pixel_angle(scene)
-    masks = {"airlight": ~near & np.all(np.isfinite(plain.airlight), axis=2), "surface": np.ones_like(near)}
+    masks = layer_masks(read_truth(scene), plain)
     layers = [layer for layer in LAYERS if np.any(getattr(plain, layer) > 0)]
 
     def compared(found: Batches, layer: str) -> Statistics:
-        return _statistics(getattr(shortened, layer), found, layer, mask=masks[layer], margin=margin)
+        mask = masks[layer]
+        test = batch_estimate(found, layer, mask)
+        return compare_statistics(Estimate(getattr(shortened, layer)), test, mask=mask, margin=margin)
 
     expected = least = _LEAST_BATCHES[estimator]
 
@@ -94,7 +99,7 @@ def agreement(
         nonlocal expected
         if not layers:
             return True
-        widest = max(_half_width(compared(found, layer)) for layer in layers) / (0.4 * margin)
+        widest = max(0.5 * np.ptp(widest_interval(compared(found, layer))) for layer in layers) / (0.4 * margin)
         done = len(found.seeds)
         # The width falls with the square root of the batches: that is when this will be over.
         expected = max(least, round(done * widest**2) if np.isfinite(widest) else batches)
@@ -161,31 +166,41 @@ def agreements(
     return found
 
 
-def _statistics(expected, found: Batches, layer: str, *, mask, margin: float) -> Statistics:
+def _bias(expected: Array, found: Batches, layer: str, mask: Mask) -> float:
+    return float(layer_mean(found, layer, mask)[mask].sum() / expected[mask].sum() - 1)
+
+
+def layer_masks(truth: TruthScene, image: TruthImage) -> dict[str, Mask]:
+    """Return the pixels to compare, by layer, (height, width): of the airlight those whose ray keeps off the lights."""
+    near = image.light_angle <= MASK_PIXELS * pixel_angle(truth)
+    return {"airlight": ~near & np.isfinite(image.airlight).all(axis=2), "surface": np.ones_like(near)}
+
+
+def layer_mean(batches: Batches, layer: str, mask: Mask) -> Array:
+    """Return the mean image of a layer, (height, width, 3), for a mask of the whole image."""
+    return batches.mean[LAYERS.index(layer)].reshape(*mask.shape, 3)
+
+
+def batch_estimate(batches: Batches, layer: str, mask: Mask) -> Estimate:
+    """Return a layer of some batches as one side of a comparison of the pixels of a mask."""
     number = LAYERS.index(layer)
-    test = Estimate(
-        found.mean[number].reshape(expected.shape),
-        found.standard_error[number].reshape(expected.shape),
-        len(found.seeds),
+    return Estimate(
+        layer_mean(batches, layer, mask),
+        batches.standard_error[number].reshape(*mask.shape, 3),
+        len(batches.seeds),
         # The batch means are those of whole images.
-        found.totals[:, number] if mask.all() else None,
+        batches.totals[:, number] if mask.all() else None,
     )
-    return compare_statistics(Estimate(expected), test, mask=mask, margin=margin)
 
 
-def _half_width(statistics: Statistics) -> float:
-    intervals = [statistics.relative_bias_ci, statistics.relative_bias_ci_batches]
-    return max(0.5 * (pair[1] - pair[0]) for pair in intervals if pair is not None)
+def widest_interval(found: Statistics) -> tuple[float, float]:
+    """Return the wider of the 95 % intervals of the relative bias."""
+    intervals = [found.relative_bias_ci, found.relative_bias_ci_batches]
+    return max((pair for pair in intervals if pair is not None), key=lambda pair: pair[1] - pair[0])
 
 
-def _bias(expected, found: Batches, layer: str, mask) -> float:
-    mean = found.mean[LAYERS.index(layer)].reshape(expected.shape)
-    return float(mean[mask].sum() / expected[mask].sum() - 1)
-
-
-def pixel_angle(scene) -> float:
+def pixel_angle(truth: TruthScene) -> float:
     """Return the angle between the two pixels in the middle of the image [rad]."""
-    truth = read_truth(scene)
     middle = (truth.height // 2) * truth.width + truth.width // 2
     beside = middle - 1 if truth.width > 1 else middle
     return float(np.arccos(np.clip(truth.direction[middle] @ truth.direction[beside], -1, 1)))

@@ -107,7 +107,7 @@ def near_light(scene) -> NDArray[np.bool_]:
     """Return which pixels' rays pass a light that they see within `MASK_PIXELS` pixel widths, (pixels,)."""
     truth = read_truth(scene)
     distance = surface_hits(truth).distance
-    widest = MASK_PIXELS * pixel_angle(scene)
+    widest = MASK_PIXELS * pixel_angle(truth)
     near = np.zeros(len(truth.direction), dtype=bool)
     for light in truth.lights:
         origin = np.broadcast_to(truth.origin, truth.direction.shape)

@@ -21,7 +21,8 @@ from reference.batches import LAYERS, Batches, merged
 from reference.scene import TruthScene, read_truth
 from reference.single_scatter import single_scatter_batch
 from reference.volpath import volpath_batch
-from validation.agreement import MASK_PIXELS, pixel_angle
+from validation.agreement import layer_masks
+from validation.load import resize
 from validation.scenes.open_fog import open_fog
 from validation.scenes.parts import fog
 from validation.truth import truth_image
@@ -128,8 +129,8 @@ def scene_efficiency(scene, *, samples: int = 64, batches: int = 8) -> Efficienc
         Of each.
     """
     truth, image = read_truth(scene), truth_image(scene)
-    mask = (image.light_angle > MASK_PIXELS * pixel_angle(scene)) & np.all(np.isfinite(image.airlight), axis=2)
     estimators = {"single-scatter": (single_scatter_batch, samples), "volpath": (volpath_batch, samples)}
+    mask = layer_masks(truth, image)["airlight"]
     return efficiency(truth, estimators, image.airlight, mask=mask, batches=batches)
 
 
@@ -144,9 +145,9 @@ def thin_fog(size: tuple[int, int]):
     lamp = np.array(description["lamp"]["position"])
     distance = float(np.linalg.norm(lamp - np.array(description["sensor"]["to_world"].matrix)[:3, 3]))
     description["fog"] = fog(0.2 / distance, (0.93, 0.87, 0.78))
-    film = description["sensor"]["film"]
-    film["width"], film["height"] = size
-    return mi.load_dict(description)
+    scene = mi.load_dict(description)
+    resize(scene, size)
+    return scene
 
 
 def _cost(name: str, runs: list[Batches], seconds: float, where: tuple[int, Array, NDArray[np.bool_]]) -> EstimatorCost:

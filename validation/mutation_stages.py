@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.batches import LAYERS, Batches, merged
+from reference.batches import Batches, merged
 from reference.epsilon import measure_shadow_epsilon
 from reference.quadrature import TruthImage
-from reference.scene import TruthScene
-from validation.agreement import MASK_PIXELS, pixel_angle
-from validation.load import load_scene
+from reference.scene import TruthScene, read_truth
+from validation.agreement import batch_estimate, layer_masks, widest_interval
+from validation.load import load_scene, resize
 from validation.monte_carlo import monte_carlo_batches
 from validation.probe_scenes import PROBES
 from validation.statistics import Estimate, Statistics, compare_statistics
@@ -58,9 +58,9 @@ def loaded_stage(name: str, size: tuple[int, int]):
 
     if name not in PROBES:
         return load_scene(name, size).scene
-    dictionary = PROBES[name]()
-    dictionary["sensor"]["film"] |= {"width": size[0], "height": size[1]}
-    return mi.load_dict(dictionary)
+    scene = mi.load_dict(PROBES[name]())
+    resize(scene, size)
+    return scene
 
 
 def stage_of(name: str, scene, *, margin: float) -> Stage:
@@ -70,8 +70,7 @@ def stage_of(name: str, scene, *, margin: float) -> Stage:
     `validation.agreement`: a rule that looks at the spread alone, so that stopping favours no verdict.
     """
     truth = truth_image(scene)
-    near = truth.light_angle <= MASK_PIXELS * pixel_angle(scene)
-    masks = {"airlight": ~near & np.isfinite(truth.airlight).all(axis=2), "surface": np.ones_like(near)}
+    masks = layer_masks(read_truth(scene), truth)
     masks = {layer: mask for layer, mask in masks.items() if np.any(getattr(truth, layer) > 0)}
 
     def volpath(found: Batches) -> Opponent:
@@ -84,7 +83,7 @@ def stage_of(name: str, scene, *, margin: float) -> Stage:
         if len(opponent.batches.seeds) < _LEAST:
             return False
         compared = (image_statistics(opponent, layer, getattr(truth, layer), mask) for layer, mask in masks.items())
-        return all(0.5 * np.ptp(widest(one)) < 0.4 * opponent.margin for one in compared)
+        return all(0.5 * np.ptp(widest_interval(one)) < 0.4 * opponent.margin for one in compared)
 
     shadow_scale = 1 - measure_shadow_epsilon()
     shortened = truth_image(scene, shadow_scale=shadow_scale)
@@ -119,33 +118,12 @@ def distance_batches(batch: Batch, truth: TruthScene, count: int) -> Batches:
 
 def image_statistics(opponent: Opponent, layer: str, image: Array, mask: NDArray[np.bool_]) -> Statistics:
     """Compare a quadrature image that may be changed with the batches of an opponent."""
-    estimate = _estimate(opponent.batches, layer, mask)
+    estimate = batch_estimate(opponent.batches, layer, mask)
     return compare_statistics(estimate, Estimate(image), mask=mask, margin=opponent.margin)
 
 
 def batch_statistics(opponent: Opponent, layer: str, batches: Batches, mask: NDArray[np.bool_]) -> Statistics:
     """Compare batches that may be changed with the quadrature image of an opponent."""
     image = getattr(opponent.image, layer)
-    return compare_statistics(Estimate(image), _estimate(batches, layer, mask), mask=mask, margin=opponent.margin)
-
-
-def layer_mean(batches: Batches, layer: str, mask: NDArray[np.bool_]) -> Array:
-    """Return the mean image of a layer, (height, width, 3)."""
-    return batches.mean[LAYERS.index(layer)].reshape(*mask.shape, 3)
-
-
-def _estimate(batches: Batches, layer: str, mask: NDArray[np.bool_]) -> Estimate:
-    number = LAYERS.index(layer)
-    return Estimate(
-        layer_mean(batches, layer, mask),
-        batches.standard_error[number].reshape(*mask.shape, 3),
-        len(batches.seeds),
-        # The batch means are those of whole images.
-        batches.totals[:, number] if mask.all() else None,
-    )
-
-
-def widest(found: Statistics) -> tuple[float, float]:
-    """Return the wider of the 95 % intervals of the relative bias."""
-    intervals = [found.relative_bias_ci, found.relative_bias_ci_batches]
-    return max((pair for pair in intervals if pair is not None), key=lambda pair: pair[1] - pair[0])
+    estimate = batch_estimate(batches, layer, mask)
+    return compare_statistics(Estimate(image), estimate, mask=mask, margin=opponent.margin)

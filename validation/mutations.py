@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from validation.agreement import layer_mean, widest_interval
 from validation.module_copies import ModuleCopies, module_source, replaced_once
 from validation.mutation import TOPS, Mutation
 from validation.mutation_catalogue import MUTATIONS
@@ -23,10 +24,8 @@ from validation.mutation_stages import (
     batch_statistics,
     distance_batches,
     image_statistics,
-    layer_mean,
     loaded_stage,
     stage_of,
-    widest,
 )
 from validation.probe_scenes import PROBES
 from validation.statistics import Statistics
@@ -176,7 +175,7 @@ def _change(image: Array, unchanged: Array, mask: NDArray[np.bool_]) -> tuple[fl
 
 
 def _sighting(stage: Stage, layer: str, against: str, found: Statistics, change: tuple[float, int]) -> Sighting:
-    (true_bias, nonfinite), interval, margin = change, widest(found), found.margin or 0.0
+    (true_bias, nonfinite), interval, margin = change, widest_interval(found), found.margin or 0.0
     return Sighting(
         scene=stage.name,
         built_in=stage.name in SCENES,

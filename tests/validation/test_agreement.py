@@ -4,6 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from reference.scene import read_truth
 from tests.scenes_for_tests import tiny_scene
 from validation.agreement import MASK_PIXELS, agreement, pixel_angle
 
@@ -89,16 +90,16 @@ def test_correction_for_the_epsilon_is_the_difference_of_the_two_biases(scene):
 def test_pixels_near_a_light_are_left_out(scene):
     from validation.truth import truth_image
 
-    near = truth_image(scene).light_angle <= MASK_PIXELS * pixel_angle(scene)
+    near = truth_image(scene).light_angle <= MASK_PIXELS * pixel_angle(read_truth(scene))
     found = agreement(scene, **BUDGET)
     assert found["airlight"].masked == near.sum()
     assert 4 <= near.sum() <= 16  # a disc of two pixels' radius
     assert found["surface"].masked == 0
 
 
-def testpixel_angle_is_that_of_the_middle(scene):
+def test_pixel_angle_is_that_of_the_middle(scene):
     # 49 degrees over 24 pixels; the tangent is linear to 1e-3 at the centre.
-    assert pixel_angle(scene) == pytest.approx(2 * np.tan(np.deg2rad(24.5)) / 24, rel=2e-3)
+    assert pixel_angle(read_truth(scene)) == pytest.approx(2 * np.tan(np.deg2rad(24.5)) / 24, rel=2e-3)
 
 
 def test_scene_without_surfaces_has_the_airlight_alone(variant):

@@ -83,7 +83,7 @@ def test_single_scatter_against_volpath(variant):
     scene = mi.load_dict(tiny_scene(ball=None, floor=None, fog=fog, size=(32, 24)))
     truth = read_truth(scene)
     image = quadrature_image(truth)
-    mask = image.light_angle > MASK_PIXELS * pixel_angle(scene)
+    mask = image.light_angle > MASK_PIXELS * pixel_angle(truth)
     estimators = {"single-scatter": (single_scatter_batch, 64), "volpath": (volpath_batch, 64)}
     found = efficiency(truth, estimators, image.airlight, mask=mask)
     assert found.fast.name == "single-scatter"
