@@ -33,24 +33,15 @@ class CasterPlan:
     warnings: tuple[str, ...]  #: what is odd about the meshes, by name
 
 
-def caster_plan(scene: Scene, casters: Casters | None = None) -> CasterPlan:
+def caster_plan(scene: Scene) -> CasterPlan:
     """Count the casters of a scene and what its camera needs of them.
-
-    Parameters
-    ----------
-    scene
-        The scene.
-    casters
-        Its casters, where they are known already.
 
     Raises
     ------
     InputError
         For a caster without triangles.
     """
-    if casters is None:
-        casters = read_casters(scene.geometry)
-        casters = with_positions(casters, scene.positions) if scene.positions else casters
+    casters = with_positions(read_casters(scene.geometry), scene.positions)
     lights = tuple(_light_plan(casters, scene, light) for light in scene.lights)
     return CasterPlan(
         shapes=len(casters.shapes),

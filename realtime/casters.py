@@ -110,6 +110,8 @@ def moved(casters: Casters, vertices: Array) -> Casters:
 
 def with_positions(casters: Casters, positions: Mapping[str, Array]) -> Casters:
     """Return the casters with the vertices of some shapes elsewhere; `positions` are those of the shapes [m]."""
+    if not positions:
+        return casters
     vertices = casters.vertices.copy()
     for name, first, own in casters.shapes:
         if name in positions:

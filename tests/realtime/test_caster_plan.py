@@ -2,7 +2,6 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from realtime.caster_plan import caster_plan, describe_casters
 
@@ -42,8 +41,7 @@ def test_what_is_left_out_is_said(variant):
     assert "left out" in describe_casters(plan)["planes"]
 
 
-@pytest.mark.parametrize("name", ["open-fog"])
-def test_no_casters_no_planes(variant, name):
-    plan = caster_plan(read(name))
+def test_no_casters_no_planes(variant):
+    plan = caster_plan(read("open-fog"))
     assert plan.triangles == plan.bodies == 0
     assert describe_casters(plan)["casters"].startswith("none")
