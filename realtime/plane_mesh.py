@@ -12,6 +12,8 @@ Beyond the last row Gamma keeps its value there. Surfaces interpolate Gamma betw
 (5.1.3).
 """
 
+import math
+
 from realtime.geometry import ray_geometry
 from realtime.kernels import gamma
 from realtime.lights import Light
@@ -55,7 +57,7 @@ def mesh_gamma(view: View, index: PlaneIndex, light: Light, *, kernel, rows: int
         p, q = dr.maximum(p, 0), dr.maximum(q, 0)
         u = dr.clip(p + q, 1, RATIO ** (rows - 1))
         t = dr.clip(q / dr.maximum(p + q, 1e-30), 0, 1)
-        cell = dr.minimum(mi.UInt32(dr.log(u) * (1 / _log_ratio())), rows - 2)
+        cell = dr.minimum(mi.UInt32(dr.log(u) * (1 / math.log(RATIO))), rows - 2)
         near = RATIO ** Float(cell)
         far = RATIO * near
         p, q = u * (1 - t), u * t
@@ -70,12 +72,6 @@ def mesh_gamma(view: View, index: PlaneIndex, light: Light, *, kernel, rows: int
         return dr.select(p / far + q / near <= 1, nearer, farther)
 
     return at
-
-
-def _log_ratio() -> float:
-    import math
-
-    return math.log(RATIO)
 
 
 def surface_gamma(view: View, light: Light, *, kernel, otherwise):

@@ -18,8 +18,6 @@ Array = NDArray[np.float64]
 
 def bodies_in_view(casters: Casters, camera: Camera, light: Array) -> NDArray[np.bool_]:
     """Return by body whether its shadow can be seen."""
-    if not len(casters.closed):
-        return np.zeros(0, dtype=bool)
     origin, normals = view_planes(camera)
     choose = np.array([[i >> k & 1 for k in range(3)] for i in range(8)])
     corners = casters.boxes[:, choose, np.arange(3)]
