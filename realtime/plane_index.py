@@ -30,6 +30,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from realtime.arrays import is_single
 from realtime.casters import Casters
 from realtime.diamond import TURN, host_diamond_angle
 from realtime.plane_cone import NEARNESS, is_outside, ring_edges
@@ -242,7 +243,7 @@ def index_planes(
     start, entries = binned(planes)
     spans = np.stack([planes.first, planes.last, planes.gain, planes.centre], axis=1)
     Float = types.scalar
-    real = np.float32 if Float is mi.Float else np.float64
+    real = np.float32 if is_single(Float) else np.float64
     x_axis, y_axis, z_axis = (types.vector(*(float(c) for c in axis)) for axis in axes)
     index = PlaneIndex(
         x_axis,

@@ -10,7 +10,7 @@ some direction of the box could cross it; whether a ray does, the ray finds out.
 
 Blocks draw on the bins of azimuth, tiles on their block. Lists are counted, their places added up, then written; where
 the room for all of them is used up, a block or tile keeps the longer list that it drew on. The planes of a tile are put
-in the order in which its middle ray crosses them.
+in the order in which its middle ray crosses them, or in that of the paper.
 """
 
 from collections.abc import Callable
@@ -222,7 +222,7 @@ class Lists:
 
     entries: Any  #: what the sources read
     source: Source
-    sorted: Any  #: whether the planes are in the order in which the middle ray crosses them
+    sorted: Any  #: whether a box has a list of its own, in the order that was asked for
 
 
 def listed(index: PlaneIndex, box: Box, entries, source: Source, *, room: int, order: str | None = None) -> Lists:
@@ -239,8 +239,8 @@ def listed(index: PlaneIndex, box: Box, entries, source: Source, *, room: int, o
     room
         Entries to make room for, for all boxes together.
     order
-        'exact': in the order in which the middle ray crosses them; 'paper': towards the camera by the cosine of the
-        middle of the edge; None: any.
+        'paper': towards the camera by the cosine of the middle of the edge; 'exact' and 'none': as the middle ray
+        crosses them; None: not sorted.
     """
     import drjit as dr
     import mitsuba as mi

@@ -23,7 +23,7 @@ difference of the two Gammas instead, as the paper does.
 from dataclasses import dataclass, replace
 from typing import Any
 
-from realtime.arrays import array_types
+from realtime.arrays import array_types, is_single
 from realtime.bounded_media import FORMS, ambient_radiance, bounded_airlight, check_form
 from realtime.casters import Casters, read_casters, with_positions
 from realtime.errors import InputError
@@ -61,7 +61,7 @@ class PlanePreparation:
 
     def standing(self, scene: Scene) -> Casters:
         """Return the casters where they are in a scene."""
-        return with_positions(self.casters, scene.positions) if scene.positions else self.casters
+        return with_positions(self.casters, scene.positions)
 
 
 def prepare_shadow_planes(scene: Scene, **settings) -> PlanePreparation:
@@ -78,16 +78,14 @@ def prepare_shadow_planes(scene: Scene, **settings) -> PlanePreparation:
 
 def light_planes(casters: Casters, scene: Scene, light: Light, *, cone: int = 0) -> PlaneIndex:
     """Return the shadow planes of one light of a scene, as its camera needs them; `cone` edges bound a spot."""
-    import mitsuba as mi
     import numpy as np
 
     position, camera = (np.array(point, dtype=np.float64).ravel() for point in (light.position, scene.camera.origin))
     used = bodies_in_view(casters, scene.camera, position)
-    single = type(scene.camera.origin.x) is mi.Float
     ring = None
     if cone and light.kind == "spot":
         ring = cone_ring(np.array(light.axis, dtype=np.float64).ravel(), float(light.cos_cutoff[0]), cone)
-    types = array_types("single" if single else "double")
+    types = array_types("single" if is_single(type(scene.camera.origin.x)) else "double")
     return index_planes(casters, position, camera, used=used, types=types, ring=ring)
 
 
@@ -157,10 +155,11 @@ def shadow_planes(
 
     total = type(view.medium.albedo)(0)
     lit = []
+    in_media: tuple[MediaRay, ...] = ()
     if view.plan.bounded:
         check_form(view.medium, media)
         _check_bounded(evaluation)
-    in_media = rays_in_media(view, media) if view.plan.bounded else ()
+        in_media = rays_in_media(view, media)
     for number, light in enumerate(view.lights):
         if cone and light.kind == "spot" and not light.soft and view.plan.shadows:
             light = replace(light, kind="point")  # planes bound it
@@ -198,7 +197,6 @@ def tile_planes(view: View, index: PlaneIndex, *, order: str) -> Lists:
     def rays(lane):
         return in_light_frame(index, *view.rays(lane))
 
-    order = "paper" if order == "paper" else "exact"
     return tile_lists(index, rays, view.distance, order=order, square=view.square_tiles)
 
 

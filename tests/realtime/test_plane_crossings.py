@@ -20,7 +20,7 @@ def added_up(index, ways, end, *, order, buffer=None, at=None):
     import drjit as dr
 
     Float = type(index.distance)
-    lists, _ = drawn_lists(index, ways, end, order="paper" if order == "paper" else "exact")
+    lists, _ = drawn_lists(index, ways, end, order=order)
     at = at or (lambda x: 1 - dr.exp(-x))
     gammas = (lambda plane, ray, x: at(x)), at
     distance = Float(np.asarray(end, dtype=np.float64))
