@@ -145,41 +145,27 @@ def crossings(bounds: Bounds, origin: Array, direction: Array) -> tuple[Array, A
     """
     if isinstance(bounds, Ball):
         return ball_crossings(np.sum((bounds.centre - origin) * direction, axis=-1), _power(bounds, origin))
-    origin = np.broadcast_to(origin, direction.shape)
-    enter, leave = np.empty(len(direction)), np.empty(len(direction))
-    step = max(1, _BLOCK // len(bounds.offset))
-    for first in range(0, len(direction), step):
-        block = slice(first, first + step)
-        times, rate, missed = _plane_crossings(bounds, origin[block], direction[block])
-        enter[block] = np.where(missed, np.inf, np.max(np.where(rate < 0, times, -np.inf), axis=1))
-        leave[block] = np.where(missed, -np.inf, np.min(np.where(rate > 0, times, np.inf), axis=1))
-    return enter, leave
+    return crossed_facets(bounds, origin, direction)[2:]
 
 
 def crossed_facets(bounds: Polyhedron, origin: Array, direction: Array) -> tuple[Index, Index, Array, Array]:
-    """Return the facets at which rays from one point, (3,), enter and leave a polyhedron, and the distances.
-
-    The results have shape (n,); a line misses the body where it leaves before it enters.
-    """
+    """Return the facets at which rays enter and leave a polyhedron, and the distances, as `crossings` does."""
+    origin = np.atleast_2d(origin)
     enter, leave = np.empty(len(direction), np.int64), np.empty(len(direction), np.int64)
     low, high = np.empty(len(direction)), np.empty(len(direction))
     step = max(1, _BLOCK // len(bounds.offset))
     for first in range(0, len(direction), step):
         block = slice(first, first + step)
-        times, rate, missed = _plane_crossings(bounds, origin[None], direction[block])
+        rate = direction[block] @ bounds.normal.T
+        room = bounds.offset - (origin if len(origin) == 1 else origin[block]) @ bounds.normal.T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            times = room / rate
         entering, leaving = np.where(rate < 0, times, -np.inf), np.where(rate > 0, times, np.inf)
         enter[block], leave[block] = np.argmax(entering, axis=1), np.argmin(leaving, axis=1)
+        missed = np.any((rate == 0) & (room < 0), axis=1)  # outside along one of the planes
         low[block] = np.where(missed, np.inf, np.max(entering, axis=1))
         high[block] = np.where(missed, -np.inf, np.min(leaving, axis=1))
     return enter, leave, low, high
-
-
-def _plane_crossings(bounds: Polyhedron, origin: Array, direction: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Return where rays cross the facets' planes, at which rate, and which rays run outside along one of them."""
-    rate = direction @ bounds.normal.T
-    room = bounds.offset - origin @ bounds.normal.T
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return room / rate, rate, np.any((rate == 0) & (room < 0), axis=1)
 
 
 def ball_crossings(along: Array, power: Array | float) -> tuple[Array, Array]:
