@@ -118,9 +118,9 @@ def is_kept(key: str) -> bool:
 
 def store_arrays(key: str, arrays: Mapping[str, Any]) -> None:
     """Keep arrays under a key, replacing what is there; a key may name a folder, as in 'volpath-0a1b/000017'."""
-    content = {name: np.asarray(value) for name, value in arrays.items()}
+    content: dict[str, Any] = {name: np.asarray(value) for name, value in arrays.items()}
     buffer = BytesIO()
-    np.savez(buffer, **content, **{_DIGEST: np.asarray(_content_digest(key, content))})  # type: ignore[arg-type]
+    np.savez(buffer, **(content | {_DIGEST: np.asarray(_content_digest(key, content))}))
     write_bytes(_path(key), buffer.getvalue())
 
 

@@ -18,6 +18,7 @@ for 0 < p_2 < height, and the leg passes it on its way to
 """
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,10 +87,10 @@ def camera_segments(truth: TruthScene, distance: Array) -> Segments:
     enter, leave = np.take_along_axis(enter, order, axis=0), np.take_along_axis(leave, order, axis=0)
     if not np.any(truth.medium.sigma_t * truth.medium.albedo > 0):
         return Segments(enter, leave, order)
-    edge = np.zeros((1, len(distance)))
-    start = np.concatenate([edge, leave, enter])
+    start = np.concatenate([np.zeros((1, len(distance))), leave, enter])
     end = np.concatenate([enter, distance[None], leave])
-    return Segments(start, end, np.concatenate([np.full_like(order, AMBIENT), order[:1] * 0 + AMBIENT, order]))
+    between = np.full((len(order) + 1, len(distance)), AMBIENT)
+    return Segments(start, end, np.concatenate([between, order]))
 
 
 def scattering_range(segments: Segments) -> tuple[Array, Array]:
@@ -119,12 +120,14 @@ def leg_kinks(bounds: Bounds, light: Array, axes: tuple[Array, Array], height: A
     ray, offset
         Number of the ray and x - foot of each kink [m], in no particular order.
     """
-    find = _ball_corners if isinstance(bounds, Ball) else _polygon_corners
+    if isinstance(bounds, Ball):
+        find, step = partial(_ball_corners, bounds), _BLOCK
+    else:
+        find, step = partial(_polygon_corners, bounds), max(1, _BLOCK // max(1, len(bounds.edge)))
     rays, offsets = [np.empty(0, np.int64)], [np.empty(0)]
-    step = max(1, _BLOCK // (1 if isinstance(bounds, Ball) else max(1, len(bounds.edge))))
     for first in range(0, len(height), step):
         block = slice(first, first + step)
-        ray, along, away = find(bounds, light, axes[0][block], axes[1][block])  # type: ignore[arg-type]
+        ray, along, away = find(light, axes[0][block], axes[1][block])
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
             offset = height[block][ray] * (along / away)
         before = (away > 0) & (away < height[block][ray]) & np.isfinite(offset)
