@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from validation.scenes.parts import Mesh, camera, fog, grid, lathe, mitsuba_mesh, placed, rotation
+from validation.scenes.parts import Mesh, camera, fog, grid, lathe, mitsuba_mesh, placed, point_light, rotation, scaled
 from validation.scenes.record import Animation, SceneRecord
 from validation.scenes.solids import arch, box, gable, gem, icosphere, prism, star, tetrahedron, torus
 
@@ -28,11 +28,7 @@ def clutter() -> dict[str, Any]:
         "type": "scene",
         "fog": fog((0.237, 0.263, 0.301), (0.93, 0.92, 0.89)),
         "sensor": camera((0.53, -5.37, 2.83), (-0.07, 0.13, 0.61), fov=48.7, size=(800, 600)),
-        "lamp": {
-            "type": "point",
-            "position": list(_LAMP),
-            "intensity": {"type": "rgb", "value": [15.7, 12.9, 8.3]},
-        },
+        "lamp": point_light(_LAMP, (15.7, 12.9, 8.3)),
         **objects,
         "table": mitsuba_mesh("table", table, (0.37, 0.31, 0.23)),
         "backdrop": mitsuba_mesh("backdrop", _backdrop(), (0.17, 0.19, 0.23)),
@@ -92,9 +88,9 @@ _KINDS = (
     lambda scale: placed(tetrahedron(0.31 * scale), (0, 0, 0.31 / 3 * scale), rotation((1, -1, 0), 54.7356)),
     _pawn,
     lambda scale: prism(star(0.11 * scale, 0.23 * scale, 6), 0.53 * scale),
-    lambda scale: placed((0.21 * scale * icosphere(2)[0], icosphere(2)[1]), (0, 0, 0.21 * scale)),
+    lambda scale: placed(scaled(icosphere(2), 0.21 * scale), (0, 0, 0.21 * scale)),
     lambda scale: arch((0.17 * scale, 0.24 * scale), 0.13 * scale, 15),
-    lambda scale: placed((0.19 * scale * gem(7, 4)[0], gem(7, 4)[1]), (0, 0, 0.19 * scale)),
+    lambda scale: placed(scaled(gem(7, 4), 0.19 * scale), (0, 0, 0.19 * scale)),
     lambda scale: lathe([0.023 * scale, 0.031 * scale, 0.017 * scale], [0.0, 0.11 * scale, 1.13 * scale], 9),
 )
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from validation.scenes.parts import Mesh, camera, fog, grid, joined, lathe, mitsuba_mesh, placed, rotation
+from validation.scenes.parts import Mesh, camera, fog, grid, joined, lathe, mitsuba_mesh, placed, point_light, rotation
 
 _SIDES, _RINGS, _COLUMNS = 72, 32, 14
 
@@ -27,11 +27,7 @@ def colonnade() -> dict[str, Any]:
         "type": "scene",
         "fog": fog(0.071, (0.94, 0.92, 0.87), {"type": "hg", "g": 0.37}),
         "sensor": camera((-1.37, -9.83, 1.71), (0.83, 1.91, 2.13), fov=63.1, size=(800, 600)),
-        "lamp": {
-            "type": "point",
-            "position": [5.13, 1.83, 4.37],
-            "intensity": {"type": "rgb", "value": [173.0, 149.0, 107.0]},
-        },
+        "lamp": point_light((5.13, 1.83, 4.37), (173.0, 149.0, 107.0)),
         "columns": mitsuba_mesh("columns", joined(columns), (0.61, 0.57, 0.49)),
         "hall": mitsuba_mesh("hall", joined(hall), (0.53, 0.47, 0.41)),
     }

@@ -9,7 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from validation.scenes.parts import Mesh, camera, fog, grid, joined, lathe, mitsuba_mesh, placed, rotation, skin
+from validation.scenes.parts import (
+    Mesh,
+    camera,
+    fog,
+    grid,
+    joined,
+    lathe,
+    mitsuba_mesh,
+    placed,
+    point_light,
+    rotation,
+    skin,
+)
 from validation.scenes.record import Animation, SceneRecord
 from validation.scenes.solids import arch, box, pierced, torus
 
@@ -30,11 +42,7 @@ def hall() -> dict[str, Any]:
         "type": "scene",
         "fog": fog(0.0433, (0.93, 0.91, 0.88), {"type": "hg", "g": 0.43}),
         "sensor": camera((-1.43, -11.3, 1.93), (0.37, 5.1, 3.37), fov=61.3, size=(800, 600)),
-        "lamp": {
-            "type": "point",
-            "position": [-0.83, 13.83, 6.47],
-            "intensity": {"type": "rgb", "value": [439.0, 397.0, 311.0]},
-        },
+        "lamp": point_light((-0.83, 13.83, 6.47), (439.0, 397.0, 311.0)),
         **casters,
         **shell,
     }

@@ -3,7 +3,7 @@
 
 from typing import Any
 
-from validation.scenes.parts import camera, fog
+from validation.scenes.parts import camera, fog, point_light
 
 
 def open_fog() -> dict[str, Any]:
@@ -12,9 +12,5 @@ def open_fog() -> dict[str, Any]:
         "type": "scene",
         "fog": fog(0.173, (0.93, 0.87, 0.78)),
         "sensor": camera((0.31, -4.87, 1.13), (0.07, 0.23, 0.91), fov=58.3, size=(800, 600)),
-        "lamp": {
-            "type": "point",
-            "position": [0.83, 0.47, 1.57],
-            "intensity": {"type": "rgb", "value": [23.1, 19.7, 14.3]},
-        },
+        "lamp": point_light((0.83, 0.47, 1.57), (23.1, 19.7, 14.3)),
     }

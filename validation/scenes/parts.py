@@ -81,6 +81,12 @@ def placed(mesh: Mesh, position: Sequence[float], turn: NDArray[np.float64] | No
     return (vertices if turn is None else vertices @ turn.T) + np.asarray(position), faces
 
 
+def scaled(mesh: Mesh, factor: float | Sequence[float]) -> Mesh:
+    """Return a mesh stretched from the origin, by one factor or by one for each axis."""
+    vertices, faces = mesh
+    return vertices * factor, faces
+
+
 def joined(meshes: Sequence[Mesh]) -> Mesh:
     """Return several meshes as one."""
     offsets = np.cumsum([0] + [len(vertices) for vertices, _ in meshes[:-1]])
@@ -135,13 +141,17 @@ def fog(
     }
 
 
+def point_light(position: Sequence[float], intensity: Sequence[float]) -> dict[str, Any]:
+    """Return a point light at a position [m] with an RGB intensity [W/sr]."""
+    return {"type": "point", "position": list(position), "intensity": {"type": "rgb", "value": list(intensity)}}
+
+
 def camera(
     origin: Sequence[float],
     target: Sequence[float],
     *,
     fov: float,
     size: tuple[int, int],
-    up=(0.0, 0.0, 1.0),
     in_fog: bool = True,
 ) -> dict[str, Any]:
     """Return a perspective sensor, in the medium 'fog' or in none; `fov` is the horizontal field of view [degrees]."""
@@ -154,7 +164,7 @@ def camera(
         "fov_axis": "x",
         "near_clip": 1e-5,
         "far_clip": 1e5,
-        "to_world": mi.ScalarTransform4f().look_at(origin=list(origin), target=list(target), up=list(up)),
+        "to_world": mi.ScalarTransform4f().look_at(origin=list(origin), target=list(target), up=[0, 0, 1]),
         "film": {
             "type": "hdrfilm",
             "width": size[0],

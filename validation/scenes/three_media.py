@@ -19,7 +19,9 @@ from validation.scenes.parts import (
     medium_boundary,
     mitsuba_mesh,
     placed,
+    point_light,
     rotation,
+    scaled,
 )
 from validation.scenes.record import Animation, SceneRecord
 from validation.scenes.solids import box, gable, gem, icosphere, prism, star, tetrahedron, torus
@@ -36,11 +38,7 @@ def three_media() -> dict[str, Any]:
     return {
         "type": "scene",
         "sensor": camera((0.67, -6.83, 2.11), (0.13, 0.31, 1.43), fov=47.3, size=(800, 600), in_fog=False),
-        "lamp": {
-            "type": "point",
-            "position": [-0.43, 0.67, 4.83],
-            "intensity": {"type": "rgb", "value": [113.0, 109.0, 101.0]},
-        },
+        "lamp": point_light((-0.43, 0.67, 4.83), (113.0, 109.0, 101.0)),
         **media,
         **casters,
         "floor": mitsuba_mesh(
@@ -51,10 +49,8 @@ def three_media() -> dict[str, Any]:
 
 
 def _media() -> list[tuple[str, Mesh, dict[str, Any]]]:
-    vertices, faces = icosphere(2)
-    red = (vertices * (0.97, 0.79, 1.13), faces)
-    vertices, faces = gem(13, 5)
-    green = (vertices * (0.83, 0.91, 1.03), faces)
+    red = scaled(icosphere(2), (0.97, 0.79, 1.13))
+    green = scaled(gem(13, 5), (0.83, 0.91, 1.03))
     return [
         (
             "red",
@@ -79,14 +75,13 @@ def _casters() -> list[tuple[str, Mesh, tuple[float, float, float]]]:
     level, height = np.linspace(0.0, 1.0, 41), np.linspace(0.0, 1.0, 43)
     spindle = lathe(0.023 + 0.093 * np.sin(np.pi * level) ** 2 * (1.3 + np.cos(9.1 * level)), 1.37 * level, 36)
     vase = lathe(0.11 + 0.13 * np.sin(2.3 * height + 0.4) ** 2, 0.97 * height, 36)
-    ball = icosphere(3)
     slats = [placed(box((0.083, 1.61, 0.047)), (0.293 * k - 0.71, 0.03 * k, 0.0)) for k in range(6)]
     gold, white, brown = (0.67, 0.59, 0.23), (0.71, 0.69, 0.67), (0.53, 0.37, 0.29)
     return [
         ("bar", placed(box((5.93, 0.17, 0.13)), (0.07, 0.09, 1.37), rotation((0.1, 1, 0.3), 3.7)), brown),
         ("ring-within", placed(torus(0.43, 0.067, (67, 24)), (-1.83, 0.17, 1.87), rotation((1, 0.4, 0), 31.3)), gold),
         ("ring-above", placed(torus(0.31, 0.053, (59, 22)), (-1.49, 0.37, 3.19), rotation((1, 0.3, 0), 23.9)), gold),
-        ("ball", placed((0.19 * ball[0], ball[1]), (-2.23, 0.31, 2.97)), white),
+        ("ball", placed(scaled(icosphere(3), 0.19), (-2.23, 0.31, 2.97)), white),
         ("star", placed(prism(star(0.19, 0.47, 7), 0.091), (0.17, -0.13, 1.93), rotation((1, 0.7, 0), 21.1)), white),
         ("slats", placed(joined(slats), (0.07, 0.11, 3.13), rotation((0.3, 0.1, 1), 19.3)), brown),
         ("spindle", placed(spindle, (2.03, 0.17, 0.79), rotation((0.3, 1, 0), 11.9)), white),

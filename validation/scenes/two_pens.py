@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from validation.scenes.parts import Mesh, camera, fog, grid, joined, lathe, mitsuba_mesh, placed, rotation
+from validation.scenes.parts import Mesh, camera, fog, grid, joined, lathe, mitsuba_mesh, placed, point_light, rotation
 
 _SIDES, _RINGS = 96, 89
 
@@ -19,11 +19,7 @@ def two_pens() -> dict[str, Any]:
         "type": "scene",
         "fog": fog((0.331, 0.349, 0.373), (0.83, 0.87, 0.91), {"type": "rayleigh"}),
         "sensor": camera((0.47, -3.71, 1.37), (0.03, 0.07, 0.89), fov=43.9, size=(800, 600)),
-        "lamp": {
-            "type": "point",
-            "position": [-1.43, 1.31, 1.97],
-            "intensity": {"type": "rgb", "value": [11.3, 10.7, 9.9]},
-        },
+        "lamp": point_light((-1.43, 1.31, 1.97), (11.3, 10.7, 9.9)),
         "pens": mitsuba_mesh("pens", joined([first, second]), (0.19, 0.27, 0.59)),
         "table": mitsuba_mesh("table", grid((-3.1, -1.7, 0.0), (6.1, 0, 0), (0, 4.9, 0), (31, 6)), (0.57, 0.51, 0.43)),
         "flag": mitsuba_mesh("flag", flag, (0.71, 0.23, 0.19)),
