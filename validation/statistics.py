@@ -160,7 +160,7 @@ def compare_statistics(
     means anything (the 95 % interval of Pareto's law with exponent 3/2 holds the truth in 80 % of cases), so mask them.
     Skewed estimates need many batches: with 32, each one log-normal number of logarithmic deviation 1, 6 % of values
     exceed the 1 % level, as a batch without a rare large value is too low and looks too sure at once. `exceeding_p` and
-    `uniformity_p` show it; the interval of the image keeps its 95 %. tests/validation/test_statistics.py checks this.
+    `uniformity_p` show it; the interval of the image keeps its 95 % (tests/validation/test_statistics_rates.py).
 
     Parameters
     ----------
