@@ -28,6 +28,21 @@ def empty_view():
     return {"origin": mi.Vector3d(CAMERA.tolist()), "direction": mi.Vector3d(0), "distance": mi.Float64(0)}
 
 
+def crossed_planes(ball):
+    """The planes of a ball, where rays cross them (plane, ray, x) and those points [m]."""
+    import mitsuba as mi
+
+    index = index_of(make_casters([("ball", *ball)]), precision="double")
+    ways = bundles(1920, spread=0.01)
+    x, _ = crossings(index, ways)
+    number, plane = np.nonzero((x > 0.2) & (x < 12))
+    x, ways = x[number, plane], ways[number]
+    rays = SimpleNamespace(**{axis: mi.Float64(np.ascontiguousarray(part)) for axis, part in zip("xyz", ways.T)})
+    # The mesh is given in the frame of the light, the light and the camera in the world's.
+    axes = np.stack([np.array(axis).ravel() for axis in (index.x_axis, index.y_axis, index.z_axis)])
+    return index, (mi.UInt32(plane), rays, mi.Float64(x)), CAMERA + x[:, None] * (ways @ axes)
+
+
 def interpolated(module, rows, ratio, monkeypatch):
     """Gamma on the planes of a finely divided ball, interpolated, and as it is."""
     import mitsuba as mi
@@ -37,20 +52,12 @@ def interpolated(module, rows, ratio, monkeypatch):
 
     monkeypatch.setattr(module, "RATIO", ratio)
     # Edges of 2 cm: what is left of their length is below what the rows leave.
-    index = index_of(make_casters([("ball", *closed_sphere(4))]), precision="double")
-    ways = bundles(1920, spread=0.01)
-    x, _ = crossings(index, ways)
-    ray, plane = np.nonzero((x > 0.2) & (x < 12))
-    x = x[ray, plane]
+    index, crossed, points = crossed_planes(closed_sphere(4))
     medium, light = fog_and_lamp()
-    vector = [mi.Float64(part) for part in np.ascontiguousarray(ways[ray].T)]
-    # The mesh is given in the frame of the light, the light and the camera in the world's.
     view: Any = SimpleNamespace(**empty_view(), medium=medium)
     kernel = KERNELS["exact"].function
     at = mesh_gamma(view, index, light, kernel=kernel, rows=rows)
-    mesh = np.array(at(mi.UInt32(plane), SimpleNamespace(x=vector[0], y=vector[1], z=vector[2]), mi.Float64(x)))
-    axes = np.stack([np.array(axis).ravel() for axis in (index.x_axis, index.y_axis, index.z_axis)])
-    points = CAMERA + x[:, None] * (ways[ray] @ axes)
+    mesh = np.array(at(*crossed))
     exact = np.array(gamma_at(view, light, mi.Vector3d(np.ascontiguousarray(points.T)), kernel=kernel))
     return mesh[0], exact[0]
 
@@ -92,16 +99,9 @@ def test_interpolation_is_exact_on_vertices_and_linear_between(variant, monkeypa
             point.x * float(slope[0]) + point.y * float(slope[1]) + point.z * float(slope[2]) + 1
         ),
     )
-    index = index_of(make_casters([("ball", *closed_sphere(1))]), precision="double")
-    ways = bundles(1920, spread=0.01)
-    x, _ = crossings(index, ways)
-    ray, plane = np.nonzero((x > 0.2) & (x < 12))
-    x = x[ray, plane]
+    index, crossed, points = crossed_planes(closed_sphere(1))
     view: Any = SimpleNamespace(**empty_view())
     light: Any = SimpleNamespace(position=mi.Vector3d(LIGHT.tolist()))
     at = module.mesh_gamma(view, index, light, kernel=None, rows=16)
-    vector = [mi.Float64(part) for part in np.ascontiguousarray(ways[ray].T)]
-    found = np.array(at(mi.UInt32(plane), SimpleNamespace(x=vector[0], y=vector[1], z=vector[2]), mi.Float64(x)))[0]
-    axes = np.stack([np.array(axis).ravel() for axis in (index.x_axis, index.y_axis, index.z_axis)])
-    points = CAMERA + x[:, None] * (ways[ray] @ axes)
+    found = np.array(at(*crossed))[0]
     assert found == pytest.approx(points @ slope + 1, rel=1e-9)

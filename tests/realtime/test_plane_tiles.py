@@ -21,6 +21,14 @@ CAMERAS = {
 }
 
 
+def endless(*names, spread):
+    """Where rays without an end cross planes, and the lists of their tiles."""
+    index = index_of(casters_of(*names))
+    ways = bundles(960, spread=spread)
+    lists, _ = drawn_lists(index, ways, np.full(960, np.inf))
+    return crossings(index, ways)[0], lists
+
+
 @pytest.mark.parametrize("camera", CAMERAS)
 @pytest.mark.parametrize("name", NAMES)
 def test_lists_hold_every_plane_that_a_ray_crosses(variant, name, camera):
@@ -41,10 +49,7 @@ def test_lists_hold_every_plane_that_a_ray_crosses(variant, name, camera):
 @pytest.mark.parametrize("name", NAMES)
 def test_planes_marked_full_are_crossed_by_all(variant, name):
     """Unless the ray ends before."""
-    index = index_of(casters_of(name))
-    ways, ends = bundles(960, spread=0.004), np.full(960, np.inf)
-    x, _ = crossings(index, ways)
-    lists, _ = drawn_lists(index, ways, ends)
+    x, lists = endless(name, spread=0.004)
     marked = 0
     for tile, (numbers, full) in enumerate(listed_planes(lists)):
         assert np.isfinite(x[16 * tile : 16 * tile + 16][:, numbers[full]]).all()
@@ -55,10 +60,7 @@ def test_planes_marked_full_are_crossed_by_all(variant, name):
 @pytest.mark.parametrize("name", NAMES)
 def test_lists_are_short(variant, name):
     """No more than twice what rays of a narrow tile cross, over all tiles."""
-    index = index_of(casters_of(name))
-    ways, ends = bundles(960, spread=0.002), np.full(960, np.inf)
-    x, _ = crossings(index, ways)
-    lists, _ = drawn_lists(index, ways, ends)
+    x, lists = endless(name, spread=0.002)
     crossed = np.isfinite(x).reshape(-1, 16, x.shape[1]).any(axis=1).sum()
     assert sum(len(numbers) for numbers, _ in listed_planes(lists)) < 2 * crossed + 20
 
@@ -89,11 +91,8 @@ def test_tiles_without_room_read_the_list_they_drew_on(variant, monkeypatch, roo
     """The bins or the list of their block: every plane that is crossed is still there, once."""
     import realtime.plane_tiles as module
 
-    index = index_of(casters_of("torus", "open cylinder"))
-    ways, ends = bundles(960, spread=0.05), np.full(960, np.inf)
-    x, _ = crossings(index, ways)
     monkeypatch.setattr(module, "ROOM", room)
-    lists, _ = drawn_lists(index, ways, ends)
+    x, lists = endless("torus", "open cylinder", spread=0.05)
     assert 0 < np.array(lists.sorted).mean() < 0.9
     for tile, (numbers, _) in enumerate(listed_planes(lists)):
         wanted = np.flatnonzero(np.isfinite(x[16 * tile : 16 * tile + 16]).any(axis=0))
