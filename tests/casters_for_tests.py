@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Meshes on which silhouettes and shadow planes go wrong, for tests: each returns (vertices (n, 3), faces (m, 3)).
 
-`SOUND` are closed and oriented outwards, `AWKWARD` each have the one flaw that their docstring names. Arbitrary numbers
-throughout; no vertex occurs twice within a mesh.
+`SOUND` are closed and oriented outwards, `AWKWARD` each have the one flaw that their docstring names, `ALL` are both.
+Arbitrary numbers throughout; no vertex occurs twice within a mesh.
 """
 
 import numpy as np
@@ -172,3 +172,4 @@ AWKWARD = {
     "inside out": inside_out,
     "mixed winding": mixed_winding,
 }
+ALL = SOUND | AWKWARD

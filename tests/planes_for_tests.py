@@ -6,16 +6,15 @@ import numpy as np
 from realtime.casters import make_casters
 from realtime.diamond import host_diamond_angle
 from realtime.plane_index import index_planes, light_frame
-from tests.casters_for_tests import AWKWARD, SOUND
+from tests.casters_for_tests import ALL
 
-MESHES = SOUND | AWKWARD
 LIGHT = np.array([1.23, -0.87, 1.61])
 CAMERA = np.array([-1.57, -1.93, 0.71])
 
 
 def casters_of(*names):
     """Return the casters of meshes for tests."""
-    return make_casters([(name, *MESHES[name]()) for name in names])
+    return make_casters([(name, *ALL[name]()) for name in names])
 
 
 def index_of(casters, light=LIGHT, camera=CAMERA, precision="single"):

@@ -6,10 +6,8 @@ import pytest
 
 from realtime.casters import make_casters, moved, read_casters
 from realtime.errors import InputError
-from tests.casters_for_tests import AWKWARD, SOUND, boxes_sharing_an_edge, closed_box, closed_sphere, open_grid
+from tests.casters_for_tests import ALL, AWKWARD, SOUND, boxes_sharing_an_edge, closed_box, closed_sphere, open_grid
 from tests.scenes_for_tests import tiny_scene
-
-ALL = SOUND | AWKWARD
 
 
 def casters_of(*meshes):

@@ -18,7 +18,8 @@ from realtime.plane_index import (
     shadow_planes,
 )
 from realtime.silhouettes import silhouette
-from tests.planes_for_tests import CAMERA, LIGHT, MESHES, bundles, casters_of, crossings, index_of, plane_table
+from tests.casters_for_tests import ALL
+from tests.planes_for_tests import CAMERA, LIGHT, bundles, casters_of, crossings, index_of, plane_table
 
 
 def planes_of(casters, light=LIGHT, camera=CAMERA):
@@ -84,7 +85,7 @@ def test_two_forms_of_a_crossing(variant, name):
     assert (distance / quotient)[crossed] == pytest.approx(x[crossed], rel=1e-9)
 
 
-@pytest.mark.parametrize("name", MESHES)
+@pytest.mark.parametrize("name", ALL)
 def test_bins_hold_what_a_ray_of_their_azimuth_crosses(name):
     planes = planes_of(casters_of(name))
     start, entries = binned(planes)
@@ -100,7 +101,7 @@ def test_bins_hold_what_a_ray_of_their_azimuth_crosses(name):
     assert np.array_equal(np.sort(entries[: len(entries) // 2][firsts != 0] & NUMBER), np.arange(count))
 
 
-@pytest.mark.parametrize("name", MESHES)
+@pytest.mark.parametrize("name", ALL)
 def test_every_azimuth_gains_as_much_as_it_loses_but_for_the_layers_on_the_axis(name):
     """Along any half plane the layers begin with those between light and camera and end with those behind the light."""
     casters = casters_of(name)

@@ -5,11 +5,10 @@ import numpy as np
 import pytest
 
 from realtime.errors import InputError
-from tests.casters_for_tests import AWKWARD, SOUND, flat_roof
+from tests.casters_for_tests import ALL, SOUND, flat_roof
 from tests.scenes_for_tests import spot, tiny_scene
 from validation.scenes.parts import joined, mitsuba_mesh
 
-MESHES = SOUND | AWKWARD
 SHIFT = np.array([0.0, 0.0, 0.9])
 
 
@@ -100,9 +99,9 @@ def surface_differs(frame, image):
     return np.mean(np.any(np.abs(frame.surface - image.surface) > 1e-2 * image.surface.mean(), axis=2))
 
 
-@pytest.mark.parametrize("name", MESHES)
+@pytest.mark.parametrize("name", ALL)
 def test_every_mesh(variant, name):
-    scene = scene_with(MESHES[name]())
+    scene = scene_with(ALL[name]())
     frame, image = planes(scene), truth(scene)
     # float32 kernels and crossings: 1e-6, a hundredth of what is asked of a frame.
     assert_is_truth(frame, image, rmse=5e-6)
@@ -119,9 +118,9 @@ def test_every_place_and_light(variant, change):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("change", CHANGES)
-@pytest.mark.parametrize("name", sorted(set(MESHES) - {"torus"}))
+@pytest.mark.parametrize("name", sorted(set(ALL) - {"torus"}))
 def test_every_mesh_in_every_place_and_light(variant, name, change):
-    scene = scene_with(MESHES[name](), **CHANGES[change]())
+    scene = scene_with(ALL[name](), **CHANGES[change]())
     frame, image = planes(scene), truth(scene)
     assert_is_truth(frame, image)
 
@@ -191,7 +190,7 @@ def test_order_none_shows_the_artefact(variant):
 @pytest.mark.parametrize("name", ["open grid", "doubled faces", "degenerate faces", "sliver"])
 def test_what_the_warnings_say_of_order_none_is_true(variant, name):
     """A sheet without folds, and flaws that are mended, are right without an order too."""
-    scene = scene_with(MESHES[name]())
+    scene = scene_with(ALL[name]())
     image = truth(scene)
     error = planes(scene, order="none").airlight - image.airlight
     assert np.sqrt(np.mean(error**2)) < 1e-4 * image.airlight.mean()
@@ -199,7 +198,7 @@ def test_what_the_warnings_say_of_order_none_is_true(variant, name):
 
 @pytest.mark.parametrize("name", ["open cylinder", "mixed winding"])
 def test_folds_of_open_meshes_count_twice_without_an_order(variant, name):
-    scene = scene_with(MESHES[name]())
+    scene = scene_with(ALL[name]())
     image = truth(scene)
     error = planes(scene, order="none").airlight - image.airlight
     assert np.sqrt(np.mean(error**2)) > 1e-3 * image.airlight.mean()
