@@ -90,7 +90,7 @@ def read_truth(scene) -> TruthScene:
     _check_disjoint(media)
     return TruthScene(
         scene=scene,
-        occluders=_occluders(scene, opaque),
+        occluders=scene_of(opaque, scene),
         width=width,
         height=height,
         origin=origin,
@@ -125,13 +125,18 @@ def _sorted_shapes(scene) -> tuple[list[Any], list[Any]]:
     return opaque, boundaries
 
 
-def _occluders(scene, opaque: list[Any]):
-    """Return the scene itself where all its shapes are opaque, else a scene of those that are."""
+def scene_of(shapes: list[Any], whole):
+    """Return a scene of some of the shapes of another one, `whole`: that itself where they are all of its shapes."""
     import mitsuba as mi
 
-    if len(opaque) == len(scene.shapes()):
-        return scene
-    return mi.load_dict({"type": "scene"} | {f"shape{number}": shape for number, shape in enumerate(opaque)})
+    if len(shapes) == len(whole.shapes()):
+        return whole
+    # The keys become the names of the shapes, in the whole scene too: they keep those they have, if these are keys.
+    names = {shape.id() for shape in shapes}
+    sound = len(names) == len(shapes) and not any("." in name or not name for name in names)
+    return mi.load_dict(
+        {"type": "scene"} | {shape.id() if sound else f"shape{number}": shape for number, shape in enumerate(shapes)}
+    )
 
 
 def _check_disjoint(media: tuple[BoundedMedium, ...]) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
-from reference.scene import TruthScene
+from reference.scene import TruthScene, scene_of
 
 Array = NDArray[np.float64]
 
@@ -33,8 +33,6 @@ class Shapes:
 
 def read_shapes(scene) -> Shapes:
     """Read the shapes of a Mitsuba scene, all of them opaque."""
-    import mitsuba as mi
-
     single: list[tuple[Any, Array | Ball]] = []
     others = []
     for shape in scene.shapes():
@@ -46,18 +44,11 @@ def read_shapes(scene) -> Shapes:
             others.append(shape)
     triangles = [part for _, part in single if not isinstance(part, tuple)]
     balls = [part for _, part in single if isinstance(part, tuple)]
-    rest = None
-    if others:
-        # The keys become the names of the shapes: they keep those they have, if these are keys at all.
-        names = {shape.id() for shape in others}
-        sound = len(names) == len(others) and not any("." in name or not name for name in names)
-        given = {shape.id() if sound else f"shape{number}": shape for number, shape in enumerate(others)}
-        rest = mi.load_dict({"type": "scene"} | given) if single else scene
     return Shapes(
         np.concatenate([np.empty((0, 3, 3)), *triangles]),
         np.array([centre for centre, _ in balls]).reshape(-1, 3),
         np.array([radius for _, radius in balls]),
-        rest,
+        scene_of(others, scene) if others else None,
         tuple(single),
     )
 
