@@ -28,12 +28,12 @@ class PlaneLists:
 
 
 def tile_corners(rays, width: int):
-    """Return the directions at the corners of all tiles; `rays` gives the direction of lanes."""
+    """Return the directions at the corners of all tiles; `rays` is that of `realtime.view.View`."""
     import drjit as dr
     import mitsuba as mi
 
     first = dr.arange(mi.UInt32, width // TILE) * TILE
-    return [rays(first + lane) for lane in _CORNERS]
+    return [rays(first + lane)[0] for lane in _CORNERS]
 
 
 def ball_range(seen, corners):

@@ -13,8 +13,11 @@ from realtime.body_tiles import tile_corners
 from realtime.camera import Camera, ray_directions, tiled_pixels
 from realtime.errors import InputError
 from realtime.kernels.table import resident_tables
+from realtime.lights import Light
 from realtime.media_rays import camera_depths
+from realtime.medium import Medium
 from realtime.methods import Method
+from realtime.plan import Plan
 from realtime.scene import Scene
 from realtime.surface import lit_surface, visible_surface, visible_triangle
 from realtime.view import View
@@ -90,21 +93,8 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
         return distance, tuple(colors) if method.lights_surfaces else (sum(colors),)
 
     def run_method(geometry, pixel, camera, medium, lights, prepared, distance, by_light):
-        direction, low = ray_directions(camera, pixel)
-        view = View(
-            origin=camera.origin,
-            direction=direction,
-            direction_low=low,
-            distance=distance,
-            lights=lights,
-            medium=medium,
-            plan=plan,
-            visible=lambda point, light: _visible(geometry, point, light),
-            rays=lambda lane: ray_directions(camera, dr.gather(mi.UInt32, pixel, lane)),
-            square_tiles=_in_square_tiles(camera, pixel),
-            visible_triangle=lambda: visible_triangle(geometry, camera.origin, direction),
-            prepared=prepared,
-        )
+        shown = {"geometry": geometry, "medium": medium, "lights": lights, "prepared": prepared}
+        view = frame_view(camera, pixel, distance, plan=plan, **shown)
         found = method.function(view, kernel=kernel, **settings)
         if not method.lights_surfaces:
             return found, None
@@ -116,8 +106,9 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
     # being recorded, which Dr.Jit 1.5 answers by aborting a later recording.
     one = type(camera.origin.x)(1)
     casts_rays = method.casts_rays(settings)
-    geometry = scene.geometry if casts_rays else None
-    run_method(geometry, mi.UInt32(0), camera, scene.medium, scene.lights, prepare(scene), one, _no_light(scene))
+    one_pixel = (scene.geometry if casts_rays else None, mi.UInt32(0), camera, scene.medium, scene.lights)
+    _, dark = _no_surface(*one_pixel)
+    run_method(*one_pixel, prepare(scene), one, dark)
     resident = resident_tables()
     airlight = dr.freeze(run_method, state_fn=lambda *_, **__: resident)
     dr.eval(pixel)
@@ -144,14 +135,53 @@ def run_stages(renderer: FrameRenderer, prepared):
     """Run the stages on the device and return distance, surface and airlight, evaluated, in the order of the lanes."""
     import drjit as dr
 
-    scene = renderer.scene
-    distance, by_light = renderer.surface(scene.geometry, renderer.pixel, scene.camera, scene.medium, scene.lights)
-    airlight, lit_surface = renderer.airlight(
-        renderer.geometry, renderer.pixel, scene.camera, scene.medium, scene.lights, prepared, distance, by_light
-    )
+    distance, by_light = run_surface(renderer)
+    airlight, lit_surface = run_airlight(renderer, prepared, distance, by_light)
     surface = by_light[0] if lit_surface is None else lit_surface
     dr.eval(distance, surface, airlight)
     return distance, surface, airlight
+
+
+def run_surface(renderer: FrameRenderer):
+    """Run the stage of the surface and return distance and radiance by light, not evaluated."""
+    scene = renderer.scene
+    return renderer.surface(scene.geometry, renderer.pixel, scene.camera, scene.medium, scene.lights)
+
+
+def run_airlight(renderer: FrameRenderer, prepared, distance, by_light):
+    """Run the stage of the airlight on what `run_surface` returned; return what the stage does, not evaluated."""
+    scene = renderer.scene
+    arguments = (renderer.pixel, scene.camera, scene.medium, scene.lights, prepared, distance, by_light)
+    return renderer.airlight(renderer.geometry, *arguments)
+
+
+def frame_view(
+    camera: Camera, pixel, distance, *, plan: Plan, geometry, medium: Medium, lights: tuple[Light, ...], prepared
+) -> View:
+    """Return what a method is given for some pixels; `geometry` may be None where the method casts no rays."""
+    direction, low = ray_directions(camera, pixel)
+    return View(
+        origin=camera.origin,
+        direction=direction,
+        direction_low=low,
+        distance=distance,
+        lights=lights,
+        medium=medium,
+        plan=plan,
+        visible=lambda point, light: _visible(geometry, point, light),
+        rays=_rays(camera, pixel),
+        square_tiles=_in_square_tiles(camera, pixel),
+        visible_triangle=lambda: visible_triangle(geometry, camera.origin, direction),
+        prepared=prepared,
+    )
+
+
+def _rays(camera: Camera, pixel):
+    """Return the function from lanes to the directions of their rays."""
+    import drjit as dr
+    import mitsuba as mi
+
+    return lambda lane: ray_directions(camera, dr.gather(mi.UInt32, pixel, lane))
 
 
 def _in_square_tiles(camera: Camera, pixel) -> bool:
@@ -163,11 +193,8 @@ def _in_square_tiles(camera: Camera, pixel) -> bool:
 def _corners(camera: Camera, pixel):
     """Return the directions at the corners of the tiles, or None where pixels do not come in tiles."""
     import drjit as dr
-    import mitsuba as mi
 
-    if not _in_square_tiles(camera, pixel):
-        return None
-    return tile_corners(lambda lane: ray_directions(camera, dr.gather(mi.UInt32, pixel, lane))[0], dr.width(pixel))
+    return tile_corners(_rays(camera, pixel), dr.width(pixel)) if _in_square_tiles(camera, pixel) else None
 
 
 def _visible(geometry, point, light):
@@ -184,12 +211,6 @@ def _visible(geometry, point, light):
 
 def _nothing(scene: Scene) -> tuple[()]:
     return ()
-
-
-def _no_light(scene: Scene):
-    import drjit as dr
-
-    return tuple(dr.zeros(type(scene.medium.albedo), 1) for _ in scene.lights)
 
 
 def _no_surface(geometry, pixel, camera, medium, lights):

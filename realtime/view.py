@@ -47,8 +47,7 @@ def rays_in_media(view: View, form: str = "exact") -> tuple[MediaRay, ...]:
     """Return the rays of a view in bounded media, by light; `form` is one of `realtime.bounded_media.FORMS`."""
     import drjit as dr
 
-    width = dr.width(view.direction)
-    corners = tile_corners(lambda lane: view.rays(lane)[0], width) if view.square_tiles else None
+    corners = tile_corners(view.rays, dr.width(view.direction)) if view.square_tiles else None
     pieces = camera_pieces(view.medium, view.origin, view.direction, corners=corners)
     rays = []
     for light in view.lights:

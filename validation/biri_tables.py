@@ -16,16 +16,14 @@ How each stage of Table 1 is measured, on the wall clock, medians, all in turns 
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from realtime.camera import ray_directions
-from realtime.frame import FrameRenderer, render_frame, run_stages
+from realtime.frame import FrameRenderer, frame_view, render_frame, run_airlight, run_stages, run_surface
 from realtime.plane_view import bodies_in_view
 from realtime.scene import Scene, read_scene
-from realtime.shadow_planes import tile_planes
+from realtime.shadow_planes import PlanePreparation, tile_planes
 from realtime.silhouettes import silhouette
 from validation.configurations import Configuration, prepared
 from validation.load import load_scene
@@ -188,28 +186,22 @@ def _stages(renderer: FrameRenderer, kernel: str) -> list[Callable[[], Any]]:
 
     scene = renderer.scene
     ready = renderer.prepare(scene)
-    distance, _, _ = run_stages(renderer, ready)
+    distance, _ = run_surface(renderer)
+    dr.eval(distance)
     plain = prepared(scene, Configuration("unshadowed", kernel))
-    arguments = (renderer.pixel, scene.camera, scene.medium, scene.lights)
-
-    def surface():
-        dr.eval(renderer.surface(scene.geometry, *arguments))
-
-    def unshadowed():
-        dr.eval(plain.airlight(plain.geometry, *arguments, (), distance, _nothing(scene)))
-
     lists = _sorting(renderer)
     return [
         lambda: _silhouettes(renderer, scene),
-        surface,
-        unshadowed,
+        lambda: dr.eval(run_surface(renderer)),
+        lambda: dr.eval(run_airlight(plain, (), distance, ())),
         lambda: renderer.prepare(scene),
-        lambda: dr.eval(lists(renderer.pixel, scene.camera, distance, ready)),
+        lambda: dr.eval(lists(renderer.pixel, scene.camera, scene.medium, scene.lights, ready, distance)),
     ]
 
 
 def _silhouettes(renderer: FrameRenderer, scene: Scene) -> None:
-    casters = renderer.prepare.standing(scene)  # type: ignore[attr-defined]  # shadow planes prepare with casters
+    assert isinstance(renderer.prepare, PlanePreparation)
+    casters = renderer.prepare.standing(scene)
     for light in scene.lights:
         position = np.array(light.position, dtype=np.float64).ravel()
         silhouette(casters, position, used=bodies_in_view(casters, scene.camera, position))
@@ -218,25 +210,14 @@ def _silhouettes(renderer: FrameRenderer, scene: Scene) -> None:
 def _sorting(renderer: FrameRenderer):
     """Return the tile lists of a frame as a frozen function of their own."""
     import drjit as dr
-    import mitsuba as mi
 
-    camera = renderer.scene.camera
-    square = camera.width % 4 == 0 and camera.height % 4 == 0
+    plan = renderer.scene.plan  # a frozen function takes what it names of its surroundings for inputs: not the renderer
 
     @dr.freeze
-    def lists(pixel, camera, distance, indices):
-        view: Any = SimpleNamespace(
-            rays=lambda lane: ray_directions(camera, dr.gather(mi.UInt32, pixel, lane)),
-            distance=distance,
-            square_tiles=square,
-        )
-        found = [tile_planes(view, index, order="exact") for index in indices]
+    def lists(pixel, camera, medium, lights, prepared, distance):
+        shown = {"geometry": None, "medium": medium, "lights": lights, "prepared": prepared}
+        view = frame_view(camera, pixel, distance, plan=plan, **shown)
+        found = [tile_planes(view, index, order="exact") for index in prepared]
         return [(one.entries, one.source.first, one.source.count, one.sorted) for one in found]
 
     return lists
-
-
-def _nothing(scene: Scene):
-    import drjit as dr
-
-    return tuple(dr.zeros(type(scene.medium.albedo), 1) for _ in scene.lights)

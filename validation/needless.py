@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from realtime.frame import run_stages
+from realtime.frame import run_airlight, run_stages, run_surface
 from realtime.scene import Scene, read_scene
 from validation.configurations import Configuration, prepared
 from validation.load import load_scene, resize
@@ -83,11 +83,10 @@ def _airlight(scene: Scene) -> Callable[[], Any]:
     import drjit as dr
 
     renderer = prepared(scene, Configuration("shadow-planes", "exact"))
-    arguments = (renderer.pixel, scene.camera, scene.medium, scene.lights)
-    distance, by_light = renderer.surface(scene.geometry, *arguments)
+    distance, by_light = run_surface(renderer)
     dr.eval(distance, by_light)
     ready = renderer.prepare(scene)
-    return lambda: dr.eval(renderer.airlight(renderer.geometry, *arguments, ready, distance, by_light))
+    return lambda: dr.eval(run_airlight(renderer, ready, distance, by_light))
 
 
 def _compared(what: str, works: list[Callable[[], Any]], *, turns: int) -> Needless:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from realtime.frame import FrameRenderer, run_stages
+from realtime.frame import FrameRenderer, run_airlight, run_stages, run_surface
 from realtime.motion import Objects, read_objects, turned_objects
 from realtime.scene import Scene
 
@@ -118,17 +118,14 @@ def time_frame(renderer: FrameRenderer, *, seconds: float = 0.6) -> FrameTimes:
 
     scene = renderer.scene
     prepared = renderer.prepare(scene)
-    distance, _, _ = run_stages(renderer, prepared)
-    _, by_light = renderer.surface(scene.geometry, renderer.pixel, scene.camera, scene.medium, scene.lights)
-    dr.eval(by_light)
-    dr.sync_thread()
+    distance, by_light = run_surface(renderer)
+    dr.eval(distance, by_light)
 
     def surface():
-        dr.eval(renderer.surface(scene.geometry, renderer.pixel, scene.camera, scene.medium, scene.lights))
+        dr.eval(run_surface(renderer))
 
     def airlight():
-        arrays = (renderer.pixel, scene.camera, scene.medium, scene.lights, prepared, distance, by_light)
-        dr.eval(renderer.airlight(renderer.geometry, *arrays))
+        dr.eval(run_airlight(renderer, prepared, distance, by_light))
 
     def rebuild():
         run_stages(renderer, renderer.prepare(scene))
