@@ -5,7 +5,6 @@ The two frames are rendered in turns, so that whatever else the machine does hit
 the ratios of the turns.
 """
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -16,6 +15,7 @@ from realtime.frame import run_airlight, run_stages, run_surface
 from realtime.scene import Scene, read_scene
 from validation.configurations import Configuration, prepared
 from validation.load import load_scene, resize
+from validation.timing import times_in_turns
 
 
 @dataclass(frozen=True)
@@ -58,21 +58,6 @@ def unseen_casters(*, size: tuple[int, int] = (800, 600), turns: int = 60) -> Ne
     return _compared("airlight with 41 casters behind the camera, against none", works, turns=turns)
 
 
-def interleaved(one: Callable[[], Any], other: Callable[[], Any], *, turns: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the times of two pieces of work done in turns [ms], after two turns of warm-up."""
-    import drjit as dr
-
-    times = np.zeros((turns + 2, 2))
-    for turn in range(turns + 2):
-        # The first of a turn changes: what comes second may find the caches warm.
-        for place in ((0, 1), (1, 0))[turn % 2]:
-            start = time.perf_counter()
-            (one, other)[place]()
-            dr.sync_thread()
-            times[turn, place] = 1e3 * (time.perf_counter() - start)
-    return times[2:, 0], times[2:, 1]
-
-
 def _frame(scene: Scene, method: str) -> Callable[[], Any]:
     renderer = prepared(scene, Configuration(method, "exact"))
     ready = renderer.prepare(scene)
@@ -90,7 +75,7 @@ def _airlight(scene: Scene) -> Callable[[], Any]:
 
 
 def _compared(what: str, works: list[Callable[[], Any]], *, turns: int) -> Needless:
-    with_ms, without_ms = interleaved(*works, turns=turns)
+    with_ms, without_ms = times_in_turns(works, seconds=0, least=turns, most=turns, alternate=True).T
     low, ratio, high = (float(value) for value in np.percentile(with_ms / without_ms, [25, 50, 75]))
     medians = float(np.median(with_ms)), float(np.median(without_ms))
     return Needless(what, ratio, low, high, *medians, turns)

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from realtime.frame import FrameRenderer, run_airlight, run_stages, run_surface
 from realtime.motion import Objects, read_objects, turned_objects
@@ -39,25 +40,22 @@ def time_repeated(work: Callable[[], Any], *, seconds: float = 0.6, least: int =
     least, most
         Bounds of the number of repetitions.
     """
-    import drjit as dr
-
-    for _ in range(2):  # the first call compiles and records, the second is the first replay
-        work()
-        dr.sync_thread()
-    times: list[float] = []
-    stop = time.perf_counter() + seconds
-    while len(times) < least or (time.perf_counter() < stop and len(times) < most):
-        start = time.perf_counter()
-        work()
-        dr.sync_thread()
-        times.append(1e3 * (time.perf_counter() - start))
-    low, median, high = np.percentile(times, [25, 50, 75])
-    return Timing(float(median), float(low), float(high), len(times))
+    (timing,) = time_in_turns([work], seconds=seconds, least=least, most=most)
+    return timing
 
 
 def time_in_turns(
     works: Sequence[Callable[[], Any]], *, seconds: float = 3.0, least: int = 5, most: int = 200
 ) -> list[Timing]:
+    """Time several pieces of work in turns; parameters as in `times_in_turns`."""
+    times = times_in_turns(works, seconds=seconds, least=least, most=most)
+    quartiles = np.percentile(times, [25, 50, 75], axis=0).T
+    return [Timing(float(median), float(low), float(high), len(times)) for low, median, high in quartiles]
+
+
+def times_in_turns(
+    works: Sequence[Callable[[], Any]], *, seconds: float, least: int, most: int, alternate: bool = False
+) -> NDArray[np.float64]:
     """Time several pieces of work in turns, so that whatever else the machine does hits all of them alike.
 
     Parameters
@@ -68,24 +66,32 @@ def time_in_turns(
         Stop after about this long, but not before `least` turns.
     least, most
         Bounds of the number of turns.
+    alternate
+        Whether every other turn goes backwards: what comes second may find the caches warm.
+
+    Returns
+    -------
+    array
+        The times after two turns of warm-up [ms], (turns, works).
     """
     import drjit as dr
 
-    times: list[list[float]] = []
-    stop = float("inf")
-    for turn in range(most + 2):
-        if turn == 2:  # the first two turns compile, record and replay
-            stop = time.perf_counter() + seconds
-        if turn >= least + 2 and time.perf_counter() > stop:
-            break
-        times.append([])
+    for _ in range(2):  # the first call compiles and records, the second is the first replay
         for work in works:
-            start = time.perf_counter()
             work()
             dr.sync_thread()
-            times[-1].append(1e3 * (time.perf_counter() - start))
-    quartiles = np.percentile(times[2:], [25, 50, 75], axis=0).T
-    return [Timing(float(median), float(low), float(high), len(times) - 2) for low, median, high in quartiles]
+    times: list[list[float]] = []
+    stop = time.perf_counter() + seconds
+    while len(times) < least or (time.perf_counter() < stop and len(times) < most):
+        turn = [0.0] * len(works)
+        backwards = alternate and len(times) % 2
+        for place in reversed(range(len(works))) if backwards else range(len(works)):
+            start = time.perf_counter()
+            works[place]()
+            dr.sync_thread()
+            turn[place] = 1e3 * (time.perf_counter() - start)
+        times.append(turn)
+    return np.array(times)
 
 
 def timed_frame(renderer: FrameRenderer, scene: Scene):

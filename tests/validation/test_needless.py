@@ -1,5 +1,4 @@
 # SPDX-License-Identifier: BSD-3-Clause
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -7,7 +6,7 @@ import pytest
 
 from realtime.frame import run_stages
 from validation.configurations import Configuration, prepared
-from validation.needless import interleaved, needless_costs, sphere_spot_with
+from validation.needless import needless_costs, sphere_spot_with
 
 
 def kernels(renderer):
@@ -41,13 +40,6 @@ def test_unseen_casters_leave_no_plane(variant):
     more, less = (prepared(scene, Configuration("shadow-planes", "exact")).prepare(scene)[0] for scene in scenes)
     for name in ("start", "entries", "lines", "spans", "ends", "layers"):
         np.testing.assert_array_equal(np.array(getattr(more, name)), np.array(getattr(less, name)), err_msg=name)
-
-
-def test_interleaved_times_are_those_of_the_work(variant):
-    slow, fast = interleaved(lambda: time.sleep(0.02), lambda: time.sleep(0.01), turns=5)
-    assert len(slow) == len(fast) == 5
-    assert slow.min() >= 20
-    assert fast.min() >= 10
 
 
 @pytest.mark.slow

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from tests.scenes_for_tests import tiny_scene
-from validation.timing import time_frame, time_in_turns, time_repeated
+from validation.timing import time_frame, time_in_turns, time_repeated, times_in_turns
 
 
 def test_median_is_the_time_of_the_work(variant):
@@ -67,6 +67,22 @@ def test_works_are_timed_in_turns(variant):
     assert slow.low_ms >= 20
     assert fast.low_ms >= 5
     assert fast.median_ms < slow.median_ms
+
+
+def test_every_other_turn_goes_backwards_on_request(variant):
+    """What comes second may find the caches warm; each time stays with its work."""
+    calls = []
+
+    def work(name, seconds):
+        calls.append(name)
+        time.sleep(seconds)
+
+    works = [lambda: work("slow", 0.02), lambda: work("fast", 0.01)]
+    slow, fast = times_in_turns(works, seconds=0.0, least=5, most=5, alternate=True).T
+    assert calls[4:] == ["slow", "fast", "fast", "slow"] * 2 + ["slow", "fast"]
+    assert len(slow) == len(fast) == 5
+    assert slow.min() >= 20
+    assert fast.min() >= 10
 
 
 @pytest.fixture(scope="module")
