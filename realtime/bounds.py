@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from realtime.casters import mesh_triangles
 from realtime.errors import InputError
 
 Array = NDArray[np.float64]
@@ -50,17 +51,12 @@ def read_bounds(shape) -> Bounds:
     InputError
         For a shape that is neither a sphere nor a closed convex mesh with its normals outwards, with its name.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     name = shape.id()
     if shape.class_name() == "Sphere":
         return _read_ball(shape)
     if not shape.is_mesh():
         raise _refusal(name, f"is a {shape.class_name()}", "a sphere, a cube or a closed convex mesh")
-    position = shape.vertex_position(dr.arange(mi.UInt32, shape.vertex_count()))
-    faces = np.array(shape.face_indices(dr.arange(mi.UInt32, shape.face_count())), dtype=np.int64).T
-    vertices = np.array(position, dtype=np.float64).T
+    vertices, faces = mesh_triangles(shape)
     return mesh_bounds(name, vertices, faces[:, ::-1] if shape.has_flipped_normals() else faces)
 
 

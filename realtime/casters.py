@@ -119,16 +119,21 @@ def with_positions(casters: Casters, positions: Mapping[str, Array]) -> Casters:
     return moved(casters, vertices)
 
 
-def _triangles(shape) -> tuple[Array, NDArray[np.int64]]:
-    """Return vertices and triangles of a Mitsuba shape."""
+def mesh_triangles(mesh) -> tuple[Array, NDArray[np.int64]]:
+    """Return the vertices [m] and the triangles of a Mitsuba mesh, (vertices, 3) and (triangles, 3)."""
     import drjit as dr
     import mitsuba as mi
 
+    # Asked for one by one: `mi.traverse` shows the transform of a rectangle or a cube, not its vertices.
+    position = mesh.vertex_position(dr.arange(mi.UInt32, mesh.vertex_count()))
+    face = mesh.face_indices(dr.arange(mi.UInt32, mesh.face_count()))
+    return np.array(position, dtype=np.float64).T.copy(), np.array(face, dtype=np.int64).T.copy()
+
+
+def _triangles(shape) -> tuple[Array, NDArray[np.int64]]:
+    """Return vertices and triangles of a Mitsuba shape."""
     if shape.is_mesh():
-        # Asked for one by one: `mi.traverse` shows the transform of a rectangle or a cube, not its vertices.
-        position = shape.vertex_position(dr.arange(mi.UInt32, shape.vertex_count()))
-        face = shape.face_indices(dr.arange(mi.UInt32, shape.face_count()))
-        return np.array(position, dtype=np.float64).T.copy(), np.array(face, dtype=np.int64).T.copy()
+        return mesh_triangles(shape)
     raise InputError(
         f"shape '{shape.id()}' is a {shape.class_name()}, which has no triangles and so no silhouette edges; wanted "
         "meshes (obj, ply, cube, rectangle); replace it by a mesh, or use --method ray-march"
