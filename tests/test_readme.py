@@ -93,7 +93,7 @@ def commands() -> dict:
 
     from reports.cli import app
 
-    found = getattr(typer.main.get_command(app), "commands")  # noqa: B009
+    found = typer.main.get_group(app).commands
     return {name: {option for one in command.params for option in one.opts} for name, command in found.items()}
 
 

@@ -13,8 +13,8 @@ from validation.relative_errors import published_errors
 
 SHAPE = (9, 12, 3)
 # The keys that the design promises to scripts.
-METRIC_KEYS = "pixels bias relative_bias rmse relative_rmse p50 p99 max nonfinite negative".split()  # noqa: SIM905
-STATISTIC_KEYS = "z_mean z_std rejected expected_rejections relative_bias_ci detectable_bias".split()  # noqa: SIM905
+METRIC_KEYS = ["pixels", "bias", "relative_bias", "rmse", "relative_rmse", "p50", "p99", "max", "nonfinite", "negative"]
+STATISTIC_KEYS = ["z_mean", "z_std", "rejected", "expected_rejections", "relative_bias_ci", "detectable_bias"]
 
 
 @pytest.fixture
