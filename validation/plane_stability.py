@@ -15,13 +15,13 @@ from typing import Any
 
 import numpy as np
 
-from realtime.frame import frame_renderer, render_frame
-from realtime.kernels import KERNELS
-from realtime.methods import METHODS
+from realtime.frame import render_frame
 from realtime.scene import read_scene
 from reference.quadrature import quadrature_image
 from reference.scene import read_truth
-from validation.scenes.parts import Mesh, camera, fog, joined, mitsuba_mesh, placed, rotation
+from validation.configurations import configuration, prepared
+from validation.metrics import FLOOR
+from validation.scenes.parts import Mesh, camera, fog, joined, mitsuba_mesh, placed, point_light, rotation
 from validation.scenes.solids import box
 
 Progress = Callable[[int, int, str], None]
@@ -30,9 +30,6 @@ SIZE = (64, 48)  #: of the images [pixels]
 WITHIN = 1e-4  #: of the pixel's true value: what the default keeps to
 SUMS = ("segments", "gamma")
 PRECISIONS = ("single", "double")
-
-_DARK = 1e-3  # pixels below this share of the mean are measured against it
-
 
 @dataclass(frozen=True)
 class PlaneStability:
@@ -103,8 +100,7 @@ def broken(found: list[PlaneStability]) -> list[str]:
 
 
 def _airlight(scene, precision: str, **parameters):
-    method, kernel = METHODS["shadow-planes"], KERNELS["exact"].function
-    renderer = frame_renderer(read_scene(scene, precision), method, kernel=kernel, **parameters)
+    renderer = prepared(read_scene(scene, precision), configuration("shadow-planes", "exact", parameters))
     return np.asarray(render_frame(renderer).airlight, dtype=np.float64)
 
 
@@ -112,7 +108,7 @@ def _compared(what: tuple[str, str, str], image, expected, *, scale) -> PlaneSta
     """Compare an image with another in units of the true values."""
     finite = np.isfinite(image)
     mean = scale.mean()
-    error = (np.abs(image - expected) / np.maximum(scale, _DARK * mean))[finite]
+    error = (np.abs(image - expected) / np.maximum(scale, FLOOR * mean))[finite]
     return PlaneStability(
         *what,
         pixels=image.shape[0] * image.shape[1],
@@ -141,10 +137,10 @@ def _slats(sigma_t: float, *, lamp: tuple[float, float, float], power: float) ->
     slats = []
     for number in range(41):
         upright = number % 2
-        vertices, faces = box((0.023, 0.011, 1.7) if upright else (1.9, 0.011, 0.023))
+        slat = box((0.023, 0.011, 1.7) if upright else (1.9, 0.011, 0.023))
         step = 0.037 * (number % 13) - 0.21
         place = (step, -1.13 + 0.051 * number, 0.93) if upright else (0.07, -1.13 + 0.051 * number, 0.93 + step)
-        slats.append((vertices + np.array(place), faces))
+        slats.append(placed(slat, place))
     return _scene(sigma_t, lamp, power, joined(slats))
 
 
@@ -154,6 +150,6 @@ def _scene(sigma_t: float, lamp, power: float, casters: Mesh) -> dict[str, Any]:
         "type": "scene",
         "fog": fog(sigma_t, (0.9, 0.8, 0.7)),
         "sensor": camera((0.03, -4.1, 0.83), (0.05, 0.0, 0.89), fov=37.0, size=SIZE),
-        "lamp": {"type": "point", "position": list(lamp), "intensity": {"type": "rgb", "value": [power] * 3}},
+        "lamp": point_light(lamp, [power] * 3),
         "casters": mitsuba_mesh("casters", casters, (0.5, 0.4, 0.3)),
     }

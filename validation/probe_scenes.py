@@ -8,7 +8,7 @@ spots or a sum over lights, is shown here.
 
 from typing import Any
 
-from validation.scenes.parts import camera, fog
+from validation.scenes.parts import camera, fog, point_light
 
 
 def many_lights() -> dict[str, Any]:
@@ -26,16 +26,8 @@ def many_lights() -> dict[str, Any]:
             "beam_width": 11.9,
             "intensity": {"type": "rgb", "value": [31.0, 27.0, 29.0]},
         },
-        "lamp": {
-            "type": "point",
-            "position": [-1.37, 1.29, 2.03],
-            "intensity": {"type": "rgb", "value": [7.3, 8.9, 6.1]},
-        },
-        "behind": {
-            "type": "point",
-            "position": [0.83, -5.39, 2.11],
-            "intensity": {"type": "rgb", "value": [13.7, 11.3, 12.9]},
-        },
+        "lamp": point_light((-1.37, 1.29, 2.03), (7.3, 8.9, 6.1)),
+        "behind": point_light((0.83, -5.39, 2.11), (13.7, 11.3, 12.9)),
         "ball": {
             "type": "sphere",
             "center": [0.17, 0.13, 0.79],
