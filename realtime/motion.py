@@ -101,11 +101,12 @@ def replace_positions(parameters, positions: Mapping[str, Array]) -> Mapping[str
     rounded = {}
     for name, vertices in positions.items():
         key = f"{name}.vertex_positions"
-        borrowed = mi.Float(vertices.astype(np.float32).ravel())
+        narrow = vertices.astype(np.float32)
+        borrowed = mi.Float(narrow.ravel())
         own = dr.gather(mi.Float, borrowed, dr.arange(mi.UInt32, dr.width(borrowed)))
         dr.eval(own)
         parameters[key] = own
-        rounded[name] = vertices.astype(np.float32).astype(np.float64)
+        rounded[name] = narrow.astype(np.float64)
     parameters.update()
     return rounded
 
