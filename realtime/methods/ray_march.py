@@ -74,8 +74,7 @@ def ray_march(
             x1 = dr.minimum(x1, x0 + _OPTICAL_REACH / least_extinction(view.medium))
         if view.medium.clear:
             x0, x1 = _within(in_media[number], x0, x1)
-        shadow_map = view.prepared[number] if shadow == "map" and view.plan.shadows else None
-        lit = _visibility(view, light, shadow, shadow_map)
+        lit = _visibility(view, number, shadow)
         media = in_media[number] if in_media else None
         integral = _march(view, light, geometry, (x0, x1), steps=steps, spacing=spacing, lit=lit, media=media)
         total += bounded_radiance(light, integral) if media else radiance(view.medium, light, integral)
@@ -99,11 +98,13 @@ def _check(steps: int, spacing: str, shadow: str, view: View) -> None:
         raise InputError("spacing=uniform: an endless ray through a vacuum has no step length; use spacing=equiangular")
 
 
-def _visibility(view: View, light: Light, shadow: str, shadow_map):
+def _visibility(view: View, number: int, shadow: str):
+    """Return the function that says whether the light of a number reaches a point."""
+    light = view.lights[number]
     if shadow == "none" or not view.plan.shadows:
         return lambda point: True
     if shadow == "map":
-        return lambda point: lit_in_map(shadow_map, light, point)
+        return lambda point: lit_in_map(view.prepared[number], light, point)
     return lambda point: view.visible(point, light)
 
 
