@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from analytic.errors import InputError
+from validation.metrics import error_metrics
 
 SIZES = (0.05, 0.17, 0.43, 0.83)  #: radius over the distance from the lamp to the centre
 OPTICAL_DEPTHS = (0.03, 0.31, 1.1, 3.1, 9.7)  #: of the diameter
@@ -117,17 +118,18 @@ def _judged(size: float, depth: float, image: tuple[int, int], against: str) -> 
     loaded = mi.load_dict(ball_in_clear_air(size, depth, image))
     scene = read_scene(loaded, "double")
     exact = truth_image(loaded).airlight if against == "truth" else _airlight(scene, "exact")
+    paper = _airlight(scene, "paper")
     body = exact[..., 1] > 0
-    test, reference = _airlight(scene, "paper")[body], exact[body]
-    mean = float(np.mean(reference))
+    test, reference = paper[body], exact[body]
     scale = float(np.sum(test * reference) / np.sum(test * test))
+    error = error_metrics(exact, paper, mask=body)
     return ConstantDistance(
         size=size,
         optical_depth=depth,
-        relative_rmse=float(np.sqrt(np.mean((test - reference) ** 2))) / mean,
-        relative_bias=float(np.mean(test - reference)) / mean,
+        relative_rmse=error.relative_rmse,
+        relative_bias=error.relative_bias,
         scale=scale,
-        shape=float(np.sqrt(np.mean((scale * test - reference) ** 2))) / mean,
+        shape=error_metrics(exact, scale * paper, mask=body).relative_rmse,
     )
 
 
