@@ -43,8 +43,8 @@ def lit_surface(
     truth: TruthScene,
     hits: SurfaceHits,
     *,
-    reached: Sequence[NDArray[np.bool_] | None] | None = None,
-    shadow_scale: float = 1.0,
+    reached: Sequence[NDArray[np.bool_] | None],
+    shadow_scale: float,
 ) -> Array:
     """Return the radiance of the lit surface at each pixel centre, (pixels, 3) [W/(m^2 sr)].
 
@@ -53,9 +53,9 @@ def lit_surface(
     truth, hits
         The scene and what its rays hit.
     reached
-        By light whether it reaches the surface at the end of each ray, as its lit intervals say. A shadow ray is cast
-        where that is not known; Mitsuba starts it 1e-4 off the surface, so that it can graze what the point itself is
-        clear of.
+        By light whether it reaches the surface at the end of each ray, as its lit intervals say. Where that is not
+        known, None, a shadow ray is cast; Mitsuba starts it 1e-4 off the surface, so that it can graze what the point
+        itself is clear of.
     shadow_scale
         See `reference.quadrature`.
     """
@@ -65,8 +65,11 @@ def lit_surface(
     total = np.zeros((len(hits.distance), 3))
     if not truth.occluders.shapes():
         return total
-    known = reached or [None] * len(truth.lights)
-    for emitter, light, reaches in zip(truth.scene.emitters(), truth.lights, known, strict=True):
+    if truth.media:
+        seen = np.where(np.isfinite(hits.distance), hits.distance, 0.0)
+        point = truth.origin + seen[:, None] * truth.direction
+        to_camera = optical_depth(truth, truth.origin, truth.direction, np.zeros(len(seen)), seen)
+    for emitter, light, reaches in zip(truth.scene.emitters(), truth.lights, reached, strict=True):
         towards, arriving = emitter.sample_direction(interaction, mi.Point2f(0.5))
         facing = interaction.is_valid()
         if reaches is None:
@@ -74,19 +77,18 @@ def lit_surface(
         reflected = interaction.bsdf().eval(mi.BSDFContext(), interaction, interaction.to_local(towards.d), facing)
         radiance = np.array(reflected * arriving, dtype=np.float64).T
         lit = np.array(facing, dtype=bool) & reaches
-        path = np.where(lit, hits.distance, 0) + shadow_scale * np.array(towards.dist, dtype=np.float64)
-        depth = np.where(lit, path, 0)[:, None] * truth.medium.sigma_t
         if truth.media:
-            depth = _depth_through_media(truth, np.where(lit, hits.distance, 0), light.position, shadow_scale)
+            depth = to_camera + _leg_depth(truth, point, light.position, shadow_scale)
+        else:
+            path = np.where(lit, hits.distance, 0) + shadow_scale * np.array(towards.dist, dtype=np.float64)
+            depth = np.where(lit, path, 0)[:, None] * truth.medium.sigma_t
         total += np.where(lit[:, None], radiance * np.exp(-depth), 0.0)
     return total
 
 
-def _depth_through_media(truth: TruthScene, distance: Array, light: Array, shadow_scale: float) -> Array:
-    """Return the optical depth camera -> point -> light of points on the pixel-centre rays, (pixels, 3)."""
-    point = truth.origin + distance[:, None] * truth.direction
+def _leg_depth(truth: TruthScene, point: Array, light: Array, shadow_scale: float) -> Array:
+    """Return the optical depth between points and a light through bounded media, (pixels, 3)."""
     leg = point - light
     length = np.linalg.norm(leg, axis=1)
     leg /= np.maximum(length, np.finfo(float).tiny)[:, None]
-    to_camera = optical_depth(truth, truth.origin, truth.direction, np.zeros(len(distance)), distance)
-    return to_camera + optical_depth(truth, light, leg, (1 - shadow_scale) * length, length)
+    return optical_depth(truth, light, leg, (1 - shadow_scale) * length, length)
