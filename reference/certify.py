@@ -72,10 +72,9 @@ def certified_cast(toggles: Toggles, found_by: Rounding, *, ends: tuple[Array, A
     checks
         Random samples of each ray and round.
     """
-    ray, theta = np.empty(0, np.int64), np.empty(0)
+    ray, theta, lit = np.empty(0, np.int64), np.empty(0), np.empty(0, bool)
     checked = disagreements = 0
     missed = 0.0
-    wrong: Bools = np.empty(0, bool)
     for number in range(_ROUNDS):
         fresh_ray, fresh = _random_samples(toggles.ray, ends, checks, number)
         fresh_lit = _cast(found_by.visible, fresh_ray, fresh)
@@ -84,12 +83,13 @@ def certified_cast(toggles: Toggles, found_by: Rounding, *, ends: tuple[Array, A
         disagreements += int(contradicted.sum())
         missed = float(contradicted.mean()) if number == 0 else missed
         ray, theta = np.append(ray, fresh_ray[contradicted]), np.append(theta, fresh[contradicted])
+        lit = np.append(lit, fresh_lit[contradicted])
         # What an earlier round contradicted is looked at again: several samples may lie in one interval.
-        wrong = _cast(found_by.visible, ray, theta) != _predicted(toggles, ray, theta)[0]
+        wrong = lit != _predicted(toggles, ray, theta)[0]
         if not wrong.any() and not contradicted.any():
             break
         toggles = _mended(toggles, ray[wrong], theta[wrong], found_by, ends)
-        wrong = _cast(found_by.visible, ray, theta) != _predicted(toggles, ray, theta)[0]
+        wrong = lit != _predicted(toggles, ray, theta)[0]
     left = int(wrong.sum())
     certificate = Certificate(checked, disagreements, disagreements - left, left, missed)
     intervals = replace(_intervals(toggles, ends), certificate=certificate)
@@ -222,7 +222,7 @@ def _with_doubt(
     if not len(ray):
         return intervals
     new = ray, theta, (ends[1][ray] - ends[0][ray]) / checks
-    return replace(intervals, doubt=new if intervals.doubt is None else joined_doubt(intervals.doubt, new))
+    return replace(intervals, doubt=joined_doubt(intervals.doubt, new))
 
 
 def _lit_by_all_shapes(geometry: Geometry, ray: np.int64, theta: np.float64) -> bool:

@@ -47,9 +47,13 @@ class LitIntervals:
     doubt: Doubt | None = None  #: what was left in doubt: rays, angles, widths [rad]
 
 
-def joined_doubt(one: Doubt, other: Doubt) -> Doubt:
-    """Put two lists of doubtful angles together."""
-    return np.append(one[0], other[0]), np.append(one[1], other[1]), np.append(one[2], other[2])
+def joined_doubt(*parts: Doubt | None) -> Doubt | None:
+    """Put lists of doubtful angles together, those that there are."""
+    known = [part for part in parts if part is not None]
+    if not known:
+        return None
+    ray, angle, width = (np.concatenate(column) for column in zip(*known, strict=True))
+    return ray, angle, width
 
 
 def intersected(one: LitIntervals, other: LitIntervals, ends: tuple[Array, Array]) -> LitIntervals:
@@ -70,9 +74,8 @@ def intersected(one: LitIntervals, other: LitIntervals, ends: tuple[Array, Array
     ray, angle = ray[order], angle[order]
     both = np.flatnonzero(np.cumsum(step[order]) == 2)
     ray, low, high = ray[both], angle[both], angle[both + 1]
-    doubt = None
-    for part in (one.doubt, other.doubt):
-        doubt = part if doubt is None else doubt if part is None else joined_doubt(doubt, part)
     transitions = int(np.sum(low > ends[0][ray]) + np.sum(high < ends[1][ray]))
     certificate = Certificate.of_all([one.certificate, other.certificate])
-    return LitIntervals(ray, low, high, transitions, max(one.edge, other.edge), certificate, doubt)
+    return LitIntervals(
+        ray, low, high, transitions, max(one.edge, other.edge), certificate, joined_doubt(one.doubt, other.doubt)
+    )
