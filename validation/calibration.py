@@ -55,6 +55,30 @@ Law = Callable[[np.random.Generator, tuple[int, ...]], Array]  #: draws numbers 
 LEVEL = 0.01  #: of the tests of values, pixels and blocks
 
 
+def normal(rng: np.random.Generator, shape: tuple[int, ...]) -> Array:
+    """Draw from the normal law, which the tests take for granted."""
+    return rng.standard_normal(shape)
+
+
+def log_normal(deviation: float) -> Law:
+    """Return the law of exp(deviation N) brought to mean 0 and deviation 1: many small values and few large ones."""
+    mean, spread = np.exp(deviation**2 / 2), np.exp(deviation**2 / 2) * np.sqrt(np.expm1(deviation**2))
+    return lambda rng, shape: (np.exp(deviation * rng.standard_normal(shape)) - mean) / spread
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """Which images are compared, and how often."""
+
+    law: Law = normal  #: of the errors of a batch in a pixel; see `normal` and `log_normal`
+    runs: int = 300  #: comparisons
+    batches: int = 16  #: of each random image
+    size: int = 24  #: pixels along each side of an image
+    noisy_reference: bool = False  #: or an exact one; the skewed errors of two random images cancel their skewness
+    unit: float = 1.0  #: factor of all radiances
+    seed: int = 1  #: of the random numbers
+
+
 @dataclass(frozen=True)
 class Calibration:
     """How often the tests of `validation.statistics` reject images that agree; all shares are of runs but `exceeding`.
@@ -141,54 +165,25 @@ class PowerCheck:
         return low <= self.measured <= high
 
 
-def normal(rng: np.random.Generator, shape: tuple[int, ...]) -> Array:
-    """Draw from the normal law, which the tests take for granted."""
-    return rng.standard_normal(shape)
-
-
-def log_normal(deviation: float) -> Law:
-    """Return the law of exp(deviation N) brought to mean 0 and deviation 1: many small values and few large ones."""
-    mean, spread = np.exp(deviation**2 / 2), np.exp(deviation**2 / 2) * np.sqrt(np.expm1(deviation**2))
-    return lambda rng, shape: (np.exp(deviation * rng.standard_normal(shape)) - mean) / spread
-
-
-def calibrate(
-    law: Law = normal,
-    *,
-    runs: int = 300,
-    batches: int = 16,
-    size: int = 24,
-    spread: float = 0.3,
-    noisy_reference: bool = False,
-    unit: float = 1.0,
-    seed: int = 1,
-) -> Calibration:
+def calibrate(experiment: Experiment, *, spread: float = 0.3) -> Calibration:
     """Compare many images that agree, and count.
 
     Parameters
     ----------
-    law
-        Of the errors of a batch in a pixel; see `normal` and `log_normal`.
-    runs, batches, size
-        Comparisons, batches of each random image, pixels along each of its sides.
+    experiment
+        What is compared.
     spread
         Relative standard deviation of one batch in one pixel.
-    noisy_reference
-        Whether the reference is a random image too, or exact. Two skewed errors of one law cancel their skewness.
-    unit
-        Factor of all radiances.
-    seed
-        Of the random numbers.
     """
-    found = _comparisons(law, 0.0, runs, batches, size, spread, noisy_reference, unit, seed)
+    found = _comparisons(experiment, 0.0, spread)
 
     def covered(name: str) -> float:
         return float(np.mean([getattr(s, name)[0] <= 0 <= getattr(s, name)[1] for s in found]))
 
     return Calibration(
-        runs=runs,
-        pixels=size**2,
-        batches=batches,
+        runs=experiment.runs,
+        pixels=experiment.size**2,
+        batches=experiment.batches,
         pixel_alarms=float(np.mean([s.rejected > 0 for s in found])),
         block_alarms=float(np.mean([s.rejected_blocks > 0 for s in found])),
         exceeding=sum(s.exceeding for s in found) / sum(s.tested for s in found),
@@ -201,29 +196,18 @@ def calibrate(
     )
 
 
-def check_power(
-    bias: float,
-    law: Law = normal,
-    *,
-    runs: int = 300,
-    batches: int = 16,
-    size: int = 24,
-    spread: float | None = None,
-    noisy_reference: bool = False,
-    unit: float = 1.0,
-    seed: int = 1,
-) -> PowerCheck:
+def check_power(bias: float, experiment: Experiment, *, spread: float | None = None) -> PowerCheck:
     """Inject a bias into many images, and compare the share that finds it with the power that was predicted.
 
     Parameters
     ----------
     bias
         Relative, such as 0.005.
+    experiment
+        What is compared.
     spread
         Relative standard deviation of one batch in one pixel; by default the one at which the bias is found nine times
         in ten.
-    law, runs, batches, size, noisy_reference, unit, seed
-        As in `calibrate`.
 
     Raises
     ------
@@ -233,26 +217,28 @@ def check_power(
     if not bias > -1 or bias == 0:
         raise InputError(f"bias: got {bias}, wanted a relative bias such as 0.005, not 0 and above -1")
     if spread is None:
-        spread = spread_to_detect(bias, batches=batches, size=size, noisy_reference=noisy_reference)
-    found = _comparisons(law, bias, runs, batches, size, spread, noisy_reference, unit, seed)
+        spread = spread_to_detect(bias, experiment)
+    found = _comparisons(experiment, bias, spread)
     predicted = [power(bias / s.relative_bias_se, s.relative_bias_freedom) for s in found]
     return PowerCheck(
         bias=bias,
         detectable=float(np.mean([s.detectable_bias for s in found])),
         predicted=float(np.mean(predicted)),
         measured=float(np.mean([s.relative_bias_p < 0.05 for s in found])),
-        runs=runs,
+        runs=experiment.runs,
     )
 
 
-def spread_to_detect(bias: float, *, batches: int = 16, size: int = 24, noisy_reference: bool = False) -> float:
+def spread_to_detect(bias: float, experiment: Experiment) -> float:
     """Return the spread of a batch at which the standard error of the relative bias is |bias| / 3.2415.
 
     With the weight w of a pixel in the sum of the image the variance of the relative bias is (spread / (1 + bias))^2
     sum w^2 / K for the test's errors, of relative size `spread`, and as much for the reference's.
     """
-    weights = _profile(size) / _profile(size).sum()
-    error = float(np.sqrt((weights**2).sum() / batches)) * (1 + bias) * (np.sqrt(2) if noisy_reference else 1)
+    profile = _profile(experiment.size)
+    weights = profile / profile.sum()
+    error = float(np.sqrt((weights**2).sum() / experiment.batches)) * (1 + bias)
+    error *= np.sqrt(2) if experiment.noisy_reference else 1
     return abs(bias) / 3.2415 / error
 
 
@@ -264,32 +250,22 @@ def share_interval(probability: float, trials: int, level: float) -> tuple[float
     return float(low) / trials, float(high) / trials
 
 
-def _comparisons(
-    law: Law,
-    bias: float,
-    runs: int,
-    batches: int,
-    size: int,
-    spread: float,
-    noisy_reference: bool,
-    unit: float,
-    seed: int,
-) -> list[Statistics]:
-    rng = np.random.default_rng(seed)
-    truth = unit * _profile(size)
+def _comparisons(experiment: Experiment, bias: float, spread: float) -> list[Statistics]:
+    rng = np.random.default_rng(experiment.seed)
+    truth = experiment.unit * _profile(experiment.size)
+
+    def estimate(image: Array) -> Estimate:
+        """Return what a renderer gives of an image: mean, standard error and batch means."""
+        images = image * (1 + spread * experiment.law(rng, (experiment.batches, *image.shape)))
+        error = images.std(axis=0, ddof=1) / np.sqrt(experiment.batches)
+        return Estimate(images.mean(axis=0), error, experiment.batches, images.mean(axis=(1, 2)))
+
     found = []
-    for _ in range(runs):
-        test = _estimate(rng, law, (1 + bias) * truth, batches, spread)
-        reference = _estimate(rng, law, truth, batches, spread) if noisy_reference else Estimate(truth)
+    for _ in range(experiment.runs):
+        test = estimate((1 + bias) * truth)
+        reference = estimate(truth) if experiment.noisy_reference else Estimate(truth)
         found.append(compare_statistics(reference, test, family_level=LEVEL, plain_level=LEVEL))
     return found
-
-
-def _estimate(rng: np.random.Generator, law: Law, truth: Array, batches: int, spread: float) -> Estimate:
-    """Return what a renderer gives of an image: mean, standard error and batch means."""
-    images = truth * (1 + spread * law(rng, (batches, *truth.shape)))
-    error = images.std(axis=0, ddof=1) / np.sqrt(batches)
-    return Estimate(images.mean(axis=0), error, batches, images.mean(axis=(1, 2)))
 
 
 def _profile(size: int) -> Array:

@@ -4,13 +4,14 @@
 Every share may leave the interval that holds it with probability 1 - 1e-4 by its binomial law. Seeds are fixed.
 """
 
-import dataclasses
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
 
 from analytic.errors import InputError
 from validation.calibration import (
+    Experiment,
     PowerCheck,
     calibrate,
     check_power,
@@ -32,12 +33,12 @@ def relative_spread(deviation):
 
 
 def test_under_the_null_the_rates_are_the_levels():
-    assert calibrate(runs=150, seed=21).problems() == ()
+    assert calibrate(Experiment(runs=150, seed=21)).problems() == ()
 
 
 @pytest.mark.parametrize("bias", BIASES)
 def test_injected_biases_are_found_with_the_printed_power(bias):
-    check = check_power(bias, runs=150, seed=round(bias * 1e4))
+    check = check_power(bias, Experiment(runs=150, seed=round(bias * 1e4)))
     assert check.agrees, check
     # The spread is chosen for 90 %; 16 batches of 576 pixels know their standard error to 1 %.
     assert check.predicted == pytest.approx(0.90, abs=0.01)
@@ -45,15 +46,16 @@ def test_injected_biases_are_found_with_the_printed_power(bias):
 
 
 def test_the_unit_of_radiance_changes_nothing():
+    few = Experiment(runs=20)
     for one, two in (
-        (calibrate(runs=20), calibrate(runs=20, unit=2.0**-100)),
-        (check_power(0.005, runs=20), check_power(0.005, runs=20, unit=2.0**100)),
+        (calibrate(few), calibrate(replace(few, unit=2.0**-100))),
+        (check_power(0.005, few), check_power(0.005, replace(few, unit=2.0**100))),
     ):
         assert one == two  # powers of two change no digit
     for unit in (1e-30, 1e30):
-        found = dataclasses.asdict(check_power(0.005, runs=20, unit=unit))
+        found = asdict(check_power(0.005, replace(few, unit=unit)))
         # Rounding of the factor, magnified by the difference of two images that agree to some per mille.
-        assert found == pytest.approx(dataclasses.asdict(check_power(0.005, runs=20)), rel=1e-9)
+        assert found == pytest.approx(asdict(check_power(0.005, few)), rel=1e-9)
 
 
 def test_laws_have_mean_zero_and_deviation_one():
@@ -67,8 +69,8 @@ def test_laws_have_mean_zero_and_deviation_one():
 
 
 def test_problems_name_what_is_wrong():
-    good = calibrate(runs=60, seed=5)
-    bad = dataclasses.replace(good, coverage=0.5, exceeding=0.02, exceeding_alarms=0.5, bias_uniformity=1e-9)
+    good = calibrate(Experiment(runs=60, seed=5))
+    bad = replace(good, coverage=0.5, exceeding=0.02, exceeding_alarms=0.5, bias_uniformity=1e-9)
     assert [problem.split()[0] for problem in bad.problems()] == [
         "exceeding",
         "coverage",
@@ -94,7 +96,7 @@ def test_share_interval_by_hand():
 @pytest.mark.parametrize("bias", [0.0, -1.0, np.nan])
 def test_no_power_without_a_bias(bias):
     with pytest.raises(InputError, match="wanted a relative bias such as"):
-        check_power(bias)
+        check_power(bias, Experiment())
 
 
 # --- large -----------------------------------------------------------------------------------------------------------
@@ -103,14 +105,14 @@ def test_no_power_without_a_bias(bias):
 @pytest.mark.statistical
 @pytest.mark.parametrize(("batches", "noisy_reference"), [(4, False), (16, False), (16, True)])
 def test_many_null_comparisons(batches, noisy_reference):
-    found = calibrate(runs=1000, batches=batches, noisy_reference=noisy_reference, seed=30 + batches)
+    found = calibrate(Experiment(runs=1000, batches=batches, noisy_reference=noisy_reference, seed=30 + batches))
     assert found.problems() == (), found
 
 
 @pytest.mark.statistical
 def test_two_images_of_few_batches_are_judged_too_mildly():
     """Welch's degrees of freedom are estimates too: with 4 batches on either side 0.7 % exceed instead of 1 %."""
-    found = calibrate(runs=400, batches=4, noisy_reference=True, seed=34)
+    found = calibrate(Experiment(runs=400, batches=4, noisy_reference=True, seed=34))
     assert 0.005 < found.exceeding < 0.008
     assert found.pixel_alarms <= share_interval(0.01, found.runs, 1e-4)[1]
     low, high = share_interval(0.95, found.runs, 1e-4)
@@ -123,8 +125,8 @@ def test_two_images_of_few_batches_are_judged_too_mildly():
 @pytest.mark.parametrize("wider", [0.6, 1.0, 1.5, 3.0])
 def test_the_printed_power_is_the_share_that_finds_a_bias(bias, wider):
     """From hardly ever to nearly always, both images random."""
-    spread = wider * spread_to_detect(bias, noisy_reference=True)
-    check = check_power(bias, runs=600, spread=spread, noisy_reference=True, seed=round(1e4 * bias + 10 * wider))
+    both = Experiment(runs=600, noisy_reference=True, seed=round(1e4 * bias + 10 * wider))
+    check = check_power(bias, both, spread=wider * spread_to_detect(bias, both))
     print(
         f"bias {bias:.2%}: detectable {check.detectable:.3%}, power {check.predicted:.3f}, found {check.measured:.3f}"
     )
@@ -135,7 +137,8 @@ def test_the_printed_power_is_the_share_that_finds_a_bias(bias, wider):
 def test_skewed_noise_breaks_the_count_of_pixels_first_and_the_interval_last():
     """Log-normal batches against an exact reference, as in the table of the module."""
     mild, skewed, heavy = (
-        calibrate(log_normal(s), runs=400, batches=16, spread=relative_spread(s), seed=40) for s in (0.5, 1.0, 2.0)
+        calibrate(Experiment(log_normal(s), runs=400, batches=16, seed=40), spread=relative_spread(s))
+        for s in (0.5, 1.0, 2.0)
     )
     assert 0.15 < mild.pixel_alarms < 0.45
     assert skewed.pixel_alarms > 0.9
@@ -152,7 +155,7 @@ def test_skewed_noise_breaks_the_count_of_pixels_first_and_the_interval_last():
 
 @pytest.mark.statistical
 def test_skewness_of_one_law_on_both_sides_cancels():
-    found = calibrate(log_normal(0.5), runs=400, spread=relative_spread(0.5), noisy_reference=True, seed=41)
+    found = calibrate(Experiment(log_normal(0.5), runs=400, noisy_reference=True, seed=41), spread=relative_spread(0.5))
     low, high = share_interval(0.95, found.runs, 1e-4)
     assert low <= found.coverage <= high
     assert found.exceeding < 0.011  # symmetric errors with heavy tails: too few exceed if anything
