@@ -31,6 +31,7 @@ WITHIN = 1e-4  #: of the pixel's true value: what the default keeps to
 SUMS = ("segments", "gamma")
 PRECISIONS = ("single", "double")
 
+
 @dataclass(frozen=True)
 class PlaneStability:
     """The errors of an image of one hard case."""
