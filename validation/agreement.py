@@ -99,7 +99,7 @@ def agreement(
         nonlocal expected
         if not layers:
             return True
-        widest = max(0.5 * np.ptp(widest_interval(compared(found, layer))) for layer in layers) / (0.4 * margin)
+        widest = max(width_to_reach(compared(found, layer), margin) for layer in layers)
         done = len(found.seeds)
         # The width falls with the square root of the batches: that is when this will be over.
         expected = max(least, round(done * widest**2) if np.isfinite(widest) else batches)
@@ -197,6 +197,12 @@ def widest_interval(found: Statistics) -> tuple[float, float]:
     """Return the wider of the 95 % intervals of the relative bias."""
     intervals = [found.relative_bias_ci, found.relative_bias_ci_batches]
     return max((pair for pair in intervals if pair is not None), key=lambda pair: pair[1] - pair[0])
+
+
+def width_to_reach(found: Statistics, margin: float) -> float:
+    """Return the half width of the wider interval over 0.4 times the margin: runs stop where it is below 1."""
+    low, high = widest_interval(found)
+    return 0.5 * (high - low) / (0.4 * margin)
 
 
 def pixel_angle(truth: TruthScene) -> float:

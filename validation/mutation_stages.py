@@ -12,7 +12,7 @@ from reference.batches import Batches, merged
 from reference.epsilon import measure_shadow_epsilon
 from reference.quadrature import TruthImage
 from reference.scene import TruthScene, read_truth
-from validation.agreement import batch_estimate, layer_masks, widest_interval
+from validation.agreement import batch_estimate, layer_masks, width_to_reach
 from validation.load import load_scene, resize
 from validation.monte_carlo import monte_carlo_batches
 from validation.probe_scenes import PROBES
@@ -83,7 +83,7 @@ def stage_of(name: str, scene, *, margin: float) -> Stage:
         if len(opponent.batches.seeds) < _LEAST:
             return False
         compared = (image_statistics(opponent, layer, getattr(truth, layer), mask) for layer, mask in masks.items())
-        return all(0.5 * np.ptp(widest_interval(one)) < 0.4 * opponent.margin for one in compared)
+        return all(width_to_reach(one, opponent.margin) < 1 for one in compared)
 
     shadow_scale = 1 - measure_shadow_epsilon()
     shortened = truth_image(scene, shadow_scale=shadow_scale)
