@@ -187,6 +187,11 @@ def _power(ball: Ball, origin: Array) -> Array:
     return np.sum((ball.centre - origin) ** 2, axis=-1) - ball.radius**2
 
 
+def half_chord(radius: Array | float, distance: Array) -> Array:
+    """Return half of the chord at a distance from the centre of a disk, sqrt(radius^2 - distance^2); 0 beyond it."""
+    return np.sqrt(np.maximum(radius - distance, 0) * (radius + distance))
+
+
 def holds(bounds: Bounds, point: Array) -> bool:
     """Return whether a point lies inside a body."""
     if isinstance(bounds, Ball):

@@ -32,6 +32,8 @@ disk, which lies between the two angles of the first case, if it meets the disk 
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.bounds import half_chord
+
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
@@ -62,12 +64,12 @@ def ball_shadows(balls: tuple[Array, Array], direction: Array, normal: Array, he
     centre, radius = balls
     side = np.cross(direction, normal) @ centre.T
     ray, ball = np.nonzero(np.abs(side) < radius)
-    disk = np.sqrt((radius[ball] - np.abs(side[ray, ball])) * (radius[ball] + np.abs(side[ray, ball])))
+    disk = half_chord(radius[ball], np.abs(side[ray, ball]))
     c_y = np.einsum("ij,ij->i", normal[ray], centre[ball])
     c_z = np.einsum("ij,ij->i", direction[ray], centre[ball])
     distance = np.linalg.norm(centre, axis=1)
     inside = (distance < radius)[ball]
-    tangent = np.sqrt(np.maximum(distance - radius, 0) * (distance + radius))[ball]
+    tangent = half_chord(distance, radius)[ball]  # T^2 = |C|^2 - R^2: the same product, with both swapped
 
     outside = ~inside
     found = [_hidden_behind(ray[outside], *(part[outside] for part in (c_y, c_z, disk, height[ray], tangent)))]
@@ -80,7 +82,7 @@ def ball_shadows(balls: tuple[Array, Array], direction: Array, normal: Array, he
 def _hidden_behind(ray: Index, c_y: Array, c_z: Array, disk: Array, height: Array, tangent: Array) -> Shadows:
     """Return what disks hide of rays from a light outside."""
     middle, half = np.arctan2(c_z, c_y), np.arctan2(disk, tangent)
-    chord = np.sqrt(np.maximum(disk - np.abs(height - c_y), 0) * (disk + np.abs(height - c_y)))
+    chord = half_chord(disk, np.abs(height - c_y))
     ends = []
     for sign in (-1, 1):
         angle = middle + sign * half
@@ -94,6 +96,6 @@ def _hidden_behind(ray: Index, c_y: Array, c_z: Array, disk: Array, height: Arra
 def _hidden_from_inside(ray: Index, c_y: Array, c_z: Array, disk: Array, height: Array) -> list[Shadows]:
     """Return what rays hide from a light inside of a disk: all that lies before it and behind it."""
     quarter = 0.5 * np.pi
-    chord = np.sqrt(np.maximum(disk - np.abs(height - c_y), 0) * (disk + np.abs(height - c_y)))
+    chord = half_chord(disk, np.abs(height - c_y))
     enters, leaves = np.arctan2(c_z - chord, height), np.arctan2(c_z + chord, height)
     return [(ray, np.full(len(ray), -quarter), enters), (ray, leaves, np.full(len(ray), quarter))]

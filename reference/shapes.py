@@ -13,11 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
+from reference.bounds import Ball, half_chord
 from reference.scene import TruthScene, scene_of
 
 Array = NDArray[np.float64]
-
-Ball = tuple[Array, float]  # centre and radius [m]
 
 
 @dataclass(frozen=True)
@@ -42,12 +41,12 @@ def read_shapes(scene) -> Shapes:
             single.append((shape, _ball(shape)))
         else:
             others.append(shape)
-    triangles = [part for _, part in single if not isinstance(part, tuple)]
-    balls = [part for _, part in single if isinstance(part, tuple)]
+    triangles = [part for _, part in single if not isinstance(part, Ball)]
+    balls = [part for _, part in single if isinstance(part, Ball)]
     return Shapes(
         np.concatenate([np.empty((0, 3, 3)), *triangles]),
-        np.array([centre for centre, _ in balls]).reshape(-1, 3),
-        np.array([radius for _, radius in balls]),
+        np.array([ball.centre for ball in balls]).reshape(-1, 3),
+        np.array([ball.radius for ball in balls]),
         scene_of(others, scene) if others else None,
         tuple(single),
     )
@@ -91,7 +90,7 @@ def _shape_triangles(shape) -> Array:
 
 def _ball(shape) -> Ball:
     matrix = _matrix(shape)
-    return matrix[:3, 3], float(np.linalg.norm(matrix[:3, 0]))
+    return Ball(matrix[:3, 3], float(np.linalg.norm(matrix[:3, 0])))
 
 
 def _matrix(shape) -> Array:
@@ -132,7 +131,7 @@ def exact_distance(truth: TruthScene, interaction: Any, distance: Array, shapes:
         mine = np.flatnonzero(hit & (shape_of_hit == number))
         if not len(mine):
             continue
-        if isinstance(part, tuple):
+        if isinstance(part, Ball):
             refined[mine] = _to_ball(part, truth.origin, truth.direction[mine], distance[mine])
             continue
         # A rectangle counts as one primitive; both its triangles lie in one plane.
@@ -151,9 +150,9 @@ def _to_plane(corner: Array, direction: Array, distance: Array) -> Array:
 
 def _to_ball(ball: Ball, origin: Array, direction: Array, distance: Array) -> Array:
     """Return how far rays go to where they enter a ball, or leave it if they start inside."""
-    centre, radius = ball
-    middle = direction @ (centre - origin)
-    miss = np.linalg.norm(centre - origin - middle[:, None] * direction, axis=1)
-    half = np.sqrt(np.maximum(radius - miss, 0) * (radius + miss))
-    inside = np.linalg.norm(centre - origin) < radius
-    return np.where(miss < radius, middle + half if inside else middle - half, distance)
+    centre = ball.centre - origin
+    middle = direction @ centre
+    miss = np.linalg.norm(centre - middle[:, None] * direction, axis=1)
+    half = half_chord(ball.radius, miss)
+    inside = np.linalg.norm(centre) < ball.radius
+    return np.where(miss < ball.radius, middle + half if inside else middle - half, distance)
