@@ -175,12 +175,12 @@ def _lit_of_chunk(shadows: Shadows, ends: tuple[Array, Array], used: Index) -> t
     scale = 1 / (high - low)
     hidden = (end - begin) * scale[row] > _MERGE
     row, begin, end = row[hidden], begin[hidden], end[hidden]
-    order = np.argsort(row + (begin - low[row]) * scale[row])
-    row, begin, end = row[order], begin[order], end[order]
+    start = row + (begin - low[row]) * scale[row]
+    order = np.argsort(start)
+    row, begin, end, start = row[order], begin[order], end[order], start[order]
     place = row + (end - low[row]) * scale[row]
     furthest = np.maximum.accumulate(place)
     last = np.maximum.accumulate(np.where(place == furthest, np.arange(len(row)), 0))
-    start = row + (begin - low[row]) * scale[row]
     # A gap opens before a shadow that begins beyond all earlier ones of its ray, and behind the last one of each ray.
     first_of_ray = np.append(True, row[1:] != row[:-1])[: len(row)]
     gap_begin = np.where(first_of_ray, low[row], np.append(0.0, end[last[:-1]])[: len(row)])
