@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The ground truth: single-scattering images, each with its own error.
 
-Two estimators that share no code lead to it. `reference.quadrature` finds the lit intervals of every camera ray by
-ray-traced visibility and sums certified integrals over them in float64. `reference.volpath` runs Mitsuba's volumetric
-path tracer, which nobody here wrote, in batches whose spread gives the standard error. `reference.epsilon` measures
-what biases the latter.
+Three estimators whose derivations share no code lead to it. `reference.quadrature` finds the lit intervals of every
+camera ray by exact geometry or ray-traced visibility and sums certified integrals over them in float64.
+`reference.single_scatter` samples the same integral as an integrator of Mitsuba. `reference.volpath` runs Mitsuba's
+volumetric path tracer, which nobody here wrote, and `reference.epsilon` measures what biases it. The last two go in
+batches whose spread gives the standard error.
 """
