@@ -48,6 +48,13 @@ def is_single(Float) -> bool:
     return dr.is_array_v(Float) and dr.itemsize_v(Float) == 4
 
 
+def four_numbers(Float):
+    """Return the type of four numbers of a type, which a gather reads at once."""
+    import mitsuba as mi
+
+    return mi.Vector4f if is_single(Float) else mi.Vector4d
+
+
 def smallest(Float) -> float:
     """Return the smallest normal number of a type."""
     return 2.0**-126 if is_single(Float) else 2.0**-1022

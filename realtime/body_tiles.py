@@ -11,6 +11,8 @@ For the way out, signs are turned.
 from dataclasses import dataclass
 from typing import Any
 
+from realtime.arrays import four_numbers
+
 TILE = 16  #: rays of a tile, which follow one another
 _CORNERS = (0, 3, 12, 15)  # lanes of a tile at its corners
 _ROOM = 48  # planes in a list; a tile that needs more reads them all
@@ -130,10 +132,8 @@ def _ranges(slices: int):
 def _signed(seen, slices, number, active):
     """Return the side of a plane, 1 outside and -1 inside, and by slice g . v times that: the least counts."""
     import drjit as dr
-    import mitsuba as mi
 
-    Vector4 = mi.Vector4f if type(slices[0][0]) is mi.Vector3f else mi.Vector4d
-    values = dr.gather(Vector4, seen.planes, number, active)
+    values = dr.gather(four_numbers(type(seen.planes)), seen.planes, number, active)
     side = dr.select(values.w > 0, type(values.w)(1), -1)
     g = values.xyz * side
     return side, [[dr.dot(g, corner) for corner in corners] for corners in slices]

@@ -19,7 +19,7 @@ between P and P + v lies in the body: min(f_out, 1) - min(f_in, 1).
 from dataclasses import dataclass
 from typing import Any
 
-from realtime.arrays import is_single
+from realtime.arrays import four_numbers
 from realtime.body_tiles import PlaneLists, plane_number
 from realtime.medium import Body
 
@@ -85,7 +85,7 @@ def inverse_crossings(
     if seen.body.planes is None:
         found = [_ball_crossings(seen, start + direction * x) for x in distances]
         return [one for one, _ in found], [other for _, other in found]
-    Float, Vector4 = type(start.x), mi.Vector4f if is_single(type(start.x)) else mi.Vector4d
+    Float = type(start.x)
     width = dr.width(start, direction, active, *distances)
     count = seen.body.count if lists is None else lists.count
     enter = [dr.full(Float, dr.inf, width) for _ in distances]
@@ -93,7 +93,7 @@ def inverse_crossings(
 
     def plane(number, enter, leave):
         # Four numbers at once: reading them is most of the work.
-        values = dr.gather(Vector4, seen.planes, plane_number(lists, number, active), active)
+        values = dr.gather(four_numbers(Float), seen.planes, plane_number(lists, number, active), active)
         g, outside = values.xyz, values.w > 0
         constant, slope = dr.dot(g, start), dr.dot(g, direction)
         first, last = dr.select(outside, constant, dr.inf), dr.select(outside, -dr.inf, constant)

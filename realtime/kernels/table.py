@@ -34,6 +34,7 @@ the four corners of each cell side by side, one fetch a read.
 
 from functools import lru_cache
 
+from realtime.arrays import four_numbers
 from realtime.errors import InputError
 from realtime.geometry import RayGeometry
 from realtime.lights import Light
@@ -178,16 +179,15 @@ def _tail(geometry: RayGeometry, ends, sigma_t, records, size: int):
 def _read(records, position, size: int, offset):
     """Interpolate bilinearly at `position` in [0, 1]^2 in the table that begins at cell `offset`."""
     import drjit as dr
-    import mitsuba as mi
 
     Float = type(records)
-    UInt32, Corners = dr.uint32_array_t(Float), mi.Vector4f if dr.itemsize_v(Float) == 4 else mi.Vector4d
+    UInt32 = dr.uint32_array_t(Float)
     cell, weight = [], []
     for value in position:
         scaled = dr.clip(value, 0, 1) * (size - 1)
         cell.append(dr.minimum(UInt32(scaled), size - 2))
         weight.append(scaled - Float(cell[-1]))
-    corners = dr.gather(Corners, records, offset + dr.fma(cell[0], UInt32(size - 1), cell[1]))
+    corners = dr.gather(four_numbers(Float), records, offset + dr.fma(cell[0], UInt32(size - 1), cell[1]))
     low = dr.lerp(corners.x, corners.y, weight[1])
     high = dr.lerp(corners.z, corners.w, weight[1])
     return dr.lerp(low, high, weight[0])
