@@ -98,12 +98,12 @@ def _warn(warnings) -> None:
 
 def _prepared(scene, chosen):
     """Return the frame renderer, the warnings of its casters printed."""
+    from realtime.shadow_planes import PlanePreparation
     from validation.configurations import prepared
 
     renderer = prepared(scene, chosen)
-    casters = getattr(renderer.prepare, "casters", None)
-    if casters is not None:
-        _warn(casters.warnings)
+    if isinstance(renderer.prepare, PlanePreparation):
+        _warn(renderer.prepare.casters.warnings)
     return renderer
 
 
