@@ -3,6 +3,7 @@ import numpy as np
 import pytest
 
 from tests.scenes_for_tests import body, clear_scene, spot, tiny_scene
+from tests.volpath_for_tests import assert_volpath_agrees
 
 STEPS = 200_000
 HG = {"phase": {"type": "hg", "g": 0.6}}
@@ -261,11 +262,7 @@ def test_agrees_with_volpath(variant, inside):
     """
     import mitsuba as mi
 
-    from reference.batches import merged
-    from reference.epsilon import measure_shadow_epsilon
-    from reference.quadrature import quadrature_image
     from reference.scene import read_truth
-    from reference.volpath import volpath_batch
 
     caster = tiny_scene()["ball"] | {"center": [0.7, 0.45, 1.2], "radius": 0.21}
     scene = clear_scene(
@@ -277,17 +274,7 @@ def test_agrees_with_volpath(variant, inside):
         scene["near"] = body(huge, 0.0, (0.0, 0.0, 0.0)) | {"interior": {"type": "ref", "id": "fog"}}
         scene = {"type": "scene", "fog": tiny_scene()["fog"]} | scene
     truth = read_truth(mi.load_dict(scene))
-    expected = quadrature_image(truth, shadow_scale=1 - measure_shadow_epsilon())
-    batches = volpath_batch(truth, 100, 256)
-    for seed in range(101, 116):
-        batches = merged(batches, volpath_batch(truth, seed, 256))
-    for number, image in enumerate((expected.airlight, expected.surface)):
-        for channel in range(3):
-            total = image[..., channel].sum()
-            bias = batches.mean[number][:, channel].sum() / total - 1
-            error = np.sqrt(np.sum(batches.standard_error[number][:, channel] ** 2)) / total
-            assert error < 0.03
-            assert abs(bias) < 4 * error
+    assert_volpath_agrees(truth, batches=16, least_precision=0.03)
     again = read_truth(truth.scene)
     for before, after in zip(truth.media, again.media, strict=True):
         assert np.array_equal(before.sigma_t, after.sigma_t)

@@ -3,6 +3,7 @@ import numpy as np
 import pytest
 
 from tests.scenes_for_tests import tiny_scene
+from tests.volpath_for_tests import assert_volpath_agrees
 
 
 @pytest.fixture(scope="module")
@@ -72,24 +73,10 @@ def test_agrees_with_the_quadrature(variant, colour):
     """
     import mitsuba as mi
 
-    from reference.batches import merged
-    from reference.epsilon import measure_shadow_epsilon
-    from reference.quadrature import quadrature_image
     from reference.scene import read_truth
-    from reference.volpath import volpath_batch
 
     fog = tiny_scene()["fog"]
     if colour == "coloured":
         fog |= {"sigma_t": {"type": "rgb", "value": [0.1, 0.3, 0.7]}, "has_spectral_extinction": True}
     truth = read_truth(mi.load_dict(tiny_scene(fog=fog)))
-    expected = quadrature_image(truth, shadow_scale=1 - measure_shadow_epsilon())
-    batches = volpath_batch(truth, 100, 256)
-    for seed in range(101, 132):
-        batches = merged(batches, volpath_batch(truth, seed, 256))
-    for number, image in enumerate((expected.airlight, expected.surface)):
-        for channel in range(3):
-            total = image[..., channel].sum()
-            bias = batches.mean[number][:, channel].sum() / total - 1
-            error = np.sqrt(np.sum(batches.standard_error[number][:, channel] ** 2)) / total
-            assert error < 0.02
-            assert abs(bias) < 4 * error
+    assert_volpath_agrees(truth, batches=32, least_precision=0.02)
