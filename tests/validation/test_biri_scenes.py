@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tests.casters_for_tests import AWKWARD, SOUND, flat_roof
+from tests.meshes_for_tests import areas, directed_edges, is_closed, normals_by_area, volume
 from validation.scenes.clutter import SCENE as CLUTTER
 from validation.scenes.hall import SCENE as HALL
 from validation.scenes.parts import skin
@@ -42,32 +43,6 @@ SOLIDS = {
     "arch": (arch((0.9, 1.3), 0.4, 11), 96, 2),
     "torus": (torus(0.9, 0.3, (20, 9)), 360, 0),
 }
-
-
-def directed_edges(faces) -> Counter:
-    pairs = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    return Counter(map(tuple, pairs.tolist()))
-
-
-def is_closed(faces) -> bool:
-    """Whether every edge is met exactly twice, in opposite directions."""
-    edges = directed_edges(faces)
-    return set(edges.values()) == {1} and {(b, a) for a, b in edges} == set(edges)
-
-
-def volume(vertices, faces) -> float:
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6)
-
-
-def normals_by_area(vertices, faces):
-    """Return the outward normals of the faces, each as long as the area of its face."""
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    return 0.5 * np.cross(b - a, c - a)
-
-
-def areas(vertices, faces):
-    return np.linalg.norm(normals_by_area(vertices, faces), axis=1)
 
 
 def winding_number(point, vertices, faces) -> float:
@@ -151,7 +126,8 @@ def test_walls_cover_what_they_should_and_face_across_times_up():
     np.testing.assert_allclose(normal.sum(axis=0), [0, -(4 * 2 - 12 * 0.61**2 * np.sin(np.pi / 12)), 0], atol=1e-12)
     assert np.all(normal[:, 1] < 0)
     np.testing.assert_allclose([vertices.min(axis=0), vertices.max(axis=0)], [[1, 2, 3], [5, 2, 5]], atol=1e-12)
-    borders = [edge for edge in directed_edges(faces) if (edge[1], edge[0]) not in directed_edges(faces)]
+    edges = directed_edges(faces)
+    borders = [edge for edge in edges if (edge[1], edge[0]) not in edges]
     assert len(borders) == 2 * 24
 
 

@@ -4,25 +4,12 @@ from collections import Counter
 import numpy as np
 import pytest
 
+from tests.meshes_for_tests import directed_edges, volume
 from validation.scenes import SCENES
 from validation.scenes.colonnade import _column
 from validation.scenes.parts import grid, joined, lathe, placed, rotation
 from validation.scenes.sphere_spot import _CENTRE, _LIGHT, _sphere
 from validation.scenes.two_pens import _pen
-
-
-def directed_edges(faces) -> Counter:
-    """Count the edges of the faces in the direction in which each face runs through them."""
-    pairs = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    return Counter(map(tuple, pairs.tolist()))
-
-
-def volume(mesh) -> float:
-    """Signed volume, positive where the faces run counter-clockwise seen from outside."""
-    vertices, faces = mesh
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6)
-
 
 CLOSED = {
     "cylinder": lambda: lathe([0.3, 0.4], [0.1, 1.7], 7),
@@ -42,7 +29,7 @@ def test_closed_parts_are_oriented_the_same_way_everywhere(name):
     # Euler's formula of a closed surface without holes; every vertex is used.
     assert len(vertices) - len(edges) // 2 + len(faces) == 2
     assert set(faces.reshape(-1)) == set(range(len(vertices)))
-    assert volume((vertices - vertices.mean(axis=0), faces)) > 0
+    assert volume(vertices - vertices.mean(axis=0), faces) > 0
 
 
 @pytest.mark.parametrize("name", CLOSED)
@@ -175,7 +162,7 @@ def test_joined_meshes_keep_their_faces_apart():
     two = placed(one, (3.0, 0.0, 0.0), rotation((0, 0, 1), 17))
     vertices, faces = joined([one, two])
     assert len(vertices) == 2 * len(one[0])
-    assert volume((vertices, faces)) == pytest.approx(2 * volume(one))
+    assert volume(vertices, faces) == pytest.approx(2 * volume(*one))
     half = len(one[1])
     assert faces[half:].min() == len(one[0])
     np.testing.assert_allclose(vertices[faces[half:]], two[0][two[1]])
