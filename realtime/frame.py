@@ -30,8 +30,8 @@ class FrameRenderer:
     scene: Scene
     pixel: Any  #: pixel numbers in the order of the lanes
     prepare: Callable[[Scene], Any]  #: what the method needs before the frame: shadow maps, shadow planes
-    surface: Callable[..., Any]  #: -> distance, and surface radiance by light
-    airlight: Callable[..., Any]  #: -> airlight radiance, and by light whether it reaches the surface, if it says so
+    surface: Callable[..., Any]  #: -> distance, and surface radiance, by light where `airlight` finds shadows, or one sum
+    airlight: Callable[..., Any]  #: -> airlight radiance, and that of the surface where this finds its shadows, or None
     casts_rays: bool  #: whether the method casts rays of its own
 
     @property
@@ -143,13 +143,13 @@ def run_stages(renderer: FrameRenderer, prepared):
 
 
 def run_surface(renderer: FrameRenderer):
-    """Run the stage of the surface and return distance and radiance by light, not evaluated."""
+    """Run the stage of the surface and return what it does, not evaluated."""
     scene = renderer.scene
     return renderer.surface(scene.geometry, renderer.pixel, scene.camera, scene.medium, scene.lights)
 
 
 def run_airlight(renderer: FrameRenderer, prepared, distance, by_light):
-    """Run the stage of the airlight on what `run_surface` returned; return what the stage does, not evaluated."""
+    """Run the stage of the airlight on what `run_surface` returned, and return what it does, not evaluated."""
     scene = renderer.scene
     arguments = (renderer.pixel, scene.camera, scene.medium, scene.lights, prepared, distance, by_light)
     return renderer.airlight(renderer.geometry, *arguments)

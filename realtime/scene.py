@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from realtime.arrays import ArrayTypes, array_types
+from realtime.arrays import ArrayTypes, array_types, is_single
 from realtime.camera import Camera
 from realtime.errors import InputError
 from realtime.lights import Light
@@ -76,7 +76,7 @@ def _read_camera(scene, types: ArrayTypes):
     tangent = math.tan(0.5 * math.radians(float(parameters["x_fov"][0])))
     pixel = 2 * tangent / width
     basis = matrix[:3, 2], matrix[:3, 0] * pixel, matrix[:3, 1] * pixel
-    real = np.float32 if types.scalar is mi.Float else np.float64
+    real = np.float32 if is_single(types.scalar) else np.float64
     low = [column - column.astype(real) for column in basis]
     vectors = [types.vector(*(float(c) for c in column)) for column in (matrix[:3, 3], *basis, *low)]
     dr.make_opaque(*vectors)
