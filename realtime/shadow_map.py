@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Shadow maps by ray casting into plain arrays: one face for a spot, six for a point light.
 
-A map stores for each texel the distance *along the ray* from the light to the first surface [m], infinite where there
-is none. A face looks along one axis with two others across; (u, v) in [-1, 1] on the plane at distance `extent` from
-the light, 1 for a cube face, 1/tan(cutoff) for a spot whose cone just fits.
+A face looks along an axis with two vectors across it: the direction through (u, v) in [-1, 1]^2 is axis + u across +
+v up, with |across| = |up| = 1 for a cube face and tan(cutoff) for a spot, whose cone just fits. Each face is cut into
+size^2 texels; a map holds at each of their (size + 1)^2 *corners* the distance *along the ray* from the light to the
+first surface [m], infinite where there is none. So the outermost values lie on the edges of the face, where the faces
+of a cube meet with the same values. The planar depth, along the axis, is the distance over the length of axis + u
+across + v up (`realtime.light_heights`).
 """
 
 from dataclasses import dataclass
@@ -18,10 +21,25 @@ class ShadowMap:
     """Distances from a light to the nearest surface, face by face, row by row."""
 
     size: int  #: texels on a side
-    distance: Any  #: faces size^2 values along the rays [m]
-    frame: tuple[
-        Any, Any, Any
-    ]  #: spot: across, up and axis, scaled so that the cone spans [-1, 1]; a cube: unit vectors
+    distance: Any  #: faces (size + 1)^2 values along the rays [m]
+    frame: tuple[Any, Any, Any] | None  #: of a spot: across, up and axis; None for a cube
+
+    @property
+    def faces(self) -> int:
+        """How many faces the map has."""
+        return 1 if self.frame else 6
+
+
+def check_size(size) -> None:
+    """Refuse what is no resolution of a shadow map.
+
+    Raises
+    ------
+    InputError
+        If `size` is not a power of two from 4 to 8192.
+    """
+    if not isinstance(size, int) or size < 4 or size > 8192 or size & (size - 1):
+        raise InputError(f"map: got {size!r}, wanted a power of two from 4 to 8192")
 
 
 def cast_shadow_map(scene, light: Light, size: int) -> ShadowMap:
@@ -44,52 +62,75 @@ def cast_shadow_map(scene, light: Light, size: int) -> ShadowMap:
     import drjit as dr
     import mitsuba as mi
 
-    if not isinstance(size, int) or size < 4 or size > 8192 or size & (size - 1):
-        raise InputError(f"map: got {size!r}, wanted a power of two from 4 to 8192")
+    check_size(size)
     Float = type(light.position.x)
-    faces = 6 if light.kind == "point" else 1
-    index = dr.arange(mi.UInt32, faces * size * size)
-    face, texel = index // (size * size), index % (size * size)
-    u = dr.fma(Float(texel % size), 2.0 / size, 1.0 / size - 1.0)
-    v = dr.fma(Float(texel // size), 2.0 / size, 1.0 / size - 1.0)
-    frame = _frame(light)
-    if light.kind == "point":
-        direction = _cube_direction(type(light.position), face, u, v)
+    frame = None if light.kind == "point" else _frame(light)
+    side = size + 1
+    index = dr.arange(mi.UInt32, (1 if frame else 6) * side * side)
+    row = index // side
+    face = row // side
+    # Whole numbers and powers of two: exact, so that neighbouring faces cast the same rays along their common edge.
+    u = dr.fma(Float(index - row * side), 2.0 / size, -1.0)
+    v = dr.fma(Float(row - face * side), 2.0 / size, -1.0)
+    if frame:
+        unit = dr.normalize(frame[0] * u + frame[1] * v + frame[2])
     else:
-        direction = frame[0] * u + frame[1] * v + frame[2]
-    ray = mi.Ray3f(mi.Point3f(light.position), mi.Vector3f(dr.normalize(direction)))
+        # In this order the sum does not depend on which coordinate is which.
+        unit = _cube_direction(type(light.position), face, u, v) * dr.rsqrt((dr.square(u) + dr.square(v)) + 1)
+    ray = mi.Ray3f(mi.Point3f(light.position), mi.Vector3f(unit))
     hit = scene.ray_intersect_preliminary(ray, coherent=True)
-    return ShadowMap(size, dr.select(hit.is_valid(), Float(hit.t), dr.inf), frame)
+    distance = dr.select(hit.is_valid(), Float(hit.t), dr.inf)
+    dr.eval(distance)  # once: whoever reads it would cast the rays again
+    return ShadowMap(size, distance, frame)
 
 
 def lit_in_map(shadow_map: ShadowMap, light: Light, point):
-    """Return whether the light reaches a point by the nearest texel of its shadow map."""
+    """Return whether the light reaches a point by the nearest value of its shadow map."""
     import drjit as dr
     import mitsuba as mi
 
     Float = type(point.x)
     d = point - light.position
-    if light.kind == "point":
+    if shadow_map.frame is None:
         face, u, v = _cube_coordinates(d)
     else:
-        across, up, axis = shadow_map.frame
-        depth = dr.rcp(dr.dot(d, axis))
-        u, v = dr.dot(d, across) * depth / dr.squared_norm(across), dr.dot(d, up) * depth / dr.squared_norm(up)
         face = mi.UInt32(0)
+        a, b, depth = face_coordinates(shadow_map, face, d)
+        u, v = a / depth, b / depth
     size = shadow_map.size
-    column = mi.UInt32(dr.clip((u + 1) * (0.5 * size), 0, size - 1))
-    row = mi.UInt32(dr.clip((v + 1) * (0.5 * size), 0, size - 1))
-    stored = dr.gather(Float, shadow_map.distance, (face * size + row) * size + column)
+    column = mi.UInt32(dr.clip(dr.fma(u, 0.5 * size, 0.5 * (size + 1)), 0, size))
+    row = mi.UInt32(dr.clip(dr.fma(v, 0.5 * size, 0.5 * (size + 1)), 0, size))
+    stored = dr.gather(Float, shadow_map.distance, (face * (size + 1) + row) * (size + 1) + column)
     return dr.squared_norm(d) <= dr.square(stored)
 
 
-def _frame(light: Light):
-    """Return two vectors across and one along a spot's axis; the two are scaled by tan(cutoff)."""
+def face_products(shadow_map: ShadowMap, face, vector):
+    """Return the scalar products of a vector with the across, up and axis of a face."""
     import drjit as dr
 
-    if light.kind == "point":
-        Vector = type(light.position)
-        return Vector(1, 0, 0), Vector(0, 1, 0), Vector(0, 0, 1)
+    if shadow_map.frame:
+        return tuple(dr.dot(vector, one) for one in shadow_map.frame)
+    x, y, z = vector.x, vector.y, vector.z
+    axis = face >> 1
+    a, b, c = (dr.select(axis == 0, p, dr.select(axis == 1, q, r)) for p, q, r in ((y, z, x), (z, x, y), (x, y, z)))
+    return a, b, dr.select((face & 1) == 0, c, -c)
+
+
+def face_coordinates(shadow_map: ShadowMap, face, vector):
+    """Return (a, b, c) of a vector a across + b up + c axis of a face."""
+    import drjit as dr
+
+    a, b, c = face_products(shadow_map, face, vector)
+    if shadow_map.frame:
+        inverse = dr.rcp(dr.squared_norm(shadow_map.frame[0]))
+        return a * inverse, b * inverse, c
+    return a, b, c
+
+
+def _frame(light: Light):
+    """Return two vectors of length tan(cutoff) across a spot's axis, and its axis."""
+    import drjit as dr
+
     axis = light.axis
     # Any vector that is not parallel to the axis will do to start from.
     helper = dr.select(dr.abs(axis.x) < 0.5, type(axis)(1, 0, 0), type(axis)(0, 1, 0))
