@@ -23,8 +23,7 @@ from numpy.typing import NDArray
 from analytic.errors import InputError
 from analytic.geometry import foot_and_height
 from reference.batches import LAYERS, Batches
-from reference.scene import read_truth
-from reference.surface import surface_hits
+from reference.scene import TruthScene
 from validation.agreement import MASK_PIXELS, pixel_angle
 
 LEAST_BATCHES = 32  #: before a standard error is good enough to stop on
@@ -103,10 +102,11 @@ def relative_errors(found: Batches, near: NDArray[np.bool_]) -> RelativeErrors:
     return RelativeErrors(pooled, worst)
 
 
-def near_light(scene) -> NDArray[np.bool_]:
-    """Return which pixels' rays pass a light that they see within `MASK_PIXELS` pixel widths, (pixels,)."""
-    truth = read_truth(scene)
-    distance = surface_hits(truth).distance
+def near_light(truth: TruthScene, distance: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return which pixels' rays pass a light that they see within `MASK_PIXELS` pixel widths, (pixels,).
+
+    `distance` is that to the visible surface, (pixels,) [m].
+    """
     widest = MASK_PIXELS * pixel_angle(truth)
     near = np.zeros(len(truth.direction), dtype=bool)
     for light in truth.lights:

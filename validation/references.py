@@ -93,7 +93,9 @@ def monte_carlo_reference(
     progress
         Called with (share done, what) after every batch.
     """
-    near = near_light(loaded.scene)
+    truth = read_truth(loaded.scene)
+    distance = surface_hits(truth).distance
+    near = near_light(truth, distance)
     batches, samples = batch_plan(budget, len(near))
     watch = _Watch(budget, near, progress)
     run = monte_carlo_batches(
@@ -108,7 +110,8 @@ def monte_carlo_reference(
     )
     errors = relative_errors(run.batches, near)
     reached = None if budget.error is None else getattr(errors, budget.target) <= budget.error
-    image = _layered_batches(loaded, estimator, run.batches)
+    distance = distance.reshape(truth.height, truth.width)
+    image = _layered_batches(loaded, estimator, run.batches, distance=distance)
     return MonteCarloReference(image, errors, reached, int(near.sum()), run.cached, run.damaged)
 
 
@@ -150,8 +153,7 @@ class _Watch:
         self._progress(min(1.0, share), f"{estimator}, {done} batches{self._words}")
 
 
-def _layered_batches(loaded: LoadedScene, estimator: str, found: Batches) -> Image:
-    distance = truth_distance(loaded)
+def _layered_batches(loaded: LoadedScene, estimator: str, found: Batches, *, distance: NDArray[np.float64]) -> Image:
     shape = (*distance.shape, 3)
     layers = {}
     for number, name in enumerate(LAYERS):
@@ -173,9 +175,3 @@ def _layered_batches(loaded: LoadedScene, estimator: str, found: Batches) -> Ima
 def volpath_reference(loaded: LoadedScene, *, samples: int, seed: int = 0, progress: Progress | None = None) -> Image:
     """Return volpath's mean with its standard errors; see `monte_carlo_reference`."""
     return monte_carlo_reference(loaded, "volpath", budget=Budget(samples=samples), seed=seed, progress=progress).image
-
-
-def truth_distance(loaded: LoadedScene) -> NDArray[np.float64]:
-    """Return the distance to the visible surface at every pixel centre [m]."""
-    truth = read_truth(loaded.scene)
-    return surface_hits(truth).distance.reshape(truth.height, truth.width)
