@@ -13,6 +13,7 @@ stratified estimator gains from holding many samples, so their number is part of
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
@@ -161,10 +162,7 @@ def _cost(name: str, runs: list[Batches], seconds: float, where: tuple[int, Arra
 def _variance(runs: list[Batches], where: tuple[int, Array, NDArray[np.bool_]]) -> float:
     """Return the relative variance of one batch, the mean over the pixels."""
     number, expected, lit = where
-    together = runs[0]
-    for run in runs[1:]:
-        together = merged(together, run)
-    squares = together.squares[number].reshape(expected.shape)[lit] / (len(runs) - 1)
+    squares = reduce(merged, runs).squares[number].reshape(expected.shape)[lit] / (len(runs) - 1)
     return float(np.mean(squares / expected[lit] ** 2))
 
 

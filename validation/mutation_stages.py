@@ -3,6 +3,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -110,10 +111,7 @@ def distance_batches(batch: Batch, truth: TruthScene, count: int) -> Batches:
     count
         How many; seeds count up from 0.
     """
-    done = batch(truth, 0, _DISTANCES)
-    for seed in range(1, count):
-        done = merged(done, batch(truth, seed, _DISTANCES))
-    return done
+    return reduce(merged, (batch(truth, seed, _DISTANCES) for seed in range(count)))
 
 
 def image_statistics(opponent: Opponent, layer: str, image: Array, mask: NDArray[np.bool_]) -> Statistics:
