@@ -30,7 +30,7 @@ class FrameRenderer:
     scene: Scene
     pixel: Any  #: pixel numbers in the order of the lanes
     prepare: Callable[[Scene], Any]  #: what the method needs before the frame: shadow maps, shadow planes
-    surface: Callable[..., Any]  #: -> distance, and surface radiance, by light where `airlight` finds shadows, or one sum
+    surface: Callable[..., Any]  #: -> distance, and surface radiance: by light where `airlight` finds shadows, or a sum
     airlight: Callable[..., Any]  #: -> airlight radiance, and that of the surface where this finds its shadows, or None
     casts_rays: bool  #: whether the method casts rays of its own
 
