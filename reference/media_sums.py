@@ -118,7 +118,7 @@ class _Sum:
         self.width = np.arcsinh(s1 / self.height) - self.start
         self.sigma_t = setup.by_medium("sigma_t", pieces.medium)
         self.factor = self.sigma_t * setup.by_medium("albedo", pieces.medium)
-        self.chords = [_chord(setup, self, medium) for medium in setup.truth.media]
+        self.chords = [_chord(self, medium) for medium in setup.truth.media]
 
     def axes(self, rows: Index) -> tuple[Array, Array]:
         ray = self.pieces.ray[rows]
@@ -211,9 +211,9 @@ class _Sum:
         return total
 
 
-def _chord(setup: Setup, block: _Sum, medium: BoundedMedium) -> Chord:
+def _chord(block: _Sum, medium: BoundedMedium) -> Chord:
     """Return a function (pieces, sin, cos of the angle at the light) -> where the leg enters and leaves a medium."""
-    bounds, light = medium.bounds, setup.light.position
+    bounds, light = medium.bounds, block.setup.light.position
     every = np.arange(len(block.width))
     along, away = block.axes(every)
     if isinstance(bounds, Ball):

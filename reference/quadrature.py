@@ -156,8 +156,8 @@ def ray_values(
     airlight, bound, light_angle = np.zeros((count, 3)), np.zeros((count, 3)), np.full(count, np.pi)
     intervals, transitions, certificates = np.zeros(count, np.int64), 0, []
     reached: list[NDArray[np.bool_] | None] = []
+    how = {"samples": samples, "edges": edges, "shapes": shapes}
     for number, light in enumerate(truth.lights):
-        how = {"samples": samples, "edges": edges, "shapes": shapes}
         found = _light_airlight(truth, light, hits.distance, shadow_scale=shadow_scale, how=how)
         airlight += found.radiance
         bound += found.bound

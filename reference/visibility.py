@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
-from reference.certify import Rounding, Toggles, certified_cast, certified_geometry
+from reference.certify import Rounding, Toggles, Visible, certified_cast, certified_geometry
 from reference.intervals import LitIntervals, intersected
 from reference.lit_geometry import geometric_intervals
 from reference.scene import TruthLight, TruthScene
@@ -30,7 +30,6 @@ from reference.shapes import Shapes, read_shapes, refuse_others
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 Index = NDArray[np.int64]
-Visible = Callable[[Index, Array], Bools]
 
 _BISECTIONS = 26  # theta range / 256 / 2^26 < 1e-10 rad: below the float32 rounding of the rays that are cast
 _CHUNK = 1 << 22  # rays cast at once
