@@ -23,6 +23,11 @@ def rays_of(truth, light=0):
     return lamp, (direction, normal, height), (np.maximum(np.arctan2(-foot, height), cone[0]), np.minimum(end, cone[1]))
 
 
+def lit_lengths(found, ends):
+    """Return how much of the angle at the light is lit on each ray."""
+    return np.bincount(found.ray, found.high - found.low, len(ends[0]))
+
+
 def box(centre, size, **changes):
     """Return a box whose sides are parallel to the axes."""
     import mitsuba as mi

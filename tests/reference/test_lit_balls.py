@@ -2,7 +2,7 @@
 import numpy as np
 import pytest
 
-from tests.polygons_for_tests import rays_of
+from tests.polygons_for_tests import lit_lengths, rays_of
 from tests.scenes_for_tests import tiny_scene
 
 
@@ -89,7 +89,7 @@ def test_a_ball_against_a_mesh_of_it(variant):
     lit = []
     for shapes in (ball, Shapes(mesh)):
         found = geometric_intervals(truth, light, rays, ends=ends, shapes=shapes)
-        lit.append(np.bincount(found.ray, found.high - found.low, len(ends[0])))
+        lit.append(lit_lengths(found, ends))
     assert np.sum(lit[0] < ends[1] - ends[0]) > 20
     assert np.all(lit[0] <= lit[1] + 1e-12)
     # Both triangles of a quad are at most 2 (1 - cos(pi/128)) R inside; a shadow that just touches loses its root.

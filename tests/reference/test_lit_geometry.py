@@ -2,7 +2,7 @@
 import numpy as np
 import pytest
 
-from tests.polygons_for_tests import box, box_scene, rays_of
+from tests.polygons_for_tests import box, box_scene, lit_lengths, rays_of
 from tests.scenes_for_tests import spot, tiny_scene
 
 
@@ -61,7 +61,7 @@ def test_edges_by_geometry_are_those_by_bisection(variant):
     light, rays, ends = rays_of(truth)
     exact = geometric_intervals(truth, light, rays, ends=ends)
     cast = lit_intervals(truth, light, rays, ends=ends, edges="rays")
-    lit = [np.bincount(found.ray, found.high - found.low, len(ends[0])) for found in (exact, cast)]
+    lit = [lit_lengths(found, ends) for found in (exact, cast)]
     # Edges of boxes that a plane cuts at a grazing angle magnify the rounding of 1e-7; 2e-6 is where shadow rays stop.
     assert np.abs(lit[0] - lit[1]).max() < 2e-5
     assert np.median(np.abs(lit[0] - lit[1])) < 1e-6
@@ -83,7 +83,7 @@ def test_a_needle_is_found_where_regular_samples_step_over_it(variant):
     shadowed = np.setdiff1d(
         np.arange(len(ends[0])), found.ray[(found.high - found.low) > (ends[1] - ends[0])[found.ray]]
     )
-    gaps = (ends[1] - ends[0]) - np.bincount(found.ray, found.high - found.low, len(ends[0]))
+    gaps = (ends[1] - ends[0]) - lit_lengths(found, ends)
     crossed = np.flatnonzero(gaps > 1e-6)
     assert len(crossed) > 50
     assert len(shadowed) >= len(crossed)
@@ -151,5 +151,4 @@ def test_order_of_triangles_and_rays_does_not_matter(variant):
         ends=(ends[0][turned], ends[1][turned]),
         shapes=Shapes(triangles),
     )
-    lit = np.bincount(plain.ray, plain.high - plain.low, len(turned))[turned]
-    assert np.bincount(other.ray, other.high - other.low, len(turned)) == pytest.approx(lit, abs=1e-13)
+    assert lit_lengths(other, ends) == pytest.approx(lit_lengths(plain, ends)[turned], abs=1e-13)

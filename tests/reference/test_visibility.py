@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from tests.polygons_for_tests import box, box_scene, rays_of
+from tests.polygons_for_tests import box, box_scene, lit_lengths, rays_of
 from tests.scenes_for_tests import tiny_scene
 
 
@@ -36,10 +36,6 @@ def test_polygons_and_balls_are_exact_and_other_shapes_are_cast(variant):
     assert lit_intervals(truth, light, rays, ends=ends).edge > EXACT_EDGE
     with pytest.raises(InputError, match="'pipe' is a Cylinder; wanted meshes, rectangles and spheres"):
         lit_intervals(truth, light, rays, ends=ends, edges="geometry")
-
-
-def lit_lengths(found, ends):
-    return np.bincount(found.ray, found.high - found.low, len(ends[0]))
 
 
 def test_mixed_scenes_keep_needles_exact_beside_shapes_that_are_cast(variant):
@@ -124,9 +120,7 @@ def test_slivers_that_random_samples_meet_are_mended(variant):
     assert known.disagreements > 1000
     assert known.refined == known.disagreements - known.left
     assert known.left < 0.05 * known.disagreements  # rays with more slivers than rounds
-    shadow = [
-        (ends[1] - ends[0])[used] - np.bincount(f.ray, f.high - f.low, len(ends[0]))[used] for f in (exact, found)
-    ]
+    shadow = [(ends[1] - ends[0])[used] - lit_lengths(f, ends)[used] for f in (exact, found)]
     assert np.abs(shadow[1] - shadow[0]).sum() < 0.05 * shadow[0].sum()
 
 
