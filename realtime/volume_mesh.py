@@ -1,0 +1,205 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The light volume as a closed mesh: the displaced grid of a shadow map, joined to the light.
+
+Billeter, Sintorn, Assarsson 2010, section 4, after McCool 2000. Each corner (u, v) of a texel, or of a larger quad of
+an adaptive tessellation, is a vertex at light + k / s, k = axis + u across + v up, with s the inverse planar depth
+(`realtime.light_heights`). In homogeneous coordinates that is
+
+    (light s + k, s),
+
+which needs no division and holds vertices at infinity, s = 0. The grid of a spot ends at the border of its face; there
+it is joined to the light itself, (light, 1). The six grids of a cube are welded along their common edges, where their
+heights are the same numbers, and close by themselves.
+
+Triangles are counter-clockwise in (u, v), so as the light sees them: their normals point away from it and out of the
+volume. Faces of a cube that look along a negative axis are mirrored: there the triangles are turned over.
+"""
+
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Any
+
+from realtime.errors import InputError
+from realtime.light_heights import inverse_depth
+from realtime.lights import Light
+from realtime.shadow_map import ShadowMap
+from realtime.tessellation import divide, edges, triangles
+
+#: Departure of an adaptive mesh from the shadow map that is allowed by default, relative to the depth.
+THRESHOLD = 1e-3
+
+
+@dataclass(frozen=True)
+class VolumeMesh:
+    """A closed mesh around the space that a light reaches."""
+
+    vertices: Any  #: (n, 4), homogeneous: the point is [:3] / [3] in world space [m]; [3] >= 0, 0 at infinity
+    triangles: Any  #: (m, 3) numbers of vertices; (v1 - v0) x (v2 - v0) points out of the lit volume
+
+
+def volume_mesh(
+    shadow_map: ShadowMap, light: Light, *, tessellation: str = "static", threshold: float = THRESHOLD
+) -> VolumeMesh:
+    """Return the mesh around what a light reaches.
+
+    Parameters
+    ----------
+    shadow_map
+        Shadow map of the light.
+    light
+        A point or spot light.
+    tessellation
+        ``static``: two triangles a texel; ``adaptive``: larger ones where the map is flat (see
+        `realtime.tessellation`).
+    threshold
+        For ``adaptive``: departure from the map that is allowed, relative to the depth.
+
+    Raises
+    ------
+    InputError
+        If `tessellation` or `threshold` is none, or a surface touches the light.
+    """
+    if tessellation not in ("static", "adaptive"):
+        raise InputError(f"tessellation: got {tessellation!r}, wanted static or adaptive")
+    height = _heights(shadow_map)
+    if tessellation == "static":
+        corners = _static_triangles(shadow_map.faces, shadow_map.size)
+    else:
+        corners = triangles(divide(edges(height, threshold)))
+    return _closed_mesh(shadow_map, light, height, corners)
+
+
+def tessellation_stages(
+    shadow_map: ShadowMap, light: Light, threshold: float = THRESHOLD
+) -> tuple[dict[str, float], VolumeMesh]:
+    """Return the time of each pass of an adaptive tessellation [ms], and its mesh.
+
+    The passes are those of the paper's Table 1, ``laplacian``, ``edge map`` and ``tessellate``, and ``vertices``, which
+    a graphics card does while it draws.
+    """
+    passed: list[Any] = [_heights(shadow_map)]
+    times = {}
+    stages = {
+        "laplacian": lambda height: edges(height, threshold),
+        "edge map": divide,
+        "tessellate": triangles,
+        "vertices": lambda corners: _closed_mesh(shadow_map, light, passed[0], corners),
+    }
+    for name, stage in stages.items():
+        start = perf_counter()
+        passed.append(stage(passed[-1]))
+        times[name] = 1e3 * (perf_counter() - start)
+    return times, passed[-1]
+
+
+def _heights(shadow_map: ShadowMap):
+    import numpy as np
+
+    side = shadow_map.size + 1
+    height = np.array(inverse_depth(shadow_map)).reshape(shadow_map.faces, side, side)
+    if not np.all(np.isfinite(height)):
+        raise InputError("light: a surface touches it, so that it has no light volume; move it off the surface")
+    return height
+
+
+def _static_triangles(faces: int, size: int):
+    """Return two triangles for each texel, as numbers of corners."""
+    import numpy as np
+
+    corner = np.arange(faces * (size + 1) ** 2, dtype=np.int32).reshape(faces, size + 1, size + 1)
+    result = np.empty((faces, size, size, 2, 3), np.int32)
+    steps = ((0, 0), (0, 1), (1, 1)), ((0, 0), (1, 1), (1, 0))  # (row, column)
+    for which, three in enumerate(steps):
+        for k, (row, column) in enumerate(three):
+            result[..., which, k] = corner[:, row : row + size, column : column + size]
+    return result.reshape(-1, 3)
+
+
+def _closed_mesh(shadow_map: ShadowMap, light: Light, height, corners) -> VolumeMesh:
+    """Return the mesh of triangles between corners of texels: those that are used become its vertices."""
+    import numpy as np
+
+    size, faces = shadow_map.size, shadow_map.faces
+    used = np.zeros(height.size, bool)
+    used[corners] = True
+    twin, original = _welds(size) if faces == 6 else (np.zeros(0, int), np.zeros(0, int))
+    used[original] |= used[twin]
+    used[twin] = False
+    number = np.cumsum(used, dtype=np.int32) - 1
+    number[twin] = number[original]
+    place = np.array(light.position, dtype=float).ravel()
+    vertices = _vertices(shadow_map, place, height, np.flatnonzero(used))
+    found = number[corners]
+    if faces == 1:
+        ring = _border(size)
+        ring = number[ring[used[ring]]]
+        apex = np.full(len(ring), len(vertices), np.int32)
+        found = np.concatenate([found, np.stack([np.roll(ring, -1), ring, apex], axis=1)])
+        vertices = np.concatenate([vertices, [[*place, 1.0]]])
+    else:
+        mirrored = (corners[:, 0] // (size + 1) ** 2) % 2 == 1
+        found[mirrored] = found[mirrored][:, [0, 2, 1]]
+    return VolumeMesh(vertices, found)
+
+
+def _vertices(shadow_map: ShadowMap, place, height, numbers):
+    """Return the homogeneous coordinates of corners of texels."""
+    import numpy as np
+
+    result = np.empty((len(numbers), 4))
+    batch = 2**20  # what is in between would take more memory than the result
+    for start in range(0, len(numbers), batch):
+        some = slice(start, start + batch)
+        s = height.ravel()[numbers[some]].astype(float)
+        k = _directions(shadow_map, numbers[some])
+        for one in range(3):
+            result[some, one] = place[one] * s + k[one]
+        result[some, 3] = s
+    return result
+
+
+def _directions(shadow_map: ShadowMap, numbers):
+    """Return axis + u across + v up at corners of texels, a row for each coordinate."""
+    import numpy as np
+
+    side = shadow_map.size + 1
+    row, column = np.divmod(numbers, side)
+    face, row = np.divmod(row, side)
+    k = np.empty((3, len(numbers)))
+    u, v = column * (2 / shadow_map.size) - 1, row * (2 / shadow_map.size) - 1
+    if shadow_map.frame:
+        across, up, axis = (np.array(one, dtype=float).ravel() for one in shadow_map.frame)
+        for one in range(3):
+            k[one] = axis[one] + u * across[one] + v * up[one]
+    else:
+        index = np.arange(len(numbers))
+        for step, value in enumerate((1.0 - 2 * (face & 1), u, v)):
+            k[((face >> 1) + step) % 3, index] = value
+    return k
+
+
+def _border(size: int):
+    """Return the corners on the border of a face, counter-clockwise in (u, v)."""
+    import numpy as np
+
+    along = np.arange(size)
+    side = size + 1
+    return np.concatenate([along, along * side + size, size * side + size - along, (size - along) * side])
+
+
+def _welds(size: int):
+    """Return the corners of a cube's faces that are the same as an earlier one, and that one."""
+    import numpy as np
+
+    face = np.repeat(np.arange(6), 4 * size)
+    border = np.tile(_border(size), 6)
+    row, column = np.divmod(border, size + 1)
+    lattice = np.empty((3, len(face)), np.int64)
+    for step, value in enumerate((size * (1 - (face & 1)), column, row)):
+        lattice[((face >> 1) + step) % 3, np.arange(len(face))] = value
+    numbers = face * (size + 1) ** 2 + border
+    key = np.ravel_multi_index(tuple(lattice), (size + 1,) * 3)
+    _, first, group = np.unique(key, return_index=True, return_inverse=True)
+    original = numbers[first[group]]
+    twin = original != numbers
+    return numbers[twin], original[twin]
