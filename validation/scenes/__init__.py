@@ -8,9 +8,11 @@ the scene. `SCENES` is the registry: add a `SceneRecord` to it and every command
 from validation.scenes.clutter import SCENE as CLUTTER
 from validation.scenes.colonnade import colonnade
 from validation.scenes.hall import SCENE as HALL
+from validation.scenes.omni_box import SCENE as OMNI_BOX
 from validation.scenes.open_fog import open_fog
 from validation.scenes.record import Animation, SceneRecord
 from validation.scenes.sphere_spot import sphere_spot
+from validation.scenes.tangle import SCENE as TANGLE
 from validation.scenes.three_media import SCENE as THREE_MEDIA
 from validation.scenes.two_pens import two_pens
 
@@ -48,5 +50,7 @@ SCENES: dict[str, SceneRecord] = {
         THREE_MEDIA,
         CLUTTER,
         HALL,
+        OMNI_BOX,
+        TANGLE,
     )
 }
