@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Every triangle of a light volume against every pixel that it covers, and the signed sum over them.
+"""Every triangle of a light volume against every pixel that it covers.
 
-Billeter, Sintorn, Assarsson 2010, section 3: where J(x) is the airlight of a lit ray up to x, a ray has the airlight
-sum_k s_k J(x_k) over its crossings x_k with the boundary of the light volume, s = +1 where it leaves the light and -1
-where it enters it (eq. 3). The order does not matter. The visible surface is at D, and crossings behind it count as
-crossings at D.
+A light volume is drawn (Billeter, Sintorn, Assarsson 2010, section 3) by its crossings with the ray of every pixel, in
+any order: `realtime.volume_sum` adds them up.
 
 Scan conversion in homogeneous coordinates. A vertex (P w, w) becomes (a, b, z, w): with the depth z along the view and
 the point in the image at column a/z, row b/z. Nothing is divided before it must be, so a vertex at infinity (w = 0) is
@@ -16,13 +14,13 @@ at
 
 in the image (z_C > 0) at the column a_C/z_C, or behind the camera. The two crossed edges of a triangle so bound its
 pixels in that row: those with left <= column < right. Where one of the ends is behind the camera, the segment leaves
-the image to the side on which it pipes through z = 0, and the span is a half line.
+the image to the side on which it passes z = 0, and the span is a half line.
 
 Why it is watertight: fma(-j, z, b) has the sign of b - j z itself, and B and A are ordered by that sign, not by
 triangle. So the two triangles of an edge find the same bits for its column. In one row the segments of a closed mesh
 join into closed polygons, directed from the edge that goes up the image to the one that goes down. Every pixel that
-such a polygon passes to the right it passes to the left as well: without a camera inside the volume the signs of the
-crossings before it add up to exactly 0, inside it to exactly 1.
+such a polygon passes to the right it passes to the left as well: the signs of the crossings before a camera outside the
+volume add up to exactly 0, before one inside it to exactly 1.
 
 Over a triangle w/z, the inverse depth, is linear in the image, and so it is along a span: it is found at the span's
 first and last pixel, as a combination of both ends with weights of 0 or more, and interpolated between the two. No
@@ -39,18 +37,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from realtime.camera import Camera
-from realtime.geometry import RayGeometry, ray_geometry
-from realtime.kernels import airlight_integral
-from realtime.lights import Light
-from realtime.medium import Medium
-from realtime.view import View, radiance
+from realtime.volume_mesh import VolumeMesh
 
-BATCH = 1 << 23  #: lanes of one batch: some 0.3 GB
+BATCH = 1 << 22  #: lanes of one batch: some 0.3 GB
 
 
 @dataclass(frozen=True)
 class Crossings:
-    """Crossings of camera rays with a mesh, one an entry, pixel by pixel along the rows of triangles."""
+    """Crossings of camera rays with a mesh, one an entry."""
 
     pixel: Any  #: row times width plus column
     distance: Any  #: along the ray, 0 or more, may be infinite; float64 [m]
@@ -68,14 +62,13 @@ class _Spans:
     step: Any  #: change of the inverse depth from pixel to pixel [1/m]
 
 
-def signed_crossings(mesh, camera: Camera, *, batch: int = BATCH) -> Iterator[Crossings]:
+def signed_crossings(mesh: VolumeMesh, camera: Camera, *, batch: int = BATCH) -> Iterator[Crossings]:
     """Yield the crossings of the rays through all pixels with the triangles of a mesh.
 
     Parameters
     ----------
     mesh
-        With `vertices`, (n, 4) homogeneous world coordinates (x w, y w, z w, w) with w >= 0 [m], and `triangles`, (m,
-        3) vertex numbers, as NumPy arrays (`realtime.volume_mesh.VolumeMesh`).
+        The mesh; vertices at infinity are as good as any.
     camera
         The camera; pixels are points at the centres of squares.
     batch
@@ -83,9 +76,9 @@ def signed_crossings(mesh, camera: Camera, *, batch: int = BATCH) -> Iterator[Cr
 
     Notes
     -----
-    Valid for any mesh. For a closed one the signs of a pixel's crossings add up to 0, to 1 where the camera is inside
-    and normals point out, without exception. The yielded arrays are not evaluated: what the caller does with them
-    becomes one kernel with the expansion of the spans.
+    Valid for any mesh. For a closed one the signs of the crossings of each pixel add up to 0, or to 1 where the camera
+    is inside and normals point out; all that can go wrong is which, with a camera on the mesh. The yielded arrays are
+    not evaluated: what the caller does with them becomes one kernel with the expansion of the spans.
     """
     import mitsuba as mi
     import numpy as np
@@ -98,88 +91,6 @@ def signed_crossings(mesh, camera: Camera, *, batch: int = BATCH) -> Iterator[Cr
             spans = _spans(screen, corners, camera, (triangle, first), owner, rank)
             for span, column in _expand(spans.count, batch):
                 yield _crossings(spans, camera, span, column)
-
-
-def crossing_sum(
-    batches, *, kernel, geometry: RayGeometry, distance, medium: Medium, light: Light, lane: Any = None
-) -> Any:
-    """Return J along the lit parts of rays, the signed sum over their crossings [1/m].
-
-    Parameters
-    ----------
-    batches
-        `Crossings`, from `signed_crossings`.
-    kernel
-        An airlight kernel function, see `realtime.kernels`.
-    geometry, distance
-        The rays and the distances to the visible surface, one entry per pixel [m].
-    medium, light
-        What fills the scene and what lights it; the cone of a spot clips every crossing.
-    lane
-        By pixel number its entry in `geometry` and `distance`; None where entries are in the order of the image.
-
-    Notes
-    -----
-    Valid for a closed mesh. The terms have the precision of the rays and are added up in float64.
-    """
-    import drjit as dr
-    import mitsuba as mi
-
-    Float = type(distance)
-    grey = len(medium.sigma_t) == 1
-    total = dr.zeros(mi.Float64 if grey else mi.Color3d, dr.width(distance))
-    for found in batches:
-        index = found.pixel if lane is None else dr.gather(mi.UInt32, lane, found.pixel)
-        fields = (geometry.foot, geometry.height, geometry.axial, geometry.offset)
-        here = RayGeometry(*(None if one is None else dr.gather(Float, one, index) for one in fields))
-        x = dr.minimum(Float(found.distance), dr.gather(Float, distance, index))
-        term = airlight_integral(kernel, here, Float(0), x, medium=medium, light=light)
-        dr.scatter_add(total, type(total)(term) * found.sign, index)
-        dr.eval(total)
-    return Float(total) if grey else type(medium.albedo)(total)
-
-
-def mesh_airlight(view: View, light: Light, mesh, camera: Camera, pixel, *, kernel, batch: int = BATCH):
-    """Return the airlight of one light by the triangles of its light volume [W/(m^2 sr)].
-
-    Parameters
-    ----------
-    view
-        The frame; its rays are those of all pixels of the camera, in the order of `pixel`.
-    light
-        The light.
-    mesh
-        Its light volume, closed, see `signed_crossings`.
-    camera
-        The camera.
-    pixel
-        Pixel number of every ray.
-    kernel
-        An airlight kernel function.
-    batch
-        See `signed_crossings`.
-
-    Notes
-    -----
-    Valid for homogeneous media that fill all space. The number of crossings is counted on the way: not for a frozen
-    function.
-
-    References
-    ----------
-    Billeter, Sintorn, Assarsson 2010, eq. 3.
-    """
-    import drjit as dr
-    import mitsuba as mi
-
-    geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
-    lane = dr.zeros(mi.UInt32, camera.width * camera.height)
-    dr.scatter(lane, dr.arange(mi.UInt32, dr.width(pixel)), pixel)
-    distance = view.distance
-    dr.eval(geometry, lane, distance)  # every crossing reads them
-    rays = {"geometry": geometry, "distance": distance, "medium": view.medium, "light": light, "lane": lane}
-    return radiance(
-        view.medium, light, crossing_sum(signed_crossings(mesh, camera, batch=batch), kernel=kernel, **rays)
-    )
 
 
 def _camera_basis(camera: Camera):

@@ -1,81 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The sum of signs is exact for every closed mesh, the distances are those of an intersection in another form."""
 
-from typing import NamedTuple
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-WIDTH, HEIGHT = 11, 8
+from realtime.volume_mesh import VolumeMesh
+from tests.volumes_for_tests import HEIGHT, WIDTH, light_pyramid, make_camera, simple_camera, tetrahedron
 
 
-class Mesh(NamedTuple):
-    vertices: np.ndarray
-    triangles: np.ndarray
-
-
-def make_camera(origin, target=(0.0, 0.0, 0.0), *, fov=50.0, size=(WIDTH, HEIGHT)):
-    import mitsuba as mi
-
-    from realtime.camera import Camera
-
-    origin = np.asarray(origin, dtype=float)
-    forward = np.asarray(target) - origin
-    forward /= np.linalg.norm(forward)
-    left = np.cross((0.1, 0.2, 1.0), forward)
-    pixel = 2 * np.tan(0.5 * np.deg2rad(fov)) / size[0]
-    left *= pixel / np.linalg.norm(left)
-    vectors = (origin, forward, left, np.cross(forward, left), *np.zeros((3, 3)))
-    return Camera(*size, *(mi.Vector3d(*map(float, vector)) for vector in vectors))
-
-
-def simple_camera():
-    """Return a camera at the origin that looks along z and has the pixel (i, j) in the direction (5 - i, 4 - j, 1)."""
-    import mitsuba as mi
-
-    from realtime.camera import Camera
-
-    vectors = ((0, 0, 0), (0, 0, 1), (1, 0, 0), (0, 1, 0), *[(0, 0, 0)] * 3)
-    return Camera(11, 9, *(mi.Vector3d(*map(float, vector)) for vector in vectors))
-
-
-def closed_mesh(vertices, triangles) -> Mesh:
-    """Return a mesh with outward normals from one that is closed and oriented either way; w may be given or not."""
-    vertices, triangles = np.asarray(vertices, dtype=float), np.asarray(triangles)
-    if vertices.shape[1] == 3:
-        vertices = np.column_stack((vertices, np.ones(len(vertices))))
-    points = vertices[triangles][..., :3]
-    volume = np.linalg.det(points).sum()
-    return Mesh(vertices, triangles if volume > 0 else triangles[:, ::-1])
-
-
-def tetrahedron(points) -> Mesh:
-    return closed_mesh(points, [(0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)])
-
-
-def light_pyramid(inverse, *, apex=(0.2, -0.1, 2.3), aim=(0.1, 0.3, -1.0)) -> Mesh:
-    """Return the volume of a spot: a grid displaced to the inverse depths given, joined to the light at its edges."""
-    side = len(inverse)
-    axis = np.asarray(aim) / np.linalg.norm(aim)
-    across = np.cross((1.0, 0.0, 0.0), axis)
-    across *= 0.6 / np.linalg.norm(across)
-    up = np.cross(axis, across)
-    u = np.linspace(-1, 1, side)
-    direction = axis + u[None, :, None] * across + u[:, None, None] * up
-    s = np.asarray(inverse, dtype=float)[..., None]
-    vertices = np.concatenate((direction + s * np.asarray(apex), s), axis=2).reshape(-1, 4)
-    number = np.arange(side * side).reshape(side, side)
-    a, b, c, d = number[:-1, :-1], number[:-1, 1:], number[1:, :-1], number[1:, 1:]
-    quads = [np.stack(three, axis=-1).reshape(-1, 3) for three in ((a, b, d), (a, d, c))]
-    border = np.concatenate((number[0, :-1], number[:-1, -1], number[-1, :0:-1], number[:0:-1, 0]))
-    ring = np.stack((np.roll(border, -1), border, np.full_like(border, side * side)), axis=1)
-    # (across, up, axis) is right-handed: u to v turns towards the axis, away from the light.
-    return Mesh(np.vstack((vertices, (*apex, 1.0))), np.concatenate((*quads, ring)))
-
-
-def winding_number(mesh: Mesh, point) -> int | None:
+def winding_number(mesh: VolumeMesh, point) -> int | None:
     """Return how often a mesh surrounds a point, by its solid angle (Van Oosterom, Strackee 1983); None if it is on it.
 
     Next to a triangle that a point is on (rounding apart), half of all directions end; there `top` is 0.
@@ -114,7 +49,7 @@ def sums_of_signs(mesh, camera, **settings):
     return np.bincount(pixel, weights=sign, minlength=camera.width * camera.height)
 
 
-def check_signs(mesh: Mesh, camera) -> None:
+def check_signs(mesh: VolumeMesh, camera) -> None:
     inside = winding_number(mesh, np.array(camera.origin).ravel())
     if inside is not None:
         assert np.all(sums_of_signs(mesh, camera) == inside)
@@ -170,7 +105,7 @@ def test_every_pixel_of_a_shared_edge_belongs_to_one_triangle(variant):
     """A square of two triangles with all edges and the diagonal through pixel centres, as rasterizers are tested."""
     square = np.array([(-3, -2, 1, 1), (2, -2, 1, 1), (2, 3, 1, 1), (-3, 3, 1, 1)], dtype=float)
     for triangles in ([(0, 1, 2), (0, 2, 3)], [(1, 2, 3), (1, 3, 0)]):
-        pixel, distance, sign = found_crossings(Mesh(square, np.array(triangles)), simple_camera())
+        pixel, distance, sign = found_crossings(VolumeMesh(square, np.array(triangles)), simple_camera())
         # Columns 5 - x and rows 4 - y; the left and upper edges belong to the square.
         columns, rows = np.meshgrid(np.arange(3, 8), np.arange(1, 6))
         assert np.array_equal(pixel, np.sort((rows * 11 + columns).ravel()))
@@ -220,51 +155,3 @@ def test_a_mesh_out_of_sight_has_no_crossings(variant):
 
     mesh = light_pyramid(np.full((5, 5), 0.5))
     assert list(signed_crossings(mesh, make_camera((0.0, 9.0, 0.0), (0.0, 19.0, 0.0)))) == []
-
-
-@pytest.mark.parametrize("kind", ["point", "spot"])
-@pytest.mark.parametrize("order", ["image", "tiles"])
-def test_sum_over_a_convex_volume_is_one_integral(variant, kind, order):
-    """A ray meets a tetrahedron in one interval: clipped by its four planes, not by crossings."""
-    import drjit as dr
-    import mitsuba as mi
-
-    from realtime.camera import ray_directions, tiled_pixels
-    from realtime.geometry import ray_geometry
-    from realtime.kernels import airlight_integral
-    from realtime.kernels.exact import exact
-    from realtime.lights import Light
-    from realtime.medium import Medium
-    from realtime.phase import Phase
-    from realtime.volume_raster import crossing_sum, signed_crossings
-
-    corners = np.array([(0.1, 0.2, 1.9), (1.1, -0.8, -0.9), (-1.2, -0.7, -1.1), (0.1, 1.3, -0.8)])
-    camera = make_camera((1.9, -2.3, 0.4), size=(32, 24))
-    pixel = mi.UInt32(tiled_pixels(32, 24) if order == "tiles" else np.arange(32 * 24, dtype=np.uint32))
-    lane = mi.UInt32(np.argsort(np.array(pixel)).astype(np.uint32)) if order == "tiles" else None
-    direction, low = ray_directions(camera, pixel)
-    rays = np.array(direction).T
-    begin, end = np.zeros(len(rays)), np.full(len(rays), 3.1)  # the visible surface cuts some of the intervals
-    for k in range(4):
-        a, b, c, inner = np.roll(corners, -k, axis=0)
-        normal = np.cross(b - a, c - a)
-        normal *= np.sign(normal @ (inner - a))
-        along, height = rays @ normal, (np.array(camera.origin).ravel() - a) @ normal
-        begin = np.where(along > 0, np.maximum(begin, -height / along), begin)
-        end = np.where(along < 0, np.minimum(end, -height / along), end)
-    assert np.mean(end > begin) > 0.1
-    assert np.any((end > begin) & (end == 3.1))
-    cone = {"axis": mi.Vector3d(0.1, 0.2, -1.0) / np.sqrt(1.05), "cutoff": mi.Float64(0.45)}
-    cone |= {"cos_cutoff": dr.cos(cone["cutoff"]), "cos_beam": dr.cos(cone["cutoff"])}
-    arrays = {"position": mi.Vector3d(0.1, 0.2, 1.9), "intensity": mi.Color3d(1)}
-    light = Light(kind, False, **arrays, **(cone if kind == "spot" else {}))
-    medium = Medium((mi.Float64(0.4),), mi.Color3d(1), Phase("isotropic"))
-    geometry = ray_geometry(camera.origin, direction, light, low=low)
-    settings = {"medium": medium, "light": light}
-    wanted = airlight_integral(exact, geometry, mi.Float64(begin), mi.Float64(np.maximum(begin, end)), **settings)
-    batches = signed_crossings(tetrahedron(corners), camera)
-    distance = mi.Float64(np.full(len(rays), 3.1))
-    found = crossing_sum(batches, kernel=exact, geometry=geometry, distance=distance, lane=lane, **settings)
-    # The nodes of J(0, x) and J(begin, end) differ; the kernel promises 1e-6 of each.
-    assert np.array(found) == pytest.approx(np.array(wanted), abs=2e-6 * np.max(np.array(wanted)))
-    assert np.max(np.array(wanted)) > 0.05
