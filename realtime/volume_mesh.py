@@ -63,10 +63,17 @@ def volume_mesh(
         raise InputError(f"tessellation: got {tessellation!r}, wanted static or adaptive")
     height = _heights(shadow_map)
     if tessellation == "static":
-        corners = _static_triangles(shadow_map.faces, shadow_map.size)
-    else:
-        corners = triangles(divide(edges(height, threshold)))
-    return _closed_mesh(shadow_map, light, height, corners)
+        return _static_mesh(shadow_map, light, height)
+    return _adaptive_mesh(shadow_map, light, height, triangles(divide(edges(height, threshold))))
+
+
+def memory_needed(faces: int, size: int) -> int:
+    """Return about how much a static mesh takes at its making, an upper bound of an adaptive one [bytes].
+
+    Each texel has one vertex (four doubles), two triangles (six 32 bit integers), a height with the copy of its
+    distance, and its numbers (one of 32, one of 64 bits).
+    """
+    return faces * (size + 1) ** 2 * (4 * 8 + 6 * 4 + 2 * 4 + 4 + 8)
 
 
 def tessellation_stages(
@@ -83,7 +90,7 @@ def tessellation_stages(
         "laplacian": lambda height: edges(height, threshold),
         "edge map": divide,
         "tessellate": triangles,
-        "vertices": lambda corners: _closed_mesh(shadow_map, light, passed[0], corners),
+        "vertices": lambda corners: _adaptive_mesh(shadow_map, light, passed[0], corners),
     }
     for name, stage in stages.items():
         start = perf_counter()
@@ -102,80 +109,98 @@ def _heights(shadow_map: ShadowMap):
     return height
 
 
-def _static_triangles(faces: int, size: int):
-    """Return two triangles for each texel, as numbers of corners."""
+def _static_mesh(shadow_map: ShadowMap, light: Light, height) -> VolumeMesh:
+    """Return the mesh of two triangles for each texel."""
     import numpy as np
 
-    corner = np.arange(faces * (size + 1) ** 2, dtype=np.int32).reshape(faces, size + 1, size + 1)
-    result = np.empty((faces, size, size, 2, 3), np.int32)
+    faces, size = shadow_map.faces, shadow_map.size
+    number, kept = _numbering(faces, size, np.ones(height.size, bool))
+    cells = 2 * faces * size * size
+    found = np.empty((cells + (4 * size if faces == 1 else 0), 3), np.int32)
+    if faces == 1:
+        found[cells:] = _sides(size, number, apex=len(kept))
+    grid, number = found[:cells].reshape(faces, size, size, 2, 3), number.reshape(height.shape)
     steps = ((0, 0), (0, 1), (1, 1)), ((0, 0), (1, 1), (1, 0))  # (row, column)
-    for which, three in enumerate(steps):
-        for k, (row, column) in enumerate(three):
-            result[..., which, k] = corner[:, row : row + size, column : column + size]
-    return result.reshape(-1, 3)
+    for face in range(faces):
+        for which, three in enumerate(steps):
+            for k, (row, column) in enumerate(three[::-1] if face % 2 else three):
+                grid[face, ..., which, k] = number[face, row : row + size, column : column + size]
+    return VolumeMesh(_vertices(shadow_map, light, height, kept), found)
 
 
-def _closed_mesh(shadow_map: ShadowMap, light: Light, height, corners) -> VolumeMesh:
+def _adaptive_mesh(shadow_map: ShadowMap, light: Light, height, corners) -> VolumeMesh:
     """Return the mesh of triangles between corners of texels: those that are used become its vertices."""
     import numpy as np
 
-    size, faces = shadow_map.size, shadow_map.faces
+    faces, size = shadow_map.faces, shadow_map.size
     used = np.zeros(height.size, bool)
     used[corners] = True
-    twin, original = _welds(size) if faces == 6 else (np.zeros(0, int), np.zeros(0, int))
-    used[original] |= used[twin]
-    used[twin] = False
-    number = np.cumsum(used, dtype=np.int32) - 1
-    number[twin] = number[original]
-    place = np.array(light.position, dtype=float).ravel()
-    vertices = _vertices(shadow_map, place, height, np.flatnonzero(used))
+    number, kept = _numbering(faces, size, used)
     found = number[corners]
     if faces == 1:
-        ring = _border(size)
-        ring = number[ring[used[ring]]]
-        apex = np.full(len(ring), len(vertices), np.int32)
-        found = np.concatenate([found, np.stack([np.roll(ring, -1), ring, apex], axis=1)])
-        vertices = np.concatenate([vertices, [[*place, 1.0]]])
+        found = np.concatenate([found, _sides(size, number, apex=len(kept))])
     else:
-        mirrored = (corners[:, 0] // (size + 1) ** 2) % 2 == 1
-        found[mirrored] = found[mirrored][:, [0, 2, 1]]
-    return VolumeMesh(vertices, found)
+        mirrored = corners[:, 0] // (size + 1) ** 2 % 2 == 1
+        found[mirrored] = found[mirrored, ::-1]
+    return VolumeMesh(_vertices(shadow_map, light, height, kept), found)
 
 
-def _vertices(shadow_map: ShadowMap, place, height, numbers):
-    """Return the homogeneous coordinates of corners of texels."""
+def _numbering(faces: int, size: int, used):
+    """Return the numbers of the vertices at all corners, and the corners that they are taken from."""
     import numpy as np
 
-    result = np.empty((len(numbers), 4))
-    batch = 2**20  # what is in between would take more memory than the result
-    for start in range(0, len(numbers), batch):
-        some = slice(start, start + batch)
-        s = height.ravel()[numbers[some]].astype(float)
-        k = _directions(shadow_map, numbers[some])
-        for one in range(3):
-            result[some, one] = place[one] * s + k[one]
-        result[some, 3] = s
-    return result
+    if faces == 6:
+        twin, original = _welds(size)
+        used[original[used[twin]]] = True
+        used[twin] = False
+    number = np.cumsum(used, dtype=np.int32) - 1
+    number[~used] = -1
+    if faces == 6:
+        number[twin] = number[original]
+    return number, np.flatnonzero(used)
 
 
-def _directions(shadow_map: ShadowMap, numbers):
-    """Return axis + u across + v up at corners of texels, a row for each coordinate."""
+def _sides(size: int, number, *, apex: int):
+    """Return the triangles between the vertices on the border of a spot's face and the light."""
+    import numpy as np
+
+    ring = number[_border(size)]
+    ring = ring[ring >= 0]
+    return np.stack([np.roll(ring, -1), ring, np.full(len(ring), apex, np.int32)], axis=1)
+
+
+def _vertices(shadow_map: ShadowMap, light: Light, height, kept):
+    """Return the homogeneous coordinates of corners of texels, in ascending order, and of a spot's light."""
     import numpy as np
 
     side = shadow_map.size + 1
-    row, column = np.divmod(numbers, side)
-    face, row = np.divmod(row, side)
-    k = np.empty((3, len(numbers)))
-    u, v = column * (2 / shadow_map.size) - 1, row * (2 / shadow_map.size) - 1
-    if shadow_map.frame:
-        across, up, axis = (np.array(one, dtype=float).ravel() for one in shadow_map.frame)
-        for one in range(3):
-            k[one] = axis[one] + u * across[one] + v * up[one]
-    else:
-        index = np.arange(len(numbers))
-        for step, value in enumerate((1.0 - 2 * (face & 1), u, v)):
-            k[((face >> 1) + step) % 3, index] = value
-    return k
+    place = np.array(light.position, dtype=float).ravel()
+    result = np.empty((len(kept) + (1 if shadow_map.frame else 0), 4))
+    result[len(kept) :] = (*place, 1)
+    starts = np.searchsorted(kept, np.arange(shadow_map.faces + 1) * side**2)
+    batch = 2**16  # what is in between stays in the cache
+    for face in range(shadow_map.faces):
+        for start in range(starts[face], starts[face + 1], batch):
+            some = slice(start, min(start + batch, starts[face + 1]))
+            numbers = (kept[some] - face * side**2).astype(np.int32)
+            row, column = np.divmod(numbers, side)
+            u, v = column * (2 / shadow_map.size) - 1, row * (2 / shadow_map.size) - 1
+            s = height[face].ravel()[numbers].astype(float)
+            for one, k in enumerate(_directions(shadow_map.frame, face, u, v)):
+                result[some, one] = place[one] * s + k
+            result[some, 3] = s
+    return result
+
+
+def _directions(frame, face: int, u, v) -> list[Any]:
+    """Return the coordinates of axis + u across + v up of a face."""
+    import numpy as np
+
+    if frame:
+        across, up, axis = (np.array(one, dtype=float).ravel() for one in frame)
+        return [axis[one] + u * across[one] + v * up[one] for one in range(3)]
+    cyclic = [1.0 - 2 * (face & 1), u, v]  # from the coordinate of the axis onwards
+    return [cyclic[(one - (face >> 1)) % 3] for one in range(3)]
 
 
 def _border(size: int):

@@ -199,6 +199,25 @@ def test_stages_are_timed(variant):
     assert np.array_equal(mesh.triangles, same.triangles)
 
 
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("tessellation", TESSELLATIONS)
+def test_memory_is_told_before(variant, kind, tessellation):
+    import tracemalloc
+
+    from realtime.volume_mesh import memory_needed, volume_mesh
+
+    shadow_map, light = map_of(kind, 256)
+    volume_mesh(shadow_map, light, tessellation=tessellation)  # kernels compiled
+    tracemalloc.start()
+    volume_mesh(shadow_map, light, tessellation=tessellation)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    told = memory_needed(shadow_map.faces, 256)
+    # Batches of 2^16 vertices and the like take some megabytes whatever the size.
+    assert peak < 1.05 * told + 6e6
+    assert tessellation == "adaptive" or peak > 0.7 * told
+
+
 def test_bad_input(variant):
     from realtime.volume_mesh import volume_mesh
 
