@@ -15,15 +15,18 @@ A texel is cut along the diagonal from its corner (0, 0) to (1, 1), into
     s00 + x (s10 - s00) + y (s11 - s10)   where x >= y,
     s00 + y (s01 - s00) + x (s11 - s01)   where y >= x.
 
-The bounds of the heights over squares of 2^k x 2^k texels, k >= 1, form a pyramid, level 0 the whole face. Its nodes
-stand level by level, row by row; 1 + 4 + ... + 4^(d - 1) = (4^d - 1) / 3 of them, in binary 0101...01, come before
-level d.
+The bounds of the heights over squares of texels form a pyramid: level 0 is the whole face, and the last level the
+texels themselves or, of maps larger than `FINEST`, squares of them. Its nodes stand level by level, row by row; 1 + 4 +
+... + 4^(d - 1) = (4^d - 1) / 3 of them, in binary 0101...01, come before level d.
 """
 
 from dataclasses import dataclass
 from typing import Any
 
+from realtime.arrays import four_numbers, is_single
 from realtime.shadow_map import ShadowMap
+
+FINEST = 512  #: nodes across the last level of the pyramid, at most
 
 
 @dataclass(frozen=True)
@@ -41,14 +44,14 @@ class LightHeights:
         return 1 if self.frame else 6
 
     @property
-    def levels(self) -> int:
-        """Levels of the pyramid; the last has nodes of 2 x 2 texels."""
-        return self.size.bit_length() - 1
+    def finest(self) -> int:
+        """The last level of the pyramid, 2^finest nodes across."""
+        return min(self.size, FINEST).bit_length() - 1
 
     @property
     def nodes(self) -> int:
         """Nodes of the pyramid of one face."""
-        return level_start(self.levels)
+        return level_start(self.finest + 1)
 
 
 def level_start(level: int) -> int:
@@ -85,14 +88,34 @@ def light_heights(shadow_map: ShadowMap) -> LightHeights:
     # A face has one row and one column of corners more than of texels.
     corner = (row + row // size) * (size + 1) + (index - row * size)
     texels = dr.empty(Float, 4 * dr.width(index))
-    dr.scatter(texels, _four(*(dr.gather(Float, height, corner + k) for k in (0, 1, size + 1, size + 2))), index)
+    four = [dr.gather(Float, height, corner + step) for step in (0, 1, size + 1, size + 2)]
+    dr.scatter(texels, four_numbers(Float)(*four), index)
     dr.eval(texels)
     found = LightHeights(size, shadow_map.frame, texels, dr.empty(Float, 0))
     bounds = dr.empty(Float, 2 * found.faces * found.nodes)
-    for level in reversed(range(found.levels)):
+    for level in reversed(range(found.finest + 1)):
         _write_level(found, bounds, level)
         dr.eval(bounds)
     return LightHeights(size, shadow_map.frame, texels, bounds)
+
+
+def node_bounds(heights: LightHeights, face, level, i, j, active=True):
+    """Return the least and largest height over the node in column `i` and row `j` of a level of the pyramid [1/m]."""
+    import drjit as dr
+    import mitsuba as mi
+
+    before = 0x55555555 & ((mi.UInt32(1) << (2 * level)) - 1)
+    node = face * heights.nodes + before + (j << level) + i
+    pair = dr.gather(_pair(type(heights.bounds)), heights.bounds, node, active)
+    return pair.x, pair.y
+
+
+def texel_heights(heights: LightHeights, face, i, j, active=True):
+    """Return the heights s00, s10, s01 and s11 of the texel in column `i` and row `j` of a face [1/m]."""
+    import drjit as dr
+
+    texel = (face * heights.size + j) * heights.size + i
+    return dr.gather(four_numbers(type(heights.texels)), heights.texels, texel, active)
 
 
 def _write_level(heights: LightHeights, bounds, level: int) -> None:
@@ -100,38 +123,46 @@ def _write_level(heights: LightHeights, bounds, level: int) -> None:
     import drjit as dr
     import mitsuba as mi
 
-    Float = type(bounds)
     side = 1 << level
     index = dr.arange(mi.UInt32, heights.faces * side * side)
     row = index // side
-    face = row // side
-    below = 2 * (row * 2 * side + (index - row * side))  # the first of the four squares below, row by row
-    low, high = [], []
-    for step in (0, 1, 2 * side, 2 * side + 1):
-        if level == heights.levels - 1:
-            four = dr.gather(type(_four(bounds)), heights.texels, below + step)
-            low.append(dr.min(four))
-            high.append(dr.max(four))
-        else:
-            node = face * (heights.nodes - 4 * side * side) + level_start(level + 1) + below + step
-            pair = dr.gather(type(_two(bounds)), bounds, node)
-            low.append(pair.x)
-            high.append(pair.y)
-    lowest = dr.minimum(dr.minimum(low[0], low[1]), dr.minimum(low[2], low[3]))
-    highest = dr.maximum(dr.maximum(high[0], high[1]), dr.maximum(high[2], high[3]))
-    node = face * (heights.nodes - side * side) + level_start(level) + index
-    dr.scatter(bounds, _two(Float(lowest), highest), node)
+    face, i = row // side, index - row * side
+    j = row - face * side
+    if level == heights.finest:
+        low, high = _texel_bounds(heights, face, i, j)
+    else:
+        full = LightHeights(heights.size, heights.frame, heights.texels, bounds)
+        four = [node_bounds(full, face, level + 1, 2 * i + k % 2, 2 * j + k // 2) for k in range(4)]
+        low, high = four[0]
+        for lower, higher in four[1:]:
+            low, high = dr.minimum(low, lower), dr.maximum(high, higher)
+    node = face * heights.nodes + level_start(level) + j * side + i
+    dr.scatter(bounds, _pair(type(bounds))(low, high), node)
 
 
-def _two(*values):
+def _texel_bounds(heights: LightHeights, face, i, j):
+    """Return the bounds over the texels of a node of the last level."""
+    import drjit as dr
     import mitsuba as mi
 
-    single = type(values[0]) is mi.Float
-    return (mi.Vector2f if single else mi.Vector2d)(*values)
+    across = heights.size >> heights.finest
+    Float = type(heights.texels)
+
+    def body(k, low, high):
+        four = texel_heights(heights, face, i * across + k % across, j * across + k // across)
+        return k + 1, dr.minimum(low, dr.min(four)), dr.maximum(high, dr.max(four))
+
+    zero = dr.zeros(mi.UInt32, dr.width(i))
+    _, low, high = dr.while_loop(
+        state=(zero, dr.full(Float, dr.inf, dr.width(i)), dr.zeros(Float, dr.width(i))),
+        cond=lambda k, low, high: k < across * across,
+        body=body,
+        labels=("k", "low", "high"),
+    )
+    return low, high
 
 
-def _four(*values):
+def _pair(Float):
     import mitsuba as mi
 
-    single = type(values[0]) is mi.Float
-    return (mi.Vector4f if single else mi.Vector4d)(*values)
+    return mi.Vector2f if is_single(Float) else mi.Vector2d

@@ -95,7 +95,7 @@ def lit_in_map(shadow_map: ShadowMap, light: Light, point):
         face, u, v = _cube_coordinates(d)
     else:
         face = mi.UInt32(0)
-        a, b, depth = face_coordinates(shadow_map, face, d)
+        a, b, depth = face_coordinates(shadow_map.frame, face, d)
         u, v = a / depth, b / depth
     size = shadow_map.size
     column = mi.UInt32(dr.clip(dr.fma(u, 0.5 * size, 0.5 * (size + 1)), 0, size))
@@ -104,25 +104,25 @@ def lit_in_map(shadow_map: ShadowMap, light: Light, point):
     return dr.squared_norm(d) <= dr.square(stored)
 
 
-def face_products(shadow_map: ShadowMap, face, vector):
-    """Return the scalar products of a vector with the across, up and axis of a face."""
+def face_products(frame, face, vector):
+    """Return the scalar products of a vector with the across, up and axis of a face; `frame` is that of the map."""
     import drjit as dr
 
-    if shadow_map.frame:
-        return tuple(dr.dot(vector, one) for one in shadow_map.frame)
+    if frame:
+        return tuple(dr.dot(vector, one) for one in frame)
     x, y, z = vector.x, vector.y, vector.z
     axis = face >> 1
     a, b, c = (dr.select(axis == 0, p, dr.select(axis == 1, q, r)) for p, q, r in ((y, z, x), (z, x, y), (x, y, z)))
     return a, b, dr.select((face & 1) == 0, c, -c)
 
 
-def face_coordinates(shadow_map: ShadowMap, face, vector):
+def face_coordinates(frame, face, vector):
     """Return (a, b, c) of a vector a across + b up + c axis of a face."""
     import drjit as dr
 
-    a, b, c = face_products(shadow_map, face, vector)
-    if shadow_map.frame:
-        inverse = dr.rcp(dr.squared_norm(shadow_map.frame[0]))
+    a, b, c = face_products(frame, face, vector)
+    if frame:
+        inverse = dr.rcp(dr.squared_norm(frame[0]))
         return a * inverse, b * inverse, c
     return a, b, c
 

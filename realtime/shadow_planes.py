@@ -21,14 +21,12 @@ difference of the two Gammas instead, as the paper does.
 """
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 from realtime.arrays import array_types, is_single
-from realtime.bounded_media import FORMS, ambient_radiance, bounded_airlight, check_form
+from realtime.bounded_media import FORMS, ambient_radiance, check_form
 from realtime.casters import Casters, read_casters, with_positions
 from realtime.errors import InputError
-from realtime.geometry import RayGeometry, clip_to_cone, ray_geometry
-from realtime.kernels import airlight_integral, gamma
+from realtime.geometry import clip_to_cone, ray_geometry
 from realtime.lights import Light
 from realtime.media_rays import MediaRay
 from realtime.plane_cone import cone_ring
@@ -38,8 +36,9 @@ from realtime.plane_mesh import mesh_gamma, surface_gamma
 from realtime.plane_sweep import RayPlanes, in_light_frame, ray_planes, sum_lit_segments
 from realtime.plane_tiles import Lists, tile_lists
 from realtime.plane_view import bodies_in_view
+from realtime.ray_airlight import RayAirlight
 from realtime.scene import Scene
-from realtime.view import View, bounded_radiance, radiance, rays_in_media
+from realtime.view import View, rays_in_media
 
 ORDERS = ("exact", "paper", "none")
 EVALUATIONS = ("pixel", "vertex")
@@ -164,7 +163,7 @@ def shadow_planes(
         if cone and light.kind == "spot" and not light.soft and view.plan.shadows:
             light = replace(light, kind="point")  # planes bound it
         geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
-        airlight = _Airlight(view, light, geometry, kernel, in_media[number] if in_media else None)
+        airlight = RayAirlight(view, light, geometry, kernel, in_media[number] if in_media else None)
         if not view.plan.shadows:
             total += airlight.radiance(airlight.integral(type(view.distance)(0), view.distance))
             lit.append(True)
@@ -200,36 +199,7 @@ def tile_planes(view: View, index: PlaneIndex, *, order: str) -> Lists:
     return tile_lists(index, rays, view.distance, order=order, square=view.square_tiles)
 
 
-@dataclass(frozen=True)
-class _Airlight:
-    """The airlight of one light along the rays of a view."""
-
-    view: View
-    light: Light
-    geometry: RayGeometry
-    kernel: Any
-    media: MediaRay | None  #: where media are bounded
-
-    def integral(self, x0, x1):
-        """Return the integral over a segment; `radiance` knows its units."""
-        if self.media:
-            return bounded_airlight(self.media, x0, x1)
-        return airlight_integral(self.kernel, self.geometry, x0, x1, medium=self.view.medium, light=self.light)
-
-    def radiance(self, integral):
-        """Return the radiance of an integral [W/(m^2 sr)]."""
-        return (
-            bounded_radiance(self.light, integral) if self.media else radiance(self.view.medium, self.light, integral)
-        )
-
-    def gamma(self, x):
-        """Return the integral from the camera on."""
-        if self.media:
-            return self.integral(type(x)(0), x)
-        return gamma(self.kernel, self.geometry, x, medium=self.view.medium, light=self.light)
-
-
-def _segments(index: PlaneIndex, lists: Lists, rays: RayPlanes, airlight: _Airlight, *, differences: bool):
+def _segments(index: PlaneIndex, lists: Lists, rays: RayPlanes, airlight: RayAirlight, *, differences: bool):
     """Sum the lit segments of one light."""
     import drjit as dr
 
@@ -241,13 +211,12 @@ def _segments(index: PlaneIndex, lists: Lists, rays: RayPlanes, airlight: _Airli
     def integral(a, b):
         return airlight.gamma(b) - airlight.gamma(a) if differences else airlight.integral(a, b)
 
-    grey = len(view.medium.sigma_t) == 1 and not airlight.media
-    zero = dr.zeros(type(view.distance) if grey else type(view.medium.albedo), dr.width(view.distance))
+    zero = dr.zeros(airlight.number, dr.width(view.distance))
     value, reached = sum_lit_segments(index, lists, rays, (x0, x1), integral, zero)
     return airlight.radiance(value), reached
 
 
-def _gammas(index: PlaneIndex, airlight: _Airlight, *, evaluation: str, rows: int):
+def _gammas(index: PlaneIndex, airlight: RayAirlight, *, evaluation: str, rows: int):
     """Return the functions that give the radiance of Gamma at a crossing, and at the surface."""
     view, light, kernel = airlight.view, airlight.light, airlight.kernel
 

@@ -34,17 +34,18 @@ def test_heights_are_inverse_planar_depths(variant, kind):
     assert np.any(expected > 0)
 
 
-@pytest.mark.parametrize("kind", ["point", "spot"])
-def test_bounds_are_those_of_the_texels(variant, kind):
+# Up to 512 the last level is the texels, above it squares of them.
+@pytest.mark.parametrize(("size", "kind", "finest"), [(16, "point", 4), (16, "spot", 4), (1024, "spot", 9)])
+def test_bounds_are_those_of_the_texels(variant, size, kind, finest):
     from realtime.light_heights import level_start
 
-    _, heights = heights_of(16, kind)
-    texels = np.array(heights.texels).reshape(heights.faces, 16, 16, 4)
+    _, heights = heights_of(size, kind)
+    texels = np.array(heights.texels).reshape(heights.faces, size, size, 4)
     bounds = np.array(heights.bounds).reshape(heights.faces, heights.nodes, 2)
-    assert heights.levels == 4
-    for level in range(heights.levels):
+    assert heights.finest == finest
+    for level in range(finest + 1):
         side = 1 << level
-        squares = texels.reshape(heights.faces, side, 16 // side, side, 16 // side, 4)
+        squares = texels.reshape(heights.faces, side, size // side, side, size // side, 4)
         nodes = bounds[:, level_start(level) : level_start(level + 1)].reshape(heights.faces, side, side, 2)
         assert np.array_equal(nodes[..., 0], squares.min(axis=(2, 4, 5)))
         assert np.array_equal(nodes[..., 1], squares.max(axis=(2, 4, 5)))

@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Beams: the rays of a tile of the image, as planes that bound them.
+
+A beam starts at the camera and is bounded by four planes through it, w . (P - camera) >= 0, by a plane beyond which
+every ray has met a surface, and by two planes through camera *and light*, between which the beam is as the light sees
+it. In the projective coordinates (u, v, s) of a light's face (`realtime.light_heights`) a plane is
+
+    gu u + gv v + g0 + gs s >= 0,   (gu, gv, g0) = w . (across, up, axis),   gs = w . (light - camera),
+
+as w . (P - camera) = w . (light - camera + (axis + u across + v up) / s). So a box in (u, v, s) that lies beyond one of
+the seven planes misses the beam. Those through the light have gs = 0: they bound the footprint of the beam on the map,
+which the others alone do not, since a box at a depth discontinuity is long in s.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+_SLACK = 2e-6  # of the terms of a sum: float32 rounding, with room to spare
+
+
+@dataclass
+class Beam:
+    """Rays through a rectangle, by tile."""
+
+    normals: list[Any]  #: of the planes that bound it; a zero vector where one is of no use
+    middle: Any  #: unit direction
+    end: Any  #: no ray goes farther along the middle [m]
+    light: Any  #: light - camera [m]
+
+
+@dataclass
+class BeamPlanes:
+    """The planes of a beam in the coordinates of a face: lists of gu, gv, g0, gs, and the rounding error of each."""
+
+    u: list[Any]
+    v: list[Any]
+    one: list[Any]
+    s: list[Any]
+    slack: list[Any]
+
+
+def make_beam(directions, end, light) -> Beam:
+    """Return the beams about rays.
+
+    Parameters
+    ----------
+    directions
+        Unit directions of rays, by tile, of which all others are combinations with positive weights.
+    end
+        Largest distance to a surface, by tile, infinite where a ray meets none [m].
+    light
+        The light less the camera [m].
+    """
+    import drjit as dr
+
+    middle = dr.normalize(sum(directions[1:], directions[0]))
+    across = directions[-1] - directions[0]
+    across -= middle * dr.dot(across, middle)
+    # A tile of one ray, or of a row of pixels, has no extent in some direction: any other will do.
+    other = dr.cross(middle, dr.select(dr.abs(middle.x) < 0.7, type(middle)(1, 0, 0), type(middle)(0, 1, 0)))
+    across = dr.normalize(dr.select(dr.squared_norm(across) > 1e-12, across, other))
+    up = dr.cross(middle, across)
+    corners, sides = _rectangle(directions, middle, across, up)
+    return Beam([*sides, *_wedge(corners, light)], middle, end, light)
+
+
+def _rectangle(directions, middle, across, up):
+    """Return the corners of the rectangle about directions on the plane before the middle, and its side planes."""
+    import drjit as dr
+
+    place = [(dr.dot(d, across), dr.dot(d, up), dr.dot(d, middle)) for d in directions]
+    a, b = [x / z for x, _, z in place], [y / z for _, y, z in place]
+    a0, a1, b0, b1 = a[0], a[0], b[0], b[0]
+    for x, y in zip(a[1:], b[1:]):
+        a0, a1, b0, b1 = dr.minimum(a0, x), dr.maximum(a1, x), dr.minimum(b0, y), dr.maximum(b1, y)
+    margin = 1e-6  # of the directions' rounding
+    a0, a1, b0, b1 = a0 - margin, a1 + margin, b0 - margin, b1 + margin
+    corners = [middle + across * x + up * y for x in (a0, a1) for y in (b0, b1)]
+    return corners, [across - middle * a0, middle * a1 - across, up - middle * b0, middle * b1 - up]
+
+
+def _wedge(corners, light):
+    """Return the planes through camera and light on either side of the corners; zero where the axis is among them."""
+    import drjit as dr
+
+    Vector = type(light)
+    left, right = Vector(0), Vector(0)
+    for corner in corners:
+        normal = dr.cross(light, corner)
+        sides = [dr.dot(normal, other) for other in corners]
+        reach = 1e-6 * dr.norm(normal)
+        above, below = dr.mask_t(sides[0])(True), dr.mask_t(sides[0])(True)
+        for side in sides:
+            above &= side >= -reach
+            below &= side <= reach
+        left = dr.select(above, normal, left)
+        right = dr.select(below, -normal, right)
+    return [left, right]
+
+
+def beam_planes(beam: Beam, products) -> BeamPlanes:
+    """Return the planes of a beam on a face; `products` gives the scalar products of a vector with its base."""
+    import drjit as dr
+
+    coefficients = [(*products(normal), dr.dot(normal, beam.light)) for normal in beam.normals]
+    ends = dr.isfinite(beam.end)
+    beyond = beam.end * (1 + 1e-5) - dr.dot(beam.middle, beam.light)
+    coefficients.append(tuple(dr.select(ends, g, 0) for g in (*(-g for g in products(beam.middle)), beyond)))
+    u, v, one, s = ([plane[k] for plane in coefficients] for k in range(4))
+    slack = [_SLACK * (dr.abs(gu) + dr.abs(gv) + dr.abs(g0)) for gu, gv, g0, _ in coefficients]
+    return BeamPlanes(u, v, one, s, slack)
+
+
+def may_meet(planes: BeamPlanes, centre, half, low, high):
+    """Return whether a beam may meet the box about `centre` = (u, v), `half` a side, from height `low` to `high`."""
+    import drjit as dr
+
+    u, v = centre
+    s, reach_s = 0.5 * (low + high), 0.5 * (high - low) + 1e-5 * high
+    met = dr.mask_t(low)(True)
+    for gu, gv, g0, gs, slack in zip(planes.u, planes.v, planes.one, planes.s, planes.slack):
+        value = dr.fma(gu, u, dr.fma(gv, v, dr.fma(gs, s, g0)))
+        reach = dr.fma(dr.abs(gu) + dr.abs(gv), half, dr.fma(dr.abs(gs), reach_s, slack))
+        met &= value + reach >= 0
+    return met

@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Camera rays in the projective coordinates of a face of a shadow map.
+
+With the camera at a0 across + b0 up + c0 axis from the light and the direction (da, db, dc) likewise, the point at x
+has
+
+    u = (a0 + x da) / c,   v = (b0 + x db) / c,   s = 1 / c,   c = c0 + x dc,
+
+and y = x / c. All four are linear along the projective line: with t from 0 to 1 between two points of the ray, each is
+(1 - t) its value at one and t its value at the other, and x = y / s. At the end of an endless ray s = 0 and y = 1 / dc.
+
+The part of the ray in the face is cut out by c + a >= 0, c - a >= 0, c + b >= 0, c - b >= 0. The line t goes over the
+part of it beyond the nearest height of the face: all before that is lit.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+from realtime.light_heights import LightHeights, node_bounds
+from realtime.shadow_map import face_coordinates
+
+_NEARER = 1 - 1e-4  # of the nearest height, with room for rounding
+_STEEP = 1e30  # stands for 1/0: lines that are never crossed lie far beyond [0, 1]
+
+
+@dataclass
+class FaceRay:
+    """A ray in a face; the coordinates are those of its line at t = 0 and t = 1."""
+
+    begin: Any  #: the part of the ray in the face [m]
+    end: Any
+    walks: Any  #: whether any of it lies beyond the nearest height
+    u: tuple[Any, Any]  #: columns [texels]
+    v: tuple[Any, Any]  #: rows [texels]
+    s: tuple[Any, Any]  #: [1/m]
+    y: tuple[Any, Any]  #: x s
+    per_u: Any  #: dt/du, positive where u stays the same
+    per_v: Any
+    per_diagonal: Any  #: dt/d(v - u)
+
+
+def in_face(heights: LightHeights, face, away, direction, segment):
+    """Return the part of a segment of rays that lies in a face, x0 >= x1 where none does; see `face_ray`."""
+    a0, b0, c0 = face_coordinates(heights.frame, face, away)
+    da, db, dc = face_coordinates(heights.frame, face, direction)
+    begin, end = segment
+    for start, slope in ((c0 + a0, dc + da), (c0 - a0, dc - da), (c0 + b0, dc + db), (c0 - b0, dc - db)):
+        begin, end = _cut(begin, end, start, slope)
+    return begin, end
+
+
+def face_ray(heights: LightHeights, face, away, direction, segment) -> FaceRay:
+    """Return rays in a face.
+
+    Parameters
+    ----------
+    heights
+        The height field.
+    face
+        Number of the face.
+    away
+        The camera less the light [m].
+    direction
+        Unit directions.
+    segment
+        The distances (x0, x1) of the part in the face; `x1` may be infinite.
+    """
+    import mitsuba as mi
+
+    a0, b0, c0 = face_coordinates(heights.frame, face, away)
+    da, db, dc = face_coordinates(heights.frame, face, direction)
+    begin, end = segment
+    zero = mi.UInt32(0)
+    _, highest = node_bounds(heights, face, zero, zero, zero)
+    nearest = _NEARER / highest  # infinite where nothing is hit: all is lit
+    t0, t1 = _cut(begin, end, c0 - nearest, dc)
+    walks = (t0 < t1) & (highest > 0)
+    ends = [_coordinates(heights.size, x, (a0, b0, c0), (da, db, dc), nearest) for x in (t0, t1)]
+    u, v, s, y = zip(*ends)
+    across, upward = u[1] - u[0], v[1] - v[0]
+    return FaceRay(begin, end, walks, u, v, s, y, _inverse(across), _inverse(upward), _inverse(upward - across))
+
+
+def _cut(begin, end, start, slope):
+    """Cut a segment down to where start + x slope >= 0."""
+    import drjit as dr
+
+    at = -start / slope
+    begin = dr.select(slope > 0, dr.maximum(begin, at), begin)
+    end = dr.select(slope < 0, dr.minimum(end, at), end)
+    return begin, dr.select((slope == 0) & (start < 0), begin, end)
+
+
+def _coordinates(size: int, x, origin, direction, nearest):
+    """Return u, v [texels], s and y of the point at x."""
+    import drjit as dr
+
+    finite = dr.isfinite(x)
+    at = dr.select(finite, x, 0)
+    a, b, c = (dr.select(finite, dr.fma(at, d, o), d) for o, d in zip(origin, direction))
+    inverse = dr.rcp(dr.select(finite, dr.maximum(c, nearest), c))
+    half = 0.5 * size
+    u, v = (dr.clip(dr.fma(half * p, inverse, half), 0, size) for p in (a, b))
+    return u, v, dr.select(finite, inverse, 0), dr.select(finite, at * inverse, inverse)
+
+
+def _inverse(length):
+    import drjit as dr
+
+    return dr.select(dr.abs(length) < 1 / _STEEP, _STEEP, 1 / length)
+
+
+def at_line(pair, t):
+    """Return a coordinate of the line at t."""
+    import drjit as dr
+
+    return dr.fma(t, pair[1], dr.fma(-t, pair[0], pair[0]))
+
+
+def distance_at(ray: FaceRay, t):
+    """Return the distance x along the ray at t [m]."""
+    return at_line(ray.y, t) / at_line(ray.s, t)
