@@ -44,6 +44,7 @@ STANDARD: tuple[Configuration, ...] = (
     Configuration("shadow-planes", "exact", (("order", "paper"),)),
     Configuration("shadow-planes", "exact", (("order", "none"),)),
     Configuration("shadow-planes", "exact", (("media", "paper"),)),
+    Configuration("min-max", "exact"),
 )
 
 #: What `report --quick` measures: one of each kind.
@@ -53,6 +54,7 @@ QUICK: tuple[Configuration, ...] = (
     Configuration("ray-march", None, (("steps", 100), ("shadow", "map"))),
     Configuration("shadow-planes", "exact"),
     Configuration("shadow-planes", "taylor"),
+    Configuration("min-max", "exact"),
 )
 
 

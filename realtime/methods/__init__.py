@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
+from realtime.methods.min_max import min_max, prepare_min_max
 from realtime.methods.ray_march import prepare_maps, ray_march
 from realtime.methods.unshadowed import unshadowed
 from realtime.shadow_planes import prepare_shadow_planes, shadow_planes
@@ -72,5 +73,13 @@ METHODS: dict[str, Method] = {
                 "cone": 0,
             }
         ),
+    ),
+    "min-max": Method(
+        "min-max",
+        min_max,
+        "epipolar slices with 1D min/max trees over the shadow map; airlight interpolated between samples",
+        "Chen, Baran, Durand, Jarosz 2011; Yusov 2013",
+        prepare=prepare_min_max,
+        parameters=MappingProxyType({"map": 512, "slices": 0, "samples": 0, "step": 16, "sampling": "slices"}),
     ),
 }
