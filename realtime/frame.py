@@ -82,15 +82,16 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
     pixel = mi.UInt32(tiled_pixels(camera.width, camera.height))
 
     @dr.freeze
-    def surface(geometry, pixel, camera, medium, lights):
+    def surface(geometry, facets, pixel, camera, medium, lights):
         direction, _ = ray_directions(camera, pixel)
-        distance, interaction = visible_surface(geometry, camera.origin, direction)
-        arguments = {"distance": distance, "medium": medium, "shadows": not method.lights_surfaces}
+        seen = visible_surface(geometry, facets, camera.origin, direction, color=type(medium.albedo))
+        depths = None
         if medium.bodies:
             corners = _corners(camera, pixel)
-            arguments["depths"] = camera_depths(medium, camera.origin, direction, distance, corners=corners)
-        colors = [lit_surface(geometry, direction, interaction, light=light, **arguments) for light in lights]
-        return distance, tuple(colors) if method.lights_surfaces else (sum(colors),)
+            depths = camera_depths(medium, camera.origin, direction, seen.distance, corners=corners)
+        asked = {"medium": medium, "depths": depths, "shadows": not method.lights_surfaces}
+        colors = [lit_surface(geometry, seen, light=light, **asked) for light in lights]
+        return seen.distance, tuple(colors) if method.lights_surfaces else (sum(colors),)
 
     def run_method(geometry, pixel, camera, medium, lights, prepared, distance, by_light):
         shown = {"geometry": geometry, "medium": medium, "lights": lights, "prepared": prepared}
@@ -107,7 +108,7 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
     one = type(camera.origin.x)(1)
     casts_rays = method.casts_rays(settings)
     one_pixel = (scene.geometry if casts_rays else None, mi.UInt32(0), camera, scene.medium, scene.lights)
-    _, dark = _no_surface(*one_pixel)
+    _, dark = _no_surface(None, None, *one_pixel[1:])
     run_method(*one_pixel, prepare(scene), one, dark)
     resident = resident_tables()
     airlight = dr.freeze(run_method, state_fn=lambda *_, **__: resident)
@@ -145,7 +146,7 @@ def run_stages(renderer: FrameRenderer, prepared):
 def run_surface(renderer: FrameRenderer):
     """Run the stage of the surface and return what it does, not evaluated."""
     scene = renderer.scene
-    return renderer.surface(scene.geometry, renderer.pixel, scene.camera, scene.medium, scene.lights)
+    return renderer.surface(scene.geometry, scene.facets, renderer.pixel, scene.camera, scene.medium, scene.lights)
 
 
 def run_airlight(renderer: FrameRenderer, prepared, distance, by_light):
@@ -213,7 +214,7 @@ def _nothing(scene: Scene) -> tuple[()]:
     return ()
 
 
-def _no_surface(geometry, pixel, camera, medium, lights):
+def _no_surface(geometry, facets, pixel, camera, medium, lights):
     import drjit as dr
 
     Float, Color = type(camera.origin.x), type(medium.albedo)

@@ -13,8 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from realtime.arrays import array_types, is_single
 from realtime.casters import Casters
 from realtime.errors import InputError
+from realtime.facets import read_facets
 from realtime.lights import Light
 from realtime.medium import Medium
 from realtime.scene import Scene
@@ -127,7 +129,10 @@ def turned_objects(scene: Scene, objects: Objects, turn: Array) -> Scene:
     for name, vertices in objects.vertices.items():
         middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
         positions[name] = (vertices - middle) @ turn.T + middle
-    return replace(scene, positions=replace_positions(objects.parameters, positions))
+    moved = replace_positions(objects.parameters, positions)
+    precision = "single" if is_single(type(scene.camera.origin.x)) else "double"
+    facets = scene.facets and read_facets(scene.geometry, array_types(precision))
+    return replace(scene, positions=moved, facets=facets)
 
 
 def closed_shapes(casters: Casters) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ from typing import Any
 from realtime.arrays import ArrayTypes, array_types, is_single
 from realtime.camera import Camera
 from realtime.errors import InputError
+from realtime.facets import Facets, read_facets
 from realtime.lights import Light
 from realtime.medium import Medium
 from realtime.plan import Plan
@@ -27,6 +28,7 @@ class Scene:
     medium: Medium
     lights: tuple[Light, ...]
     plan: Plan
+    facets: Facets | None = None  #: the triangles, where a table says all that shading needs
     positions: Mapping[str, Any] = field(default_factory=dict)  #: vertices of the shapes that moved, by name [m]
 
 
@@ -52,7 +54,8 @@ def read_scene(scene, precision: str = "single") -> Scene:
     lights = tuple(_read_light(emitter, types) for emitter in scene.emitters())
     if not lights:
         raise InputError("the scene has no light; wanted at least one emitter of type 'point' or 'spot'")
-    return Scene(opaque_scene(scene, opaque), camera, medium, lights, _make_plan(opaque, medium, lights))
+    geometry = opaque_scene(scene, opaque)
+    return Scene(geometry, camera, medium, lights, _make_plan(opaque, medium, lights), read_facets(geometry, types))
 
 
 def _read_camera(scene, types: ArrayTypes):

@@ -9,36 +9,65 @@ zero where a shadow ray is blocked. With bounded media both exponents are sums o
 (`realtime.media_rays`). A one-sided surface is black from behind, as in Mitsuba's `diffuse`.
 """
 
+from dataclasses import dataclass
+from typing import Any
+
+from realtime.facets import Facets, facet_at
 from realtime.geometry import falloff, ray_geometry
 from realtime.lights import Light
 from realtime.media_rays import path_transmittance
 from realtime.medium import Medium, transmittance
 
 
-def visible_surface(scene, origin, direction):
+@dataclass
+class VisibleSurface:
+    """What camera rays meet first, with all that its shading needs."""
+
+    distance: Any  #: infinite where there is nothing [m]
+    point: Any  #: [m]
+    normal: Any  #: unit normal, on the side of the camera where the surface is lit from both
+    albedo: Any  #: diffuse reflectance
+    seen: Any  #: whether there is a surface, seen from a side that reflects
+    interaction: Any  #: Mitsuba's, for shadow rays
+
+
+def visible_surface(scene, facets: Facets | None, origin, direction, *, color) -> VisibleSurface:
     """Cast the camera rays.
 
     Parameters
     ----------
     scene
         The Mitsuba scene.
+    facets
+        Its triangles, or None: then Mitsuba is asked for the surfaces.
     origin, direction
         Rays in any precision; they are cast in float32.
-
-    Returns
-    -------
-    distance
-        To the nearest surface, infinite where there is none [m], in the precision of the rays.
-    interaction
-        Mitsuba's surface interaction.
+    color
+        The type of an albedo.
     """
     import drjit as dr
     import mitsuba as mi
 
+    Vector, Float = type(direction), type(origin.x)
     ray = mi.Ray3f(mi.Point3f(origin), mi.Vector3f(direction))
     hit = scene.ray_intersect_preliminary(ray, coherent=True)
-    interaction = hit.compute_surface_interaction(ray, ray_flags=mi.RayFlags.All)
-    return dr.select(hit.is_valid(), type(origin.x)(hit.t), dr.inf), interaction
+    valid = hit.is_valid()
+    distance = dr.select(valid, Float(hit.t), dr.inf)
+    if facets is None:
+        interaction = hit.compute_surface_interaction(ray, ray_flags=mi.RayFlags.All)
+        bsdf = interaction.bsdf()
+        albedo = color(bsdf.eval_diffuse_reflectance(interaction))
+        point, normal = Vector(interaction.p), Vector(interaction.sh_frame.n)
+        two_sided = mi.has_flag(bsdf.flags(), mi.BSDFFlags.BackSide)
+    else:
+        unit, two_sided, reflectance = facet_at(facets, hit, valid)
+        normal, albedo = Vector(*unit), color(*reflectance)
+        point = dr.fma(direction, dr.select(valid, distance, 0), origin)
+        interaction = dr.zeros(mi.Interaction3f)
+        interaction.t, interaction.p, interaction.n = hit.t, mi.Point3f(point), mi.Normal3f(normal)
+    facing = -dr.dot(normal, direction)
+    normal = dr.select(two_sided & (facing < 0), -normal, normal)
+    return VisibleSurface(distance, point, normal, albedo, valid & (two_sided | (facing > 0)), interaction)
 
 
 def visible_triangle(scene, origin, direction):
@@ -68,18 +97,14 @@ def visible_triangle(scene, origin, direction):
     return corners, (1 - u - v, u, v), seen
 
 
-def lit_surface(
-    scene, view_direction, interaction, *, distance, medium: Medium, light: Light, depths=None, shadows: bool = True
-):
+def lit_surface(scene, surface: VisibleSurface, *, medium: Medium, light: Light, depths=None, shadows: bool = True):
     """Return the radiance that the visible surface sends to the eye through the medium, from one light [W/(m^2 sr)].
 
     Parameters
     ----------
     scene
         The Mitsuba scene, for shadow rays.
-    view_direction
-        Unit directions of the camera rays.
-    interaction, distance
+    surface
         From `visible_surface`.
     medium, light
         What the light crosses and where it comes from.
@@ -91,28 +116,19 @@ def lit_surface(
     import drjit as dr
     import mitsuba as mi
 
-    Vector, Color = type(view_direction), type(medium.albedo)
-    bsdf = interaction.bsdf()
-    albedo = Color(bsdf.eval_diffuse_reflectance(interaction))
-    normal = Vector(interaction.sh_frame.n)
-    facing = -dr.dot(normal, view_direction)
-    two_sided = mi.has_flag(bsdf.flags(), mi.BSDFFlags.BackSide)
-    normal = dr.select(two_sided & (facing < 0), -normal, normal)
-    seen = interaction.is_valid() & (two_sided | (facing > 0))
-    point = Vector(interaction.p)
-    to_light = light.position - point
+    to_light = light.position - surface.point
     r = dr.norm(to_light)
-    cosine = dr.dot(normal, to_light) / r
-    arriving = light.intensity * _profile(light, point, -to_light / r)
-    lit = seen & (cosine > 0)
+    cosine = dr.dot(surface.normal, to_light) / r
+    arriving = light.intensity * _profile(light, surface.point, -to_light / r)
+    lit = surface.seen & (cosine > 0)
     if shadows:
-        lit &= ~scene.ray_test(interaction.spawn_ray_to(mi.Point3f(light.position)), lit)
-    reflected = albedo * arriving * (dr.inv_pi * cosine / dr.square(r))
+        lit &= ~scene.ray_test(surface.interaction.spawn_ray_to(mi.Point3f(light.position)), lit)
+    reflected = surface.albedo * arriving * (dr.inv_pi * cosine / dr.square(r))
     if medium.bodies:
-        kept = path_transmittance(medium, light, depths=depths, point=point, active=lit)
+        kept = path_transmittance(medium, light, depths=depths, point=surface.point, active=lit)
     else:
-        kept = transmittance(medium, dr.select(lit, distance + r, 0))
-    return dr.select(lit, reflected * kept, Color(0))
+        kept = transmittance(medium, dr.select(lit, surface.distance + r, 0))
+    return dr.select(lit, reflected * kept, type(medium.albedo)(0))
 
 
 def _profile(light: Light, point, away):

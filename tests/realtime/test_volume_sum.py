@@ -67,7 +67,8 @@ def view_of(scene):
 
     camera = scene.camera
     pixel = mi.UInt32(tiled_pixels(camera.width, camera.height))
-    distance, _ = visible_surface(scene.geometry, camera.origin, ray_directions(camera, pixel)[0])
+    direction = ray_directions(camera, pixel)[0]
+    distance = visible_surface(scene.geometry, None, camera.origin, direction, color=mi.Color3f).distance
     parts = {"plan": scene.plan, "geometry": scene.geometry, "medium": scene.medium, "lights": scene.lights}
     return frame_view(camera, pixel, distance, **parts, prepared=()), pixel
 
