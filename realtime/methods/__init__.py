@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
+from realtime.light_volumes import light_volumes, prepare_light_volumes
 from realtime.methods.min_max import min_max, prepare_min_max
 from realtime.methods.ray_march import prepare_maps, ray_march
 from realtime.methods.unshadowed import unshadowed
@@ -73,6 +74,14 @@ METHODS: dict[str, Method] = {
                 "cone": 0,
             }
         ),
+    ),
+    "light-volumes": Method(
+        "light-volumes",
+        light_volumes,
+        "the volume between the light and its shadow map, crossed without marching",
+        "Billeter, Sintorn, Assarsson 2010",
+        prepare=prepare_light_volumes,
+        parameters=MappingProxyType({"map": 512}),
     ),
     "min-max": Method(
         "min-max",
