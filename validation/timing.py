@@ -17,6 +17,10 @@ from realtime.frame import FrameRenderer, run_airlight, run_stages, run_surface
 from realtime.motion import Objects, read_objects, turned_objects
 from realtime.scene import Scene
 
+#: Of a frame that takes longer than this the stages are timed once, in one more frame: its spread matters little, and
+#: fifty such frames would take an hour [s].
+SLOW = 8.0
+
 
 @dataclass(frozen=True)
 class Timing:
@@ -126,6 +130,12 @@ def time_frame(renderer: FrameRenderer, *, seconds: float = 0.6) -> FrameTimes:
     prepared = renderer.prepare(scene)
     distance, by_light = run_surface(renderer)
     dr.eval(distance, by_light)
+    dr.sync_thread()
+    begin = time.perf_counter()
+    dr.eval(run_airlight(renderer, prepared, distance, by_light))
+    dr.sync_thread()
+    if time.perf_counter() - begin > SLOW:
+        return _slow_frame(renderer)
 
     def surface():
         dr.eval(run_surface(renderer))
@@ -150,6 +160,37 @@ def time_frame(renderer: FrameRenderer, *, seconds: float = 0.6) -> FrameTimes:
         rebuild=time_repeated(rebuild, seconds=0.5 * seconds, least=3),
         moved=time_repeated(moved, seconds=0.5 * seconds, least=3),
     )
+
+
+def _slow_frame(renderer: FrameRenderer) -> FrameTimes:
+    """Time every stage once."""
+    import drjit as dr
+
+    scene = renderer.scene
+    objects = _objects(scene)
+    times = [time.perf_counter()]
+
+    def done() -> None:
+        dr.sync_thread()
+        times.append(time.perf_counter())
+
+    there = turned_objects(scene, objects, np.eye(3)) if objects else scene
+    done()
+    prepared = renderer.prepare(there)
+    done()
+    distance, by_light = run_surface(renderer)
+    dr.eval(distance, by_light)
+    done()
+    dr.eval(run_airlight(renderer, prepared, distance, by_light))
+    done()
+    move, prepare, surface, airlight = (float(1e3 * step) for step in np.diff(times))
+
+    def once(milliseconds: float) -> Timing:
+        return Timing(milliseconds, milliseconds, milliseconds, 1)
+
+    frame = surface + airlight
+    rebuild = prepare + frame
+    return FrameTimes(once(frame), once(surface), once(airlight), once(rebuild), once(move + rebuild))
 
 
 def _objects(scene: Scene) -> Objects | None:

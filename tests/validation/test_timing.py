@@ -153,3 +153,20 @@ def test_moved_builds_the_acceleration_structure_again_and_rebuild_does_not(vari
     monkeypatch.setattr(timing, "time_repeated", counted)
     time_frame(renderer)
     assert list(measured.values()) == [0, 0, 0, 0, 1]  # frame, surface, airlight, rebuild, moved
+
+
+def test_a_slow_frame_is_timed_once(variant, monkeypatch):
+    """A frame that takes minutes must not be rendered fifty times."""
+    import mitsuba as mi
+
+    from realtime.frame import frame_renderer
+    from realtime.methods import METHODS
+    from realtime.scene import read_scene
+    from validation import timing
+
+    monkeypatch.setattr(timing, "SLOW", -1.0)
+    scene = read_scene(mi.load_dict(tiny_scene(size=(16, 12))))
+    times = time_frame(frame_renderer(scene, METHODS["ray-march"], steps=3))
+    assert times.frame.repetitions == times.airlight.repetitions == 1
+    assert times.frame.median_ms == pytest.approx(times.surface.median_ms + times.airlight.median_ms)
+    assert times.frame.median_ms <= times.rebuild.median_ms <= times.moved.median_ms
