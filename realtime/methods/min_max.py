@@ -84,8 +84,8 @@ def min_max(
 
     Notes
     -----
-    Valid for point and spot lights anywhere; the epipole may lie in the image. Shadows are those of the map, sampled
-    once more along the slices.
+    Valid for point and spot lights anywhere; the epipole may lie in the image, where the pixels next to the light are
+    the least accurate. Shadows are those of the map, sampled once more along the slices.
 
     References
     ----------
@@ -107,7 +107,7 @@ def min_max(
         if sampling == "pixels":
             total += airlight.radiance(_lit_integral(airlight, heights, _nearest(cut, point)))
             continue
-        count = samples or max(camera.width, camera.height) // 2
+        count = samples or max(2, camera.width, camera.height) // 2
         count = (count + WORD - 1) // WORD * WORD
         drawn = mark_samples(cut, _depth_image(cut, point, view.distance), count=count, step=step)
         shares = _sampled_shares(view, number, kernel, drawn, heights, camera)
@@ -230,7 +230,9 @@ def _yardstick(airlight: RayAirlight):
     if airlight.media:
         return airlight.integral(x0, x1)
     geometry, medium = airlight.geometry, airlight.view.medium
-    foot, height = geometry.foot, geometry.height
+    foot = geometry.foot
+    # As in the kernels, so that a ray through the light has a finite share.
+    height = dr.maximum(geometry.height, 1e-9 * dr.abs(x0 - foot))
     endless = ~dr.isfinite(x1)
     end = dr.select(endless, x0, x1)
     across = dr.select(endless, height, height * (x1 - x0))

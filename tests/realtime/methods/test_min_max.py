@@ -182,6 +182,21 @@ def test_both_precisions_agree(variant):
     assert np.median(np.abs(one - other) / other) < 1e-5
 
 
+@pytest.mark.parametrize("size", [(1, 1), (16, 1), (3, 50)])
+def test_images_of_any_size(variant, size):
+    import mitsuba as mi
+
+    changes = CHANGES["light in view"]()
+    changes["sensor"]["film"] = changes["sensor"]["film"] | {"width": size[0], "height": size[1]}
+    scene = mi.load_dict(tiny_scene(**changes))
+    expected = render(scene, "unshadowed")
+    for settings in ({}, {"sampling": "pixels"}, {"slices": 1}):
+        found = render(scene, "min-max", map=32, **settings)
+        assert np.all(np.isfinite(found))
+        # Little of this view is in shadow; that of one pixel is as exact as its kernel.
+        assert relative_rmse(found, expected) < (1e-5 if size == (1, 1) else 0.3)
+
+
 def test_a_frame_follows_its_light(variant):
     """Recorded once, replayed with the epipole elsewhere: outside the image instead of in it."""
     from dataclasses import replace
