@@ -2,7 +2,8 @@
 """A frame: primary rays, the lit surface and the airlight, each stage one frozen function.
 
 Frozen functions (`drjit.freeze`) record their kernels on the first call and replay them afterwards, so a frame costs
-its kernels and little else. All that moves (camera, lights, medium, shadow maps) is passed in as opaque arrays.
+its kernels and little else. A method whose arrays change their sizes from frame to frame cannot be frozen. All that
+moves (camera, lights, medium, shadow maps) is passed in as opaque arrays.
 """
 
 from collections.abc import Callable
@@ -66,7 +67,8 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
     Raises
     ------
     InputError
-        For a parameter that the method does not have, where a kernel is missing, and for what method or kernel refuse.
+        For a parameter that the method does not have, where a kernel is missing, and for what method or kernel refuse;
+        what the kernel of a method that is not frozen refuses comes with the first frame.
     """
     import drjit as dr
     import mitsuba as mi
@@ -102,16 +104,21 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
         airlight, lit = found
         return airlight, sum(dr.select(reached, color, 0) for reached, color in zip(lit, by_light))
 
-    prepare = method.prepare(scene, **settings) if method.prepare and plan.shadows else _nothing
-    # Trace one pixel without launching anything: what the method refuses must not be raised while a frozen function is
-    # being recorded, which Dr.Jit 1.5 answers by aborting a later recording.
-    one = type(camera.origin.x)(1)
+    # Asked of every scene: it checks the parameters also where nothing casts a shadow.
+    prepare = method.prepare(scene, **settings) if method.prepare else _nothing
+    if not plan.shadows:
+        prepare = _nothing
     casts_rays = method.casts_rays(settings)
-    one_pixel = (scene.geometry if casts_rays else None, mi.UInt32(0), camera, scene.medium, scene.lights)
-    _, dark = _no_surface(None, None, *one_pixel[1:])
-    run_method(*one_pixel, prepare(scene), one, dark)
-    resident = resident_tables()
-    airlight = dr.freeze(run_method, state_fn=lambda *_, **__: resident)
+    airlight = run_method
+    if method.frozen(settings):
+        # Trace one pixel without launching anything: what the method refuses must not be raised while a frozen function
+        # is being recorded, which Dr.Jit 1.5 answers by aborting a later recording.
+        one = type(camera.origin.x)(1)
+        one_pixel = (scene.geometry if casts_rays else None, mi.UInt32(0), camera, scene.medium, scene.lights)
+        _, dark = _no_surface(None, None, *one_pixel[1:])
+        run_method(*one_pixel, prepare(scene), one, dark)
+        resident = resident_tables()
+        airlight = dr.freeze(run_method, state_fn=lambda *_, **__: resident)
     dr.eval(pixel)
     return FrameRenderer(scene, pixel, prepare, surface if plan.surfaces else _no_surface, airlight, casts_rays)
 
@@ -170,6 +177,8 @@ def frame_view(
         medium=medium,
         plan=plan,
         visible=lambda point, light: _visible(geometry, point, light),
+        camera=camera,
+        pixel=pixel,
         rays=_rays(camera, pixel),
         square_tiles=_in_square_tiles(camera, pixel),
         visible_triangle=lambda: visible_triangle(geometry, camera.origin, direction),

@@ -7,22 +7,47 @@ and leaves that volume at crossings with its boundary; with Gamma(x) the airligh
 
     L = sum_n s_n Gamma(min(x_n, x_visible)),   s_n = +1 where it leaves the light, -1 where it enters it,
 
-in any order. The boundary is the height field of `realtime.light_heights`. Each ray looks at the texels on its line
-(`realtime.volume_walk`) that a beam of rays about it may meet (`realtime.volume_tiles`); terms are put in order and
-integrated pair by pair, which keeps the digits that a difference of two Gammas loses.
+in any order. The boundary is the height field of `realtime.light_heights`, and `evaluation` says how it is crossed:
+
+* `walk`: each ray looks at the texels on its line (`realtime.volume_walk`) that a beam of rays about it may meet
+  (`realtime.volume_tiles`); terms are put in order and integrated pair by pair, which keeps the digits that a
+  difference of two Gammas loses.
+* `mesh`, as published: the boundary becomes triangles (`realtime.volume_mesh`), each is drawn over the pixels that it
+  covers (`realtime.volume_raster`), and terms are added up as they come (`realtime.volume_sum`). The `static` mesh is
+  the height field itself, an `adaptive` one has fewer triangles where the map is flat (`realtime.tessellation`).
 """
 
+from collections.abc import Callable
+from typing import Any
+
+from realtime.arrays import is_single
+from realtime.errors import InputError
 from realtime.geometry import clip_to_cone, ray_geometry
-from realtime.light_heights import light_heights
+from realtime.light_heights import LightHeights, level_start, light_heights
+from realtime.lights import Light
+from realtime.memory import check_memory
 from realtime.ray_airlight import RayAirlight
 from realtime.scene import Scene
 from realtime.shadow_map import cast_shadow_map, check_size
 from realtime.view import View, rays_in_media
+from realtime.volume_mesh import THRESHOLD, memory_needed, volume_mesh
+from realtime.volume_sum import mesh_airlight
 from realtime.volume_tiles import tile_leaves
 from realtime.volume_walk import sum_lit_pieces
 
+EVALUATIONS = ("walk", "mesh")
+TESSELLATIONS = ("static", "adaptive")
 
-def light_volumes(view: View, *, kernel, map: int = 512):
+
+def light_volumes(
+    view: View,
+    *,
+    kernel,
+    map: int = 512,
+    evaluation: str = "walk",
+    tessellation: str = "static",
+    threshold: float = THRESHOLD,
+):
     """Return the airlight of every ray in the light volumes [W/(m^2 sr)].
 
     Parameters
@@ -33,50 +58,110 @@ def light_volumes(view: View, *, kernel, map: int = 512):
         An airlight kernel, see `realtime.kernels`.
     map
         Resolution of the shadow maps, a power of two [texels].
+    evaluation
+        'walk' or 'mesh', see above.
+    tessellation
+        'static' or 'adaptive', of the mesh.
+    threshold
+        Departure of an adaptive mesh from the shadow map that is allowed, relative to the depth.
 
     Notes
     -----
     Valid for point and spot lights and any shapes that rays can be cast against. Exact with respect to the shadow map:
-    what it misses of the scene falls as the size of a texel (`validation.map_study`). Bounded media have nodes of their
-    own, the kernel is not asked.
+    what it misses of the scene falls as the size of a texel (`validation.map_study`). A map that sees nothing lights
+    everything; a light inside a closed occluder lights nothing outside it. Bounded media are for evaluation=walk; they
+    have nodes of their own, the kernel is not asked.
 
     References
     ----------
     Billeter, Sintorn, Assarsson 2010, *Real time volumetric shadows using polygonal light volumes*, High Performance
     Graphics.
     """
-    import drjit as dr
-
     total = type(view.medium.albedo)(0)
     in_media = rays_in_media(view) if view.plan.bounded else ()
     for number, light in enumerate(view.lights):
+        if evaluation == "mesh" and view.plan.shadows:
+            total += mesh_airlight(view, light, view.prepared[number], view.camera, view.pixel, kernel=kernel)
+            continue
         geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
         airlight = RayAirlight(view, light, geometry, kernel, in_media[number] if in_media else None)
         segment = type(view.distance)(0), view.distance
         if light.kind == "spot":
             segment = clip_to_cone(geometry, light.cos_cutoff, *segment)
-        if not view.plan.shadows:
+        if view.plan.shadows:
+            total += _walk(view.prepared[number], airlight, segment)
+        else:
             total += airlight.radiance(airlight.integral(*segment))
-            continue
-        heights = view.prepared[number]
-        toward = light.position - view.origin
-        leaves = tile_leaves(
-            heights, lambda lane: view.rays(lane)[0], view.distance, light=toward, square=view.square_tiles
-        )
-        value, _ = sum_lit_pieces(
-            heights,
-            leaves,
-            away=-toward,
-            direction=view.direction,
-            segment=segment,
-            integral=airlight.integral,
-            zero=dr.zeros(airlight.number, dr.width(view.distance)),
-        )
-        total += airlight.radiance(value)
     return total
 
 
-def prepare_light_volumes(scene: Scene, *, map: int, **_):
-    """Return the function that makes the height field of every light of a frame."""
+def _walk(heights: LightHeights, airlight: RayAirlight, segment):
+    """Return the airlight of one light along segments of the rays [W/(m^2 sr)]."""
+    import drjit as dr
+
+    view = airlight.view
+    toward = airlight.light.position - view.origin
+    leaves = tile_leaves(
+        heights, lambda lane: view.rays(lane)[0], view.distance, light=toward, square=view.square_tiles
+    )
+    zero = dr.zeros(airlight.number, dr.width(view.distance))
+    place = {"away": -toward, "direction": view.direction, "segment": segment}
+    value, _ = sum_lit_pieces(heights, leaves, **place, integral=airlight.integral, zero=zero)
+    return airlight.radiance(value)
+
+
+def prepare_light_volumes(
+    scene: Scene, *, map: int, evaluation: str, tessellation: str, threshold: float
+) -> Callable[[Scene], tuple[Any, ...]]:
+    """Return the function that makes the height field, or the mesh, of every light of a frame.
+
+    Raises
+    ------
+    InputError
+        For parameters out of range or that contradict each other, a mesh in bounded media, and more memory than the
+        machine has.
+    """
+    _check(map, evaluation, tessellation, threshold)
+    if evaluation == "mesh" and scene.plan.bounded:
+        raise InputError(
+            "evaluation=mesh: the scene has a medium with bounds, wanted one medium that fills all space; use "
+            "evaluation=walk"
+        )
+    if scene.plan.shadows:
+        needed = sum(_memory_of(light, map, evaluation) for light in scene.lights)
+        check_memory(f"map: {map} texels for {len(scene.lights)} light(s)", needed, "use a smaller map")
+
+    def volume(scene: Scene, light: Light):
+        shadow_map = cast_shadow_map(scene.geometry, light, map)
+        if evaluation == "walk":
+            return light_heights(shadow_map)
+        return volume_mesh(shadow_map, light, tessellation=tessellation, threshold=threshold)
+
+    return lambda scene: tuple(volume(scene, light) for light in scene.lights)
+
+
+def _check(map: int, evaluation: str, tessellation: str, threshold: float) -> None:
     check_size(map)
-    return lambda scene: tuple(light_heights(cast_shadow_map(scene.geometry, light, map)) for light in scene.lights)
+    words = ("evaluation", evaluation, EVALUATIONS), ("tessellation", tessellation, TESSELLATIONS)
+    for name, value, allowed in words:
+        if value not in allowed:
+            raise InputError(f"{name}: got {value!r}, wanted one of {', '.join(allowed)}")
+    if tessellation == "adaptive" and evaluation != "mesh":
+        raise InputError(
+            f"tessellation=adaptive: got evaluation={evaluation}, which has no triangles to save; wanted "
+            "evaluation=mesh with it"
+        )
+    if not 0 < threshold < float("inf"):
+        raise InputError(f"threshold: got {threshold!r}, wanted a positive number, for instance {THRESHOLD:g}")
+
+
+def _memory_of(light: Light, size: int, evaluation: str) -> int:
+    """Return how much the volume of a light takes at its making, an upper bound where it is adaptive [bytes]."""
+    number = 4 if is_single(type(light.position.x)) else 8
+    faces = 1 if light.kind == "spot" else 6
+    corners = number * faces * (size + 1) ** 2
+    if evaluation == "mesh":
+        return corners + memory_needed(faces, size)
+    # Distances and heights at the corners, four heights a texel, two bounds a node.
+    heights = LightHeights(size, None, None, None)
+    return 2 * corners + number * faces * (4 * size**2 + 2 * level_start(heights.finest + 1))

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from realtime.body_tiles import tile_corners
+from realtime.camera import Camera
 from realtime.geometry import ray_geometry
 from realtime.lights import Light
 from realtime.media_rays import MediaRay, camera_pieces, media_ray
@@ -29,6 +30,8 @@ class View:
     medium: Medium
     plan: Plan  #: what the scene needs; a method leaves out the rest
     visible: Callable[[Any, Light], Any]  #: (point, light) -> whether the light reaches the point
+    camera: Camera
+    pixel: Any  #: pixel number of every ray: row times width plus column
     rays: Callable[[Any], tuple[Any, Any]]  #: lanes -> the directions of their rays, and their low parts
     square_tiles: bool  #: whether every 16 rays that follow one another are 4 x 4 pixels
     visible_triangle: Callable[[], tuple[Any, Any, Any]]  #: -> corners [m], barycentric weights, whether there is one

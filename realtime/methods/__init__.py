@@ -29,6 +29,7 @@ class Method:
     prepare: Callable[..., Any] | None = None  #: (scene, **parameters) -> function of the scene, run when things moved
     lights_surfaces: bool = False  #: whether it returns, after the radiance, by light whether it reaches the surface
     casts_rays: Callable[[Mapping[str, Any]], bool] = lambda settings: False  #: parameters -> whether it casts rays
+    frozen: Callable[[Mapping[str, Any]], bool] = lambda settings: True  #: parameters -> whether it can be frozen
     shadows: bool = True  #: whether it knows shadows; one that does not is wrong where there are occluders
     parameters: Mapping[str, int | float | str] = field(
         default_factory=lambda: MappingProxyType({})
@@ -81,7 +82,8 @@ METHODS: dict[str, Method] = {
         "the volume between the light and its shadow map, crossed without marching",
         "Billeter, Sintorn, Assarsson 2010",
         prepare=prepare_light_volumes,
-        parameters=MappingProxyType({"map": 512}),
+        frozen=lambda settings: settings["evaluation"] == "walk",  # the crossings of a mesh are counted on the way
+        parameters=MappingProxyType({"map": 512, "evaluation": "walk", "tessellation": "static", "threshold": 1e-3}),
     ),
     "min-max": Method(
         "min-max",

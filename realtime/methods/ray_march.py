@@ -22,7 +22,7 @@ from realtime.media_rays import MediaRay
 from realtime.medium import least_extinction, per_extinction
 from realtime.phase import evaluate
 from realtime.scene import Scene
-from realtime.shadow_map import ShadowMap, cast_shadow_map, lit_in_map
+from realtime.shadow_map import ShadowMap, cast_shadow_map, check_size, lit_in_map
 from realtime.view import View, bounded_radiance, radiance, rays_in_media
 
 SPACINGS = ("equiangular", "uniform")
@@ -82,7 +82,14 @@ def ray_march(
 
 
 def prepare_maps(scene: Scene, *, shadow: str, map: int, **_) -> Callable[[Scene], tuple[ShadowMap, ...]]:
-    """Return the function that casts a shadow map for every light of a frame, if they are asked for."""
+    """Return the function that casts a shadow map for every light of a frame, if they are asked for.
+
+    Raises
+    ------
+    InputError
+        If `map` is no size of a shadow map.
+    """
+    check_size(map)
     if shadow != "map":
         return lambda scene: ()
     return lambda scene: tuple(cast_shadow_map(scene.geometry, light, map) for light in scene.lights)
