@@ -72,7 +72,7 @@ def bounded_airlight(ray: MediaRay, x0, x1):
     import drjit as dr
 
     if ray.light.kind == "spot":
-        x0, x1 = clip_to_cone(ray.geometry, ray.light.cos_cutoff, x0, x1)
+        x0, x1 = clip_to_cone(ray.geometry, x0, x1)
     panels = stretches(ray.geometry, ray.light, x0, x1)
     Float, Color = type(ray.geometry.height), type(ray.medium.albedo)
     zero = dr.zeros(Color, dr.width(ray.geometry.height, x0, x1))

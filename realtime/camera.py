@@ -13,12 +13,14 @@ Rays start at the pinhole; the near clip plane does not cut the medium away (DES
 A direction that is rounded to float32 misses its aim by 6e-8 of the distance: 3e-7 m at a light 5 m away, which is 1e-4
 of the height of a ray that passes it at half a pixel, and of the airlight there. So a direction is a sum of two
 numbers, `direction + low`, and likewise the camera's vectors. Sums and products keep their rounding errors by the
-error-free transformations of Knuth (two_sum) and Dekker, the latter by fused multiply-add (two_product). Only the *aim*
-needs this: a relative error of the length scales nothing but rounding.
+error-free transformations of `realtime.error_free`. Only the *aim* needs this: a relative error of the length scales
+nothing but rounding.
 """
 
 from dataclasses import dataclass
 from typing import Any
+
+from realtime.error_free import two_product, two_sum
 
 
 @dataclass(frozen=True)
@@ -75,27 +77,12 @@ def ray_directions(camera: Camera, pixel):
     column = pixel - row * camera.width
     # Whole and half numbers: exact.
     i, j = 0.5 * (camera.width - 1) - Float(column), 0.5 * (camera.height - 1) - Float(row)
-    across, across_error = _two_product(camera.left, i)
-    upward, upward_error = _two_product(camera.up, j)
-    plane, plane_error = _two_sum(across, upward)
-    aim, aim_error = _two_sum(plane, camera.forward)
+    across, across_error = two_product(camera.left, i)
+    upward, upward_error = two_product(camera.up, j)
+    plane, plane_error = two_sum(across, upward)
+    aim, aim_error = two_sum(plane, camera.forward)
     low = aim_error + plane_error + across_error + upward_error
     low += camera.forward_low + camera.left_low * i + camera.up_low * j
     scale = dr.rsqrt(dr.squared_norm(aim))
     direction = aim * scale
     return direction, dr.fma(aim, scale, -direction) + low * scale
-
-
-def _two_product(a, b):
-    """Return the rounded product and its rounding error."""
-    import drjit as dr
-
-    product = a * b
-    return product, dr.fma(a, type(a)(b), -product)
-
-
-def _two_sum(a, b):
-    """Return the rounded sum and its rounding error (Knuth)."""
-    total = a + b
-    of_b = total - a
-    return total, (a - (total - of_b)) + (b - of_b)

@@ -9,12 +9,16 @@ multiply-add gives it to 1.5 units in the last place:
     w = c d;   e = fma(-c, d, w)   (the exact rounding error of w);   a b - c d = fma(a, b, -w) + e
 
 That is as good as v and d are. The rounding errors of both are known, v's from the subtraction and d's from
-`realtime.camera`, and enter to first order: (v + v') x (d + d') = v x d + v' x d + v x d'.
+`realtime.camera`, and enter to first order: (v + v') x (d + d') = v x d + v' x d + v x d'. A spot's cone needs the
+cross product to twice the digits (`realtime.cone`); a point light does not pay for them.
 """
 
 from dataclasses import dataclass
 from typing import Any
 
+from realtime.arrays import smallest
+from realtime.cone import cone_interval
+from realtime.error_free import difference_of_products, two_cross, two_dot, two_sum
 from realtime.lights import Light
 
 
@@ -24,27 +28,16 @@ class RayGeometry:
 
     foot: Any  #: signed distance along the ray of the foot of the perpendicular from the light [m]
     height: Any  #: distance from the light to the ray [m]
-    axial: Any  #: spot only: cosine between the ray and the axis of the spot
-    offset: Any  #: spot only: component along the axis of the vector from the light to the foot [m]
-
-
-def difference_of_products(a, b, c, d):
-    """Return a b - c d with an error of at most 1.5 units in the last place.
-
-    References
-    ----------
-    Jeannerod, Louvet, Muller 2013, *Further analysis of Kahan's algorithm for the accurate computation of 2x2
-    determinants*, Mathematics of Computation 82.
-    """
-    import drjit as dr
-
-    w = c * d
-    error = dr.fma(-c, d, w)
-    return dr.fma(a, b, -w) + error
+    axial: Any = None  #: spot only: cosine between the ray and the axis of the spot
+    offset: Any = None  #: spot only: component along the axis of the vector from the light to the foot [m]
+    enter: Any = None  #: spot only: distance at which the ray enters the cone, -inf if it misses it [m]
+    leave: Any = None  #: spot only: distance at which it leaves the cone, -inf if it misses it [m]
+    beam_enter: Any = None  #: soft spot only: the same for the cone of full intensity [m]
+    beam_leave: Any = None
 
 
 def ray_geometry(origin, direction, light: Light, *, low=None) -> RayGeometry:
-    """Return foot and height of rays with respect to one light.
+    """Return foot and height of rays with respect to one light, and where they are in the cone of a spot.
 
     Parameters
     ----------
@@ -61,11 +54,10 @@ def ray_geometry(origin, direction, light: Light, *, low=None) -> RayGeometry:
     """
     import drjit as dr
 
-    v = light.position - origin
-    # The rounding error of the difference (Knuth's two_sum).
-    of_origin = light.position - v
-    v_low = (light.position - (v + of_origin)) + (of_origin - origin)
+    v, v_low = two_sum(light.position, -origin)
     d = direction
+    if light.kind == "spot":
+        return _spot_geometry((v, v_low), d, low, light)
     cross = type(v)(
         difference_of_products(v.y, d.z, v.z, d.y),
         difference_of_products(v.z, d.x, v.x, d.z),
@@ -74,12 +66,33 @@ def ray_geometry(origin, direction, light: Light, *, low=None) -> RayGeometry:
     cross += dr.cross(v_low, d)
     if low is not None:
         cross += dr.cross(v, low)
-    foot = dr.dot(v, d)
-    height = dr.norm(cross)
-    if light.kind == "point":
-        return RayGeometry(foot, height, None, None)
-    perpendicular = d * foot - v
-    return RayGeometry(foot, height, dr.dot(light.axis, d), dr.dot(light.axis, perpendicular))
+    return RayGeometry(dr.dot(v, d), dr.norm(cross))
+
+
+def _spot_geometry(away, direction, direction_low, light: Light) -> RayGeometry:
+    """Return the geometry of rays and a spot; `away` is the vector to the light with its low part."""
+    import drjit as dr
+
+    v, v_low = away
+    cross, cross_low = two_cross(v, direction)
+    cross_low += dr.cross(v_low, direction)
+    if direction_low is not None:
+        cross_low += dr.cross(v, direction_low)
+    square, square_low = two_dot(cross, cross)
+    square_low += 2 * dr.dot(cross, cross_low)
+    height = dr.sqrt(square)
+    # One Newton step from the root of the rounded square: what is left of it, over twice the root.
+    height_low = (dr.fma(-height, height, square) + square_low) / dr.maximum(2 * height, smallest(type(height)))
+    across, across_low = two_dot(light.axis, cross)
+    across_low += dr.dot(light.axis, cross_low) + dr.dot(light.axis_low, cross)
+    foot, axial = dr.dot(v, direction), dr.dot(light.axis, direction)
+    # In this form it keeps its digits where the light is close to the ray.
+    offset = dr.dot(light.axis, dr.cross(cross, direction))
+    ends = []
+    for cone in (light.cone, light.beam):
+        moments = (height, height_low), (across, across_low)
+        ends += [foot + s for s in cone_interval(axial, offset, moments, cone)] if cone else [None, None]
+    return RayGeometry(foot, height, axial, offset, *ends)
 
 
 def distance_to_light(geometry: RayGeometry, x):
@@ -90,24 +103,13 @@ def distance_to_light(geometry: RayGeometry, x):
     return dr.sqrt(dr.fma(s, s, geometry.height * geometry.height))
 
 
-def clip_to_cone(geometry: RayGeometry, cos_angle, x0, x1):
-    """Clip [x0, x1] to the part of the ray inside a cone around the axis of a spot.
-
-    With s = x - foot, the point at x lies in the cone where (axial s + offset) >= cos_angle sqrt(s^2 + height^2).
-    Squared,
-
-        A s^2 + 2 B s + C >= 0,   A = axial^2 - cos^2,   B = axial offset,   C = offset^2 - cos^2 height^2,
-
-    and (B^2 - A C) = cos^2 (offset^2 + height^2 A). The double cone loses its second nappe by the sign of axial s +
-    offset: for A < 0 the solution is the interval between the roots, both on one nappe; for A > 0 it is a half line,
-    beyond the larger root if axial > 0, before the smaller one otherwise.
+def clip_to_cone(geometry: RayGeometry, x0, x1):
+    """Clip [x0, x1] to the part of the ray inside the cone of a spot.
 
     Parameters
     ----------
     geometry
         Rays and a spot.
-    cos_angle
-        Cosine of the half angle of the cone, in (0, 1).
     x0, x1
         The segment [m]; `x1` may be infinite.
 
@@ -116,34 +118,22 @@ def clip_to_cone(geometry: RayGeometry, cos_angle, x0, x1):
     x0, x1
         The clipped segment [m]; x1 = x0 where the segment misses the cone.
     """
-    import drjit as dr
-
-    axial, offset, height = geometry.axial, geometry.offset, geometry.height
-    a = (axial - cos_angle) * (axial + cos_angle)
-    b = axial * offset
-    c = (offset - cos_angle * height) * (offset + cos_angle * height)
-    discriminant = dr.square(cos_angle) * dr.fma(offset, offset, dr.square(height) * a)
-    q = -(b + dr.mulsign(dr.sqrt(dr.maximum(discriminant, 0)), b))
-    # The smaller root in magnitude is C/q, the other q/A: no cancellation, and A = 0 leaves an infinite root.
-    root_a, root_b = q / a, c / q
-    low, high = dr.minimum(root_a, root_b), dr.maximum(root_a, root_b)
-    half_line = a >= 0
-    begin = dr.select(half_line, dr.select(axial > 0, high, -dr.inf), low)
-    end = dr.select(half_line, dr.select(axial > 0, dr.inf, low), high)
-    middle = dr.select(half_line, dr.select(axial > 0, high, low), 0.5 * (low + high))
-    hit = ((discriminant >= 0) | half_line) & ((axial * middle + offset) >= 0)
-    begin = dr.select(hit, begin + geometry.foot, x0)
-    end = dr.select(hit, end + geometry.foot, x0)
-    x0_clipped = dr.clip(begin, x0, x1)
-    return x0_clipped, dr.maximum(dr.clip(end, x0, x1), x0_clipped)
+    return _clip(geometry.enter, geometry.leave, x0, x1)
 
 
 def stretches(geometry: RayGeometry, light: Light, x0, x1):
     """Cut [x0, x1] where a soft spot's `falloff` has kinks, at the cone of the beam; one stretch for other lights."""
     if not light.soft:
         return [(x0, x1)]
-    inner0, inner1 = clip_to_cone(geometry, light.cos_beam, x0, x1)
+    inner0, inner1 = _clip(geometry.beam_enter, geometry.beam_leave, x0, x1)
     return [(x0, inner0), (inner0, inner1), (inner1, x1)]
+
+
+def _clip(enter, leave, x0, x1):
+    import drjit as dr
+
+    begin = dr.clip(enter, x0, x1)
+    return begin, dr.maximum(dr.clip(leave, x0, x1), begin)
 
 
 def falloff(geometry: RayGeometry, light: Light, x):

@@ -87,7 +87,7 @@ def light_volumes(
         airlight = RayAirlight(view, light, geometry, kernel, in_media[number] if in_media else None)
         segment = type(view.distance)(0), view.distance
         if light.kind == "spot":
-            segment = clip_to_cone(geometry, light.cos_cutoff, *segment)
+            segment = clip_to_cone(geometry, *segment)
         if view.plan.shadows:
             total += _walk(view.prepared[number], airlight, segment)
         else:

@@ -1,8 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Point and spot lights as Dr.Jit values."""
 
+import math
 from dataclasses import dataclass
 from typing import Any
+
+from realtime.arrays import ArrayTypes, is_single
+
+
+@dataclass(frozen=True)
+class Cone:
+    """A cone about the axis of a spot, by its half angle."""
+
+    cos: Any
+    sin: Any
+    sin_low: Any  #: what rounding took from `sin`
 
 
 @dataclass(frozen=True)
@@ -14,7 +26,54 @@ class Light:
     position: Any  #: three-vector [m]
     intensity: Any  #: radiant intensity on the axis [W/sr], RGB
     axis: Any = None  #: spot: unit vector from the light along its axis
+    axis_low: Any = None  #: spot: what rounding took from `axis`
     cutoff: Any = None  #: spot: half angle beyond which there is no light [rad]
-    cos_cutoff: Any = None
-    cos_beam: Any = None  #: spot: cosine of the half angle up to which the intensity is full
+    cone: Cone | None = None  #: spot: of the cut-off
+    beam: Cone | None = None  #: soft spot: the cone in which the intensity is full
     inverse_transition: Any = None  #: soft spot: 1 / (cutoff - beam) [1/rad]
+
+    @property
+    def cos_cutoff(self) -> Any:
+        """Cosine of the half angle beyond which there is no light."""
+        return self.cone.cos if self.cone else None
+
+
+def spot_fields(axis, cutoff: float, beam: float, types: ArrayTypes) -> dict[str, Any]:
+    """Return the fields of a `Light` that only a spot has.
+
+    Parameters
+    ----------
+    axis
+        Unit vector from the light along its axis, in float64.
+    cutoff, beam
+        Half angles beyond which there is no light, and up to which the intensity is full [rad].
+    types
+        Of the arrays.
+    """
+    import numpy as np
+
+    axis = np.asarray(axis, dtype=np.float64)
+    high, low = with_low(axis, types)
+    fields = {
+        "axis": types.vector(*(float(one) for one in high)),
+        "axis_low": types.vector(*(float(one) for one in low)),
+        "cutoff": types.scalar(cutoff),
+        "cone": _cone(cutoff, types),
+    }
+    if beam < cutoff:
+        fields |= {"beam": _cone(beam, types), "inverse_transition": types.scalar(1 / (cutoff - beam))}
+    return fields
+
+
+def with_low(values, types: ArrayTypes):
+    """Return float64 values as they are in a precision, and what rounding takes from them, in float64."""
+    import numpy as np
+
+    values = np.asarray(values, dtype=np.float64)
+    high = values.astype(np.float32 if is_single(types.scalar) else np.float64).astype(np.float64)
+    return high, values - high
+
+
+def _cone(angle: float, types: ArrayTypes) -> Cone:
+    sine, low = with_low(math.sin(angle), types)
+    return Cone(types.scalar(math.cos(angle)), types.scalar(float(sine)), types.scalar(float(low)))

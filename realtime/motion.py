@@ -39,7 +39,10 @@ def turned_light(light: Light, about: Array, turn: Array) -> Light:
     position = np.array(light.position, dtype=np.float64).ravel()
     arrays = {"position": _like(light.position, about + turn @ (position - about))}
     if light.axis is not None:
-        arrays["axis"] = _like(light.axis, turn @ np.array(light.axis, dtype=np.float64).ravel())
+        high, low = (np.array(part, dtype=np.float64).ravel() for part in (light.axis, light.axis_low))
+        axis = turn @ (high + low)
+        arrays["axis"] = _like(light.axis, axis)
+        arrays["axis_low"] = _like(light.axis_low, axis - np.array(arrays["axis"], dtype=np.float64).ravel())
     return replace(light, **arrays)
 
 

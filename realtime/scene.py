@@ -13,7 +13,7 @@ from realtime.arrays import ArrayTypes, array_types, is_single
 from realtime.camera import Camera
 from realtime.errors import InputError
 from realtime.facets import Facets, read_facets
-from realtime.lights import Light
+from realtime.lights import Light, spot_fields
 from realtime.medium import Medium
 from realtime.plan import Plan
 from realtime.scene_media import opaque_scene, read_medium, sort_shapes
@@ -114,32 +114,22 @@ def _read_light(emitter, types: ArrayTypes) -> Light:
     }
     soft = False
     if kind == "spot":
-        soft, cone = _read_cone(parameters, matrix, types)
-        arrays |= cone
+        cutoff, beam = _read_angles(parameters)
+        soft = beam < cutoff
+        arrays |= spot_fields(matrix[:3, 2] / np.linalg.norm(matrix[:3, 2]), cutoff, beam, types)
     dr.make_opaque(*arrays.values())
     return Light(kind, soft, **arrays)
 
 
-def _read_cone(parameters, matrix, types: ArrayTypes):
-    import numpy as np
-
+def _read_angles(parameters) -> tuple[float, float]:
+    """Return the half angles of a spot's cut-off and of its beam [rad]."""
     cutoff = math.radians(float(parameters["cutoff_angle"][0]))
     beam = min(math.radians(float(parameters["beam_width"][0])), cutoff)
     if not 0 < cutoff < 0.5 * math.pi:
         raise InputError(
             f"the spot light's cutoff_angle is {math.degrees(cutoff):g} degrees; wanted more than 0, less than 90"
         )
-    axis = matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])
-    soft = beam < cutoff
-    cone = {
-        "axis": types.vector(*(float(c) for c in axis)),
-        "cutoff": types.scalar(cutoff),
-        "cos_cutoff": types.scalar(math.cos(cutoff)),
-        "cos_beam": types.scalar(math.cos(beam)),
-    }
-    if soft:
-        cone["inverse_transition"] = types.scalar(1 / (cutoff - beam))
-    return soft, cone
+    return cutoff, beam
 
 
 def _make_plan(opaque, medium: Medium, lights: tuple[Light, ...]) -> Plan:

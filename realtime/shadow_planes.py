@@ -206,7 +206,7 @@ def _segments(index: PlaneIndex, lists: Lists, rays: RayPlanes, airlight: RayAir
     view, light = airlight.view, airlight.light
     x0, x1 = type(view.distance)(0), view.distance
     if light.kind == "spot":
-        x0, x1 = clip_to_cone(airlight.geometry, light.cos_cutoff, x0, x1)
+        x0, x1 = clip_to_cone(airlight.geometry, x0, x1)
 
     def integral(a, b):
         return airlight.gamma(b) - airlight.gamma(a) if differences else airlight.integral(a, b)

@@ -7,6 +7,7 @@ at D, and crossings behind it count as crossings at D.
 """
 
 from collections.abc import Iterable
+from dataclasses import fields
 from typing import Any
 
 from realtime.camera import Camera
@@ -65,8 +66,8 @@ def crossing_sum(
 
     def add(index, x0, x1, sign):
         dr.eval(index, x0, x1, sign)  # so that all calls are one kernel: compiling it is what takes time
-        fields = (geometry.foot, geometry.height, geometry.axial, geometry.offset)
-        rays = RayGeometry(*(None if one is None else dr.gather(Float, one, index) for one in fields))
+        columns = (getattr(geometry, field.name) for field in fields(RayGeometry))
+        rays = RayGeometry(*(None if one is None else dr.gather(Float, one, index) for one in columns))
         term = airlight_integral(kernel, rays, x0, x1, medium=medium, light=light)
         dr.scatter_add(total, type(total)(term) * sign, index)
         dr.eval(total)

@@ -146,5 +146,5 @@ def airlight_integral(kernel, geometry: RayGeometry, x0, x1, *, medium: Medium, 
         What fills the scene and what lights it.
     """
     if light.kind == "spot":
-        x0, x1 = clip_to_cone(geometry, light.cos_cutoff, x0, x1)
+        x0, x1 = clip_to_cone(geometry, x0, x1)
     return kernel(geometry, x0, x1, medium, light)

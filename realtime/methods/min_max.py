@@ -158,7 +158,7 @@ def _segment(airlight: RayAirlight):
     """Return the part of the rays that the light could reach [m]."""
     light, distance = airlight.light, airlight.view.distance
     x0 = type(distance)(0)
-    return clip_to_cone(airlight.geometry, light.cos_cutoff, x0, distance) if light.kind == "spot" else (x0, distance)
+    return clip_to_cone(airlight.geometry, x0, distance) if light.kind == "spot" else (x0, distance)
 
 
 def _lit_integral(airlight: RayAirlight, heights: SliceHeights, number, active=True):

@@ -69,7 +69,7 @@ def ray_march(
         geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
         x0, x1 = type(view.distance)(0), view.distance
         if light.kind == "spot":
-            x0, x1 = clip_to_cone(geometry, light.cos_cutoff, x0, x1)
+            x0, x1 = clip_to_cone(geometry, x0, x1)
         if spacing == "uniform" and not view.medium.clear:
             x1 = dr.minimum(x1, x0 + _OPTICAL_REACH / least_extinction(view.medium))
         if view.medium.clear:

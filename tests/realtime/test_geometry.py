@@ -10,21 +10,11 @@ def point_light(types, position):
 
 
 def spot_light(types, position, axis, degrees):
-    from realtime.lights import Light
+    from realtime.lights import Light, spot_fields
 
-    angle = np.deg2rad(degrees)
-    axis = np.asarray(axis) / np.linalg.norm(axis)
-    cosine = types.scalar(float(np.cos(angle)))
-    return Light(
-        "spot",
-        False,
-        types.vector(*(float(p) for p in position)),
-        types.color(1),
-        axis=types.vector(*(float(a) for a in axis)),
-        cutoff=types.scalar(float(angle)),
-        cos_cutoff=cosine,
-        cos_beam=cosine,
-    )
+    angle = float(np.deg2rad(degrees))
+    fields = spot_fields(np.asarray(axis) / np.linalg.norm(axis), angle, angle, types)
+    return Light("spot", False, types.vector(*(float(p) for p in position)), types.color(1), **fields)
 
 
 def test_height_of_rays_that_nearly_meet_the_light(variant):
@@ -62,7 +52,7 @@ def test_cone_clip_against_sampling(variant, precision):
     for degrees in (3.0, 37.0, 71.0, 89.0):
         light = spot_light(types, (0.3, -0.2, 0.1), (0.4, 0.5, -0.7), degrees)
         geometry = ray_geometry(types.vector(origin.T), types.vector(direction.T), light)
-        clipped = clip_to_cone(geometry, light.cos_cutoff, types.scalar(0), types.scalar(9.0))
+        clipped = clip_to_cone(geometry, types.scalar(0), types.scalar(9.0))
         low, high = (np.broadcast_to(np.array(x, dtype=np.float64), n) for x in clipped)
         x = np.linspace(0.01, 8.99, m)
         away = origin[:, None] + x[:, None] * direction[:, None] - np.array([0.3, -0.2, 0.1])
@@ -81,21 +71,28 @@ def test_endless_rays_are_clipped_to_half_lines(variant):
     types = array_types()
     light = spot_light(types, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 30.0)
     along = ray_geometry(types.vector(0.5, 0.0, -3.0), types.vector(0.0, 0.0, 1.0), light)
-    low, high = clip_to_cone(along, light.cos_cutoff, types.scalar(0), types.scalar(np.inf))
+    low, high = clip_to_cone(along, types.scalar(0), types.scalar(np.inf))
     assert np.array(low)[0] == pytest.approx(3 + 0.5 / np.tan(np.deg2rad(30)), rel=1e-6)
     assert np.isinf(np.array(high)[0])
     against = ray_geometry(types.vector(0.5, 0.0, 3.0), types.vector(0.0, 0.0, 1.0), light)
-    assert np.array(clip_to_cone(against, light.cos_cutoff, types.scalar(0), types.scalar(np.inf))[0])[0] == 0
+    assert np.array(clip_to_cone(against, types.scalar(0), types.scalar(np.inf))[0])[0] == 0
 
 
-def test_difference_of_products_is_exact_to_rounding(variant):
-    import mitsuba as mi
+def test_rays_parallel_to_a_line_on_the_cone(variant):
+    """The quadratic equation has one root: a half line inside the cone, or on the other side of the axis nothing."""
+    from realtime.arrays import array_types
+    from realtime.geometry import clip_to_cone, ray_geometry
 
-    from realtime.geometry import difference_of_products
-
-    rng = np.random.default_rng(3)
-    a, b = rng.normal(size=(2, 20000)).astype(np.float32)
-    c, d = a * np.float32(1 + 1e-6), b * np.float32(1 - 1e-6)  # a b - c d nearly cancels
-    value = np.array(difference_of_products(*(mi.Float(v) for v in (a, b, c, d))), dtype=np.float64)
-    exact = a.astype(np.float64) * b - c.astype(np.float64) * d
-    assert np.all(np.abs(value - exact) <= 1.5 * np.spacing(np.abs(exact).astype(np.float32)))
+    types = array_types()
+    degrees = np.rad2deg(np.arccos(0.8))
+    light = spot_light(types, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), degrees)
+    direction = types.vector(0.6, 0.0, 0.8)
+    assert np.array(light.cos_cutoff)[0] == np.float32(0.8)
+    # In the cone |x| <= 3/4 z; from (-1, 0, 0) that is 1 - 0.6 t <= 0.6 t on one side, and always on the other.
+    within = ray_geometry(types.vector(-1.0, 0.0, 0.0), direction, light)
+    low, high = (np.array(x)[0] for x in clip_to_cone(within, types.scalar(0), types.scalar(np.inf)))
+    assert low == pytest.approx(1 / 1.2, rel=1e-6)
+    assert np.isinf(high)
+    beside = ray_geometry(types.vector(1.0, 0.0, 0.0), direction, light)
+    low, high = (np.array(x)[0] for x in clip_to_cone(beside, types.scalar(0), types.scalar(np.inf)))
+    assert low == high == 0

@@ -46,6 +46,9 @@ def test_a_spot_turns_with_its_axis_and_keeps_all_else(scene):
     np.testing.assert_allclose(host(turned.position), [0.5, 0.7, 2.6], rtol=1e-6)
     x, y, z = host(light.axis)
     np.testing.assert_allclose(host(turned.axis), [-y, x, z], rtol=1e-5, atol=1e-7)
+    whole, before = (host(one.axis) + host(one.axis_low) for one in (turned, light))
+    x, y, z = before
+    np.testing.assert_allclose(whole, [-y, x, z], rtol=0, atol=1e-14)  # twice the digits of float32
     assert turned.kind == light.kind
     np.testing.assert_array_equal(host(turned.intensity), host(light.intensity))
     assert type(turned.position) is type(light.position)

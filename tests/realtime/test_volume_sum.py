@@ -12,14 +12,14 @@ from tests.volumes_for_tests import make_camera, tetrahedron
 @pytest.mark.parametrize("order", ["image", "tiles"])
 def test_sum_over_a_convex_volume_is_one_integral(variant, kind, order):
     """A ray meets a tetrahedron in one interval: clipped by its four planes, not by crossings."""
-    import drjit as dr
     import mitsuba as mi
 
+    from realtime.arrays import array_types
     from realtime.camera import ray_directions, tiled_pixels
     from realtime.geometry import ray_geometry
     from realtime.kernels import airlight_integral
     from realtime.kernels.exact import exact
-    from realtime.lights import Light
+    from realtime.lights import Light, spot_fields
     from realtime.medium import Medium
     from realtime.phase import Phase
     from realtime.volume_raster import signed_crossings
@@ -41,8 +41,7 @@ def test_sum_over_a_convex_volume_is_one_integral(variant, kind, order):
         end = np.where(along < 0, np.minimum(end, -height / along), end)
     assert np.mean(end > begin) > 0.1
     assert np.any((end > begin) & (end == 3.1))
-    cone = {"axis": mi.Vector3d(0.1, 0.2, -1.0) / np.sqrt(1.05), "cutoff": mi.Float64(0.45)}
-    cone |= {"cos_cutoff": dr.cos(cone["cutoff"]), "cos_beam": dr.cos(cone["cutoff"])}
+    cone = spot_fields(np.array([0.1, 0.2, -1.0]) / np.sqrt(1.05), 0.45, 0.45, array_types("double"))
     arrays = {"position": mi.Vector3d(0.1, 0.2, 1.9), "intensity": mi.Color3d(1)}
     light = Light(kind, False, **arrays, **(cone if kind == "spot" else {}))
     medium = Medium((mi.Float64(0.4),), mi.Color3d(1), Phase("isotropic"))

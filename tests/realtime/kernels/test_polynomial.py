@@ -201,7 +201,7 @@ def soft_spot(precision):
     """Return rays across a spot whose intensity falls off from 20 to 50 degrees, and the spot."""
     from realtime.arrays import array_types
     from realtime.geometry import ray_geometry
-    from realtime.lights import Light
+    from realtime.lights import Light, spot_fields
 
     types = array_types(precision)
     cutoff, beam = np.deg2rad(50.0), np.deg2rad(20.0)
@@ -210,11 +210,7 @@ def soft_spot(precision):
         True,
         types.vector(0.1, 0.2, 2.0),
         types.color(1),
-        axis=types.vector(0, 0, -1),
-        cutoff=types.scalar(cutoff),
-        cos_cutoff=types.scalar(np.cos(cutoff)),
-        cos_beam=types.scalar(np.cos(beam)),
-        inverse_transition=types.scalar(1 / (cutoff - beam)),
+        **spot_fields((0, 0, -1), cutoff, beam, types),
     )
     direction = np.array([[0.96, 0.8], [0.0, 0.48], [-0.28, -0.36]])
     return types, ray_geometry(types.vector(-2, 0, 1), types.vector(direction), light), light
@@ -230,7 +226,7 @@ def test_soft_spot(variant, phase):
 
     types, geometry, light = soft_spot("double")
     medium = Medium((types.scalar(0.4),), types.color(1), Phase(phase))
-    x0, x1 = clip_to_cone(geometry, light.cos_cutoff, types.scalar(0, 0), types.scalar(9, 9))
+    x0, x1 = clip_to_cone(geometry, types.scalar(0, 0), types.scalar(9, 9))
     value = numbers(polynomial(geometry, x0, x1, medium, light, degree=23))
     fit = polynomial_coefficients(geometry, x0, x1, medium, light, degree=23)
     np.testing.assert_allclose(numbers(evaluate(fit, x1)), value, rtol=1e-13)
