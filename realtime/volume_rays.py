@@ -9,8 +9,9 @@ has
 and y = x / c. All four are linear along the projective line: with t from 0 to 1 between two points of the ray, each is
 (1 - t) its value at one and t its value at the other, and x = y / s. At the end of an endless ray s = 0 and y = 1 / dc.
 
-The part of the ray in the face is cut out by c + a >= 0, c - a >= 0, c + b >= 0, c - b >= 0. The line t goes over the
-part of it beyond the nearest height of the face: all before that is lit.
+The part of the ray in the face is cut out by c + a >= 0, c - a >= 0, c + b >= 0, c - b >= 0. A ray that stays on the
+border of two faces is in one of them, that of the first axis: neighbours compute the same numbers there, with opposite
+signs. The line t goes over the part of it beyond the nearest height of the face: all before that is lit.
 """
 
 from dataclasses import dataclass
@@ -41,11 +42,20 @@ class FaceRay:
 
 def in_face(heights: LightHeights, face, away, direction, segment):
     """Return the part of a segment of rays that lies in a face, x0 >= x1 where none does; see `face_ray`."""
+    import drjit as dr
+
     a0, b0, c0 = face_coordinates(heights.frame, face, away)
     da, db, dc = face_coordinates(heights.frame, face, direction)
     begin, end = segment
-    for start, slope in ((c0 + a0, dc + da), (c0 - a0, dc - da), (c0 + b0, dc + db), (c0 - b0, dc - db)):
+    # The neighbours across come later in the order of axes, but for the last axis; those above only for the first one.
+    for start, slope, is_first in (
+        (c0 + a0, dc + da, face < 4),
+        (c0 - a0, dc - da, face < 4),
+        (c0 + b0, dc + db, face < 2),
+        (c0 - b0, dc - db, face < 2),
+    ):
         begin, end = _cut(begin, end, start, slope)
+        end = dr.select((slope == 0) & (start == 0) & ~is_first, begin, end)
     return begin, end
 
 
@@ -100,7 +110,9 @@ def _coordinates(size: int, x, origin, direction, nearest):
     a, b, c = (dr.select(finite, dr.fma(at, d, o), d) for o, d in zip(origin, direction))
     inverse = dr.rcp(dr.select(finite, dr.maximum(c, nearest), c))
     half = 0.5 * size
-    u, v = (dr.clip(dr.fma(half * p, inverse, half), 0, size) for p in (a, b))
+    # Just within the last column and row: a line along the far border would lie in none.
+    last = size * (1 - dr.epsilon(type(x)))
+    u, v = (dr.clip(dr.fma(half * p, inverse, half), 0, last) for p in (a, b))
     return u, v, dr.select(finite, inverse, 0), dr.select(finite, at * inverse, inverse)
 
 

@@ -174,7 +174,7 @@ def volume_intervals(field: HeightField, rays: Rays, ends: tuple[Array, Array]) 
     parts = []
     for face, matrix in enumerate(field.coordinates):
         normal, direction = rays.normal @ matrix.T, rays.direction @ matrix.T
-        low, high = _within_face(normal, direction, ends) if field.is_cube else ends
+        low, high = _within_face(face, normal, direction, ends) if field.is_cube else ends
         inside = np.flatnonzero(high > low)
         step = max(1, _CHUNK // (4 * field.size))
         for first in range(0, len(inside), step):
@@ -199,14 +199,21 @@ class _Path:
     height: Array  # (rays,) [m]
 
 
-def _within_face(normal: Array, direction: Array, ends: tuple[Array, Array]) -> tuple[Array, Array]:
-    """Return where rays are within |a| <= c, |b| <= c: four times where a cosine of theta - middle is positive."""
+def _within_face(face: int, normal: Array, direction: Array, ends: tuple[Array, Array]) -> tuple[Array, Array]:
+    """Return where rays are within |a| <= c, |b| <= c: four times where a cosine of theta - middle is positive.
+
+    Where that is 0 at every theta, the ray stays on the border with the face of another axis, and the first axis has
+    it.
+    """
+    axis = face // 2
     low, high = ends
     for one in (0, 1):
         for sign in (-1.0, 1.0):
             across, along = normal[:, 2] + sign * normal[:, one], direction[:, 2] + sign * direction[:, one]
             middle = np.arctan2(along, across)
             low, high = np.maximum(low, middle - 0.5 * np.pi), np.minimum(high, middle + 0.5 * np.pi)
+            if (axis + 1 + one) % 3 < axis:
+                high = np.where((across == 0) & (along == 0), low, high)
     return low, high
 
 
