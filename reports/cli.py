@@ -23,6 +23,7 @@ from reports.command_doctor import doctor
 from reports.command_figures import figures
 from reports.command_integrate import integrate
 from reports.command_list import kernels, methods, scenes
+from reports.command_maps import maps
 from reports.command_merge import merge
 from reports.command_mutations import mutations
 from reports.command_published import published
@@ -49,6 +50,7 @@ _COMMANDS = (
     compare,
     integrate,
     bench,
+    maps,
     published,
     stability,
     mutations,

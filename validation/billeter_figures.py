@@ -1,0 +1,219 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Figures 6 and 7 of Billeter, Sintorn, Assarsson 2010 again: frames a second beside the published ones, and the error.
+
+Fig. 6 is a simple scene with an omni light at three sizes of the shadow map, Fig. 7 a hall of columns by marching and
+by the light volume. Neither published scene is at hand: `omni-box` and `colonnade` stand for them. The paper gives no
+size of the image for Fig. 6; that of Fig. 7 is taken for both. Its hall has one map, ours a lamp that shines all round,
+with six.
+
+Every frame is judged twice, at one pixel in `stride` along both axes: against the truth, and against what its own
+shadow map stands for, the height field met in float64 (`validation.volume_twin`). What a marcher misses of the second
+is its steps and, as it looks texels up without interpolation, the steps of the map.
+"""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analytic.errors import InputError
+from realtime.errors import InputError as RealtimeError
+from realtime.frame import Frame, FrameRenderer, render_frame, run_stages
+from realtime.scene import Scene, read_scene
+from realtime.shadow_map import cast_shadow_map
+from reference.quadrature import quadrature_image
+from reference.scene import TruthScene, read_truth
+from validation.configurations import Configuration, configuration, prepared
+from validation.load import load_scene
+from validation.metrics import Metrics, error_metrics
+from validation.timing import Timing, time_in_turns
+from validation.volume_twin import twin_airlight
+
+Array = NDArray[np.float64]
+
+SIZE = (1024, 1024)  #: of the published images [pixels]
+LIMIT = 30.0  #: a frame that takes longer is not measured [s]
+
+
+@dataclass(frozen=True)
+class FigureEntry:
+    """One image of a figure, and what stands for it here."""
+
+    where: str
+    scene: str
+    map: int  #: [texels]
+    method: str
+    parameters: tuple[tuple[str, int | str], ...] = ()  #: without the map
+    fps: float | None = None  #: published; None for a peer that the paper does not have
+
+    def configuration(self, kernel: str) -> Configuration:
+        """Return the configuration to measure."""
+        values = dict(self.parameters) | {"map": self.map}
+        return configuration(self.method, None if self.method == "ray-march" else kernel, values)
+
+
+_WALK, _MESH = ("evaluation", "walk"), ("evaluation", "mesh")
+
+
+def _march(steps: int) -> tuple[tuple[str, int | str], ...]:
+    return (("steps", steps), ("spacing", "uniform"), ("shadow", "map"))
+
+
+FIGURES = (
+    FigureEntry("Fig. 6a", "omni-box", 32, "light-volumes", (_MESH,), 230),
+    FigureEntry("Fig. 6a", "omni-box", 32, "light-volumes", (_WALK,), 230),
+    FigureEntry("Fig. 6b", "omni-box", 128, "light-volumes", (_MESH,), 165),
+    FigureEntry("Fig. 6b", "omni-box", 128, "light-volumes", (_WALK,), 165),
+    FigureEntry("Fig. 6c", "omni-box", 512, "light-volumes", (_MESH,), 25),
+    FigureEntry("Fig. 6c", "omni-box", 512, "light-volumes", (_WALK,), 25),
+    FigureEntry("Fig. 7a", "colonnade", 512, "ray-march", _march(150), 25),
+    FigureEntry("Fig. 7b", "colonnade", 512, "ray-march", _march(400), 10),
+    FigureEntry("Fig. 7c", "colonnade", 512, "light-volumes", (_MESH,), 96),
+    FigureEntry("Fig. 7c", "colonnade", 512, "light-volumes", (_WALK,), 96),
+    FigureEntry("peer", "colonnade", 512, "min-max"),
+)
+
+
+@dataclass(frozen=True)
+class FigureRow:
+    """One image, measured beside what was published; without times and errors where `missing` says why."""
+
+    entry: FigureEntry
+    size: tuple[int, int]  #: [pixels]
+    rebuilt: Timing | None = None  #: a frame after the light moved: shadow map, volume, all stages
+    static: Timing | None = None  #: a frame with static light and geometry
+    error: Metrics | None = None  #: of the airlight against the truth
+    map_error: Metrics | None = None  #: of the airlight against what the shadow map stands for
+    missing: str | None = None
+
+
+@dataclass(frozen=True)
+class _Stage:
+    """A scene at the size of the frame, and its truth at some pixels of it."""
+
+    scene: Scene
+    truth: TruthScene  #: of the pixels that are compared
+    stride: int
+    airlight: Array  #: the truth
+
+    def compared(self, image: Array) -> Array:
+        return sampled(image, self.stride)
+
+
+def figure_rows(
+    entries: Sequence[FigureEntry] = FIGURES,
+    *,
+    kernel: str = "exact",
+    size: tuple[int, int] = SIZE,
+    seconds: float = 0.6,
+    limit: float = LIMIT,
+    progress: Callable[[float, str], None] | None = None,
+) -> list[FigureRow]:
+    """Measure images of the figures.
+
+    Parameters
+    ----------
+    entries
+        What to measure.
+    kernel
+        Airlight kernel of the methods that call one.
+    size
+        Of the frames [pixels].
+    seconds
+        Time to spend on each of two timings.
+    limit
+        A frame that takes longer is not measured [s].
+    progress
+        Told the share done and what comes next.
+    """
+    rows: list[FigureRow] = []
+    stage: _Stage | None = None
+    twins: dict[int, Array] = {}
+    shown = None
+    for entry in entries:
+        chosen = entry.configuration(kernel)
+        if progress is not None:
+            progress(len(rows) / len(entries), f"{entry.where}, {entry.scene}, {chosen.label}")
+        if entry.scene != shown:
+            stage, twins, shown = _stage(entry.scene, size), {}, entry.scene
+        assert stage is not None
+        rows.append(_figure_row(entry, stage, chosen, twins, seconds=seconds, limit=limit))
+    return rows
+
+
+def _stage(name: str, size: tuple[int, int]) -> _Stage:
+    loaded = load_scene(name, size).scene
+    # An odd step: over tiles of 4 x 4 pixels every place in a tile has its turn.
+    stride = 2 * (max(size) // 256) + 1
+    truth = sampled_truth(read_truth(loaded), stride)
+    return _Stage(read_scene(loaded), truth, stride, quadrature_image(truth).airlight)
+
+
+def sampled(image: Array, stride: int) -> Array:
+    """Return one pixel in `stride` along both axes of an image, from the middle of the first ones on."""
+    return image[stride // 2 :: stride, stride // 2 :: stride]
+
+
+def sampled_truth(truth: TruthScene, stride: int) -> TruthScene:
+    """Return the scene with only the rays of the pixels that `sampled` takes."""
+    direction = sampled(truth.direction.reshape(truth.height, truth.width, 3), stride)
+    height, width, _ = direction.shape
+    return replace(truth, width=width, height=height, direction=direction.reshape(-1, 3))
+
+
+def _figure_row(
+    entry: FigureEntry, stage: _Stage, chosen: Configuration, twins: dict[int, Array], *, seconds: float, limit: float
+) -> FigureRow:
+    camera = stage.scene.camera
+    size = camera.width, camera.height
+    try:
+        renderer = prepared(stage.scene, chosen)
+        frame = frame_within(renderer, limit)
+    except (InputError, RealtimeError, MemoryError, TimeoutError) as reason:
+        return FigureRow(entry, size, missing=str(reason) or "out of memory")
+    if entry.map not in twins:
+        maps = [cast_shadow_map(stage.scene.geometry, light, entry.map) for light in stage.scene.lights]
+        distance = stage.compared(np.asarray(frame.distance, dtype=np.float64))
+        twins[entry.map] = twin_airlight(stage.truth, maps, distance=distance)
+    shown = stage.compared(frame.airlight)
+    rebuilt, static = time_rates(renderer, seconds)
+    return FigureRow(
+        entry,
+        size,
+        rebuilt,
+        static,
+        error=error_metrics(stage.airlight, shown),
+        map_error=error_metrics(twins[entry.map], shown),
+    )
+
+
+def frame_within(renderer: FrameRenderer, limit: float) -> Frame:
+    """Render a frame, or say that frames take too long to be timed.
+
+    Raises
+    ------
+    TimeoutError
+        If it took longer than `limit` [s], compiling included.
+    """
+    start = time.perf_counter()
+    frame = render_frame(renderer)
+    taken = time.perf_counter() - start
+    if taken > limit:
+        raise TimeoutError(f"a frame takes {taken:.0f} s, more than the limit of {limit:g} s")
+    return frame
+
+
+def time_rates(renderer: FrameRenderer, seconds: float) -> tuple[Timing, Timing]:
+    """Time a frame after the light moved and one with everything static, in turns."""
+    ready = renderer.prepare(renderer.scene)
+    rebuilt, static = time_in_turns(
+        [
+            lambda: run_stages(renderer, renderer.prepare(renderer.scene)),
+            lambda: run_stages(renderer, ready),
+        ],
+        seconds=2 * seconds,
+        least=3,
+    )
+    return rebuilt, static
