@@ -61,7 +61,31 @@ def make_beam(directions, end, light) -> Beam:
     across = dr.normalize(dr.select(dr.squared_norm(across) > 1e-12, across, other))
     up = dr.cross(middle, across)
     corners, sides = _rectangle(directions, middle, across, up)
-    return Beam([*sides, *_wedge(corners, light)], middle, end, light)
+    # Planes through the light bound the footprint of the beam on the map, planes across them its heights.
+    (left, right), found = _pair_about(corners, light)
+    above, below = _pair_about(corners, dr.cross(light, middle))[0]
+    normals = [dr.select(found, one, side) for one, side in zip((left, right, above, below), sides)]
+    return Beam(normals, middle, end, light)
+
+
+def _pair_about(corners, axis):
+    """Return the normals of the planes through an axis on either side of the corners, and whether there are such."""
+    import drjit as dr
+
+    Vector = type(axis)
+    left, right = Vector(0), Vector(0)
+    on_left, on_right = dr.mask_t(axis.x)(False), dr.mask_t(axis.x)(False)
+    for corner in corners:
+        normal = dr.cross(axis, corner)
+        sides = [dr.dot(normal, other) for other in corners]
+        reach = 1e-6 * dr.norm(normal)
+        least, largest = (
+            dr.minimum(dr.minimum(sides[0], sides[1]), dr.minimum(sides[2], sides[3])),
+            dr.maximum(dr.maximum(sides[0], sides[1]), dr.maximum(sides[2], sides[3])),
+        )
+        left, on_left = dr.select(least >= -reach, normal, left), on_left | (least >= -reach)
+        right, on_right = dr.select(largest <= reach, -normal, right), on_right | (largest <= reach)
+    return (left, right), on_left & on_right
 
 
 def _rectangle(directions, middle, across, up):
@@ -77,25 +101,6 @@ def _rectangle(directions, middle, across, up):
     a0, a1, b0, b1 = a0 - margin, a1 + margin, b0 - margin, b1 + margin
     corners = [middle + across * x + up * y for x in (a0, a1) for y in (b0, b1)]
     return corners, [across - middle * a0, middle * a1 - across, up - middle * b0, middle * b1 - up]
-
-
-def _wedge(corners, light):
-    """Return the planes through camera and light on either side of the corners; zero where the axis is among them."""
-    import drjit as dr
-
-    Vector = type(light)
-    left, right = Vector(0), Vector(0)
-    for corner in corners:
-        normal = dr.cross(light, corner)
-        sides = [dr.dot(normal, other) for other in corners]
-        reach = 1e-6 * dr.norm(normal)
-        above, below = dr.mask_t(sides[0])(True), dr.mask_t(sides[0])(True)
-        for side in sides:
-            above &= side >= -reach
-            below &= side <= reach
-        left = dr.select(above, normal, left)
-        right = dr.select(below, -normal, right)
-    return [left, right]
 
 
 def beam_planes(beam: Beam, products) -> BeamPlanes:

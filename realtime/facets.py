@@ -2,8 +2,8 @@
 """What shading needs of every triangle of a scene, in two tables.
 
 Mitsuba computes a surface interaction by calls over all kinds and instances of shapes and materials; where all of them
-are meshes with flat, uniformly diffuse triangles, the number of the triangle says all, and reading it from a table
-costs a quarter of that. A scene with anything else is shaded by Mitsuba's interaction.
+are uniformly diffuse meshes, the number of the triangle says all, and reading it from a table costs a quarter of that.
+A scene with anything else is shaded by Mitsuba's interaction.
 """
 
 from dataclasses import dataclass
@@ -11,6 +11,7 @@ from typing import Any
 
 from realtime.arrays import ArrayTypes, four_numbers
 
+_CORNERS = (0, 0), (1, 0), (0, 1)  # barycentric coordinates u, v
 _FLAT = 1e-5  # length of the difference between the normals of a corner and of the triangle: float32, with room
 
 
@@ -19,12 +20,13 @@ class Facets:
     """The triangles of all shapes, shape after shape."""
 
     first: Any  #: by number of the shape in Mitsuba's registry, its first triangle
-    normals: Any  #: four numbers each: the unit normal, and 1 if it is lit from both sides
+    normals: Any  #: four numbers each, or each of its corners: the unit normal, and 1 if it is lit from both sides
     albedos: Any  #: four numbers each: the diffuse reflectance, and 0
+    smooth: bool  #: whether normals are those of corners, to be interpolated
 
 
 def read_facets(scene, types: ArrayTypes) -> Facets | None:
-    """Return the triangles of a Mitsuba scene; None where a shape is more than flat triangles of one diffuse colour."""
+    """Return the triangles of a Mitsuba scene; None where a shape is no mesh of one diffuse colour."""
     import drjit as dr
     import mitsuba as mi
 
@@ -36,10 +38,11 @@ def read_facets(scene, types: ArrayTypes) -> Facets | None:
     first = [0] * (max(numbers) + 1)
     for place, number in enumerate(numbers):
         first[number] = sum(counts[:place])
-    rows = [_of_shape(shape, types) for shape in shapes]
-    if not all(flat for _, _, flat in rows):
-        return None
-    table = Facets(mi.UInt32(first), *(_joined(types, [row[k] for row in rows], counts) for k in range(2)))
+    smooth = any(_is_smooth(shape) for shape in shapes)
+    rows = [_of_shape(shape, types, smooth) for shape in shapes]
+    normals, albedos = ([row[k] for row in rows] for k in range(2))
+    corners = [3 * count if smooth else count for count in counts]
+    table = Facets(mi.UInt32(first), _joined(types, normals, corners), _joined(types, albedos, counts), smooth)
     dr.make_opaque(table)
     return table
 
@@ -52,9 +55,16 @@ def facet_at(facets: Facets, hit, active):
     shape = dr.reinterpret_array(mi.UInt32, hit.shape)
     number = dr.gather(mi.UInt32, facets.first, shape, active) + hit.prim_index
     Four = four_numbers(type(facets.normals))
-    x, y, z, two_sided = dr.gather(Four, facets.normals, number, active)
     red, green, blue, _ = dr.gather(Four, facets.albedos, number, active)
-    return (x, y, z), two_sided > 0, (red, green, blue)
+    if not facets.smooth:
+        x, y, z, two_sided = dr.gather(Four, facets.normals, number, active)
+        return (x, y, z), two_sided > 0, (red, green, blue)
+    Float = type(red)
+    u, v = Float(hit.prim_uv.x), Float(hit.prim_uv.y)
+    corners = [dr.gather(Four, facets.normals, 3 * number + k, active) for k in range(3)]
+    x, y, z = (dr.fma(u, b, dr.fma(v, c, (1 - u - v) * a)) for a, b, c in list(zip(*corners))[:3])
+    scale = dr.rsqrt(x * x + y * y + z * z)
+    return (x * scale, y * scale, z * scale), corners[0].w > 0, (red, green, blue)
 
 
 def _is_plain(shape) -> bool:
@@ -67,24 +77,41 @@ def _is_plain(shape) -> bool:
     return names == [["reflectance", "value"]]
 
 
-def _of_shape(shape, types: ArrayTypes):
-    """Return normals and albedos of the triangles of a shape, as Mitsuba has them, and whether all are shaded flat."""
+def _is_smooth(shape) -> bool:
+    """Return whether normals differ over a triangle of a shape."""
     import drjit as dr
     import mitsuba as mi
 
-    middle = _interaction(shape, 1 / 3, 1 / 3)
-    two_sided = float(mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.BackSide))
-    middle.wi = mi.Vector3f(0, 0, 1)
-    normal, albedo = middle.sh_frame.n, shape.bsdf().eval_diffuse_reflectance(middle)
-    # One that is a line has no normal, and no ray meets it.
-    proper = dr.all(dr.isfinite(normal))
+    if not shape.has_vertex_normals():
+        return False
     flat = mi.Bool(True)
-    if shape.has_vertex_normals():
-        for u, v in ((0, 0), (1, 0), (0, 1)):
-            flat &= ~proper | (dr.norm(_interaction(shape, u, v).sh_frame.n - middle.n) < _FLAT)
-    Four = four_numbers(types.scalar)
-    albedo = Four(*(types.scalar(channel) for channel in albedo), 0)
-    return Four(*(types.scalar(part) for part in normal), two_sided), albedo, bool(dr.all(flat)[0])
+    for u, v in _CORNERS:
+        there = _interaction(shape, u, v)
+        # A triangle that is a line has no normal, and no ray meets it.
+        flat &= ~dr.all(dr.isfinite(there.n)) | (dr.norm(there.sh_frame.n - there.n) < _FLAT)
+    return not dr.all(flat)
+
+
+def _of_shape(shape, types: ArrayTypes, smooth: bool):
+    """Return normals and albedos of the triangles of a shape, as Mitsuba has them."""
+    import drjit as dr
+    import mitsuba as mi
+
+    Float, Four = types.scalar, four_numbers(types.scalar)
+    two_sided = float(mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.BackSide))
+    middle = _interaction(shape, 1 / 3, 1 / 3)
+    middle.wi = mi.Vector3f(0, 0, 1)
+    albedo = shape.bsdf().eval_diffuse_reflectance(middle)
+    albedos = Four(*(Float(channel) for channel in albedo), 0)
+    if not smooth:
+        return Four(*(Float(part) for part in middle.sh_frame.n), two_sided), albedos
+    count = shape.face_count()
+    normals = dr.empty(Float, 12 * count)
+    for corner, (u, v) in enumerate(_CORNERS):
+        normal = _interaction(shape, u, v).sh_frame.n
+        row = Four(*(Float(part) for part in normal), two_sided)
+        dr.scatter(normals, row, 3 * dr.arange(mi.UInt32, count) + corner)
+    return dr.gather(Four, normals, dr.arange(mi.UInt32, 3 * count)), albedos
 
 
 def _interaction(shape, u: float, v: float):

@@ -81,6 +81,7 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
         raise InputError(f"method {method.name}: got no kernel, wanted one of realtime.kernels.KERNELS")
     settings = dict(method.parameters) | parameters
     plan, camera = scene.plan, scene.camera
+    lights_surfaces = method.lights_surfaces(settings)
     pixel = mi.UInt32(tiled_pixels(camera.width, camera.height))
 
     @dr.freeze
@@ -91,15 +92,15 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
         if medium.bodies:
             corners = _corners(camera, pixel)
             depths = camera_depths(medium, camera.origin, direction, seen.distance, corners=corners)
-        asked = {"medium": medium, "depths": depths, "shadows": not method.lights_surfaces}
+        asked = {"medium": medium, "depths": depths, "shadows": not lights_surfaces}
         colors = [lit_surface(geometry, seen, light=light, **asked) for light in lights]
-        return seen.distance, tuple(colors) if method.lights_surfaces else (sum(colors),)
+        return seen.distance, tuple(colors) if lights_surfaces else (sum(colors),)
 
     def run_method(geometry, pixel, camera, medium, lights, prepared, distance, by_light):
         shown = {"geometry": geometry, "medium": medium, "lights": lights, "prepared": prepared}
         view = frame_view(camera, pixel, distance, plan=plan, **shown)
         found = method.function(view, kernel=kernel, **settings)
-        if not method.lights_surfaces:
+        if not lights_surfaces:
             return found, None
         airlight, lit = found
         return airlight, sum(dr.select(reached, color, 0) for reached, color in zip(lit, by_light))

@@ -15,9 +15,9 @@ A texel is cut along the diagonal from its corner (0, 0) to (1, 1), into
     s00 + x (s10 - s00) + y (s11 - s10)   where x >= y,
     s00 + y (s01 - s00) + x (s11 - s01)   where y >= x.
 
-The bounds of the heights over squares of texels form a pyramid: level 0 is the whole face, and the last level the
-texels themselves or, of maps larger than `FINEST`, squares of them. Its nodes stand level by level, row by row; 1 + 4 +
-... + 4^(d - 1) = (4^d - 1) / 3 of them, in binary 0101...01, come before level d.
+The bounds of the heights over squares of texels form a pyramid: level 0 is the whole face, and the last level squares
+of `LEAF` texels, larger ones of maps beyond `FINEST` of them. Its nodes stand level by level, row by row; 1 + 4 + ... +
+4^(d - 1) = (4^d - 1) / 3 of them, in binary 0101...01, come before level d.
 """
 
 from dataclasses import dataclass
@@ -26,7 +26,8 @@ from typing import Any
 from realtime.arrays import four_numbers, is_single
 from realtime.shadow_map import ShadowMap
 
-FINEST = 512  #: nodes across the last level of the pyramid, at most
+LEAF = 4  #: texels on a side of a node of the last level: smaller nodes cost more to find than they save
+FINEST = 1024  #: nodes across the last level, at most
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,7 @@ class LightHeights:
     @property
     def finest(self) -> int:
         """The last level of the pyramid, 2^finest nodes across."""
-        return min(self.size, FINEST).bit_length() - 1
+        return min(self.size // LEAF, FINEST).bit_length() - 1
 
     @property
     def nodes(self) -> int:
@@ -137,6 +138,7 @@ def _write_level(heights: LightHeights, bounds, level: int) -> None:
         for lower, higher in four[1:]:
             low, high = dr.minimum(low, lower), dr.maximum(high, higher)
     node = face * heights.nodes + level_start(level) + j * side + i
+    dr.eval(low, high)  # Dr.Jit would copy an array that one kernel both reads and writes
     dr.scatter(bounds, _pair(type(bounds))(low, high), node)
 
 

@@ -17,7 +17,7 @@ in any order. The boundary is the height field of `realtime.light_heights`, and 
   the height field itself, an `adaptive` one has fewer triangles where the map is flat (`realtime.tessellation`).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from realtime.arrays import is_single
@@ -37,6 +37,7 @@ from realtime.volume_walk import sum_lit_pieces
 
 EVALUATIONS = ("walk", "mesh")
 TESSELLATIONS = ("static", "adaptive")
+SURFACES = ("map", "ray")
 
 
 def light_volumes(
@@ -47,6 +48,7 @@ def light_volumes(
     evaluation: str = "walk",
     tessellation: str = "static",
     threshold: float = THRESHOLD,
+    surface: str = "map",
 ):
     """Return the airlight of every ray in the light volumes [W/(m^2 sr)].
 
@@ -64,6 +66,16 @@ def light_volumes(
         'static' or 'adaptive', of the mesh.
     threshold
         Departure of an adaptive mesh from the shadow map that is allowed, relative to the depth.
+    surface
+        Where the shadows on surfaces come from: 'map', which costs nothing with evaluation=walk, or 'ray'. A mesh needs
+        rays for them.
+
+    Returns
+    -------
+    radiance
+        In-scattered radiance [W/(m^2 sr)].
+    lit
+        By light, whether it reaches the visible surface; only where `finds_lit_surfaces`.
 
     Notes
     -----
@@ -78,6 +90,7 @@ def light_volumes(
     Graphics.
     """
     total = type(view.medium.albedo)(0)
+    lit = []
     in_media = rays_in_media(view) if view.plan.bounded else ()
     for number, light in enumerate(view.lights):
         if evaluation == "mesh" and view.plan.shadows:
@@ -89,14 +102,21 @@ def light_volumes(
         if light.kind == "spot":
             segment = clip_to_cone(geometry, *segment)
         if view.plan.shadows:
-            total += _walk(view.prepared[number], airlight, segment)
+            value, reached = _walk(view.prepared[number], airlight, segment)
         else:
-            total += airlight.radiance(airlight.integral(*segment))
-    return total
+            value, reached = airlight.radiance(airlight.integral(*segment)), True
+        total += value
+        lit.append(reached)
+    return (total, tuple(lit)) if finds_lit_surfaces({"evaluation": evaluation, "surface": surface}) else total
+
+
+def finds_lit_surfaces(settings: Mapping[str, Any]) -> bool:
+    """Return whether the method, with these parameters, says which surfaces are lit."""
+    return settings["evaluation"] == "walk" and settings["surface"] == "map"
 
 
 def _walk(heights: LightHeights, airlight: RayAirlight, segment):
-    """Return the airlight of one light along segments of the rays [W/(m^2 sr)]."""
+    """Return the airlight of one light along segments of the rays [W/(m^2 sr)], and whether it reaches their ends."""
     import drjit as dr
 
     view = airlight.view
@@ -106,12 +126,12 @@ def _walk(heights: LightHeights, airlight: RayAirlight, segment):
     )
     zero = dr.zeros(airlight.number, dr.width(view.distance))
     place = {"away": -toward, "direction": view.direction, "segment": segment}
-    value, _ = sum_lit_pieces(heights, leaves, **place, integral=airlight.integral, zero=zero)
-    return airlight.radiance(value)
+    value, reached = sum_lit_pieces(heights, leaves, **place, integral=airlight.integral, zero=zero)
+    return airlight.radiance(value), reached
 
 
 def prepare_light_volumes(
-    scene: Scene, *, map: int, evaluation: str, tessellation: str, threshold: float
+    scene: Scene, *, map: int, evaluation: str, tessellation: str, threshold: float, surface: str
 ) -> Callable[[Scene], tuple[Any, ...]]:
     """Return the function that makes the height field, or the mesh, of every light of a frame.
 
@@ -121,7 +141,7 @@ def prepare_light_volumes(
         For parameters out of range or that contradict each other, a mesh in bounded media, and more memory than the
         machine has.
     """
-    _check(map, evaluation, tessellation, threshold)
+    _check(map, evaluation, tessellation, threshold, surface)
     if evaluation == "mesh" and scene.plan.bounded:
         raise InputError(
             "evaluation=mesh: the scene has a medium with bounds, wanted one medium that fills all space; use "
@@ -140,9 +160,13 @@ def prepare_light_volumes(
     return lambda scene: tuple(volume(scene, light) for light in scene.lights)
 
 
-def _check(map: int, evaluation: str, tessellation: str, threshold: float) -> None:
+def _check(map: int, evaluation: str, tessellation: str, threshold: float, surface: str) -> None:
     check_size(map)
-    words = ("evaluation", evaluation, EVALUATIONS), ("tessellation", tessellation, TESSELLATIONS)
+    words = (
+        ("evaluation", evaluation, EVALUATIONS),
+        ("tessellation", tessellation, TESSELLATIONS),
+        ("surface", surface, SURFACES),
+    )
     for name, value, allowed in words:
         if value not in allowed:
             raise InputError(f"{name}: got {value!r}, wanted one of {', '.join(allowed)}")

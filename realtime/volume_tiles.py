@@ -3,7 +3,7 @@
 
 A tile is sixteen rays that follow one another (4 x 4 pixels), a block sixteen tiles. Where a beam of rays (see
 `realtime.beams`) misses the box of a node of the pyramid of heights, no ray of it meets the height field there: all of
-the node that they pass is lit, or all is dark. Blocks walk the pyramid from its top down to squares of `COARSE` texels,
+the node that they pass is lit, or all is dark. Blocks walk the pyramid from its top down to squares of some leaves,
 tiles from those of their block down to leaves, the last level, which a ray then looks at one by one. Lists have a fixed
 length: a tile whose leaves do not fit takes larger ones, and the whole face if need be.
 
@@ -21,8 +21,8 @@ from realtime.light_heights import LightHeights, node_bounds
 from realtime.shadow_map import face_products
 
 TILE = 16  #: rays in a tile, and tiles in a block
-COARSE = 8  #: texels on a side of what a block lists
-_BLOCK_ROOM = 128  # entries of the list of a block and face
+COARSE = 1  #: levels above the leaves of what a block lists
+_BLOCK_ROOM = 256  # entries of the list of a block and face
 _TILE_ROOM = 96  # of a tile, for all faces together
 _CORNERS = (0, 3, 12, 15)  # lanes of a square tile at its corners
 
@@ -98,7 +98,7 @@ def tile_leaves(heights: LightHeights, rays, distance, *, light, square: bool) -
 
 
 def _block_lists(heights: LightHeights, beam: Beam, face):
-    """Return the nodes of `COARSE` texels that beams may meet, `_BLOCK_ROOM` places each, and how many they are."""
+    """Return the nodes of level `finest - COARSE` that beams may meet, `_BLOCK_ROOM` places each, and how many."""
     import drjit as dr
     import mitsuba as mi
 
@@ -106,7 +106,7 @@ def _block_lists(heights: LightHeights, beam: Beam, face):
     entries = dr.empty(mi.UInt32, dr.width(face) * _BLOCK_ROOM)
     planes = beam_planes(beam, partial(face_products, heights.frame, face))
     write = _writer(entries, lane * _BLOCK_ROOM, _BLOCK_ROOM)
-    level = mi.UInt32(max(0, heights.finest - (COARSE.bit_length() - 1)))
+    level = mi.UInt32(max(0, heights.finest - COARSE))
     count = _descend(heights, planes, face, _root(), level, dr.zeros(mi.UInt32, dr.width(face)), write, True)
     dr.eval(entries, count)
     return entries, count

@@ -19,12 +19,15 @@ x) of both signs would lose digits.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import reduce
 from itertools import pairwise
 from typing import Any
 
 from realtime.light_heights import LightHeights, texel_heights
 from realtime.volume_rays import FaceRay, at_line, distance_at, face_ray, in_face
 from realtime.volume_tiles import TILE, Leaves, unpacked
+
+_ROUNDING = 1e-5  # of a height of the map, with room
 
 PLACES = 8  #: crossings that a ray keeps; even, so that it is lit after them as before
 
@@ -54,7 +57,8 @@ def sum_lit_pieces(
     total
         Sum over the lit pieces.
     lit
-        Whether the end of the segment is lit.
+        Whether the light reaches what is at the end of the segment: a hard shadow by the shadow map, with the range of
+        the heights over a texel as its bias.
     """
     import drjit as dr
     import mitsuba as mi
@@ -96,7 +100,7 @@ def _face_sum(heights, face, ray: FaceRay, source, total, integral):
     line = _line_of(heights, face, ray)
     # All is lit before the line begins, and after it ends early.
     lit = ~ray.walks | (line.excess[0] > 0)
-    reached = ~ray.walks | (line.excess[1] > 0)
+    reached = ~ray.walks | (line.excess[1] > -line.slack)
 
     def one_pass(after, total, more):
         queue, lost = _nearest_crossings(heights, face, line, source, after, more & ray.walks)
@@ -121,6 +125,7 @@ class _Line:
     right: Any  #: whether columns rise along it
     up: Any  #: whether rows do
     excess: tuple[Any, Any]  #: D at t = 0 and t = 1
+    slack: Any  #: how far below the height field a point at t = 1 may seem that lies on what it samples
 
 
 def _line_of(heights: LightHeights, face, ray: FaceRay) -> _Line:
@@ -129,7 +134,7 @@ def _line_of(heights: LightHeights, face, ray: FaceRay) -> _Line:
     import mitsuba as mi
 
     right, up = ray.per_u > 0, ray.per_v > 0
-    excess = []
+    excess, slack = [], type(ray.begin)(0)
     for t in (0, 1):
         at = type(ray.begin)(t)
         i, j = (
@@ -141,7 +146,9 @@ def _line_of(heights: LightHeights, face, ray: FaceRay) -> _Line:
         below = x >= y
         along, upward = dr.select(below, s10 - s00, s11 - s01), dr.select(below, s11 - s10, s01 - s00)
         excess.append(ray.s[t] - dr.fma(x, along, dr.fma(y, upward, s00)))
-    return _Line(ray, right, up, (excess[0], excess[1]))
+        heights_there = (s00, s10, s01, s11)
+        slack = dr.fma(ray.s[t], _ROUNDING, reduce(dr.maximum, heights_there) - reduce(dr.minimum, heights_there))
+    return _Line(ray, right, up, (excess[0], excess[1]), slack)
 
 
 def _cell(pair, per, t, low, side):
@@ -174,39 +181,27 @@ def _nearest_crossings(heights, face, line: _Line, source, after, active):
     Float = type(after)
     width = dr.width(after)
     last = dr.select(active, last, first)
-    level = unpacked(dr.gather(mi.UInt32, entries, first, first < last)).level  # all leaves of a list are of one size
-    side = mi.UInt32(heights.size) >> level
-    queue, lost = [dr.full(Float, dr.inf, width) for _ in range(PLACES)], dr.full(mi.Bool, False, width)
-    # Two loops, since a branch between them in one would carry the queue through every step.
-    for crossings, applies in ((_texel_leaf, side == 1), (_square_leaf, side > 1)):
 
-        def of_entry(k, queue, lost, crossings=crossings):
-            node = unpacked(dr.gather(mi.UInt32, entries, k, k < last))
-            queue, lost = crossings(heights, face, line, (node.i * side, node.j * side, side), queue, lost, after)
-            return k + 1, queue, lost
+    def of_entry(k, queue, lost):
+        node = unpacked(dr.gather(mi.UInt32, entries, k, k < last))
+        side = mi.UInt32(heights.size) >> node.level
+        queue, lost = _leaf_crossings(heights, face, line, (node.i * side, node.j * side, side), queue, lost, after)
+        return k + 1, queue, lost
 
-        end = dr.select(applies, last, first)
-        _, queue, lost = dr.while_loop(
-            state=(first + dr.zeros(mi.UInt32, width), queue, lost),
-            cond=lambda k, queue, lost, end=end: k < end,
-            body=of_entry,
-            labels=("k", "queue", "lost"),
-        )
+    _, queue, lost = dr.while_loop(
+        state=(
+            first + dr.zeros(mi.UInt32, width),
+            [dr.full(Float, dr.inf, width) for _ in range(PLACES)],
+            dr.full(mi.Bool, False, width),
+        ),
+        cond=lambda k, queue, lost: k < last,
+        body=of_entry,
+        labels=("k", "queue", "lost"),
+    )
     return queue, lost
 
 
-def _texel_leaf(heights, face, line: _Line, square, queue, lost, after):
-    """Put the crossings in one texel into the queue."""
-    import drjit as dr
-
-    column, row, _ = square
-    in_u, _ = _borders(type(after)(column), line.ray.u[0], line.ray.per_u)
-    in_v, _ = _borders(type(after)(row), line.ray.v[0], line.ray.per_v)
-    begin = dr.maximum(dr.maximum(in_u, in_v), 0)
-    return _texel_crossings(heights, face, line, (column, row), begin, queue, lost, after)[:2]
-
-
-def _square_leaf(heights, face, line: _Line, square, queue, lost, after):
+def _leaf_crossings(heights, face, line: _Line, square, queue, lost, after):
     """Put the crossings in a square of texels into the queue."""
     import drjit as dr
 
@@ -216,71 +211,81 @@ def _square_leaf(heights, face, line: _Line, square, queue, lost, after):
     in_v, out_v = _borders(Float(row), ray.v[0], ray.per_v, Float(side))
     begin, end = dr.maximum(dr.maximum(in_u, in_v), 0), dr.minimum(dr.minimum(out_u, out_v), 1)
     i, j = _cell(ray.u, ray.per_u, begin, column, side), _cell(ray.v, ray.per_v, begin, row, side)
-    from_u = in_u >= begin
-    i = dr.select(from_u, dr.select(line.right, column, column + side - 1), i)
-    j = dr.select((in_v >= begin) & ~from_u, dr.select(line.up, row, row + side - 1), j)
+    by_u = in_u >= begin
+    i = dr.select(by_u, dr.select(line.right, column, column + side - 1), i)
+    j = dr.select((in_v >= begin) & ~by_u, dr.select(line.up, row, row + side - 1), j)
+    near_near, near_far, far_near, _ = _as_seen(line, texel_heights(heights, face, i, j, begin < end))
+    excess = _excess_on_border(line, (i, j), begin, by_u, near_near, dr.select(by_u, near_far, far_near))
+    excess = dr.select(dr.maximum(in_u, in_v) < 0, line.excess[0], excess)
 
-    def step(i, j, t, queue, lost):
-        queue, lost, t, by_u = _texel_crossings(heights, face, line, (i, j), t, queue, lost, after)
+    def step(i, j, t, excess, queue, lost):
+        queue, lost, t, excess, by_u = _cross_texel(heights, face, line, (i, j), t, excess, queue, lost, after)
         i = dr.select(by_u, dr.select(line.right, i + 1, i - 1), i)
-        return i, dr.select(by_u, j, dr.select(line.up, j + 1, j - 1)), t, queue, lost
+        return i, dr.select(by_u, j, dr.select(line.up, j + 1, j - 1)), t, excess, queue, lost
 
-    _, _, _, queue, lost = dr.while_loop(
-        state=(i, j, begin, queue, lost),
-        cond=lambda i, j, t, queue, lost: t < end,
+    _, _, _, _, queue, lost = dr.while_loop(
+        state=(i, j, begin, excess, queue, lost),
+        cond=lambda i, j, t, excess, queue, lost: t < end,
         body=step,
-        labels=("i", "j", "t", "queue", "lost"),
+        labels=("i", "j", "t", "excess", "queue", "lost"),
     )
     return queue, lost
 
 
-def _texel_crossings(heights, face, line: _Line, texel, t, queue, lost, after):
+def _as_seen(line: _Line, four):
+    """Return the heights of a texel's corners near or far in u, then near or far in v, as the line goes."""
+    import drjit as dr
+
+    s00, s10, s01, s11 = four
+    low = dr.select(line.right, s00, s10), dr.select(line.right, s10, s00)
+    high = dr.select(line.right, s01, s11), dr.select(line.right, s11, s01)
+    near_near, near_far = dr.select(line.up, low[0], high[0]), dr.select(line.up, high[0], low[0])
+    far_near, far_far = dr.select(line.up, low[1], high[1]), dr.select(line.up, high[1], low[1])
+    return near_near, near_far, far_near, far_far
+
+
+def _excess_on_border(line: _Line, texel, t, on_u, base, other):
+    """Return D on the border of a texel, between the height `base` of its nearer corner and that of the other."""
+    import drjit as dr
+
+    ray, Float = line.ray, type(t)
+    x, y = at_line(ray.u, t) - Float(texel[0]), at_line(ray.v, t) - Float(texel[1])
+    along = dr.select(on_u, dr.select(line.up, y, 1 - y), dr.select(line.right, x, 1 - x))
+    return at_line(ray.s, t) - dr.fma(along, other - base, base)
+
+
+def _cross_texel(heights, face, line: _Line, texel, t, excess, queue, lost, after):
     """Put the crossings in a texel, which the line enters at t, into the queue.
 
     Returns
     -------
     queue, lost
         The queue after that, and whether a crossing had no place in it.
-    end
-        The t at which the line leaves the texel.
+    end, excess
+        The t at which the line leaves the texel, and D there.
     by_u
         Whether it leaves it over the border of a column.
     """
     import drjit as dr
 
-    ray = line.ray
-    column, row = type(t)(texel[0]), type(t)(texel[1])
-    in_u, out_u = _borders(column, ray.u[0], ray.per_u)
-    in_v, out_v = _borders(row, ray.v[0], ray.per_v)
+    ray, Float = line.ray, type(t)
+    _, out_u = _borders(Float(texel[0]), ray.u[0], ray.per_u)
+    _, out_v = _borders(Float(texel[1]), ray.v[0], ray.per_v)
     end = dr.minimum(dr.minimum(out_u, out_v), 1)
     by_u = out_u <= end
-    s00, s10, s01, s11 = texel_heights(heights, face, *texel)
-    # As the line sees the corners: near or far in u, then near or far in v.
-    low = dr.select(line.right, s00, s10), dr.select(line.right, s10, s00)
-    high = dr.select(line.right, s01, s11), dr.select(line.right, s11, s01)
-    near_near, far_near = dr.select(line.up, low[0], high[0]), dr.select(line.up, low[1], high[1])
-    near_far, far_far = dr.select(line.up, high[0], low[0]), dr.select(line.up, high[1], low[1])
-
-    def excess(t, on_u, base, of_u, of_v):
-        """Return D on a border, between the height `base` and that of the next corner along it."""
-        x, y = at_line(ray.u, t) - column, at_line(ray.v, t) - row
-        x, y = dr.select(line.right, x, 1 - x), dr.select(line.up, y, 1 - y)
-        other = dr.select(on_u, of_u, of_v)
-        return at_line(ray.s, t) - dr.fma(dr.select(on_u, y, x), other - base, base)
-
-    d0 = excess(t, in_u >= t, near_near, near_far, far_near)
-    d0 = dr.select(dr.maximum(in_u, in_v) < 0, line.excess[0], d0)
-    d1 = excess(end, by_u, dr.select(by_u, far_near, near_far), far_far, far_far)
+    four = texel_heights(heights, face, *texel)
+    _, near_far, far_near, far_far = _as_seen(line, four)
+    d1 = _excess_on_border(line, texel, end, by_u, dr.select(by_u, far_near, near_far), far_far)
     d1 = dr.select(end < dr.minimum(out_u, out_v), line.excess[1], d1)
-    middle = ((ray.u[0] - column) - (ray.v[0] - row)) * ray.per_diagonal
+    middle = ((ray.u[0] - Float(texel[0])) - (ray.v[0] - Float(texel[1]))) * ray.per_diagonal
     bends = (middle > t) & (middle < end)
     middle = dr.select(bends, middle, end)
-    on_diagonal = dr.fma(at_line(ray.u, middle) - column, s11 - s00, s00)
+    on_diagonal = dr.fma(at_line(ray.u, middle) - Float(texel[0]), four[3] - four[0], four[0])
     dm = dr.select(bends, at_line(ray.s, middle) - on_diagonal, d1)
-    first, second = (d0 > 0) != (dm > 0), (dm > 0) != (d1 > 0)
+    first, second = (excess > 0) != (dm > 0), (dm > 0) != (d1 > 0)
 
     def store(queue, lost):
-        for changes, ends, excesses in ((first, (t, middle), (d0, dm)), (second, (middle, end), (dm, d1))):
+        for changes, ends, excesses in ((first, (t, middle), (excess, dm)), (second, (middle, end), (dm, d1))):
             share = excesses[0] / (excesses[0] - excesses[1])
             x = distance_at(ray, dr.fma(share, ends[1] - ends[0], ends[0]))
             queue, out = _inserted(queue, dr.select(changes & (x > after), x, dr.inf))
@@ -293,7 +298,7 @@ def _texel_crossings(heights, face, line: _Line, texel, t, queue, lost, after):
         true_fn=store,
         false_fn=lambda queue, lost: (queue, lost),
     )
-    return queue, lost, end, by_u
+    return queue, lost, end, d1, by_u
 
 
 def _inserted(queue, x):

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
-from realtime.light_volumes import light_volumes, prepare_light_volumes
+from realtime.light_volumes import finds_lit_surfaces, light_volumes, prepare_light_volumes
 from realtime.methods.min_max import min_max, prepare_min_max
 from realtime.methods.ray_march import prepare_maps, ray_march
 from realtime.methods.unshadowed import unshadowed
@@ -27,7 +27,9 @@ class Method:
     source: str
     uses_kernel: bool = True
     prepare: Callable[..., Any] | None = None  #: (scene, **parameters) -> function of the scene, run when things moved
-    lights_surfaces: bool = False  #: whether it returns, after the radiance, by light whether it reaches the surface
+    lights_surfaces: Callable[[Mapping[str, Any]], bool] = lambda settings: (
+        False
+    )  #: parameters -> whether it returns, after the radiance, by light whether it reaches the surface
     casts_rays: Callable[[Mapping[str, Any]], bool] = lambda settings: False  #: parameters -> whether it casts rays
     frozen: Callable[[Mapping[str, Any]], bool] = lambda settings: True  #: parameters -> whether it can be frozen
     shadows: bool = True  #: whether it knows shadows; one that does not is wrong where there are occluders
@@ -61,7 +63,7 @@ METHODS: dict[str, Method] = {
         "Biri, Arques, Michelin 2006",
         prepare=prepare_shadow_planes,
         casts_rays=lambda settings: settings["evaluation"] == "vertex",  # to know the triangle of a surface
-        lights_surfaces=True,
+        lights_surfaces=lambda settings: True,
         parameters=MappingProxyType(
             {
                 "order": "exact",
@@ -82,8 +84,11 @@ METHODS: dict[str, Method] = {
         "the volume between the light and its shadow map, crossed without marching",
         "Billeter, Sintorn, Assarsson 2010",
         prepare=prepare_light_volumes,
+        lights_surfaces=finds_lit_surfaces,
         frozen=lambda settings: settings["evaluation"] == "walk",  # the crossings of a mesh are counted on the way
-        parameters=MappingProxyType({"map": 512, "evaluation": "walk", "tessellation": "static", "threshold": 1e-3}),
+        parameters=MappingProxyType(
+            {"map": 512, "evaluation": "walk", "tessellation": "static", "threshold": 1e-3, "surface": "map"}
+        ),
     ),
     "min-max": Method(
         "min-max",
