@@ -39,7 +39,7 @@ def configurations_for(plan: Plan, configurations: Sequence[Configuration] = STA
     Variants that differ in their shadows need something that casts one, the paper's way with bounded media needs such
     media, in clear air.
     """
-    needless = set() if plan.shadows else {"shadow", "order"}
+    needless = set() if plan.shadows else {"shadow", "order", "map"}
     needless |= set() if plan.clear else {"media"}
     return tuple(chosen for chosen in configurations if not needless & set(dict(chosen.parameters)))
 

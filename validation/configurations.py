@@ -45,6 +45,9 @@ STANDARD: tuple[Configuration, ...] = (
     Configuration("shadow-planes", "exact", (("order", "none"),)),
     Configuration("shadow-planes", "exact", (("media", "paper"),)),
     Configuration("min-max", "exact"),
+    Configuration("light-volumes", "exact"),
+    Configuration("light-volumes", "taylor"),
+    Configuration("light-volumes", "exact", (("map", 2048),)),
 )
 
 #: What `report --quick` measures: one of each kind.
@@ -55,6 +58,7 @@ QUICK: tuple[Configuration, ...] = (
     Configuration("shadow-planes", "exact"),
     Configuration("shadow-planes", "taylor"),
     Configuration("min-max", "exact"),
+    Configuration("light-volumes", "exact"),
 )
 
 
