@@ -48,6 +48,13 @@ def is_single(Float) -> bool:
     return dr.is_array_v(Float) and dr.itemsize_v(Float) == 4
 
 
+def two_numbers(Float):
+    """Return the type of two numbers of a type, which a gather reads at once."""
+    import mitsuba as mi
+
+    return mi.Vector2f if is_single(Float) else mi.Vector2d
+
+
 def four_numbers(Float):
     """Return the type of four numbers of a type, which a gather reads at once."""
     import mitsuba as mi

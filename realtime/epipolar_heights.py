@@ -16,7 +16,7 @@ volume, and a shadow ends where that says and not at the end of a texel.
 from dataclasses import dataclass, replace
 from typing import Any
 
-from realtime.arrays import is_single
+from realtime.arrays import two_numbers
 from realtime.epipolar import Slices
 from realtime.lights import Light
 from realtime.shadow_map import ShadowMap, _cube_coordinates, face_coordinates
@@ -83,13 +83,6 @@ def slice_heights(shadow_map: ShadowMap, heights, slices: Slices, light: Light) 
     return replace(empty, tree=_tree(empty, *ends))
 
 
-def pair_type(Float):
-    """Return the type of two numbers of a type."""
-    import mitsuba as mi
-
-    return mi.Vector2f if is_single(Float) else mi.Vector2d
-
-
 def line_point(heights: SliceHeights, number, q):
     """Return (k_x, k_y) at `q`, counted in leaves, of slices."""
     import drjit as dr
@@ -108,7 +101,7 @@ def _tree(heights: SliceHeights, one, other):
     import mitsuba as mi
 
     count, leaves = heights.slices.count, heights.leaves
-    Pair = pair_type(type(one))
+    Pair = two_numbers(type(one))
     # Written only: reading from what is being written would copy it at every level.
     tree = dr.empty(type(one), 2 * count * 2 * leaves)
     index = dr.arange(mi.UInt32, count * leaves)
@@ -173,5 +166,5 @@ def node_pair(heights: SliceHeights, number, place, level):
     import mitsuba as mi
 
     heap = (mi.UInt32(heights.leaves) + place) >> level
-    pair = dr.gather(pair_type(type(heights.tree)), heights.tree, number * (2 * heights.leaves) + heap)
+    pair = dr.gather(two_numbers(type(heights.tree)), heights.tree, number * (2 * heights.leaves) + heap)
     return pair.x, pair.y

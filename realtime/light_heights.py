@@ -23,7 +23,7 @@ of `LEAF` texels, larger ones of maps beyond `FINEST` of them. Its nodes stand l
 from dataclasses import dataclass
 from typing import Any
 
-from realtime.arrays import four_numbers, is_single
+from realtime.arrays import four_numbers, two_numbers
 from realtime.shadow_map import ShadowMap
 
 LEAF = 4  #: texels on a side of a node of the last level: smaller nodes cost more to find than they save
@@ -107,7 +107,7 @@ def node_bounds(heights: LightHeights, face, level, i, j, active=True):
 
     before = 0x55555555 & ((mi.UInt32(1) << (2 * level)) - 1)
     node = face * heights.nodes + before + (j << level) + i
-    pair = dr.gather(_pair(type(heights.bounds)), heights.bounds, node, active)
+    pair = dr.gather(two_numbers(type(heights.bounds)), heights.bounds, node, active)
     return pair.x, pair.y
 
 
@@ -139,7 +139,7 @@ def _write_level(heights: LightHeights, bounds, level: int) -> None:
             low, high = dr.minimum(low, lower), dr.maximum(high, higher)
     node = face * heights.nodes + level_start(level) + j * side + i
     dr.eval(low, high)  # Dr.Jit would copy an array that one kernel both reads and writes
-    dr.scatter(bounds, _pair(type(bounds))(low, high), node)
+    dr.scatter(bounds, two_numbers(type(bounds))(low, high), node)
 
 
 def _texel_bounds(heights: LightHeights, face, i, j):
@@ -162,9 +162,3 @@ def _texel_bounds(heights: LightHeights, face, i, j):
         labels=("k", "low", "high"),
     )
     return low, high
-
-
-def _pair(Float):
-    import mitsuba as mi
-
-    return mi.Vector2f if is_single(Float) else mi.Vector2d

@@ -16,6 +16,7 @@ any order.
 from dataclasses import dataclass, replace
 from typing import Any
 
+from realtime.arrays import four_numbers, two_numbers
 from realtime.crossing_queue import Queue, filled, inserted, popped, pushed
 from realtime.diamond import diamond_angle
 from realtime.plane_index import FULL, GAIN_SHIFT, GAIN_ZERO, NUMBER, PlaneIndex
@@ -69,18 +70,17 @@ def read_plane(index: PlaneIndex, lists: Lists, ray: RayPlanes, k, active):
     entry, counts = entry_at(lists.entries, ray.source, k, active)
     number = entry & NUMBER
     Float = type(ray.x)
-    a, b = (dr.gather(Float, index.lines, number * 4 + n, counts) for n in range(2))
+    a, b, p, q = dr.gather(four_numbers(Float), index.lines, number, counts)
     quotient = dr.fma(a, ray.x, dr.fma(b, ray.y, -ray.z))
+    beyond = quotient < index.distance * dr.fma(p, ray.x, q * ray.y)
 
-    def looked_up(number, x, y, azimuth, quotient, unsure):
-        p, q = (dr.gather(Float, index.lines, number * 4 + n, unsure) for n in (2, 3))
-        first, last = (dr.gather(Float, index.spans, number * 4 + n, unsure) for n in (0, 1))
-        beyond = quotient < index.distance * dr.fma(p, x, q * y)
+    def looked_up(number, azimuth, quotient, beyond, unsure):
+        first, last = dr.gather(two_numbers(Float), index.spans, 2 * number, unsure)
         return (azimuth >= first) & (azimuth < last) & beyond & (quotient > 0)
 
     unsure = counts & ((entry & FULL) == 0)
     crossed = dr.if_stmt(
-        args=(number, ray.x, ray.y, ray.azimuth, quotient, unsure),
+        args=(number, ray.azimuth, quotient, beyond, unsure),
         cond=unsure,
         true_fn=looked_up,
         false_fn=lambda *_: mi.Bool(True),

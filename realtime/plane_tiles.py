@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from functools import reduce
 from typing import Any
 
+from realtime.arrays import four_numbers, two_numbers
 from realtime.diamond import diamond_angle
 from realtime.plane_index import BINS, FIRST, FULL, NUMBER, TURN, PlaneIndex
 
@@ -178,9 +179,9 @@ def touches(index: PlaneIndex, box: Box, entry, active):
     import drjit as dr
 
     Float = type(box.x)
-    number = (entry & NUMBER) * 4
-    a, b, p, q = (dr.gather(Float, index.lines, number + k, active) for k in range(4))
-    first, last = (dr.gather(Float, index.spans, number + k, active) for k in range(2))
+    number = entry & NUMBER
+    a, b, p, q = dr.gather(four_numbers(Float), index.lines, number, active)
+    first, last = dr.gather(two_numbers(Float), index.spans, 2 * number, active)
     quotient = dr.fma(a, box.x, dr.fma(b, box.y, -box.z))
     reach = dr.fma(dr.abs(a), box.x_half, dr.fma(dr.abs(b), box.y_half, box.z_half))
     reach += _SLACK * (dr.abs(a * box.x) + dr.abs(b * box.y) + 1)
