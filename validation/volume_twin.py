@@ -171,7 +171,7 @@ def volume_intervals(field: HeightField, rays: Rays, ends: tuple[Array, Array]) 
     ends
         Angles at the light between which the rays can be lit, (n,) each [rad]; those of a spot lie within its face.
     """
-    parts = []
+    parts: list[tuple[Index, Array, Array]] = [(np.empty(0, np.int64), np.empty(0), np.empty(0))]
     for face, matrix in enumerate(field.coordinates):
         normal, direction = rays.normal @ matrix.T, rays.direction @ matrix.T
         low, high = _within_face(face, normal, direction, ends) if field.is_cube else ends
@@ -180,12 +180,9 @@ def volume_intervals(field: HeightField, rays: Rays, ends: tuple[Array, Array]) 
         for first in range(0, len(inside), step):
             some = inside[first : first + step]
             path = _Path(normal[some], direction[some], rays.height[some])
-            row, *interval = _lit_parts(field, face, path, (low[some], high[some]))
-            parts.append((some[row], *interval))
-    ray, low, high = (
-        np.concatenate([np.empty(0, kind), *column])
-        for kind, column in zip((np.int64, float, float), zip(*parts, strict=True), strict=True)
-    )
+            row, begin, end = _lit_parts(field, face, path, (low[some], high[some]))
+            parts.append((some[row], begin, end))
+    ray, low, high = (np.concatenate(column) for column in zip(*parts, strict=True))
     order = np.lexsort((low, ray))
     return LitIntervals(ray[order], low[order], high[order], len(ray), 0.0)
 

@@ -1,0 +1,447 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Frames of light volumes, walked and drawn, against the float64 twin with the very map that they used."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from realtime.errors import InputError
+from tests.scenes_for_tests import body, clear_scene, spot, tiny_scene
+
+SIZE = (48, 36)
+EVALUATIONS = ("walk", "mesh")
+
+
+def lamp(*position):
+    return {"type": "point", "position": list(position), "intensity": {"type": "rgb", "value": [5.0, 4.0, 3.0]}}
+
+
+def camera(origin, target, *, size=SIZE, up=(0, 0, 1)):
+    import mitsuba as mi
+
+    look = mi.ScalarTransform4f().look_at(list(origin), list(target), list(up))
+    return {"sensor": tiny_scene(size=size)["sensor"] | {"to_world": look}}
+
+
+def bars(count=14):
+    """Bars between the light and the rays of a camera that looks along them."""
+    import mitsuba as mi
+
+    def bar(number):
+        place = mi.ScalarTransform4f().translate([-1.6 + 0.25 * number, 0.9, 1.0])
+        return {"type": "cube", "to_world": place.scale([0.05, 0.03, 2.0])}
+
+    return {f"bar{number}": bar(number) for number in range(count)}
+
+
+def fence():
+    return (
+        camera((-3.9, 1.7, 1.4), (2.3, 1.43, 0.9), size=(28, 20))
+        | {"lamp": lamp(0.1, -0.9, 1.2), "ball": None}
+        | bars()
+    )
+
+
+def coloured_fog():
+    colours = {"type": "rgb", "value": [0.1, 0.4, 0.9]}
+    return {"type": "homogeneous", "id": "fog", "sigma_t": colours, "albedo": 0.8, "phase": {"type": "hg", "g": 0.5}}
+
+
+#: Changes of the tiny scene by name, and the size of the map. Cameras on the grid have a column in the middle.
+GRID = (33, 25)
+SCENES = {
+    "light beside the view": (dict, 64),
+    "light in view": (lambda: camera((-2.5, -2.2, 0.3), (0.9, 0.7, 1.9)), 64),
+    "light behind": (lambda: camera((1.7, 1.6, 2.9), (-0.9, -0.7, -0.1)), 64),
+    "looking away": (lambda: camera((0.9, -4.7, 1.9), (0.9, -9.7, 1.9)), 64),
+    "camera close to the light": (lambda: camera((0.9, 0.7001, 1.9), (0, 0, 0.9)), 64),
+    "camera in shadow": (lambda: camera((-0.5, -0.5, 0.1), (2, 1.5, 0.9)), 64),
+    "fence": (fence, 256),
+    "spot": (lambda: {"lamp": spot()}, 64),
+    "spot in view": (lambda: {"lamp": spot()} | camera((-2.5, -2.2, 0.3), (0.5, 0.0, 1.5)), 64),
+    "soft spot": (lambda: {"lamp": spot(cutoff=37.0, beam=19.0)}, 64),
+    "colour, HG": (lambda: {"fog": coloured_fog()}, 64),
+    "three lights": (lambda: {"second": lamp(-1, 1.4, 0.6), "third": spot(beam=11.0)}, 64),
+    "coarse map": (dict, 4),
+    "fine map": (lambda: camera((0.2, -4.1, 1.3), (0.1, 0.0, 0.6), size=(8, 6)), 1024),
+    "along a column of texels": (
+        lambda: camera((0, -4, 2), (0, 0, 2), size=GRID) | {"lamp": lamp(0, 0, 2.5)},
+        16,
+    ),
+    "along the axis of a face": (
+        lambda: camera((0, 0, 0.3), (0, 3, 0.3), size=GRID) | {"lamp": lamp(0, 0, 2.5)},
+        16,
+    ),
+    "along diagonals": (lambda: camera((-3, -3, 2), (0, 0, 2), size=GRID) | {"lamp": lamp(0, 0, 2.5)}, 4),
+    "along the border of two faces": (
+        lambda: camera((1, -4, 1.5), (1, 4, 1.5), size=GRID) | {"lamp": lamp(0, 0, 2.5)},
+        8,
+    ),
+}
+
+#: One of a kind; a kernel in float64, above all of a spot, takes seconds to compile.
+FEW = {
+    "single": ("light in view", "fence", "spot in view", "coarse map", "fine map"),
+    "double": ("along diagonals",),
+}
+
+#: Share of the pixels that must be within 1e-4 of their own value. Where many rays graze the rim of a cone, some
+#: millimetres of 3 m are lit, of which float32 holds 1e-4, or at the rim of a soft one what is lit is as dim.
+SHARES = {"spot": 0.997, "soft spot": 0.994, "three lights": 0.998}
+ALL = [
+    pytest.param(name, precision, marks=() if name in few else pytest.mark.slow)
+    for precision, few in FEW.items()
+    for name in SCENES
+]
+
+
+def loaded_scene(name="light beside the view", **changes):
+    import mitsuba as mi
+
+    return mi.load_dict(tiny_scene(size=changes.pop("size", SIZE), **(SCENES[name][0]() | changes)))
+
+
+def renderer_of(loaded, method="light-volumes", precision="single", **parameters):
+    from realtime.frame import frame_renderer
+    from realtime.kernels import KERNELS
+    from realtime.methods import METHODS
+    from realtime.scene import read_scene
+
+    kernel = KERNELS["exact"].function if METHODS[method].uses_kernel else None
+    return frame_renderer(read_scene(loaded, precision), METHODS[method], kernel=kernel, **parameters)
+
+
+def render(loaded, method="light-volumes", precision="single", **parameters):
+    from realtime.frame import render_frame
+
+    return render_frame(renderer_of(loaded, method, precision, **parameters))
+
+
+def render_both(loaded, precision="single", **parameters):
+    return [render(loaded, precision=precision, evaluation=one, **parameters) for one in EVALUATIONS]
+
+
+def differ(found, wanted):
+    """Return the largest difference, relative to the largest value."""
+    return np.max(np.abs(found - wanted)) / np.max(wanted)
+
+
+def twin_of(loaded, frame, size, precision="single"):
+    """Return the airlight of the map that a frame was rendered with, by another route."""
+    from realtime.scene import read_scene
+    from realtime.shadow_map import cast_shadow_map
+    from reference.scene import read_truth
+    from validation.volume_twin import twin_airlight
+
+    scene = read_scene(loaded, precision)
+    maps = [cast_shadow_map(scene.geometry, light, size) for light in scene.lights]
+    return twin_airlight(read_truth(loaded), maps, distance=frame.distance)
+
+
+@pytest.mark.parametrize(("name", "precision"), ALL)
+def test_frames_are_exact_with_respect_to_the_map(variant, name, precision):
+    loaded, size = loaded_scene(name), SCENES[name][1]
+    frames = render_both(loaded, precision, map=size)
+    wanted = twin_of(loaded, frames[0], size, precision)
+    assert np.max(wanted) > 5e-4
+    for frame in frames:
+        error = np.abs(frame.airlight - wanted)
+        # The kernel's 5e-6 of the value, and room for the rounding of some terms. In double precision what is left is
+        # the scene's own: it holds its numbers in float32, 6e-8 each.
+        assert np.max(error) < (1e-5 if precision == "single" else 1e-7) * np.max(wanted)
+        assert np.mean(error <= 1e-4 * wanted) > (SHARES.get(name, 0.999) if precision == "single" else 0.999)
+    if precision == "double":
+        # The same terms but for their order, of which those of the mesh cancel.
+        assert differ(*(frame.airlight for frame in frames)) < 1e-12
+
+
+def test_rays_cross_the_fence_more_often_than_a_queue_holds(variant):
+    from realtime.scene import read_scene
+    from realtime.shadow_map import cast_shadow_map
+    from realtime.volume_mesh import volume_mesh
+    from realtime.volume_raster import signed_crossings
+    from realtime.volume_walk import PLACES
+
+    scene = read_scene(loaded_scene("fence"))
+    mesh = volume_mesh(cast_shadow_map(scene.geometry, scene.lights[0], SCENES["fence"][1]), scene.lights[0])
+    pixels = np.concatenate([np.array(found.pixel) for found in signed_crossings(mesh, scene.camera)])
+    assert np.max(np.bincount(pixels)) > 2 * PLACES
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 7), (5, 3), (18, 13), (20, 16)])
+def test_any_size_of_image(variant, size):
+    """Tiles of 4 x 4 pixels are squares in few of them."""
+    loaded = loaded_scene(size=size)
+    frames = render_both(loaded, map=64)
+    wanted = twin_of(loaded, frames[0], 64)
+    for frame in frames:
+        assert frame.airlight.shape == (size[1], size[0], 3)
+        assert differ(frame.airlight, wanted) < 1e-5
+
+
+@pytest.mark.parametrize("rooms", [(6, 1), (8, 3), (24, 9)])
+def test_lists_that_overflow_change_nothing(variant, monkeypatch, rooms):
+    import realtime.volume_tiles
+
+    loaded = loaded_scene("fence")
+    wanted = render(loaded, map=64).airlight
+    monkeypatch.setattr(realtime.volume_tiles, "_TILE_ROOM", rooms[0])
+    monkeypatch.setattr(realtime.volume_tiles, "_BLOCK_ROOM", rooms[1])
+    # Larger squares begin elsewhere on the line: rounding.
+    assert differ(render(loaded, map=64).airlight, wanted) < 2e-6
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("evaluation", EVALUATIONS)
+def test_rays_on_the_border_of_two_faces_are_lit_once(variant, axis, evaluation):
+    """The plane of the border holds the camera, and a column, a row or a diagonal of its pixels."""
+    origin, target, up, light = (np.roll(one, axis) for one in ((1, -4, 1.5), (1, 4, 1.5), (0, 0, 1), (0, 0, 2.5)))
+    speck = {"type": "sphere", "center": [0.3, 0.2, -90.0], "radius": 1e-3}  # falls between the rays of the map
+    changes = camera(origin, target, size=GRID, up=up) | {"lamp": lamp(*light), "ball": speck, "floor": None}
+    loaded = loaded_scene(**changes)
+    wanted = render(loaded, "unshadowed").airlight
+    # Three faces have nodes of their own: within the kernel's 5e-6.
+    assert render(loaded, map=64, evaluation=evaluation).airlight == pytest.approx(wanted, rel=1e-5)
+
+
+HEIGHTS = (0.0, 0.15, 0.4, 0.7, 1.9)  # inverse depths [1/m]; few, so that many texels are flat
+VIEWS = (((0.2, -4.1, 1.3), (0.1, 0.0, 0.6)), ((0.31, -1.2, 1.13), (0.9, 0.6, 1.7)), ((1.3, 0.4, 2.1), (5, 4, 2.7)))
+SMALL = 4  # texels
+
+
+@cache
+def renderers(kind, view):
+    """Return a scene, its renderers in float64, and a map to replace the values of."""
+    from realtime.shadow_map import cast_shadow_map
+
+    changes = camera(*VIEWS[view], size=(13, 9)) | ({"lamp": spot(cutoff=50.0, beam=50.0)} if kind == "spot" else {})
+    loaded = loaded_scene(**changes)
+    both = [renderer_of(loaded, precision="double", map=SMALL, evaluation=one) for one in EVALUATIONS]
+    scene = both[0].scene
+    return loaded, both, cast_shadow_map(scene.geometry, scene.lights[0], SMALL)
+
+
+def vertices_of(shadow_map):
+    """Return for each corner of the texels the number of its vertex: faces of a cube meet in the same ones."""
+    size = shadow_map.size
+    face, row, column = np.indices((shadow_map.faces, size + 1, size + 1)).reshape(3, -1)
+    place = np.stack([np.where(face % 2, -size, size), 2 * column - size, 2 * row - size])
+    lattice = np.empty_like(place)
+    for one in range(3):
+        lattice[(face // 2 + one) % 3, np.arange(len(face))] = place[one]
+    return np.unique(lattice, axis=1, return_inverse=True)[1].ravel()
+
+
+@pytest.mark.parametrize("kind", ["point", pytest.param("spot", marks=pytest.mark.slow)])
+@settings(max_examples=20, deadline=None, derandomize=True, database=None)
+@given(data=st.data())
+def test_any_map(variant, kind, data):
+    """Whatever the heights: three routes to the same volume."""
+    import mitsuba as mi
+
+    from realtime.frame import image_frame, run_stages
+    from realtime.light_heights import inverse_depth, light_heights
+    from realtime.volume_mesh import volume_mesh
+    from reference.scene import read_truth
+    from validation.volume_twin import twin_airlight
+
+    loaded, (walk, mesh), shadow_map = renderers(kind, data.draw(st.integers(0, len(VIEWS) - 1)))
+    vertex = vertices_of(shadow_map)
+    count = int(np.max(vertex)) + 1
+    heights = data.draw(st.lists(st.sampled_from(HEIGHTS), min_size=count, max_size=count))
+    length = np.array(inverse_depth(replace(shadow_map, distance=mi.Float64(np.ones(len(vertex))))))
+    with np.errstate(divide="ignore"):
+        found = replace(shadow_map, distance=mi.Float64(length / np.array(heights)[vertex]))
+    walked = image_frame(walk, run_stages(walk, (light_heights(found),)))
+    drawn = image_frame(mesh, run_stages(mesh, (volume_mesh(found, walk.scene.lights[0]),)))
+    wanted = twin_airlight(read_truth(loaded), [found], distance=walked.distance)
+    # As in the frames above; what is lit may be next to nothing, so the scale is the light's.
+    scale = np.max(np.array(walk.scene.lights[0].intensity))
+    assert np.max(np.abs(walked.airlight - drawn.airlight)) < 1e-13 * scale
+    assert np.max(np.abs(walked.airlight - wanted)) < 1e-7 * scale
+
+
+def test_a_light_that_moves_between_frames(variant):
+    """The frozen frame of the walk replays with it, the mesh has other sizes."""
+    import drjit as dr
+    import mitsuba as mi
+
+    from realtime.frame import image_frame, run_stages
+
+    renderer = {one: renderer_of(loaded_scene(), map=64, evaluation=one) for one in EVALUATIONS}
+    scene = renderer["walk"].scene
+    frames = []
+    for height in (1.9, 2.3, 2.9):
+        light = replace(scene.lights[0], position=mi.Vector3f(0.9, 0.7, height))
+        dr.make_opaque(light.position)
+        there = replace(scene, lights=(light,))
+        for one in EVALUATIONS:
+            moved = replace(renderer[one], scene=there)
+            frames.append(image_frame(moved, run_stages(moved, moved.prepare(there))).airlight)
+        assert differ(frames[-1], frames[-2]) < 1e-5
+    assert renderer["walk"].airlight.n_recordings == 1
+    assert np.max(np.abs(frames[0] - frames[-1])) > 0.01 * np.max(frames[0])
+
+
+def test_adaptive_meshes_come_closer_with_the_threshold(variant):
+    """In a dome, which is curved everywhere."""
+    loaded = loaded_scene(floor={"type": "sphere", "center": [0.3, 0.4, 0.2], "radius": 5.1})
+    exact = render(loaded, map=128).airlight
+    thresholds = (1e-1, 1e-2, 1e-3)
+    errors = []
+    for threshold in thresholds:
+        found = render(loaded, map=128, evaluation="mesh", tessellation="adaptive", threshold=threshold).airlight
+        errors.append(np.sqrt(np.mean((found - exact) ** 2)) / np.mean(exact))
+    # The airlight up to the dome is wrong by less than the depth of the dome is: all of it lies before.
+    assert np.all(np.array(errors) < thresholds)
+    assert errors == sorted(errors, reverse=True)
+    assert errors[0] > 10 * errors[-1]
+
+
+def test_a_map_that_sees_nothing_lights_everything(variant):
+    """Nothing in the cone of a spot, or between the rays of the map: as without shadows."""
+    speck = {"type": "sphere", "center": [0.3, 0.2, -90.0], "radius": 1e-3}
+    for lights in ({}, {"lamp": spot()}):
+        loaded = loaded_scene(ball=speck, floor=None, **lights)
+        wanted = render(loaded, "unshadowed").airlight
+        assert np.max(wanted) > 0.01
+        for frame in render_both(loaded, map=64):
+            # Each face's part of a ray has nodes of its own: within the kernel's 5e-6.
+            assert np.all(np.abs(frame.airlight - wanted) <= 1e-5 * wanted)
+
+
+@pytest.mark.parametrize("shape", ["sphere", "cube"])
+@pytest.mark.parametrize("kind", ["point", "spot"])
+def test_a_light_inside_a_closed_occluder_lights_nothing_outside(variant, shape, kind):
+    import mitsuba as mi
+
+    place = mi.ScalarTransform4f().translate([0.11, 0.13, 0.72]).rotate([0.3, 1, 0.2], 17).scale(0.39)
+    inside = [0.173, 0.052, 0.781]
+    light = {"to_world": mi.ScalarTransform4f().look_at(inside, [0, 1, 2], [1, 0, 0])}
+    lights = {"lamp": lamp(*inside) if kind == "point" else spot() | light}
+    loaded = loaded_scene(ball={"type": shape, "to_world": place}, **lights)
+    assert np.max(render(loaded, "unshadowed").airlight) > 0.01
+    # Before a wall that the camera sees, 0.3 m from the light and 3 m away, rounding leaves 1e-6 m at most.
+    at_wall = 0.31 * 9 / (4 * np.pi * 0.3**2)
+    for frame in render_both(loaded, map=32):
+        assert np.max(np.abs(frame.airlight)) < 1e-6 * at_wall
+
+
+def test_a_light_outside_the_bounds_of_the_scene(variant):
+    loaded = loaded_scene(lamp=lamp(9.1, -7.3, 12.7))
+    frames = render_both(loaded, map=128)
+    wanted = twin_of(loaded, frames[0], 128)
+    for frame in frames:
+        assert differ(frame.airlight, wanted) < 1e-5
+    assert np.max(np.abs(wanted - render(loaded, "unshadowed").airlight)) > 0.01 * np.max(wanted)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        ({"map": 500}, "map: got 500, wanted a power of two from 4 to 8192"),
+        ({"map": 2}, "map: got 2, wanted"),
+        ({"evaluation": "march"}, "evaluation: got 'march', wanted one of walk, mesh"),
+        ({"evaluation": "mesh", "tessellation": "fine"}, "tessellation: got 'fine', wanted one of static, adaptive"),
+        ({"tessellation": "adaptive"}, "tessellation=adaptive: got evaluation=walk.*; wanted evaluation=mesh"),
+        ({"threshold": 0.0}, "threshold: got 0.0, wanted a positive number"),
+        ({"threshold": float("nan")}, "threshold: got nan"),
+    ],
+)
+@pytest.mark.parametrize("floor", ["casters", "none"])
+def test_bad_parameters_are_named_with_casters_and_without(variant, floor, parameters, message):
+    loaded = loaded_scene(size=(4, 4), **({} if floor == "casters" else {"ball": None, "floor": None}))
+    with pytest.raises(InputError, match=message):
+        renderer_of(loaded, **parameters)
+
+
+@pytest.mark.parametrize(
+    ("method", "parameters", "message"),
+    [
+        ("shadow-planes", {"order": "depth"}, "order: got 'depth'"),
+        ("ray-march", {"map": 500}, "map: got 500"),
+        ("min-max", {"sampling": "rows"}, "sampling: got 'rows'"),
+    ],
+)
+def test_other_methods_check_their_parameters_without_casters(variant, method, parameters, message):
+    with pytest.raises(InputError, match=message):
+        renderer_of(loaded_scene(size=(4, 4), ball=None, floor=None), method, **parameters)
+
+
+def test_a_mesh_is_for_media_without_bounds(variant):
+    import mitsuba as mi
+
+    ball = body({"type": "sphere", "center": [0.1, 0.2, 0.9], "radius": 0.4}, 0.7, (0.9, 0.8, 0.7))
+    loaded = mi.load_dict(clear_scene(cloud=ball))
+    with pytest.raises(InputError, match=r"evaluation=mesh: the scene has a medium with bounds.*evaluation=walk"):
+        renderer_of(loaded, evaluation="mesh")
+    assert np.max(render(loaded, map=16).airlight) > 0
+
+
+@pytest.mark.parametrize("evaluation", EVALUATIONS)
+def test_memory_is_counted_before_it_is_taken(variant, monkeypatch, evaluation):
+    import realtime.light_volumes
+    import realtime.memory
+
+    def never(*args):
+        raise AssertionError("a map was cast")
+
+    loaded = loaded_scene(size=(4, 4))
+    monkeypatch.setattr(realtime.memory, "machine_memory", lambda: 10**9)
+    with monkeypatch.context() as patch:
+        patch.setattr(realtime.light_volumes, "cast_shadow_map", never)
+        message = r"map: 4096 texels for 1 light\(s\): needs [0-9.]+ GB of memory, this machine has 1 GB; use a smaller"
+        with pytest.raises(InputError, match=message):
+            renderer_of(loaded, map=4096, evaluation=evaluation)
+    render(loaded, map=64, evaluation=evaluation)
+
+
+def test_memory_that_is_needed_is_what_the_arrays_hold(variant):
+    """Of a map of 8192 texels by proportion: nothing grows faster."""
+    import realtime.light_volumes
+    from realtime.light_heights import light_heights
+    from realtime.scene import read_scene
+    from realtime.shadow_map import cast_shadow_map
+
+    scene = read_scene(loaded_scene())
+    shadow_map = cast_shadow_map(scene.geometry, scene.lights[0], 64)
+    heights = light_heights(shadow_map)
+    held = 4 * (2 * len(shadow_map.distance) + len(heights.texels) + len(heights.bounds))
+    assert realtime.light_volumes._memory_of(scene.lights[0], 64, "walk") == held
+
+
+def run_command(*arguments):
+    from reports import cli
+
+    return cli.run(["render", *arguments, "--method", "light-volumes"])
+
+
+def test_the_command_renders_meshes(variant, tmp_path):
+    from reference.exr import read_exr
+
+    images = []
+    for mesh in ([], ["--set", "evaluation=mesh", "--set", "tessellation=adaptive", "--set", "threshold=1e-4"]):
+        arguments = ["sphere-spot", "--size", "20x15", "--frames", "1", "--set", "map=128", *mesh]
+        assert run_command(*arguments, "-o", str(tmp_path / "image.exr")) == 0
+        images.append(read_exr(tmp_path / "image-0001.exr").layers["airlight"])
+    assert differ(*images) < 1e-3
+    assert np.any(images[0] != images[1])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["sphere-spot", "--set", "map=500"], "map: got 500, wanted a power of two from 4 to 8192"),
+        (["open-fog", "--set", "tessellation=adaptive"], "wanted evaluation=mesh with it"),
+        (["three-media", "--set", "evaluation=mesh"], "use evaluation=walk"),
+    ],
+)
+def test_the_command_refuses_in_one_line(variant, capfd, arguments, message):
+    assert run_command(*arguments, "--size", "4x3") == 2
+    error = capfd.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1
