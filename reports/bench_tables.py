@@ -51,6 +51,8 @@ def print_bench(found: list[dict[str, Any]], *, markdown: bool = False) -> None:
         for one in scene["methods"]:
             if one["refused"]:
                 print(f"{scene['name']}, {one['label']}: refused: {one['refused']}")
+            if one["note"]:
+                print(f"{scene['name']}, {one['label']}: {one['note']}")
         rows = [_row(one) for one in scene["methods"] if not one["refused"]]
         show(_HEADERS, rows, f"{scene['name']}, {scene['size'][0]} x {scene['size'][1]}")
     rows = [_agreement_row(scene["name"], one) for scene in found for one in scene["agreement"].values()]

@@ -72,6 +72,7 @@ def measurement_data(measured: Measurement) -> dict[str, Any]:
         "parameters": dict(measured.configuration.parameters),
         "knows_shadows": knows_shadows(measured.configuration),
         "refused": measured.refused,
+        "note": measured.note,
         "times": plain(measured.times),
         "error": plain(measured.error),
         "surface_error": plain(measured.surface_error),

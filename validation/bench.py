@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Speed against error: every configuration of a scene is timed and compared with the quadrature truth."""
 
+import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
@@ -19,6 +20,8 @@ from validation.truth import truth_image
 
 Progress = Callable[[int, int, str], None]
 
+_LONG = 25.0  # a first frame, with the compilation of its kernels, that took longer is not timed at a larger size [s]
+
 
 @dataclass(frozen=True)
 class Measurement:
@@ -31,6 +34,7 @@ class Measurement:
     surface_error: Metrics | None
     flip: Flip | None = None  #: HDR-FLIP of all light, airlight and surface; None where it was not asked for
     refused: str | None = None  #: why this configuration cannot render this scene
+    note: str | None = None  #: what its times are, where not those of the others
 
 
 def configurations_for(plan: Plan, configurations: Sequence[Configuration] = STANDARD) -> tuple[Configuration, ...]:
@@ -72,9 +76,15 @@ def measure(
     """
     try:
         renderer = prepared(scene, chosen)
+        begin = time.perf_counter()
         frame = render_frame(renderer)
+        took = time.perf_counter() - begin
     except InputError as error:
         return Measurement(chosen, None, None, None, None, refused=str(error))
+    note = None
+    if timed is not None and took > _LONG:
+        timed = None
+        note = f"timed at {scene.camera.width} x {scene.camera.height}: larger frames take minutes"
     times = time_frame(renderer if timed is None else prepared(timed, chosen), seconds=seconds)
     return Measurement(
         chosen,
@@ -83,6 +93,7 @@ def measure(
         error_metrics(truth.airlight, frame.airlight),
         error_metrics(truth.surface, frame.surface) if scene.plan.surfaces else None,
         flip_hdr(truth.airlight + truth.surface, frame.airlight + frame.surface) if with_flip else None,
+        note=note,
     )
 
 

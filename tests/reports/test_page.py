@@ -60,6 +60,7 @@ def method(label, **changes):
     return {
         "label": label,
         "refused": None,
+        "note": None,
         "knows_shadows": True,
         "times": {name: timing(3.21) for name in ("frame", "surface", "airlight", "rebuild")},
         "error": error,

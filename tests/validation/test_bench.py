@@ -129,3 +129,20 @@ def test_configuration_says_whether_it_knows_shadows():
     assert knows_shadows(MARCH)
     assert knows_shadows(Configuration("ray-march", None, (("shadow", "map"),)))
     assert not knows_shadows(Configuration("ray-march", None, (("shadow", "none"),)))
+
+
+def test_slow_configurations_are_not_timed_at_a_larger_size(variant, loaded, monkeypatch):
+    import mitsuba as mi
+
+    from realtime.scene import read_scene
+    from validation import bench as module
+    from validation.truth import truth_image
+
+    truth = truth_image(loaded.scene)
+    scene = read_scene(loaded.scene)
+    timed = read_scene(mi.load_dict(tiny_scene(size=(32, 24))))
+    assert measure(scene, MARCH, truth=truth, timed=timed, seconds=0.01).note is None
+    monkeypatch.setattr(module, "_LONG", 0.0)
+    slow = measure(scene, MARCH, truth=truth, timed=timed, seconds=0.01)
+    assert "16 x 12" in slow.note
+    assert slow.times is not None
