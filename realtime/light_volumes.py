@@ -180,12 +180,13 @@ def _check(map: int, evaluation: str, tessellation: str, threshold: float, surfa
 
 
 def _memory_of(light: Light, size: int, evaluation: str) -> int:
-    """Return how much the volume of a light takes at its making, an upper bound where it is adaptive [bytes]."""
+    """Return about how much the volume of a light takes, an upper bound where it is adaptive [bytes]."""
     number = 4 if is_single(type(light.position.x)) else 8
     faces = 1 if light.kind == "spot" else 6
     corners = number * faces * (size + 1) ** 2
     if evaluation == "mesh":
-        return corners + memory_needed(faces, size)
+        # Drawing it takes four doubles for each vertex as it is, and four for it in the image.
+        return corners + memory_needed(faces, size) + faces * (size + 1) ** 2 * 8 * 8
     # Distances and heights at the corners, four heights a texel, two bounds a node.
     heights = LightHeights(size, None, None, None)
     return 2 * corners + number * faces * (4 * size**2 + 2 * level_start(heights.finest + 1))
