@@ -26,6 +26,15 @@ def two_sum(a, b):
     return total, (a - (total - of_b)) + (b - of_b)
 
 
+def settled(high, low):
+    """Return the same sum of two numbers, its low part below half a unit in the last place of the other (Dekker).
+
+    Valid where `low` is the smaller one; else the low part has the error that rounding makes in it anyway.
+    """
+    total = high + low
+    return total, low - (total - high)
+
+
 def difference_of_products(a, b, c, d):
     """Return a b - c d with an error of at most 1.5 units in the last place.
 

@@ -16,9 +16,8 @@ cross product to twice the digits (`realtime.cone`); a point light does not pay 
 from dataclasses import dataclass
 from typing import Any
 
-from realtime.arrays import smallest
-from realtime.cone import cone_interval
-from realtime.error_free import difference_of_products, two_cross, two_dot, two_sum
+from realtime.cone import axis_geometry, cone_interval
+from realtime.error_free import difference_of_products, two_sum
 from realtime.lights import Light
 
 
@@ -73,26 +72,12 @@ def _spot_geometry(away, direction, direction_low, light: Light) -> RayGeometry:
     """Return the geometry of rays and a spot; `away` is the vector to the light with its low part."""
     import drjit as dr
 
-    v, v_low = away
-    cross, cross_low = two_cross(v, direction)
-    cross_low += dr.cross(v_low, direction)
-    if direction_low is not None:
-        cross_low += dr.cross(v, direction_low)
-    square, square_low = two_dot(cross, cross)
-    square_low += 2 * dr.dot(cross, cross_low)
-    height = dr.sqrt(square)
-    # One Newton step from the root of the rounded square: what is left of it, over twice the root.
-    height_low = (dr.fma(-height, height, square) + square_low) / dr.maximum(2 * height, smallest(type(height)))
-    across, across_low = two_dot(light.axis, cross)
-    across_low += dr.dot(light.axis, cross_low) + dr.dot(light.axis_low, cross)
-    foot, axial = dr.dot(v, direction), dr.dot(light.axis, direction)
-    # In this form it keeps its digits where the light is close to the ray.
-    offset = dr.dot(light.axis, dr.cross(cross, direction))
+    ray = axis_geometry(away, direction, direction_low, light)
+    foot = dr.dot(away[0], direction)
     ends = []
     for cone in (light.cone, light.beam):
-        moments = (height, height_low), (across, across_low)
-        ends += [foot + s for s in cone_interval(axial, offset, moments, cone)] if cone else [None, None]
-    return RayGeometry(foot, height, axial, offset, *ends)
+        ends += [foot + s for s in cone_interval(ray, cone)] if cone else [None, None]
+    return RayGeometry(foot, ray.height, ray.axial, ray.offset, *ends)
 
 
 def distance_to_light(geometry: RayGeometry, x):

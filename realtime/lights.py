@@ -13,8 +13,8 @@ class Cone:
     """A cone about the axis of a spot, by its half angle."""
 
     cos: Any
-    sin: Any
-    sin_low: Any  #: what rounding took from `sin`
+    square_sin: Any
+    square_sin_low: Any  #: what rounding took from `square_sin`
 
 
 @dataclass(frozen=True)
@@ -75,5 +75,5 @@ def with_low(values, types: ArrayTypes):
 
 
 def _cone(angle: float, types: ArrayTypes) -> Cone:
-    sine, low = with_low(math.sin(angle), types)
-    return Cone(types.scalar(math.cos(angle)), types.scalar(float(sine)), types.scalar(float(low)))
+    square, low = with_low(math.sin(angle) ** 2, types)
+    return Cone(types.scalar(math.cos(angle)), types.scalar(float(square)), types.scalar(float(low)))

@@ -17,7 +17,8 @@ def spot_light(types, position, axis, degrees):
     return Light("spot", False, types.vector(*(float(p) for p in position)), types.color(1), **fields)
 
 
-def test_height_of_rays_that_nearly_meet_the_light(variant):
+@pytest.mark.parametrize("kind", ["point", "spot"])
+def test_height_of_rays_that_nearly_meet_the_light(variant, kind):
     """Rays towards the light, off by 1e-6 to 1: the textbook form has no correct digit at the small end."""
     import mitsuba as mi
 
@@ -28,7 +29,10 @@ def test_height_of_rays_that_nearly_meet_the_light(variant):
     light = np.array([1.25, -2.5, 3.75])  # exact in float32, as is light - origin below
     direction = (light + 10.0 ** rng.uniform(-6, 0, (4000, 1)) * rng.normal(size=(4000, 3))).astype(np.float32)
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    geometry = ray_geometry(mi.Vector3f(0), mi.Vector3f(direction.T), point_light(array_types(), light))
+    types = array_types()
+    axis = np.array([0.6, 0.0, -0.8])
+    lamp = point_light(types, light) if kind == "point" else spot_light(types, light, axis, 40.0)
+    geometry = ray_geometry(mi.Vector3f(0), mi.Vector3f(direction.T), lamp)
     exact = direction.astype(np.float64)
     height = np.linalg.norm(np.cross(light, exact), axis=1)
     # 1.5 units in the last place for each component, and one for each step of the norm.
@@ -36,6 +40,31 @@ def test_height_of_rays_that_nearly_meet_the_light(variant):
     assert np.max(np.abs(np.array(geometry.foot) - exact @ light)) < 4 * np.finfo(np.float32).eps * np.linalg.norm(
         light
     )
+
+
+@pytest.mark.parametrize("kind", ["point", "spot"])
+def test_rounding_of_light_and_direction_is_no_height(variant, kind):
+    """Where light - origin and direction are rounded, their low parts make up for it: 1e-7 m of a height of 1e-4 m."""
+    from realtime.arrays import array_types
+    from realtime.geometry import ray_geometry
+    from realtime.lights import with_low
+
+    types = array_types()
+    rng = np.random.default_rng(8)
+    light, origin = (with_low(one, types)[0] for one in ((1.237, -2.519, 3.751), (-0.33, 0.71, 0.123)))
+    direction = light - origin + 10.0 ** rng.uniform(-4, 0, (2000, 1)) * rng.normal(size=(2000, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    high, low = with_low(direction, types)
+    axis = np.array([0.48, 0.6, -0.64])
+    lamp = point_light(types, light) if kind == "point" else spot_light(types, light, axis, 40.0)
+    at = types.vector(*(float(x) for x in origin))
+    geometry = ray_geometry(at, types.vector(high.T), lamp, low=types.vector(low.T))
+    cross = np.cross(light - origin, direction)
+    height = np.linalg.norm(cross, axis=1)
+    assert np.max(np.abs(np.array(geometry.height) / height - 1)) < 4e-7  # three roundings of a component and a norm
+    if kind == "spot":
+        offset = np.cross(cross, direction) @ axis
+        assert np.max(np.abs(np.array(geometry.offset) - offset) / height) < 4e-7
 
 
 @pytest.mark.parametrize("precision", ["single", "double"])
@@ -78,21 +107,44 @@ def test_endless_rays_are_clipped_to_half_lines(variant):
     assert np.array(clip_to_cone(against, types.scalar(0), types.scalar(np.inf))[0])[0] == 0
 
 
-def test_rays_parallel_to_a_line_on_the_cone(variant):
-    """The quadratic equation has one root: a half line inside the cone, or on the other side of the axis nothing."""
+@pytest.mark.parametrize("degrees", [40.0, 50.0])
+def test_rays_through_the_light(variant, degrees):
+    """Height and all products with it are 0; in the cone lies what is beyond the light, before it, or nothing."""
     from realtime.arrays import array_types
     from realtime.geometry import clip_to_cone, ray_geometry
 
     types = array_types()
-    degrees = np.rad2deg(np.arccos(0.8))
     light = spot_light(types, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), degrees)
-    direction = types.vector(0.6, 0.0, 0.8)
-    assert np.array(light.cos_cutoff)[0] == np.float32(0.8)
-    # In the cone |x| <= 3/4 z; from (-1, 0, 0) that is 1 - 0.6 t <= 0.6 t on one side, and always on the other.
-    within = ray_geometry(types.vector(-1.0, 0.0, 0.0), direction, light)
-    low, high = (np.array(x)[0] for x in clip_to_cone(within, types.scalar(0), types.scalar(np.inf)))
-    assert low == pytest.approx(1 / 1.2, rel=1e-6)
-    assert np.isinf(high)
-    beside = ray_geometry(types.vector(1.0, 0.0, 0.0), direction, light)
-    low, high = (np.array(x)[0] for x in clip_to_cone(beside, types.scalar(0), types.scalar(np.inf)))
-    assert low == high == 0
+    direction = np.array([(0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (0.6, 0.0, 0.8), (0.6, 0.0, -0.8), (1.0, 0.0, 0.0)])
+    origin = -2 * direction.astype(np.float32).astype(np.float64)
+    geometry = ray_geometry(types.vector(origin.T), types.vector(direction.T), light)
+    assert np.all(np.array(geometry.height) == 0)
+    low, high = (np.array(x) for x in clip_to_cone(geometry, types.scalar(0), types.scalar(np.inf)))
+    foot = np.array(geometry.foot)
+    np.testing.assert_array_equal(low[:4], [foot[0], 0, foot[2], 0])
+    np.testing.assert_array_equal(high[:4], [np.inf, foot[1], np.inf, foot[3]])
+    assert high[4] == low[4]
+
+
+@pytest.mark.parametrize(("sine", "cosine"), [(0.6, 0.8), (0.8, 0.6)])
+def test_rays_parallel_to_a_line_on_the_cone(variant, sine, cosine):
+    """The quadratic equation has one root: a half line inside the cone, or on the other side of the axis nothing.
+
+    The other root is infinite, or at 1e7 m by the rounding of sine and cosine.
+    """
+    from realtime.arrays import array_types
+    from realtime.geometry import clip_to_cone, ray_geometry
+
+    types = array_types()
+    light = spot_light(types, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), np.rad2deg(np.arcsin(sine)))
+    assert np.array(light.cos_cutoff)[0] == np.float32(cosine)
+    # In the cone |x| <= tan z; from (-1, 0, 0) that is 1 - sine t <= sine t on one side, and always on the other.
+    for x, sign, wanted in ((-1, 1, (0.5 / sine, np.inf)), (1, 1, None), (-1, -1, None), (1, -1, None)):
+        direction = types.vector(sign * sine, 0.0, sign * cosine)
+        beside = ray_geometry(types.vector(x, 0.0, 0.0), direction, light)
+        low, high = (np.array(end)[0] for end in clip_to_cone(beside, types.scalar(0), types.scalar(np.inf)))
+        if wanted is None:
+            assert low == high == 0 or low > 1e7
+        else:
+            assert low == pytest.approx(wanted[0], rel=1e-6)
+            assert high > 1e7
