@@ -28,8 +28,8 @@ class Light:
     axis: Any = None  #: spot: unit vector from the light along its axis
     axis_low: Any = None  #: spot: what rounding took from `axis`
     cutoff: Any = None  #: spot: half angle beyond which there is no light [rad]
-    cone: Cone | None = None  #: spot: of the cut-off
-    beam: Cone | None = None  #: soft spot: the cone in which the intensity is full
+    cone: Any = None  #: spot: the `Cone` of the cut-off
+    beam: Any = None  #: soft spot: the `Cone` in which the intensity is full
     inverse_transition: Any = None  #: soft spot: 1 / (cutoff - beam) [1/rad]
 
     @property

@@ -7,6 +7,9 @@ size^2 texels; a map holds at each of their (size + 1)^2 *corners* the distance 
 first surface [m], infinite where there is none. So the outermost values lie on the edges of the face, where the faces
 of a cube meet with the same values. The planar depth, along the axis, is the distance over the length of axis + u
 across + v up (`realtime.light_heights`).
+
+Directions are computed in float64 and rounded once, to the float32 that rays are cast in: a ray that passes an edge
+closely meets the same surface whatever the precision of the method, and one map can stand for both.
 """
 
 from dataclasses import dataclass
@@ -64,23 +67,25 @@ def cast_shadow_map(scene, light: Light, size: int) -> ShadowMap:
 
     check_size(size)
     Float = type(light.position.x)
+    Double, Vector = mi.Float64, mi.Vector3d
     frame = None if light.kind == "point" else _frame(light)
     side = size + 1
     index = dr.arange(mi.UInt32, (1 if frame else 6) * side * side)
     row = index // side
     face = row // side
     # Whole numbers and powers of two: exact, so that neighbouring faces cast the same rays along their common edge.
-    u = dr.fma(Float(index - row * side), 2.0 / size, -1.0)
-    v = dr.fma(Float(row - face * side), 2.0 / size, -1.0)
+    u = dr.fma(Double(index - row * side), 2.0 / size, -1.0)
+    v = dr.fma(Double(row - face * side), 2.0 / size, -1.0)
     if frame:
         unit = dr.normalize(frame[0] * u + frame[1] * v + frame[2])
     else:
         # In this order the sum does not depend on which coordinate is which.
-        unit = _cube_direction(type(light.position), face, u, v) * dr.rsqrt((dr.square(u) + dr.square(v)) + 1)
+        unit = _cube_direction(Vector, face, u, v) * dr.rsqrt((dr.square(u) + dr.square(v)) + 1)
     ray = mi.Ray3f(mi.Point3f(light.position), mi.Vector3f(unit))
     hit = scene.ray_intersect_preliminary(ray, coherent=True)
     distance = dr.select(hit.is_valid(), Float(hit.t), dr.inf)
-    dr.eval(distance)  # once: whoever reads it would cast the rays again
+    frame = frame and tuple(type(light.position)(one) for one in frame)
+    dr.eval(distance, frame)  # once: whoever reads it would cast the rays again
     return ShadowMap(size, distance, frame)
 
 
@@ -128,14 +133,16 @@ def face_coordinates(frame, face, vector):
 
 
 def _frame(light: Light):
-    """Return two vectors of length tan(cutoff) across a spot's axis, and its axis."""
+    """Return two vectors of length tan(cutoff) across a spot's axis, and its axis, in float64."""
     import drjit as dr
+    import mitsuba as mi
 
-    axis = light.axis
+    axis = mi.Vector3d(light.axis) + mi.Vector3d(light.axis_low)
     # Any vector that is not parallel to the axis will do to start from.
     helper = dr.select(dr.abs(axis.x) < 0.5, type(axis)(1, 0, 0), type(axis)(0, 1, 0))
     across = dr.normalize(dr.cross(helper, axis))
-    scale = dr.tan(light.cutoff)
+    square = mi.Float64(light.cone.square_sin) + mi.Float64(light.cone.square_sin_low)
+    scale = dr.sqrt(square / (1 - square))
     return across * scale, dr.cross(axis, across) * scale, axis
 
 

@@ -238,7 +238,8 @@ def _truth_light(known: TruthLight, light: Light) -> TruthLight:
     position = np.array(light.position, dtype=np.float64).reshape(3)
     if light.axis is None:
         return replace(known, position=position)
-    axis = np.array(light.axis, dtype=np.float64).reshape(3)
+    high, low = (np.array(part, dtype=np.float64).reshape(3) for part in (light.axis, light.axis_low))
+    axis = high + low
     return replace(known, position=position, axis=axis / np.linalg.norm(axis))
 
 

@@ -127,3 +127,29 @@ def test_all_sorts_of_rays(variant, degrees, precision):
         error *= np.sqrt(np.clip(np.sin(spread) ** 2 - (across / height) ** 2, 0, 1))
     assert np.max(error[hit.all(axis=0)]) < 4 * np.finfo(np.float32 if precision == "single" else np.float64).eps
     assert np.sum(np.isfinite(wanted)) > 300
+
+
+@pytest.mark.parametrize("method", ["unshadowed", "light-volumes"])
+def test_airlight_of_a_spot_in_both_precisions(variant, method):
+    """What single precision makes of the same rays, cone and shadow map."""
+    from realtime.frame import frame_renderer, render_frame
+    from realtime.kernels import KERNELS
+    from realtime.methods import METHODS
+    from realtime.scene import read_scene
+    from validation.load import load_scene
+
+    loaded = load_scene("sphere-spot", (96, 72)).scene
+    single, double = (
+        render_frame(
+            frame_renderer(read_scene(loaded, precision), METHODS[method], kernel=KERNELS["exact"].function)
+        ).airlight.astype(np.float64)
+        for precision in ("single", "double")
+    )
+    error = np.max(np.abs(single - double), axis=2)
+    assert np.max(error) < 4e-6 * np.max(double)  # measured 1e-6
+    lit = np.min(double, axis=2) > 0
+    assert np.all(error[~lit] == 0)
+    own = error[lit] / np.min(double[lit], axis=1)
+    # The kernel promises 1e-6; measured 3e-6 of 99.9 per cent, more where the chord is a few roundings long.
+    assert np.quantile(own, 0.999) < 1e-5
+    assert np.max(own) < 1e-4
