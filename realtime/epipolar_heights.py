@@ -19,7 +19,7 @@ from typing import Any
 from realtime.arrays import two_numbers
 from realtime.epipolar import Slices
 from realtime.lights import Light
-from realtime.shadow_map import ShadowMap, _cube_coordinates, face_coordinates
+from realtime.shadow_map import ShadowMap, cube_coordinates, face_coordinates
 
 
 @dataclass(frozen=True)
@@ -129,7 +129,7 @@ def _height(shadow_map: ShadowMap, heights, direction):
         a, b, depth = face_coordinates(shadow_map.frame, mi.UInt32(0), direction)
         face, u, v = mi.UInt32(0), a / depth, b / depth
     else:
-        face, u, v = _cube_coordinates(direction)
+        face, u, v = cube_coordinates(direction)
         depth = dr.maximum(dr.maximum(dr.abs(direction.x), dr.abs(direction.y)), dr.abs(direction.z))
     u, v = (dr.clip(dr.fma(0.5 * size, one, 0.5 * size), 0, size) for one in (u, v))
     column, row = (dr.minimum(mi.UInt32(one), size - 1) for one in (u, v))

@@ -80,7 +80,7 @@ def cast_shadow_map(scene, light: Light, size: int) -> ShadowMap:
         unit = dr.normalize(frame[0] * u + frame[1] * v + frame[2])
     else:
         # In this order the sum does not depend on which coordinate is which.
-        unit = _cube_direction(Vector, face, u, v) * dr.rsqrt((dr.square(u) + dr.square(v)) + 1)
+        unit = cube_direction(Vector, face, u, v) * dr.rsqrt((dr.square(u) + dr.square(v)) + 1)
     ray = mi.Ray3f(mi.Point3f(light.position), mi.Vector3f(unit))
     hit = scene.ray_intersect_preliminary(ray, coherent=True)
     distance = dr.select(hit.is_valid(), Float(hit.t), dr.inf)
@@ -97,7 +97,7 @@ def lit_in_map(shadow_map: ShadowMap, light: Light, point):
     Float = type(point.x)
     d = point - light.position
     if shadow_map.frame is None:
-        face, u, v = _cube_coordinates(d)
+        face, u, v = cube_coordinates(d)
     else:
         face = mi.UInt32(0)
         a, b, depth = face_coordinates(shadow_map.frame, face, d)
@@ -146,8 +146,11 @@ def _frame(light: Light):
     return across * scale, dr.cross(axis, across) * scale, axis
 
 
-def _cube_direction(Vector, face, u, v):
-    """Face 2k looks along +axis k, face 2k + 1 along -axis k; u and v go along the next two axes."""
+def cube_direction(Vector, face, u, v):
+    """Return the direction through (u, v) of a face of a cube, not of unit length.
+
+    Face 2k looks along +axis k, face 2k + 1 along -axis k; u and v go along the next two axes.
+    """
     import drjit as dr
 
     sign = dr.select((face & 1) == 0, type(u)(1), type(u)(-1))
@@ -155,7 +158,8 @@ def _cube_direction(Vector, face, u, v):
     return dr.select(axis == 0, Vector(sign, u, v), dr.select(axis == 1, Vector(v, sign, u), Vector(u, v, sign)))
 
 
-def _cube_coordinates(d):
+def cube_coordinates(d):
+    """Return the face of a cube that a direction goes through, and u and v there."""
     import drjit as dr
     import mitsuba as mi
 

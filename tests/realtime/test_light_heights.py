@@ -61,7 +61,7 @@ def test_faces_of_a_cube_meet_with_the_same_values(variant):
     """The mesh of the light volume has no cracks only if rays along a common edge are the same to the last bit."""
     import mitsuba as mi
 
-    from realtime.shadow_map import _cube_direction
+    from realtime.shadow_map import cube_direction
 
     shadow_map, _ = heights_of(16, "point")
     distance = np.array(shadow_map.distance).reshape(6, 17, 17)
@@ -70,7 +70,7 @@ def test_faces_of_a_cube_meet_with_the_same_values(variant):
     for face in range(6):
         for row in range(17):
             for column in range(17):
-                direction = _cube_direction(mi.Vector3f, mi.UInt32(face), mi.Float(u[column]), mi.Float(u[row]))
+                direction = cube_direction(mi.Vector3f, mi.UInt32(face), mi.Float(u[column]), mi.Float(u[row]))
                 key = tuple(np.array(direction).ravel())
                 assert seen.setdefault(key, distance[face, row, column]) == distance[face, row, column]
     assert len(seen) == 6 * 15 * 15 + 12 * 15 + 8

@@ -57,13 +57,13 @@ def test_cube_coordinates_invert_the_directions(variant):
     import drjit as dr
     import mitsuba as mi
 
-    from realtime.shadow_map import _cube_coordinates, _cube_direction
+    from realtime.shadow_map import cube_coordinates, cube_direction
 
     rng = np.random.default_rng(2)
     u, v = rng.uniform(-0.999, 0.999, (2, 6000))
     face = np.arange(6000) % 6
-    direction = _cube_direction(mi.Vector3f, mi.UInt32(face.astype(np.uint32)), mi.Float(u), mi.Float(v))
-    found, u_found, v_found = _cube_coordinates(dr.normalize(direction))
+    direction = cube_direction(mi.Vector3f, mi.UInt32(face.astype(np.uint32)), mi.Float(u), mi.Float(v))
+    found, u_found, v_found = cube_coordinates(dr.normalize(direction))
     assert np.array_equal(np.array(found), face)
     assert np.array(u_found) == pytest.approx(u, abs=1e-6)
     assert np.array(v_found) == pytest.approx(v, abs=1e-6)
