@@ -13,8 +13,8 @@ not matter (Billeter, Sintorn, Assarsson 2010, eq. 3), and what `realtime.volume
 sign. A ray that is lit at its beginning is lit at its end after an even number of crossings: no tolerance can break it.
 
 Crossings are kept in order of distance, the nearest eight. A ray with more goes over its texels again for those that
-are farther. Between them the kernel integrates each lit piece by itself: a sum of positive terms, where a sum of J(0,
-x) of both signs would lose digits.
+are farther; two may lie at the same distance, so it counts anew how many it has passed. Between crossings the kernel
+integrates each lit piece by itself: a sum of positive terms, where a sum of J(0, x) of both signs would lose digits.
 """
 
 from collections.abc import Callable
@@ -103,9 +103,9 @@ def _face_sum(heights, face, ray: FaceRay, source, total, integral):
     reached = ~ray.walks | (line.excess[1] > -line.slack)
 
     def one_pass(after, total, more):
-        queue, lost = _nearest_crossings(heights, face, line, source, after, more & ray.walks)
-        total = _add_pieces(queue, ray, after, lit, more, lost, integral, total)
-        return dr.select(lost, queue[-1], after), total, more & lost
+        found = _nearest_crossings(heights, face, line, source, after, more & ray.walks)
+        total = _add_pieces(found, ray, after, lit ^ found.odd, more, integral, total)
+        return dr.select(found.lost, found.queue[-1], after), total, more & found.lost
 
     after = ray.begin + dr.zeros(type(ray.begin), dr.width(total))
     _, total, _ = dr.while_loop(
@@ -172,6 +172,15 @@ def _borders(low, start, per, across=1.0):
     return dr.minimum(one, other), dr.maximum(one, other)
 
 
+@dataclass
+class _Crossings:
+    """Crossings of rays, beyond some distance."""
+
+    queue: list[Any]  #: the nearest, in order, infinite where there are no more [m]
+    lost: Any  #: whether others had no place in it
+    odd: Any  #: whether an odd number of them is not beyond that distance
+
+
 def _nearest_crossings(heights, face, line: _Line, source, after, active):
     """Return the nearest crossings beyond `after`, and whether there are more."""
     import drjit as dr
@@ -182,27 +191,23 @@ def _nearest_crossings(heights, face, line: _Line, source, after, active):
     width = dr.width(after)
     last = dr.select(active, last, first)
 
-    def of_entry(k, queue, lost):
+    def of_entry(k, found):
         node = unpacked(dr.gather(mi.UInt32, entries, k, k < last))
         side = mi.UInt32(heights.size) >> node.level
-        queue, lost = _leaf_crossings(heights, face, line, (node.i * side, node.j * side, side), queue, lost, after)
-        return k + 1, queue, lost
+        return k + 1, _leaf_crossings(heights, face, line, (node.i * side, node.j * side, side), found, after)
 
-    _, queue, lost = dr.while_loop(
-        state=(
-            first + dr.zeros(mi.UInt32, width),
-            [dr.full(Float, dr.inf, width) for _ in range(PLACES)],
-            dr.full(mi.Bool, False, width),
-        ),
-        cond=lambda k, queue, lost: k < last,
+    queue, no = [dr.full(Float, dr.inf, width) for _ in range(PLACES)], dr.full(mi.Bool, False, width)
+    _, found = dr.while_loop(
+        state=(first + dr.zeros(mi.UInt32, width), _Crossings(queue, no, no & True)),
+        cond=lambda k, found: k < last,
         body=of_entry,
-        labels=("k", "queue", "lost"),
+        labels=("k", "found"),
     )
-    return queue, lost
+    return found
 
 
-def _leaf_crossings(heights, face, line: _Line, square, queue, lost, after):
-    """Put the crossings in a square of texels into the queue."""
+def _leaf_crossings(heights, face, line: _Line, square, found: _Crossings, after) -> _Crossings:
+    """Add the crossings in a square of texels."""
     import drjit as dr
 
     column, row, side = square
@@ -218,18 +223,17 @@ def _leaf_crossings(heights, face, line: _Line, square, queue, lost, after):
     excess = _excess_on_border(line, (i, j), begin, by_u, near_near, dr.select(by_u, near_far, far_near))
     excess = dr.select(dr.maximum(in_u, in_v) < 0, line.excess[0], excess)
 
-    def step(i, j, t, excess, queue, lost):
-        queue, lost, t, excess, by_u = _cross_texel(heights, face, line, (i, j), t, excess, queue, lost, after)
+    def step(i, j, t, excess, found):
+        found, t, excess, by_u = _cross_texel(heights, face, line, (i, j), t, excess, found, after)
         i = dr.select(by_u, dr.select(line.right, i + 1, i - 1), i)
-        return i, dr.select(by_u, j, dr.select(line.up, j + 1, j - 1)), t, excess, queue, lost
+        return i, dr.select(by_u, j, dr.select(line.up, j + 1, j - 1)), t, excess, found
 
-    _, _, _, _, queue, lost = dr.while_loop(
-        state=(i, j, begin, excess, queue, lost),
-        cond=lambda i, j, t, excess, queue, lost: t < end,
+    return dr.while_loop(
+        state=(i, j, begin, excess, found),
+        cond=lambda i, j, t, excess, found: t < end,
         body=step,
-        labels=("i", "j", "t", "excess", "queue", "lost"),
-    )
-    return queue, lost
+        labels=("i", "j", "t", "excess", "found"),
+    )[-1]
 
 
 def _as_seen(line: _Line, four):
@@ -254,13 +258,13 @@ def _excess_on_border(line: _Line, texel, t, on_u, base, other):
     return at_line(ray.s, t) - dr.fma(along, other - base, base)
 
 
-def _cross_texel(heights, face, line: _Line, texel, t, excess, queue, lost, after):
-    """Put the crossings in a texel, which the line enters at t, into the queue.
+def _cross_texel(heights, face, line: _Line, texel, t, excess, found: _Crossings, after):
+    """Add the crossings in a texel, which the line enters at t.
 
     Returns
     -------
-    queue, lost
-        The queue after that, and whether a crossing had no place in it.
+    found
+        The crossings so far.
     end, excess
         The t at which the line leaves the texel, and D there.
     by_u
@@ -284,21 +288,18 @@ def _cross_texel(heights, face, line: _Line, texel, t, excess, queue, lost, afte
     dm = dr.select(bends, at_line(ray.s, middle) - on_diagonal, d1)
     first, second = (excess > 0) != (dm > 0), (dm > 0) != (d1 > 0)
 
-    def store(queue, lost):
+    def store(found):
+        queue, lost, odd = found.queue, found.lost, found.odd
         for changes, ends, excesses in ((first, (t, middle), (excess, dm)), (second, (middle, end), (dm, d1))):
             share = excesses[0] / (excesses[0] - excesses[1])
             x = distance_at(ray, dr.fma(share, ends[1] - ends[0], ends[0]))
             queue, out = _inserted(queue, dr.select(changes & (x > after), x, dr.inf))
             lost = lost | (out < dr.inf)
-        return queue, lost
+            odd = odd ^ (changes & (x <= after))
+        return _Crossings(queue, lost, odd)
 
-    queue, lost = dr.if_stmt(
-        args=(queue, lost),
-        cond=(first | second) & (end > t),
-        true_fn=store,
-        false_fn=lambda queue, lost: (queue, lost),
-    )
-    return queue, lost, end, d1, by_u
+    found = dr.if_stmt(args=(found,), cond=(first | second) & (end > t), true_fn=store, false_fn=lambda found: found)
+    return found, end, d1, by_u
 
 
 def _inserted(queue, x):
@@ -312,11 +313,12 @@ def _inserted(queue, x):
     return places, x
 
 
-def _add_pieces(queue, ray: FaceRay, after, lit, active, more, integral, total):
+def _add_pieces(found: _Crossings, ray: FaceRay, after, lit, active, integral, total):
     """Add the lit pieces between the crossings of a queue; the last one waits if there are more crossings."""
     import drjit as dr
     import mitsuba as mi
 
+    queue, more = found.queue, found.lost
     # Lit pieces lie between the first and second entry, the third and fourth, and so on.
     bounds = [dr.select(lit, after, queue[0])]
     bounds += [dr.select(lit, before, behind) for before, behind in pairwise(queue)]
