@@ -115,3 +115,11 @@ def cone_interval(ray: AxisGeometry, cone: Cone):
     # A ray parallel to a line on the cone meets it at infinity, if at all.
     hit = dr.select(half_line, enter < dr.inf, (discriminant >= 0) & (ray.offset >= 0))
     return dr.select(hit, enter, -dr.inf), dr.select(hit, leave, -dr.inf)
+
+
+def normal_cosine(ray: AxisGeometry):
+    """Return the cosine between the axis and w; of a ray through the light, whose w is 0, one that fits `axial`."""
+    import drjit as dr
+
+    sine = dr.sqrt(dr.maximum(dr.fma(-ray.axial, ray.axial, 1), 0))
+    return dr.select(ray.height > 0, ray.across / ray.height, sine)

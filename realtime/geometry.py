@@ -13,10 +13,11 @@ That is as good as v and d are. The rounding errors of both are known, v's from 
 cross product to twice the digits (`realtime.cone`); a point light does not pay for them.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
-from realtime.cone import axis_geometry, cone_interval
+from realtime.arrays import smallest
+from realtime.cone import axis_geometry, cone_interval, normal_cosine
 from realtime.error_free import difference_of_products, two_sum
 from realtime.lights import Light
 
@@ -33,6 +34,7 @@ class RayGeometry:
     leave: Any = None  #: spot only: distance at which it leaves the cone, -inf if it misses it [m]
     beam_enter: Any = None  #: soft spot only: the same for the cone of full intensity [m]
     beam_leave: Any = None
+    aside: Any = None  #: soft spot only: cosine between the axis and the normal of the plane of ray and light
 
 
 def ray_geometry(origin, direction, light: Light, *, low=None) -> RayGeometry:
@@ -74,10 +76,12 @@ def _spot_geometry(away, direction, direction_low, light: Light) -> RayGeometry:
 
     ray = axis_geometry(away, direction, direction_low, light)
     foot = dr.dot(away[0], direction)
-    ends = []
-    for cone in (light.cone, light.beam):
-        ends += [foot + s for s in cone_interval(ray, cone)] if cone else [None, None]
-    return RayGeometry(foot, ray.height, ray.axial, ray.offset, *ends)
+    enter, leave = (foot + s for s in cone_interval(ray, light.cone))
+    geometry = RayGeometry(foot, ray.height, ray.axial, ray.offset, enter, leave)
+    if not light.soft:
+        return geometry
+    begin, end = (foot + s for s in cone_interval(ray, light.beam))
+    return replace(geometry, beam_enter=begin, beam_leave=end, aside=normal_cosine(ray))
 
 
 def distance_to_light(geometry: RayGeometry, x):
@@ -124,11 +128,20 @@ def _clip(enter, leave, x0, x1):
 def falloff(geometry: RayGeometry, light: Light, x):
     """Return the relative intensity of a spot at the point at `x`: Mitsuba's profile, linear in the angle [1].
 
-    One inside the beam, zero outside the cut-off; between the two, (cutoff - angle) / (cutoff - beam).
+    One inside the beam, zero outside the cut-off; between the two, (cutoff - angle) / (cutoff - beam). The difference
+    is computed as one angle, from sine and cosine of `angle`: near the axis a cosine alone has lost it. Along the ray,
+    the perpendicular to it from the light and their normal, the point is (s, h, 0) from the light and the axis is
+    (axial, offset/h, aside), so r times the sine is the length of their cross product,
+
+        sqrt(aside^2 r^2 + (axial h - (offset/h) s)^2).
     """
     import drjit as dr
 
+    h = geometry.height
     s = x - geometry.foot
-    cosine = dr.fma(geometry.axial, s, geometry.offset) / distance_to_light(geometry, x)
-    angle = dr.safe_acos(cosine)
-    return dr.clip((light.cutoff - angle) * light.inverse_transition, 0, 1)
+    across = dr.fma(-geometry.offset / dr.maximum(h, smallest(type(h))), s, geometry.axial * h)
+    sine = dr.sqrt(dr.fma(dr.square(geometry.aside), dr.fma(s, s, h * h), dr.square(across)))
+    cosine = dr.fma(geometry.axial, s, geometry.offset)
+    cos, sin = light.cone.cos, dr.sqrt(light.cone.square_sin)
+    within = dr.atan2(sin * cosine - cos * sine, dr.fma(cos, cosine, sin * sine))
+    return dr.clip(within * light.inverse_transition, 0, 1)
