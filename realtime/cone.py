@@ -117,9 +117,24 @@ def cone_interval(ray: AxisGeometry, cone: Cone):
     return dr.select(hit, enter, -dr.inf), dr.select(hit, leave, -dr.inf)
 
 
-def normal_cosine(ray: AxisGeometry):
-    """Return the cosine between the axis and w; of a ray through the light, whose w is 0, one that fits `axial`."""
+def axis_distance(ray: AxisGeometry) -> dict[str, Any]:
+    """Return `slant`, `slide` and `gap`: the distance from the axis is sqrt((slant s - slide)^2 + gap^2) [m].
+
+    Along d, (w x d)/h and w/h the point at s is (s, h, 0) from the light, the axis is (axial, offset/h, across/h), and
+    the distance is the length of their cross product,
+
+        sqrt((across/h)^2 (s^2 + h^2) + (axial h - (offset/h) s)^2).
+
+    With n^2 = (offset/h)^2 + (across/h)^2 = 1 - axial^2 this is the sum of squares above for slant = n, slide =
+    axial offset / n, gap = |across| / n.
+    """
     import drjit as dr
 
+    size = dr.sqrt(dr.fma(ray.offset, ray.offset, dr.square(ray.across)))
+    # Of a ray through the light only the sine is left, which loses digits only near the axis.
     sine = dr.sqrt(dr.maximum(dr.fma(-ray.axial, ray.axial, 1), 0))
-    return dr.select(ray.height > 0, ray.across / ray.height, sine)
+    slant = dr.select(ray.height > 0, size / ray.height, sine)
+    parallel = size == 0
+    slide = dr.select(parallel, 0, ray.axial * ray.height * (ray.offset / size))
+    gap = dr.select(parallel, ray.height, ray.height * (dr.abs(ray.across) / size))
+    return {"slant": slant, "slide": slide, "gap": gap}

@@ -16,8 +16,7 @@ cross product to twice the digits (`realtime.cone`); a point light does not pay 
 from dataclasses import dataclass, replace
 from typing import Any
 
-from realtime.arrays import smallest
-from realtime.cone import axis_geometry, cone_interval, normal_cosine
+from realtime.cone import axis_distance, axis_geometry, cone_interval
 from realtime.error_free import difference_of_products, two_sum
 from realtime.lights import Light
 
@@ -34,7 +33,9 @@ class RayGeometry:
     leave: Any = None  #: spot only: distance at which it leaves the cone, -inf if it misses it [m]
     beam_enter: Any = None  #: soft spot only: the same for the cone of full intensity [m]
     beam_leave: Any = None
-    aside: Any = None  #: soft spot only: cosine between the axis and the normal of the plane of ray and light
+    slant: Any = None  #: soft spot only: sine between the ray and the axis
+    slide: Any = None  #: soft spot only: slant times the distance from the foot to the point closest to the axis [m]
+    gap: Any = None  #: soft spot only: distance between the ray and the axis, as endless lines [m]
 
 
 def ray_geometry(origin, direction, light: Light, *, low=None) -> RayGeometry:
@@ -81,7 +82,7 @@ def _spot_geometry(away, direction, direction_low, light: Light) -> RayGeometry:
     if not light.soft:
         return geometry
     begin, end = (foot + s for s in cone_interval(ray, light.beam))
-    return replace(geometry, beam_enter=begin, beam_leave=end, aside=normal_cosine(ray))
+    return replace(geometry, beam_enter=begin, beam_leave=end, **axis_distance(ray))
 
 
 def distance_to_light(geometry: RayGeometry, x):
@@ -128,20 +129,13 @@ def _clip(enter, leave, x0, x1):
 def falloff(geometry: RayGeometry, light: Light, x):
     """Return the relative intensity of a spot at the point at `x`: Mitsuba's profile, linear in the angle [1].
 
-    One inside the beam, zero outside the cut-off; between the two, (cutoff - angle) / (cutoff - beam). The difference
-    is computed as one angle, from sine and cosine of `angle`: near the axis a cosine alone has lost it. Along the ray,
-    the perpendicular to it from the light and their normal, the point is (s, h, 0) from the light and the axis is
-    (axial, offset/h, aside), so r times the sine is the length of their cross product,
-
-        sqrt(aside^2 r^2 + (axial h - (offset/h) s)^2).
+    One inside the beam, zero outside the cut-off; between the two, (cutoff - angle) / (cutoff - beam). The angle is
+    that of the distances from the axis and along it: near the axis a cosine alone has lost it.
     """
     import drjit as dr
 
-    h = geometry.height
     s = x - geometry.foot
-    across = dr.fma(-geometry.offset / dr.maximum(h, smallest(type(h))), s, geometry.axial * h)
-    sine = dr.sqrt(dr.fma(dr.square(geometry.aside), dr.fma(s, s, h * h), dr.square(across)))
-    cosine = dr.fma(geometry.axial, s, geometry.offset)
-    cos, sin = light.cone.cos, dr.sqrt(light.cone.square_sin)
-    within = dr.atan2(sin * cosine - cos * sine, dr.fma(cos, cosine, sin * sine))
-    return dr.clip(within * light.inverse_transition, 0, 1)
+    t = dr.fma(geometry.slant, s, -geometry.slide)
+    away = dr.sqrt(dr.fma(t, t, dr.square(geometry.gap)))
+    angle = dr.atan2(away, dr.fma(geometry.axial, s, geometry.offset))
+    return dr.clip((light.cutoff - angle) * light.inverse_transition, 0, 1)

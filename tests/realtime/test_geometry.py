@@ -182,3 +182,20 @@ def test_falloff_near_the_axis_and_the_edge(variant, cutoff, beam):
     # Distances of up to 10 m, rounded, over a distance from the light of 0.5 m or more; measured 9e-7.
     assert np.max(np.abs(found - wanted)) * (angle - np.deg2rad(beam)) < 2e-6
     assert np.mean((wanted > 0) & (wanted < 1)) > 0.05
+
+
+def test_falloff_along_the_axis_and_through_the_light(variant):
+    """A ray parallel to the axis, at 0.5 m and at none, and one through the light, aslant: no product is left of it."""
+    from realtime.arrays import array_types
+    from realtime.geometry import falloff, ray_geometry
+    from realtime.lights import Light, spot_fields
+
+    types = array_types()
+    fields = spot_fields((0.0, 0.0, 1.0), 1.0, 0.25, types)
+    light = Light("spot", True, types.vector(0.0), types.color(1), **fields)
+    origin = np.array([(0.5, 0.0, -2.0), (0.0, 0.0, -2.0), (-1.2, 0.0, -1.6)])
+    direction = np.array([(0.0, 0.0, 1.0), (0.0, 0.0, 1.0), (0.6, 0.0, 0.8)])
+    geometry = ray_geometry(types.vector(origin.T), types.vector(direction.T), light)
+    found = np.array(falloff(geometry, light, types.scalar(3.0)))
+    angle = np.array([np.arctan2(0.5, 1.0), 0.0, np.arctan2(0.6, 0.8)])
+    np.testing.assert_allclose(found, np.clip((1 - angle) / 0.75, 0, 1), atol=1e-6)
