@@ -60,7 +60,7 @@ def print_maps(name: str, size: tuple[int, int], errors: "MapErrors", flicker: "
         for texels, one in zip(errors.sizes, errors.metrics, strict=True)
     ]
     show(("map", "rel. RMSE", "rel. bias", "p50", "p99", "max"), cells, f"{title}: error")
-    print(f"\nThe relative RMSE falls {_order(errors.slope)}.")
+    print(f"\nThe relative RMSE {_trend(errors.slope)}.")
     if flicker is None:
         return
     cells = [
@@ -69,19 +69,18 @@ def print_maps(name: str, size: tuple[int, int], errors: "MapErrors", flicker: "
     ]
     headers = ("map", "texels a frame", "flicker", "rel. RMSE")
     show(headers, cells, f"{title}: flicker of a moving light")
-    print(
-        f"\nThe flicker falls {_order(flicker.slope)}; the truth itself changes by {number(flicker.truth_change, 2)}."
-    )
+    print(f"\nThe flicker {_trend(flicker.slope)}; the truth itself changes by {number(flicker.truth_change, 2)}.")
 
 
-def _order(slope: "Slope") -> str:
+def _trend(slope: "Slope") -> str:
+    """Return how errors change with the size of the map, as the predicate of a sentence."""
     from math import isnan
 
     if isnan(slope.order):
-        return "by no law: too few errors above 0"
+        return "follows no law: too few errors above 0"
     spread = "" if isnan(slope.standard_error) else f" +- {slope.standard_error:.1g}"
-    return (
-        f"as size^-{slope.order:.2f}{spread}"
-        if slope.order >= 0
-        else f"not: it grows as size^{-slope.order:.2f}{spread}"
-    )
+    if abs(slope.order) < 0.01:
+        return "does not depend on the size"
+    if slope.order < 0:
+        return f"does not fall: it grows as size^{-slope.order:.2f}{spread}"
+    return f"falls as size^-{slope.order:.2f}{spread}"
