@@ -13,6 +13,7 @@ from typing import Any
 from realtime.body_tiles import tile_corners
 from realtime.camera import Camera, ray_directions, tiled_pixels
 from realtime.errors import InputError
+from realtime.frozen import Frozen
 from realtime.kernels.table import resident_tables
 from realtime.lights import Light
 from realtime.media_rays import camera_depths
@@ -84,7 +85,7 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
     lights_surfaces = method.lights_surfaces(settings)
     pixel = mi.UInt32(tiled_pixels(camera.width, camera.height))
 
-    @dr.freeze
+    @Frozen
     def surface(geometry, facets, pixel, camera, medium, lights):
         direction, _ = ray_directions(camera, pixel)
         seen = visible_surface(geometry, facets, camera.origin, direction, color=type(medium.albedo))
@@ -119,7 +120,7 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
         _, dark = _no_surface(None, None, *one_pixel[1:])
         run_method(*one_pixel, prepare(scene), one, dark)
         resident = resident_tables()
-        airlight = dr.freeze(run_method, state_fn=lambda *_, **__: resident)
+        airlight = Frozen(run_method, state_fn=lambda *_, **__: resident)
     dr.eval(pixel)
     return FrameRenderer(scene, pixel, prepare, surface if plan.surfaces else _no_surface, airlight, casts_rays)
 

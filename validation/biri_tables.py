@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from realtime.frame import FrameRenderer, frame_view, render_frame, run_airlight, run_stages, run_surface
+from realtime.frozen import Frozen
 from realtime.plane_view import bodies_in_view
 from realtime.scene import Scene, read_scene
 from realtime.shadow_planes import PlanePreparation, tile_planes
@@ -209,11 +210,9 @@ def _silhouettes(renderer: FrameRenderer, scene: Scene) -> None:
 
 def _sorting(renderer: FrameRenderer):
     """Return the tile lists of a frame as a frozen function of their own."""
-    import drjit as dr
-
     plan = renderer.scene.plan  # a frozen function takes what it names of its surroundings for inputs: not the renderer
 
-    @dr.freeze
+    @Frozen
     def lists(pixel, camera, medium, lights, prepared, distance):
         shown = {"geometry": None, "medium": medium, "lights": lights, "prepared": prepared}
         view = frame_view(camera, pixel, distance, plan=plan, **shown)

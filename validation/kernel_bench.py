@@ -15,6 +15,7 @@ import numpy as np
 from analytic.cases import Cases
 from analytic.errors import InputError
 from realtime.errors import InputError as RealtimeInputError
+from realtime.frozen import Frozen
 from realtime.kernels import KERNELS
 from validation.kernel_choice import find_kernel, sized, split_name
 from validation.kernel_errors import relative_error
@@ -266,7 +267,7 @@ def _frozen(function: Kernel, cases: Cases, rays: int | None = None) -> Callable
     def evaluate(geometry, x0, x1, medium, light):
         return function(geometry, x0, x1, medium, light)
 
-    replay = dr.freeze(evaluate, state_fn=lambda *_, **__: resident)
+    replay = Frozen(evaluate, state_fn=lambda *_, **__: resident)
 
     def work():
         J = replay(geometry, x0, x1, medium, light)

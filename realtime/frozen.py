@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Frozen functions that Python's garbage collector does not interrupt.
+
+While Dr.Jit records a function, nothing may be freed that the device must be told of, and no object may vanish that
+virtual calls go over: a Mitsuba scene that is collected in the middle ends the process, or the recording fails. What is
+garbage then is collected after the call.
+"""
+
+import gc
+from collections.abc import Callable
+from typing import Any
+
+
+class Frozen:
+    """A function frozen by `drjit.freeze`, during whose calls nothing is collected."""
+
+    def __init__(self, function: Callable[..., Any], **options):
+        import drjit as dr
+
+        self._recorded = dr.freeze(function, **options)
+
+    def __call__(self, *args):
+        """Call the function: the first time it is recorded, then replayed."""
+        enabled = gc.isenabled()
+        gc.disable()
+        try:
+            return self._recorded(*args)
+        finally:
+            if enabled:
+                gc.enable()
+
+    @property
+    def n_recordings(self) -> int:
+        """How often the function was recorded."""
+        return self._recorded.n_recordings
