@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Fixtures shared by all tests."""
 
+import gc
 from pathlib import Path
 
 import pytest
@@ -31,3 +32,10 @@ def own_cache(monkeypatch, tmp_path) -> Path:
     """An empty cache that this test shares with no other; where its folder will be."""
     monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path / "cache"))
     return tmp_path / "cache"
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _nothing_left_behind():
+    """Free the scenes of a module before the next one: Dr.Jit's virtual calls go over all objects that are alive."""
+    yield
+    gc.collect()
