@@ -1,18 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Beams: the rays of a tile of the image, as planes that bound them.
 
-A beam starts at the camera and is bounded by four planes through it, w . (P - camera) >= 0, by a plane beyond which
-every ray has met a surface, and by two planes through camera *and light*, between which the beam is as the light sees
-it. In the projective coordinates (u, v, s) of a light's face (`realtime.light_heights`) a plane is
+A beam starts at the camera and is bounded by four planes through it, w . (P - camera) >= 0, and by a plane beyond which
+every ray has met a surface. Two of the four go through camera *and light*: between them the beam lies as the light sees
+it. The other two go across them. Where the light, or the point opposite it, is seen within the beam there are no such
+planes, and the sides of a rectangle about the rays serve instead. In the projective coordinates (u, v, s) of a light's
+face (`realtime.light_heights`) a plane is
 
     gu u + gv v + g0 + gs s >= 0,   (gu, gv, g0) = w . (across, up, axis),   gs = w . (light - camera),
 
 as w . (P - camera) = w . (light - camera + (axis + u across + v up) / s). So a box in (u, v, s) that lies beyond one of
-the seven planes misses the beam. Those through the light have gs = 0: they bound the footprint of the beam on the map,
-which the others alone do not, since a box at a depth discontinuity is long in s.
+the five planes misses the beam. Those through the light have gs = 0: they bound the footprint of the beam on the map,
+which others alone do not, since a box at a depth discontinuity is long in s.
 """
 
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any
 
 _SLACK = 2e-6  # of the terms of a sum: float32 rounding, with room to spare
@@ -22,7 +25,7 @@ _SLACK = 2e-6  # of the terms of a sum: float32 rounding, with room to spare
 class Beam:
     """Rays through a rectangle, by tile."""
 
-    normals: list[Any]  #: of the planes that bound it; a zero vector where one is of no use
+    normals: list[Any]  #: of the four planes through the camera
     middle: Any  #: unit direction
     end: Any  #: no ray goes farther along the middle [m]
     light: Any  #: light - camera [m]
@@ -79,10 +82,7 @@ def _pair_about(corners, axis):
         normal = dr.cross(axis, corner)
         sides = [dr.dot(normal, other) for other in corners]
         reach = 1e-6 * dr.norm(normal)
-        least, largest = (
-            dr.minimum(dr.minimum(sides[0], sides[1]), dr.minimum(sides[2], sides[3])),
-            dr.maximum(dr.maximum(sides[0], sides[1]), dr.maximum(sides[2], sides[3])),
-        )
+        least, largest = reduce(dr.minimum, sides), reduce(dr.maximum, sides)
         left, on_left = dr.select(least >= -reach, normal, left), on_left | (least >= -reach)
         right, on_right = dr.select(largest <= reach, -normal, right), on_right | (largest <= reach)
     return (left, right), on_left & on_right
@@ -94,11 +94,9 @@ def _rectangle(directions, middle, across, up):
 
     place = [(dr.dot(d, across), dr.dot(d, up), dr.dot(d, middle)) for d in directions]
     a, b = [x / z for x, _, z in place], [y / z for _, y, z in place]
-    a0, a1, b0, b1 = a[0], a[0], b[0], b[0]
-    for x, y in zip(a[1:], b[1:]):
-        a0, a1, b0, b1 = dr.minimum(a0, x), dr.maximum(a1, x), dr.minimum(b0, y), dr.maximum(b1, y)
     margin = 1e-6  # of the directions' rounding
-    a0, a1, b0, b1 = a0 - margin, a1 + margin, b0 - margin, b1 + margin
+    a0, b0 = (reduce(dr.minimum, values) - margin for values in (a, b))
+    a1, b1 = (reduce(dr.maximum, values) + margin for values in (a, b))
     corners = [middle + across * x + up * y for x in (a0, a1) for y in (b0, b1)]
     return corners, [across - middle * a0, middle * a1 - across, up - middle * b0, middle * b1 - up]
 
