@@ -77,6 +77,17 @@ def _row(one: dict[str, Any]) -> tuple[str, ...]:
     )
 
 
+def rate_cells(row: Any, published: float | None) -> tuple[str, str, str, str]:
+    """Return the rate after the light moved, its share of a published one, the static one and the quartiles [ms].
+
+    `row` has the timings `rebuilt` and `static`; `published` is None where nothing comparable was.
+    """
+    rebuilt = row.rebuilt
+    of_published = f"{1000 / rebuilt.median_ms / published:.2g} x" if published else "-"
+    quartiles = f"{number(rebuilt.low_ms)}..{number(rebuilt.high_ms)}"
+    return rate(rebuilt.median_ms), of_published, rate(row.static.median_ms), quartiles
+
+
 def rate(milliseconds: float) -> str:
     """Return how often a second something that takes so long can be done."""
     value = 1000 / milliseconds

@@ -4,7 +4,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-from reports.bench_tables import print_heading, print_markdown, rate
+from reports.bench_tables import print_heading, print_markdown, rate_cells
 from reports.tables import number, print_table
 
 
@@ -129,13 +129,9 @@ def _print_passes(rows: Sequence, show) -> None:
 
 
 def _rates(row, fps: float | None) -> tuple[str, ...]:
-    """Return the cells of the rate after the light moved, its share of the published one, the static one, quartiles."""
     from validation.billeter_figures import SIZE
 
-    rebuilt = row.rebuilt
-    of_published = f"{1000 / rebuilt.median_ms / fps:.2g} x" if fps and row.size == SIZE else "-"
-    quartiles = f"{number(rebuilt.low_ms)}..{number(rebuilt.high_ms)}"
-    return rate(rebuilt.median_ms), of_published, rate(row.static.median_ms), quartiles
+    return rate_cells(row, fps if row.size == SIZE else None)
 
 
 def _image(row) -> str:

@@ -4,7 +4,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-from reports.bench_tables import print_heading, print_markdown, rate
+from reports.bench_tables import print_heading, print_markdown, rate_cells
 from reports.tables import number, print_table
 
 
@@ -73,16 +73,13 @@ def _print_rates(rows: Sequence, show) -> None:
     )
     cells = []
     for row in rows:
-        rebuilt, error = row.rebuilt, row.error
+        error = row.error
         cells.append(
             (
                 _name(row),
                 str(row.triangles),
                 number(row.published.fps),
-                rate(rebuilt.median_ms),
-                f"{1000 / rebuilt.median_ms / row.published.fps:.2g} x" if row.size == row.published.size else "-",
-                rate(row.static.median_ms),
-                f"{number(rebuilt.low_ms)}..{number(rebuilt.high_ms)}",
+                *rate_cells(row, row.published.fps if row.size == row.published.size else None),
                 number(error.relative_rmse, 2),
                 number(error.relative_bias, 2),
                 number(error.p99, 2),
