@@ -9,79 +9,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from realtime.errors import InputError
-from tests.scenes_for_tests import body, clear_scene, spot, tiny_scene
-
-SIZE = (48, 36)
-EVALUATIONS = ("walk", "mesh")
-
-
-def lamp(*position):
-    return {"type": "point", "position": list(position), "intensity": {"type": "rgb", "value": [5.0, 4.0, 3.0]}}
-
-
-def camera(origin, target, *, size=SIZE, up=(0, 0, 1)):
-    import mitsuba as mi
-
-    look = mi.ScalarTransform4f().look_at(list(origin), list(target), list(up))
-    return {"sensor": tiny_scene(size=size)["sensor"] | {"to_world": look}}
-
-
-def bars(count=14):
-    """Bars between the light and the rays of a camera that looks along them."""
-    import mitsuba as mi
-
-    def bar(number):
-        place = mi.ScalarTransform4f().translate([-1.6 + 0.25 * number, 0.9, 1.0])
-        return {"type": "cube", "to_world": place.scale([0.05, 0.03, 2.0])}
-
-    return {f"bar{number}": bar(number) for number in range(count)}
-
-
-def fence():
-    return (
-        camera((-3.9, 1.7, 1.4), (2.3, 1.43, 0.9), size=(28, 20))
-        | {"lamp": lamp(0.1, -0.9, 1.2), "ball": None}
-        | bars()
-    )
-
-
-def coloured_fog():
-    colours = {"type": "rgb", "value": [0.1, 0.4, 0.9]}
-    return {"type": "homogeneous", "id": "fog", "sigma_t": colours, "albedo": 0.8, "phase": {"type": "hg", "g": 0.5}}
-
-
-#: Changes of the tiny scene by name, and the size of the map. Cameras on the grid have a column in the middle.
-GRID = (33, 25)
-SCENES = {
-    "light beside the view": (dict, 64),
-    "light in view": (lambda: camera((-2.5, -2.2, 0.3), (0.9, 0.7, 1.9)), 64),
-    "light behind": (lambda: camera((1.7, 1.6, 2.9), (-0.9, -0.7, -0.1)), 64),
-    "looking away": (lambda: camera((0.9, -4.7, 1.9), (0.9, -9.7, 1.9)), 64),
-    "camera close to the light": (lambda: camera((0.9, 0.7001, 1.9), (0, 0, 0.9)), 64),
-    "camera in shadow": (lambda: camera((-0.5, -0.5, 0.1), (2, 1.5, 0.9)), 64),
-    "fence": (fence, 256),
-    "spot": (lambda: {"lamp": spot()}, 64),
-    "spot in view": (lambda: {"lamp": spot()} | camera((-2.5, -2.2, 0.3), (0.5, 0.0, 1.5)), 64),
-    "soft spot": (lambda: {"lamp": spot(cutoff=37.0, beam=19.0)}, 64),
-    "colour, HG": (lambda: {"fog": coloured_fog()}, 64),
-    "three lights": (lambda: {"second": lamp(-1, 1.4, 0.6), "third": spot(beam=11.0)}, 64),
-    "coarse map": (dict, 4),
-    "fine map": (lambda: camera((0.2, -4.1, 1.3), (0.1, 0.0, 0.6), size=(8, 6)), 1024),
-    "along a column of texels": (
-        lambda: camera((0, -4, 2), (0, 0, 2), size=GRID) | {"lamp": lamp(0, 0, 2.5)},
-        16,
-    ),
-    "along the axis of a face": (
-        lambda: camera((0, 0, 0.3), (0, 3, 0.3), size=GRID) | {"lamp": lamp(0, 0, 2.5)},
-        16,
-    ),
-    "along diagonals": (lambda: camera((-3, -3, 2), (0, 0, 2), size=GRID) | {"lamp": lamp(0, 0, 2.5)}, 4),
-    "along the border of two faces": (
-        lambda: camera((1, -4, 1.5), (1, 4, 1.5), size=GRID) | {"lamp": lamp(0, 0, 2.5)},
-        8,
-    ),
-}
+from tests.light_frames_for_tests import (
+    EVALUATIONS,
+    GRID,
+    SCENES,
+    camera,
+    differ,
+    lamp,
+    loaded_scene,
+    render,
+    render_both,
+    renderer_of,
+    twin_of,
+)
+from tests.scenes_for_tests import spot
 
 #: One of a kind; a kernel in float64, above all of a spot, takes seconds to compile.
 FEW = {
@@ -97,49 +38,6 @@ ALL = [
     for precision, few in FEW.items()
     for name in SCENES
 ]
-
-
-def loaded_scene(name="light beside the view", **changes):
-    import mitsuba as mi
-
-    return mi.load_dict(tiny_scene(size=changes.pop("size", SIZE), **(SCENES[name][0]() | changes)))
-
-
-def renderer_of(loaded, method="light-volumes", precision="single", **parameters):
-    from realtime.frame import frame_renderer
-    from realtime.kernels import KERNELS
-    from realtime.methods import METHODS
-    from realtime.scene import read_scene
-
-    kernel = KERNELS["exact"].function if METHODS[method].uses_kernel else None
-    return frame_renderer(read_scene(loaded, precision), METHODS[method], kernel=kernel, **parameters)
-
-
-def render(loaded, method="light-volumes", precision="single", **parameters):
-    from realtime.frame import render_frame
-
-    return render_frame(renderer_of(loaded, method, precision, **parameters))
-
-
-def render_both(loaded, precision="single", **parameters):
-    return [render(loaded, precision=precision, evaluation=one, **parameters) for one in EVALUATIONS]
-
-
-def differ(found, wanted):
-    """Return the largest difference, relative to the largest value."""
-    return np.max(np.abs(found - wanted)) / np.max(wanted)
-
-
-def twin_of(loaded, frame, size, precision="single"):
-    """Return the airlight of the map that a frame was rendered with, by another route."""
-    from realtime.scene import read_scene
-    from realtime.shadow_map import cast_shadow_map
-    from reference.scene import read_truth
-    from validation.volume_twin import twin_airlight
-
-    scene = read_scene(loaded, precision)
-    maps = [cast_shadow_map(scene.geometry, light, size) for light in scene.lights]
-    return twin_airlight(read_truth(loaded), maps, distance=frame.distance)
 
 
 @pytest.mark.parametrize(("name", "precision"), ALL)
@@ -338,110 +236,3 @@ def test_a_light_outside_the_bounds_of_the_scene(variant):
     for frame in frames:
         assert differ(frame.airlight, wanted) < 1e-5
     assert np.max(np.abs(wanted - render(loaded, "unshadowed").airlight)) > 0.01 * np.max(wanted)
-
-
-@pytest.mark.parametrize(
-    ("parameters", "message"),
-    [
-        ({"map": 500}, "map: got 500, wanted a power of two from 4 to 8192"),
-        ({"map": 2}, "map: got 2, wanted"),
-        ({"evaluation": "march"}, "evaluation: got 'march', wanted one of walk, mesh"),
-        ({"evaluation": "mesh", "tessellation": "fine"}, "tessellation: got 'fine', wanted one of static, adaptive"),
-        ({"tessellation": "adaptive"}, "tessellation=adaptive: got evaluation=walk.*; wanted evaluation=mesh"),
-        ({"threshold": 0.0}, "threshold: got 0.0, wanted a positive number"),
-        ({"threshold": float("nan")}, "threshold: got nan"),
-    ],
-)
-@pytest.mark.parametrize("floor", ["casters", "none"])
-def test_bad_parameters_are_named_with_casters_and_without(variant, floor, parameters, message):
-    loaded = loaded_scene(size=(4, 4), **({} if floor == "casters" else {"ball": None, "floor": None}))
-    with pytest.raises(InputError, match=message):
-        renderer_of(loaded, **parameters)
-
-
-@pytest.mark.parametrize(
-    ("method", "parameters", "message"),
-    [
-        ("shadow-planes", {"order": "depth"}, "order: got 'depth'"),
-        ("ray-march", {"map": 500}, "map: got 500"),
-        ("min-max", {"sampling": "rows"}, "sampling: got 'rows'"),
-    ],
-)
-def test_other_methods_check_their_parameters_without_casters(variant, method, parameters, message):
-    with pytest.raises(InputError, match=message):
-        renderer_of(loaded_scene(size=(4, 4), ball=None, floor=None), method, **parameters)
-
-
-def test_a_mesh_is_for_media_without_bounds(variant):
-    import mitsuba as mi
-
-    ball = body({"type": "sphere", "center": [0.1, 0.2, 0.9], "radius": 0.4}, 0.7, (0.9, 0.8, 0.7))
-    loaded = mi.load_dict(clear_scene(cloud=ball))
-    with pytest.raises(InputError, match=r"evaluation=mesh: the scene has a medium with bounds.*evaluation=walk"):
-        renderer_of(loaded, evaluation="mesh")
-    assert np.max(render(loaded, map=16).airlight) > 0
-
-
-@pytest.mark.parametrize("evaluation", EVALUATIONS)
-def test_memory_is_counted_before_it_is_taken(variant, monkeypatch, evaluation):
-    import realtime.light_volumes
-    import realtime.memory
-
-    def never(*args):
-        raise AssertionError("a map was cast")
-
-    loaded = loaded_scene(size=(4, 4))
-    monkeypatch.setattr(realtime.memory, "machine_memory", lambda: 10**9)
-    with monkeypatch.context() as patch:
-        patch.setattr(realtime.light_volumes, "cast_shadow_map", never)
-        message = r"map: 4096 texels for 1 light\(s\): needs [0-9.]+ GB of memory, this machine has 1 GB; use a smaller"
-        with pytest.raises(InputError, match=message):
-            renderer_of(loaded, map=4096, evaluation=evaluation)
-    render(loaded, map=64, evaluation=evaluation)
-
-
-def test_memory_that_is_needed_is_what_the_arrays_hold(variant):
-    """Of a map of 8192 texels by proportion: nothing grows faster."""
-    import realtime.light_volumes
-    from realtime.light_heights import light_heights
-    from realtime.scene import read_scene
-    from realtime.shadow_map import cast_shadow_map
-
-    scene = read_scene(loaded_scene())
-    shadow_map = cast_shadow_map(scene.geometry, scene.lights[0], 64)
-    heights = light_heights(shadow_map)
-    held = 4 * (2 * len(shadow_map.distance) + len(heights.texels) + len(heights.bounds))
-    assert realtime.light_volumes._memory_of(scene.lights[0], 64, "walk") == held
-
-
-def run_command(*arguments):
-    from reports import cli
-
-    return cli.run(["render", *arguments, "--method", "light-volumes"])
-
-
-def test_the_command_renders_meshes(variant, tmp_path):
-    from reference.exr import read_exr
-
-    images = []
-    for mesh in ([], ["--set", "evaluation=mesh", "--set", "tessellation=adaptive", "--set", "threshold=1e-4"]):
-        arguments = ["sphere-spot", "--size", "20x15", "--frames", "1", "--set", "map=128", *mesh]
-        assert run_command(*arguments, "-o", str(tmp_path / "image.exr")) == 0
-        images.append(read_exr(tmp_path / "image-0001.exr").layers["airlight"])
-    assert differ(*images) < 1e-3
-    assert np.any(images[0] != images[1])
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["sphere-spot", "--set", "map=500"], "map: got 500, wanted a power of two from 4 to 8192"),
-        (["open-fog", "--set", "tessellation=adaptive"], "wanted evaluation=mesh with it"),
-        (["three-media", "--set", "evaluation=mesh"], "use evaluation=walk"),
-    ],
-)
-def test_the_command_refuses_in_one_line(variant, capfd, arguments, message):
-    assert run_command(*arguments, "--size", "4x3") == 2
-    error = capfd.readouterr().err
-    assert message in error
-    assert error.count("\n") == 1

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import numpy as np
 
-from tests.realtime.test_light_volumes import differ, fence, render
+from tests.light_frames_for_tests import differ, fence, render
 from tests.scenes_for_tests import tiny_scene
 
 
