@@ -41,6 +41,11 @@ def array_types(precision: str = "single") -> ArrayTypes:
     raise InputError(f"precision: got {precision!r}, wanted one of {', '.join(PRECISIONS)}")
 
 
+def types_of(Float) -> ArrayTypes:
+    """Return the array types of the precision of a number type."""
+    return array_types("single" if is_single(Float) else "double")
+
+
 def is_single(Float) -> bool:
     """Return whether a number type is float32; Python's float, the number of the scalar backend, is not."""
     import drjit as dr

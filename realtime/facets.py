@@ -7,6 +7,7 @@ A scene with anything else is shaded by Mitsuba's interaction.
 """
 
 from dataclasses import dataclass
+from itertools import accumulate
 from typing import Any
 
 from realtime.arrays import ArrayTypes, four_numbers
@@ -36,8 +37,8 @@ def read_facets(scene, types: ArrayTypes) -> Facets | None:
     numbers = [int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))[0]) for shape in shapes]
     counts = [shape.face_count() for shape in shapes]
     first = [0] * (max(numbers) + 1)
-    for place, number in enumerate(numbers):
-        first[number] = sum(counts[:place])
+    for number, before in zip(numbers, accumulate(counts, initial=0)):
+        first[number] = before
     smooth = any(_is_smooth(shape) for shape in shapes)
     rows = [_of_shape(shape, types, smooth) for shape in shapes]
     normals, albedos = ([row[k] for row in rows] for k in range(2))

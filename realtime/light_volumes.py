@@ -22,11 +22,10 @@ from typing import Any
 
 from realtime.arrays import is_single
 from realtime.errors import InputError
-from realtime.geometry import clip_to_cone, ray_geometry
 from realtime.light_heights import LightHeights, level_start, light_heights
 from realtime.lights import Light
 from realtime.memory import check_memory
-from realtime.ray_airlight import RayAirlight
+from realtime.ray_airlight import RayAirlight, integral_type, ray_airlight
 from realtime.scene import Scene
 from realtime.shadow_map import cast_shadow_map, check_size
 from realtime.view import View, rays_in_media
@@ -94,17 +93,13 @@ def light_volumes(
     in_media = rays_in_media(view) if view.plan.bounded else ()
     for number, light in enumerate(view.lights):
         if evaluation == "mesh" and view.plan.shadows:
-            total += mesh_airlight(view, light, view.prepared[number], view.camera, view.pixel, kernel=kernel)
+            total += mesh_airlight(view, light, view.prepared[number], kernel=kernel)
             continue
-        geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
-        airlight = RayAirlight(view, light, geometry, kernel, in_media[number] if in_media else None)
-        segment = type(view.distance)(0), view.distance
-        if light.kind == "spot":
-            segment = clip_to_cone(geometry, *segment)
+        airlight = ray_airlight(view, light, kernel, in_media[number] if in_media else None)
         if view.plan.shadows:
-            value, reached = _walk(view.prepared[number], airlight, segment)
+            value, reached = _walk(view.prepared[number], airlight)
         else:
-            value, reached = airlight.radiance(airlight.integral(*segment)), True
+            value, reached = airlight.radiance(airlight.integral(*airlight.segment)), True
         total += value
         lit.append(reached)
     return (total, tuple(lit)) if finds_lit_surfaces({"evaluation": evaluation, "surface": surface}) else total
@@ -115,8 +110,8 @@ def finds_lit_surfaces(settings: Mapping[str, Any]) -> bool:
     return settings["evaluation"] == "walk" and settings["surface"] == "map"
 
 
-def _walk(heights: LightHeights, airlight: RayAirlight, segment):
-    """Return the airlight of one light along segments of the rays [W/(m^2 sr)], and whether it reaches their ends."""
+def _walk(heights: LightHeights, airlight: RayAirlight):
+    """Return the airlight of one light along the rays [W/(m^2 sr)], and whether it reaches their ends."""
     import drjit as dr
 
     view = airlight.view
@@ -124,8 +119,8 @@ def _walk(heights: LightHeights, airlight: RayAirlight, segment):
     leaves = tile_leaves(
         heights, lambda lane: view.rays(lane)[0], view.distance, light=toward, square=view.square_tiles
     )
-    zero = dr.zeros(airlight.number, dr.width(view.distance))
-    place = {"away": -toward, "direction": view.direction, "segment": segment}
+    zero = dr.zeros(integral_type(view), dr.width(view.distance))
+    place = {"away": -toward, "direction": view.direction, "segment": airlight.segment}
     value, reached = sum_lit_pieces(heights, leaves, **place, integral=airlight.integral, zero=zero)
     return airlight.radiance(value), reached
 

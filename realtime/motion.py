@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.arrays import array_types, is_single
+from realtime.arrays import types_of
 from realtime.casters import Casters
 from realtime.errors import InputError
 from realtime.facets import read_facets
@@ -133,8 +133,7 @@ def turned_objects(scene: Scene, objects: Objects, turn: Array) -> Scene:
         middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
         positions[name] = (vertices - middle) @ turn.T + middle
     moved = replace_positions(objects.parameters, positions)
-    precision = "single" if is_single(type(scene.camera.origin.x)) else "double"
-    facets = scene.facets and read_facets(scene.geometry, array_types(precision))
+    facets = scene.facets and read_facets(scene.geometry, types_of(type(scene.camera.origin.x)))
     return replace(scene, positions=moved, facets=facets)
 
 

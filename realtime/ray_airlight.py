@@ -5,11 +5,23 @@ from dataclasses import dataclass
 from typing import Any
 
 from realtime.bounded_media import bounded_airlight
-from realtime.geometry import RayGeometry
+from realtime.geometry import RayGeometry, clip_to_cone, ray_geometry
 from realtime.kernels import airlight_integral, gamma
 from realtime.lights import Light
 from realtime.media_rays import MediaRay
 from realtime.view import View, bounded_radiance, radiance
+
+
+def integral_type(view: View) -> Any:
+    """Return the type of an integral: a number for a grey medium, a colour otherwise."""
+    grey = len(view.medium.sigma_t) == 1 and not view.plan.bounded
+    return type(view.distance) if grey else type(view.medium.albedo)
+
+
+def ray_airlight(view: View, light: Light, kernel, media: MediaRay | None = None) -> "RayAirlight":
+    """Return the airlight of a light along the rays of a view; `media` where media are bounded."""
+    geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
+    return RayAirlight(view, light, geometry, kernel, media)
 
 
 @dataclass(frozen=True)
@@ -23,10 +35,10 @@ class RayAirlight:
     media: MediaRay | None  #: where media are bounded
 
     @property
-    def number(self) -> Any:
-        """The type of an integral: a number for a grey medium, a colour otherwise."""
-        grey = len(self.view.medium.sigma_t) == 1 and not self.media
-        return type(self.view.distance) if grey else type(self.view.medium.albedo)
+    def segment(self) -> tuple[Any, Any]:
+        """The part of the rays that the light could reach: up to the visible surface, in the cone of a spot [m]."""
+        x0, x1 = type(self.view.distance)(0), self.view.distance
+        return clip_to_cone(self.geometry, x0, x1) if self.light.kind == "spot" else (x0, x1)
 
     def integral(self, x0, x1):
         """Return the integral over a segment; `radiance` knows its units."""

@@ -22,11 +22,10 @@ difference of the two Gammas instead, as the paper does.
 
 from dataclasses import dataclass, replace
 
-from realtime.arrays import array_types, is_single
+from realtime.arrays import types_of
 from realtime.bounded_media import FORMS, ambient_radiance, check_form
 from realtime.casters import Casters, read_casters, with_positions
 from realtime.errors import InputError
-from realtime.geometry import clip_to_cone, ray_geometry
 from realtime.lights import Light
 from realtime.media_rays import MediaRay
 from realtime.plane_cone import cone_ring
@@ -36,7 +35,7 @@ from realtime.plane_mesh import mesh_gamma, surface_gamma
 from realtime.plane_sweep import RayPlanes, in_light_frame, ray_planes, sum_lit_segments
 from realtime.plane_tiles import Lists, tile_lists
 from realtime.plane_view import bodies_in_view
-from realtime.ray_airlight import RayAirlight
+from realtime.ray_airlight import RayAirlight, integral_type, ray_airlight
 from realtime.scene import Scene
 from realtime.view import View, rays_in_media
 
@@ -84,7 +83,7 @@ def light_planes(casters: Casters, scene: Scene, light: Light, *, cone: int = 0)
     ring = None
     if cone and light.kind == "spot":
         ring = cone_ring(np.array(light.axis, dtype=np.float64).ravel(), float(light.cos_cutoff[0]), cone)
-    types = array_types("single" if is_single(type(scene.camera.origin.x)) else "double")
+    types = types_of(type(scene.camera.origin.x))
     return index_planes(casters, position, camera, used=used, types=types, ring=ring)
 
 
@@ -162,8 +161,7 @@ def shadow_planes(
     for number, light in enumerate(view.lights):
         if cone and light.kind == "spot" and not light.soft and view.plan.shadows:
             light = replace(light, kind="point")  # planes bound it
-        geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
-        airlight = RayAirlight(view, light, geometry, kernel, in_media[number] if in_media else None)
+        airlight = ray_airlight(view, light, kernel, in_media[number] if in_media else None)
         if not view.plan.shadows:
             total += airlight.radiance(airlight.integral(type(view.distance)(0), view.distance))
             lit.append(True)
@@ -203,16 +201,13 @@ def _segments(index: PlaneIndex, lists: Lists, rays: RayPlanes, airlight: RayAir
     """Sum the lit segments of one light."""
     import drjit as dr
 
-    view, light = airlight.view, airlight.light
-    x0, x1 = type(view.distance)(0), view.distance
-    if light.kind == "spot":
-        x0, x1 = clip_to_cone(airlight.geometry, x0, x1)
+    view = airlight.view
 
     def integral(a, b):
         return airlight.gamma(b) - airlight.gamma(a) if differences else airlight.integral(a, b)
 
-    zero = dr.zeros(airlight.number, dr.width(view.distance))
-    value, reached = sum_lit_segments(index, lists, rays, (x0, x1), integral, zero)
+    zero = dr.zeros(integral_type(view), dr.width(view.distance))
+    value, reached = sum_lit_segments(index, lists, rays, airlight.segment, integral, zero)
     return airlight.radiance(value), reached
 
 

@@ -10,7 +10,6 @@ from collections.abc import Iterable
 from dataclasses import fields
 from typing import Any
 
-from realtime.camera import Camera
 from realtime.geometry import RayGeometry, ray_geometry
 from realtime.kernels import airlight_integral
 from realtime.lights import Light
@@ -93,21 +92,17 @@ def crossing_sum(
     return Float(total) if grey else type(medium.albedo)(total)
 
 
-def mesh_airlight(view: View, light: Light, mesh: VolumeMesh, camera: Camera, pixel, *, kernel, batch: int = BATCH):
+def mesh_airlight(view: View, light: Light, mesh: VolumeMesh, *, kernel, batch: int = BATCH):
     """Return the airlight of one light by the triangles of its light volume [W/(m^2 sr)].
 
     Parameters
     ----------
     view
-        The frame; its rays are those of all pixels of the camera, in the order of `pixel`.
+        The frame; its rays are those of all pixels of its camera.
     light
         The light.
     mesh
         Its light volume, closed.
-    camera
-        The camera.
-    pixel
-        Pixel number of every ray.
     kernel
         An airlight kernel function.
     batch
@@ -126,11 +121,11 @@ def mesh_airlight(view: View, light: Light, mesh: VolumeMesh, camera: Camera, pi
     import mitsuba as mi
 
     geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
-    lane = dr.zeros(mi.UInt32, camera.width * camera.height)
-    dr.scatter(lane, dr.arange(mi.UInt32, dr.width(pixel)), pixel)
+    lane = dr.zeros(mi.UInt32, view.camera.width * view.camera.height)
+    dr.scatter(lane, dr.arange(mi.UInt32, dr.width(view.pixel)), view.pixel)
     distance = view.distance
     dr.eval(geometry, lane, distance)  # every crossing reads them
     rays = {"geometry": geometry, "distance": distance, "medium": view.medium, "light": light, "lane": lane}
     return radiance(
-        view.medium, light, crossing_sum(signed_crossings(mesh, camera, batch=batch), kernel=kernel, **rays)
+        view.medium, light, crossing_sum(signed_crossings(mesh, view.camera, batch=batch), kernel=kernel, **rays)
     )

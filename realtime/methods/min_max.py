@@ -16,7 +16,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from realtime.camera import Camera
 from realtime.epipolar import Slices, image_point, image_slices, neighbour, pixel_number, slice_coordinate
 from realtime.epipolar_heights import SliceHeights, slice_heights
 from realtime.epipolar_samples import (
@@ -32,12 +31,12 @@ from realtime.epipolar_samples import (
 )
 from realtime.epipolar_walk import sum_lit_pieces
 from realtime.errors import InputError
-from realtime.geometry import clip_to_cone, distance_to_light, ray_geometry
+from realtime.geometry import distance_to_light
 from realtime.light_heights import inverse_depth
 from realtime.lights import Light
 from realtime.medium import transmittance
 from realtime.phase import evaluate
-from realtime.ray_airlight import RayAirlight
+from realtime.ray_airlight import RayAirlight, integral_type, ray_airlight
 from realtime.scene import Scene
 from realtime.shadow_map import ShadowMap, cast_shadow_map, check_size
 from realtime.view import View, rays_in_media
@@ -51,7 +50,6 @@ class EpipolarMap:
 
     shadow_map: ShadowMap
     heights: Any  #: inverse planar depths at the corners of its texels [1/m]
-    camera: Camera
 
 
 def min_max(
@@ -95,12 +93,11 @@ def min_max(
     total = type(view.medium.albedo)(0)
     for number, light in enumerate(view.lights):
         airlight = _ray_airlight(view, number, kernel)
-        x0, x1 = _segment(airlight)
         if not view.plan.shadows:
-            total += airlight.radiance(airlight.integral(x0, x1))
+            total += airlight.radiance(airlight.integral(*airlight.segment))
             continue
         found: EpipolarMap = view.prepared[number]
-        camera = found.camera
+        camera = view.camera
         cut = image_slices(camera, light, slices or max(4, (camera.width + camera.height) // 2))
         heights = slice_heights(found.shadow_map, found.heights, cut, light)
         point = image_point(camera, view.direction)
@@ -110,7 +107,7 @@ def min_max(
         count = samples or max(2, camera.width, camera.height) // 2
         count = (count + WORD - 1) // WORD * WORD
         drawn = mark_samples(cut, _depth_image(cut, point, view.distance), count=count, step=step)
-        shares = _sampled_shares(view, number, kernel, drawn, heights, camera)
+        shares = _sampled_shares(view, number, kernel, drawn, heights)
         total += airlight.radiance(_interpolated(airlight, drawn, shares, heights, point))
     return total
 
@@ -143,32 +140,22 @@ def _epipolar_map(scene: Scene, light: Light, size: int) -> EpipolarMap:
     shadow_map = cast_shadow_map(scene.geometry, light, size)
     heights = inverse_depth(shadow_map)
     dr.eval(heights)
-    return EpipolarMap(shadow_map, heights, scene.camera)
+    return EpipolarMap(shadow_map, heights)
 
 
 def _ray_airlight(view: View, number: int, kernel) -> RayAirlight:
     """Return the airlight of one light along the rays of a view."""
     light = view.lights[number]
-    geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
     media = rays_in_media(replace(view, lights=(light,)))[0] if view.plan.bounded else None
-    return RayAirlight(view, light, geometry, kernel, media)
-
-
-def _segment(airlight: RayAirlight):
-    """Return the part of the rays that the light could reach [m]."""
-    light, distance = airlight.light, airlight.view.distance
-    x0 = type(distance)(0)
-    return clip_to_cone(airlight.geometry, x0, distance) if light.kind == "spot" else (x0, distance)
+    return ray_airlight(view, light, kernel, media)
 
 
 def _lit_integral(airlight: RayAirlight, heights: SliceHeights, number, active=True):
     """Return the integral over the lit pieces of rays, each in a slice; 0 where not `active`."""
     import drjit as dr
 
-    x0, x1 = _segment(airlight)
-    view = airlight.view
-    grey = len(view.medium.sigma_t) == 1 and not airlight.media
-    zero = dr.zeros(type(view.distance) if grey else type(view.medium.albedo), dr.width(view.distance))
+    x0, x1 = airlight.segment
+    zero = dr.zeros(integral_type(airlight.view), dr.width(airlight.view.distance))
     ends = x0, dr.select(active, x1, x0)
     return sum_lit_pieces(heights, number, airlight.geometry, ends, airlight.integral, zero)
 
@@ -191,14 +178,14 @@ def _depth_image(slices: Slices, point, distance):
     return image
 
 
-def _sampled_shares(view: View, number: int, kernel, samples: Samples, heights: SliceHeights, camera: Camera):
+def _sampled_shares(view: View, number: int, kernel, samples: Samples, heights: SliceHeights):
     """Return by sample, of those that are marked, the share of its airlight that is lit."""
     import drjit as dr
     import mitsuba as mi
 
     marked, count = marked_samples(samples)
-    grey = len(view.medium.sigma_t) == 1 and not view.plan.bounded
-    shares = dr.empty(type(view.distance) if grey else type(view.medium.albedo), dr.width(marked))
+    camera = view.camera
+    shares = dr.empty(integral_type(view), dr.width(marked))
 
     def computed(lane):
         sample = dr.gather(mi.UInt32, marked, lane)
@@ -226,7 +213,7 @@ def _yardstick(airlight: RayAirlight):
     """
     import drjit as dr
 
-    x0, x1 = _segment(airlight)
+    x0, x1 = airlight.segment
     if airlight.media:
         return airlight.integral(x0, x1)
     geometry, medium = airlight.geometry, airlight.view.medium

@@ -57,7 +57,7 @@ def test_sum_over_a_convex_volume_is_one_integral(variant, kind, order):
 
 
 def view_of(scene):
-    """Return the view of a scene's frame, and the pixel of every ray."""
+    """Return the view of a scene's frame."""
     import mitsuba as mi
 
     from realtime.camera import ray_directions, tiled_pixels
@@ -69,7 +69,7 @@ def view_of(scene):
     direction = ray_directions(camera, pixel)[0]
     distance = visible_surface(scene.geometry, None, camera.origin, direction, color=mi.Color3f).distance
     parts = {"plan": scene.plan, "geometry": scene.geometry, "medium": scene.medium, "lights": scene.lights}
-    return frame_view(camera, pixel, distance, **parts, prepared=()), pixel
+    return frame_view(camera, pixel, distance, **parts, prepared=())
 
 
 @pytest.mark.parametrize("kind", ["point", "spot"])
@@ -92,10 +92,10 @@ def test_a_frame_is_that_of_the_height_field(variant, kind, precision):
     scene = read_scene(loaded, precision)
     light = scene.lights[0]
     shadow_map = cast_shadow_map(scene.geometry, light, 32)
-    view, pixel = view_of(scene)
-    lanes = mesh_airlight(view, light, volume_mesh(shadow_map, light), scene.camera, pixel, kernel=exact)
+    view = view_of(scene)
+    lanes = mesh_airlight(view, light, volume_mesh(shadow_map, light), kernel=exact)
     found, distance = np.empty((40 * 28, 3)), np.empty(40 * 28)
-    found[np.array(pixel)], distance[np.array(pixel)] = np.array(lanes).T, np.array(view.distance)
+    found[np.array(view.pixel)], distance[np.array(view.pixel)] = np.array(lanes).T, np.array(view.distance)
     wanted = twin_airlight(read_truth(loaded), [shadow_map], distance=distance.reshape(28, 40)).reshape(-1, 3)
     # The scene holds its numbers in float32, 6e-8 each; float32 adds the kernel's 5e-6 and the rounding of the cone.
     tolerance = 3e-7 if precision == "double" else 1e-5
