@@ -198,8 +198,12 @@ def _sampled_shares(view: View, number: int, kernel, samples: Samples, heights: 
         return lane
 
     lane = spread(dr.width(marked))
-    # Most of the room is empty: a branch steps over it.
-    dr.if_stmt(args=(lane,), cond=lane < count, true_fn=computed, false_fn=lambda lane: lane)
+    if view.plan.bounded:
+        # The planes of bodies are written to a table first, which no branch may do: empty room repeats the last sample.
+        computed(dr.minimum(lane, dr.maximum(count, 1) - 1))
+    else:
+        # Most of the room is empty: a branch steps over it.
+        dr.if_stmt(args=(lane,), cond=lane < count, true_fn=computed, false_fn=lambda lane: lane)
     dr.eval(shares)
     return shares
 

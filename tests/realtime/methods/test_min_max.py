@@ -224,3 +224,23 @@ def test_bad_parameters_are_refused(variant, settings):
     (name,) = settings
     with pytest.raises(InputError, match=f"{name}: got"):
         render(scene_with(), "min-max", **settings)
+
+
+def test_samples_in_a_medium_bounded_by_a_mesh(variant):
+    """The planes of a mesh are written to a table on the way, which a branch over the samples must not hold."""
+    from realtime.frame import frame_renderer, render_frame
+    from realtime.kernels.exact import exact
+    from realtime.methods import METHODS
+    from realtime.scene import read_scene
+    from validation.load import load_scene
+
+    scene = read_scene(load_scene("three-media", (32, 24)).scene)
+    settings = {"map": 64, "samples": 1024, "slices": 400, "step": 4}
+    images = [
+        render_frame(frame_renderer(scene, METHODS["min-max"], kernel=exact, sampling=one, **settings)).airlight
+        for one in ("slices", "pixels")
+    ]
+    assert all(np.all(np.isfinite(image)) for image in images)
+    assert np.mean(images[1]) > 0
+    # The slices only interpolate between samples that the pixels take one by one: dense enough, the mean agrees.
+    assert abs(np.mean(images[0]) / np.mean(images[1]) - 1) < 0.01
