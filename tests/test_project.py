@@ -133,7 +133,8 @@ def _project() -> dict:
 def test_the_lock_pins_what_the_project_asks_for_and_all_that_it_needs():
     locked = _locked()
     project = _project()
-    waiting = [Requirement(text) for text in project["dependencies"] + project["optional-dependencies"]["test"]]
+    extras = project["optional-dependencies"]
+    waiting = [Requirement(text) for text in project["dependencies"] + extras["test"] + extras["docs"]]
     checked = set()
     while waiting:
         wanted = waiting.pop()
