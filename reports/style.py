@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How every chart looks: one colour and marker for each method and for each kernel, and the style sheets for papers.
+
+The colours are six of Okabe and Ito 2008, *Color Universal Design*, and two darker ones. Under normal sight and for
+whoever lacks one kind of cones (Machado, Oliveira, Fernandes 2009, severity 1) any two differ by more than
+`LEAST_DIFFERENCE` in CIEDE2000; no chart leaves a distinction to the colour alone, each has its marker too. Variants of
+one method (its kernel, its parameters) keep colour and marker and differ by the filling of the marker and the dashes of
+the line.
+
+Nothing heavy is imported at the top, and nothing is set: `figure_style` changes matplotlib's settings for a block.
+"""
+
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from analytic.errors import InputError
+
+#: Of any two of `COLOURS`, in CIEDE2000, under normal sight and without one kind of cones.
+LEAST_DIFFERENCE = 10.0
+
+COLOURS: Mapping[str, str] = {
+    "blue": "#0072b2",
+    "vermillion": "#d55e00",
+    "green": "#009e73",
+    "purple": "#cc79a7",
+    "sky": "#56b4e9",
+    "orange": "#e69f00",
+    "wine": "#882255",
+    "navy": "#1b3a8a",
+}
+
+#: Width of a figure [inches] by column.
+WIDTHS: Mapping[str, float] = {"single": 3.5, "double": 7.16}
+
+_METHODS = {
+    "unshadowed": ("sky", "o"),
+    "ray-march": ("vermillion", "s"),
+    "shadow-planes": ("blue", "^"),
+    "light-volumes": ("green", "D"),
+    "min-max": ("purple", "v"),
+}
+_OTHERS = (("orange", "P"), ("wine", "X"), ("navy", "*"))  # methods of users and images of engines
+# Kernels that are variants of one idea share the colour.
+_KERNELS = {
+    "exact": ("blue", "o"),
+    "quadrature": ("green", "s"),
+    "quadrature-theta": ("green", "^"),
+    "taylor": ("vermillion", "v"),
+    "taylor-printed": ("vermillion", "x"),
+    "polynomial": ("purple", "D"),
+    "equiangular": ("orange", "<"),
+    "uniform": ("orange", ">"),
+    "table": ("sky", "P"),
+    "table-tail": ("sky", "X"),
+    "closed-form": ("wine", "*"),
+}
+_OTHER_KERNEL = ("navy", "h")
+_FILLS = ("full", "none", "left", "right", "top", "bottom")
+_DASHES = ("-", "--", ":", "-.")
+
+_SHEETS = Path(__file__).parent / "styles"
+
+
+def method_style(method: str, variant: int = 0) -> dict[str, Any]:
+    """Return matplotlib's properties of a method's markers and lines.
+
+    Parameters
+    ----------
+    method
+        Its name. One that is not built in ('module:function', an image) has one of three styles kept for such, always
+        the same for the same name; `report_styles` keeps several apart.
+    variant
+        Which of its variants: other fillings of the same marker, all different up to the twelfth.
+
+    Returns
+    -------
+    dict
+        `color`, `marker`, `fillstyle`, `markerfacecoloralt` and `markeredgecolor`.
+    """
+    colour, marker = _METHODS.get(method) or _OTHERS[zlib.crc32(method.encode()) % len(_OTHERS)]
+    return _marker_style(colour, marker, variant)
+
+
+def kernel_style(kernel: str, variant: int = 0) -> dict[str, Any]:
+    """Return matplotlib's properties of a kernel's markers and lines; 'name-N' looks like 'name'."""
+    base, _, digits = kernel.rpartition("-")
+    name = base if digits.isdecimal() and base in _KERNELS else kernel
+    return _marker_style(*_KERNELS.get(name, _OTHER_KERNEL), variant)
+
+
+def truth_style() -> dict[str, Any]:
+    """Return matplotlib's properties of the line of what is known: black, without markers."""
+    return {"color": "black", "linestyle": "-", "linewidth": 1.3}
+
+
+def dashes(variant: int) -> str:
+    """Return the line style of a variant."""
+    return _DASHES[variant % len(_DASHES)]
+
+
+def report_styles(scenes: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+    """Return the marker style of every label of a report, the same in its page and in all figures made from it.
+
+    Variants of a method are numbered in the order in which the scenes name them. Of methods that are not built in the
+    first three have styles of their own.
+
+    Parameters
+    ----------
+    scenes
+        The scenes of report.json.
+    """
+    variants: dict[str, list[str]] = {}
+    for scene in scenes:
+        for one in scene["methods"]:
+            labels = variants.setdefault(one["method"], [])
+            if one["label"] not in labels:
+                labels.append(one["label"])
+    others = [method for method in variants if method not in _METHODS]
+    styles = {}
+    for method, labels in variants.items():
+        for number, label in enumerate(labels):
+            if method in others:
+                colour, marker = _OTHERS[others.index(method) % len(_OTHERS)]
+                styles[label] = _marker_style(colour, marker, number)
+            else:
+                styles[label] = method_style(method, number)
+    return styles
+
+
+@contextmanager
+def figure_style(column: str = "double", extra: Sequence[str] = ()) -> Iterator[float]:
+    """Use the style sheets for papers for a block; give the width of the column [inches].
+
+    Parameters
+    ----------
+    column
+        'single' (3.5 inches) or 'double' (7.16 inches).
+    extra
+        Further style sheets of matplotlib, by name or path, on top of ours.
+
+    Raises
+    ------
+    InputError
+        For another column or a style sheet that matplotlib does not find.
+    """
+    import matplotlib.style
+
+    if column not in WIDTHS:
+        raise InputError(f"column: got {column!r}, wanted one of {', '.join(WIDTHS)}")
+    sheets = [str(_SHEETS / "airlight.mplstyle"), str(_SHEETS / f"{column}.mplstyle"), *extra]
+    try:
+        context = matplotlib.style.context(sheets, after_reset=True)
+        context.__enter__()
+    except OSError as error:
+        raise InputError(f"style: got {', '.join(extra)}, wanted style sheets of matplotlib: {error}") from error
+    try:
+        yield WIDTHS[column]
+    finally:
+        context.__exit__(None, None, None)
+
+
+def _marker_style(colour: str, marker: str, variant: int) -> dict[str, Any]:
+    second_round = (variant // len(_FILLS)) % 2
+    return {
+        "color": COLOURS[colour],
+        "marker": marker,
+        "fillstyle": _FILLS[variant % len(_FILLS)],
+        "markerfacecoloralt": "white",
+        "markeredgecolor": "black" if second_round else COLOURS[colour],
+    }
