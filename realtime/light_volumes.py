@@ -27,7 +27,7 @@ from realtime.lights import Light
 from realtime.memory import check_memory
 from realtime.ray_airlight import RayAirlight, integral_type, ray_airlight
 from realtime.scene import Scene
-from realtime.shadow_map import cast_shadow_map, check_size
+from realtime.shadow_map import cast_shadow_map, check_size, map_memory
 from realtime.view import View, rays_in_media
 from realtime.volume_mesh import THRESHOLD, memory_needed, volume_mesh
 from realtime.volume_sum import mesh_airlight
@@ -178,7 +178,7 @@ def _memory_of(light: Light, size: int, evaluation: str) -> int:
     """Return about how much the volume of a light takes, an upper bound where it is adaptive [bytes]."""
     number = 4 if is_single(type(light.position.x)) else 8
     faces = 1 if light.kind == "spot" else 6
-    corners = number * faces * (size + 1) ** 2
+    corners = map_memory(light, size)
     if evaluation == "mesh":
         # Drawing it takes four doubles for each vertex as it is, and four for it in the image.
         return corners + memory_needed(faces, size) + faces * (size + 1) ** 2 * 8 * 8

@@ -15,6 +15,7 @@ closely meets the same surface whatever the precision of the method, and one map
 from dataclasses import dataclass
 from typing import Any
 
+from realtime.arrays import is_single
 from realtime.errors import InputError
 from realtime.lights import Light
 
@@ -43,6 +44,12 @@ def check_size(size) -> None:
     """
     if not isinstance(size, int) or size < 4 or size > 8192 or size & (size - 1):
         raise InputError(f"map: got {size!r}, wanted a power of two from 4 to 8192")
+
+
+def map_memory(light: Light, size: int) -> int:
+    """Return how much the distances of the shadow map of a light take [bytes]."""
+    number = 4 if is_single(type(light.position.x)) else 8
+    return number * (1 if light.kind == "spot" else 6) * (size + 1) ** 2
 
 
 def cast_shadow_map(scene, light: Light, size: int) -> ShadowMap:

@@ -16,6 +16,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
+from realtime.arrays import is_single
+from realtime.camera import Camera
 from realtime.epipolar import Slices, image_point, image_slices, neighbour, pixel_number, slice_coordinate
 from realtime.epipolar_heights import SliceHeights, slice_heights
 from realtime.epipolar_samples import (
@@ -35,10 +37,11 @@ from realtime.geometry import distance_to_light
 from realtime.light_heights import inverse_depth
 from realtime.lights import Light
 from realtime.medium import transmittance
+from realtime.memory import check_memory
 from realtime.phase import evaluate
 from realtime.ray_airlight import RayAirlight, integral_type, ray_airlight
 from realtime.scene import Scene
-from realtime.shadow_map import ShadowMap, cast_shadow_map, check_size
+from realtime.shadow_map import ShadowMap, cast_shadow_map, check_size, map_memory
 from realtime.view import View, rays_in_media
 
 SAMPLINGS = ("slices", "pixels")
@@ -98,15 +101,14 @@ def min_max(
             continue
         found: EpipolarMap = view.prepared[number]
         camera = view.camera
-        cut = image_slices(camera, light, slices or max(4, (camera.width + camera.height) // 2))
+        cut = image_slices(camera, light, slices or _usual_slices(camera))
         heights = slice_heights(found.shadow_map, found.heights, cut, light)
         point = image_point(camera, view.direction)
         if sampling == "pixels":
             total += airlight.radiance(_lit_integral(airlight, heights, _nearest(cut, point)))
             continue
-        count = samples or max(2, camera.width, camera.height) // 2
-        count = (count + WORD - 1) // WORD * WORD
-        drawn = mark_samples(cut, _depth_image(cut, point, view.distance), count=count, step=step)
+        depth = _depth_image(cut, point, view.distance)
+        drawn = mark_samples(cut, depth, count=_whole_words(samples, camera), step=step)
         shares = _sampled_shares(view, number, kernel, drawn, heights)
         total += airlight.radiance(_interpolated(airlight, drawn, shares, heights, point))
     return total
@@ -120,7 +122,7 @@ def prepare_min_max(
     Raises
     ------
     InputError
-        For parameters out of range.
+        For parameters out of range, and for more memory than the machine has.
     """
     check_size(map)
     if sampling not in SAMPLINGS:
@@ -131,7 +133,30 @@ def prepare_min_max(
     if step not in STEPS:
         raise InputError(f"step: got {step!r}, wanted one of {', '.join(str(one) for one in STEPS)}")
 
+    if scene.plan.shadows:
+        held = sum(2 * map_memory(light, map) for light in scene.lights)
+        drawn = max((_memory_of_slices(scene, light, map, slices, samples) for light in scene.lights), default=0)
+        what = f"map: {map} texels, slices: {slices or _usual_slices(scene.camera)}"
+        check_memory(f"{what} for {len(scene.lights)} light(s)", held + drawn, "use a smaller map, or fewer slices")
     return lambda scene: tuple(_epipolar_map(scene, light, map) for light in scene.lights)
+
+
+def _usual_slices(camera: Camera) -> int:
+    return max(4, (camera.width + camera.height) // 2)
+
+
+def _whole_words(samples: int, camera: Camera) -> int:
+    """Return how many samples a slice has."""
+    count = samples or max(2, camera.width, camera.height) // 2
+    return (count + WORD - 1) // WORD * WORD
+
+
+def _memory_of_slices(scene: Scene, light: Light, size: int, slices: int, samples: int) -> int:
+    """Return about how much the slices of a light take [bytes]: per leaf its value, two bounds, four of the tree."""
+    number = 4 if is_single(type(light.position.x)) else 8
+    leaves = size if light.kind == "spot" else 2 * size
+    lanes = _whole_words(samples, scene.camera)
+    return (slices or _usual_slices(scene.camera)) * (number * 7 * leaves + lanes * (4 + 3 * number))
 
 
 def _epipolar_map(scene: Scene, light: Light, size: int) -> EpipolarMap:

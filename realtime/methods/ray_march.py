@@ -20,9 +20,10 @@ from realtime.geometry import RayGeometry, clip_to_cone, distance_to_light, fall
 from realtime.lights import Light
 from realtime.media_rays import MediaRay
 from realtime.medium import least_extinction, per_extinction
+from realtime.memory import check_memory
 from realtime.phase import evaluate
 from realtime.scene import Scene
-from realtime.shadow_map import ShadowMap, cast_shadow_map, check_size, lit_in_map
+from realtime.shadow_map import ShadowMap, cast_shadow_map, check_size, lit_in_map, map_memory
 from realtime.view import View, bounded_radiance, radiance, rays_in_media
 
 SPACINGS = ("equiangular", "uniform")
@@ -87,11 +88,13 @@ def prepare_maps(scene: Scene, *, shadow: str, map: int, **_) -> Callable[[Scene
     Raises
     ------
     InputError
-        If `map` is no size of a shadow map.
+        If `map` is no size of a shadow map, or needs more memory than the machine has.
     """
     check_size(map)
     if shadow != "map":
         return lambda scene: ()
+    needed = sum(map_memory(light, map) for light in scene.lights)
+    check_memory(f"map: {map} texels for {len(scene.lights)} light(s)", needed, "use a smaller map")
     return lambda scene: tuple(cast_shadow_map(scene.geometry, light, map) for light in scene.lights)
 
 

@@ -244,3 +244,18 @@ def test_samples_in_a_medium_bounded_by_a_mesh(variant):
     assert np.mean(images[1]) > 0
     # The slices only interpolate between samples that the pixels take one by one: dense enough, the mean agrees.
     assert abs(np.mean(images[0]) / np.mean(images[1]) - 1) < 0.01
+
+
+def test_memory_is_counted_before_it_is_taken(variant, monkeypatch):
+    import realtime.memory
+
+    monkeypatch.setattr(realtime.memory, "machine_memory", lambda: 10**9)
+    scene = scene_with()
+    message = r"needs [0-9.]+ GB of memory, this machine has 1 GB; use a smaller map"
+    with pytest.raises(InputError, match=r"map: 8192 texels, slices: .*" + message):
+        render(scene, "min-max", map=8192)
+    with pytest.raises(InputError, match=r"map: 512 texels, slices: 65536 .*" + message):
+        render(scene, "min-max", slices=65536)
+    with pytest.raises(InputError, match=r"map: 8192 texels .*" + message):
+        render(scene, "ray-march", shadow="map", map=8192)
+    assert np.all(np.isfinite(render(scene, "min-max", map=64)))
