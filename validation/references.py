@@ -42,7 +42,12 @@ def quadrature_reference(loaded: LoadedScene, *, pixel: str = "centre", progress
         if progress is not None:
             progress(done / total, what)
 
-    image = layered_truth(loaded.name, truth_image(loaded.scene, pixel=pixel, progress=tell))
+    return whole_truth(loaded, truth_image(loaded.scene, pixel=pixel, progress=tell), pixel=pixel)
+
+
+def whole_truth(loaded: LoadedScene, truth: TruthImage, *, pixel: str = "centre") -> Image:
+    """Return the quadrature truth of a loaded scene as layers; the header says of which bytes of the scene."""
+    image = layered_truth(loaded.name, truth)
     made = {"airlight:pixel": pixel, "airlight:scene_digest": scene_digest(loaded.scene)}
     return replace(image, attributes=dict(image.attributes) | made)
 

@@ -1,0 +1,323 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The Python API for images: load a scene, render it, compute its truth, compare.
+
+Every function chooses the Mitsuba variant that works here when it is first needed, and raises `airlight.InputError`
+with one line for what cannot be used. Results are frozen, see `reports.results`.
+"""
+
+import dataclasses
+from collections.abc import Callable
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Literal
+
+from analytic.errors import InputError
+from reports.api_inputs import ImageLike, OpenScene, Progress, SceneLike, Size, as_image, one_error, opened, telling
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from reports.results import ImageComparison, Reference, Rendering
+    from validation.budget import Budget
+
+USUAL_SAMPLES = 2048  #: a pixel, of an estimator that samples and is given no budget
+
+
+@one_error
+def load_scene(scene: SceneLike, size: Size | None = None) -> OpenScene:
+    """Load a scene.
+
+    Parameters
+    ----------
+    scene
+        A built-in name (`airlight.SCENES`), the path of a Mitsuba XML file, a Mitsuba dictionary, or a Mitsuba scene.
+    size
+        Width and height of its image [pixels], or 'WxH'; the scene's own by default.
+
+    Raises
+    ------
+    InputError
+        For what is no scene, or cannot be read.
+
+    Examples
+    --------
+    >>> import airlight
+    >>> scene = airlight.load_scene("open-fog", size=(32, 24))
+    >>> scene
+    OpenScene(open-fog, 32 x 24)
+    >>> scene.plan()["lights"]
+    '1 point'
+    """
+    return opened(scene, size)
+
+
+@one_error
+def render(
+    scene: SceneLike,
+    method: str | Callable[..., Any] = "ray-march",
+    kernel: str | None = None,
+    *,
+    size: Size | None = None,
+    precision: Literal["single", "double"] = "single",
+    timed: bool = False,
+    **parameters: Any,
+) -> "Rendering":
+    """Render a frame by a real-time method.
+
+    Parameters
+    ----------
+    scene
+        See `load_scene`.
+    method
+        A name (`airlight.METHODS`), one's own as 'module:function' or 'path/to/file.py:function', or such a function
+        itself, ``method(view, *, kernel=None, **parameters)``, from the top of a module or a notebook.
+    kernel
+        A name (`airlight.KERNELS`), such a name with '-N', or 'module:function'; 'exact' by default, for a method that
+        calls a kernel.
+    size
+        Width and height [pixels], or 'WxH'; the scene's own by default.
+    precision
+        Of all that the method computes: 'single' (float32) or 'double'.
+    timed
+        Also measure what a frame costs, which takes a few seconds.
+    parameters
+        Parameters of the method, such as ``steps=64``.
+
+    Raises
+    ------
+    InputError
+        For what is not known, and for what the method refuses.
+
+    Examples
+    --------
+    >>> import airlight
+    >>> frame = airlight.render("open-fog", "ray-march", size=(32, 24), steps=64)
+    >>> frame
+    Rendering(open-fog by ray-march (steps=64), 32 x 24)
+    >>> frame.airlight.shape, frame.airlight.dtype.name
+    ((24, 32, 3), 'float32')
+    """
+    from realtime.frame import render_frame
+    from realtime.plan import describe
+    from realtime.scene import read_scene
+    from reports.environment import activate
+    from reports.results import Rendering, sealed
+    from validation.configurations import configuration, prepared
+    from validation.references import layered_frame
+    from validation.timing import time_frame
+
+    activate()  # a module of the user's may want a variant when it is imported
+    chosen = configuration(method, kernel, parameters)
+    loaded = opened(scene, size)
+    read = read_scene(loaded.scene, precision)
+    renderer = prepared(read, chosen)
+    image = layered_frame(loaded.name, chosen, render_frame(renderer))
+    return Rendering(
+        scene=loaded.name,
+        image=sealed(image),
+        method=chosen.method,
+        kernel=chosen.kernel,
+        parameters=MappingProxyType(dict(chosen.parameters)),
+        label=chosen.label,
+        precision=precision,
+        plan=MappingProxyType(describe(read.plan)),
+        notes=read.plan.notes,
+        times=time_frame(renderer) if timed else None,
+    )
+
+
+@one_error
+def reference(
+    scene: SceneLike,
+    estimator: Literal["quadrature", "single-scatter", "volpath"] = "quadrature",
+    *,
+    size: Size | None = None,
+    pixel: Literal["centre", "area"] = "centre",
+    samples: int | None = None,
+    error: float | None = None,
+    seconds: float | None = None,
+    target: Literal["pooled", "worst"] = "pooled",
+    seed: int = 0,
+    progress: Progress = None,
+) -> "Reference":
+    """Compute the truth of a scene, with its error; what was computed before comes from the cache.
+
+    Parameters
+    ----------
+    scene
+        See `load_scene`.
+    estimator
+        'quadrature', with a bound of the error in every pixel; or by random samples, with standard errors,
+        'single-scatter' and 'volpath'.
+    size
+        Width and height [pixels], or 'WxH'; the scene's own by default.
+    pixel
+        Of the quadrature: the radiance at a pixel's 'centre', or the mean over its 'area'.
+    samples, error, seconds
+        When an estimator that samples stops: at so many samples a pixel (2048 where none of the three is given), at a
+        relative standard error, or after a time [s].
+    target
+        Whether `error` is that of the image, 'pooled', or of its 'worst' pixel.
+    seed
+        Of the first batch of samples; the others count up.
+    progress
+        Called with (share done, what); True shows a bar.
+
+    Raises
+    ------
+    InputError
+        For what the estimator has no use for, and more than one of `samples`, `error` and `seconds`.
+
+    Examples
+    --------
+    >>> import airlight
+    >>> truth = airlight.reference("open-fog", size=(32, 24))
+    >>> truth.relative_error < 1e-6
+    True
+    >>> traced = airlight.reference("open-fog", "single-scatter", size=(32, 24), samples=64)
+    >>> traced.standard_error.shape
+    (24, 32, 3)
+    """
+    from validation.load import nearest
+
+    known = ("quadrature", "single-scatter", "volpath")
+    if estimator not in known:
+        raise InputError(f"estimator: got {estimator!r}, wanted one of {', '.join(known)}" + nearest(estimator, known))
+    given = {"samples": samples, "error": error, "seconds": seconds}
+    if estimator == "quadrature":
+        named = [name for name, value in given.items() if value is not None]
+        if named:
+            raise InputError(f"{named[0]}: is for 'single-scatter' and 'volpath'; leave it out, or take one of these")
+        with telling(progress, "quadrature") as tell:
+            return _quadrature(opened(scene, size), pixel, tell)
+    if pixel != "centre":
+        raise InputError(
+            f"pixel: got {pixel!r}, but {estimator} traces pixel centres; leave it out or take 'quadrature'"
+        )
+    budget = _budget(given, target)
+    with telling(progress, estimator) as tell:
+        return _sampled(opened(scene, size), estimator, budget, seed=seed, tell=tell)
+
+
+def _quadrature(loaded: OpenScene, pixel: str, tell: Callable[[float, str], None]) -> "Reference":
+    import numpy as np
+
+    from reports.results import Reference, sealed
+    from validation.references import whole_truth
+    from validation.truth import truth_image
+
+    truth = truth_image(loaded.scene, pixel=pixel, progress=lambda done, total, what: tell(done / total, what))
+    finite = np.isfinite(truth.airlight)
+    mean = float(truth.airlight[finite].mean()) if finite.any() else 0.0
+    counts = ("transitions", "checked", "disagreements", "refined", "left")
+    return Reference(
+        scene=loaded.name,
+        image=sealed(whole_truth(loaded, truth, pixel=pixel)),
+        estimator="quadrature",
+        relative_error=float(truth.airlight_bound[finite].mean()) / mean if mean > 0 else float("nan"),
+        details=MappingProxyType({"pixel": pixel} | {name: getattr(truth, name) for name in counts}),
+    )
+
+
+def _sampled(
+    loaded: OpenScene, estimator: str, budget: "Budget", *, seed: int, tell: Callable[[float, str], None]
+) -> "Reference":
+    from reports.results import Reference, sealed
+    from validation.references import monte_carlo_reference
+
+    found = monte_carlo_reference(loaded, estimator, budget=budget, seed=seed, progress=tell)
+    attributes = {name.removeprefix("airlight:"): value for name, value in found.image.attributes.items()}
+    details: dict[str, Any] = {name: attributes[name] for name in ("spp", "batches", "seeds")}
+    details |= {"cached": found.cached, "masked": found.masked, "reached": found.reached}
+    return Reference(
+        scene=loaded.name,
+        image=sealed(found.image),
+        estimator=estimator,
+        relative_error=getattr(found.errors, budget.target),
+        details=MappingProxyType(details),
+    )
+
+
+def _budget(given: dict[str, Any], target: str) -> "Budget":
+    from validation.budget import Budget
+
+    named = [name for name, value in given.items() if value is not None]
+    if len(named) > 1:
+        raise InputError(f"{' and '.join(named)} exclude each other; give one of them")
+    for name in named:
+        if not isinstance(given[name], int | float) or not given[name] > 0:
+            raise InputError(f"{name}: got {given[name]!r}, wanted a number above 0")
+    if target not in ("pooled", "worst"):
+        raise InputError(f"target: got {target!r}, wanted 'pooled' or 'worst'")
+    usual = given["samples"] if named else USUAL_SAMPLES
+    return Budget(samples=usual, error=given["error"], seconds=given["seconds"], target=target)  # type: ignore[arg-type]
+
+
+@one_error
+def compare(
+    reference: ImageLike,
+    test: ImageLike,
+    layer: str = "airlight",
+    *,
+    margin: float | None = None,
+    mask: "ArrayLike | None" = None,
+    all_metrics: bool = False,
+    flip: bool = False,
+    exposure: float | None = None,
+) -> "ImageComparison":
+    """Compare a layer of an image with that of a reference.
+
+    Parameters
+    ----------
+    reference, test
+        What `reference` or `render` returned, the paths of EXR files, or arrays (height, width, 3) [W/(m^2 sr)].
+    layer
+        'airlight', 'surface' or 'total'.
+    margin
+        Largest relative bias that counts as agreement, such as 0.005; wants standard errors in either image.
+    mask
+        Pixels to compare, (height, width) of truth values; all by default.
+    all_metrics
+        Also the errors by the formulas of other tools and the colour differences.
+    flip
+        Also HDR-FLIP.
+    exposure
+        Of the colour differences and of HDR-FLIP [stops]; each chooses its own from the reference by default.
+
+    Raises
+    ------
+    InputError
+        If a layer is missing, sizes differ, or a margin is given without standard errors.
+
+    Examples
+    --------
+    >>> import airlight
+    >>> truth = airlight.reference("open-fog", size=(32, 24))
+    >>> frame = airlight.render("open-fog", "unshadowed", "exact", size=(32, 24))
+    >>> compared = airlight.compare(truth, frame)
+    >>> compared.metrics.relative_rmse < 1e-5
+    True
+    >>> compared.passed, compared.error.shape
+    (True, (24, 32, 3))
+    """
+    import numpy as np
+
+    from reference.exr import layer as image_layer
+    from reports.results import ImageComparison
+    from validation.compare import compare_images
+
+    one, first = as_image(reference, layer, "the reference")
+    two, second = as_image(test, layer, "the test image")
+    chosen = None if mask is None else np.asarray(mask)
+    found = compare_images(
+        one,
+        two,
+        layer=layer,
+        mask=chosen,
+        margin=margin,
+        all_metrics=all_metrics,
+        flip=flip,
+        exposure=exposure,
+    )
+    kept: dict[str, Any] = {field.name: getattr(found, field.name) for field in dataclasses.fields(found)}
+    kept |= {"reference": image_layer(one, layer), "test": image_layer(two, layer)}
+    return ImageComparison(**kept, names=(first, second))

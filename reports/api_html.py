@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Pieces of HTML for results in a notebook: tables and pictures, without scripts, in the colours of the page."""
+
+import base64
+from collections.abc import Sequence
+from html import escape
+
+#: Narrower pictures are enlarged to this in whole multiples, so that single pixels can be seen [CSS pixels].
+_NARROW = 240
+
+Cell = str
+
+
+def block(title: str, *parts: str) -> str:
+    """Return a titled block; the title is plain text, the parts are HTML."""
+    return f'<div class="airlight"><p><strong>{escape(title)}</strong></p>{"".join(parts)}</div>'
+
+
+def paragraph(text: str) -> str:
+    """Return a paragraph of plain text."""
+    return f"<p>{escape(text)}</p>"
+
+
+def bullets(items: Sequence[str]) -> str:
+    """Return a list of plain texts; nothing for no items."""
+    inside = "".join(f"<li>{escape(item)}</li>" for item in items)
+    return f"<ul>{inside}</ul>" if items else ""
+
+
+def table(rows: Sequence[Sequence[Cell]], headers: Sequence[str] = ()) -> str:
+    """Return a table of plain texts; the first cell of each row is its header."""
+    head = "".join(f'<th scope="col" style="text-align:left">{escape(name)}</th>' for name in headers)
+    body = "".join(f"<tr>{_row(row)}</tr>" for row in rows)
+    return f"<table>{f'<thead><tr>{head}</tr></thead>' if headers else ''}<tbody>{body}</tbody></table>"
+
+
+def _row(row: Sequence[Cell]) -> str:
+    first, *others = row
+    cells = "".join(f'<td style="text-align:left">{escape(cell)}</td>' for cell in others)
+    return f'<th scope="row" style="text-align:left">{escape(first)}</th>{cells}'
+
+
+def picture(png: bytes, width: int, *, alt: str, caption: str) -> str:
+    """Return a PNG file of that width [pixels] as a figure that carries it inside."""
+    times = max(1, -(-_NARROW // width))
+    style = f"width:{times * width}px;max-width:100%;height:auto" + (";image-rendering:pixelated" if times > 1 else "")
+    source = "data:image/png;base64," + base64.b64encode(png).decode("ascii")
+    return (
+        '<figure style="display:inline-block;margin:0 1em 0.5em 0;vertical-align:top">'
+        f'<img src="{source}" alt="{escape(alt)}" style="{style}">'
+        f"<figcaption>{escape(caption)}</figcaption></figure>"
+    )
+
+
+def link(target: str, text: str) -> str:
+    """Return a link."""
+    return f'<a href="{escape(target)}">{escape(text)}</a>'

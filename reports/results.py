@@ -1,0 +1,343 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Images as results of the Python API: frozen, NumPy arrays where one is wanted, pictures in a notebook.
+
+Arrays are (height, width, 3) of linear RGB radiance [W/(m^2 sr)], the first row at the top, and read-only. They keep
+the precision of what made them: float32 from a method in single precision, float64 from one in double and from the
+truth, whose error is far below what float32 can hold; `.numpy(numpy.float32)` converts.
+"""
+
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from analytic.errors import InputError
+from reference.exr import TOTAL, Image
+from reference.exr import layer as image_layer
+from reports.tables import number
+from validation.compare import Comparison
+from validation.metrics import FLOOR, colours
+from validation.timing import FrameTimes
+
+Array = NDArray[np.floating]
+
+
+def sealed(image: Image) -> Image:
+    """Return a layered image whose arrays and mappings cannot be written to."""
+    layers = {name: _read_only(values) for name, values in image.layers.items()}
+    depth = None if image.depth is None else _read_only(image.depth)
+    return Image(MappingProxyType(layers), depth, MappingProxyType(dict(image.attributes)))
+
+
+def _read_only(values: Any) -> Array:
+    view = np.asarray(values).view()
+    view.flags.writeable = False
+    return view
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class LayeredImage:
+    """What renderings and references share: layers of radiance and the depth, see the module."""
+
+    scene: str  #: name of the scene
+    image: Image  #: the layers as they are written to a file, with what made them
+
+    @property
+    def airlight(self) -> Array:
+        """The in-scattered radiance alone [W/(m^2 sr)], (height, width, 3)."""
+        return image_layer(self.image, "airlight")
+
+    @property
+    def surface(self) -> Array:
+        """The radiance of the lit surface through the medium [W/(m^2 sr)], (height, width, 3)."""
+        return image_layer(self.image, "surface")
+
+    @cached_property
+    def total(self) -> Array:
+        """All light, airlight and surface [W/(m^2 sr)], (height, width, 3)."""
+        return _read_only(self.airlight + self.surface)
+
+    @property
+    def depth(self) -> Array:
+        """The distance along the ray to the visible surface, infinite where there is none [m], (height, width)."""
+        assert self.image.depth is not None
+        return self.image.depth
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height [pixels]."""
+        height, width = self.airlight.shape[:2]
+        return width, height
+
+    def numpy(self, dtype: DTypeLike | None = None) -> Array:
+        """Return the total as an array of one's own, which can be written to."""
+        return np.array(self.total, dtype=dtype)
+
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> Array:
+        return _as_array(self.total, dtype, copy)
+
+    def with_total(self) -> Image:
+        """Return the layers and the total among them."""
+        return replace(self.image, layers=dict(self.image.layers) | {TOTAL: self.total})
+
+    def picture(self, layer: str = TOTAL, exposure: float | None = None) -> NDArray[np.uint8]:
+        """Return a layer as a picture for a screen, (height, width, 3).
+
+        Parameters
+        ----------
+        layer
+            'total', 'airlight', 'surface' or another layer that is there.
+        exposure
+            Stops: the radiance is multiplied by 2 to this power. By default one that suits the total.
+        """
+        from reports.pictures import tone_mapped
+        from validation.colour_difference import auto_exposure
+
+        stops = auto_exposure(self.total) if exposure is None else exposure
+        radiance = np.asarray(image_layer(self.with_total(), layer), dtype=np.float64)
+        return tone_mapped(radiance, 2.0**stops)
+
+    def save(self, path: str | os.PathLike[str], exposure: float | None = None) -> Path:
+        """Write the layers as EXR or the picture of the total as PNG, by the suffix of the path, which is returned."""
+        from reference.exr import write_exr
+        from reports.environment import stamped
+        from reports.pictures import write_png
+
+        target = Path(path)
+        if target.suffix.lower() == ".exr":
+            write_exr(target, stamped(self.image))
+        elif target.suffix.lower() == ".png":
+            write_png(target, self.picture(exposure=exposure))
+        else:
+            raise InputError(
+                f"save: got {str(path)!r}, wanted a path that ends with .exr (all layers) or .png (picture)"
+            )
+        return target
+
+    def facts(self) -> dict[str, str]:
+        """Return what there is to say of the image, in words, by name."""
+        width, height = self.size
+        return {"scene": self.scene, "size": f"{width} x {height}"} | _levels(self)
+
+    @property
+    def title(self) -> str:
+        """What to call the image."""
+        return self.scene
+
+    @cached_property
+    def _png(self) -> bytes:
+        from reports.pictures import png_bytes
+
+        return png_bytes(self.picture())
+
+    def _repr_png_(self) -> bytes:
+        return self._png
+
+    def _repr_html_(self) -> str:
+        from reports.api_html import block, picture, table
+        from reports.pictures import png_bytes
+
+        title = self.title
+        shown = [picture(self._png, self.size[0], alt=f"{title}, all light", caption="all light")]
+        if np.any(self.surface):
+            png = png_bytes(self.picture("airlight"))
+            shown.append(picture(png, self.size[0], alt=f"{title}, the airlight", caption="airlight"))
+        return block(title, *shown, table(list(self.facts().items())))
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.title}, {self.size[0]} x {self.size[1]})"
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Rendering(LayeredImage):
+    """A frame by a real-time method."""
+
+    method: str
+    kernel: str | None  #: None for a method that calls none
+    parameters: Mapping[str, Any]  #: those that differ from the method's defaults
+    label: str  #: method, kernel and parameters in one
+    precision: str  #: 'single' or 'double'
+    plan: Mapping[str, str]  #: what the scene needs of a method, in words
+    notes: tuple[str, ...] = ()  #: what there is to know of the scene
+    times: FrameTimes | None = None  #: what a frame costs, where it was asked for
+
+    def facts(self) -> dict[str, str]:
+        """Return what there is to say of the frame, in words, by name."""
+        found = super().facts() | {"method": self.label, "precision": self.precision}
+        if self.times is not None:
+            frame = self.times.frame
+            found["a frame"] = (
+                f"{number(frame.median_ms)} ms, quartiles {number(frame.low_ms)}..{number(frame.high_ms)}"
+            )
+            found["of it airlight"] = f"{number(self.times.airlight.median_ms)} ms"
+            found["after the light moved"] = f"{number(self.times.rebuild.median_ms)} ms"
+        return found | ({"notes": " ".join(self.notes)} if self.notes else {})
+
+    @property
+    def title(self) -> str:
+        """What to call the frame."""
+        return f"{self.scene} by {self.label}"
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Reference(LayeredImage):
+    """The truth of a scene, with its error."""
+
+    estimator: str  #: 'quadrature', 'single-scatter' or 'volpath'
+    relative_error: float  #: of the airlight: mean bound over mean, or the relative standard error of the image
+    details: Mapping[str, Any] = field(
+        default_factory=dict
+    )  #: how it was made: samples, seeds, shadow rays that checked
+
+    @property
+    def bound(self) -> Array | None:
+        """The bound of the airlight's error [W/(m^2 sr)], (height, width, 3); None for an estimator that samples."""
+        return self.image.layers.get("airlight_bound")
+
+    @property
+    def standard_error(self) -> Array | None:
+        """The standard error of the airlight [W/(m^2 sr)], (height, width, 3); None for the quadrature."""
+        return self.image.layers.get("airlight_se")
+
+    @property
+    def surface_standard_error(self) -> Array | None:
+        """The standard error of the surface [W/(m^2 sr)], (height, width, 3); None for the quadrature."""
+        return self.image.layers.get("surface_se")
+
+    def facts(self) -> dict[str, str]:
+        """Return what there is to say of the truth, in words, by name."""
+        kind = "mean bound of the airlight's error" if self.bound is not None else "standard error of the image"
+        error = {kind: f"{number(100 * self.relative_error)} %"} if math.isfinite(self.relative_error) else {}
+        words = {name.replace("_", " "): str(value) for name, value in self.details.items() if value is not None}
+        return super().facts() | {"estimator": self.estimator} | error | words
+
+    @property
+    def title(self) -> str:
+        """What to call the truth."""
+        return f"{self.scene}, the truth by {self.estimator}"
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class ImageComparison(Comparison):
+    """How far an image is from a reference: the numbers of `airlight compare`, and the images."""
+
+    reference: Array  #: the layer of the reference, (height, width[, channels]) [W/(m^2 sr)]
+    test: Array  #: the layer of the image that is judged
+    names: tuple[str, str] = ("the reference", "the test image")
+
+    @property
+    def passed(self) -> bool:
+        """Whether nothing is wrong with the test image; `failures` says what is."""
+        return not self.failures
+
+    @cached_property
+    def error(self) -> Array:
+        """The signed relative error (test - ref) / max(ref, 0.001 mean(ref)), of the shape of the images."""
+        reference, test = (np.asarray(values, dtype=np.float64) for values in (self.reference, self.test))
+        finite = np.isfinite(reference) & np.isfinite(test)
+        mean = float(reference[finite].mean()) if finite.any() else math.nan
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return _read_only((test - reference) / np.maximum(reference, FLOOR * mean))
+
+    def numpy(self, dtype: DTypeLike | None = None) -> Array:
+        """Return `error` as an array of one's own, which can be written to."""
+        return np.array(self.error, dtype=dtype)
+
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> Array:
+        return _as_array(self.error, dtype, copy)
+
+    def picture(self) -> NDArray[np.uint8]:
+        """Return the map of the signed relative error, see `reports.pictures.error_map`, (height, width, 3)."""
+        from reports.pictures import error_map
+
+        reference, test = self._colours()
+        return error_map(reference, test)
+
+    def _colours(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        shape = (*self.reference.shape[:2], -1)
+        one, two = (np.asarray(v, dtype=np.float64).reshape(shape) for v in (self.reference, self.test))
+        return colours(one), colours(two)
+
+    @cached_property
+    def _png(self) -> bytes:
+        from reports.pictures import png_bytes
+
+        return png_bytes(self.picture())
+
+    def _repr_png_(self) -> bytes:
+        return self._png
+
+    def _repr_html_(self) -> str:
+        from reports.api_html import block, bullets, picture, table
+        from reports.pictures import ERROR_CEILING, ERROR_FLOOR, exposure, png_bytes, tone_mapped
+
+        one, two = self._colours()
+        factor, width = exposure(one), one.shape[1]
+        shown = [
+            picture(png_bytes(tone_mapped(values, factor)), width, alt=f"{name}, {self.layer}", caption=name)
+            for name, values in zip(self.names, (one, two))
+        ]
+        scale = f"relative error: blue too dark, red too bright, logarithmic from {ERROR_FLOOR:g} to {ERROR_CEILING:g}"
+        shown.append(picture(self._png, width, alt=f"signed relative error of the {self.layer}", caption=scale))
+        return block(self.title, *shown, table(self._rows()), bullets([f"failed: {why}" for why in self.failures]))
+
+    def _rows(self) -> list[tuple[str, str]]:
+        m = self.metrics
+        rows = [
+            ("relative RMSE", _percent(m.relative_rmse)),
+            ("relative bias", _percent(m.relative_bias)),
+            ("relative error, median, 99 %, largest", f"{number(m.p50)}, {number(m.p99)}, {number(m.max)}"),
+            ("pixels, masked, not finite, negative", f"{m.pixels}, {self.masked}, {m.nonfinite}, {m.negative}"),
+        ]
+        if self.statistics is not None:
+            low, high = self.statistics.relative_bias_ci
+            rows.append(("95 % interval of the bias", f"{_percent(low)} to {_percent(high)}"))
+            rows.append(("bias that would have been found", _percent(self.statistics.detectable_bias)))
+        if self.flip is not None:
+            rows.append(("HDR-FLIP", f"none: {self.flip.note}" if self.flip.value is None else number(self.flip.value)))
+        return rows
+
+    @property
+    def title(self) -> str:
+        """What is compared with what."""
+        return f"{self.layer} of {self.names[1]} against {self.names[0]}"
+
+    def __repr__(self) -> str:
+        m = self.metrics
+        verdict = "passed" if self.passed else f"failed: {'; '.join(self.failures)}"
+        return (
+            f"ImageComparison({self.title}: relative RMSE {m.relative_rmse:.3g}, "
+            f"relative bias {m.relative_bias:.3g}, {verdict})"
+        )
+
+
+def _as_array(values: Array, dtype: DTypeLike | None, copy: bool | None) -> Array:
+    """Answer NumPy's protocol: a view unless another type or a copy is wanted."""
+    if dtype is not None and np.dtype(dtype) != values.dtype:
+        if copy is False:
+            raise ValueError(f"a copy is needed to turn {values.dtype} into {np.dtype(dtype)}")
+        return values.astype(dtype)
+    return values.copy() if copy else values
+
+
+def _levels(image: LayeredImage) -> dict[str, str]:
+    """Say how bright the layers are, and what is odd in them."""
+    found = {}
+    for name, values in (("airlight", image.airlight), ("surface", image.surface)):
+        finite = np.isfinite(values)
+        mean = float(values[finite].mean(dtype=np.float64)) if finite.any() else math.nan
+        odd = [f"{int((~finite).any(axis=-1).sum())} pixels not finite"] if not finite.all() else []
+        odd += [f"{int((values < 0).any(axis=-1).sum())} pixels negative"] if (values < 0).any() else []
+        found[f"mean {name}"] = ", ".join([f"{number(mean, 4)} W/(m^2 sr)", *odd])
+    return found
+
+
+def _percent(value: float) -> str:
+    return f"{number(100 * value)} %"
