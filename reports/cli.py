@@ -19,6 +19,7 @@ from reports import __version__
 from reports.command_bench import bench
 from reports.command_certify import certify
 from reports.command_compare import compare
+from reports.command_diff import diff
 from reports.command_doctor import doctor
 from reports.command_figures import figures
 from reports.command_integrate import integrate
@@ -48,6 +49,7 @@ _COMMANDS = (
     reference,
     merge,
     compare,
+    diff,
     integrate,
     bench,
     maps,
