@@ -35,6 +35,7 @@ class FrameRenderer:
     surface: Callable[..., Any]  #: -> distance, and surface radiance: by light where `airlight` finds shadows, or a sum
     airlight: Callable[..., Any]  #: -> airlight radiance, and that of the surface where this finds its shadows, or None
     casts_rays: bool  #: whether the method casts rays of its own
+    check: Callable[[Any], None] | None = None  #: airlight (height, width, 3) -> raises what is wrong with it
 
     @property
     def geometry(self) -> Any:
@@ -122,7 +123,8 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
         resident = resident_tables()
         airlight = Frozen(run_method, state_fn=lambda *_, **__: resident)
     dr.eval(pixel)
-    return FrameRenderer(scene, pixel, prepare, surface if plan.surfaces else _no_surface, airlight, casts_rays)
+    shown = surface if plan.surfaces else _no_surface
+    return FrameRenderer(scene, pixel, prepare, shown, airlight, casts_rays, method.check)
 
 
 def render_frame(renderer: FrameRenderer) -> Frame:
@@ -134,8 +136,11 @@ def image_frame(renderer: FrameRenderer, stages) -> Frame:
     """Bring what `run_stages` returned to the host in the order of the image."""
     distance, surface, airlight = stages
     height, width = renderer.scene.camera.height, renderer.scene.camera.width
+    light = _image(renderer, airlight, (height, width, 3))
+    if renderer.check is not None:
+        renderer.check(light)
     return Frame(
-        _image(renderer, airlight, (height, width, 3)),
+        light,
         _image(renderer, surface, (height, width, 3)),
         _image(renderer, distance, (height, width)),
     )

@@ -14,7 +14,9 @@ def bench(
     estimators: Annotated[
         bool, typer.Option("--estimators", help="Time single-scatter and volpath at equal error.")
     ] = False,
-    methods: Annotated[str | None, typer.Option(help="Comma-separated methods; all by default.")] = None,
+    methods: Annotated[
+        str | None, typer.Option(help="Comma-separated methods, also your own MODULE:FUNCTION; all by default.")
+    ] = None,
     size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels; the scene's own by default.")] = None,
     truth: Annotated[bool, typer.Option(help="Also compare the truth with single-scatter and volpath.")] = True,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,

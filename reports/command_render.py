@@ -13,7 +13,9 @@ Size = Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels; the scen
 
 def render(
     scene: Scene,
-    method: Annotated[str, typer.Option(help="Real-time method, see `airlight methods`.")] = "ray-march",
+    method: Annotated[
+        str, typer.Option(help="Real-time method, see `airlight methods`, or MODULE:FUNCTION.")
+    ] = "ray-march",
     kernel: Annotated[str | None, typer.Option(help="Airlight kernel, see `airlight kernels`.")] = None,
     set_: Annotated[list[str] | None, typer.Option("--set", help="NAME=VALUE, a parameter of the method.")] = None,
     size: Size = None,
@@ -74,13 +76,13 @@ def _check_outputs(outputs: dict[str, Path | None], frames: int | None, animate:
 
 def _print_plan(scene, chosen, *, json: bool) -> None:
     from realtime.caster_plan import caster_plan, describe_casters
-    from realtime.methods import METHODS
+    from realtime.methods import find_method
     from realtime.plan import describe
     from realtime.shadow_planes import prepare_shadow_planes
     from reports.tables import print_json
 
     words, notes = describe(scene.plan), list(scene.plan.notes)
-    if METHODS[chosen.method].prepare is prepare_shadow_planes:
+    if find_method(chosen.method).prepare is prepare_shadow_planes:
         casters = caster_plan(scene)
         words |= describe_casters(casters)
         _warn(casters.warnings)

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 from realtime.errors import InputError
 from realtime.frame import Frame, render_frame
-from realtime.methods import METHODS
+from realtime.frozen import Frozen
+from realtime.methods import find_method
 from realtime.plan import Plan
 from realtime.scene import Scene, read_scene
 from reference.quadrature import TruthImage
@@ -81,10 +82,12 @@ def measure(
         took = time.perf_counter() - begin
     except InputError as error:
         return Measurement(chosen, None, None, None, None, refused=str(error))
-    note = None
+    notes = []
     if timed is not None and took > _LONG:
         timed = None
-        note = f"timed at {scene.camera.width} x {scene.camera.height}: larger frames take minutes"
+        notes.append(f"timed at {scene.camera.width} x {scene.camera.height}: larger frames take minutes")
+    if ":" in chosen.method and not isinstance(renderer.airlight, Frozen):
+        notes.append("not frozen: its Python runs again for every frame")
     times = time_frame(renderer if timed is None else prepared(timed, chosen), seconds=seconds)
     return Measurement(
         chosen,
@@ -93,7 +96,7 @@ def measure(
         error_metrics(truth.airlight, frame.airlight),
         error_metrics(truth.surface, frame.surface) if scene.plan.surfaces else None,
         flip_hdr(truth.airlight + truth.surface, frame.airlight + frame.surface) if with_flip else None,
-        note=note,
+        note="; ".join(notes) or None,
     )
 
 
@@ -112,4 +115,4 @@ def bench(
 
 def knows_shadows(chosen: Configuration) -> bool:
     """Return whether a configuration renders volumetric shadows."""
-    return METHODS[chosen.method].shadows and dict(chosen.parameters).get("shadow") != "none"
+    return find_method(chosen.method).shadows and dict(chosen.parameters).get("shadow") != "none"

@@ -1,16 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Configurations: a method with a kernel and the values of its parameters, as a user names them."""
 
-from collections.abc import Mapping, Sequence
+import sys
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from analytic.errors import InputError
+from realtime.errors import InputError as MethodError
 from realtime.frame import FrameRenderer, frame_renderer
-from realtime.methods import METHODS
+from realtime.methods import find_method
 from realtime.scene import Scene
 from validation.kernel_choice import find_kernel
 from validation.load import nearest
+
+_TRUE, _FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
 
 
 @dataclass(frozen=True)
@@ -62,13 +66,16 @@ QUICK: tuple[Configuration, ...] = (
 )
 
 
-def configuration(method: str, kernel: str | None = None, parameters: Mapping[str, Any] | None = None) -> Configuration:
+def configuration(
+    method: str | Callable[..., Any], kernel: str | None = None, parameters: Mapping[str, Any] | None = None
+) -> Configuration:
     """Return a configuration, checked.
 
     Parameters
     ----------
     method
-        A name of `realtime.methods.METHODS`.
+        A name of `realtime.methods.METHODS`, one's own as 'module:function' or 'path/to/file.py:function', or such a
+        function itself.
     kernel
         See `validation.kernel_choice.find_kernel`; 'exact' by default for methods that call a kernel.
     parameters
@@ -77,11 +84,14 @@ def configuration(method: str, kernel: str | None = None, parameters: Mapping[st
     Raises
     ------
     InputError
-        For an unknown method, kernel or parameter (the nearest is named) and a value of the wrong type.
+        For an unknown method, kernel or parameter (the nearest is named), a value of the wrong type, and a method of
+        one's own that cannot be loaded.
     """
-    if method not in METHODS:
-        raise InputError(f"method: got {method!r}, wanted one of {', '.join(METHODS)}" + nearest(method, METHODS))
-    record = METHODS[method]
+    method = method if isinstance(method, str) else _function_name(method)
+    try:
+        record = find_method(method)
+    except MethodError as error:
+        raise InputError(str(error)) from error
     if not record.uses_kernel and kernel is not None:
         raise InputError(f"method {method}: got the kernel {kernel!r}, but this method calls no kernel: leave it out")
     if record.uses_kernel:
@@ -114,7 +124,20 @@ def parse_settings(settings: Sequence[str]) -> dict[str, str]:
 def prepared(scene: Scene, chosen: Configuration) -> FrameRenderer:
     """Return the frame renderer of a configuration for a scene."""
     kernel = find_kernel(chosen.kernel) if chosen.kernel else None
-    return frame_renderer(scene, METHODS[chosen.method], kernel=kernel, **dict(chosen.parameters))
+    return frame_renderer(scene, find_method(chosen.method), kernel=kernel, **dict(chosen.parameters))
+
+
+def _function_name(function: Callable[..., Any]) -> str:
+    """Return 'module:function', by which it can be found again."""
+    name = f"{getattr(function, '__module__', '')}:{getattr(function, '__qualname__', '')}"
+    found: Any = sys.modules.get(getattr(function, "__module__", None) or "")
+    for part in getattr(function, "__qualname__", "").split("."):
+        found = getattr(found, part, None)
+    if not callable(function) or found is not function:
+        raise InputError(
+            f"method: got {function!r}, wanted a name or a function at the top of a module: give it a name there"
+        )
+    return name
 
 
 def _converted(record, name: str, value: Any) -> int | float | str:
@@ -124,6 +147,11 @@ def _converted(record, name: str, value: Any) -> int | float | str:
             f"method {record.name}: got a parameter {name!r}, wanted one of: {known}" + nearest(name, record.parameters)
         )
     default = record.parameters[name]
+    if isinstance(default, bool):
+        word = str(value).strip().lower()
+        if word not in _TRUE + _FALSE:
+            raise InputError(f"method {record.name}: {name} got {value!r}, wanted true or false")
+        return word in _TRUE
     if isinstance(default, float):
         try:
             return float(value)

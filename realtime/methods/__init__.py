@@ -2,41 +2,20 @@
 """Real-time methods: the in-scattered radiance of every pixel of a view.
 
 A method is a function ``method(view, *, kernel, **parameters)``, see `realtime.view`. `METHODS` is the registry: add a
-`Method` to it and every command and report knows it.
+`Method` to it and every command and report knows it. `find_method` also finds a user's own, which is not in it.
 """
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+import difflib
 from types import MappingProxyType
-from typing import Any
 
+from realtime.errors import InputError
 from realtime.light_volumes import finds_lit_surfaces, light_volumes, prepare_light_volumes
 from realtime.methods.min_max import min_max, prepare_min_max
+from realtime.methods.own import own_method
 from realtime.methods.ray_march import prepare_maps, ray_march
+from realtime.methods.record import Method
 from realtime.methods.unshadowed import unshadowed
 from realtime.shadow_planes import prepare_shadow_planes, shadow_planes
-
-
-@dataclass(frozen=True)
-class Method:
-    """A method under its name, with what a user must know of it."""
-
-    name: str
-    function: Callable[..., Any]
-    summary: str
-    source: str
-    uses_kernel: bool = True
-    prepare: Callable[..., Any] | None = None  #: (scene, **parameters) -> function of the scene, run when things moved
-    lights_surfaces: Callable[[Mapping[str, Any]], bool] = lambda settings: (
-        False
-    )  #: parameters -> whether it returns, after the radiance, by light whether it reaches the surface
-    casts_rays: Callable[[Mapping[str, Any]], bool] = lambda settings: False  #: parameters -> whether it casts rays
-    frozen: Callable[[Mapping[str, Any]], bool] = lambda settings: True  #: parameters -> whether it can be frozen
-    shadows: bool = True  #: whether it knows shadows; one that does not is wrong where there are occluders
-    parameters: Mapping[str, int | float | str] = field(
-        default_factory=lambda: MappingProxyType({})
-    )  #: name -> default
-
 
 METHODS: dict[str, Method] = {
     "unshadowed": Method(
@@ -99,3 +78,25 @@ METHODS: dict[str, Method] = {
         parameters=MappingProxyType({"map": 512, "slices": 0, "samples": 0, "step": 16, "sampling": "slices"}),
     ),
 }
+
+
+def find_method(name: str) -> Method:
+    """Return the record of a method.
+
+    Parameters
+    ----------
+    name
+        A name of `METHODS`, or a user's own: 'module:function', 'path/to/file.py:function' (`realtime.methods.own`).
+
+    Raises
+    ------
+    InputError
+        For an unknown name (the nearest is named), and for what cannot be imported or is no method.
+    """
+    if name in METHODS:
+        return METHODS[name]
+    if ":" in name:
+        return own_method(name)
+    close = difflib.get_close_matches(name, METHODS, n=1, cutoff=0.4)
+    hint = f"; did you mean {close[0]!r}?" if close else ""
+    raise InputError(f"method: got {name!r}, wanted one of {', '.join(METHODS)}, or your own 'module:function'{hint}")

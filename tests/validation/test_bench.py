@@ -7,7 +7,7 @@ import pytest
 from realtime.plan import Plan
 from tests.scenes_for_tests import tiny_scene
 from validation.bench import bench, configurations_for, knows_shadows, measure
-from validation.configurations import STANDARD, Configuration
+from validation.configurations import STANDARD, Configuration, configuration
 from validation.load import LoadedScene
 
 MARCH = Configuration("ray-march", None, (("steps", 200),))
@@ -146,3 +146,19 @@ def test_slow_configurations_are_not_timed_at_a_larger_size(variant, loaded, mon
     slow = measure(scene, MARCH, truth=truth, timed=timed, seconds=0.01)
     assert "16 x 12" in slow.note
     assert slow.times is not None
+
+
+def test_a_method_of_ones_own_that_is_not_frozen_has_a_note(tmp_path, variant):
+    import mitsuba as mi
+
+    from realtime.scene import read_scene
+    from validation.truth import truth_image
+
+    path = tmp_path / "own_bench_for_tests.py"
+    path.write_text("def f(view):\n    return 1\n\n\ndef g(view):\n    return 1\n\n\ng.frozen = True\n")
+    loaded = mi.load_dict(tiny_scene())
+    truth = truth_image(loaded)
+    notes = [
+        measure(read_scene(loaded), configuration(f"{path}:{name}"), truth=truth, seconds=0.01).note for name in "fg"
+    ]
+    assert notes == ["not frozen: its Python runs again for every frame", None]

@@ -150,6 +150,44 @@ def test_kernel_of_ones_own_that_is_no_function_is_refused():
         find_kernel("math:pi")
 
 
+@pytest.mark.parametrize(("word", "value"), [("yes", True), ("False", False), (True, True), ("0", False)])
+def test_truth_values_of_ones_own_method_are_read(own_module, word, value):
+    assert configuration(f"{own_module}:f", None, {"on": word}).parameters == (("on", value),)
+
+
+def test_method_of_ones_own_has_no_kernel_unless_it_takes_one(own_module):
+    assert configuration(f"{own_module}:f") == Configuration(f"{own_module}:f")
+    assert configuration(f"{own_module}:g") == Configuration(f"{own_module}:g", "exact")
+    assert chosen_configurations([f"{own_module}:g"]) == (Configuration(f"{own_module}:g", "exact"),)
+    with refused("calls no kernel"):
+        configuration(f"{own_module}:f", "taylor")
+    with refused("on got 'maybe', wanted true or false"):
+        configuration(f"{own_module}:f", None, {"on": "maybe"})
+    with refused("has no 'h'"):
+        configuration(f"{own_module}:h")
+
+
+def test_function_itself_is_taken_by_its_name(own_module, monkeypatch):
+    import importlib
+    import sys
+
+    monkeypatch.setattr(sys, "path", [str(own_module.parent), *sys.path])
+    module = importlib.import_module(own_module.stem)
+    assert configuration(module.f).method == f"{own_module.stem}:f"
+    with refused("wanted a name or a function at the top of a module"):
+        configuration(lambda view: 1)
+    with refused("wanted a name or a function"):
+        configuration(7)
+
+
+@pytest.fixture
+def own_module(tmp_path):
+    """The path of a file with two methods of one's own."""
+    path = tmp_path / "own_configuration_for_tests.py"
+    path.write_text("def f(view, on=True):\n    return 1\n\n\ndef g(view, *, kernel):\n    return 1\n")
+    return path
+
+
 def test_prepared_renderer_has_the_parameters(variant):
     """More steps are nearer to the integral: the parameter arrives."""
     import mitsuba as mi
