@@ -28,6 +28,7 @@ def report(
     from realtime.methods import METHODS
     from realtime.scene import read_scene
     from reference.files import ensure_folder
+    from reports.claims import confirmed
     from reports.environment import activate
     from reports.progress import progress_bar
     from reports.report import write_report
@@ -56,8 +57,7 @@ def report(
     if json:
         print_json(data)
     else:
-        print("\n".join(f"- {claim}" for claim in data["claims"]))
+        print("\n".join(f"- {claim['text']}" for claim in data["claims"]))
         print(f"{output / 'report.html'}: {len(names)} scenes in {data['seconds']:.0f} s")
-    agreements = [one for scene in data["scenes"] for one in scene["agreement"].values()]
-    if not all(one["statistics"]["equivalent"] for one in agreements):
+    if not confirmed(data["scenes"]):
         raise typer.Exit(1)

@@ -5,7 +5,7 @@ import json
 import time
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,8 @@ import numpy as np
 from analytic.errors import InputError
 from reference.exr import write_exr
 from reference.files import ensure_folder, write_text
-from reports.data import SCHEMA, claims, mutations_data, plain, scene_data
+from reports.claims import claims
+from reports.data import SCHEMA, mutations_data, plain, scene_data
 from reports.environment import describe_environment, stamped
 from reports.page import render_page
 from reports.pictures import error_map, exposure, tone_mapped, write_png
@@ -87,12 +88,15 @@ def write_report(
         "created": time.strftime("%Y-%m-%d %H:%M:%S %z"),
         "command": command,
         "seconds": round(time.monotonic() - start, 1),
+        "kept": 0,
+        "computed": sum(len(scene["methods"]) for scene in found),
         "settings": asdict(effort),
         "environment": describe_environment(),
         "claims": claims(found),
         "scenes": found,
-        "kernels": kernels,
+        "stability": kernels,
         "mutations": mutations,
+        "published": None,
     }
     write_text(target / "report.json", json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
     write_text(target / "report.html", render_page(data, target))
@@ -125,6 +129,9 @@ def _write_scene(target: Path, study: SceneStudy) -> dict[str, Any]:
             continue
         frame, stem = measured.frame, _file_stem(one["label"])
         image = layered_frame(study.loaded.name, measured.configuration, frame)
+        if measured.flip is not None and measured.flip.error_map is not None:
+            grey = np.repeat(measured.flip.error_map[:, :, None], 3, axis=2)
+            image = replace(image, layers=dict(image.layers) | {"flip": grey})
         write_exr(folder / f"{stem}.exr", stamped(image))
         write_png(folder / f"{stem}.png", tone_mapped(np.asarray(frame.airlight) + frame.surface, factor))
         write_png(folder / f"{stem}-error.png", error_map(truth.airlight, np.asarray(frame.airlight, dtype=np.float64)))

@@ -64,7 +64,7 @@ def test_json_file_is_what_is_returned(written):
 
 def test_data_have_the_schema(written):
     data = written.data
-    assert data["schema"] == "airlight-report/1"
+    assert data["schema"] == "airlight-report/2"
     assert re.fullmatch(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d [+-]\d{4}", data["created"])
     assert data["command"] == "airlight report --tiny"
     assert data["settings"]["name"] == "tiny"
@@ -81,12 +81,14 @@ def test_data_have_the_schema(written):
 
 def test_claims_follow_from_the_numbers(written):
     (scene,) = written.data["scenes"]
-    assert "confirmed by Mitsuba's volpath in 2 of 2 comparisons" in written.data["claims"][0]
-    assert "confirmed by our own Mitsuba integrator in 2 of 2 comparisons" in written.data["claims"][0]
-    assert written.data["claims"][-1] == "Refused, with the reason in the tables: unshadowed (taylor) in my <fog>."
+    assert "confirmed by Mitsuba's volpath in 2 of 2 comparisons" in written.data["claims"][1]["text"]
+    assert "confirmed by our own Mitsuba integrator in 2 of 2 comparisons" in written.data["claims"][0]["text"]
+    assert (
+        written.data["claims"][-1]["text"] == "Refused, with the reason in the tables: unshadowed (taylor) in my <fog>."
+    )
     rmse = {one["label"]: one["error"]["relative_rmse"] for one in scene["methods"] if one["error"]}
     reached = min(rmse.values()) <= 0.01
-    assert ("no method reaches a relative RMSE of 1 %" in written.data["claims"][1]) is not reached
+    assert ("no method reaches a relative RMSE of 1 %" in written.data["claims"][2]["text"]) is not reached
 
 
 def test_refused_method_has_its_reason_and_no_files(written):

@@ -1,0 +1,216 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The claims at the top of a report, a sentence each; every one follows from the numbers of `report.json`.
+
+A claim is {"kind", "text", "good"}: `good` is true or false for what is a verdict, null for what is a fact. The kinds:
+
+    truth          whether an estimator confirms the truth, with its margin and the least bias that it would have found
+    fastest        which method is fastest within a target error
+    left-out       the light that single scattering leaves out
+    image          what the images of an engine are off by
+    failed         values that are not finite or negative, lit intervals on which shadow rays disagree
+    refused        what a method cannot do, by its own words
+    not-measured   what was left out for the time it takes, HDR-FLIP that could not be had
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+Claim = dict[str, Any]
+Scenes = Sequence[Mapping[str, Any]]
+
+TARGETS = (0.01, 0.001)  #: relative RMSE for which the fastest method is named
+
+_WORDS = {"volpath": "Mitsuba's volpath", "single-scatter": "our own Mitsuba integrator"}
+
+
+def claims(scenes: Scenes) -> list[Claim]:
+    """Return the claims that follow from the scenes of a report, in the order of the page."""
+    if not scenes:
+        return []
+    found = _trust(scenes)
+    for target in TARGETS:
+        found += _fastest(scenes, target)
+    found += [_left_out(scenes), *_images(scenes), *_failed(scenes)]
+    refused = [m for m in _methods(scenes) if m[1]["refused"]]
+    found += _listed("refused", "Refused, with the reason in the tables", refused, lambda m: not m.get("left_out"))
+    slow = "Not measured for the time that they take, with the reason in the tables"
+    found += _listed("not-measured", slow, refused, lambda m: bool(m.get("left_out")))
+    return found + _without_flip(scenes)
+
+
+def confirmed(scenes: Scenes) -> bool:
+    """Return whether no comparison speaks against the truth, and each layer is confirmed by at least one."""
+    for scene in scenes:
+        compared = list(scene["agreement"].values())
+        if any(verdict(one) is False for one in compared):
+            return False
+        for layer in {one["layer"] for one in compared}:
+            if not any(verdict(one) for one in compared if one["layer"] == layer):
+                return False
+    return True
+
+
+def verdict(compared: Mapping[str, Any]) -> bool | None:
+    """Return whether a comparison confirms the truth; None where it ran out of time before it could tell.
+
+    Out of time is what stopped before the intervals were as narrow as wanted. It can still speak against the truth: by
+    an interval that lies outside the margin as a whole.
+    """
+    statistics = compared["statistics"]
+    if statistics["equivalent"]:
+        return True
+    interval = statistics.get("relative_bias_ci")
+    if compared.get("finished", True) or interval is None or None in interval:
+        return False
+    low, high = interval
+    return None if low <= statistics["margin"] and high >= -statistics["margin"] else False
+
+
+def _claim(kind: str, text: str, good: bool | None = None) -> Claim:
+    return {"kind": kind, "text": text, "good": good}
+
+
+def _methods(scenes: Scenes, *, images: bool = False) -> list[tuple[str, Mapping[str, Any]]]:
+    """Return the scene's name with every entry of a method, or with every image of an engine."""
+    found = [(scene["name"], one) for scene in scenes for one in scene["methods"]]
+    return [(name, one) for name, one in found if (one.get("kind") == "image") == images]
+
+
+def _trust(scenes: Scenes) -> list[Claim]:
+    """Return a claim for each estimator that checked the truth."""
+    compared = [(scene["name"], one) for scene in scenes for one in scene["agreement"].values()]
+    if not compared:
+        text = "There is no light to compare with Mitsuba's volpath: no airlight and no lit surface in any scene."
+        return [_claim("truth", text)]
+    estimators = dict.fromkeys(one["estimator"] for _, one in compared)
+    return [_verdict(_WORDS[name], [pair for pair in compared if pair[1]["estimator"] == name]) for name in estimators]
+
+
+def _verdict(words: str, compared: list[tuple[str, Mapping[str, Any]]]) -> Claim:
+    against = [f"{name} ({one['layer']})" for name, one in compared if verdict(one) is False]
+    margin = 100 * compared[0][1]["statistics"]["margin"]
+    if against:
+        text = (
+            f"The truth is NOT confirmed within {margin:g} % by {words} in {', '.join(against)}: there the 95 % "
+            "interval of the relative bias is not inside the margin."
+        )
+        return _claim("truth", text, False)
+    open_ = [f"{name} ({one['layer']})" for name, one in compared if verdict(one) is None]
+    good = [one for _, one in compared if verdict(one)]
+    text = ""
+    if good:
+        detectable = max(one["statistics"]["detectable_bias"] for one in good)
+        text = (
+            f"The truth is confirmed by {words} in {len(good)} of {len(compared)} comparisons: the 95 % interval of "
+            f"the pooled relative bias lies within ±{margin:g} %; the least bias that would have been found is at "
+            f"worst {100 * detectable:.2g} %."
+        )
+    if open_:
+        text += (" " if text else "") + (
+            f"By {words} it is not decided within the time in {', '.join(open_)}: the 95 % interval is not narrow "
+            f"enough there for a margin of ±{margin:g} %."
+        )
+    return _claim("truth", text, None if open_ else True)
+
+
+def _fastest(scenes: Scenes, target: float) -> list[Claim]:
+    """Return which method is fastest within a relative RMSE: once where it is the same everywhere, else by scene."""
+    best = {scene["name"]: _best(scene, target) for scene in scenes}
+    words = f"within {100 * target:g} % relative RMSE"
+    labels = {one["label"] if one else None for one in best.values()}
+    if len(best) > 1 and len(labels) == 1:
+        (label,) = labels
+        if label is None:
+            text = f"In none of the {len(best)} scenes a method reaches a relative RMSE of {100 * target:g} %."
+            return [_claim("fastest", text)]
+        each = ", ".join(f"{name} {_rate(one)}" for name, one in best.items() if one)
+        text = f"In all {len(best)} scenes the fastest method {words} is {label}: {each}."
+        return [_claim("fastest", text, True)]
+    return [_of_scene(name, one, words, target) for name, one in best.items()]
+
+
+def _of_scene(name: str, best: Mapping[str, Any] | None, words: str, target: float) -> Claim:
+    if best is None:
+        return _claim("fastest", f"{name}: no method reaches a relative RMSE of {100 * target:g} %.")
+    milliseconds = best["times"]["frame"]["median_ms"]
+    text = (
+        f"{name}: the fastest method {words} is {best['label']}: {milliseconds:.3g} ms a frame "
+        f"({1000 / milliseconds:.0f} frames/s)."
+    )
+    return _claim("fastest", text, True)
+
+
+def _rate(one: Mapping[str, Any]) -> str:
+    return f"{one['times']['frame']['median_ms']:.3g} ms"
+
+
+def _best(scene: Mapping[str, Any], target: float) -> Mapping[str, Any] | None:
+    """Return the entry that is fastest within a relative RMSE; None where there is none."""
+    # Pixels that are not finite are left out of the RMSE: a method that has any must not win by it.
+    good = [
+        m
+        for m in scene["methods"]
+        if m["times"] and m["error"] and _rmse(m) <= target and not m["error"].get("nonfinite")
+    ]
+    return min(good, key=lambda m: m["times"]["frame"]["median_ms"]) if good else None
+
+
+def _rmse(m: Mapping[str, Any]) -> float:
+    value = m["error"]["relative_rmse"]
+    return float("inf") if value is None else value
+
+
+def _left_out(scenes: Scenes) -> Claim:
+    shares = "; ".join(f"{scene['name']} {100 * scene['multiple']['medium']['value']:.2g} %" for scene in scenes)
+    text = f"Every method here scatters once. The share of the airlight that this leaves out: {shares}."
+    return _claim("left-out", text)
+
+
+def _images(scenes: Scenes) -> Iterator[Claim]:
+    for scene, one in _methods(scenes, images=True):
+        error = one["error"]
+        if not error or error["relative_rmse"] is None:
+            continue
+        what = "airlight" if one["layer"] == "airlight" else "total of airlight and surface"
+        text = (
+            f"The image {one['label']} of {scene}, judged by its {what}: relative RMSE "
+            f"{100 * error['relative_rmse']:.3g} %, relative bias {100 * error['relative_bias']:+.3g} %."
+        )
+        yield _claim("image", text)
+
+
+def _failed(scenes: Scenes) -> Iterator[Claim]:
+    everything = _methods(scenes) + _methods(scenes, images=True)
+    for count, words in (("nonfinite", "values that are not finite"), ("negative", "negative values")):
+        wrong = [f"{m['label']} in {name} ({m['error'][count]} pixels)" for name, m in everything if _count(m, count)]
+        if wrong:
+            yield _claim("failed", f"Images with {words}: {'; '.join(wrong)}.", False)
+    left = [f"{scene['name']} ({scene['truth']['left']})" for scene in scenes if scene.get("truth", {}).get("left")]
+    if left:
+        text = f"Random shadow rays disagree with lit intervals, and were not settled: {'; '.join(left)} of them."
+        yield _claim("failed", text + " They are counted in the bound of the truth.", False)
+
+
+def _count(m: Mapping[str, Any], name: str) -> int:
+    return (m["error"] or {}).get(name) or 0
+
+
+def _listed(kind: str, words: str, entries: Sequence[tuple[str, Mapping[str, Any]]], wanted) -> list[Claim]:
+    names = [f"{m['label']} in {name}" for name, m in entries if wanted(m)]
+    return [_claim(kind, f"{words}: {'; '.join(names)}.")] if names else []
+
+
+def _without_flip(scenes: Scenes) -> list[Claim]:
+    """Return why there is no HDR-FLIP where it was wanted; once for each reason."""
+    everything = _methods(scenes) + _methods(scenes, images=True)
+    reasons: dict[str, list[str]] = {}
+    for name, m in everything:
+        flip = m.get("flip")
+        if flip and flip["value"] is None:
+            reasons.setdefault(flip["note"], []).append(f"{m['label']} in {name}")
+    return [
+        _claim(
+            "not-measured", f"No HDR-FLIP ({reason}): {'; '.join(names) if len(names) < 8 else f'{len(names)} images'}."
+        )
+        for reason, names in reasons.items()
+    ]
