@@ -45,7 +45,7 @@ class Cases:
     direction: Array | None  #: (n, 3), where the file gives rays
     light: Array | None  #: (n, 3) [m], where the file gives rays
     header: tuple[str, ...]  #: names of all columns of the file
-    rows: tuple[tuple[str, ...], ...]  #: the text of all columns, to write the table out again
+    rows: tuple[tuple[str, ...], ...]  #: the text of all columns, to write the table out again; none from memory
 
 
 def read_cases(path: str | Path) -> Cases:
@@ -63,11 +63,16 @@ def read_cases(path: str | Path) -> Cases:
         unknown phase function: the message names file, line (from 1, the header) and column.
     """
     header, lines = _read_text(Path(path))
-    table = _Table(Path(path), header, lines)
+    return checked_cases(Table(str(path), header, lines))
+
+
+def checked_cases(table: "Table") -> Cases:
+    """Return the cases of a table; raises `InputError` as `read_cases` does."""
+    header = table.header
     rays = "t" not in header and any(name in header for name in _RAY)
     table.require("phase", *(_RAY if rays else _FOOT), "x0", "x1", "sigma_t")
     columns = {name: table.numbers(name) for name in ("x0", "x1", "sigma_t", *(_RAY if rays else _FOOT))}
-    g = table.numbers("g") if "g" in header else np.zeros(len(lines))
+    g = table.numbers("g") if "g" in header else np.zeros(table.count)
     phase = tuple(cell.strip().lower() for cell in table.cells("phase"))
     for row, name in enumerate(phase):
         if name not in PHASE_NAMES or name == "tabulated":
@@ -99,7 +104,7 @@ def read_cases(path: str | Path) -> Cases:
         direction,
         light,
         tuple(header),
-        tuple(tuple(cells) for _, cells in lines),
+        tuple(tuple(cells) for _, cells in table.lines),
     )
 
 
@@ -114,29 +119,38 @@ def integrate_cases(cases: Cases, *, rtol: float = 1e-10) -> tuple[Array, Array]
 
 
 @dataclass(frozen=True)
-class _Table:
+class Table:
     """The text of a table and where it came from, for messages."""
 
-    path: Path
+    name: str  #: path of the file
     header: list[str]
-    lines: list[tuple[int, list[str]]]  # number of the line in the file, cells
+    lines: list[tuple[int, list[str]]]  #: number of the line in the file, cells
+
+    @property
+    def count(self) -> int:
+        """How many cases there are."""
+        return len(self.lines)
 
     def require(self, *names: str) -> None:
+        """Refuse a table without these columns."""
         missing = [name for name in names if name not in self.header]
         if missing:
             raise InputError(
-                f"{self.path}, line 1: no column '{missing[0]}'; the file has {', '.join(self.header)}: add it, the "
+                f"{self.name}, line 1: no column '{missing[0]}'; the file has {', '.join(self.header)}: add it, the "
                 f"columns wanted are phase, x0, x1, sigma_t and either t, h or {', '.join(_RAY)}"
             )
 
     def cells(self, name: str) -> list[str]:
+        """Return the text of a column."""
         column = self.header.index(name)
         return [cells[column] for _, cells in self.lines]
 
     def where(self, row: int, name: str) -> str:
-        return f"{self.path}, line {self.lines[row][0]}, column '{name}'"
+        """Name a cell."""
+        return f"{self.name}, line {self.lines[row][0]}, column '{name}'"
 
     def numbers(self, name: str, *, infinite: bool = False) -> Array:
+        """Return a column of numbers, finite but for `x1` and where that is said."""
         values = np.empty(len(self.lines))
         for row, cell in enumerate(self.cells(name)):
             try:
@@ -149,6 +163,7 @@ class _Table:
         return values
 
     def check(self, name: str, fine: NDArray[np.bool_], wanted: str) -> None:
+        """Refuse a column of which a row is not fine."""
         if not fine.all():
             row = int(np.argmin(fine))
             given = self.cells(name)[row]

@@ -43,10 +43,11 @@ def _row(row: Sequence[Cell]) -> str:
 def picture(png: bytes, width: int, *, alt: str, caption: str) -> str:
     """Return a PNG file of that width [pixels] as a figure that carries it inside."""
     times = max(1, -(-_NARROW // width))
-    style = f"width:{times * width}px;max-width:100%;height:auto" + (";image-rendering:pixelated" if times > 1 else "")
+    style = "width:100%;height:auto" + (";image-rendering:pixelated" if times > 1 else "")
     source = "data:image/png;base64," + base64.b64encode(png).decode("ascii")
     return (
-        '<figure style="display:inline-block;margin:0 1em 0.5em 0;vertical-align:top">'
+        f'<figure style="display:inline-block;width:{times * width}px;max-width:100%;margin:0 1em 0.5em 0;'
+        'vertical-align:top">'
         f'<img src="{source}" alt="{escape(alt)}" style="{style}">'
         f"<figcaption>{escape(caption)}</figcaption></figure>"
     )

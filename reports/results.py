@@ -81,7 +81,7 @@ class LayeredImage:
         return np.array(self.total, dtype=dtype)
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> Array:
-        return _as_array(self.total, dtype, copy)
+        return as_array(self.total, dtype, copy)
 
     def with_total(self) -> Image:
         """Return the layers and the total among them."""
@@ -251,7 +251,7 @@ class ImageComparison(Comparison):
         return np.array(self.error, dtype=dtype)
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> Array:
-        return _as_array(self.error, dtype, copy)
+        return as_array(self.error, dtype, copy)
 
     def picture(self) -> NDArray[np.uint8]:
         """Return the map of the signed relative error, see `reports.pictures.error_map`, (height, width, 3)."""
@@ -318,7 +318,7 @@ class ImageComparison(Comparison):
         )
 
 
-def _as_array(values: Array, dtype: DTypeLike | None, copy: bool | None) -> Array:
+def as_array(values: Array, dtype: DTypeLike | None, copy: bool | None) -> Array:
     """Answer NumPy's protocol: a view unless another type or a copy is wanted."""
     if dtype is not None and np.dtype(dtype) != values.dtype:
         if copy is False:
