@@ -1,36 +1,144 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`airlight figures`: figures and tables for papers."""
 
+import importlib
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-_FIGURES = {"polynomials": "the airlight kernel over theta, beside Biri's polynomials, derived and as printed"}
+if TYPE_CHECKING:
+    from types import ModuleType
+
+#: Figure -> module and what its `compute` takes: 'quick', 'report' (without which it cannot be), 'published' (a report
+#: if there is one). A figure's name is its module's `NAME`; its summary is there too.
+FIGURES: dict[str, tuple[str, tuple[str, ...]]] = {
+    "polynomials": ("figure_polynomials", ("rays",)),
+    "kernel-errors": ("figure_kernel_errors", ("quick", "progress")),
+    "kernel-speed": ("figure_kernel_speed", ("quick", "progress")),
+    "convergence": ("figure_convergence", ("quick", "progress")),
+    "z-distribution": ("figure_z_distribution", ("quick", "progress")),
+    "map-size": ("figure_map_size", ("quick", "progress")),
+    "frame-speed": ("figure_frame_speed", ("report",)),
+}
 
 
 def figures(
     names: Annotated[
-        list[str] | None, typer.Argument(help=f"Figures: {', '.join(_FIGURES)}; all by default.", show_default=False)
+        list[str] | None, typer.Argument(help=f"Figures: {', '.join(FIGURES)}; all by default.", show_default=False)
     ] = None,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the figures.")] = Path("airlight-figures"),
-    rays: Annotated[int, typer.Option(min=64, max=1_000_000, help="Rays that tables count.")] = 100_000,
+    report: Annotated[
+        Path | None,
+        typer.Option(help="Folder of a report; airlight-report by default, if it is there.", show_default=False),
+    ] = None,
+    source: Annotated[
+        Path | None,
+        typer.Option("--from", help="Draw again from the data in this folder; nothing is measured."),
+    ] = None,
+    column: Annotated[str, typer.Option(help="Width: single (3.5 inches) or double (7.16 inches).")] = "double",
+    style: Annotated[
+        list[str] | None, typer.Option(help="A style sheet of matplotlib on top of ours, by name or path; repeatable.")
+    ] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer rays, smaller images, shorter timings.")] = False,
+    rays: Annotated[int, typer.Option(min=64, max=1_000_000, help="polynomials: rays to count.")] = 100_000,
+    scene: Annotated[
+        str | None, typer.Option(help="strip: the scene of the report; the first with shadows by default.")
+    ] = None,
+    methods: Annotated[
+        str | None, typer.Option(help="strip: labels of the report, separated by ';'; the best of each by default.")
+    ] = None,
 ) -> None:
-    """Write figures for papers as PDF and PNG, with the data of each as CSV beside it."""
+    """Write figures as PDF and PNG and tables as LaTeX, with the data of each as CSV beside it.
+
+    Computing writes the data, drawing only reads them: the same data give the same bytes. Figures of whole frames and
+    images are made from a report (`airlight report`); the others are measured here.
+    """
     from analytic.errors import InputError
     from reference.files import ensure_folder
-    from reports import figure_polynomials
-    from reports.environment import activate
     from reports.progress import progress_bar
+    from reports.style import WIDTHS
     from validation.load import nearest
 
     for name in names or ():
-        if name not in _FIGURES:
-            raise InputError(f"figure: got {name!r}, wanted one of {', '.join(_FIGURES)}" + nearest(name, _FIGURES))
+        if name not in FIGURES:
+            raise InputError(f"figure: got {name!r}, wanted one of {', '.join(FIGURES)}" + nearest(name, FIGURES))
+    if column not in WIDTHS:
+        raise InputError(f"--column: got {column!r}, wanted one of {', '.join(WIDTHS)}" + nearest(column, WIDTHS))
+    drawing: dict[str, Any] = {"column": column, "extra": tuple(style or ())}
+    if source is not None:
+        _redraw(names, source, ensure_folder(source if output == Path("airlight-figures") else output), drawing)
+        return
+    found = _report_folder(report)
+    given = {"quick": quick, "rays": rays, "report": found, "scene": scene, "methods": methods}
+    chosen = _chosen(names, found)
     folder = ensure_folder(output)
-    activate()
     with progress_bar("figures") as tell:
-        tell(0.0, figure_polynomials.NAME)
-        figure_polynomials.compute(folder, rays=rays)
-        figure_polynomials.plot(folder)
-    print(f"{folder / figure_polynomials.NAME}.pdf, .png and .csv: {_FIGURES[figure_polynomials.NAME]}")
+        for number, name in enumerate(chosen):
+
+            def told(share: float, what: str, number: int = number, name: str = name) -> None:
+                tell((number + share) / len(chosen), f"{name}: {what}")
+
+            tell(number / len(chosen), name)
+            _compute(name, folder, given | {"progress": told})
+            _module(name).plot(folder, **drawing)
+            _print_files(name, folder)
+
+
+def _module(name: str) -> "ModuleType":
+    return importlib.import_module(f"reports.{FIGURES[name][0]}")
+
+
+def _report_folder(report: Path | None) -> Path | None:
+    """Return the folder of the report that was asked for, or of the usual one if it is there."""
+    from reports.figure_report import FOLDER, read_report
+
+    if report is not None:
+        read_report(report)
+        return report
+    return FOLDER if (FOLDER / "report.json").is_file() else None
+
+
+def _chosen(names: list[str] | None, report: Path | None) -> list[str]:
+    """Return the figures to make; without a report those that can do without, if none were named."""
+    from analytic.errors import InputError
+    from reports.figure_report import FOLDER
+
+    need = [name for name in names or FIGURES if "report" in FIGURES[name][1]]
+    if report is not None or not need:
+        return list(names or FIGURES)
+    reason = f"made from a report: write one with `airlight report -o {FOLDER}`, or name its folder by --report"
+    if names:
+        raise InputError(f"{', '.join(need)}: {reason}")
+    print(f"Left out: {', '.join(need)}: {reason}.")
+    return [name for name in FIGURES if name not in need]
+
+
+def _compute(name: str, folder: Path, given: dict[str, Any]) -> None:
+    """Write the data of a figure; only what measures starts Mitsuba."""
+    takes = FIGURES[name][1]
+    settings = {key: given[key] for key in takes if key != "published"}
+    if "published" in takes:
+        settings["report"] = given["report"]
+    if "report" not in takes:
+        from reports.environment import activate
+
+        activate()
+    _module(name).compute(folder, **settings)
+
+
+def _redraw(names: list[str] | None, source: Path, target: Path, drawing: dict[str, Any]) -> None:
+    """Draw figures from their data: those named, or all that have data there."""
+    from analytic.errors import InputError
+
+    chosen = names or [name for name in FIGURES if (source / f"{name}.csv").is_file()]
+    if not chosen:
+        raise InputError(f"--from: {source} holds no data of a figure; write some with `airlight figures -o {source}`")
+    for name in chosen:
+        _module(name).plot(source, output=target, **drawing)
+        _print_files(name, target)
+
+
+def _print_files(name: str, folder: Path) -> None:
+    made = [suffix for suffix in (".pdf", ".png", ".tex", ".csv") if (folder / f"{name}{suffix}").is_file()]
+    print(f"{folder / name}{', '.join(made)}: {_module(name).SUMMARY}", flush=True)

@@ -10,13 +10,15 @@ exact, by the derived Taylor polynomial of degree 4 and by the one printed in th
 three kernels integrate to within 1 % and 10 % (`validation.printed`).
 """
 
-import csv
-import io
 from pathlib import Path
+from typing import Any
 
-from reference.files import ensure_folder, write_bytes, write_text
+from reference.files import ensure_folder
+from reports.figure_files import draw_figure, new_figure, read_csv, values, write_csv, write_provenance
+from reports.style import WIDTHS, kernel_style, truth_style
 
 NAME = "polynomials"
+SUMMARY = "the airlight kernel over theta, beside Biri's polynomials, derived and as printed"
 THICKNESSES = (0.1, 0.5, 2.0)
 _PHASES = ("isotropic", "rayleigh", "hazy", "murky")
 _CURVES = ("exact", "taylor", "taylor-printed")
@@ -43,13 +45,14 @@ def compute(folder: Path | str, *, rays: int = 100_000) -> None:
         for a in THICKNESSES:
             curves = _curves(phase, a, theta)
             rows += [(phase, a, *values) for values in zip(theta, *(curves[name] for name in _CURVES))]
-    _write_csv(target / f"{NAME}.csv", ("phase", "a", "theta", *_CURVES), rows)
+    write_csv(target / f"{NAME}.csv", ("phase", "a", "theta", *_CURVES), rows)
     shares = [
         (one.phase, one.region, one.kernel, one.rays, one.within_1_percent, one.within_10_percent)
         for one in printed_against_derived(rays)
     ]
     header = ("phase", "region", "kernel", "rays", "within_1_percent", "within_10_percent")
-    _write_csv(target / f"{NAME}-shares.csv", header, shares)
+    write_csv(target / f"{NAME}-shares.csv", header, shares)
+    write_provenance(target, NAME, rays=rays)
 
 
 def _curves(phase: str, a: float, theta):
@@ -69,48 +72,35 @@ def _curves(phase: str, a: float, theta):
     return {"exact": exact, **polynomials}
 
 
-def plot(folder: Path | str) -> None:
-    """Draw `polynomials.pdf` and `.png` from the data in a folder."""
-    import matplotlib
+def plot(folder: Path | str, **options: Any) -> None:
+    """Draw `polynomials.pdf` and `.png` from the data in a folder; options: see `reports.figure_files.draw_figure`."""
+    draw_figure(NAME, folder, _draw, **options)
+
+
+def _draw(folder: Path, column: str):
     import numpy as np
-    from matplotlib.figure import Figure
 
-    folder = Path(folder)
-    with open(folder / f"{NAME}.csv", newline="", encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
+    rows = read_csv(folder / f"{NAME}.csv", NAME)
     styles = {
-        "exact": {"color": "black", "linewidth": 1.6},
-        "taylor": {"color": "#0072b2", "linestyle": "--", "linewidth": 1.2},
-        "taylor-printed": {"color": "#d55e00", "linestyle": ":", "linewidth": 1.4},
+        "exact": truth_style(),
+        "taylor": {"color": kernel_style("taylor")["color"], "linestyle": "--"},
+        "taylor-printed": {"color": kernel_style("taylor-printed")["color"], "linestyle": ":"},
     }
-    with matplotlib.rc_context({"font.size": 8, "pdf.fonttype": 42}):
-        figure = Figure(figsize=(7.16, 6.8), layout="constrained")
-        panels = figure.subplots(len(_PHASES), len(THICKNESSES), sharex=True)
-        for line, phase in zip(panels, _PHASES):
-            for panel, a in zip(line, THICKNESSES):
-                chosen = [row for row in rows if row["phase"] == phase and float(row["a"]) == a]
-                theta = np.array([float(row["theta"]) for row in chosen])
-                exact = np.array([float(row["exact"]) for row in chosen])
-                for name, style in styles.items():
-                    panel.plot(theta, [float(row[name]) for row in chosen], label=name, **style)
-                panel.set_ylim(-0.25 * exact.max(), 1.25 * exact.max())
-                panel.set_title(f"{phase}, a = {a:g}", fontsize=8)
-                panel.grid(True, linewidth=0.3)
-        for panel in panels[-1]:
-            panel.set_xlabel("theta [rad]")
-        for line in panels:
-            line[0].set_ylabel("f(theta) [1]")
-        handles, labels = panels[0][0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False)
-        for suffix, metadata in ((".pdf", {"CreationDate": None}), (".png", {"Software": None})):
-            buffer = io.BytesIO()
-            figure.savefig(buffer, format=suffix[1:], dpi=200, metadata=metadata)
-            write_bytes(folder / f"{NAME}{suffix}", buffer.getvalue())
-
-
-def _write_csv(path: Path, header, rows) -> None:
-    buffer = io.StringIO()
-    writer = csv.writer(buffer, lineterminator="\n")
-    writer.writerow(header)
-    writer.writerows([[f"{value:.9g}" if isinstance(value, float) else value for value in row] for row in rows])
-    write_text(path, buffer.getvalue())
+    width = WIDTHS[column]
+    figure = new_figure(width, 0.95 * width if column == "double" else 1.15 * width)
+    panels = figure.subplots(len(_PHASES), len(THICKNESSES), sharex=True, squeeze=False)
+    for line, phase in zip(panels, _PHASES):
+        for panel, a in zip(line, THICKNESSES):
+            chosen = [row for row in rows if row["phase"] == phase and float(row["a"]) == a]
+            exact = np.array(values(chosen, "exact"))
+            for name, style in styles.items():
+                panel.plot(values(chosen, "theta"), values(chosen, name), label=name, **style)
+            panel.set_ylim(-0.25 * exact.max(), 1.25 * exact.max())
+            panel.set_title(f"{phase}, a = {a:g}")
+    for panel in panels[-1]:
+        panel.set_xlabel("theta [rad]")
+    for line in panels:
+        line[0].set_ylabel("f(theta) [1]")
+    handles, labels = panels[0][0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=3)
+    return figure
