@@ -7,11 +7,21 @@ with one line for what cannot be used. Results are frozen, see `reports.results`
 
 import dataclasses
 from collections.abc import Callable
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
 from analytic.errors import InputError
-from reports.api_inputs import ImageLike, OpenScene, Progress, SceneLike, Size, as_image, one_error, opened, telling
+from reports.api_inputs import (
+    ImageLike,
+    OpenScene,
+    Progress,
+    SceneLike,
+    Size,
+    as_image,
+    kernel_name,
+    one_error,
+    opened,
+    telling,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -54,7 +64,7 @@ def load_scene(scene: SceneLike, size: Size | None = None) -> OpenScene:
 def render(
     scene: SceneLike,
     method: str | Callable[..., Any] = "ray-march",
-    kernel: str | None = None,
+    kernel: str | Callable[..., Any] | None = None,
     *,
     size: Size | None = None,
     precision: Literal["single", "double"] = "single",
@@ -71,8 +81,8 @@ def render(
         A name (`airlight.METHODS`), one's own as 'module:function' or 'path/to/file.py:function', or such a function
         itself, ``method(view, *, kernel=None, **parameters)``, from the top of a module or a notebook.
     kernel
-        A name (`airlight.KERNELS`), such a name with '-N', or 'module:function'; 'exact' by default, for a method that
-        calls a kernel.
+        A name (`airlight.KERNELS`), such a name with '-N', 'module:function', or such a function itself; 'exact' by
+        default, for a method that calls a kernel.
     size
         Width and height [pixels], or 'WxH'; the scene's own by default.
     precision
@@ -106,7 +116,7 @@ def render(
     from validation.timing import time_frame
 
     activate()  # a module of the user's may want a variant when it is imported
-    chosen = configuration(method, kernel, parameters)
+    chosen = configuration(method, kernel_name(kernel), parameters)
     loaded = opened(scene, size)
     read = read_scene(loaded.scene, precision)
     renderer = prepared(read, chosen)
@@ -116,10 +126,10 @@ def render(
         image=sealed(image),
         method=chosen.method,
         kernel=chosen.kernel,
-        parameters=MappingProxyType(dict(chosen.parameters)),
+        parameters=dict(chosen.parameters),
         label=chosen.label,
         precision=precision,
-        plan=MappingProxyType(describe(read.plan)),
+        plan=describe(read.plan),
         notes=read.plan.notes,
         times=time_frame(renderer) if timed else None,
     )
@@ -214,7 +224,7 @@ def _quadrature(loaded: OpenScene, pixel: str, tell: Callable[[float, str], None
         image=sealed(whole_truth(loaded, truth, pixel=pixel)),
         estimator="quadrature",
         relative_error=float(truth.airlight_bound[finite].mean()) / mean if mean > 0 else float("nan"),
-        details=MappingProxyType({"pixel": pixel} | {name: getattr(truth, name) for name in counts}),
+        details={"pixel": pixel} | {name: getattr(truth, name) for name in counts},
     )
 
 
@@ -233,7 +243,7 @@ def _sampled(
         image=sealed(found.image),
         estimator=estimator,
         relative_error=getattr(found.errors, budget.target),
-        details=MappingProxyType(details),
+        details=details,
     )
 
 
@@ -244,8 +254,9 @@ def _budget(given: dict[str, Any], target: str) -> "Budget":
     if len(named) > 1:
         raise InputError(f"{' and '.join(named)} exclude each other; give one of them")
     for name in named:
-        if not isinstance(given[name], int | float) or not given[name] > 0:
-            raise InputError(f"{name}: got {given[name]!r}, wanted a number above 0")
+        kind, words = (int, "a whole number") if name == "samples" else (int | float, "a number")
+        if not isinstance(given[name], kind) or not given[name] > 0:
+            raise InputError(f"{name}: got {given[name]!r}, wanted {words} above 0")
     if target not in ("pooled", "worst"):
         raise InputError(f"target: got {target!r}, wanted 'pooled' or 'worst'")
     usual = given["samples"] if named else USUAL_SAMPLES

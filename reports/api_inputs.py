@@ -3,6 +3,7 @@
 
 import functools
 import os
+import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -135,6 +136,18 @@ def as_image(image: Any, layer: str, name: str) -> tuple["Image", str]:
     return Image({layer: values}), name
 
 
+def kernel_name(kernel: str | Callable[..., Any] | None) -> str | None:
+    """Return the name of a kernel: of a function 'module:function', by which it can be found again."""
+    if kernel is None or isinstance(kernel, str):
+        return kernel
+    module, name = getattr(kernel, "__module__", ""), getattr(kernel, "__qualname__", "")
+    if not callable(kernel) or getattr(sys.modules.get(module), name, None) is not kernel:
+        raise InputError(
+            f"kernel: got {kernel!r}, wanted a name or a function at the top of a module: give it a name there"
+        )
+    return f"{module}:{name}"
+
+
 @contextmanager
 def telling(progress: Progress, title: str) -> Iterator[Callable[[float, str], None]]:
     """Yield a function (share done, what) that tells whoever wants to know."""
@@ -184,9 +197,15 @@ def _from_mitsuba(scene: Any) -> OpenScene:
     import mitsuba as mi
 
     if not isinstance(scene, mi.Scene):
+        kind = type(scene)
+        if kind.__name__ == "Scene" and kind.__module__.split(".")[0] == "mitsuba":
+            raise InputError(
+                f"scene: got a Mitsuba scene of another variant than {mi.variant()}; call airlight.activate() before "
+                "you build it"
+            )
         raise InputError(
-            f"scene: got {type(scene).__name__}, wanted a name, the path of a Mitsuba XML file, a Mitsuba dictionary "
-            "of the type 'scene', or a scene that is loaded"
+            f"scene: got {kind.__name__}, wanted a name, the path of a Mitsuba XML file, a Mitsuba dictionary of the "
+            "type 'scene', or a scene that is loaded"
         )
     if not scene.sensors():
         raise InputError("scene: it has no sensor; add one of the type 'perspective'")

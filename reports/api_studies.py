@@ -5,11 +5,10 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from analytic.errors import InputError
-from reports.api_inputs import Progress, SceneLike, Size, one_error, opened, telling
+from reports.api_inputs import Progress, SceneLike, Size, kernel_name, one_error, opened, telling
 
 if TYPE_CHECKING:
     from analytic.cases import Cases
@@ -24,7 +23,7 @@ MethodLike: TypeAlias = "str | Callable[..., Any] | Configuration"
 @one_error
 def integrate(
     cases: "Mapping[str, Any] | Cases | str | os.PathLike[str]",
-    kernel: str = "exact",
+    kernel: str | Callable[..., Any] = "exact",
     *,
     precision: Literal["single", "double"] = "single",
     certify: bool = False,
@@ -39,7 +38,7 @@ def integrate(
         `direction` and `light`, (..., 3); a data frame with such columns; or the path of a CSV file, see
         `analytic.cases`.
     kernel
-        A name (`airlight.KERNELS`), such a name with '-N', or 'module:function'.
+        A name (`airlight.KERNELS`), such a name with '-N', 'module:function', or such a function itself.
     precision
         Of all that the kernel computes.
     certify
@@ -72,16 +71,17 @@ def integrate(
 
     activate()
     read, shape = _cases(cases)
-    J = integrate_cases(read, kernel, precision)
+    named = kernel_name(kernel) or "exact"
+    J = integrate_cases(read, named, precision)
     if certify and read.value is None:
         read = replace(read, value=certified(read)[0])
     return Integrals(
         J=_sealed(J, shape),
         value=None if read.value is None else _sealed(read.value, shape),
-        kernel=kernel,
+        kernel=named,
         precision=precision,
         cases=read,
-        summary=MappingProxyType(summary(read, J)),
+        summary=summary(read, J),
     )
 
 
@@ -165,9 +165,9 @@ def bench(
             for place, each in enumerate(useful):
                 tell((number + place / len(useful)) / len(loaded), f"{one.name}: {each.label}")
                 measured = measure(scene, each, truth=truth, seconds=seconds, with_flip=flip)
-                rows.append(MappingProxyType({"scene": one.name, **_size(scene), **_numbers(measured)}))
+                rows.append({"scene": one.name, **_size(scene), **_numbers(measured)})
         tell(1.0, "done")
-    return BenchTable(rows=tuple(rows), environment=MappingProxyType(describe_environment()))
+    return BenchTable(rows=tuple(rows), environment=describe_environment())
 
 
 def _several(scenes: Any) -> list[Any]:

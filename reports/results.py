@@ -12,7 +12,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -30,10 +29,10 @@ Array = NDArray[np.floating]
 
 
 def sealed(image: Image) -> Image:
-    """Return a layered image whose arrays and mappings cannot be written to."""
+    """Return a layered image whose arrays cannot be written to."""
     layers = {name: _read_only(values) for name, values in image.layers.items()}
     depth = None if image.depth is None else _read_only(image.depth)
-    return Image(MappingProxyType(layers), depth, MappingProxyType(dict(image.attributes)))
+    return Image(layers, depth, dict(image.attributes))
 
 
 def _read_only(values: Any) -> Array:

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Results of the Python API: frozen, arrays for NumPy, HTML and PNG for a notebook; from made-up numbers, no scene."""
 
+import copy
 import dataclasses
 import io
+import pickle
 from html.parser import HTMLParser
 from types import MappingProxyType
 
@@ -98,6 +100,15 @@ def test_results_are_frozen_and_so_are_their_arrays(name):
         np.asarray(result)[0] = 0
     own = result.numpy()
     own[0] = 0  # one's own
+
+
+@pytest.mark.parametrize("name", RESULTS)
+def test_results_can_be_sent_to_another_process(name):
+    result = RESULTS[name]()
+    again = pickle.loads(pickle.dumps(result))
+    assert repr(again) == repr(result)
+    np.testing.assert_array_equal(np.asarray(again), np.asarray(result))
+    assert copy.deepcopy(result)._repr_html_() == result._repr_html_()
 
 
 def test_layers_are_arrays_of_the_precision_of_what_made_them():
