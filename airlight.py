@@ -33,11 +33,11 @@ if TYPE_CHECKING:  # for editors, which complete names from here; `_API` says th
     from reference.exr import write_exr as write_exr
     from reports.api import compare as compare
     from reports.api import load_scene as load_scene
-    from reports.api import reference as reference
     from reports.api import render as render
     from reports.api_studies import bench as bench
     from reports.api_studies import integrate as integrate
     from reports.api_studies import report as report
+    from reports.api_truth import reference as reference
     from reports.environment import MissingError as MissingError
     from reports.environment import activate as activate
     from reports.environment import versions as versions
@@ -59,7 +59,7 @@ if TYPE_CHECKING:  # for editors, which complete names from here; `_API` says th
 _API = {
     "load_scene": "reports.api",
     "render": "reports.api",
-    "reference": "reports.api",
+    "reference": "reports.api_truth",
     "compare": "reports.api",
     "integrate": "reports.api_studies",
     "bench": "reports.api_studies",

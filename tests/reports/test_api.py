@@ -62,7 +62,7 @@ def test_the_import_is_light_and_the_variant_is_chosen_on_first_use():
     assert ran.stdout == "Rendering(open-fog by unshadowed (exact), 8 x 6)\n", ran.stderr
 
 
-@pytest.mark.parametrize("module", ["airlight", "reports.api"])
+@pytest.mark.parametrize("module", ["airlight", "reports.api", "reports.api_truth"])
 def test_examples_of_the_docstrings(module, variant):
     found = doctest.testmod(importlib.import_module(module))
     assert found.attempted
