@@ -12,7 +12,7 @@ def diff(
     new: Annotated[Path, typer.Argument(help="report.json, or its folder, to judge.", show_default=False)],
     error_tolerance: Annotated[
         float, typer.Option(help="Relative change of an error that is noise; that of a maximum is twice as wide.")
-    ] = 0.05,
+    ] = 0.02,
     time_tolerance: Annotated[
         float, typer.Option(help="Relative change of a time that is noise, on a quiet machine.")
     ] = 0.25,

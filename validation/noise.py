@@ -7,12 +7,16 @@ vectors, another LLVM or CUDA fuse and order the same float32 operations differe
 
     |e' - e| <= band e + floor
 
-- the floor is what rounding alone makes of a method without any other error. Taking all rounding away (the same
-  scenes in float64, 64 x 48 pixels) moved relative RMSE, bias, p50 and p99 by at most 1.3e-6 and the maximum by 2.2e-6;
-  another rounding moves them less. The floor is 16 times the rounding unit 2^-24 for averages, 64 times for the
-  maximum;
-- the band is for what rounding decides: a ray that just misses an edge, a texel that is just in the light. One pixel of
-  a few thousand then has another error, which moves a maximum more than an average: its band is twice as wide.
+- the floor is what rounding alone makes of a method without any other error: 24 times the rounding unit 2^-24 for
+  averages. In a pixel a thousand times darker than the mean, which is where the denominator of a relative error ends,
+  a rounding of the size of the mean counts a thousand times: the floor of the maximum is 2^-24 / 0.001;
+- the band is for what rounding decides: a ray that just misses an edge, a texel that is just in the light. One pixel
+  of a few thousand then has another error, which moves a maximum more than an average: its band is twice as wide.
+
+Measured on 2026-11-21 with the standard configurations of open-fog, sphere-spot, three-media, two-pens and colonnade at
+64 x 48 pixels: code for AVX2, 8 lanes wide, instead of AVX-512, 16 wide, changed 657 of their numbers; beyond the floor
+none by more than 0.2 %. Taking rounding away altogether (float64) moves more, and says where the floor must end: the
+99 % quantile of methods without other errors falls by 1.3e-6, their largest error by up to 6e-5.
 
 A count of negative pixels may move by the band and a thousandth of the image (sums that cancel to zero have a random
 sign); a count of pixels that are not finite may not move at all.
@@ -30,8 +34,9 @@ longer than a repetition; so the quartiles say how noisy the moment was, not how
    profit alike from wider vectors, larger caches or more threads.
 3. *Witnesses.* The stages were timed one after the other, and each is part of others: surface and airlight of the
    frame, the frame of one after the light moved, that of one after objects moved. Work that grew is seen in them too, a
-   burst is not: the median of the stages that contain it must have grown by half as many milliseconds. What has no
-   witness must have its quartiles parted by the whole ratio; a single repetition, without quartiles, the square of it.
+   burst is not: every stage that contains it must have grown by half as many milliseconds, and the quartiles must not
+   overlap. Two bursts do meet now and then: with a single witness the square of the ratio is needed, without one the
+   cube, and the square where there are too few repetitions for quartiles. The surface alone is no concern of a method.
 """
 
 import math
@@ -41,22 +46,21 @@ from typing import Any
 import numpy as np
 
 ROUNDING = 2.0**-24  #: half of the distance from 1 to the next float32
-ERROR_TOLERANCE = 0.05  #: relative band of an error
+ERROR_TOLERANCE = 0.02  #: relative band of an error
 TIME_TOLERANCE = 0.25  #: relative band of a time
 FLOORS = {
-    "relative_rmse": 16 * ROUNDING,
-    "relative_bias": 16 * ROUNDING,
-    "p50": 16 * ROUNDING,
-    "p99": 16 * ROUNDING,
-    "max": 64 * ROUNDING,
-    "mean": 16 * ROUNDING,
+    "relative_rmse": 24 * ROUNDING,
+    "relative_bias": 24 * ROUNDING,
+    "p50": 24 * ROUNDING,
+    "p99": 24 * ROUNDING,
+    "max": ROUNDING / 1e-3,
+    "mean": 24 * ROUNDING,
     "flip": 1e-4,  # the package's own note says 1e-5 between operating systems
 }
 SHORTEST = 0.05  #: differences below this are launches and the clock, not work [ms]
 
 _FEW = 3  # repetitions without which quartiles say nothing
 _WITNESSES = {
-    "surface": ("frame", "rebuild", "moved"),
     "airlight": ("frame", "rebuild", "moved"),
     "frame": ("sum", "rebuild", "moved"),
     "rebuild": ("moved",),
@@ -134,15 +138,13 @@ def slower_stages(old: Times, new: Times, *, least: float, scale: float) -> list
 def _slower(stage: str, old: Times, new: Times, least: float) -> bool:
     before, after = old[stage], new[stage]
     growth = after["median_ms"] - before["median_ms"]
-    if min(before["repetitions"], after["repetitions"]) < _FEW:
-        return growth >= SHORTEST and after["median_ms"] >= least**2 * before["median_ms"]
-    if growth < SHORTEST or after["median_ms"] < least * before["median_ms"]:
-        return False
     witnesses = [_median(new, name) - _median(old, name) for name in _WITNESSES[stage] if _known(old, name)]
-    parted = 1.0 if witnesses else least
-    if after["low_ms"] <= parted * before["high_ms"]:
+    power = max(1, 3 - len(witnesses))
+    if min(before["repetitions"], after["repetitions"]) < _FEW:
+        power = max(2, power)
+    if growth < SHORTEST or after["median_ms"] < least**power * before["median_ms"]:
         return False
-    return not witnesses or float(np.median(witnesses)) >= 0.5 * growth
+    return after["low_ms"] > before["high_ms"] and all(one >= 0.5 * growth for one in witnesses)
 
 
 def _known(times: Times, stage: str) -> bool:
