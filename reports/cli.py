@@ -16,10 +16,13 @@ from typing import Annotated
 import typer
 
 from reports import __version__
+from reports.command_baselines import baselines
 from reports.command_bench import bench
 from reports.command_certify import certify
 from reports.command_compare import compare
+from reports.command_describe import describe
 from reports.command_diff import diff
+from reports.command_docs import docs
 from reports.command_doctor import doctor
 from reports.command_figures import figures
 from reports.command_integrate import integrate
@@ -45,11 +48,13 @@ _COMMANDS = (
     scenes,
     methods,
     kernels,
+    describe,
     render,
     reference,
     merge,
     compare,
     diff,
+    baselines,
     integrate,
     bench,
     maps,
@@ -58,6 +63,7 @@ _COMMANDS = (
     mutations,
     certify,
     figures,
+    docs,
 )
 
 app = typer.Typer(
