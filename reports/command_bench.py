@@ -98,7 +98,7 @@ def _bench_kernels(names: list[str] | None, *, json: bool, markdown: bool) -> No
     from realtime.kernels import KERNELS
     from reports.bench_tables import print_heading, print_markdown
     from reports.environment import activate, describe_environment
-    from reports.kernel_tables import print_convergence, print_kernel_bench
+    from reports.kernel_tables import convergence_data, print_convergence, print_kernel_bench
     from reports.progress import progress_bar
     from reports.tables import print_json, print_table
     from validation.convergence import convergence, declared
@@ -113,7 +113,8 @@ def _bench_kernels(names: list[str] | None, *, json: bool, markdown: bool) -> No
     if json:
         from reports.data import plain
 
-        print_json({"environment": describe_environment(), "kernels": plain(found), "convergence": plain(rates)})
+        orders = [convergence_data(one) for one in rates]
+        print_json({"environment": describe_environment(), "kernels": plain(found), "convergence": orders})
         return
     if markdown:
         print_heading()

@@ -2,7 +2,7 @@
 """The tables of `airlight bench --kernels`: what kernels cost, and which is cheapest at each error."""
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from reports.tables import number, print_table
 
@@ -53,6 +53,20 @@ def print_convergence(found: "Sequence[Convergence]", *, show: Show = print_tabl
         for one in found
     ]
     show(("kernel", "law", "declared", "measured", "sizes"), rows, "convergence in float64")
+
+
+def convergence_data(found: "Convergence") -> dict[str, Any]:
+    """Return one convergence for JSON: what is declared and measured, without the rays."""
+    from validation.metrics import plain
+
+    declared = found.declared
+    return {
+        "kernel": found.kernel,
+        "sizes": list(found.sizes),
+        "errors": plain(found.errors),
+        "declared": {"kind": declared.kind, "value": declared.value, "power": declared.power} if declared else None,
+        "measured": plain(found.measured),
+    }
 
 
 def _cost_row(cost: "KernelCost") -> tuple[str, ...]:

@@ -6,7 +6,7 @@ import typer
 
 from reports.command_stability import stability as command
 from reports.data import plain
-from reports.kernel_tables import print_convergence, print_kernel_bench
+from reports.kernel_tables import convergence_data, print_convergence, print_kernel_bench
 from reports.stability_tables import boost
 from validation.convergence import Convergence
 from validation.kernel_bench import KernelBench, KernelCost, Spread, speed_against_error
@@ -82,3 +82,12 @@ def test_command_fails_where_the_claim_is_broken(variant, few_laws, monkeypatch,
 
 def test_numbers_of_a_study_fit_json():
     json.dumps(plain(Errors(1, 0, float("nan"), float("inf"), 1.0, 1.0, 0, 0, 0, None)), allow_nan=False)
+
+
+def test_a_convergence_is_json_without_its_rays(variant):
+    from validation.convergence import convergence
+
+    data = convergence_data(convergence("uniform", (4, 8)))
+    assert json.loads(json.dumps(data)) == data
+    assert data["declared"] == {"kind": "order", "value": 2.0, "power": 0.0}
+    assert len(data["errors"]) == len(data["sizes"]) == 2
