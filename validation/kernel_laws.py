@@ -3,15 +3,15 @@
 
 From J = int_{x0}^{x1} exp(-sigma_t (x + r)) p(cos) / r^2 dx, r^2 = h^2 + (x - t)^2:
 
-unit scaling    J(c lengths, sigma_t / c) = J / c. For c a power of two no digit changes in floating point: what differs
-                comes from a constant with a unit, an epsilon against division by zero for instance.
-additivity      J(x0, m) + J(m, x1) = J(x0, x1).
-camera shift    Moving the camera back by d adds the way d: J(t + d, x0 + d, x1 + d) = exp(-sigma_t d) J(t, x0, x1).
-reversal        In a vacuum the ray may be looked along from its other end: J(t, h, x0, x1; p(cos)) =
-                J(x0 + x1 - t, h, x0, x1; p(-cos)). Extinction breaks it: the way to the camera changes.
-intensity       L is linear in the intensity, which J does not contain: J must not change at all.
-phase           J is linear in p: the mean of two tables gives the mean of their J.
-same phase      'hg' with g = 0 and a table of ones are isotropic.
+* unit scaling: J(c lengths, sigma_t / c) = J / c. For c a power of two no digit changes in floating point: what differs
+  comes from a constant with a unit, an epsilon against division by zero for instance.
+* additivity: J(x0, m) + J(m, x1) = J(x0, x1).
+* camera shift: moving the camera back by d adds the way d: J(t + d, x0 + d, x1 + d) = exp(-sigma_t d) J(t, x0, x1).
+* reversal: in a vacuum the ray may be looked along from its other end: J(t, h, x0, x1; p(cos)) = J(x0 + x1 - t, h, x0,
+  x1; p(-cos)). Extinction breaks it: the way to the camera changes.
+* intensity: L is linear in the intensity, which J does not contain: J must not change at all.
+* phase: J is linear in p: the mean of two tables gives the mean of their J.
+* same phase: 'hg' with g = 0 and a table of ones are isotropic.
 
 Swapping camera and light. A single ray has no such law: the ray from the light has no more than one point in common
 with the ray from the camera. But the light scattered at one point P reaches the camera C from the light L with

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Parts of pages that are made from the program and from a report.
+
+A line `<!-- generated: NAME WORDS -->` of a page is replaced by Markdown that a function of `listed` or `measured`
+returns, before the page is read. So the pages read well in a plain viewer too, and nothing on them is copied by hand.
+Links to Python files of the project lead to the page of the API that holds the module.
+"""
+
+import re
+from pathlib import Path
+
+import listed
+import measured
+from sphinx.application import Sphinx
+from sphinx.errors import ExtensionError
+
+ROOT = Path(__file__).resolve().parents[2]
+PARTS = {
+    "modules": listed.modules,
+    "names": listed.names,
+    "commands": listed.commands,
+    "methods": listed.methods,
+    "parameters": listed.parameters,
+    "kernels": listed.kernels,
+    "method": measured.method,
+    "kernel-costs": measured.kernel_costs,
+    "kernel-orders": measured.kernel_orders,
+    "left-out": measured.left_out,
+    "scenes": measured.scenes,
+    "claims": measured.claims,
+    "provenance": measured.provenance,
+}
+_MARK = re.compile(r"^<!-- generated: ([a-z-]+)((?: [\w-]+)*) -->$", flags=re.MULTILINE)
+_SOURCE = re.compile(r"\[([^\]]+)\]\(\.\./((?:analytic|realtime|reference|validation|reports)/[\w/]+)\.py\)")
+#: Documents above this folder and the pages that show them.
+_PAGES = {"../CONTRIBUTING.md": "contributing.md", "../CHANGELOG.md": "changelog.md", "../DESIGN.md": "conventions.md"}
+
+
+def fill(text: str) -> str:
+    """Return the source of a page with its generated parts in place.
+
+    Raises
+    ------
+    ExtensionError
+        If a mark names no part.
+    """
+    return _MARK.sub(_part, text)
+
+
+def _part(found: re.Match[str]) -> str:
+    if found[1] not in PARTS:
+        raise ExtensionError(f"{found[0]}: wanted one of {', '.join(PARTS)}")
+    return PARTS[found[1]](*found[2].split())
+
+
+def _module(found: re.Match[str]) -> str:
+    name = found[2].replace("/", ".").removesuffix(".__init__")
+    return f"{{py:mod}}`{found[1].strip('`')} <{name}>`"
+
+
+def _replace(app: Sphinx, docname: str, content: list[str]) -> None:
+    text = _SOURCE.sub(_module, content[0])
+    for path, page in _PAGES.items():
+        text = text.replace(f"]({path}", f"]({page}")
+    content[0] = fill(text)
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Fill every page when it is read."""
+    app.connect("source-read", _replace)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Parts of pages that list what the program has: modules, names, commands, methods, kernels."""
+
+import ast
+import inspect
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[2]
+#: Pages of methods that are called otherwise than the method.
+PAGES: dict[str, str] = {}
+
+
+def table(headers: Sequence[str], rows: Sequence[Sequence[str]], words: int = 1) -> str:
+    """Return a Markdown table whose first columns, of words, stand to the left and the others, of numbers, right."""
+    rule = ["---" if number < words else "---:" for number in range(len(headers))]
+    return "\n".join("| " + " | ".join(row) + " |" for row in [headers, rule, *rows]) + "\n"
+
+
+def modules(package: str) -> str:
+    """Return all modules of a package with their docstrings and what they define."""
+    found = []
+    for path in sorted((ROOT / package).rglob("*.py")):
+        name = ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+        if path.stem.startswith("command_") or not ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))):
+            continue
+        directive = f".. automodule:: {name}\n   :members:\n   :undoc-members:"
+        found.append(f"## `{name}`\n\n```{{eval-rst}}\n{directive}\n```\n")
+    return "\n".join(found)
+
+
+def names() -> str:
+    """Return what `import airlight` gives: each name, in a sentence, with a link to its module."""
+    import airlight
+
+    rows = []
+    for name in sorted(airlight._API, key=str.lower):
+        module = airlight._API[name]
+        value = getattr(airlight, name)
+        documented = inspect.isfunction(value) or inspect.isclass(value)
+        words = _sentence(value) if documented else f"see {{py:mod}}`{module}`"
+        role = f"{{py:obj}}`{name} <{module}.{name}>`"
+        rows.append((role, words))
+    return table(("name", "what it is"), rows, 2)
+
+
+def _sentence(value: Any) -> str:
+    """Return the first sentence of a docstring, as a cell of a table."""
+    first = " ".join((inspect.getdoc(value) or "").split("\n\n")[0].split())
+    return first.replace("|", "\\|")
+
+
+def methods() -> str:
+    """Return the methods with links to their pages."""
+    from realtime.methods import METHODS
+
+    rows = [
+        (
+            f"[`{record.name}`]({PAGES.get(record.name, record.name)}.md)",
+            record.summary,
+            "yes" if record.uses_kernel else "no",
+            "yes" if record.shadows else "no",
+            record.source,
+        )
+        for record in METHODS.values()
+    ]
+    return table(("method", "what it does", "calls a kernel", "knows shadows", "source"), rows, 5)
+
+
+def parameters(method: str) -> str:
+    """Return the defaults of a method's parameters in a sentence."""
+    from realtime.methods import METHODS
+
+    values = METHODS[method].parameters
+    if not values:
+        return "The method has no parameters."
+    return "Defaults: " + ", ".join(f"`{name}={value}`" for name, value in values.items()) + "."
+
+
+def kernels() -> str:
+    """Return the kernels."""
+    from realtime.kernels import KERNELS
+
+    rows = [
+        (
+            f"`{record.name}`",
+            record.summary,
+            ", ".join(f"`{name}={value}`" for name, value in record.parameters.items()),
+            record.source,
+        )
+        for record in KERNELS.values()
+    ]
+    return table(("kernel", "what it does", "size", "source"), rows, 4)
+
+
+def commands() -> str:
+    """Return every sub-command with its arguments, options and words."""
+    import typer
+
+    from reports.cli import app
+
+    found = typer.main.get_group(app).commands
+    return "\n".join(_command(name, command) for name, command in found.items())
+
+
+def _command(name: str, command: Any) -> str:
+    words = [f"## airlight {name}", ""]
+    shown = [one for one in command.params if one.name not in ("help", "context")]
+    arguments = [one for one in shown if one.param_type_name == "argument"]
+    usage = " ".join(["airlight", name, *(_argument(one) for one in arguments), "[OPTIONS]"])
+    words += ["```text", usage, "```", "", inspect.cleandoc(command.help or ""), ""]
+    rows = [(_option(one), " ".join((one.help or "").split()).replace("|", "\\|"), _default(one)) for one in shown]
+    if rows:
+        words.append(table(("", "what it does", "default"), rows, 3))
+    return "\n".join(words)
+
+
+def _argument(one: Any) -> str:
+    name = one.make_metavar() if _takes_no_context(one.make_metavar) else one.name.upper()
+    return name
+
+
+def _takes_no_context(function: Any) -> bool:
+    return not inspect.signature(function).parameters
+
+
+def _option(one: Any) -> str:
+    if one.param_type_name == "argument":
+        return f"`{one.name.upper()}`"
+    return ", ".join(f"`{name}`" for name in [*one.opts, *one.secondary_opts])
+
+
+def _default(one: Any) -> str:
+    value = one.default
+    if value is None or callable(value) or value in (False, (), []) or one.required:
+        return ""
+    return f"`{value}`" if value is not True else "yes"

@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Parts of pages that print what a report measured, from `docs/data/report.json`."""
+
+import json
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from listed import table
+
+from reports.tables import number
+
+DATA = Path(__file__).resolve().parents[1] / "data"
+_COLUMNS = ("scene", "configuration", "frame ms", "quartiles", "rebuilt ms", "rel. RMSE", "rel. bias", "p99", "max")
+
+
+@cache
+def data() -> dict[str, Any]:
+    """Return the numbers that the documentation keeps."""
+    return json.loads((DATA / "report.json").read_text(encoding="utf-8"))
+
+
+def provenance() -> str:
+    """Return on what machine, when and how the numbers of a page were measured."""
+    report = data()["report"]
+    versions = report["versions"]
+    command = report["command"].split(" -o ")[0]
+    return (
+        f"*Measured {report['created'][:10]} on {report['processor']}, {report['threads']} threads, "
+        f"{report['variant']}, mitsuba {versions['mitsuba']}, drjit {versions['drjit']}, by "
+        f"`{command}`. Times are medians of whole frames, kernels compiled before, "
+        " the geometry static; `rebuilt`: after the light moved. Errors are those of the airlight against the "
+        "`quadrature` truth: relative RMSE and bias over the mean, and quantiles of |test - ref| / max(ref, 0.001 "
+        "mean(ref)).*"
+    )
+
+
+def claims() -> str:
+    """Return the sentences at the top of the report."""
+    return "\n".join(f"> - {claim}" for claim in data()["claims"])
+
+
+def method(name: str) -> str:
+    """Return a method's picture with its error, and its costs and errors in every scene."""
+    rows, notes = [], []
+    for scene in data()["scenes"]:
+        size = "{} x {}".format(*scene["size"])
+        for one in scene["methods"]:
+            if one["method"] != name:
+                continue
+            label = _inside(one["label"])
+            if one["refused"] or one["error"] is None:
+                notes.append(f"- {scene['name']}, {label}: {one['refused'] or one['note'] or 'not measured'}")
+            else:
+                rows.append((f"{scene['name']}, {size}", label, *_numbers(one)))
+    if not rows:
+        return f"The report at hand did not measure `{name}`."
+    parts = [_pictures(name), table(_COLUMNS, rows, 2), provenance()]
+    if notes:
+        parts.append("What was refused or left out:\n\n" + "\n".join(notes))
+    return "\n\n".join(part for part in parts if part)
+
+
+def _inside(label: str) -> str:
+    """Return what stands in the brackets of a label: the kernel and the parameters."""
+    return label.split(" (", 1)[1].rstrip(")") if " (" in label else "-"
+
+
+def _numbers(one: dict[str, Any]) -> tuple[str, ...]:
+    error, times = one["error"], one["times"]
+    errors = [number(error[name], 2) for name in ("relative_rmse", "relative_bias", "p99", "max")]
+    if not times:
+        return ("-", "-", "-", *errors)
+    frame = times["frame"]
+    rebuilt = number(times["rebuild"]["median_ms"]) if times["rebuild"] else "-"
+    return (number(frame["median_ms"]), f"{number(frame['low_ms'])}..{number(frame['high_ms'])}", rebuilt, *errors)
+
+
+def _pictures(name: str) -> str:
+    shown = data()["pictures"].get(name)
+    if shown is None:
+        return ""
+    frame = f"The scene {shown['scene']} by {shown['label']}"
+    error = f"Its relative error, relative RMSE {number(shown['relative_rmse'], 2)}"
+    return (
+        f"```{{container}} pair\n![{frame}](data/method-{name}.png)\n![{error}](data/method-{name}-error.png)\n```\n\n"
+        f"*Left: `{shown['scene']}` by {shown['label']}. Right: its relative error, blue where it is too dark and red "
+        f"where it is too bright, white below 1e-4, full colour from 1 on; relative RMSE "
+        f"{number(shown['relative_rmse'], 2)}.*"
+    )
+
+
+def kernel_costs(phase: str) -> str:
+    """Return what kernels cost and how wrong they are for one phase function, the default sizes."""
+    from realtime.kernels import KERNELS
+
+    found = data()["kernels"]
+    if found is None:
+        return "No costs of kernels are at hand: `airlight bench --kernels` measures them."
+    rows = []
+    for one in found["costs"]:
+        default = next(iter(KERNELS[one["family"]].parameters.values()), None) if one["family"] in KERNELS else None
+        if one["phase"] != phase or one["size"] not in (default, None):
+            continue
+        if one["refused"]:
+            rows.append((f"`{one['kernel']}`", "refused", "-", "-", "-", "-"))
+            continue
+        spread = one["device"] or one["wall"]
+        errors = [number(one[name], 2) for name in ("median", "p99", "max")]
+        quartiles = f"{number(spread['low'])}..{number(spread['high'])}"
+        rows.append((f"`{one['kernel']}`", number(spread["median"]), quartiles, *errors))
+    return table(("kernel", "ns/ray", "quartiles", "median error", "99 %", "max"), rows)
+
+
+def kernel_orders() -> str:
+    """Return the declared and the measured order of convergence of the kernels that have a size."""
+    found = data()["kernels"]
+    if found is None:
+        return ""
+    rows = [
+        (
+            f"`{one['kernel']}`",
+            one["declared"]["kind"] if one["declared"] else "-",
+            number(one["declared"]["value"]) if one["declared"] else "-",
+            number(one["measured"]),
+            f"{one['sizes'][0]}..{one['sizes'][-1]}",
+        )
+        for one in found["convergence"]
+    ]
+    return table(("kernel", "law", "declared", "measured", "sizes"), rows, 2)
+
+
+def left_out() -> str:
+    """Return for every scene the share of light that single scattering leaves out."""
+    rows = []
+    for scene in data()["scenes"]:
+        shares = [scene["multiple"][name] for name in ("medium", "everything")] if scene["multiple"] else [None, None]
+        rows.append((f"`{scene['name']}`", *(_share(one) for one in shares)))
+    return table(("scene", "of the airlight", "of all light"), rows)
+
+
+def _share(share: dict[str, Any] | None) -> str:
+    if share is None:
+        return "-"
+    low, high = (100 * end for end in share["interval"])
+    return f"{100 * share['value']:.1f} % ({low:.1f}..{high:.1f})"
+
+
+def scenes() -> str:
+    """Return the gallery: every built-in scene with its picture, what it is for and what it holds."""
+    from validation.scenes import SCENES
+
+    kept = {scene["name"]: scene for scene in data()["scenes"]}
+    return "\n".join(_scene(record, kept.get(name)) for name, record in SCENES.items())
+
+
+def _scene(record: Any, kept: dict[str, Any] | None) -> str:
+    words = [f"## `{record.name}`", ""]
+    if (DATA / f"scene-{record.name}.png").exists():
+        words += [f"![The scene {record.name}](data/scene-{record.name}.png)", ""]
+    words += [record.purpose, "", f"- Published: {record.published}."]
+    if kept:
+        count = kept["counts"]
+        lights = kept["plan"]["lights"]
+        words.append(f"- {count['shapes']} shapes, {count['triangles']} triangles, lights: {lights}.")
+        words.append(f"- Medium: {kept['plan']['medium']}; extinction: {kept['plan']['extinction']}.")
+        truth = kept["truth"]
+        if truth["relative_bound"] is not None:
+            bound = number(truth["relative_bound"], 2)
+            words.append(f"- The truth: mean airlight {number(truth['mean'])} W/(m^2 sr), bound of its error {bound}.")
+        if kept["multiple"]:
+            words.append(f"- Single scattering leaves out {_share(kept['multiple']['medium'])} of the airlight.")
+    return "\n".join([*words, ""])

@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Sphinx's settings; `airlight docs` builds the pages."""
+
+import sys
+from pathlib import Path
+
+_HERE = Path(__file__).resolve().parent
+sys.path[:0] = [str(_HERE.parent), str(_HERE / "_ext")]
+
+from reports import __version__  # noqa: E402
+
+project = "airlight"
+author = "the airlight authors"
+release = version = __version__
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx.ext.viewcode",
+    "plain_docstrings",
+    "mathml",
+    "generated",
+]
+exclude_patterns = ["_ext", "data"]
+highlight_language = "none"  # what is indented is a formula
+myst_enable_extensions = ["dollarmath"]
+myst_heading_anchors = 3
+suppress_warnings = ["myst.header"]
+
+autodoc_member_order = "bysource"
+autodoc_preserve_defaults = True
+autodoc_typehints = "none"  # shapes and units are in the words
+napoleon_google_docstring = False
+napoleon_use_rtype = False
+napoleon_use_ivar = True
+default_role = "code"
+toc_object_entries = False
+
+# What other packages define has no page here, and there is no network to ask for theirs.
+nitpicky = True
+nitpick_ignore_regex = [("py:.*", r"(numpy|collections|typing|types|pathlib|os|fractions|matplotlib|typer)\..*")]
+
+html_theme = "furo"
+html_title = f"airlight {__version__}"
+html_static_path = ["_static"]
+html_css_files = ["airlight.css"]
+html_copy_source = False
+html_show_copyright = False
+html_show_sphinx = False
