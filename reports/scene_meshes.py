@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The shapes of a Mitsuba scene as triangle meshes, for engines that know no other.
+
+Meshes, rectangles and Mitsuba's cubes stay what they are. Round shapes are cut into `SIDES` around: no point of the
+mesh is further inside the shape than 1 - cos(pi / SIDES) = 3e-4 of the radius, twice that for spheres.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analytic.errors import InputError
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+SIDES = 128
+
+
+@dataclass(frozen=True)
+class ShapeMesh:
+    """A shape as triangles."""
+
+    name: str
+    vertices: Array  #: (vertices, 3) [m]
+    faces: Index  #: (faces, 3), counter-clockwise seen from the side that normals point to
+    normals: Array | None  #: unit normals at the vertices, where the shape is shaded smoothly
+    exact: bool  #: whether the triangles are the shape itself
+
+
+def shape_mesh(shape: Any) -> ShapeMesh:
+    """Return a shape as a mesh.
+
+    Parameters
+    ----------
+    shape
+        A shape of a Mitsuba scene.
+
+    Raises
+    ------
+    InputError
+        For a shape that cannot be made one, with its name.
+    """
+    unit = {"Rectangle": _rectangle, "Sphere": _sphere, "Disk": _disk, "Cylinder": _cylinder}.get(shape.class_name())
+    if unit is None and shape.is_mesh():  # Mitsuba's rectangle says that it is a mesh too, but has no vertices
+        return _of_mesh(shape)
+    if unit is None:
+        raise InputError(
+            f"shape '{shape.id()}' is a {shape.class_name()}; wanted meshes, cubes, rectangles, spheres, disks and "
+            "cylinders to write as triangles: replace it by a mesh"
+        )
+    return _placed(shape, *unit())
+
+
+def triangle_count(shape: Any) -> int | None:
+    """Return the triangles of a mesh or a rectangle, None for other shapes."""
+    if shape.class_name() == "Rectangle":
+        return 2
+    return int(shape.face_count()) if shape.is_mesh() else None
+
+
+def _of_mesh(shape: Any) -> ShapeMesh:
+    import mitsuba as mi
+
+    parameters = mi.traverse(shape)
+    vertices = np.array(parameters["vertex_positions"], dtype=np.float64).reshape(-1, 3)
+    faces = np.array(parameters["faces"], dtype=np.int64).reshape(-1, 3)
+    normals = None
+    if shape.has_vertex_normals():
+        normals = np.array(parameters["vertex_normals"], dtype=np.float64).reshape(-1, 3)
+        length = np.linalg.norm(normals, axis=1, keepdims=True)
+        normals = normals / np.where(length > 0, length, 1)
+        faces = _towards(vertices, faces, normals)
+    return _turned(shape, ShapeMesh(shape.id(), vertices, faces, normals, exact=True))
+
+
+def _placed(shape: Any, vertices: Array, faces: Index, normals: Array | None) -> ShapeMesh:
+    """Move a unit shape to where its transform puts it; normals go with the inverse transposed.
+
+    Where the transform mirrors, Mitsuba's cylinder shades its inside, the others the side that the transform leaves.
+    """
+    import mitsuba as mi
+
+    matrix = np.array(mi.traverse(shape)["to_world"].matrix, dtype=np.float64).reshape(4, 4)
+    mirrored = np.linalg.det(matrix[:3, :3]) < 0
+    if mirrored and shape.class_name() != "Cylinder":
+        faces = faces[:, ::-1]
+    if normals is not None:
+        normals = normals @ np.linalg.inv(matrix[:3, :3]) * (-1 if mirrored and shape.class_name() == "Cylinder" else 1)
+        normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    moved = vertices @ matrix[:3, :3].T + matrix[:3, 3]
+    return _turned(shape, ShapeMesh(shape.id(), moved, faces, normals, exact=shape.class_name() == "Rectangle"))
+
+
+def _towards(vertices: Array, faces: Index, normals: Array) -> Index:
+    """Return faces that run counter-clockwise about their normals: a mesh that was mirrored keeps its order."""
+    corners = vertices[faces]
+    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    against = np.sum(normals[faces].sum(axis=1) * area, axis=1) < 0
+    return np.where(against[:, None], faces[:, ::-1], faces)
+
+
+def _turned(shape: Any, mesh: ShapeMesh) -> ShapeMesh:
+    """Return the mesh inside out where the shape is."""
+    if not shape.has_flipped_normals():
+        return mesh
+    normals = None if mesh.normals is None else -mesh.normals
+    return ShapeMesh(mesh.name, mesh.vertices, mesh.faces[:, ::-1], normals, mesh.exact)
+
+
+def _rectangle() -> tuple[Array, Index, None]:
+    corners = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    return corners, np.array([[0, 1, 2], [0, 2, 3]]), None
+
+
+def _disk() -> tuple[Array, Index, None]:
+    i = np.arange(SIDES)
+    fan = np.stack([np.full(SIDES, SIDES), i, (i + 1) % SIDES], axis=1)
+    return np.concatenate([_circle(), np.zeros((1, 3))]), fan, None
+
+
+def _cylinder() -> tuple[Array, Index, Array]:
+    """Return the side of the cylinder from z = 0 to 1; Mitsuba's has no ends."""
+    circle = _circle()
+    vertices = np.concatenate([circle, circle + np.array([0.0, 0, 1])])
+    return vertices, _band(0, SIDES), np.concatenate([circle, circle])
+
+
+def _sphere() -> tuple[Array, Index, Array]:
+    rings = SIDES // 2
+    polar = np.pi * np.arange(1, rings) / rings
+    circle = _circle()
+    rows = [np.sin(angle) * circle - np.array([0, 0, np.cos(angle)]) for angle in polar]
+    vertices = np.concatenate([*rows, [[0.0, 0, -1], [0, 0, 1]]])
+    bands = [_band(ring * SIDES, (ring + 1) * SIDES) for ring in range(rings - 2)]
+    i = np.arange(SIDES)
+    j = (i + 1) % SIDES
+    south, north, top = np.full(SIDES, len(vertices) - 2), np.full(SIDES, len(vertices) - 1), (rings - 2) * SIDES
+    ends = [np.stack([south, j, i], axis=1), np.stack([north, top + i, top + j], axis=1)]
+    return vertices, np.concatenate([*bands, *ends]), vertices
+
+
+def _circle() -> Array:
+    angle = 2 * np.pi * np.arange(SIDES) / SIDES
+    return np.stack([np.cos(angle), np.sin(angle), np.zeros(SIDES)], axis=1)
+
+
+def _band(low: int, high: int) -> Index:
+    """Return the triangles between two rings, the upper one further along z, seen from outside."""
+    i = np.arange(SIDES)
+    j = (i + 1) % SIDES
+    return np.concatenate([np.stack([low + i, low + j, high + j], 1), np.stack([low + i, high + j, high + i], 1)])
