@@ -4,7 +4,7 @@
 import io
 from typing import Any
 
-_MARKERS = "os^Dv<>Pp*hX"
+from reports.style import report_styles
 
 
 def speed_error_chart(scenes: list[dict[str, Any]]) -> str:
@@ -17,21 +17,21 @@ def speed_error_chart(scenes: list[dict[str, Any]]) -> str:
     """
     from matplotlib.figure import Figure
 
-    labels = list(dict.fromkeys(m["label"] for scene in scenes for m in scene["methods"]))
+    styles = report_styles(scenes)
     columns = min(2, len(scenes))
     rows = -(-len(scenes) // columns)
     figure = Figure(figsize=(5.1 * columns, 3.3 * rows + 0.9), layout="constrained")
     panels = figure.subplots(rows, columns, squeeze=False)
     for panel, scene in zip(panels.flat, scenes):
-        _panel(panel, scene, labels)
+        _panel(panel, scene, styles)
     for panel in list(panels.flat)[len(scenes) :]:
         panel.set_visible(False)
-    handles = [panels.flat[0].plot([], [], **_style(labels, label), label=label)[0] for label in labels]
-    figure.legend(handles=handles, loc="outside lower center", ncols=2, fontsize=8, frameon=False)
+    handles = [panels.flat[0].plot([], [], **_points(style), label=label)[0] for label, style in styles.items()]
+    figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=8, frameon=False)
     return _svg(figure)
 
 
-def _panel(panel, scene: dict[str, Any], labels: list[str]) -> None:
+def _panel(panel, scene: dict[str, Any], styles: dict[str, dict[str, Any]]) -> None:
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     for measured in scene["methods"]:
@@ -40,7 +40,7 @@ def _panel(panel, scene: dict[str, Any], labels: list[str]) -> None:
         time = measured["times"]["frame"]
         spread = [[time["median_ms"] - time["low_ms"]], [time["high_ms"] - time["median_ms"]]]
         point = (time["median_ms"], measured["error"]["relative_rmse"])
-        panel.errorbar(*point, xerr=spread, **_style(labels, measured["label"]))
+        panel.errorbar(*point, xerr=spread, **_points(styles[measured["label"]]))
     panel.set(xscale="log", yscale="log", xlabel="time of a frame [ms]", ylabel="relative RMSE of the airlight [1]")
     # Times often span less than a decade: name 1, 2 and 5 of each, in plain numbers.
     panel.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
@@ -50,12 +50,8 @@ def _panel(panel, scene: dict[str, Any], labels: list[str]) -> None:
     panel.grid(True, which="major", linewidth=0.4, alpha=0.5)
 
 
-def _style(labels: list[str], label: str) -> dict[str, Any]:
-    import matplotlib
-
-    number = labels.index(label)
-    colour = matplotlib.colormaps["viridis"](0.05 + 0.85 * number / max(1, len(labels) - 1))
-    return {"color": colour, "marker": _MARKERS[number % len(_MARKERS)], "linestyle": "none", "markersize": 7}
+def _points(style: dict[str, Any]) -> dict[str, Any]:
+    return style | {"linestyle": "none", "markersize": 7}
 
 
 def _svg(figure) -> str:

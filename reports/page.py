@@ -1,69 +1,131 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The page of a report: report.json and its pictures as one self-contained HTML file."""
+"""The page of a report: report.json and its images as one self-contained HTML file.
+
+Styles, scripts and images are put into the file: it opens without a network, in any recent browser. The images go in as
+data (`reports.image_data`), decoded and drawn by the scripts in `templates/`.
+"""
 
 import base64
+import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from analytic.errors import InputError
 from reports.charts import speed_error_chart
-from reports.pictures import ERROR_CEILING, ERROR_FLOOR, error_scale, png_bytes
+from reports.claims import verdict
+from reports.colour_maps import signed_colours, unsigned_colours
+from reports.image_data import SceneImages, scene_images
+from reports.page_published import BILLETER_PASSES, BILLETER_SIZE
+from reports.page_published import FILTERS as PUBLISHED_FILTERS
+from reports.page_words import FILTERS, KEYS, KINDS, MARKS, kept_words, precision_words, viewer_words
+
+PAGE_LIMIT = 30_000_000  #: bytes of a page
+WORDS_LIMIT = 2_500_000  #: of these for all that is not an image
+SCRIPTS = ("codec.js", "scene.js", "draw.js", "viewer.js", "page.js")
+TEMPLATES = Path(__file__).parent / "templates"
 
 
-def render_page(data: dict[str, Any], folder: Path) -> str:
+def render_page(data: dict[str, Any], folder: Path, *, limit: int = PAGE_LIMIT) -> str:
     """Return the HTML page of a report.
 
     Parameters
     ----------
     data
-        The content of report.json.
+        The content of report.json, schema "airlight-report/2".
     folder
-        Where the pictures that it names lie.
+        Where the files that it names lie.
+    limit
+        Of the page [bytes]; images are thinned out to keep it.
+
+    Raises
+    ------
+    InputError
+        If a file is missing or cannot be used, or if the page cannot be made small enough.
     """
     import jinja2
+    from markupsafe import Markup
 
     environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"),
+        loader=jinja2.FileSystemLoader(TEMPLATES),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"percent": _percent, "number": _number, "interval": _interval}
-
-    def picture(name: str) -> str:
-        return "data:image/png;base64," + base64.b64encode((folder / name).read_bytes()).decode("ascii")
-
-    return environment.get_template("report.html.j2").render(
+    environment.filters |= {**FILTERS, **PUBLISHED_FILTERS, "verdict": verdict}
+    # A scene of which nothing could be shown has no viewer, and no images in the page.
+    with_images = [scene for scene in data["scenes"] if any(one["files"] for one in scene["methods"])]
+    images = _images(with_images, Path(folder), limit - WORDS_LIMIT)
+    number_of = {id(scene): number for number, scene in enumerate(with_images)}
+    page = environment.get_template("report.html.j2").render(
         report=data,
-        picture=picture,
-        chart=speed_error_chart(data["scenes"]),
-        scale="data:image/png;base64," + base64.b64encode(png_bytes(error_scale())).decode("ascii"),
-        error_floor=ERROR_FLOOR,
-        error_ceiling=ERROR_CEILING,
+        viewers=[
+            _viewer(scene, number_of[id(scene)], images[number_of[id(scene)]]) if id(scene) in number_of else None
+            for scene in data["scenes"]
+        ],
+        chart=Markup(speed_error_chart(data["scenes"])) if data["scenes"] else "",
+        css=Markup((TEMPLATES / "report.css").read_text(encoding="utf-8")),
+        scripts=[Markup((TEMPLATES / name).read_text(encoding="utf-8")) for name in SCRIPTS],
+        images=Markup(_script_json({"scenes": [one.index for one in images], "maps": _maps()})),
+        pixels=[Markup(one.data) for one in images],
+        billeter_passes=BILLETER_PASSES,
+        billeter_size=BILLETER_SIZE,
+        key_table=KEYS,
+        kinds=KINDS,
+        marks=MARKS,
+        kept=kept_words(data),
+        precision_words=precision_words([one.index for one in images]),
     )
+    if len(page.encode()) > limit:
+        raise InputError(
+            f"report: the page takes {len(page.encode()) / 1e6:.1f} MB, wanted at most {limit / 1e6:g} MB; "
+            "report fewer scenes or methods at once"
+        )
+    return page
 
 
-def _number(value: float | None, digits: int = 3) -> str:
-    """Return a number with some significant digits, an en dash for none."""
-    if value is None:
-        return "\N{EN DASH}"
-    text = f"{value:.{digits - 1}e}" if 0 < abs(value) < 1e-3 else f"{value:.{digits}g}"
-    if "e" in text:
-        mantissa, exponent = text.split("e")
-        return f"{mantissa}·10{_superscript(int(exponent))}"
-    return text
+def _images(scenes: Sequence[Mapping[str, Any]], folder: Path, limit: int) -> list[SceneImages]:
+    """Return the images of the scenes; each may take its share of what those before it left."""
+    found: list[SceneImages] = []
+    for place, scene in enumerate(scenes):
+        left = limit - sum(len(one.data) for one in found)
+        found.append(scene_images(scene, folder, left // (len(scenes) - place)))
+    return found
 
 
-def _percent(value: float | None, digits: int = 3) -> str:
-    return "\N{EN DASH}" if value is None else f"{_number(100 * value, digits)} %"
+def _viewer(scene: Mapping[str, Any], number: int, images: SceneImages) -> dict[str, Any]:
+    shown = [one for one in scene["methods"] if one["files"]]
+    return {
+        "number": number,
+        "shown": shown,
+        "first": _first_shown(shown),
+        "size": images.index["size"],
+        "words": viewer_words(images.index),
+    }
 
 
-def _interval(pair: list[float | None] | None) -> str:
-    """Return an interval of relative values in per cent."""
-    if pair is None or pair[0] is None or pair[1] is None:
-        return "\N{EN DASH}"
-    return f"{100 * pair[0]:+.3f} … {100 * pair[1]:+.3f} %"
+def _first_shown(methods: Sequence[Mapping[str, Any]], target: float = 0.01) -> int:
+    """Return the place of the fastest method within the target, as the claims name it, or else of the most accurate."""
+
+    def order(number: int) -> tuple[float, float]:
+        one = methods[number]
+        error = (one["error"] or {}).get("relative_rmse")
+        if error is None or one["error"].get("nonfinite"):
+            return 2, 0
+        if error <= target and one["times"]:
+            return 0, one["times"]["frame"]["median_ms"]
+        return 1, error
+
+    return min(range(len(methods)), key=order)
 
 
-def _superscript(value: int) -> str:
-    return str(value).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+def _maps() -> dict[str, str]:
+    """Return the colour maps by name, their bytes in base64."""
+    maps = {"signed": signed_colours(), "relative": unsigned_colours("viridis"), "flip": unsigned_colours("magma")}
+    return {name: base64.b64encode(colours.tobytes()).decode("ascii") for name, colours in maps.items()}
+
+
+def _script_json(value: Any) -> str:
+    """Return JSON that can stand inside a script element: no tag can begin in it."""
+    return json.dumps(value, ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.files import write_bytes
+from reports.colour_maps import NOT_FINITE, signed_colours
 from validation.colour_difference import auto_exposure
 
 Picture = NDArray[np.uint8]
@@ -28,7 +29,7 @@ def tone_mapped(radiance: NDArray[np.float64], factor: float) -> Picture:
     linear = np.clip(np.where(finite[..., None], radiance, 0) * factor, 0, 1)
     encoded = np.asarray(colour.cctf_encoding(linear, function="sRGB"))
     picture = np.round(255 * np.clip(encoded, 0, 1)).astype(np.uint8)
-    picture[~finite] = (255, 0, 255)
+    picture[~finite] = NOT_FINITE
     return picture
 
 
@@ -38,8 +39,6 @@ def error_map(reference: NDArray[np.float64], test: NDArray[np.float64]) -> Pict
     The error of a pixel is its largest over the channels of (test - reference) / max(reference, 0.001 mean(reference)),
     on a scale that is logarithmic from 1e-4 to 1 on either side, so that one scale serves every method.
     """
-    import matplotlib
-
     finite = np.isfinite(reference) & np.isfinite(test)
     mean = float(reference[finite].mean()) if finite.any() else 0.0
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -49,18 +48,16 @@ def error_map(reference: NDArray[np.float64], test: NDArray[np.float64]) -> Pict
     worst = np.take_along_axis(relative, np.abs(relative).argmax(axis=-1)[..., None], axis=-1)[..., 0]
     decades = np.log10(ERROR_CEILING / ERROR_FLOOR)
     size = np.clip(np.log10(np.maximum(np.abs(worst), 1e-30) / ERROR_FLOOR) / decades, 0, 1)
-    colours = matplotlib.colormaps["RdBu_r"](0.5 + 0.5 * np.sign(worst) * size)[..., :3]
-    picture = np.round(255 * colours).astype(np.uint8)
-    picture[~np.all(finite, axis=-1)] = (255, 0, 255)
+    colours = signed_colours()
+    middle = len(colours) // 2
+    picture = colours[np.round(middle * (1 + np.sign(worst) * size)).astype(int)]
+    picture[~np.all(finite, axis=-1)] = NOT_FINITE
     return picture
 
 
 def error_scale() -> Picture:
     """Return the colour scale of `error_map` as a horizontal bar."""
-    import matplotlib
-
-    bar = matplotlib.colormaps["RdBu_r"](np.linspace(0, 1, 512))[:, :3]
-    return np.repeat(np.round(255 * bar).astype(np.uint8)[None], 12, axis=0)
+    return np.repeat(np.repeat(signed_colours(), 2, axis=0)[None], 12, axis=0)
 
 
 def png_bytes(picture: Picture) -> bytes:

@@ -1,147 +1,25 @@
 # SPDX-License-Identifier: BSD-3-Clause
-import base64
-import copy
-from html.parser import HTMLParser
+import json
 
 import numpy as np
 import pytest
 
+from analytic.errors import InputError
 from reports.charts import speed_error_chart
-from reports.page import _interval, _number, _percent, render_page
-from reports.pictures import png_bytes, write_png
-
-EN_DASH = "\N{EN DASH}"
-VOID = {"meta", "img", "br", "hr", "link", "input"}
-
-
-class Page(HTMLParser):
-    """The page as a reader of HTML sees it; every tag must be closed in order."""
-
-    def __init__(self, text):
-        super().__init__(convert_charrefs=True)
-        self.open, self.tags, self.words, self.tables = [], [], [], []
-        self.feed(text)
-        self.close()
-        assert self.open == []
-
-    def handle_starttag(self, tag, attrs):
-        self.tags.append((tag, dict(attrs)))
-        if tag == "table":
-            self.tables.append([])
-        elif self.tables and "table" in self.open:
-            self.tables[-1].append((tag, dict(attrs)))
-        if tag not in VOID:
-            self.open.append(tag)
-
-    def handle_startendtag(self, tag, attrs):
-        self.tags.append((tag, dict(attrs)))
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-    def handle_data(self, data):
-        if not {"style", "svg"} & set(self.open):
-            self.words.append(data)
-
-    def attributes(self, tag):
-        return [attributes for name, attributes in self.tags if name == tag]
-
-    @property
-    def text(self):
-        return " ".join(" ".join(self.words).split())
-
-
-def timing(median):
-    return {"median_ms": median, "low_ms": 0.9 * median, "high_ms": 1.2 * median, "repetitions": 7}
-
-
-def method(label, **changes):
-    error = {"relative_rmse": 0.0123, "relative_bias": -0.0045, "p50": 0.0011, "p99": 0.0555, "nonfinite": 0}
-    return {
-        "label": label,
-        "refused": None,
-        "note": None,
-        "knows_shadows": True,
-        "times": {name: timing(3.21) for name in ("frame", "surface", "airlight", "rebuild")},
-        "error": error,
-        "flip": {"value": 0.0321, "note": ""},
-        "files": {"picture": "s/a.png", "error": "s/a.png", "exr": "s/a.exr"},
-    } | changes
-
-
-STATISTICS = {
-    "relative_bias": 0.00017,
-    "relative_bias_ci": [-0.0011, 0.0014],
-    "margin": 0.005,
-    "equivalent": True,
-    "detectable_bias": 0.0021,
-    "z_mean": 0.013,
-    "z_std": 1.021,
-    "rejected": 3,
-    "expected_rejections": 0.01,
-}
-AGREEMENT = {
-    "estimator": "volpath",
-    "layer": "airlight",
-    "width": 160,
-    "height": 120,
-    "batches": 48,
-    "samples": 64,
-    "epsilon": 8.94e-4,
-    "masked": 11,
-    "uncorrected_bias": 0.0013,
-    "statistics": STATISTICS,
-}
-DATA = {
-    "schema": "airlight-report/1",
-    "created": "2026-11-21 12:34:56 +0000",
-    "command": "airlight report --quick",
-    "seconds": 12.3,
-    "settings": {"name": "quick", "image": [32, 24], "timed": [64, 48]},
-    "environment": {"versions": {"airlight": "0.1.0", "mitsuba": "3.9.1"}, "variant": "llvm_ad_rgb", "threads": 2},
-    "claims": ["The truth is confirmed.", "hall: the fastest method is good."],
-    "scenes": [
-        {
-            "name": "hall",
-            "purpose": "A hall.",
-            "published": "Billeter 2010",
-            "path": None,
-            "size": [32, 24],
-            "plan": {"shadows": "visibility tests", "medium": "unbounded"},
-            "notes": [],
-            "truth": {
-                "mean": 0.98765,
-                "relative_bound": 1.2e-6,
-                "transitions": 4321,
-                "missed": 0.0007,
-                "checked": 98765,
-                "disagreements": 12,
-                "refined": 11,
-                "left": 1,
-            },
-            "multiple": {
-                "medium": {"value": 0.123, "interval": [0.12, 0.126]},
-                "everything": {"value": 0.21, "interval": [0.2, 0.22]},
-                "max_depth": 64,
-            },
-            "agreement": {"airlight": AGREEMENT, "surface": AGREEMENT | {"layer": "surface"}},
-            "methods": [method("good (k)"), method("flat", knows_shadows=False)],
-            "exposure": 2.5,
-            "files": {"picture": "s/a.png"},
-        }
-    ],
-}
+from reports.page import SCRIPTS, render_page
+from reports.page_words import DASH, first_sentence, interval, kept_words, number, percent, rate, words
+from reports.pictures import png_bytes
+from tests.page_for_tests import DATA, Page, engine_image, method, refused, report_data, timing, write_files
 
 
 @pytest.fixture
 def data():
-    return copy.deepcopy(DATA)
+    return report_data()
 
 
-@pytest.fixture
-def folder(tmp_path):
-    write_png(tmp_path / "s" / "a.png", np.full((2, 3, 3), 77, dtype=np.uint8))
-    return tmp_path
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return write_files(tmp_path_factory.mktemp("page"))
 
 
 def render(data, folder):
@@ -149,14 +27,8 @@ def render(data, folder):
 
 
 @pytest.fixture(scope="module")
-def page(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("page")
-    write_png(folder / "s" / "a.png", np.full((2, 3, 3), 77, dtype=np.uint8))
-    text = render_page(copy.deepcopy(DATA), folder)
-    parsed = Page(text)
-    parsed.source = text
-    parsed.picture = base64.b64encode((folder / "s" / "a.png").read_bytes()).decode()
-    return parsed
+def page(folder):
+    return render(report_data(), folder)
 
 
 def test_page_shows_the_numbers_of_the_data(page):
@@ -164,33 +36,40 @@ def test_page_shows_the_numbers_of_the_data(page):
     for shown in ("1.23 %", "-0.45 %", "5.55 %", "3.21", "312", "0.98765", "4321", "-0.110 … +0.140 %", "±0.5 %", "11"):
         assert shown in text, shown
     for claim in DATA["claims"]:
-        assert claim in text
+        assert claim["text"] in text
     assert "Answers to: Billeter 2010." in text
     assert "airlight report --quick" in text
     assert "mitsuba 3.9.1" in text
 
 
 def test_page_needs_nothing_but_itself(page):
-    for _, attributes in page.tags:
+    """Only the pictures that are named for readers without scripts are other files, and they are not loaded."""
+    for tag, attributes in page.tags:
         for name in ("src", "href", "xlink:href", "data", "poster", "srcset", "action"):
             target = attributes.get(name)
-            assert target is None or target.startswith(("data:image/png;base64,", "#")), target
-    tags = {tag for tag, _ in page.tags}
-    assert not tags & {"script", "link", "iframe", "object", "embed"}
+            ok = target is None or target.startswith(("#", "data:,")) or (tag == "a" and target.startswith("s/"))
+            assert ok, (tag, target)
+    assert not {tag for tag, _ in page.tags} & {"iframe", "object", "embed", "img"}
     assert "@import" not in page.source
     assert "url(http" not in page.source
 
 
-def test_pictures_are_in_the_page_and_have_words_beside_them(page):
-    images = page.attributes("img")
-    assert len(images) == 1 + 2 * 3
-    assert all(image["alt"].strip() for image in images)
-    assert sum(image["src"].endswith("," + page.picture) for image in images) == 6
-    assert len({image["alt"] for image in images if "error" in image["alt"]}) == 3  # the scale and two methods
+def test_images_are_data_and_every_canvas_has_words(page):
+    index = json.loads(page.script("images"))
+    (scene,) = index["scenes"]
+    assert [one["label"] for one in scene["methods"]] == ["good (k)", "flat"]
+    assert set(scene["methods"][1]["layers"]) == {"airlight", "surface", "flip"}
+    assert len(page.script("pixels-0")) > 1000
+    pictures = [attributes for attributes in page.attributes("canvas") if "aria-hidden" not in attributes]
+    shown = [attributes for attributes in pictures if attributes.get("role") == "img"]
+    assert len(shown) == 3
+    assert len({attributes["aria-label"] for attributes in shown}) == 3
+    assert all(attributes["tabindex"] == "0" for attributes in shown)
 
 
 def test_tables_have_headers_and_captions(page):
-    assert len(page.tables) == 3
+    # Probe, methods, agreement, multiple scattering, environment, settings, keys.
+    assert len(page.tables) == 7
     for table in page.tables:
         assert any(tag == "caption" for tag, _ in table)
         headers = [attributes for tag, attributes in table if tag == "th"]
@@ -201,27 +80,45 @@ def test_tables_have_headers_and_captions(page):
         assert sum(attributes["scope"] == "row" for attributes in headers) >= rows - 1
 
 
-def test_rows_of_the_methods_are_as_wide_as_their_headers(data, folder):
-    data["scenes"][0]["methods"].append(method("bad", refused="no", times=None, error=None, files={}))
-    table = render(data, folder).tables[0]
-    widths, row = [], 0
+def widths(table):
+    """The columns of each row of a table."""
+    found = []
     for tag, attributes in table:
         if tag == "tr":
-            widths.append(row)
-            row = 0
-        row += int(attributes.get("colspan", 1)) if tag in ("td", "th") else 0
-    widths.append(row)
-    assert set(widths[1:]) == {12}
+            found.append(0)
+        if tag in ("td", "th"):
+            found[-1] += int(attributes.get("colspan", 1))
+    return found
 
 
-def test_page_has_language_title_and_one_main_heading(page):
+def table_of(page, caption):
+    """The table whose group is named by a caption."""
+    labels = [attributes["aria-label"] for tag, attributes in page.tags if attributes.get("role") == "group"]
+    tables = [label for label in labels if label not in ("Side by side or one picture",)]
+    boxes = [label for label in tables if not label.startswith(("Images of", "What the pictures"))]
+    return page.tables[next(place for place, label in enumerate(boxes) if label.startswith(caption))]
+
+
+def test_rows_of_the_methods_are_as_wide_as_their_headers(data, folder):
+    data["scenes"][0]["methods"] += [refused("bad", "no"), engine_image()]
+    assert set(widths(table_of(render(data, folder), "Times and errors"))) == {12}
+
+
+def test_page_has_language_title_one_main_heading_and_landmarks(page):
     assert page.attributes("html") == [{"lang": "en"}]
     assert "2026-11-21" in page.text
-    assert len(page.attributes("h1")) == 1
-    assert [attributes["id"] for attributes in page.attributes("h2") if "id" in attributes] == ["hall"]
+    assert len(page.attributes("h1")) == len(page.attributes("main")) == 1
+    names = {attributes["id"] for _, attributes in page.tags if "id" in attributes}
+    assert all(attributes["href"][1:] in names for attributes in page.attributes("a") if attributes["href"][0] == "#")
+    assert all(attributes["aria-labelledby"] in names for attributes in page.attributes("section"))
 
 
-EVIL = "<script>alert('1')</script> & \"q\" $x^2$ {{ 7 * 7 }}"
+def test_names_are_unique(page):
+    names = [attributes["id"] for _, attributes in page.tags if "id" in attributes]
+    assert len(names) == len(set(names))
+
+
+EVIL = "</script><script>alert('1')</script> & \"q\" $x^2$ {{ 7 * 7 }}"
 
 
 def test_names_and_notes_are_words_and_never_html(data, folder):
@@ -230,14 +127,16 @@ def test_names_and_notes_are_words_and_never_html(data, folder):
     scene["notes"] = [EVIL]
     scene["plan"][EVIL] = EVIL
     scene["methods"][0]["label"] = EVIL
-    scene["methods"].append(method("x", refused=EVIL, times=None, error=None, files={}))
-    data["claims"].append(EVIL)
+    scene["methods"].append(refused("x", EVIL))
+    data["claims"].append({"kind": EVIL, "text": EVIL, "good": None})
     data["command"] = data["environment"]["variant"] = EVIL
     page = render(data, folder)
-    assert "script" not in {tag for tag, _ in page.tags}
-    # Claim, name, purpose, published, note, plan twice, label, refusal, command, environment: all as they came.
-    assert page.text.count(EVIL) >= 10
-    assert any(image["alt"].startswith(EVIL) for image in page.attributes("img"))
+    # Scripts of our own, the index and one scene's pixels; none by what a file is called.
+    assert len(page.scripts) == len(SCRIPTS) + 2
+    # Claim twice, name, purpose, published, note, plan twice, label, refusal, command, environment: all as they came.
+    assert page.text.count(EVIL) >= 12
+    index = json.loads(page.script("images"))
+    assert index["scenes"][0]["name"] == index["scenes"][0]["methods"][0]["label"] == EVIL
 
 
 @pytest.mark.parametrize("name", ["50$ a$", "$", "a_b^c", "日本", "$\\frac{$"])
@@ -252,7 +151,7 @@ def test_missing_values_are_dashes(data, folder):
     scene = data["scenes"][0]
     scene["truth"] |= {"mean": None, "relative_bound": None, "missed": None}
     scene["methods"][0]["error"] |= {"relative_rmse": None, "relative_bias": None, "p50": None, "p99": None}
-    scene["methods"].append(method("bad", refused="no series", times=None, error=None, files={}))
+    scene["methods"].append(refused("bad", "no series"))
     scene["agreement"]["airlight"]["statistics"] |= {
         "relative_bias": None,
         "relative_bias_ci": [None, None],
@@ -264,7 +163,7 @@ def test_missing_values_are_dashes(data, folder):
     text = render(data, folder).text
     assert "None" not in text
     assert "nan" not in text.lower().replace("airlight", "").split()
-    assert EN_DASH in text
+    assert DASH in text
     assert "refused: no series" in text
     assert "NO" in text
 
@@ -272,24 +171,64 @@ def test_missing_values_are_dashes(data, folder):
 def test_scene_without_agreement_and_published_figure(data, folder):
     data["scenes"][0] |= {"agreement": {}, "published": ""}
     page = render(data, folder)
-    assert len(page.tables) == 2
+    assert len(page.tables) == 6
     assert "Answers to" not in page.text
 
 
-def test_failures_are_marked(data, folder):
+def test_scene_of_which_everything_was_refused_has_no_viewer(data, folder):
+    blank = report_data()["scenes"][0] | {"name": "dark", "methods": [refused("x", "too dark")]}
+    page = render(data | {"scenes": [blank, data["scenes"][0]]}, folder)
+    assert len([1 for _, attributes in page.tags if attributes.get("class") == "viewer"]) == 1
+    assert [one["name"] for one in json.loads(page.script("images"))["scenes"]] == ["hall"]
+    assert "viewer-0" in {attributes.get("id") for _, attributes in page.tags}
+
+
+def test_failures_are_marked_and_not_by_colour_alone(data, folder):
     statistics = data["scenes"][0]["agreement"]["surface"]["statistics"]
     data["scenes"][0]["agreement"]["surface"]["statistics"] = statistics | {"equivalent": False}
     data["scenes"][0]["methods"][0]["error"]["nonfinite"] = 9
-    data["claims"] = ["The truth is NOT confirmed."]
+    data["claims"] = [{"kind": "truth", "text": "The truth is NOT confirmed.", "good": False}]
     page = render(data, folder)
-    assert sum("bad" in (attributes.get("class") or "") for tag, attributes in page.tags) == 3
+    marked = [tag for tag, attributes in page.tags if "bad" in (attributes.get("class") or "").split()]
+    assert sorted(marked) == ["li", "p", "td", "td"]  # claim, words for who has no scripts, agreement, not finite
     assert "NO, ±0.5 %" in page.text
+    assert "does not hold: The truth is NOT confirmed." in page.text
+
+
+def test_agreement_that_ran_out_of_time_is_neither_yes_nor_no(data, folder):
+    late = data["scenes"][0]["agreement"]["airlight"]
+    late["statistics"] = late["statistics"] | {"equivalent": False, "relative_bias_ci": [-0.01, 0.002]}
+    late["finished"] = False
+    assert "not decided in time, ±0.5 %" in render(data, folder).text
 
 
 def test_method_without_shadows_is_marked_where_there_are_shadows(data, folder):
     assert render(data, folder).text.count("(no shadows)") == 1
     data["scenes"][0]["plan"]["shadows"] = "none: nothing casts a shadow"
     assert "(no shadows)" not in render(data, folder).text
+
+
+def test_image_of_an_engine_has_no_times_and_says_what_is_judged(data, folder):
+    data["scenes"][0]["methods"].append(engine_image())
+    page = render(data, folder)
+    assert "(image, total)" in page.text
+    assert set(json.loads(page.script("images"))["scenes"][0]["methods"][2]["layers"]) == {"total"}
+
+
+def test_viewer_begins_with_the_fastest_within_one_per_cent(data, folder):
+    good, flat = data["scenes"][0]["methods"]
+    good["error"]["relative_rmse"] = flat["error"]["relative_rmse"] = 0.001
+    flat["times"] = flat["times"] | {"frame": timing(1.0)}
+
+    def first():
+        (viewer,) = (a for _, a in render(data, folder).tags if a.get("class") == "viewer")
+        return viewer["data-method"]
+
+    assert first() == "1"
+    flat["error"]["nonfinite"] = 1  # pixels that are left out of the error must not win
+    assert first() == "0"
+    good["error"]["relative_rmse"], flat["error"] = 0.5, flat["error"] | {"relative_rmse": 0.4, "nonfinite": 0}
+    assert first() == "1"
 
 
 def test_entry_that_is_missing_is_an_error_rather_than_a_blank(data, folder):
@@ -300,13 +239,22 @@ def test_entry_that_is_missing_is_an_error_rather_than_a_blank(data, folder):
         render_page(data, folder)
 
 
+def test_page_that_cannot_be_made_small_enough_is_refused(data, folder):
+    with pytest.raises(InputError, match="MB"):
+        render_page(data, folder, limit=2_500_100)
+
+
+def test_same_data_give_the_same_page(data, folder):
+    assert render_page(data, folder) == render_page(report_data(), folder)
+
+
 def test_chart_is_the_same_for_the_same_data(data):
-    assert speed_error_chart(data["scenes"]) == speed_error_chart(copy.deepcopy(data["scenes"]))
+    assert speed_error_chart(data["scenes"]) == speed_error_chart(report_data()["scenes"])
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])
-def test_chart_has_a_panel_for_each_scene_and_names_every_method(data, count):
-    scenes = [copy.deepcopy(data["scenes"][0]) | {"name": f"scene{k}"} for k in range(count)]
+def test_chart_has_a_panel_for_each_scene_and_names_every_method(count):
+    scenes = [report_data()["scenes"][0] | {"name": f"scene{k}"} for k in range(count)]
     scenes[-1]["methods"].append(method("third"))
     svg = speed_error_chart(scenes)
     assert all(f">scene{k}<" in svg for k in range(count))
@@ -314,12 +262,13 @@ def test_chart_has_a_panel_for_each_scene_and_names_every_method(data, count):
 
 
 def test_chart_leaves_out_what_has_no_place_on_a_logarithmic_axis(data):
-    """Refused, without an error, without any error at all: no point, no warning, no crash."""
+    """Refused, without an error, without any error at all, without times: no point, no warning, no crash."""
     scene = data["scenes"][0]
     scene["methods"] = [
-        method("refused", refused="x", times=None, error=None),
+        refused("refused", "x"),
         method("none", error={"relative_rmse": None}),
         method("exact", error={"relative_rmse": 0.0}),
+        engine_image(),
     ]
     assert ">exact<" in speed_error_chart([scene])
 
@@ -327,7 +276,7 @@ def test_chart_leaves_out_what_has_no_place_on_a_logarithmic_axis(data):
 @pytest.mark.parametrize(
     ("value", "text"),
     [
-        (None, EN_DASH),
+        (None, DASH),
         (0, "0"),
         (0.0, "0"),
         (1234.5, "1.23·10³"),
@@ -339,13 +288,22 @@ def test_chart_leaves_out_what_has_no_place_on_a_logarithmic_axis(data):
     ],
 )
 def test_number(value, text):
-    assert _number(value) == text
+    assert number(value) == text
 
 
-def test_percent_and_interval():
-    assert _percent(None) == _interval(None) == _interval([None, None]) == EN_DASH
-    assert _percent(0.01234) == "1.23 %"
-    assert _interval([-0.001, 0.0123456]) == "-0.100 … +1.235 %"
+def test_percent_interval_rate_and_words():
+    assert percent(None) == interval(None) == interval([None, None]) == rate(None) == words(None) == DASH
+    assert percent(0.01234) == "1.23 %"
+    assert interval([-0.001, 0.0123456]) == "-0.100 … +1.235 %"
+    assert (rate(3.21), rate(321)) == ("312", "3.1")
+    assert words({"a": [1, 2], "b": True}) == "a 1, 2, b yes"
+    assert first_sentence("One. Two.") == first_sentence("One.") == "One"
+
+
+def test_page_says_what_came_from_earlier_runs(data, folder):
+    assert kept_words(data) == ""
+    data["kept"] = 7
+    assert "7 of 16 results were kept from earlier runs" in render(data, folder).text
 
 
 def test_same_picture_gives_the_same_bytes():
@@ -366,12 +324,15 @@ def test_kernels_have_a_table_where_they_were_tried(data, folder):
     }
     kernel = {
         "kernel": "my-kernel",
+        "broken": ["law of scale"],
         "sets": [{"name": "certified", "single": {"all": errors}, "double": {"all": errors}}],
     }
-    page = render(data | {"kernels": [kernel]}, folder)
+    page = render(data | {"stability": [kernel]}, folder)
     assert "my-kernel" in page.text
     assert "4.5·10⁻⁶" in page.text
+    assert "my-kernel breaks what it claims: law of scale" in page.text
     assert "bad" in [attributes.get("class") for attributes in page.attributes("td")]
+    assert set(widths(table_of(page, "Stability of the kernels"))) == {9}
     assert "Where kernels break" not in render(data, folder).text
 
 

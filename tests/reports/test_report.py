@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from reports.page import _number, _percent
+from reports.page_words import number as _number
+from reports.page_words import percent as _percent
 from reports.report import _file_stem, write_report
 from validation.configurations import STANDARD, Configuration
 from validation.study import EFFORTS, Effort

@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How numbers are written on the page of a report, and the sentences that the page makes of its data."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+DASH = "\N{EN DASH}"
+
+#: Kinds of claims as the page names them.
+KINDS = {
+    "truth": "Truth",
+    "fastest": "Fastest",
+    "left-out": "Left out",
+    "image": "Engine",
+    "failed": "Failed",
+    "refused": "Refused",
+    "not-measured": "Not measured",
+}
+#: By whether a claim is good: a mark, and the words for who cannot see it.
+MARKS = {True: ("✓", "holds"), False: ("✗", "does not hold"), None: ("·", "")}
+
+#: The keys of the page, and what they do.
+KEYS: tuple[tuple[tuple[str, ...], str], ...] = (
+    (("1", "…", "9"), "show the first to the ninth method"),
+    (("←", "→"), "show the method before, the next one; on a picture: move the probe"),
+    (("f",), "flip: one picture, reference and method in the same place"),
+    (("v",), "one picture, or all side by side"),
+    (("e",), "next kind of error map"),
+    (("r",), "next range of the error map, or next amplification"),
+    (("l",), "next layer: airlight, surface, total"),
+    (("+", "-", "0"), "exposure half a stop up, half a stop down, as at first"),
+    (("n", "p"), "next scene, scene before"),
+    (("Esc",), "let go of the probe"),
+    (("?",), "this list"),
+)
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """Return a number with some significant digits, an en dash for none."""
+    if value is None:
+        return DASH
+    text = f"{value:.{digits - 1}e}" if 0 < abs(value) < 1e-3 else f"{value:.{digits}g}"
+    if "e" in text:
+        mantissa, exponent = text.split("e")
+        return f"{mantissa}·10{_superscript(int(exponent))}"
+    return text
+
+
+def percent(value: float | None, digits: int = 3) -> str:
+    """Return a relative value in per cent."""
+    return DASH if value is None else f"{number(100 * value, digits)} %"
+
+
+def interval(pair: Sequence[float | None] | None) -> str:
+    """Return an interval of relative values in per cent."""
+    if pair is None or pair[0] is None or pair[1] is None:
+        return DASH
+    return f"{100 * pair[0]:+.3f} … {100 * pair[1]:+.3f} %"
+
+
+def rate(milliseconds: float | None) -> str:
+    """Return how often a second something that takes so long can be done."""
+    if milliseconds is None:
+        return DASH
+    value = 1000 / milliseconds
+    return f"{value:.0f}" if value >= 10 else f"{value:.1f}"
+
+
+def words(value: Any) -> str:
+    """Return any value of report.json in a line."""
+    if value is None:
+        return DASH
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, Mapping):
+        return ", ".join(f"{key} {words(one)}" for key, one in value.items())
+    if isinstance(value, list | tuple):
+        return ", ".join(words(one) for one in value)
+    return str(value)
+
+
+def first_sentence(text: str) -> str:
+    """Return a text up to its first full stop."""
+    return text.partition(". ")[0].removesuffix(".")
+
+
+def sentence(text: str) -> str:
+    """Return a text with a capital at its beginning."""
+    return text[:1].upper() + text[1:]
+
+
+def kept_words(data: Mapping[str, Any]) -> str:
+    """Return how many results of a report were kept from earlier runs; empty where none was."""
+    kept, computed = data.get("kept") or 0, data.get("computed")
+    if not kept:
+        return ""
+    of = f" of {kept + computed}" if computed is not None else ""
+    return f"{kept}{of} results were kept from earlier runs on this machine with the same code, not measured again"
+
+
+def viewer_words(index: Mapping[str, Any]) -> str:
+    """Return how exact the images of a scene are on the page."""
+    stride, (width, height) = index["stride"], index["full"]
+    size = f"{width} \N{MULTIPLICATION SIGN} {height} pixels"
+    if stride > 1:
+        size += f", of which the page holds one in {stride} along both axes to stay small; the files have all"
+    return f"{size}. Exposure {number(index['exposure'])}\N{MULTIPLICATION SIGN} at 0 stops."
+
+
+def precision_words(indices: Sequence[Mapping[str, Any]]) -> str:
+    """Return how exact the differences of the images are, of the coarsest of the scenes."""
+    if not indices:
+        return ""
+    coarsest = max(indices, key=lambda index: index["of_difference"])
+    return (
+        f"A difference is rounded by at most {percent(coarsest['of_difference'], 2)} of itself where it is large, and "
+        f"by {number(coarsest['of_value'], 2)} of the value where it is small."
+    )
+
+
+def _superscript(value: int) -> str:
+    return str(value).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+
+
+FILTERS: Mapping[str, Callable[..., str]] = {
+    "number": number,
+    "percent": percent,
+    "interval": interval,
+    "rate": rate,
+    "words": words,
+    "first_sentence": first_sentence,
+    "sentence": sentence,
+}

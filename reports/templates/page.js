@@ -1,0 +1,190 @@
+// The page: one viewer a scene, what they share, keys, help, theme.
+"use strict";
+
+(function () {
+  const data = JSON.parse(document.getElementById("images").textContent);
+  const tables = Object.fromEntries(Object.entries(data.maps).map(([name, map]) => [name, colourTable(map)]));
+  const live = document.getElementById("live");
+  const help = document.getElementById("help");
+  const SHARED = ["layer", "mode", "floor", "gain", "stops", "view", "shown"];
+  const KEEP = 3;  // scenes whose images stay decoded
+  let all = true, active = null, keys = true;
+  const recent = [];
+
+  function say(words) { live.textContent = words; }
+
+  // --- viewers ---
+
+  const viewers = data.scenes.map((index, number) => new Viewer(
+    document.getElementById(`viewer-${number}`), new SceneImages(index, document.getElementById(`pixels-${number}`)),
+    tables, changed));
+
+  function changed(viewer, what) {
+    active = viewer;
+    if ("spoken" in what) return say(what.spoken);
+    if ("all" in what) return shareAll(what.all);
+    if (!all) return redrawStrips([viewer], what);
+    const shared = Object.fromEntries(Object.entries(what).filter(([name]) => SHARED.includes(name)));
+    for (const other of viewers) {
+      if (other === viewer) continue;
+      const same = "method" in what ? other.labels.indexOf(viewer.labels[viewer.state.method]) : -1;
+      const changes = same >= 0 ? {...shared, method: same} : shared;
+      if (Object.keys(changes).length) other.set(changes, false);
+    }
+    redrawStrips(viewers, what);
+    clearTimeout(changed.timer);
+    changed.timer = setTimeout(drawRest, 1500);
+  }
+
+  function redrawStrips(changedViewers, what) {
+    if (!["layer", "mode", "floor", "gain", "stops"].some((name) => name in what)) return;
+    if ("stops" in what && changedViewers.every((viewer) => viewer.state.mode !== "difference")) return;
+    clearTimeout(redrawStrips.timer);
+    redrawStrips.timer = setTimeout(() => changedViewers.forEach((viewer) => viewer.redrawStrip()), 150);
+  }
+
+  function shareAll(wanted) {
+    all = wanted;
+    for (const viewer of viewers) viewer.controls.querySelector("[name=all]").checked = all;
+    if (all && active) changed(active, Object.fromEntries(SHARED.map((name) => [name, active.state[name]])));
+  }
+
+  // Decoded images take some 100 MB a scene: keep those of the scenes looked at last.
+  function look(viewer) {
+    recent.splice(0, recent.length, viewer, ...recent.filter((other) => other !== viewer));
+    recent.splice(KEEP).forEach((old) => { if (!old.visible) old.images.drop(); else recent.push(old); });
+  }
+
+  let queue = Promise.resolve();
+  const near = new IntersectionObserver((entries) => {
+    for (const {target, isIntersecting} of entries) {
+      const viewer = viewers.find((one) => one.element === target);
+      viewer.visible = isIntersecting;
+      if (!isIntersecting) continue;
+      look(viewer);
+      viewer.draw();
+      if (!viewer.images.complete) queue = queue.then(() => viewer.visible && viewer.loadAll()).catch(failed);
+    }
+  }, {rootMargin: "400px 0px"});
+
+  function failed(error) { say(`An image could not be decoded: ${error.message}`); console.error(error); }
+
+  // Every scene is drawn, also those out of sight, so that all of them are there on paper, and in one exposure.
+  async function drawAll() {
+    for (const viewer of viewers) {
+      if (!viewer.stale) continue;
+      await viewer.load();
+      await viewer.loadAll();
+      if (!viewer.visible) viewer.images.drop();
+      await new Promise((resolve) => (window.requestIdleCallback ?? setTimeout)(resolve));
+    }
+    document.documentElement.dataset.drawn = "";
+  }
+
+  function drawRest() { queue = queue.then(drawAll).catch(failed); }
+
+  // --- keys ---
+
+  function current() {
+    if (active) {
+      const box = active.element.getBoundingClientRect();
+      if (box.bottom > 0 && box.top < innerHeight) return active;
+    }
+    const middle = (viewer) => {
+      const box = viewer.element.getBoundingClientRect();
+      return Math.abs((box.top + box.bottom) / 2 - innerHeight / 2);
+    };
+    return viewers.reduce((best, one) => (best && middle(best) <= middle(one) ? best : one), null);
+  }
+
+  function cycled(values, value, step = 1) {
+    return values[(values.indexOf(value) + step + values.length) % values.length];
+  }
+
+  function choose(viewer, number) {
+    if (number < 0 || number >= viewer.labels.length) return;
+    viewer.set({method: number});
+    say(viewer.labels[number]);
+  }
+
+  function expose(viewer, stops) {
+    viewer.set({stops: Math.max(-STOPS, Math.min(STOPS, stops))});
+    say(`Exposure ${viewer.state.stops} stops`);
+  }
+
+  const ACTIONS = {
+    ArrowLeft: (v) => choose(v, (v.state.method + v.labels.length - 1) % v.labels.length),
+    ArrowRight: (v) => choose(v, (v.state.method + 1) % v.labels.length),
+    f: (v) => {
+      v.set({view: "flip", shown: v.state.view === "flip" && v.state.shown === "method" ? "reference" : "method"});
+      say(v.state.shown === "reference" ? "reference" : v.labels[v.state.method]);
+    },
+    v: (v) => v.set({view: v.state.view === "side" ? "flip" : "side"}),
+    e: (v) => {
+      const modes = Object.keys(MAPS).filter((mode) => mode !== "flip" || v.hasFlip);
+      v.set({mode: cycled(modes, v.mode)});
+      say(MAPS[v.state.mode].words);
+    },
+    l: (v) => { v.set({layer: cycled(["airlight", "surface", "total"], v.state.layer)}); say(v.state.layer); },
+    r: (v) => v.state.mode === "difference" ? v.set({gain: cycled(GAINS, v.state.gain)})
+      : v.set({floor: cycled(FLOORS, v.state.floor)}),
+    "+": (v) => expose(v, v.state.stops + 0.5),
+    "-": (v) => expose(v, v.state.stops - 0.5),
+    "0": (v) => expose(v, 0),
+    n: (v) => go(v, 1),
+    p: (v) => go(v, -1),
+    Escape: (v) => { v.state.pinned = false; },
+  };
+  ACTIONS["="] = ACTIONS["+"];
+
+  function go(viewer, step) {
+    const next = viewers[viewers.indexOf(viewer) + step];
+    if (!next) return;
+    active = next;
+    next.element.closest("section").scrollIntoView();
+    say(next.images.index.name);
+  }
+
+  // Keys that the focused control needs for itself.
+  function taken(target, key) {
+    if (target.closest("select, textarea, dialog")) return true;
+    if (!target.closest("input")) return false;
+    return key.length > 1 || key === " " || (target.type === "range" && "+-".includes(key));
+  }
+
+  document.addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.metaKey || event.altKey || event.defaultPrevented || taken(event.target, event.key)) return;
+    if (event.key === "?") return help.showModal();
+    const viewer = current();
+    if (!keys || !viewer) return;
+    if (/^[1-9]$/.test(event.key)) return choose(viewer, Number(event.key) - 1);
+    const action = ACTIONS[event.key];
+    if (!action) return;
+    event.preventDefault();
+    action(viewer);
+  });
+
+  // --- help, theme ---
+
+  for (const button of document.querySelectorAll("[data-opens=help]")) button.addEventListener("click", () => help.showModal());
+  document.getElementById("keys-on").addEventListener("change", ({target}) => { keys = target.checked; });
+  const theme = document.getElementById("theme");
+  theme.addEventListener("change", () => { document.documentElement.dataset.theme = theme.value; });
+
+  // Wide tables scroll within themselves; the keyboard must reach them then.
+  function reachable() {
+    for (const box of document.querySelectorAll(".scroll"))
+      if (box.scrollWidth > box.clientWidth) box.tabIndex = 0; else box.removeAttribute("tabindex");
+  }
+  addEventListener("resize", reachable);
+
+  document.querySelector("header .settings").hidden = false;
+  for (const viewer of viewers) {
+    viewer.showControls();
+    viewer.element.addEventListener("pointerenter", () => { active = viewer; });
+    viewer.element.addEventListener("focusin", () => { active = viewer; });
+    near.observe(viewer.element);
+  }
+  reachable();
+  addEventListener("load", () => (window.requestIdleCallback ?? setTimeout)(drawRest));
+})();
