@@ -26,10 +26,10 @@ Bools = NDArray[np.bool_]
 Index = NDArray[np.int64]
 Visible = Callable[[Index, Array], Bools]
 Bisect = Callable[[Visible, Index, tuple[Array, Array], Bools], Array]
-Geometry = tuple[Array, tuple[Array, Array, Array], Shapes]
+Leg = Callable[[np.int64, np.float64], tuple[Array, Array]]
 
 _ROUNDS = 4
-_ROUNDING = 1e-5  # of the angle: float32 shadow rays end 2e-6 early, and start and direction are rounded to 1e-7
+ROUNDING = 1e-5  # of the angle: float32 shadow rays end 2e-6 early, and start and direction are rounded to 1e-7
 _JUDGED = 256  # contradictions that are tested against every shape; more than a few mean that something is wrong
 _CHUNK = 1 << 22  # rays cast at once
 
@@ -99,11 +99,12 @@ def certified_cast(toggles: Toggles, found_by: Rounding, *, ends: tuple[Array, A
 def certified_geometry(
     exact: LitIntervals,
     visible: Visible,
-    geometry: Geometry,
+    geometry: tuple[Leg, Shapes],
     *,
     ends: tuple[Array, Array],
     checks: int,
     others: Visible | None = None,
+    rounding: Array | float = ROUNDING,
 ) -> LitIntervals:
     """Check intervals from exact geometry.
 
@@ -114,19 +115,24 @@ def certified_geometry(
     visible
         Shadow rays, (ray numbers, angles) -> whether the light reaches those points.
     geometry
-        Position of the light (3,), rays as in `reference.visibility.lit_intervals`, and the shapes.
+        (ray number, angle) -> where the leg from the light begins and the way from there to the point, in float64; and
+        the shapes.
     ends
         Angles at the light between which the rays are looked at [rad].
     checks
         Random samples of each ray.
     others
         Shadow rays among the shapes that are neither triangles nor balls, if there are any.
+    rounding
+        How close to an edge the shadow rays cannot be asked [rad], one number or one for each ray.
     """
     toggles = _as_toggles(exact, ends)
     ray, theta = _random_samples(toggles.ray, ends, checks, 0)
     predicted, gap = _predicted(toggles, ray, theta)
     gap = np.minimum(gap, np.minimum(theta - ends[0][ray], ends[1][ray] - theta))
-    wrong = np.flatnonzero((_cast(visible, ray, theta) != predicted) & (gap > _ROUNDING))
+    wrong = np.flatnonzero(
+        (_cast(visible, ray, theta) != predicted) & (gap > np.broadcast_to(rounding, len(ends[0]))[ray])
+    )
     judged = wrong[:_JUDGED]
     lit = np.array([_lit_by_all_shapes(geometry, ray[k], theta[k]) for k in judged], dtype=bool)
     if others is not None:
@@ -225,11 +231,11 @@ def _with_doubt(
     return replace(intervals, doubt=joined_doubt(intervals.doubt, new))
 
 
-def _lit_by_all_shapes(geometry: Geometry, ray: np.int64, theta: np.float64) -> bool:
+def _lit_by_all_shapes(geometry: tuple[Leg, Shapes], ray: np.int64, theta: np.float64) -> bool:
     """Test one shadow ray against every triangle and every ball in float64."""
-    position, (direction, normal, height), shapes = geometry
+    leg, shapes = geometry
     triangles = shapes.triangles
-    way = (np.sin(theta) * direction[ray] + np.cos(theta) * normal[ray]) * height[ray] / np.cos(theta)
+    position, way = leg(ray, theta)
     edge1, edge2 = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     p = np.cross(way, edge2)
     determinant = np.einsum("ij,ij->i", edge1, p)

@@ -32,8 +32,8 @@ from reference.shapes import Shapes, read_shapes
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-_RAYS = 256  # rays taken at once: pairs of a few hundred rays with their triangles stay in the processor's cache
-_SLACK = 1e-9  # added to the culling angles [rad]: float64 rounding of an angle is 1e-15, of a near vertex some more
+RAYS = 256  # rays taken at once: pairs of a few hundred rays with their triangles stay in the processor's cache
+SLACK = 1e-9  # added to the culling angles [rad]: float64 rounding of an angle is 1e-15, of a near vertex some more
 _MERGE = 1e-12  # gaps between shadows below this share of a ray are rounding: neighbouring triangles share an edge
 
 #: Relative uncertainty of the distance of an edge: float64 rounding, a digit lost on a near vertex, and `_MERGE`.
@@ -41,13 +41,13 @@ EXACT_EDGE = 1e-11
 
 
 @dataclass(frozen=True)
-class _Cones:
-    """Bounds of the triangles in angles about the axis from the camera to the light, arrays of shape (triangles,)."""
+class Reaches:
+    """Bounds of the triangles about the axis from the camera to the light, arrays of shape (triangles,)."""
 
     azimuth: Array  #: where the interval of azimuths begins, in [-pi, pi] [rad]
     width: Array  #: its width, 2 pi if the axis meets the triangle [rad]
     camera: Array  #: smallest angle at the camera, from the light [rad]
-    light: Array  #: smallest angle at the light, from the camera [rad]
+    before: Array  #: what only rays that end later can be shadowed by: here the smallest angle at the light [rad]
 
 
 def geometric_intervals(
@@ -83,19 +83,23 @@ def geometric_intervals(
     corners = shapes.triangles - light.position
     balls = shapes.centre - light.position, shapes.radius
     used = np.flatnonzero(ends[1] > ends[0])
-    frame = _axis_frame(truth.origin - light.position)
+    frame = axis_frame(light.position - truth.origin)
     cones = _cones(corners, truth.origin - light.position, frame)
     azimuth = np.arctan2(rays[0][used] @ frame[2], rays[0][used] @ frame[1])
     order = np.argsort(azimuth, kind="stable")
     parts = []
-    for start in range(0, len(used), _RAYS):
-        chosen = order[start : start + _RAYS]
-        pairs = _pairs(azimuth[chosen], rays[0][used[chosen]] @ frame[0], ends[1][used[chosen]], cones)
+    for start in range(0, len(used), RAYS):
+        chosen = order[start : start + RAYS]
         mine = used[chosen]
+        # The angle at the light between the camera and the point at theta is, in the triangle of camera, light and that
+        # point, pi minus the angle at the camera minus the angle at the point, pi/2 - theta: pi/2 + theta - camera.
+        at_camera = np.arccos(np.clip(rays[0][mine] @ frame[0], -1, 1)) + SLACK
+        at_light = 0.5 * np.pi + ends[1][mine] - at_camera + 3 * SLACK
+        pairs = near_pairs(azimuth[chosen], (at_camera, at_light), cones)
         lines = rays[0][mine], rays[1][mine], rays[2][mine]
         hidden = _shadows(corners, lines, pairs), ball_shadows(balls, *lines)
         row, begin, end = (np.concatenate(both) for both in zip(*hidden, strict=True))
-        parts.append(_lit_of_chunk((row, begin, end), ends, mine))
+        parts.append(lit_of_chunk((row, begin, end), ends, mine))
     ray, low, high = (np.concatenate([part[i] for part in parts] or [np.empty(0)]) for i in range(3))
     by_ray = np.lexsort((low, ray))
     ray, low, high = ray[by_ray].astype(np.int64), low[by_ray], high[by_ray]
@@ -103,17 +107,29 @@ def geometric_intervals(
     return LitIntervals(ray, low, high, transitions, edge=EXACT_EDGE)
 
 
-def _axis_frame(camera: Array) -> Array:
-    """Return three unit vectors as rows: from the camera, given relative to the light, to the light, and two across."""
-    length = np.linalg.norm(camera)
-    axis = -camera / length if length > 0 else np.array([0.0, 0.0, 1.0])
+def axis_frame(to_light: Array) -> Array:
+    """Return three unit vectors as rows: along the way from the camera to the light, and two across."""
+    length = np.linalg.norm(to_light)
+    axis = to_light / length if length > 0 else np.array([0.0, 0.0, 1.0])
     across = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
     across /= np.linalg.norm(across)
     return np.stack([axis, across, np.cross(axis, across)])
 
 
-def _cones(corners: Array, camera: Array, frame: Array) -> _Cones:
+def _cones(corners: Array, camera: Array, frame: Array) -> Reaches:
     """Bound every triangle, given relative to the light, in azimuth and in the angles at the camera and the light."""
+    begin, width = azimuths(corners, frame)
+    centre, radius = balls_around(corners)
+    at_camera = angle_below(centre - camera, radius, frame[0])
+    at_light = angle_below(centre, radius, -frame[0])
+    return Reaches(begin, width, at_camera - SLACK, at_light - SLACK)
+
+
+def azimuths(corners: Array, frame: Array) -> tuple[Array, Array]:
+    """Return where the azimuths of triangles about the axis begin, and how wide they are [rad].
+
+    The corners are relative to a point of the axis.
+    """
     across = corners @ frame[1:].T
     azimuth = np.sort(np.arctan2(across[..., 1], across[..., 0]), axis=1)
     # A triangle that the axis misses spans less than half a turn: it fills the complement of the widest gap.
@@ -123,16 +139,16 @@ def _cones(corners: Array, camera: Array, frame: Array) -> _Cones:
     width = 2 * np.pi - gaps.max(axis=1)
     begin = azimuth[np.arange(len(azimuth)), (widest + 1) % 3]
     near_axis = np.linalg.norm(across, axis=2).min(axis=1) < 1e-6 * np.abs(corners).max(axis=(1, 2), initial=0)
-    width = np.where((width > np.pi - 1e-6) | near_axis, 2 * np.pi, width)
+    return begin, np.where((width > np.pi - 1e-6) | near_axis, 2 * np.pi, width)
 
+
+def balls_around(corners: Array) -> tuple[Array, Array]:
+    """Return the centres and radii of balls that hold the triangles."""
     centre = corners.mean(axis=1)
-    radius = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1, initial=0)
-    at_camera = _angle_below(centre - camera, radius, frame[0])
-    at_light = _angle_below(centre, radius, -frame[0])
-    return _Cones(begin, width, at_camera - _SLACK, at_light - _SLACK)
+    return centre, np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1, initial=0)
 
 
-def _angle_below(centre: Array, radius: Array, axis: Array) -> Array:
+def angle_below(centre: Array, radius: Array, axis: Array) -> Array:
     """Return a lower bound of the angle between an axis and the points of balls around `centre`."""
     distance = np.linalg.norm(centre, axis=1)
     along = centre @ axis
@@ -141,30 +157,35 @@ def _angle_below(centre: Array, radius: Array, axis: Array) -> Array:
     return np.where(inside, 0.0, angle - np.arcsin(np.where(inside, 0, radius / np.maximum(distance, 1e-300))))
 
 
-def _pairs(azimuth: Array, cosine: Array, end: Array, cones: _Cones) -> tuple[Index, Index]:
-    """Return the pairs (ray, triangle) of a chunk of rays, sorted by azimuth, that can matter.
+def near_pairs(azimuth: Array, reach: tuple[Array, Array], cones: Reaches) -> tuple[Index, Index]:
+    """Return the pairs (ray, triangle) of a chunk of rays that can matter.
 
-    The angle at the light between the camera and the point at theta is, in the triangle of camera, light and that
-    point, pi minus the angle at the camera minus the angle at the point, pi/2 - theta: pi/2 + theta - camera.
+    Parameters
+    ----------
+    azimuth
+        Of the rays, ascending [rad].
+    reach
+        By ray, what `Reaches.camera` and `Reaches.before` of a triangle must not exceed.
+    cones
+        The triangles.
     """
-    at_camera = np.arccos(np.clip(cosine, -1, 1)) + _SLACK
-    at_light = 0.5 * np.pi + end - at_camera + 3 * _SLACK
+    at_camera, at_end = reach
     # Distance in azimuth from where the triangle begins, modulo a turn; the slack lets a ray begin just before it.
-    first = np.mod(azimuth[0] - cones.azimuth + _SLACK, 2 * np.pi)
-    reach = cones.width + 2 * _SLACK
-    touched = (first <= reach) | (first + (azimuth[-1] - azimuth[0]) >= 2 * np.pi)
-    touched &= (cones.camera < at_camera.max()) & (cones.light < at_light.max())
+    first = np.mod(azimuth[0] - cones.azimuth + SLACK, 2 * np.pi)
+    turn = cones.width + 2 * SLACK
+    touched = (first <= turn) | (first + (azimuth[-1] - azimuth[0]) >= 2 * np.pi)
+    touched &= (cones.camera < at_camera.max()) & (cones.before < at_end.max())
     triangle = np.flatnonzero(touched)
     turned = first[triangle] + (azimuth - azimuth[0])[:, None]
     turned -= 2 * np.pi * (turned >= 2 * np.pi)
-    near = turned <= reach[triangle]
+    near = turned <= turn[triangle]
     near &= cones.camera[triangle] < at_camera[:, None]
-    near &= cones.light[triangle] < at_light[:, None]
+    near &= cones.before[triangle] < at_end[:, None]
     row, column = np.nonzero(near)
     return row, triangle[column]
 
 
-def _lit_of_chunk(shadows: Shadows, ends: tuple[Array, Array], used: Index) -> tuple[Array, Array, Array]:
+def lit_of_chunk(shadows: Shadows, ends: tuple[Array, Array], used: Index) -> tuple[Array, Array, Array]:
     """Return rays, beginnings and ends of the lit intervals of a chunk of rays, given what is hidden."""
     low, high = ends[0][used], ends[1][used]
     row, begin, end = shadows
@@ -198,8 +219,19 @@ def _shadows(
     corners: Array, rays: tuple[Array, Array, Array], pairs: tuple[Index, Index]
 ) -> tuple[Index, Array, Array]:
     """Return the rays and the intervals of theta that triangles hide."""
+    row, one, other = plane_sections(corners, rays[:2], pairs)
+    return _clipped(row, one, other, rays[2][row])
+
+
+def plane_sections(
+    corners: Array, axes: tuple[Array, Array], pairs: tuple[Index, Index]
+) -> tuple[Index, tuple[Array, Array], tuple[Array, Array]]:
+    """Return the segments in which triangles meet the planes of rays: number of the ray, (y, z) of both ends.
+
+    The corners are relative to a point of all planes, which `axes` span: unit vectors along z and along y, (rays, 3).
+    """
     row, triangle = pairs
-    direction, normal, height = rays
+    direction, normal = axes
     chosen = corners[triangle]
     side = _components(chosen, np.cross(direction, normal)[row])
     above = side >= 0
@@ -209,8 +241,8 @@ def _shadows(
     # The corner that is alone on its side of the plane: both edges that the plane cuts start there.
     alone = np.argmax(above[:, cut] == (count[cut] == 1), axis=0)
     y, z = _components(chosen, normal[row]), _components(chosen, direction[row])
-    points = [_crossing(alone, (alone + k) % 3, side, (y, z)) for k in (1, 2)]
-    return _clipped(row, points[0], points[1], height[row])
+    one, other = (_crossing(alone, (alone + k) % 3, side, (y, z)) for k in (1, 2))
+    return row, one, other
 
 
 def _components(chosen: Array, vector: Array) -> Array:

@@ -123,7 +123,7 @@ def leg_kinks(bounds: Bounds, light: Array, axes: tuple[Array, Array], height: A
     if isinstance(bounds, Ball):
         find, step = partial(_ball_corners, bounds), _BLOCK
     else:
-        find, step = partial(_polygon_corners, bounds), max(1, _BLOCK // max(1, len(bounds.edge)))
+        find, step = partial(polygon_corners, bounds), max(1, _BLOCK // max(1, len(bounds.edge)))
     rays, offsets = [np.empty(0, np.int64)], [np.empty(0)]
     for first in range(0, len(height), step):
         block = slice(first, first + step)
@@ -136,7 +136,7 @@ def leg_kinks(bounds: Bounds, light: Array, axes: tuple[Array, Array], height: A
     return np.concatenate(rays), np.concatenate(offsets)
 
 
-def _polygon_corners(body: Polyhedron, light: Array, along: Array, away: Array) -> tuple[Index, Array, Array]:
+def polygon_corners(body: Polyhedron, light: Array, along: Array, away: Array) -> tuple[Index, Array, Array]:
     """Return where the edges of a polyhedron meet the planes of rays and light: ray, p_1, p_2."""
     ends = body.edge - light
     normal = np.cross(along, away)

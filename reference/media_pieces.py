@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.interval_sums import Rays
-from reference.media import AMBIENT, Segments, leg_kinks, optical_depth
+from reference.media import AMBIENT, Segments, optical_depth
 from reference.scene import TruthLight, TruthMedium, TruthScene
 
 Array = NDArray[np.float64]
@@ -21,15 +21,12 @@ _UNDERFLOW = 745.0  # optical depth after which nothing is left
 
 
 @dataclass(frozen=True)
-class Setup:
-    """What all pieces share."""
+class Crossed:
+    """Rays of a scene and the media that they cross."""
 
     truth: TruthScene
-    light: TruthLight
-    rays: Rays
+    direction: Array  # of the rays, unit, (rays, 3)
     segments: Segments
-    shadow_scale: float
-    edge: float  # relative uncertainty of the distance of an edge between light and shadow
 
     def medium(self, number: int) -> TruthMedium:
         """Return the medium of this number."""
@@ -39,6 +36,16 @@ class Setup:
         """Return a property of the media of these numbers, (n, 3)."""
         media = (*self.truth.media, self.truth.medium)  # AMBIENT is the last
         return np.stack([getattr(medium, name) for medium in media])[numbers]
+
+
+@dataclass(frozen=True)
+class Setup(Crossed):
+    """What all pieces of rays share that a point light shines on."""
+
+    light: TruthLight
+    rays: Rays
+    shadow_scale: float
+    edge: float  # relative uncertainty of the distance of an edge between light and shadow
 
 
 @dataclass(frozen=True)
@@ -57,12 +64,26 @@ class Pieces:
         return Pieces(*(getattr(self, f.name)[rows] for f in fields(self)))
 
 
-def cut_pieces(setup: Setup, ray: Index, x0: Array, x1: Array) -> Pieces:
-    """Cut lit intervals [x0, x1] of rays at the bounds of media and at every kink of the integrand."""
-    return _cut(setup, _parts(setup, ray, x0, x1))
+def cut_pieces(
+    setup: Crossed, lit: tuple[Index, Array, Array], kinks: tuple[Index, Array], foot: Array | None = None
+) -> Pieces:
+    """Cut lit intervals at the bounds of media and at every kink of the integrand.
+
+    Parameters
+    ----------
+    setup
+        The rays.
+    lit
+        Rays and distances of both ends of the lit intervals [m].
+    kinks
+        Rays and distances of the kinks [m], in any order.
+    foot
+        Distance at which each ray is closest to the light, where rays may be endless [m].
+    """
+    return _cut(setup, _parts(setup, *lit, foot), *kinks)
 
 
-def _parts(setup: Setup, ray: Index, x0: Array, x1: Array) -> Pieces:
+def _parts(setup: Crossed, ray: Index, x0: Array, x1: Array, foot: Array | None) -> Pieces:
     """Return what parts of lit intervals lie in each medium, by ray and distance."""
     parts = []
     for start, end, medium in zip(setup.segments.start, setup.segments.end, setup.segments.medium):
@@ -71,30 +92,17 @@ def _parts(setup: Setup, ray: Index, x0: Array, x1: Array) -> Pieces:
         rows, low, high = ray[keep], low[keep], high[keep]
         parts.append((rows, medium[rows], low, high, low == x0[keep], (high == x1[keep]) & np.isfinite(high)))
     ray, number, low, high, first, last = (np.concatenate(column) for column in zip(*parts))
-    if np.any(np.isinf(high)):
+    if foot is not None and np.any(np.isinf(high)):
         # Only what surrounds the bodies is endless, and only if its extinction is not zero does it scatter.
         sigma_t = setup.truth.medium.sigma_t
-        reach = np.maximum(low, setup.rays.foot[ray]) + _UNDERFLOW / sigma_t[sigma_t > 0].min()
+        reach = np.maximum(low, foot[ray]) + _UNDERFLOW / sigma_t[sigma_t > 0].min()
         high = np.where(np.isinf(high), reach, high)
     order = np.lexsort((low, ray))
     return Pieces(ray, number, low, high, first, last, np.zeros((len(ray), 3)))[order]
 
 
-def _cut(setup: Setup, parts: Pieces) -> Pieces:
-    """Cut parts of rays, given by ray and distance, at the kinks of the leg from the light and of phase functions."""
-    rays, used = setup.rays, np.unique(parts.ray)
-    axes, height, foot = (rays.direction[used], rays.normal[used]), rays.height[used], rays.foot[used]
-    owners, offsets = [], []
-    for medium in setup.truth.media:
-        row, offset = leg_kinks(medium.bounds, setup.light.position, axes, height)
-        owners.append(row)
-        offsets.append(offset)
-    for phase in (setup.truth.medium.phase, *(medium.phase for medium in setup.truth.media)):
-        kinks = phase.kinks
-        owners.append(np.repeat(np.arange(len(used)), len(kinks)))
-        offsets.append(np.outer(height, -kinks / np.sqrt(1 - kinks**2)).ravel())
-    row = np.concatenate(owners)
-    ray, x = used[row], foot[row] + np.concatenate(offsets)
+def _cut(setup: Crossed, parts: Pieces, ray: Index, x: Array) -> Pieces:
+    """Cut parts of rays, given by ray and distance, at kinks."""
     # The part in which each kink lies is the last one that begins before it.
     everything = np.lexsort((np.concatenate([parts.x0, x]), np.concatenate([parts.ray, ray])))
     begins = everything < len(parts.ray)
@@ -110,7 +118,7 @@ def _cut(setup: Setup, parts: Pieces) -> Pieces:
     end = np.where(ends, parts.x1[owner], np.append(start[1:], 0.0)[: len(owner)])
     begin = np.append(True, ends[:-1])[: len(owner)]
     before = optical_depth(
-        setup.truth, setup.truth.origin, rays.direction[parts.ray], np.zeros(len(parts.ray)), parts.x0
+        setup.truth, setup.truth.origin, setup.direction[parts.ray], np.zeros(len(parts.ray)), parts.x0
     )
     sigma_t = setup.by_medium("sigma_t", parts.medium[owner])
     depth = before[owner] + (start - parts.x0[owner])[:, None] * sigma_t

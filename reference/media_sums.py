@@ -15,7 +15,7 @@ Gauss and Kronrod's pair on panels that are halved until a ray meets the toleran
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,17 +25,16 @@ from reference.bounds import Ball, ball_crossings, crossed_facets
 from reference.cone import falloff
 from reference.interval_sums import Rays, lit_stretches, sums_of
 from reference.intervals import LitIntervals
-from reference.media import Segments
+from reference.media import Segments, leg_kinks
 from reference.media_pieces import Pieces, Setup, cut_pieces
+from reference.panels_of_pieces import Panels, first_panels, sum_panels
 from reference.scene import BoundedMedium, TruthLight, TruthScene
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Chord = Callable[[Index, Array, Array], tuple[Array, Array]]
 
-RTOL = 1e-9  #: relative tolerance of the sum of a ray and a light
 _PANEL = 2.4  # width in w of the first panels, as in `analytic.panels`
-_HALVINGS = 40
 _AT_LIGHT = 1e-290  # height [m] below which a ray meets the light
 _NEAR_ZERO = 1e-15  # height over distance below which a light beside a piece may as well be at this height
 _RAYS = 4096  # rays at once
@@ -64,12 +63,13 @@ def sum_media(
         Airlight [W/(m^2 sr)] and a bound of its error, (rays, 3) each; infinite where a ray meets the light inside a
         medium that scatters.
     """
-    setup = Setup(truth, light, rays, segments, shadow_scale, lit.edge)
+    setup = Setup(truth, rays.direction, segments, light, rays, shadow_scale, lit.edge)
     ray, x0, x1 = lit_stretches(light, rays, lit)
     total, bound = np.zeros((len(rays.foot), 3)), np.zeros((len(rays.foot), 3))
     for first in range(0, len(rays.foot), _RAYS):
         chosen = (ray >= first) & (ray < first + _RAYS) & (x1 > x0)
-        pieces = cut_pieces(setup, ray[chosen], x0[chosen], x1[chosen])
+        stretches = ray[chosen], x0[chosen], x1[chosen]
+        pieces = cut_pieces(setup, stretches, _kinks(setup, np.unique(ray[chosen])), rays.foot)
         if len(pieces.ray):
             block = slice(first, first + _RAYS)
             value, error = _Sum(setup, pieces, first, len(rays.foot[block])).adapt()
@@ -77,19 +77,21 @@ def sum_media(
     return total * light.intensity / (4 * np.pi), bound * light.intensity / (4 * np.pi)
 
 
-@dataclass(frozen=True)
-class _Panels:
-    """Panels and what the two rules gave for them, arrays of shape (m,) and (m, 3)."""
-
-    piece: Index
-    start: Array  # w
-    width: Array
-    value: Array
-    error: Array
-    noise: Array  # rounding error of the value
-
-    def __getitem__(self, rows) -> "_Panels":
-        return _Panels(*(getattr(self, f.name)[rows] for f in fields(self)))
+def _kinks(setup: Setup, used: Index) -> tuple[Index, Array]:
+    """Return rays, among those used, and distances of the kinks of the leg from the light and of phase functions."""
+    truth, rays = setup.truth, setup.rays
+    axes, height = (rays.direction[used], rays.normal[used]), rays.height[used]
+    owners, offsets = [], []
+    for medium in truth.media:
+        row, offset = leg_kinks(medium.bounds, setup.light.position, axes, height)
+        owners.append(row)
+        offsets.append(offset)
+    for phase in (truth.medium.phase, *(medium.phase for medium in truth.media)):
+        kinks = phase.kinks
+        owners.append(np.repeat(np.arange(len(used)), len(kinks)))
+        offsets.append(np.outer(height, -kinks / np.sqrt(1 - kinks**2)).ravel())
+    ray = used[np.concatenate(owners)]
+    return ray, rays.foot[ray] + np.concatenate(offsets)
 
 
 @dataclass
@@ -127,23 +129,8 @@ class _Sum:
     def adapt(self) -> tuple[Array, Array]:
         """Halve panels until all rays meet the tolerance, or only rounding is left."""
         owner = self.pieces.ray - self.first
-        panels = self.evaluate(*self.first_panels())
-        for _ in range(_HALVINGS):
-            ray = owner[panels.piece]
-            allowed = RTOL * sums_of(ray, panels.value, self.count)
-            missed = sums_of(ray, panels.error, self.count) > allowed
-            share = allowed / np.maximum(np.bincount(ray, minlength=self.count), 1)[:, None]
-            halve = np.any(missed[ray] & (panels.error > share[ray]) & (panels.error > panels.noise), axis=1)
-            if not halve.any():
-                break
-            half = 0.5 * panels.width[halve]
-            start = np.concatenate([panels.start[halve], panels.start[halve] + half])
-            halves = self.evaluate(np.tile(panels.piece[halve], 2), start, np.tile(half, 2))
-            kept = panels[~halve]
-            panels = _Panels(*(np.concatenate([getattr(p, f.name) for p in (kept, halves)]) for f in fields(_Panels)))
-        ray = owner[panels.piece]
-        value = sums_of(ray, panels.value, self.count)
-        error = sums_of(ray, panels.error + panels.noise, self.count) + sums_of(owner, self.edge_error(), self.count)
+        value, error = sum_panels(first_panels(self.start, self.width, _PANEL), self.evaluate, owner, self.count)
+        error = error + sums_of(owner, self.edge_error(), self.count)
         meets = sums_of(owner, self.meets_light()[:, None] * self.factor, self.count) > 0
         return np.where(meets, np.inf, value), np.where(meets, np.inf, error)
 
@@ -151,14 +138,7 @@ class _Sum:
         near = self.setup.rays.height[self.pieces.ray] < _AT_LIGHT
         return near & (self.pieces.x0 <= self.foot) & (self.foot <= self.pieces.x1)
 
-    def first_panels(self) -> tuple[Index, Array, Array]:
-        count = np.maximum(np.ceil(self.width / _PANEL), 1).astype(np.int64)
-        piece = np.repeat(np.arange(len(count)), count)
-        number = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
-        width = (self.width / count)[piece]
-        return piece, self.start[piece] + number * width, width
-
-    def evaluate(self, piece: Index, start: Array, width: Array) -> _Panels:
+    def evaluate(self, piece: Index, start: Array, width: Array) -> Panels:
         """Integrate panels by both rules, a block at a time so that the arrays stay in the cache."""
         both, noise = np.empty((2, len(piece), 3)), np.empty((len(piece), 3))
         for first in range(0, len(piece), _PANELS):
@@ -169,7 +149,7 @@ class _Sum:
             integral = np.einsum("mnc,nk->kmc", f, KRONROD_AND_GAUSS)
             both[:, block] = integral * scale
             noise[block] = np.finfo(float).eps * (16 + depth[:, 10]) * np.abs(both[0, block])
-        return _Panels(piece, start, width, both[0], np.abs(both[0] - both[1]), noise)
+        return Panels(piece, start, width, both[0], np.abs(both[0] - both[1]), noise)
 
     def integrand(self, rows: Index, w: Array) -> tuple[Array, Array]:
         """Return exp(-tau) p / cosh w times the light's profile, and tau, at w of shape (m, nodes): (m, nodes, 3)."""

@@ -11,7 +11,8 @@ For each light and each ray, in float64:
 4. the intervals are integrated and added up, with an error estimate (`reference.interval_sums`).
 
 The bound of a ray adds the estimates, what the rounding of each edge between light and shadow is worth, and what the
-shadow rays left in doubt. One ray through its centre stands for a pixel, or the mean over its area is taken
+shadow rays left in doubt. For lights at infinity the share of a ray takes the place of the angle
+(`reference.directional_light`). One ray through its centre stands for a pixel, or the mean over its area is taken
 (`reference.pixel_area`).
 """
 
@@ -25,6 +26,7 @@ from numpy.typing import NDArray
 from analytic.errors import InputError
 from analytic.geometry import foot_and_height
 from reference.cone import cone_interval, perpendicular
+from reference.directional_airlight import directional_airlight
 from reference.interval_sums import Rays, sum_intervals
 from reference.intervals import Certificate, LitIntervals
 from reference.media import camera_segments, scattering_range
@@ -103,8 +105,9 @@ def quadrature_image(
 
     Notes
     -----
-    Valid for homogeneous media, point and spot lights, opaque surfaces. A pixel whose centre ray meets a light has an
-    infinite airlight; the mean over its area is finite.
+    Valid for homogeneous media, point and spot lights, opaque surfaces; for directional lights where all media have
+    bounds. Their legs have no end, so `shadow_scale` leaves them as they are. A pixel whose centre ray meets a light
+    has an infinite airlight; the mean over its area is finite.
     """
     if pixel == "area":
         from reference.pixel_area import area_image
@@ -157,6 +160,7 @@ def ray_values(
     intervals, transitions, certificates = np.zeros(count, np.int64), 0, []
     reached: list[NDArray[np.bool_] | None] = []
     how = {"samples": samples, "edges": edges, "shapes": shapes}
+    total = len(truth.lights) + len(truth.directional)
     for number, light in enumerate(truth.lights):
         found = _light_airlight(truth, light, hits.distance, shadow_scale=shadow_scale, how=how)
         airlight += found.radiance
@@ -167,7 +171,17 @@ def ray_values(
         certificates.append(found.lit.certificate)
         reached.append(found.reached)
         if progress is not None:
-            progress(number + 1, len(truth.lights), "quadrature")
+            progress(number + 1, total, "quadrature")
+    for number, far in enumerate(truth.directional, start=len(truth.lights)):
+        sent = directional_airlight(truth, far, hits.distance, how)
+        if sent is not None:
+            airlight += sent.radiance
+            bound += sent.bound
+            intervals += np.bincount(sent.lit.ray, minlength=count)
+            transitions += sent.lit.transitions
+            certificates.append(sent.lit.certificate)
+        if progress is not None:
+            progress(number + 1, total, "quadrature")
     surface = lit_surface(truth, hits, reached=reached, shadow_scale=shadow_scale)
     return RayValues(
         airlight, bound, surface, cast, light_angle, intervals, transitions, Certificate.of_all(certificates)

@@ -16,6 +16,7 @@ from analytic.errors import InputError
 from analytic.phase import PhaseFunction
 from reference.bounds import Bounds, holds, overlap, read_bounds
 from reference.camera import camera_matrix, film_directions, pixel_centres
+from reference.directional_light import DirectionalLight, endless_medium, is_directional, read_directional
 
 Array = NDArray[np.float64]
 
@@ -65,8 +66,9 @@ class TruthScene:
     origin: Array  #: the pinhole [m], (3,)
     direction: Array  #: unit directions through the pixel centres, (pixels, 3), row by row
     medium: TruthMedium  #: the medium without bounds, a vacuum of extinction 0 where there is none
-    lights: tuple[TruthLight, ...]
+    lights: tuple[TruthLight, ...]  #: point and spot lights
     media: tuple[BoundedMedium, ...] = ()  #: the media with bounds, disjoint
+    directional: tuple[DirectionalLight, ...] = ()  #: lights at infinity; all media then have bounds
 
 
 def read_truth(scene) -> TruthScene:
@@ -81,13 +83,17 @@ def read_truth(scene) -> TruthScene:
         raise InputError("the scene has no camera; wanted a sensor of type 'perspective'")
     sensor = scene.sensors()[0]
     width, height = (int(n) for n in sensor.film().size())
-    lights = tuple(_read_light(emitter) for emitter in scene.emitters())
-    if not lights:
-        raise InputError("the scene has no light; wanted at least one emitter of type 'point' or 'spot'")
+    far, near = (tuple(one for one in scene.emitters() if is_directional(one) == kind) for kind in (True, False))
+    if not far + near:
+        raise InputError("the scene has no light; wanted at least one emitter of type 'point', 'spot' or 'directional'")
+    lights = tuple(_read_light(emitter) for emitter in near)
     opaque, boundaries = _sorted_shapes(scene)
     media = tuple(_read_bounded(shape) for shape in boundaries)
     origin = camera_matrix(sensor)[:3, 3]
     _check_disjoint(media)
+    medium = _read_ambient(sensor, origin, media, boundaries)
+    if far and np.any(medium.sigma_t > 0):
+        raise InputError(endless_medium(far[0]))
     return TruthScene(
         scene=scene,
         occluders=scene_of(opaque, scene),
@@ -95,9 +101,10 @@ def read_truth(scene) -> TruthScene:
         height=height,
         origin=origin,
         direction=film_directions(sensor, pixel_centres((width, height)), (width, height)),
-        medium=_read_ambient(sensor, origin, media, boundaries),
+        medium=medium,
         lights=lights,
         media=media,
+        directional=tuple(read_directional(emitter) for emitter in far),
     )
 
 
@@ -213,7 +220,9 @@ def _read_light(emitter) -> TruthLight:
 
     name = emitter.class_name()
     if name not in ("PointLight", "SpotLight"):
-        raise InputError(f"the scene has an emitter of class {name}; wanted emitters of type 'point' or 'spot' only")
+        raise InputError(
+            f"the scene has an emitter of class {name}; wanted emitters of type 'point', 'spot' or 'directional' only"
+        )
     parameters = mi.traverse(emitter)
     matrix = np.array(emitter.world_transform().matrix, dtype=np.float64).reshape(4, 4)
     spot = name == "SpotLight"

@@ -4,7 +4,8 @@
     L = f(w_i, w_o) cos I / r^2 exp(-sigma_t (distance + s r)),
 
 with f cos by `BSDF.eval` and I / r^2 by `Emitter.sample_direction`; s scales the shadow leg (see
-`reference.quadrature`). Through bounded media the optical depth is that of both legs piece by piece.
+`reference.quadrature`). Through bounded media the optical depth is that of both legs piece by piece. A directional
+light has its irradiance in the place of I / r^2, and its leg is endless: to be dimmed it has only bodies to pass.
 """
 
 from collections.abc import Sequence
@@ -14,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.directional_light import DirectionalLight, is_directional
 from reference.media import optical_depth
 from reference.scene import TruthScene
 
@@ -69,7 +71,8 @@ def lit_surface(
         seen = np.where(np.isfinite(hits.distance), hits.distance, 0.0)
         point = truth.origin + seen[:, None] * truth.direction
         to_camera = optical_depth(truth, truth.origin, truth.direction, np.zeros(len(seen)), seen)
-    for emitter, light, reaches in zip(truth.scene.emitters(), truth.lights, reached, strict=True):
+    near = [emitter for emitter in truth.scene.emitters() if not is_directional(emitter)]
+    for emitter, light, reaches in zip(near, truth.lights, reached, strict=True):
         towards, arriving = emitter.sample_direction(interaction, mi.Point2f(0.5))
         facing = interaction.is_valid()
         if reaches is None:
@@ -83,7 +86,26 @@ def lit_surface(
             path = np.where(lit, hits.distance, 0) + shadow_scale * np.array(towards.dist, dtype=np.float64)
             depth = np.where(lit, path, 0)[:, None] * truth.medium.sigma_t
         total += np.where(lit[:, None], radiance * np.exp(-depth), 0.0)
+    for far in truth.directional:
+        lit, radiance = _lit_from_infinity(truth, interaction, far)
+        if truth.media:
+            towards = np.broadcast_to(-far.direction, point.shape)
+            endless = np.full(len(point), np.finfo(float).max)
+            radiance = radiance * np.exp(-to_camera - optical_depth(truth, point, towards, 0 * endless, endless))
+        total += np.where(lit[:, None], radiance, 0.0)
     return total
+
+
+def _lit_from_infinity(truth: TruthScene, interaction: Any, light: DirectionalLight) -> tuple[NDArray[np.bool_], Array]:
+    """Return which surfaces a directional light reaches, by shadow rays, and what they reflect in clear air."""
+    import mitsuba as mi
+
+    towards, arriving = light.emitter.sample_direction(interaction, mi.Point2f(0.5))
+    facing = interaction.is_valid()
+    hidden = truth.occluders.ray_test(interaction.spawn_ray(towards.d), facing)
+    reflected = interaction.bsdf().eval(mi.BSDFContext(), interaction, interaction.to_local(towards.d), facing)
+    lit = np.array(facing, dtype=bool) & ~np.array(hidden, dtype=bool)
+    return lit, np.array(reflected * arriving, dtype=np.float64).T
 
 
 def _leg_depth(truth: TruthScene, point: Array, light: Array, shadow_scale: float) -> Array:

@@ -13,15 +13,20 @@ goes too fast to be one, are cut further; wherever two neighbours disagree a tra
 bisected to rounding.
 
 Whatever the route, fresh random shadow rays then check the intervals (`reference.certify`).
+
+What is done is the same for a light at infinity (`reference.directional_visibility`); there a point of a ray is told by
+its share of the way, not by an angle. `Legs` is what differs.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
-from reference.certify import Rounding, Toggles, Visible, certified_cast, certified_geometry
+from reference.certify import ROUNDING, Leg, Rounding, Toggles, Visible, certified_cast, certified_geometry
 from reference.intervals import LitIntervals, intersected
 from reference.lit_geometry import geometric_intervals
 from reference.scene import TruthLight, TruthScene
@@ -36,6 +41,18 @@ _CHUNK = 1 << 22  # rays cast at once
 _PARTS = 4  # a suspicious cell is cut into so many
 _LEVELS = 2  # so many times
 _STEEP = 4.0  # a surface seen within atan(1/4) = 14 degrees of grazing, or a jump, may hide an edge
+
+
+@dataclass(frozen=True)
+class Legs:
+    """The legs from one light to points of camera rays, a point being told by ray number and angle."""
+
+    shadow: Callable[[Index, Array], Any]  #: Mitsuba's shadow rays, from the light on, which end just before the points
+    single: Leg  #: one leg in float64: where it begins, and the way from there to the point
+    depth: Callable[[Index, Array], Array]  #: (ray numbers, distances along their legs) -> what no smooth surface makes
+    #: change faster than `_STEEP` times the angle
+    exact: Callable[[Shapes], LitIntervals]  #: lit intervals by geometry
+    rounding: Array | float = ROUNDING  #: how close to an edge shadow rays cannot be asked [rad]
 
 
 def lit_intervals(
@@ -78,6 +95,35 @@ def lit_intervals(
     By geometry, valid for all scenes of opaque meshes, rectangles and spheres. By casting rays, valid where shadows
     along a ray are wider than (high - low)/samples in theta; the certificate measures what is not.
     """
+    return found_intervals(
+        truth, _point_legs(truth, light, rays, ends), ends=ends, samples=samples, edges=edges, shapes=shapes
+    )
+
+
+def _point_legs(truth: TruthScene, light: TruthLight, rays: tuple[Array, Array, Array], ends: tuple[Array, Array]):
+    return Legs(
+        _shadow_rays(light.position, rays),
+        point_leg(light.position, rays),
+        lambda ray, distance: np.log(distance),
+        lambda shapes: geometric_intervals(truth, light, rays, ends=ends, shapes=shapes),
+    )
+
+
+def point_leg(position: Array, rays: tuple[Array, Array, Array]) -> Leg:
+    """Return a function (ray number, angle) -> the light's position and the way to the point, in float64."""
+    direction, normal, height = rays
+
+    def leg(ray: np.int64, theta: np.float64) -> tuple[Array, Array]:
+        sine, cosine = np.sin(theta), np.cos(theta)
+        return position, (sine * direction[ray] + cosine * normal[ray]) * height[ray] / cosine
+
+    return leg
+
+
+def found_intervals(
+    truth: TruthScene, legs: Legs, *, ends: tuple[Array, Array], samples: int, edges: str, shapes: Shapes | None
+) -> LitIntervals:
+    """Find and check the lit intervals of rays for any light; the parameters are those of `lit_intervals`."""
     if edges not in ("auto", "geometry", "rays"):
         raise InputError(f"edges is '{edges}'; wanted 'geometry', 'rays' or 'auto'")
     low, high = ends
@@ -85,29 +131,33 @@ def lit_intervals(
     if not truth.occluders.shapes() or not len(used):
         return LitIntervals(used, low[used], high[used], 0, edge=0.0)
     if edges == "rays":
-        return _cast_intervals(truth.occluders, light, rays, ends, samples)
+        return _cast_intervals(truth.occluders, legs, ends, samples)
     shapes = read_shapes(truth.occluders) if shapes is None else shapes
     if edges == "geometry":
         refuse_others(shapes)
     if shapes.others is not None and not shapes.single:
-        return _cast_intervals(shapes.others, light, rays, ends, samples)
-    exact = geometric_intervals(truth, light, rays, ends=ends, shapes=shapes)
+        return _cast_intervals(shapes.others, legs, ends, samples)
+    exact = legs.exact(shapes)
     others = None
     if shapes.others is not None:
-        others = visibility_test(shapes.others, light.position, rays)
-        exact = intersected(exact, _cast_intervals(shapes.others, light, rays, ends, samples), ends)
-    visible = visibility_test(truth.occluders, light.position, rays)
-    geometry = light.position, rays, shapes
-    return certified_geometry(exact, visible, geometry, ends=ends, checks=max(1, samples // 8), others=others)
+        others = _visible(shapes.others, legs.shadow)
+        exact = intersected(exact, _cast_intervals(shapes.others, legs, ends, samples), ends)
+    return certified_geometry(
+        exact,
+        _visible(truth.occluders, legs.shadow),
+        (legs.single, shapes),
+        ends=ends,
+        checks=max(1, samples // 8),
+        others=others,
+        rounding=legs.rounding,
+    )
 
 
-def _cast_intervals(
-    scene, light: TruthLight, rays: tuple[Array, Array, Array], ends: tuple[Array, Array], samples: int
-) -> LitIntervals:
+def _cast_intervals(scene, legs: Legs, ends: tuple[Array, Array], samples: int) -> LitIntervals:
     """Find lit intervals by casting rays in a scene, and have them checked and mended."""
     used = np.flatnonzero(ends[1] > ends[0])
-    visible = visibility_test(scene, light.position, rays)
-    hits = _first_hits(scene, light.position, rays)
+    visible = _visible(scene, legs.shadow)
+    hits = _first_hits(scene, legs)
     per_chunk = max(1, _CHUNK // (samples + 2))
     chunks = [
         _toggles(visible, hits, ends, used[start : start + per_chunk], samples)
@@ -123,11 +173,12 @@ def visibility_test(scene, position: Array, rays: tuple[Array, Array, Array]) ->
     The shadow rays start at the light, where nothing is close, and stop twenty float32 roundings before the point: a
     point on a surface must not be blocked by that surface.
     """
-    shadow = _shadow_rays(position, rays)
+    return _visible(scene, _shadow_rays(position, rays))
 
+
+def _visible(scene, shadow: Callable[[Index, Array], Any]) -> Visible:
     def visible(ray: Index, theta: Array) -> Bools:
-        shadow_ray = shadow(ray, theta)
-        return ~np.array(scene.ray_test(shadow_ray), dtype=bool)
+        return ~np.array(scene.ray_test(shadow(ray, theta)), dtype=bool)
 
     return visible
 
@@ -150,23 +201,21 @@ def _shadow_rays(position: Array, rays: tuple[Array, Array, Array]) -> Callable:
     return shadow
 
 
-def _first_hits(scene, position: Array, rays: tuple[Array, Array, Array]) -> Callable:
-    """Return a function (ray numbers, angles) -> (lit or not, logarithm of the first distance, number of the shape)."""
+def _first_hits(scene, legs: Legs) -> Callable:
+    """Return a function (ray numbers, angles) -> (lit or not, `Legs.depth` of what is met, number of the shape)."""
     import drjit as dr
     import mitsuba as mi
 
-    shadow = _shadow_rays(position, rays)
-
     def hits(ray: Index, theta: Array) -> tuple[Bools, Array, Index]:
-        shadow_ray = shadow(ray, theta)
+        shadow_ray = legs.shadow(ray, theta)
         length = mi.Float(shadow_ray.maxt)
         shadow_ray.maxt = dr.inf
         found = scene.ray_intersect_preliminary(shadow_ray, coherent=True)
         valid = found.is_valid()
         lit = ~(valid & (found.t < length))
         shape = dr.select(valid, dr.reinterpret_array(mi.UInt32, found.shape), 0)
-        distance = np.array(dr.log(dr.select(valid, found.t, 1.0)), dtype=np.float64)
-        return np.array(lit, dtype=bool), distance, np.array(shape, dtype=np.int64)
+        distance = np.array(dr.select(valid, found.t, 1.0), dtype=np.float64)
+        return np.array(lit, dtype=bool), legs.depth(ray, distance), np.array(shape, dtype=np.int64)
 
     return hits
 

@@ -109,7 +109,7 @@ def test_random_shadow_rays_contradict_nothing(variant, place):
     from reference.lit_geometry import EXACT_EDGE, geometric_intervals
     from reference.scene import read_truth
     from reference.shapes import read_shapes
-    from reference.visibility import lit_intervals, visibility_test
+    from reference.visibility import lit_intervals, point_leg, visibility_test
 
     shells = {
         "light": {"type": "sphere", "center": [0.8, 0.8, 1.7], "radius": 0.6},
@@ -132,5 +132,7 @@ def test_random_shadow_rays_contradict_nothing(variant, place):
     fewer = replace(shapes, centre=shapes.centre[keep], radius=shapes.radius[keep])
     wrong = geometric_intervals(truth, light, rays, ends=ends, shapes=fewer)
     visible = visibility_test(truth.occluders, light.position, rays)
-    left = certified_geometry(wrong, visible, (light.position, rays, shapes), ends=ends, checks=100).certificate.left
+    left = certified_geometry(
+        wrong, visible, (point_leg(light.position, rays), shapes), ends=ends, checks=100
+    ).certificate.left
     assert (left > 50) == (place in ("outside", "both"))

@@ -142,13 +142,13 @@ def test_wrong_geometry_is_found_and_left_in_doubt(variant):
     from reference.certify import certified_geometry
     from reference.lit_geometry import geometric_intervals
     from reference.shapes import Shapes, read_shapes
-    from reference.visibility import visibility_test
+    from reference.visibility import point_leg, visibility_test
 
     truth, light, rays, ends = setup(box_scene())
     shapes = read_shapes(truth.occluders)
     wrong = geometric_intervals(truth, light, rays, ends=ends, shapes=Shapes(shapes.triangles[12:]))
     visible = visibility_test(truth.occluders, light.position, rays)
-    found = certified_geometry(wrong, visible, (light.position, rays, shapes), ends=ends, checks=16)
+    found = certified_geometry(wrong, visible, (point_leg(light.position, rays), shapes), ends=ends, checks=16)
     assert found.certificate.left > 20
     assert found.doubt is not None
     assert len(found.doubt[0]) == found.certificate.left
@@ -160,7 +160,7 @@ def test_wrong_geometry_is_found_and_left_in_doubt(variant):
         lit[::701] ^= True
         return lit
 
-    found = certified_geometry(right, unreliable, (light.position, rays, shapes), ends=ends, checks=4)
+    found = certified_geometry(right, unreliable, (point_leg(light.position, rays), shapes), ends=ends, checks=4)
     assert found.certificate.disagreements > 0
     assert found.certificate.left == 0
     assert found.doubt is None
