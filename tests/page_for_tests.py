@@ -20,7 +20,7 @@ class Page(HTMLParser):
     def __init__(self, text):
         super().__init__(convert_charrefs=True)
         self.source = text
-        self.open, self.tags, self.words, self.tables, self.scripts = [], [], [], [], []
+        self.open, self.tags, self.words, self.tables, self.captions, self.scripts = [], [], [], [], [], []
         self.feed(text)
         self.close()
         assert self.open == []
@@ -47,6 +47,8 @@ class Page(HTMLParser):
             self.scripts[-1][1].append(data)
         elif not {"style", "svg"} & set(self.open):
             self.words.append(data)
+            if "caption" in self.open:
+                self.captions.append(data)
 
     def attributes(self, tag):
         return [attributes for name, attributes in self.tags if name == tag]
