@@ -11,12 +11,13 @@ do. Where the extinction depends on the channel, each channel has a run of its o
 picks its channel at random may have infinite variance (DESIGN section 6.7). Boundaries of media are of type 'null':
 paths go through them without counting an edge, and they stay as they are when surfaces turn black.
 
-Each batch has its own seed and at most 256 samples a pixel; means and standard errors are taken over the batches in
-float64.
+Each batch has its own seed and at most 256 samples a pixel on the average; what a pixel gets may differ, see
+`reference.allocation`. Sums, means and standard errors are taken in float64.
 """
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -26,12 +27,15 @@ from reference.batches import Batches, check_samples, single_batch
 from reference.scene import TruthMedium, TruthScene
 
 Array = NDArray[np.float64]
+Counts = NDArray[np.integer]
 
 _PATHS = 1 << 22  # paths traced at once
 _VALUES = ("sigma_t.value.value", "albedo.value.value")  # what decides the numbers among a medium's parameters
 
 
-def volpath_batch(truth: TruthScene, seed: int, samples: int, *, max_depth: int = 2) -> Batches:
+def volpath_batch(
+    truth: TruthScene, seed: int, samples: int, *, max_depth: int = 2, counts: Counts | None = None
+) -> Batches:
     """Trace one batch.
 
     Parameters
@@ -45,6 +49,8 @@ def volpath_batch(truth: TruthScene, seed: int, samples: int, *, max_depth: int 
     max_depth
         Most edges of a path: 2 is one scattering. With more, `airlight` is the light that was scattered by the medium
         alone, any number of times up to max_depth - 1, and `surface` all other light: what met a surface at least once.
+    counts
+        Samples of each pixel, (layers, pixels), for `max_depth` 2; all have `samples` by default.
 
     Notes
     -----
@@ -56,15 +62,18 @@ def volpath_batch(truth: TruthScene, seed: int, samples: int, *, max_depth: int 
     check_samples(samples)
     if max_depth < 2:
         raise ValueError(f"max_depth: got {max_depth}, wanted at least 2, one scattering")
+    if counts is not None and max_depth != 2:
+        raise ValueError("counts: got some with multiple scattering, whose layers are traced along the same paths")
+    in_air, on_surface = np.full((2, truth.width * truth.height), samples) if counts is None else counts
     integrator = mi.load_dict({"type": "volpath", "max_depth": max_depth, "rr_depth": 1000})
     with _black_surfaces(truth.occluders):
-        airlight = _trace(truth, integrator, 2 * seed, samples)
+        airlight = _trace(truth, integrator, 2 * seed, in_air)
     surface = np.zeros_like(airlight)
     if truth.occluders.shapes() and max_depth == 2:
-        surface = _trace(truth, integrator, 2 * seed + 1, samples, scattering=False)
+        surface = _trace(truth, integrator, 2 * seed + 1, on_surface, scattering=False)
     elif truth.occluders.shapes():
         # The same paths once more, now with light from surfaces; the difference is what these add.
-        surface = _trace(truth, integrator, 2 * seed, samples) - airlight
+        surface = _trace(truth, integrator, 2 * seed, in_air) - airlight
     return single_batch(seed, samples, np.stack([airlight, surface]))
 
 
@@ -84,37 +93,44 @@ def _black_surfaces(scene) -> Iterator[None]:
             shape.set_bsdf(bsdf)
 
 
-def _trace(truth: TruthScene, integrator, seed: int, samples: int, *, scattering: bool = True) -> Array:
-    """Return the mean radiance of every pixel, (pixels, 3)."""
-    pixels = truth.width * truth.height
-    rows = max(1, _PATHS // samples)
-    image = np.zeros((pixels, 3))
+def _trace(truth: TruthScene, integrator, seed: int, counts: Counts, *, scattering: bool = True) -> Array:
+    """Return the mean radiance of every pixel, (pixels, 3), over so many paths each."""
+    image = np.zeros((len(counts), 3))
+    parts = _parts(counts)
     extinctions = np.stack([medium.sigma_t for medium in (truth.medium, *truth.media)], axis=1)
     for number, sigma_t in enumerate(dict.fromkeys(map(tuple, extinctions))):
         channels = np.all(extinctions == sigma_t, axis=1)
         with _grey_media(truth, int(np.argmax(channels)), scattering) as medium:
-            for start in range(0, pixels, rows):
-                # Streams differ by seed; the chunk and the channel get seeds of their own.
-                stream = (seed * 3 + number) * (pixels // rows + 1) + start // rows
-                part = slice(start, min(start + rows, pixels))
-                image[part, channels] = _trace_pixels(truth, integrator, medium, part, stream, samples)[:, channels]
+            for place, part in enumerate(parts):
+                # Streams differ by seed; the part and the channel get seeds of their own.
+                stream = (seed * 3 + number) * len(parts) + place
+                image[part, channels] = _trace_pixels(truth, integrator, medium, part, stream, counts[part])[
+                    :, channels
+                ]
     return image
 
 
-def _trace_pixels(truth: TruthScene, integrator, medium, pixels: slice, seed: int, samples: int) -> Array:
+def _parts(counts: Counts) -> list[slice]:
+    """Cut the pixels into parts that have about `_PATHS` paths together, or are one pixel."""
+    part = (np.cumsum(counts) - 1) // _PATHS
+    edges = [0, *(np.flatnonzero(np.diff(part)) + 1), len(counts)]
+    return [slice(int(start), int(end)) for start, end in pairwise(edges)]
+
+
+def _trace_pixels(truth: TruthScene, integrator, medium, pixels: slice, seed: int, counts: Counts) -> Array:
     import drjit as dr
     import mitsuba as mi
 
     direction = mi.Vector3f(truth.direction[pixels].T)
-    count = dr.width(direction)
-    lane = dr.arange(mi.UInt32, count * samples)
+    pixel = mi.UInt32(np.repeat(np.arange(len(counts), dtype=np.uint32), counts))
     sampler = mi.load_dict({"type": "independent"})
-    sampler.seed(seed, count * samples)
+    sampler.seed(seed, dr.width(pixel))
     start = mi.Point3f(*(float(c) for c in truth.origin))
-    ray = mi.Ray3f(start, dr.normalize(dr.gather(mi.Vector3f, direction, lane // samples)))
+    ray = mi.Ray3f(start, dr.normalize(dr.gather(mi.Vector3f, direction, pixel)))
     radiance, _, _ = integrator.sample(truth.scene, sampler, mi.RayDifferential3f(ray), medium)
-    means = [np.array(dr.block_sum(channel, samples), dtype=np.float64) / samples for channel in radiance]
-    return np.stack(means, axis=1)
+    first = np.cumsum(counts, dtype=np.int64) - counts
+    sums = [np.add.reduceat(np.array(channel, dtype=np.float64), first) for channel in radiance]
+    return np.stack(sums, axis=1) / counts[:, None]
 
 
 @contextmanager

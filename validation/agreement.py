@@ -3,21 +3,23 @@
 
 They share no code but Mitsuba's ray casting. `single-scatter` estimates the same integral as the quadrature by other
 means: agreement of a few hundredths of a percent says that neither has a fault. `volpath` is code that nobody here
-wrote. It attenuates over a shadow ray that ends a relative epsilon before
-the light (DESIGN section 6.1), so it is compared with the quadrature image of *that* integral, exp(-sigma_t (x + (1 -
-epsilon) r)), with the epsilon measured on this machine. The bias without this correction is given beside it.
+wrote. It attenuates over a shadow ray that ends a relative epsilon before the light (DESIGN section 6.1), so it is
+compared with the quadrature image of *that* integral, exp(-sigma_t (x + (1 - epsilon) r)), with the epsilon measured on
+this machine. The bias without this correction is given beside it.
 
 Rays that pass closer to a light than `MASK_PIXELS` pixel widths are left out: the contribution of one path there is
 bounded only by 1/h^2, so that no number of samples gives a standard error to trust (DESIGN section 6.6).
 """
 
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.batches import LAYERS, Batches
+from reference.allocation import allocated
+from reference.batches import LARGEST_SEED, LAYERS, Batches
 from reference.epsilon import measure_shadow_epsilon
 from reference.quadrature import TruthImage
 from reference.scene import TruthScene, read_truth
@@ -32,6 +34,7 @@ Progress = Callable[[int, int, str], None]
 MASK_PIXELS = 2.0
 #: Below 32 batches the standard error of a standard error exceeds 13 %; those of single-scatter cost little.
 _LEAST_BATCHES = {"volpath": 32, "single-scatter": 96}
+_PILOT = 8  # batches that say where volpath's samples go, with seeds that no run reaches
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,7 @@ class Agreement:
     masked: int  #: pixels left out because a light is close to their ray
     statistics: Statistics  #: of the estimator against the quadrature, for volpath that of the shortened shadow ray
     uncorrected_bias: float  #: pooled relative bias against the plain truth
+    finished: bool = True  #: whether the intervals became as narrow as wanted; else time or batches ran out before
 
 
 def agreement(
@@ -57,12 +61,13 @@ def agreement(
     margin: float = 0.005,
     batches: int = 256,
     samples: int = 64,
+    seconds: float | None = None,
     progress: Progress | None = None,
 ) -> dict[str, Agreement]:
     """Compare an estimator with the quadrature image of a Mitsuba scene at its own size.
 
     It runs until the half width of every interval is below 0.4 times the margin: a rule that looks at the spread
-    alone, so that stopping favours no verdict.
+    alone, so that stopping favours no verdict. Nor does the end of its time.
 
     Parameters
     ----------
@@ -73,7 +78,10 @@ def agreement(
     margin
         The two agree if the 95 % interval of the relative bias lies inside +- this.
     batches, samples
-        Batches at most, and samples a pixel in each.
+        Batches at most, and samples a pixel in each; those of volpath go where its pilot spread most
+        (`reference.allocation`).
+    seconds
+        Trace no further batch after so long; without a limit by default.
     progress
         Called with (done, total, what) after every batch.
 
@@ -93,6 +101,12 @@ def agreement(
         test = batch_estimate(found, layer, mask)
         return compare_statistics(Estimate(getattr(shortened, layer)), test, mask=mask, margin=margin)
 
+    start = time.monotonic()
+    counts = None
+    if estimator == "volpath" and layers:
+        pilot = monte_carlo_batches(scene, estimator, batches=_PILOT, samples=samples, first_seed=LARGEST_SEED // 2)
+        counts = allocated(pilot.batches, samples, shape=plain.distance.shape, masks=masks)
+    go_on = None if seconds is None else (lambda done: time.monotonic() - start <= seconds)
     expected = least = _LEAST_BATCHES[estimator]
 
     def enough(found: Batches) -> bool:
@@ -110,8 +124,16 @@ def agreement(
             progress(min(done, expected), min(total, expected), what)
 
     found = monte_carlo_batches(
-        scene, estimator, batches=batches, samples=samples, enough=enough, progress=tell
+        scene,
+        estimator,
+        batches=batches,
+        samples=samples,
+        counts=counts,
+        enough=enough,
+        go_on=go_on,
+        progress=tell,
     ).batches
+    results = {layer: compared(found, layer) for layer in layers}
     return {
         layer: Agreement(
             estimator,
@@ -122,8 +144,9 @@ def agreement(
             found.samples,
             epsilon,
             int((~masks[layer]).sum()),
-            compared(found, layer),
+            results[layer],
             _bias(getattr(plain, layer), found, layer, masks[layer]),
+            width_to_reach(results[layer], margin) < 1,
         )
         for layer in layers
     }
@@ -133,7 +156,9 @@ def agreements(
     scene,
     margins: Mapping[str, float],
     *,
+    batches: int = 256,
     samples: int = 64,
+    seconds: float | None = None,
     progress: Callable[[float, str], None] | None = None,
 ) -> dict[str, Agreement]:
     """Compare several estimators with the quadrature image.
@@ -144,8 +169,8 @@ def agreements(
         The `mi.Scene`.
     margins
         By estimator, the margin.
-    samples
-        A pixel in each batch.
+    batches, samples, seconds
+        Of each estimator, see `agreement`.
     progress
         Called with (share done, what).
 
@@ -155,14 +180,22 @@ def agreements(
         By estimator and layer, as in 'volpath airlight'.
     """
     tell = progress or (lambda share, what: None)
-    found = {}
+    found: dict[str, Agreement] = {}
     for number, (estimator, margin) in enumerate(margins.items()):
 
         def told(done: int, total: int, what: str, first: int = number) -> None:
             tell((first + done / total) / len(margins), what)
 
-        for layer, one in agreement(scene, estimator=estimator, margin=margin, samples=samples, progress=told).items():
-            found[f"{estimator} {layer}"] = one
+        by_layer = agreement(
+            scene,
+            estimator=estimator,
+            margin=margin,
+            batches=batches,
+            samples=samples,
+            seconds=seconds,
+            progress=told,
+        )
+        found |= {f"{estimator} {layer}": one for layer, one in by_layer.items()}
     return found
 
 

@@ -9,6 +9,7 @@ kept within a block are traced again).
 """
 
 import errno
+import hashlib
 import os
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -16,6 +17,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from reference.batches import LARGEST_SEED, Batches, merged
@@ -30,6 +32,7 @@ Trace = Callable[[int], Batches]  # from the seed
 
 ESTIMATORS = ("single-scatter", "volpath")
 BLOCK = 8  #: batches in a block
+_REVISIONS = {"volpath": {"revision": 2}}  # raised when the same seed gives other numbers than it did
 
 
 @dataclass(frozen=True)
@@ -49,6 +52,7 @@ def monte_carlo_batches(
     samples: int,
     first_seed: int = 0,
     max_depth: int = 2,
+    counts: NDArray[np.integer] | None = None,
     enough: Callable[[Batches], bool] | None = None,
     go_on: Callable[[int], bool] | None = None,
     progress: Progress | None = None,
@@ -69,6 +73,9 @@ def monte_carlo_batches(
         Seed of the first batch; the others count up.
     max_depth
         Most edges of a path, see `reference.volpath.volpath_batch`; volpath only.
+    counts
+        Samples of each pixel in each batch, (layers, pixels), with the mean `samples`, see `reference.allocation`;
+        volpath only, the same for all pixels by default.
     enough
         Asked after every block, whose last seed is one less than a multiple of eight, whether to stop.
     go_on
@@ -91,41 +98,43 @@ def monte_carlo_batches(
         raise InputError(
             f"seed: got {first_seed} for {batches} batches, which count up; wanted 0 to {LARGEST_SEED - batches}"
         )
-    settings = {"samples": samples} | ({"max_depth": max_depth} if max_depth != 2 else {})
+    settings: dict[str, Any] = {"samples": samples} | ({"max_depth": max_depth} if max_depth != 2 else {})
+    settings |= _REVISIONS.get(estimator, {})
+    settings |= {} if counts is None else {"counts": hashlib.sha256(counts.astype("<u4").tobytes()).hexdigest()}
     folder = cache_key(scene, estimator, settings)
     sweep(cache_folder() / folder)
-    trace = _tracer(scene, estimator, samples, max_depth)
-    counts: Counter[str] = Counter()
+    trace = _tracer(scene, estimator, samples, max_depth, counts)
+    tally: Counter[str] = Counter()
 
     def kept_or_traced(seed: int) -> Batches | None:
-        batch = _load(folder, range(seed, seed + 1), samples, counts)
+        batch = _load(folder, range(seed, seed + 1), samples, tally)
         if batch is None:
-            if go_on is not None and counts["done"] >= 2 and not go_on(counts["done"]):
+            if go_on is not None and tally["done"] >= 2 and not go_on(tally["done"]):
                 return None
             batch = trace(seed)
             _store(folder, batch)
             if progress is not None:
-                progress(counts["done"] + 1, batches, estimator)
-        counts["done"] += 1
+                progress(tally["done"] + 1, batches, estimator)
+        tally["done"] += 1
         return batch
 
     try:
         done = None
         for seeds in _blocks(first_seed, batches):
-            block, whole = _block(folder, seeds, samples, counts=counts, batch_of=kept_or_traced)
+            block, whole = _block(folder, seeds, samples, tally=tally, batch_of=kept_or_traced)
             if block is not None:
                 done = block if done is None else merged(done, block)
-            if not whole or (enough is not None and 2 <= counts["done"] < batches and enough(_all(done))):
+            if not whole or (enough is not None and 2 <= tally["done"] < batches and enough(_all(done))):
                 break
     except KeyboardInterrupt:
-        raise KeyboardInterrupt(f"{_kept(counts)}; run again to go on") from None
+        raise KeyboardInterrupt(f"{_kept(tally)}; run again to go on") from None
     except OSError as error:
         if error.errno not in NO_SPACE:
             raise
         reason = os.strerror(error.errno or errno.ENOSPC)
         hint = "make room, or name another folder by AIRLIGHT_CACHE_DIR, and run again to go on"
-        raise OSError(error.errno, f"{reason}; {_kept(counts)}; {hint}", str(cache_folder())) from error
-    return Run(_all(done), counts["cached"], counts["damaged"])
+        raise OSError(error.errno, f"{reason}; {_kept(tally)}; {hint}", str(cache_folder())) from error
+    return Run(_all(done), tally["cached"], tally["damaged"])
 
 
 def _all(done: Batches | None) -> Batches:
@@ -133,11 +142,12 @@ def _all(done: Batches | None) -> Batches:
     return done
 
 
-def _tracer(scene, estimator: str, samples: int, max_depth: int) -> Trace:
+def _tracer(scene, estimator: str, samples: int, max_depth: int, counts: NDArray[np.integer] | None) -> Trace:
     truth = read_truth(scene)
     if estimator == "volpath":
-        return lambda seed: volpath_batch(truth, seed, samples, max_depth=max_depth)
-    if estimator == "single-scatter" and max_depth == 2:
+        own = {} if counts is None else {"counts": counts}
+        return lambda seed: volpath_batch(truth, seed, samples, max_depth=max_depth, **own)
+    if estimator == "single-scatter" and max_depth == 2 and counts is None:
         return lambda seed: single_scatter_batch(truth, seed, samples)
     raise ValueError(f"estimator: got {estimator!r} with max_depth {max_depth}, wanted one of {', '.join(ESTIMATORS)}")
 
@@ -152,13 +162,13 @@ def _blocks(first_seed: int, batches: int) -> Iterator[range]:
 
 
 def _block(
-    folder: str, seeds: range, samples: int, *, counts: Counter[str], batch_of: Callable[[int], Batches | None]
+    folder: str, seeds: range, samples: int, *, tally: Counter[str], batch_of: Callable[[int], Batches | None]
 ) -> tuple[Batches | None, bool]:
     """Return the batches of some seeds added up, and whether they are all there."""
     full = len(seeds) == BLOCK
-    block = _load(folder, seeds, samples, counts) if full else None
+    block = _load(folder, seeds, samples, tally) if full else None
     if block is not None:
-        counts["done"] += BLOCK
+        tally["done"] += BLOCK
         return block, True
     for seed in seeds:
         batch = batch_of(seed)
@@ -183,16 +193,16 @@ def _store(folder: str, batches: Batches) -> None:
     store_arrays(_name(folder, range(batches.seeds[0], batches.seeds[-1] + 1)), arrays)
 
 
-def _load(folder: str, seeds: range, samples: int, counts: Counter[str]) -> Batches | None:
+def _load(folder: str, seeds: range, samples: int, tally: Counter[str]) -> Batches | None:
     name = _name(folder, seeds)
     stored = load_arrays(name)
     if stored is None:
-        counts["damaged"] += is_kept(name)
+        tally["damaged"] += is_kept(name)
         return None
-    counts["cached"] += len(seeds)
+    tally["cached"] += len(seeds)
     squares = stored["squares"] if len(seeds) > 1 else np.zeros_like(stored["mean"])
     return Batches(tuple(seeds), samples, stored["mean"], squares, stored["totals"])
 
 
-def _kept(counts: Counter[str]) -> str:
-    return f"{counts['done']} finished batches are kept" if counts["done"] else "nothing was finished yet"
+def _kept(tally: Counter[str]) -> str:
+    return f"{tally['done']} finished batches are kept" if tally["done"] else "nothing was finished yet"
