@@ -34,9 +34,9 @@ if TYPE_CHECKING:  # for editors, which complete names from here; `_API` says th
     from reports.api import compare as compare
     from reports.api import load_scene as load_scene
     from reports.api import render as render
+    from reports.api_report import report as report
     from reports.api_studies import bench as bench
     from reports.api_studies import integrate as integrate
-    from reports.api_studies import report as report
     from reports.api_truth import reference as reference
     from reports.environment import MissingError as MissingError
     from reports.environment import activate as activate
@@ -63,7 +63,7 @@ _API = {
     "compare": "reports.api",
     "integrate": "reports.api_studies",
     "bench": "reports.api_studies",
-    "report": "reports.api_studies",
+    "report": "reports.api_report",
     "InputError": "analytic.errors",
     "MissingError": "reports.environment",
     "activate": "reports.environment",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The Python API for studies: integrals by kernels, speed against error, the error report."""
+"""The Python API for studies: integrals by kernels, speed against error."""
 
 import os
 from collections.abc import Callable, Mapping, Sequence
@@ -12,7 +12,7 @@ from reports.api_inputs import Progress, SceneLike, Size, kernel_name, one_error
 
 if TYPE_CHECKING:
     from analytic.cases import Cases
-    from reports.api_tables import BenchTable, Integrals, Report
+    from reports.api_tables import BenchTable, Integrals
     from validation.bench import Measurement
     from validation.configurations import Configuration
 
@@ -153,8 +153,8 @@ def bench(
     from validation.truth import truth_image
 
     activate()
-    chosen = _configurations(methods)
-    loaded = [opened(one, size) for one in _several(scenes)]
+    chosen = chosen_methods(methods)
+    loaded = [opened(one, size) for one in several(scenes)]
     read = [read_scene(one.scene) for one in loaded]  # refuse what cannot be used before the work begins
     rows = []
     with telling(progress, "bench") as tell:
@@ -170,17 +170,19 @@ def bench(
     return BenchTable(rows=tuple(rows), environment=describe_environment())
 
 
-def _several(scenes: Any) -> list[Any]:
-    return list(scenes) if isinstance(scenes, list | tuple) else [scenes]
+def several(things: Any) -> list[Any]:
+    """Return one or several as a list."""
+    return list(things) if isinstance(things, list | tuple) else [things]
 
 
-def _configurations(methods: Any) -> "tuple[Configuration, ...]":
+def chosen_methods(methods: Any) -> "tuple[Configuration, ...]":
+    """Return what to measure, all standard configurations for None; see `bench`."""
     from validation.configurations import STANDARD, Configuration, chosen_configurations, configuration
 
     if methods is None:
         return STANDARD
     found: list[Configuration] = []
-    for one in _several(methods):
+    for one in several(methods):
         if isinstance(one, Configuration):
             found.append(one)
         else:
@@ -208,72 +210,3 @@ def _numbers(measured: "Measurement") -> dict[str, Any]:
         row[name] = error and plain(getattr(error, name))
     row["flip"] = measured.flip and measured.flip.value
     return row | {"refused": measured.refused, "note": measured.note}
-
-
-@one_error
-def report(
-    folder: str | os.PathLike[str] = "airlight-report",
-    *,
-    scenes: Sequence[str] | None = None,
-    methods: "Sequence[MethodLike] | None" = None,
-    effort: Literal["quick", "default", "full"] = "quick",
-    progress: Progress = None,
-) -> "Report":
-    """Measure methods in scenes and write the error report: one page, its data, EXR files and pictures.
-
-    Parameters
-    ----------
-    folder
-        Where it is written.
-    scenes
-        Built-in names and paths of Mitsuba XML files; those of `airlight report` by default.
-    methods
-        As for `bench`; those of `airlight report` by default.
-    effort
-        'quick', 'default' or 'full': minutes or an hour.
-    progress
-        Called with (share done, what); True shows a bar.
-
-    Raises
-    ------
-    InputError
-        For what cannot be used, before the work begins.
-
-    Examples
-    --------
-    >>> import airlight
-    >>> found = airlight.report("my-report", scenes=["open-fog"], methods=["unshadowed"])  # doctest: +SKIP
-    >>> found.claims[0]  # doctest: +SKIP
-    'The truth is confirmed by our own Mitsuba integrator in 1 of 1 comparisons: ...'
-    """
-    from realtime.scene import read_scene
-    from reference.files import ensure_folder
-    from reports.api_tables import Report
-    from reports.environment import activate
-    from reports.report import write_report
-    from validation.configurations import QUICK, STANDARD
-    from validation.load import nearest
-    from validation.scenes import SCENES
-    from validation.study import EFFORTS, QUICK_SCENES
-
-    if effort not in EFFORTS:
-        raise InputError(f"effort: got {effort!r}, wanted one of {', '.join(EFFORTS)}" + nearest(effort, EFFORTS))
-    target = ensure_folder(folder)
-    activate()
-    usual = QUICK if effort == "quick" else STANDARD
-    chosen = usual if methods is None else _configurations(methods)
-    names = (
-        [os.fspath(one) for one in _several(scenes)] if scenes else list(QUICK_SCENES if effort == "quick" else SCENES)
-    )
-    for name in names:
-        read_scene(opened(name, (8, 6)).scene)
-    with telling(progress, "report") as tell:
-        data = write_report(
-            target,
-            scenes=names,
-            effort=EFFORTS[effort],
-            configurations=chosen,
-            command=f"airlight.report({os.fspath(folder)!r}, ..)",
-            progress=tell,
-        )
-    return Report(folder=target, data=data)

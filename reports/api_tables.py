@@ -164,9 +164,10 @@ class Report:
 
     @property
     def confirmed(self) -> bool:
-        """Whether every check of the truth found it within its margin."""
-        agreements = [one for scene in self.data["scenes"] for one in scene["agreement"].values()]
-        return all(one["statistics"]["equivalent"] for one in agreements)
+        """Whether no check speaks against the truth, and at least one confirms each layer."""
+        from reports.claims import confirmed
+
+        return confirmed(self.data["scenes"])
 
     def _repr_html_(self) -> str:
         from reports.api_html import block, bullets, link

@@ -154,10 +154,28 @@ def test_report_hands_on_what_it_was_given(variant, tmp_path, monkeypatch):
     assert given["scenes"] == ["open-fog"]
     assert given["effort"].name == "quick"
     assert [one.method.rpartition(":")[2] for one in given["configurations"]] == ["min-max", "brighter"]
+    assert given["images"] == {}
+    assert not given["fresh"]
+    airlight.render("open-fog", "unshadowed", size=TINY).save(tmp_path / "open-fog.engine.exr")
+    airlight.report(tmp_path / "out", images=tmp_path, fresh=True)
+    assert given["scenes"] == ["open-fog"]
+    assert [one.label for one in given["images"]["open-fog"]] == ["engine"]
+    assert given["fresh"]
     with pytest.raises(airlight.InputError, match="did you mean 'full'"):
         airlight.report(tmp_path, effort="ful")
     with pytest.raises(airlight.InputError, match="did you mean 'hall'"):
         airlight.report(tmp_path, scenes=["hal"])
+
+
+def test_ctrl_c_in_a_report_is_ctrl_c(variant, tmp_path, monkeypatch):
+    from reports.progress import Interrupted
+
+    def write(folder, **options):
+        raise Interrupted("three results are kept")
+
+    monkeypatch.setattr("reports.report.write_report", write)
+    with pytest.raises(KeyboardInterrupt, match="three results are kept"):
+        airlight.report(tmp_path, scenes=["open-fog"])
 
 
 @pytest.mark.slow
