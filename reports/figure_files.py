@@ -108,6 +108,11 @@ def value(row: Row, name: str) -> float | None:
     return float(row[name]) if row[name] else None
 
 
+def pixels(row: Row) -> str:
+    """Return the size of an image as a figure names it, from the columns `width` and `height`."""
+    return f"{row['width']} \N{MULTIPLICATION SIGN} {row['height']}"
+
+
 def write_provenance(folder: Path | str, name: str, **made_by: Any) -> None:
     """Write `NAME.json`: what made the data of a figure, when and on what."""
     from reports.environment import describe_environment
