@@ -14,7 +14,7 @@ which is linear for |d| < s and logarithmic above, so that the rounding of d is 
 
 that is d/2k of a large error, and s/2k, below single precision for the finest of `PRECISIONS`, of a small one. Nothing
 is clamped: where the largest code would not fit, k is made smaller for that plane. The reference keeps the upper 24
-bits of each float32, rounded: 16 binary digits, to 2^-17 = 7.6e-6 relative at most. `d` is taken against the rounded
+bits of each float32, rounded: 16 binary digits, to 2^-16 = 1.5e-5 relative at most. `d` is taken against the rounded
 reference in the denominator and against the exact one in the difference, so that the errors do not see that rounding.
 
 A plane of codes is then predicted (from nothing, from the left, from the gradient left + up - left-up), the second and

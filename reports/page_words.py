@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How numbers are written on the page of a report, and the sentences that the page makes of its data."""
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -89,6 +90,11 @@ def sentence(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
+def unbroken(text: str) -> str:
+    """Return a text in which no line ends before a unit."""
+    return re.sub(r"(?<=\d) (?=%|ms\b|frames/s)", "\N{NO-BREAK SPACE}", text)
+
+
 def kept_words(data: Mapping[str, Any]) -> str:
     """Return how many results of a report were kept from earlier runs; empty where none was."""
     kept, computed = data.get("kept") or 0, data.get("computed")
@@ -130,4 +136,5 @@ FILTERS: Mapping[str, Callable[..., str]] = {
     "words": words,
     "first_sentence": first_sentence,
     "sentence": sentence,
+    "unbroken": unbroken,
 }

@@ -202,12 +202,12 @@ class Viewer {
       drawPixels(bar, table.length, 1, (i) => table[i]);
       marks = MAPS[mode].ticks(state.floor);
     }
-    const crowded = marks.length > 7;
+    // Where there are many ticks every second one has its words, and always both ends and the middle.
+    const outer = mode === "signed" ? (marks.length - 1) / 2 : marks.length - 1;
     ticks.replaceChildren(...marks.map(([place, words], number) => {
       const tick = document.createElement("span");
-      const fromMiddle = Math.abs(number - (marks.length - 1) / 2);
-      const side = mode === "signed" ? fromMiddle : number;
-      if (!crowded || side % 2 === (mode === "signed" ? (marks.length - 1) / 2 % 2 : 0)) tick.textContent = words;
+      const step = mode === "signed" ? Math.abs(number - outer) : number;
+      if (marks.length <= 7 || step === 0 || (step > 1 && (outer - step) % 2 === 0)) tick.textContent = words;
       tick.style.left = `${100 * place}%`;
       tick.className = place === 0 ? "first" : place === 1 ? "last" : "";
       return tick;
