@@ -22,9 +22,9 @@ def compare_methods(old: Report, new: Report, *, tolerance: float, gone: str) ->
         if bool(one["refused"]) != bool(two["refused"]):
             lost = two["refused"]
             words = f"refused: {lost}" if lost else "no longer refused"
-            # What was left out for the time it takes is a decision of the one who measured, not a fault.
-            verdict_ = ("note" if two.get("left_out") else "worse") if lost else "better"
-            findings.append(Finding(verdict_, name, label, words))
+            # What was left out for the time it would take is a decision of the one who measured, not a fault.
+            decided = one.get("left_out") or two.get("left_out")
+            findings.append(Finding("note" if decided else "worse" if lost else "better", name, label, words))
         elif one.get("layer", "airlight") != two.get("layer", "airlight"):
             findings.append(Finding("note", name, label, "errors not compared: they are of different layers"))
         elif reason is None:

@@ -29,15 +29,11 @@ def compare_times(old: Report, new: Report, *, tolerance: float | None) -> TimeC
     notes = [Finding("note", "", "", one) for one in changes]
     if tolerance is None:
         return TimeComparison(0, machine, changes, 1.0, 1.0, 1.0, tuple(notes))
-    timed = [report["settings"].get("timed") for report in (old, new)]
-    if timed[0] != timed[1]:
-        sizes = " and ".join("x".join(map(str, size or ["?"])) for size in timed)
-        notes.append(Finding("note", "", "", f"times not compared: the frames timed are {sizes} pixels"))
-        return TimeComparison(0, machine, changes, 1.0, 1.0, 1.0, tuple(notes))
     kept = new.get("kept")
     if kept:
         notes.append(Finding("note", "", "", f"{kept} results of the new report were measured earlier and kept"))
-    pairs = _pairs(old, new)
+    pairs, otherwise = _pairs(old, new)
+    notes += otherwise
     both = max(spread(_all_times(old)), spread(_all_times(new)))
     least = least_ratio(both, same_machine=machine, tolerance=tolerance)
     common = drift(pairs.values()) if pairs else 1.0
@@ -61,17 +57,33 @@ def _machines(old: Report, new: Report) -> tuple[bool, tuple[str, ...]]:
     return same, tuple(changes)
 
 
-def _pairs(old: Report, new: Report) -> dict[tuple[str, str], tuple[Times, Times]]:
-    """Return the times of what both reports timed alike."""
-    before, after = (_timed(report) for report in (old, new))
-    shared = [key for key in before if key in after and before[key][0] == after[key][0]]
-    return {key: (before[key][1], after[key][1]) for key in shared}
+Key = tuple[str, str]  # scene and label
 
 
-def _timed(report: Report) -> dict[tuple[str, str], tuple[Any, Times]]:
-    """Return how and how long, by scene and label; a note says that another size was timed."""
+def _pairs(old: Report, new: Report) -> tuple[dict[Key, tuple[Times, Times]], list[Finding]]:
+    """Return the times of what both reports timed alike, and what they timed otherwise."""
+    before, after = _timed(old), _timed(new)
+    pairs: dict[Key, tuple[Times, Times]] = {}
+    notes: dict[Finding, None] = {}
+    for key in [key for key in before if key in after]:
+        (size, note, one), (new_size, new_note, two) = before[key], after[key]
+        if size != new_size:
+            sizes = " and ".join("x".join(map(str, found or ["?"])) for found in (size, new_size))
+            notes[Finding("note", key[0], "", f"times not compared: the frames timed are {sizes} pixels")] = None
+        elif note != new_note:
+            notes[
+                Finding("note", *key, f"times not compared: {note or 'as usual'} before, {new_note or 'as usual'} now")
+            ] = None
+        else:
+            pairs[key] = one, two
+    return pairs, list(notes)
+
+
+def _timed(report: Report) -> dict[Key, tuple[Any, str | None, Times]]:
+    """Return the size of the frames that were timed, the note on how, and the times, by scene and label."""
+    usual = report["settings"].get("timed")
     return {
-        (scene["name"], one["label"]): ((one.get("note"), scene["size"] if one.get("note") else None), one["times"])
+        (scene["name"], one["label"]): (scene.get("timed", usual), one.get("note"), one["times"])
         for scene in report["scenes"]
         for one in scene["methods"]
         if one.get("times") and "frame" in one["times"]
