@@ -8,7 +8,9 @@ from dataclasses import asdict, is_dataclass
 from typing import Any
 
 from realtime.plan import describe
+from reference.quadrature import TruthImage
 from validation.bench import Measurement, knows_shadows
+from validation.engine_images import ImageMeasurement
 from validation.metrics import plain as plain_value
 from validation.study import SceneStudy
 
@@ -26,38 +28,39 @@ def plain(value: Any) -> Any:
     return plain_value(value)
 
 
-def scene_data(study: SceneStudy) -> dict[str, Any]:
-    """Return what a study found, without its images."""
+def scene_facts(study: SceneStudy) -> dict[str, Any]:
+    """Return what a scene is, before anything is measured in it."""
+    loaded, effort, plan = study.loaded, study.effort, study.scene.plan
+    return {
+        "name": loaded.name,
+        "purpose": loaded.purpose,
+        "published": loaded.published,
+        "path": str(loaded.path) if loaded.path else None,
+        "size": list(effort.image),
+        "timed": list(effort.timed),
+        "plan": describe(plan),
+        "notes": list(plan.notes),
+    }
+
+
+def truth_data(truth: TruthImage) -> dict[str, Any]:
+    """Return how exact the quadrature truth is, without its images."""
     import numpy as np
 
-    truth = study.truth
     finite = np.isfinite(truth.airlight)
-    height, width = truth.distance.shape
     mean = float(truth.airlight[finite].mean()) if finite.any() else float("nan")
-    return {
-        "name": study.loaded.name,
-        "purpose": study.loaded.purpose,
-        "published": study.loaded.published,
-        "path": str(study.loaded.path) if study.loaded.path else None,
-        "size": [width, height],
-        "plan": describe(study.plan),
-        "notes": list(study.plan.notes),
-        "truth": plain(
-            {
-                "mean": mean,
-                "relative_bound": float(truth.airlight_bound[finite].mean()) / mean if mean > 0 else None,
-                "transitions": truth.transitions,
-                "missed": truth.missed,
-                "checked": truth.checked,
-                "disagreements": truth.disagreements,
-                "refined": truth.refined,
-                "left": truth.left,
-            }
-        ),
-        "agreement": plain(study.agreement),
-        "multiple": plain(study.multiple),
-        "methods": [measurement_data(one) for one in study.measurements],
-    }
+    return plain(
+        {
+            "mean": mean,
+            "relative_bound": float(truth.airlight_bound[finite].mean()) / mean if mean > 0 else None,
+            "transitions": truth.transitions,
+            "missed": truth.missed,
+            "checked": truth.checked,
+            "disagreements": truth.disagreements,
+            "refined": truth.refined,
+            "left": truth.left,
+        }
+    )
 
 
 def measurement_data(measured: Measurement) -> dict[str, Any]:
@@ -71,9 +74,30 @@ def measurement_data(measured: Measurement) -> dict[str, Any]:
         "parameters": dict(measured.configuration.parameters),
         "knows_shadows": knows_shadows(measured.configuration),
         "refused": measured.refused,
-        "left_out": False,
+        "left_out": measured.left_out,
         "note": measured.note,
         "times": plain(measured.times),
+        "error": plain(measured.error),
+        "surface_error": plain(measured.surface_error),
+        "flip": measured.flip.to_json() if measured.flip else None,
+        "files": {},
+    }
+
+
+def image_data(measured: ImageMeasurement) -> dict[str, Any]:
+    """Return how wrong an image from elsewhere is, with the keys of `measurement_data`."""
+    return {
+        "label": measured.shown.label,
+        "kind": "image",
+        "layer": measured.layer,
+        "method": "image",
+        "kernel": None,
+        "parameters": {},
+        "knows_shadows": True,
+        "refused": None,
+        "left_out": False,
+        "note": measured.note,
+        "times": None,
         "error": plain(measured.error),
         "surface_error": plain(measured.surface_error),
         "flip": measured.flip.to_json() if measured.flip else None,

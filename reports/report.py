@@ -1,28 +1,37 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The error report: studies written down as EXR files, pictures, report.json and one page of HTML."""
+"""The error report: studies written down as EXR files, pictures, report.json and one page of HTML.
+
+Every result is kept on disk as soon as it is there (`validation.kept`), so a report that was interrupted goes on where
+it stopped and one in which nothing changed measures nothing. The files of a report appear when it is whole.
+"""
 
 import json
 import time
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import asdict, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from analytic.errors import InputError
-from reference.exr import write_exr
-from reference.files import ensure_folder, write_text
+from reference.files import ensure_folder
 from reports.claims import claims
-from reports.data import SCHEMA, mutations_data, plain, scene_data
-from reports.environment import describe_environment, stamped
+from reports.data import SCHEMA, plain
+from reports.environment import describe_environment
 from reports.page import render_page
-from reports.pictures import error_map, exposure, tone_mapped, write_png
-from reports.progress import Progress
+from reports.progress import Interrupted, Progress
+from reports.report_papers import mutations_part, published_part, stability_part
+from reports.report_scene import raise_own_error, scene_report
+from reports.staging import staged
 from validation.configurations import STANDARD, Configuration
-from validation.references import layered_frame, layered_truth
-from validation.study import Effort, SceneStudy, study_scene
+from validation.engine_images import EngineImage, images_size
+from validation.kept import Kept, keeper, now, sweep_results
+from validation.study import Effort, open_study
+
+#: Modules that make what is kept, besides the four sides.
+_MAKERS = ("data.py", "pictures.py", "colour_maps.py", "report_scene.py", "report_papers.py")
+_SCENES = 0.85  # share of the scenes in the progress
 
 
 def write_report(
@@ -31,7 +40,9 @@ def write_report(
     scenes: Sequence[str],
     effort: Effort,
     configurations: Sequence[Configuration] = STANDARD,
+    images: Mapping[str, Sequence[EngineImage]] | None = None,
     command: str = "airlight report",
+    fresh: bool = False,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Study scenes and write the report.
@@ -46,61 +57,150 @@ def write_report(
         How much work to do.
     configurations
         What to measure.
+    images
+        By scene, images from elsewhere to judge; such a scene is studied at their size.
     command
         The command line that the page names under "how to reproduce".
+    fresh
+        Measure again what was kept from earlier runs.
     progress
         Called with (share done, what) now and then.
 
     Returns
     -------
     dict
-        The content of `report.json`.
+        The content of `report.json`, see docs/report-schema.md.
 
     Raises
     ------
     InputError
-        If the folder cannot be written or a scene cannot be used; nothing that was there before is damaged.
+        If the folder cannot be written, a scene or an image cannot be used, or a method of one's own is at fault;
+        nothing that was there before is damaged.
+    Interrupted
+        At Ctrl-C, with what is kept.
     """
     _refuse_twins(scenes)
+    shown = dict(images or {})
+    sizes = {name: images_size(tuple(several)) for name, several in shown.items()}
     target = ensure_folder(folder)
-    start = time.monotonic()
-    found = []
-    for number, name in enumerate(scenes):
-
-        def tell(share: float, what: str, number: int = number, name: str = name) -> None:
-            if progress is not None:
-                progress((number + share) / len(scenes), f"{Path(name).stem}: {what}")
-
-        study = study_scene(name, effort, configurations=configurations, progress=tell)
-        found.append(_write_scene(target, study))
-    kernels = []
-    if effort.rays:
-        from validation.stability import stability
-
-        kernels = plain(stability(count=effort.rays))
-    mutations = None
-    if effort.mutations:
-        from validation.mutations import study_mutations
-
-        mutations = mutations_data(study_mutations())
-    data = {
-        "schema": SCHEMA,
-        "created": time.strftime("%Y-%m-%d %H:%M:%S %z"),
-        "command": command,
-        "seconds": round(time.monotonic() - start, 1),
-        "kept": 0,
-        "computed": sum(len(scene["methods"]) for scene in found),
-        "settings": asdict(effort),
-        "environment": describe_environment(),
-        "claims": claims(found),
-        "scenes": found,
-        "stability": kernels,
-        "mutations": mutations,
-        "published": None,
-    }
-    write_text(target / "report.json", json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
-    write_text(target / "report.html", render_page(data, target))
+    environment = describe_environment()
+    sweep_results()
+    results: list[Kept] = []
+    watch = _Watch(progress)
+    here = Path(__file__).parent
+    machine = {name: str(environment.get(name)) for name in ("processor", "threads", "variant", "llvm", "device")}
+    common = keeper(machine, more=[here / name for name in _MAKERS if (here / name).is_file()], fresh=fresh)
+    try:
+        with staged(target) as hidden:
+            found = []
+            for number, name in enumerate(scenes):
+                stem = Path(name).stem
+                tell = watch.within(_SCENES * number / len(scenes), _SCENES / len(scenes), f"{stem}: ")
+                study = open_study(name, effort, size=sizes.get(stem))
+                if number == 0:
+                    _try_own(study, configurations)
+                found.append(
+                    scene_report(
+                        study,
+                        configurations=configurations,
+                        images=shown.get(stem, ()),
+                        keeper=common,
+                        folder=hidden,
+                        results=results,
+                        tell=tell,
+                    )
+                )
+                watch.part("scenes")
+            stability = stability_part(effort, common, results, watch.within(_SCENES, 0.05))
+            watch.part("stability")
+            mutations = mutations_part(effort, common, results, watch.within(0.9, 0.02))
+            watch.part("mutations")
+            papers = published_part(effort, scenes, common, results, watch.within(0.92, 0.07))
+            watch.part("published")
+            data = {
+                "schema": SCHEMA,
+                "created": now(),
+                "command": command,
+                "seconds": watch.seconds(),
+                "parts": watch.parts,
+                **_counts(results),
+                "settings": plain(asdict(effort)),
+                "environment": environment,
+                "claims": claims(found),
+                "scenes": found,
+                "stability": stability,
+                "mutations": mutations,
+                "published": papers,
+            }
+            watch.within(0.99, 0.01)(0.0, "the page")
+            write_page(data, images=hidden, folder=hidden)
+    except KeyboardInterrupt as stop:
+        raise Interrupted(_kept_words(results, str(stop))) from None
+    watch.within(1.0, 0.0)(0.0, "done")
     return data
+
+
+def write_page(data: Mapping[str, Any], *, images: Path, folder: Path) -> None:
+    """Write report.json and the page that is made from it and from the files it names, which lie in `images`."""
+    text = json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    (folder / "report.json").write_text(text, encoding="utf-8", newline="\n")
+    (folder / "report.html").write_text(render_page(dict(data), images), encoding="utf-8", newline="\n")
+
+
+class _Watch:
+    """The time that the parts of a run take, and how far it is."""
+
+    def __init__(self, progress: Progress | None) -> None:
+        self._progress = progress
+        self._start = self._last = time.monotonic()
+        self.parts: dict[str, float] = {}  #: seconds of this run by part
+
+    def within(self, first: float, width: float, before: str = "") -> Progress:
+        """Return a function to tell the share done of a part that is a share of the whole."""
+
+        def tell(share: float, what: str) -> None:
+            if self._progress is not None:
+                self._progress(first + width * share, before + what)
+
+        return tell
+
+    def part(self, name: str) -> None:
+        """Note that a part is over."""
+        now = time.monotonic()
+        self.parts[name] = round(self.parts.get(name, 0.0) + now - self._last, 2)
+        self._last = now
+
+    def seconds(self) -> float:
+        """Return the seconds since the start."""
+        return round(time.monotonic() - self._start, 1)
+
+
+def _counts(results: Sequence[Kept]) -> dict[str, Any]:
+    """Return how many results were kept, how many computed, and when the first and the last of all."""
+    kept = sum(one.cached for one in results)
+    order = sorted((one.measured for one in results), key=lambda text: datetime.strptime(text, "%Y-%m-%d %H:%M:%S %z"))
+    measured = {"first": order[0], "last": order[-1]} if order else None
+    return {"kept": kept, "computed": len(results) - kept, "measured": measured}
+
+
+def _kept_words(results: Sequence[Kept], more: str) -> str:
+    words = f"{len(results)} results are kept" if results else "no result was finished yet"
+    return f"{words}{f' ({more})' if more else ''}; nothing was written; run the same command again to go on"
+
+
+def _try_own(study, configurations: Sequence[Configuration]) -> None:
+    """Render a small frame with every method of the user's own: what is at fault there is said before the work."""
+    from realtime.errors import InputError as MethodError
+    from realtime.frame import render_frame
+    from validation.bench import Measurement
+    from validation.configurations import prepared
+
+    for one in configurations:
+        if ":" in one.method:
+            try:
+                render_frame(prepared(study.probe, one))
+            except MethodError as error:
+                raise_own_error(Measurement(one, None, None, None, None, refused=str(error)))
 
 
 def _refuse_twins(scenes: Sequence[str]) -> None:
@@ -108,39 +208,3 @@ def _refuse_twins(scenes: Sequence[str]) -> None:
     for name, count in Counter(Path(scene).stem for scene in scenes).items():
         if count > 1:
             raise InputError(f"scenes: two scenes are called {name}; give each once, or rename one of the files")
-
-
-def _write_scene(target: Path, study: SceneStudy) -> dict[str, Any]:
-    """Write the images of one scene and return its data with the names of the files."""
-    data = scene_data(study)
-    folder = ensure_folder(target / study.loaded.name)
-    truth = study.truth
-    factor = exposure(truth.airlight + truth.surface)
-    data["exposure"] = factor
-    write_exr(folder / "reference.exr", stamped(layered_truth(study.loaded.name, truth)))
-    write_png(folder / "reference.png", tone_mapped(truth.airlight + truth.surface, factor))
-    write_png(folder / "reference-airlight.png", tone_mapped(truth.airlight, factor))
-    data["files"] = {
-        name: f"{study.loaded.name}/reference{suffix}"
-        for name, suffix in (("exr", ".exr"), ("picture", ".png"), ("airlight", "-airlight.png"))
-    }
-    for one, measured in zip(data["methods"], study.measurements):
-        if measured.frame is None:
-            continue
-        frame, stem = measured.frame, _file_stem(one["label"])
-        image = layered_frame(study.loaded.name, measured.configuration, frame)
-        if measured.flip is not None and measured.flip.error_map is not None:
-            grey = np.repeat(measured.flip.error_map[:, :, None], 3, axis=2)
-            image = replace(image, layers=dict(image.layers) | {"flip": grey})
-        write_exr(folder / f"{stem}.exr", stamped(image))
-        write_png(folder / f"{stem}.png", tone_mapped(np.asarray(frame.airlight) + frame.surface, factor))
-        write_png(folder / f"{stem}-error.png", error_map(truth.airlight, np.asarray(frame.airlight, dtype=np.float64)))
-        one["files"] = {
-            name: f"{study.loaded.name}/{stem}{suffix}"
-            for name, suffix in (("exr", ".exr"), ("picture", ".png"), ("error", "-error.png"))
-        }
-    return data
-
-
-def _file_stem(label: str) -> str:
-    return "".join(c if c.isalnum() else "-" for c in label).strip("-").replace("--", "-").lower()

@@ -21,6 +21,7 @@ from validation.truth import truth_image
 
 Progress = Callable[[int, int, str], None]
 
+_DOUBTFUL = 0.3  # of a configuration whose preparation took longer a small frame is tried before the large one [s]
 _LONG = 25.0  # a first frame, with the compilation of its kernels, that took longer is not timed at a larger size [s]
 
 
@@ -34,7 +35,8 @@ class Measurement:
     error: Metrics | None  #: of the airlight
     surface_error: Metrics | None
     flip: Flip | None = None  #: HDR-FLIP of all light, airlight and surface; None where it was not asked for
-    refused: str | None = None  #: why this configuration cannot render this scene
+    refused: str | None = None  #: why there is no frame
+    left_out: bool = False  #: whether `refused` is about time: the configuration could render this scene
     note: str | None = None  #: what its times are, where not those of the others
 
 
@@ -57,6 +59,9 @@ def measure(
     timed: Scene | None = None,
     seconds: float = 0.6,
     with_flip: bool = False,
+    slow: float | None = None,
+    limit: float | None = None,
+    probe: Callable[[], Scene] | None = None,
 ) -> Measurement:
     """Render, compare and time one configuration.
 
@@ -74,9 +79,20 @@ def measure(
         Time to spend on each timing.
     with_flip
         Also compute HDR-FLIP; where that cannot be had, it holds a note.
+    slow
+        See `validation.timing.time_frame` [s].
+    limit, probe
+        Leave the configuration out if a frame is expected to take longer than `limit` [s], by one of the same scene at
+        a small size, which `probe` returns. Asked for where preparing took long, and for a method of one's own.
     """
     try:
+        begin = time.perf_counter()
         renderer = prepared(scene, chosen)
+        doubtful = time.perf_counter() - begin > _DOUBTFUL or ":" in chosen.method
+        if limit is not None and probe is not None and doubtful:
+            reason = _too_long(probe(), chosen, scene, limit)
+            if reason:
+                return Measurement(chosen, None, None, None, None, refused=reason, left_out=True)
         begin = time.perf_counter()
         frame = render_frame(renderer)
         took = time.perf_counter() - begin
@@ -88,7 +104,7 @@ def measure(
         notes.append(f"timed at {scene.camera.width} x {scene.camera.height}: larger frames take minutes")
     if ":" in chosen.method and not isinstance(renderer.airlight, Frozen):
         notes.append("not frozen: its Python runs again for every frame")
-    times = time_frame(renderer if timed is None else prepared(timed, chosen), seconds=seconds)
+    times = time_frame(renderer if timed is None else prepared(timed, chosen), seconds=seconds, slow=slow)
     return Measurement(
         chosen,
         frame,
@@ -97,6 +113,23 @@ def measure(
         error_metrics(truth.surface, frame.surface) if scene.plan.surfaces else None,
         flip_hdr(truth.airlight + truth.surface, frame.airlight + frame.surface) if with_flip else None,
         note="; ".join(notes) or None,
+    )
+
+
+def _too_long(probe: Scene, chosen: Configuration, scene: Scene, limit: float) -> str | None:
+    """Say that a frame would take too long, by the second of the same scene at a small size; None if it would not."""
+    small, large = probe.camera, scene.camera
+    renderer = prepared(probe, chosen)
+    render_frame(renderer)
+    begin = time.perf_counter()
+    render_frame(renderer)
+    took = time.perf_counter() - begin
+    expected = took * (large.width * large.height) / (small.width * small.height)
+    if expected <= limit:
+        return None
+    return (
+        f"not measured: by one of {small.width} x {small.height} pixels that took {took:.2g} s, a frame of "
+        f"{large.width} x {large.height} would take {expected:.0f} s, more than the limit of {limit:g} s"
     )
 
 

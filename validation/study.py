@@ -1,15 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The study of one scene: its truth, how far that can be trusted, and every configuration measured against it."""
+"""The study of one scene: its truth, how far that can be trusted, and every configuration measured against it.
+
+Each part is a function of its own, so that a report can keep what it computed before and ask for the rest.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import cached_property
 
-from realtime.plan import Plan
-from realtime.scene import read_scene
+from realtime.scene import Scene, read_scene
+from reference.cache import scene_digest
 from reference.quadrature import TruthImage
 from validation.agreement import Agreement, agreements
-from validation.bench import Measurement, configurations_for, measure
-from validation.configurations import STANDARD, Configuration
+from validation.bench import Measurement, measure
+from validation.configurations import Configuration
+from validation.flip import flip_hdr
 from validation.load import LoadedScene, load_scene
 from validation.multiple import MultipleScattering, multiple_scattering_share
 from validation.truth import truth_image
@@ -17,6 +23,7 @@ from validation.truth import truth_image
 Progress = Callable[[float, str], None]
 
 _MULTIPLE = (64, 48)  # pixels of the image whose multiple scattering is measured: one share, of the whole image
+_PROBE = (64, 48)  # pixels of the frame that says whether one at full size would take too long
 
 
 @dataclass(frozen=True)
@@ -30,9 +37,15 @@ class Effort:
     margins: Mapping[str, float]  #: by estimator, of its relative bias
     seconds: float  #: spent on each timing
     samples: int = 64  #: a pixel in each batch of these comparisons
+    batches: int = 256  #: of these comparisons at most
+    patience: float = 60.0  #: seconds after which an estimator that has not decided is stopped
+    slow: float = 2.0  #: stages of a frame that takes longer are timed once [s]
+    limit: float = 60.0  #: a frame that would take longer is not measured, and the report says so [s]
     flip: bool = False  #: compute HDR-FLIP of every image
     mutations: bool = False  #: count how many faults of the physics the checks of the truth find
     rays: int = 0  #: generated rays on which kernels are tried, besides the certified ones; 0 leaves this out
+    papers: tuple[str, ...] = ()  #: whose tables are measured again: 'biri', 'billeter'
+    paper_kernels: tuple[str, ...] = ("exact",)  #: with these kernels
 
 
 def _margins(single_scatter: float, volpath: float) -> Mapping[str, float]:
@@ -46,17 +59,36 @@ EFFORTS: dict[str, Effort] = {
     effort.name: effort
     for effort in (
         Effort("quick", (320, 240), (320, 240), (80, 60), _margins(0.002, 0.02), 0.15, samples=16),
-        Effort("default", (400, 300), (800, 600), (120, 90), _margins(0.0005, 0.01), 0.4, flip=True, rays=20_000),
+        Effort(
+            "default",
+            (400, 300),
+            (400, 300),
+            (120, 90),
+            _margins(0.0005, 0.01),
+            0.2,
+            patience=20.0,
+            slow=0.8,
+            limit=20.0,
+            flip=True,
+            rays=20_000,
+            papers=("biri",),
+        ),
         Effort(
             "full",
             (800, 600),
             (800, 600),
             (160, 120),
             _margins(0.0005, 0.002),
-            1.0,
+            0.6,
+            batches=4096,
+            patience=120.0,
+            slow=2.0,
+            limit=40.0,
             flip=True,
             mutations=True,
             rays=100_000,
+            papers=("biri", "billeter"),
+            paper_kernels=("exact", "taylor"),
         ),
     )
 }
@@ -64,24 +96,48 @@ EFFORTS: dict[str, Effort] = {
 
 @dataclass(frozen=True)
 class SceneStudy:
-    """What a study of a scene found."""
+    """One scene with what is asked of it; what costs time is done when it is first asked for."""
 
-    loaded: LoadedScene
-    plan: Plan
-    truth: TruthImage
-    agreement: dict[str, Agreement]  #: by estimator and layer
-    multiple: MultipleScattering  #: what single scattering leaves out
-    measurements: tuple[Measurement, ...]
+    loaded: LoadedScene  #: at the size of the images
+    effort: Effort
+
+    @cached_property
+    def digest(self) -> str:
+        """Of the content of the scene."""
+        return scene_digest(self.loaded.scene)
+
+    @cached_property
+    def scene(self) -> Scene:
+        """The scene for the methods."""
+        return read_scene(self.loaded.scene)
+
+    @cached_property
+    def timed(self) -> Scene | None:
+        """The scene at the size of the frames that are timed; None where that is the size of the images."""
+        return None if self.effort.timed == self.effort.image else read_scene(self.at(self.effort.timed).scene)
+
+    @cached_property
+    def probe(self) -> Scene:
+        """The scene at a small size: what takes long there takes too long at the full one."""
+        return read_scene(self.at(_PROBE).scene)
+
+    @cached_property
+    def truth(self) -> TruthImage:
+        """The quadrature truth."""
+        return truth_image(self.loaded.scene)
+
+    @property
+    def name(self) -> str:
+        """The name of the scene: a built-in one, or the stem of its file."""
+        return self.loaded.name
+
+    def at(self, size: tuple[int, int]) -> LoadedScene:
+        """Return the scene at another size [pixels]."""
+        return load_scene(str(self.loaded.path or self.loaded.name), size)
 
 
-def study_scene(
-    name_or_path: str,
-    effort: Effort,
-    *,
-    configurations: Sequence[Configuration] = STANDARD,
-    progress: Progress | None = None,
-) -> SceneStudy:
-    """Study one scene.
+def open_study(name_or_path: str, effort: Effort, *, size: tuple[int, int] | None = None) -> SceneStudy:
+    """Load a scene to study.
 
     Parameters
     ----------
@@ -89,32 +145,63 @@ def study_scene(
         A built-in scene or the path of a Mitsuba XML file.
     effort
         How much work to do.
-    configurations
-        What to measure; variants that the scene has no use for are left out.
-    progress
-        Called with (share done, what) now and then.
+    size
+        Of the images in place of the effort's, for comparisons with images from elsewhere; frames are then timed at
+        this size too [pixels].
     """
-    tell = progress or (lambda share, what: None)
-    loaded = load_scene(name_or_path, effort.image)
-    tell(0.0, "the quadrature truth")
-    scene = read_scene(loaded.scene)
-    truth = truth_image(loaded.scene)
-    tell(0.1, "single-scatter")
-    small = load_scene(name_or_path, effort.checked)
-    agreed = agreements(
-        small.scene, effort.margins, samples=effort.samples, progress=lambda share, what: tell(0.1 + 0.35 * share, what)
+    if size is not None:
+        effort = replace(effort, image=size, timed=size)
+    return SceneStudy(load_scene(name_or_path, effort.image), effort)
+
+
+def check_truth(study: SceneStudy, *, progress: Progress | None = None) -> dict[str, Agreement]:
+    """Compare the truth with Monte Carlo estimators, at the effort's size, margins and patience."""
+    effort = study.effort
+    return agreements(
+        study.at(effort.checked).scene,
+        effort.margins,
+        batches=effort.batches,
+        samples=effort.samples,
+        seconds=effort.patience,
+        progress=progress,
     )
-    tell(0.45, "multiple scattering")
-    multiple = multiple_scattering_share(load_scene(name_or_path, _MULTIPLE).scene)
-    timed = None
-    if effort.timed != effort.image:
-        timed = read_scene(load_scene(name_or_path, effort.timed).scene)
-    chosen = configurations_for(scene.plan, configurations)
-    measurements = []
-    for number, one in enumerate(chosen):
-        tell(0.5 + 0.5 * number / len(chosen), one.label)
-        measurements.append(
-            measure(scene, one, truth=truth, timed=timed, seconds=effort.seconds, with_flip=effort.flip)
+
+
+def study_multiple(study: SceneStudy) -> MultipleScattering:
+    """Measure what single scattering leaves out of the image."""
+    return multiple_scattering_share(study.at(_MULTIPLE).scene)
+
+
+def study_configuration(study: SceneStudy, chosen: Configuration) -> Measurement:
+    """Measure a configuration against the truth, all but HDR-FLIP: see `with_flips`."""
+    effort = study.effort
+    return measure(
+        study.scene,
+        chosen,
+        truth=study.truth,
+        timed=study.timed,
+        seconds=effort.seconds,
+        slow=effort.slow,
+        limit=effort.limit,
+        probe=lambda: study.probe,
+    )
+
+
+def with_flips(study: SceneStudy, measured: Sequence[Measurement], *, workers: int) -> list[Measurement]:
+    """Return measurements with their HDR-FLIP, where the effort asks for it.
+
+    FLIP runs on one processor, in a process of its own: several at once take no longer than one. They must not run
+    while anything is timed.
+    """
+    if not study.effort.flip:
+        return list(measured)
+    truth = study.truth.airlight + study.truth.surface
+
+    def one(measurement: Measurement) -> Measurement:
+        frame = measurement.frame
+        return (
+            measurement if frame is None else replace(measurement, flip=flip_hdr(truth, frame.airlight + frame.surface))
         )
-    tell(1.0, "done")
-    return SceneStudy(loaded, scene.plan, truth, agreed, multiple, tuple(measurements))
+
+    with ThreadPoolExecutor(workers) as pool:
+        return list(pool.map(one, measured))

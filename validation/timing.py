@@ -18,7 +18,7 @@ from realtime.motion import Objects, read_objects, turned_objects
 from realtime.scene import Scene
 
 #: Of a frame that takes longer than this the stages are timed once, in one more frame: its spread matters little, and
-#: fifty such frames would take an hour [s].
+#: some thirty such frames, as others have, would take minutes [s].
 SLOW = 8.0
 
 
@@ -122,8 +122,19 @@ class FrameTimes:
     moved: Timing  #: a frame after the objects moved too: acceleration structure, adjacent planes, all of the above
 
 
-def time_frame(renderer: FrameRenderer, *, seconds: float = 0.6) -> FrameTimes:
-    """Time the stages of a frame, the whole frame, a frame after the light moved and one after the objects moved."""
+def time_frame(renderer: FrameRenderer, *, seconds: float = 0.6, slow: float | None = None) -> FrameTimes:
+    """Time the stages of a frame, the whole frame, a frame after the light moved and one after the objects moved.
+
+    Parameters
+    ----------
+    renderer
+        Of the frame.
+    seconds
+        Time to spend on each of the five.
+    slow
+        If the airlight takes longer than this, whole frames are run stage by stage and the five are added up from
+        them: up to five frames in place of some thirty; `SLOW` by default [s].
+    """
     import drjit as dr
 
     scene = renderer.scene
@@ -134,8 +145,9 @@ def time_frame(renderer: FrameRenderer, *, seconds: float = 0.6) -> FrameTimes:
     begin = time.perf_counter()
     dr.eval(run_airlight(renderer, prepared, distance, by_light))
     dr.sync_thread()
-    if time.perf_counter() - begin > SLOW:
-        return _slow_frame(renderer)
+    took = time.perf_counter() - begin
+    if took > (SLOW if slow is None else slow):
+        return _slow_frame(renderer, turns=int(np.clip(SLOW / took, 1, 5)))
 
     def surface():
         dr.eval(run_surface(renderer))
@@ -162,35 +174,39 @@ def time_frame(renderer: FrameRenderer, *, seconds: float = 0.6) -> FrameTimes:
     )
 
 
-def _slow_frame(renderer: FrameRenderer) -> FrameTimes:
-    """Time every stage once."""
+def _slow_frame(renderer: FrameRenderer, *, turns: int) -> FrameTimes:
+    """Time the stages of some frames."""
     import drjit as dr
 
     scene = renderer.scene
     objects = _objects(scene)
-    times = [time.perf_counter()]
+    steps = []
+    for _ in range(turns):
+        times = [time.perf_counter()]
 
-    def done() -> None:
-        dr.sync_thread()
-        times.append(time.perf_counter())
+        def done(times: list[float] = times) -> None:
+            dr.sync_thread()
+            times.append(time.perf_counter())
 
-    there = turned_objects(scene, objects, np.eye(3)) if objects else scene
-    done()
-    prepared = renderer.prepare(there)
-    done()
-    distance, by_light = run_surface(renderer)
-    dr.eval(distance, by_light)
-    done()
-    dr.eval(run_airlight(renderer, prepared, distance, by_light))
-    done()
-    move, prepare, surface, airlight = (float(1e3 * step) for step in np.diff(times))
+        there = turned_objects(scene, objects, np.eye(3)) if objects else scene
+        done()
+        prepared = renderer.prepare(there)
+        done()
+        distance, by_light = run_surface(renderer)
+        dr.eval(distance, by_light)
+        done()
+        dr.eval(run_airlight(renderer, prepared, distance, by_light))
+        done()
+        steps.append(1e3 * np.diff(times))
+    move, prepare, surface, airlight = np.array(steps).T
 
-    def once(milliseconds: float) -> Timing:
-        return Timing(milliseconds, milliseconds, milliseconds, 1)
+    def timing(milliseconds: NDArray[np.float64]) -> Timing:
+        low, median, high = (float(value) for value in np.percentile(milliseconds, [25, 50, 75]))
+        return Timing(median, low, high, turns)
 
     frame = surface + airlight
     rebuild = prepare + frame
-    return FrameTimes(once(frame), once(surface), once(airlight), once(rebuild), once(move + rebuild))
+    return FrameTimes(timing(frame), timing(surface), timing(airlight), timing(rebuild), timing(move + rebuild))
 
 
 def _objects(scene: Scene) -> Objects | None:

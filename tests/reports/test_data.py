@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from reports.data import measurement_data, plain
+from reports.data import measurement_data, plain, truth_data
 from validation.bench import Measurement
 from validation.configurations import Configuration
 
@@ -39,22 +39,11 @@ def test_refused_measurement_has_every_entry():
 
 
 @pytest.mark.parametrize("airlight", [np.zeros((2, 3, 3)), np.full((2, 3, 3), np.inf)])
-def test_scene_without_light_that_is_finite_has_no_numbers_rather_than_nan(airlight):
-    from types import SimpleNamespace
-
+def test_truth_without_light_that_is_finite_has_no_numbers_rather_than_nan(airlight):
     from reference.quadrature import TruthImage
-    from reports.data import scene_data
-    from tests.validation.test_bench import PLAN
-    from validation.load import LoadedScene
-    from validation.multiple import MultipleScattering, Share
-    from validation.study import SceneStudy
 
-    truth = TruthImage(
-        airlight, np.zeros_like(airlight), np.zeros_like(airlight), np.ones((2, 3)), np.ones((2, 3)), 0, float("nan")
-    )
-    multiple = MultipleScattering(Share(0.0, (0.0, 0.0)), Share(0.0, (0.0, 0.0)), 64, 32, 16)
-    study = SceneStudy(LoadedScene("x", SimpleNamespace(), "p", ""), PLAN, truth, {}, multiple, ())
-    data = scene_data(study)
+    black = np.zeros_like(airlight)
+    data = truth_data(TruthImage(airlight, black, black, np.ones((2, 3)), np.ones((2, 3)), 0, float("nan")))
     json.dumps(data, allow_nan=False)
-    assert data["size"] == [3, 2]
-    assert data["truth"]["relative_bound"] is None
+    assert data["relative_bound"] is None
+    assert data["missed"] is None

@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from reports.page_words import number as _number
-from reports.page_words import percent as _percent
-from reports.report import _file_stem, write_report
+from reports.load_report import SCHEMA_FILE, named_files
+from reports.page_words import number, percent
+from reports.progress import Interrupted
+from reports.report import write_report
+from reports.report_scene import file_stems
 from validation.configurations import STANDARD, Configuration
 from validation.study import EFFORTS, Effort
 
@@ -146,13 +148,13 @@ def test_every_number_of_the_data_is_on_the_page(written):
     (scene,) = written.data["scenes"]
     for one in scene["methods"][1:]:
         for name in ("frame", "airlight", "surface", "rebuild"):
-            assert f">{_number(one['times'][name]['median_ms'])}<" in page
+            assert f">{number(one['times'][name]['median_ms'])}<" in page
         for name in ("relative_rmse", "relative_bias", "p50", "p99"):
-            assert f">{_percent(one['error'][name])}<" in page
+            assert f">{percent(one['error'][name])}<" in page
     for agreed in scene["agreement"].values():
-        assert _percent(agreed["statistics"]["relative_bias"]) in page
-        assert _percent(agreed["uncorrected_bias"]) in page
-    assert _number(scene["truth"]["mean"], 5) in page
+        assert percent(agreed["statistics"]["relative_bias"]) in page
+        assert percent(agreed["uncorrected_bias"]) in page
+    assert number(scene["truth"]["mean"], 5) in page
     assert str(scene["truth"]["transitions"]) in page
     assert "my &lt;fog&gt;" in page
     assert "my <fog>" not in page
@@ -167,19 +169,64 @@ def test_progress_rises_to_one(written):
     assert all(what.startswith("my <fog>: ") for _, what in written.told)
 
 
-def test_second_report_replaces_the_first(written, variant):
-    before = json.loads((written.folder / "report.json").read_text())
-    again = write_report(
-        written.folder,
-        scenes=[before["scenes"][0]["path"]],
-        effort=TINY,
-        configurations=CHOSEN,
-        command="airlight report --tiny",
-    )
+def again(written, tmp_path, **options):
+    """The same report, into another folder."""
+    given = {"scenes": [written.data["scenes"][0]["path"]], "effort": TINY, "configurations": CHOSEN}
+    return write_report(tmp_path / "again", **(given | options))
+
+
+def test_a_second_report_is_kept_in_full(written, variant, tmp_path):
+    found = again(written, tmp_path)
+    assert (found["kept"], found["computed"]) == (3 + len(CHOSEN), 0)
+    assert found["measured"] == written.data["measured"]
+    (one,), (two,) = written.data["scenes"], found["scenes"]
+    assert [m["kept"] for m in two["methods"]] == [True] * len(CHOSEN)
+    for before, after in zip(one["methods"], two["methods"], strict=True):
+        assert before | {"kept": True} == after
+    assert {name: one[name] for name in one if name != "methods"} == {
+        name: two[name] for name in two if name != "methods"
+    }
+    for name in named_files(found):
+        assert (tmp_path / "again" / name).read_bytes() == (written.folder / name).read_bytes()
+
+
+def test_fresh_measures_again_and_finds_the_same_errors(written, variant, tmp_path):
+    found = again(written, tmp_path, fresh=True, configurations=CHOSEN[1:])
+    assert (found["kept"], found["computed"]) == (0, 3 + len(CHOSEN) - 1)
     # From the same truth and the same frames: all but the times.
-    for one, two in zip(before["scenes"][0]["methods"], again["scenes"][0]["methods"], strict=True):
+    for one, two in zip(written.data["scenes"][0]["methods"][1:], found["scenes"][0]["methods"], strict=True):
         assert one["error"] == two["error"]
-    assert before["scenes"][0]["agreement"] == again["scenes"][0]["agreement"]
+        assert one["times"] != two["times"]
+    assert written.data["scenes"][0]["agreement"] == found["scenes"][0]["agreement"]
+
+
+def test_a_changed_scene_is_measured_again(written, variant, tmp_path):
+    (tmp_path / "my <fog>.xml").write_text(SCENE.replace("0.31", "0.37"))
+    found = again(written, tmp_path, scenes=[str(tmp_path / "my <fog>.xml")], configurations=())
+    assert found["kept"] == 0
+
+
+def test_ctrl_c_leaves_nothing_half_written_and_says_what_is_kept(written, variant, tmp_path, monkeypatch):
+    def stopped(*args, **kwargs):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("reports.report_scene.study_configuration", stopped)
+    target = tmp_path / "again"
+    target.mkdir()
+    (target / "report.html").write_text("the one before")
+    changed = (Configuration("unshadowed", "exact"),)
+    with pytest.raises(Interrupted, match="3 results are kept; nothing was written; run the same command again"):
+        again(written, tmp_path, configurations=changed)
+    assert [path.name for path in target.rglob("*")] == ["report.html"]
+    assert (target / "report.html").read_text() == "the one before"
+
+
+def test_json_keeps_to_its_schema(written):
+    import jsonschema
+
+    schema = json.loads(SCHEMA_FILE.read_text(encoding="utf-8"))
+    jsonschema.Draft202012Validator.check_schema(schema)
+    jsonschema.validate(json.loads((written.folder / "report.json").read_text(encoding="utf-8")), schema)
 
 
 def test_folder_that_is_a_file_is_refused_before_the_work(variant, tmp_path):
@@ -206,10 +253,16 @@ def test_unknown_scene_leaves_no_page(variant, tmp_path):
 
 
 def test_files_of_configurations_do_not_collide():
-    stems = [_file_stem(one.label) for one in STANDARD]
+    stems = file_stems([one.label for one in STANDARD])
     assert len(set(stems)) == len(stems)
     assert all(re.fullmatch(r"[a-z0-9-]+", stem) for stem in stems)
     assert "reference" not in stems
+
+
+def test_labels_that_would_share_a_file_get_numbers():
+    # `x` has the picture x-error.png, which would be that of the label `x error` too.
+    stems = file_stems(["x", "X!", "x error", "reference", "\N{GREEK SMALL LETTER PHI}", "my.module:shafts (exact)"])
+    assert stems == ["x", "x-2", "x-error-2", "reference-2", "image", "my-module-shafts-exact"]
 
 
 def test_efforts_cost_more_and_promise_more_in_turn():

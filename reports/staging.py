@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A folder in which a report grows, out of sight until it is whole."""
+
+import os
+import shutil
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+_PREFIX = ".airlight-report-"
+_STALE = 86400.0  # seconds after which what a killed run left belongs to nobody
+
+
+@contextmanager
+def staged(target: Path) -> Iterator[Path]:
+    """Give a hidden folder in `target` whose files move there when the block ends without an exception.
+
+    Files of the same name are replaced one by one, the page and its data last; others stay. Any exception, a
+    KeyboardInterrupt too, leaves the target as it was.
+
+    Parameters
+    ----------
+    target
+        A folder that can be written.
+
+    Yields
+    ------
+    Path
+        Where to write.
+    """
+    for left in target.glob(f"{_PREFIX}*"):
+        if time.time() - left.stat().st_mtime > _STALE:
+            shutil.rmtree(left, ignore_errors=True)
+    hidden = Path(tempfile.mkdtemp(prefix=_PREFIX, dir=target))
+    try:
+        yield hidden
+        files = [path for path in hidden.rglob("*") if path.is_file()]
+        for path in sorted(files, key=lambda one: (one.parent == hidden, one)):
+            place = target / path.relative_to(hidden)
+            place.parent.mkdir(parents=True, exist_ok=True)
+            os.replace(path, place)
+    finally:
+        shutil.rmtree(hidden, ignore_errors=True)
