@@ -37,6 +37,7 @@ _STANDARD = frozenset((
     "tiles", "type", "version", "view",
 ))
 # fmt: on
+_COLOURS = {"r": "R", "g": "G", "b": "B", "red": "R", "green": "G", "blue": "B"}  # as other programs name channels
 _MAGIC = 20000630
 _KINDS = {0x200: "tiled", 0x800: "deep", 0x1000: "multi-part"}  # bits of the second word of a file
 
@@ -106,8 +107,9 @@ def write_exr(path: str | os.PathLike[str], image: Image) -> None:
 def read_exr(path: str | os.PathLike[str]) -> Image:
     """Read an image written by `write_exr` or by another program.
 
-    Plain `R`, `G`, `B` become the layer `total`, half floats float32, a lone `Y` three equal channels; the attribute
-    `airlight:read` says so, and names the channels left out (alpha, integers, incomplete layers).
+    Plain `R`, `G`, `B` (or `r`, `Red` and so on) become the layer `total`, half floats float32, a lone `Y` three equal
+    channels; the attribute `airlight:read` says so, and names the channels left out (alpha, integers, incomplete
+    layers).
 
     Raises
     ------
@@ -233,21 +235,23 @@ def _quiet() -> Iterator[None]:
 def _image(channels: dict[str, NDArray[Any]], header: dict[str, Any]) -> Image:
     """Group channels into layers; note what is changed or left out."""
     floats = {k: v.astype(np.float32, copy=False) for k, v in channels.items() if v.dtype.kind == "f"}
-    groups: dict[str, dict[str, NDArray[np.float32]]] = {}
-    for key, values in floats.items():
+    groups: dict[str, dict[str, str]] = {}
+    for key in floats:
         name, _, suffix = key.rpartition(".")
-        groups.setdefault(name, {})[suffix] = values
+        groups.setdefault(name, {})[suffix] = key
     layers, used, grey = {}, set(), []
     for name, group in groups.items():
-        if {"R", "G", "B"} <= group.keys():
-            suffixes = "RGB"
+        # Some programs write r, g, b or Red, Green, Blue.
+        colours = {_COLOURS[suffix.lower()]: key for suffix, key in group.items() if suffix.lower() in _COLOURS} | group
+        if {"R", "G", "B"} <= colours.keys():
+            keys = [colours[suffix] for suffix in "RGB"]
         elif "Y" in group and group.keys() <= {"Y", "A", "Z"}:
-            suffixes = "YYY"
+            keys = [group["Y"]] * 3
             grey.append(name or TOTAL)
         else:
             continue
-        layers[name or TOTAL] = np.stack([group[suffix] for suffix in suffixes], axis=-1)
-        used |= {f"{name}.{suffix}" if name else suffix for suffix in suffixes}
+        layers[name or TOTAL] = np.stack([floats[key] for key in keys], axis=-1)
+        used |= set(keys)
     # Beside an X it is a component of a vector.
     depth_key = next((key for key in ("depth.Z", "Z") if key in floats and key[:-1] + "X" not in floats), None)
     used |= {depth_key} if depth_key else set()

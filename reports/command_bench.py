@@ -45,6 +45,8 @@ def bench(
     from validation.scenes import SCENES
 
     names = methods.split(",") if methods else list(METHODS)
+    if any(":" in name for name in names):
+        activate()  # one's own module may want arrays when it is imported
     chosen = chosen_configurations([name.strip() for name in names])
     pixels = parse_size(size) if size else None
     activate()

@@ -44,6 +44,8 @@ def render(
     from validation.configurations import configuration, parse_settings
     from validation.load import load_scene, parse_size
 
+    if ":" in method:
+        activate()  # one's own module may want arrays when it is imported
     chosen = configuration(method, kernel, parse_settings(set_ or []))
     outputs = {"exr": output, "png": preview}
     _check_outputs(outputs, frames, animate)

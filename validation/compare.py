@@ -148,7 +148,7 @@ def compare_files(
         Also if a file is missing, broken or of a kind that is not read.
     """
     one, two = read_exr(reference), read_exr(test)
-    chosen = None if mask is None else _read_mask(mask)
+    chosen = None if mask is None else read_mask(mask)
     names = (str(reference), one), (str(test), two)
     return _compare(*names, name=layer, mask=chosen, margin=margin, extras=_Extras(all_metrics, flip, exposure))
 
@@ -198,8 +198,14 @@ def _compare(
     )
 
 
-def _read_mask(path: str | os.PathLike[str]) -> NDArray[np.bool_]:
-    """Return where the plain channels of an EXR file are not zero."""
+def read_mask(path: str | os.PathLike[str]) -> NDArray[np.bool_]:
+    """Return where the plain channels of an EXR file are not zero, (height, width).
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, has no plain channels or values that are not finite.
+    """
     values = np.asarray(image_layer(read_exr(path), TOTAL, path))
     if not np.isfinite(values).all():
         raise InputError(f"{path} as a mask has values that are not finite; wanted 0 for out and 1 for in")

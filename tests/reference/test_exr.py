@@ -149,6 +149,18 @@ def test_reads_plain_half_images_and_says_so(tmp_path):
     assert "channels left out: A" in image.attributes["airlight:read"]
 
 
+@pytest.mark.parametrize("names", ["rgb", ("Red", "Green", "Blue"), "RGB"])
+@pytest.mark.parametrize("prefix", ["", "Final."])
+def test_reads_colours_by_the_names_of_other_programs(tmp_path, names, prefix):
+    path = tmp_path / "other.exr"
+    pixels = [np.full((3, 4), value, dtype=np.float32) for value in (0.1, 0.2, 0.3, 1.0)]
+    channels = {prefix + name: values for name, values in zip([*names, "A"], pixels)}
+    write_raw(path, channels)
+    image = read_exr(path)
+    np.testing.assert_array_equal(image.layers[prefix[:-1] or "total"], np.stack(pixels[:3], axis=-1))
+    assert image.attributes["airlight:read"] == f"channels left out: {prefix}A"
+
+
 def test_reads_grey_images_and_says_so(tmp_path):
     grey = np.arange(12, dtype=np.float32).reshape(3, 4)
     write_raw(tmp_path / "a.exr", {"Y": grey, "airlight.Y": 2 * grey, "Z": 3 * grey})

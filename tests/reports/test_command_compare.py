@@ -4,7 +4,7 @@ import json
 import numpy as np
 import pytest
 
-from reference.exr import Image, write_exr
+from reference.exr import Image, read_exr, write_exr
 from reports.cli import run
 
 SHAPE = (16, 20, 3)
@@ -60,4 +60,40 @@ def test_everything_at_once(files, capsys):
 )
 def test_wrong_options_are_refused(files, capsys, arguments, message):
     assert run(["compare", *files[0], *arguments]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_a_file_is_compared_with_the_truth_of_a_scene(tmp_path, capsys):
+    """The truth at another size is written by `reference`, and found again; upside down it is suspected."""
+    path, turned = tmp_path / "open-fog.exr", tmp_path / "turned.exr"
+    assert run(["reference", "open-fog", "--size", "32x24", "-o", str(path)]) == 0
+    airlight = read_exr(path).layers["airlight"]
+    write_exr(turned, Image({"total": airlight[::-1]}))
+    capsys.readouterr()
+    assert run(["compare", "--scene", "open-fog", str(path), "--margin", "1e-6", "--json"]) == 0
+    values = json.loads(capsys.readouterr().out)
+    assert (values["scene"], values["size"], values["hints"]) == ("open-fog", [32, 24], [])
+    assert values["relative_rmse"] < 1e-6  # the file is float32
+    assert run(["compare", str(turned), "--scene", "open-fog", "--margin", "1e-6"]) == 0  # a turn moves no light
+    assert "suspect          the image is upside down" in capsys.readouterr().out
+    write_exr(turned, Image({"airlight": 1.01 * airlight}))
+    assert run(["compare", str(turned), "--scene", "open-fog", "--margin", "0.005"]) == 1
+    assert "failed           the relative bias, +0.01, is not within +-0.005" in capsys.readouterr().out
+    write_exr(turned, Image({"airlight": airlight[:20]}))
+    assert run(["compare", str(turned), "--scene", "open-fog"]) == 2
+    assert "open-fog is 800 x 600, 1.333 to 1" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["a.exr"], "got 1 file, wanted REFERENCE.exr TEST.exr; or name a scene by --scene"),
+        (["a.exr", "b.exr", "--scene", "open-fog"], "got 2 files, wanted one EXR file beside --scene"),
+        (["a.exr", "b.exr", "--pixel", "area"], "this option goes with --scene"),
+        (["a.exr", "--scene", "open-fog", "--pixel", "corner"], "--pixel corner; wanted 'centre' or 'area'"),
+        (["a.exr", "--scene", "open-fog"], "cannot read a.exr"),
+    ],
+)
+def test_wrong_files_are_refused(capsys, arguments, message):
+    assert run(["compare", *arguments]) == 2
     assert message in capsys.readouterr().err

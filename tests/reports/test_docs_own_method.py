@@ -3,6 +3,8 @@
 
 import json
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -84,3 +86,25 @@ def test_the_plain_example_returns_what_it_says(fog, variant):
     frame = render_frame(prepared(scene, configuration(f"{fog.parent / 'plain.py'}:uniform_fog")))
     wanted = 0.1 * (1 - np.exp(-0.31 * frame.distance[..., None])) * np.array([0.9, 0.8, 0.7])
     np.testing.assert_allclose(frame.airlight, wanted, rtol=1e-5)  # float32
+
+
+def test_arrays_may_be_made_when_the_module_is_imported(tmp_path):
+    """In a process of its own: here Mitsuba's variant is set before."""
+    (tmp_path / "early.py").write_text(
+        "import mitsuba as mi\nHALF = mi.Float(0.5)\n\n\ndef fog(view):\n    return HALF\n"
+    )
+    launcher = Path(__file__).parents[2] / "airlight.py"
+    command = [
+        sys.executable,
+        str(launcher),
+        "render",
+        "open-fog",
+        "--size",
+        "16x12",
+        "--method",
+        "early:fog",
+        "--json",
+    ]
+    ran = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300)
+    assert (ran.returncode, ran.stderr) == (0, "")
+    assert json.loads(ran.stdout)["method"] == "early:fog"
