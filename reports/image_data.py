@@ -3,8 +3,8 @@
 
 Each scene becomes one string of base64 that holds all of its packed planes, and an entry of the index that says where
 each lies and how it was coded (`reports.image_codes`). A page has a limit of bytes; each scene gets its share of what
-is left of it, and the finest of `LADDER` that fits: first the differences are coded more coarsely, then every second,
-third ... pixel is kept. What was done is in the index, and the page says so.
+is left of it, and the finest of `LADDER` that fits (`reports.image_kept`): first the differences are coded more
+coarsely, then every second, third ... pixel is kept. What was done is in the index, and the page says so.
 """
 
 import base64
@@ -62,42 +62,21 @@ class SceneImages:
 
 
 @dataclass(frozen=True)
-class _Images:
+class StoredImages:
     """The layers of one scene as they are in the files: of the reference, and of each method with its FLIP map."""
 
     reference: Mapping[str, Array]
     methods: Sequence[Mapping[str, Array]]
 
 
-def scene_images(scene: Mapping[str, Any], folder: Path, limit: int) -> SceneImages:
-    """Return the images of a scene, in no more than so many characters.
-
-    Parameters
-    ----------
-    scene
-        A scene of report.json.
-    folder
-        Where the files that it names lie.
-    limit
-        Of the length of `data`.
+def read_images(scene: Mapping[str, Any], folder: Path) -> StoredImages:
+    """Return the images of a scene of report.json from the files that it names.
 
     Raises
     ------
     InputError
-        If a file is missing or cannot be read, its size is not that of the reference, or nothing of `LADDER` fits.
+        If a file is missing or cannot be read, or its size is not that of the reference.
     """
-    images = _read_images(scene, folder)
-    for precision, stride in LADDER:
-        found = _packed_scene(scene, images, precision, stride)
-        if len(found.data) <= limit:
-            return found
-    raise InputError(
-        f"report: the images of {scene['name']} take {len(found.data) / 1e6:.1f} MB of the page even with one pixel in "
-        f"{stride} along both axes, wanted at most {limit / 1e6:.1f} MB; report fewer scenes or methods at once"
-    )
-
-
-def _read_images(scene: Mapping[str, Any], folder: Path) -> _Images:
     reference = _layers(folder / scene["files"]["exr"])
     files = [folder / one["files"]["exr"] for one in scene["methods"] if one["files"]]
     methods = [_layers(path) for path in files]  # one at a time: reading turns the standard error stream off
@@ -109,7 +88,7 @@ def _read_images(scene: Mapping[str, Any], folder: Path) -> _Images:
                     f"{path}: got {layer.shape[1]} x {layer.shape[0]} pixels, wanted the {size[1]} x {size[0]} of the "
                     "scene's reference; make the report again"
                 )
-    return _Images(reference, methods)
+    return StoredImages(reference, methods)
 
 
 def _layers(path: Path) -> dict[str, Array]:
@@ -119,7 +98,21 @@ def _layers(path: Path) -> dict[str, Array]:
     return {name: np.asarray(layers[name], dtype=np.float64) for name in wanted if name in layers}
 
 
-def _packed_scene(scene: Mapping[str, Any], images: _Images, precision: Precision, stride: int) -> SceneImages:
+def packed_scene(scene: Mapping[str, Any], images: StoredImages, precision: Precision, stride: int) -> SceneImages:
+    """Return the images of a scene for the page.
+
+    Parameters
+    ----------
+    scene
+        A scene of report.json.
+    images
+        From its files.
+    precision
+        Of the differences.
+    stride
+        One pixel in so many is kept, along both axes.
+    """
+
     def thin(layers: Mapping[str, Array]) -> dict[str, Array]:
         return {name: layer[::stride, ::stride] for name, layer in layers.items()}
 

@@ -15,7 +15,8 @@ from analytic.errors import InputError
 from reports.charts import speed_error_chart
 from reports.claims import verdict
 from reports.colour_maps import signed_colours, unsigned_colours
-from reports.image_data import SceneImages, scene_images
+from reports.image_data import SceneImages
+from reports.image_kept import scene_images
 from reports.page_published import BILLETER_PASSES, BILLETER_SIZE
 from reports.page_published import FILTERS as PUBLISHED_FILTERS
 from reports.page_words import FILTERS, KEYS, KINDS, MARKS, kept_words, precision_words, viewer_words

@@ -8,7 +8,8 @@ from analytic.errors import InputError
 from reference.exr import Image, read_exr, write_exr
 from reports.image_codes import DIFFERENCE_BITS, REFERENCE_BITS, Packed, decode_planes, difference_values
 from reports.image_codes import reference_values as values_of
-from reports.image_data import DARK, LADDER, relative_difference, scene_images
+from reports.image_data import DARK, LADDER, relative_difference
+from reports.image_kept import scene_images
 from tests.page_for_tests import HEIGHT, WIDTH, engine_image, images, report_data, write_files
 
 
@@ -130,3 +131,22 @@ def test_reference_that_is_not_finite_leaves_the_value_of_the_method():
     exact = np.array([[[np.nan, np.inf, 1.0]]])
     got = relative_difference(exact, exact, np.full((1, 1, 3), 2.0), 0.5)
     np.testing.assert_array_equal(got, [[[4.0, 4.0, 1.0]]])
+
+
+def test_packed_images_are_kept_until_a_file_changes(scene, own_cache, tmp_path):
+    write_files(tmp_path)
+    first = scene_images(scene, tmp_path, 10**8)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("reports.image_kept.packed_scene", None)
+        assert scene_images(scene, tmp_path, 10**8) == first  # not packed again
+    changed = images()["flat"]
+    write_exr(tmp_path / "s" / "flat.exr", Image(changed | {"airlight": 1.01 * changed["airlight"]}))
+    assert scene_images(scene, tmp_path, 10**8).data != first.data
+
+
+def test_damaged_entry_is_made_again(scene, tmp_path, own_cache):
+    write_files(tmp_path)
+    first = scene_images(scene, tmp_path, 10**8)
+    (kept,) = own_cache.glob("page-*.npz")
+    kept.write_bytes(kept.read_bytes()[:-9])
+    assert scene_images(scene, tmp_path, 10**8) == first
