@@ -126,7 +126,7 @@ def _sampled(
     )
 
 
-def _budget(given: dict[str, Any], target: str) -> "Budget":
+def _budget(given: dict[str, Any], target: Any) -> "Budget":
     from validation.budget import Budget
 
     named = [name for name, value in given.items() if value is not None]
@@ -139,4 +139,4 @@ def _budget(given: dict[str, Any], target: str) -> "Budget":
     if target not in ("pooled", "worst"):
         raise InputError(f"target: got {target!r}, wanted 'pooled' or 'worst'")
     usual = given["samples"] if named else USUAL_SAMPLES
-    return Budget(samples=usual, error=given["error"], seconds=given["seconds"], target=target)  # type: ignore[arg-type]
+    return Budget(samples=usual, error=given["error"], seconds=given["seconds"], target=target)
