@@ -19,7 +19,11 @@ FIGURES: dict[str, tuple[str, tuple[str, ...]]] = {
     "convergence": ("figure_convergence", ("quick", "progress")),
     "z-distribution": ("figure_z_distribution", ("quick", "progress")),
     "map-size": ("figure_map_size", ("quick", "progress")),
+    "stages": ("figure_stages", ("quick", "progress", "published")),
+    "published": ("figure_published", ("quick", "progress", "published")),
     "frame-speed": ("figure_frame_speed", ("report",)),
+    "strip": ("figure_strip", ("report", "scene", "methods")),
+    "methods-table": ("figure_methods_table", ("report",)),
 }
 
 
@@ -27,7 +31,10 @@ def figures(
     names: Annotated[
         list[str] | None, typer.Argument(help=f"Figures: {', '.join(FIGURES)}; all by default.", show_default=False)
     ] = None,
-    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the figures.")] = Path("airlight-figures"),
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="Folder of the figures; airlight-figures by default.", show_default=False),
+    ] = None,
     report: Annotated[
         Path | None,
         typer.Option(help="Folder of a report; airlight-report by default, if it is there.", show_default=False),
@@ -67,12 +74,16 @@ def figures(
         raise InputError(f"--column: got {column!r}, wanted one of {', '.join(WIDTHS)}" + nearest(column, WIDTHS))
     drawing: dict[str, Any] = {"column": column, "extra": tuple(style or ())}
     if source is not None:
-        _redraw(names, source, ensure_folder(source if output == Path("airlight-figures") else output), drawing)
+        _redraw(names, source, ensure_folder(output or source), drawing)
         return
     found = _report_folder(report)
     given = {"quick": quick, "rays": rays, "report": found, "scene": scene, "methods": methods}
     chosen = _chosen(names, found)
-    folder = ensure_folder(output)
+    if (scene or methods) and "strip" not in chosen:
+        raise InputError(
+            "--scene and --methods choose images of the figure strip, which is not asked for: leave them out"
+        )
+    folder = ensure_folder(output or "airlight-figures")
     with progress_bar("figures") as tell:
         for number, name in enumerate(chosen):
 
@@ -100,17 +111,23 @@ def _report_folder(report: Path | None) -> Path | None:
 
 
 def _chosen(names: list[str] | None, report: Path | None) -> list[str]:
-    """Return the figures to make; without a report those that can do without, if none were named."""
+    """Return the figures to make: those named, else all but those that need a report that is not there."""
     from analytic.errors import InputError
-    from reports.figure_report import FOLDER
+    from reports.figure_report import FOLDER, read_report
 
-    need = [name for name in names or FIGURES if "report" in FIGURES[name][1]]
-    if report is not None or not need:
-        return list(names or FIGURES)
+    need = [] if report else [name for name in names or FIGURES if "report" in FIGURES[name][1]]
     reason = f"made from a report: write one with `airlight report -o {FOLDER}`, or name its folder by --report"
     if names:
-        raise InputError(f"{', '.join(need)}: {reason}")
-    print(f"Left out: {', '.join(need)}: {reason}.")
+        if need:
+            raise InputError(f"{', '.join(need)}: {reason}")
+        return names
+    if need:
+        print(f"Left out: {', '.join(need)}: {reason}.")
+    if report is None or not read_report(report).get("published"):
+        need.append("published")
+        print(
+            "Left out: published: no report holds the tables of the papers; named, they are measured in some minutes."
+        )
     return [name for name in FIGURES if name not in need]
 
 

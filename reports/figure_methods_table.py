@@ -47,7 +47,7 @@ def compute(folder: Path | str, *, report: Path | str) -> None:
     target, data = ensure_folder(folder), read_report(report)
     rows = []
     for scene in data["scenes"]:
-        bound = scene["truth"].get("relative_bound")
+        bound = (scene["truth"] or {}).get("relative_bound")
         for one in scene["methods"]:
             error, times = one["error"] or {}, one["times"] or {}
             errors = [error.get(name) for name in ("relative_rmse", "relative_bias", "p99", "nonfinite")]

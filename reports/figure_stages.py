@@ -46,7 +46,7 @@ def compute(
     target = ensure_folder(folder)
     data = read_report(report) if report is not None else {}
     found, origin = (data.get("published") or {}).get("biri"), {}
-    if found:
+    if found and any(row["published"]["shares"] for row in found["rows"]):
         origin = report_origin(report or "", data)
     else:
         found = _measured(0.25 if quick else 1.0, progress)
