@@ -18,6 +18,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PARTS = {
     "modules": listed.modules,
     "names": listed.names,
+    "keys": listed.keys,
     "commands": listed.commands,
     "methods": listed.methods,
     "parameters": listed.parameters,
@@ -67,5 +68,6 @@ def _replace(app: Sphinx, docname: str, content: list[str]) -> None:
 
 def setup(app: Sphinx) -> dict[str, bool]:
     """Fill every page when it is read."""
+    listed.commands()
     app.connect("source-read", _replace)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -3,7 +3,9 @@
 
 import ast
 import inspect
+import re
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -36,19 +38,24 @@ def names() -> str:
 
     rows = []
     for name in sorted(airlight._API, key=str.lower):
-        module = airlight._API[name]
         value = getattr(airlight, name)
-        documented = inspect.isfunction(value) or inspect.isclass(value)
-        words = _sentence(value) if documented else f"see {{py:mod}}`{module}`"
-        role = f"{{py:obj}}`{name} <{module}.{name}>`"
+        if inspect.isfunction(value) or inspect.isclass(value):
+            role, words = f"{{py:obj}}`{name} <{value.__module__}.{name}>`", _sentence(value)
+        else:
+            role, words = f"`{name}`", f"see {{py:mod}}`{airlight._API[name]}`"
         rows.append((role, words))
     return table(("name", "what it is"), rows, 2)
 
 
 def _sentence(value: Any) -> str:
     """Return the first sentence of a docstring, as a cell of a table."""
-    first = " ".join((inspect.getdoc(value) or "").split("\n\n")[0].split())
-    return first.replace("|", "\\|")
+    return _cell((inspect.getdoc(value) or "").split("\n\n")[0])
+
+
+def _cell(words: str) -> str:
+    """Return words as a cell of a table, in which options are code: two hyphens would become a dash."""
+    flat = " ".join(words.split()).replace("|", "\\|")
+    return re.sub(r"(?<![\w`-])(--[a-z][a-z-]*)", r"`\1`", flat)
 
 
 def methods() -> str:
@@ -94,8 +101,20 @@ def kernels() -> str:
     return table(("kernel", "what it does", "size", "source"), rows, 4)
 
 
+def keys() -> str:
+    """Return the keys of a report's page."""
+    from reports.page_words import KEYS
+
+    rows = [(" ".join(f"`{one}`" for one in names), words) for names, words in KEYS]
+    return table(("key", "what it does"), rows, 2)
+
+
+@cache
 def commands() -> str:
-    """Return every sub-command with its arguments, options and words."""
+    """Return every sub-command with its arguments, options and words.
+
+    Call it before autodoc reads a function: that puts the words of the source in place of default values.
+    """
     import typer
 
     from reports.cli import app
@@ -109,20 +128,21 @@ def _command(name: str, command: Any) -> str:
     shown = [one for one in command.params if one.name not in ("help", "context")]
     arguments = [one for one in shown if one.param_type_name == "argument"]
     usage = " ".join(["airlight", name, *(_argument(one) for one in arguments), "[OPTIONS]"])
-    words += ["```text", usage, "```", "", inspect.cleandoc(command.help or ""), ""]
-    rows = [(_option(one), " ".join((one.help or "").split()).replace("|", "\\|"), _default(one)) for one in shown]
+    words += ["```text", usage, "```", "", _prose(inspect.cleandoc(command.help or "")), ""]
+    shown = [one for one in shown if not getattr(one, "hidden", False)]
+    rows = [(_option(one), _cell(one.help or ""), _default(one)) for one in shown]
     if rows:
         words.append(table(("", "what it does", "default"), rows, 3))
     return "\n".join(words)
 
 
+def _prose(words: str) -> str:
+    return "\n\n".join(_cell(paragraph) for paragraph in words.split("\n\n"))
+
+
 def _argument(one: Any) -> str:
-    name = one.make_metavar() if _takes_no_context(one.make_metavar) else one.name.upper()
-    return name
-
-
-def _takes_no_context(function: Any) -> bool:
-    return not inspect.signature(function).parameters
+    name = one.name.upper() + ("..." if one.nargs == -1 else "")
+    return name if one.required else f"[{name}]"
 
 
 def _option(one: Any) -> str:

@@ -1,9 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Formulas as MathML, which browsers draw without scripts, fonts or a network."""
 
+import re
+
 from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
+
+_FUNCTION = "<mi>(?:arctan|cosh|cos|sinh|sin|tanh|tan|log|max)</mi>"
+_SPACE = '<mspace width="0.1667em"/>'  # MathML knows no space about a function's name
 
 
 def markup(latex: str, *, block: bool) -> str:
@@ -24,9 +29,11 @@ def markup(latex: str, *, block: bool) -> str:
     from latex2mathml.converter import convert
 
     try:
-        return convert(latex, display="block" if block else "inline")
+        found = convert(latex, display="block" if block else "inline")
     except Exception as error:  # every slip in a formula has a class of its own
         raise ExtensionError(f"formula {latex!r}: {error or type(error).__name__}") from error
+    spaced = re.sub(rf"(?<=</mi>)(?={_FUNCTION})", _SPACE, found)
+    return re.sub(rf"({_FUNCTION})(?=<mi>)", rf"\1{_SPACE}", spaced)
 
 
 def _inline(writer, node: nodes.math) -> None:

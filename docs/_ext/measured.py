@@ -25,13 +25,14 @@ def provenance() -> str:
     report = data()["report"]
     versions = report["versions"]
     command = report["command"].split(" -o ")[0]
+    sizes = dict.fromkeys("{} x {}".format(*scene["size"]) for scene in data()["scenes"])
     return (
         f"*Measured {report['created'][:10]} on {report['processor']}, {report['threads']} threads, "
         f"{report['variant']}, mitsuba {versions['mitsuba']}, drjit {versions['drjit']}, by "
-        f"`{command}`. Times are medians of whole frames, kernels compiled before, "
-        " the geometry static; `rebuilt`: after the light moved. Errors are those of the airlight against the "
-        "`quadrature` truth: relative RMSE and bias over the mean, and quantiles of |test - ref| / max(ref, 0.001 "
-        "mean(ref)).*"
+        f"`{command}`. Images of {' and '.join(sizes)} pixels. Times are medians of whole frames, kernels "
+        "compiled before, the geometry static; `rebuilt`: after the light moved. Errors are those of the airlight "
+        "against the `quadrature` truth: relative RMSE and bias over the mean, and quantiles of |test - ref| / "
+        "max(ref, 0.001 mean(ref)).*"
     )
 
 
@@ -44,7 +45,6 @@ def method(name: str) -> str:
     """Return a method's picture with its error, and its costs and errors in every scene."""
     rows, notes = [], []
     for scene in data()["scenes"]:
-        size = "{} x {}".format(*scene["size"])
         for one in scene["methods"]:
             if one["method"] != name:
                 continue
@@ -52,7 +52,7 @@ def method(name: str) -> str:
             if one["refused"] or one["error"] is None:
                 notes.append(f"- {scene['name']}, {label}: {one['refused'] or one['note'] or 'not measured'}")
             else:
-                rows.append((f"{scene['name']}, {size}", label, *_numbers(one)))
+                rows.append((f"`{scene['name']}`", label, *_numbers(one)))
     if not rows:
         return f"The report at hand did not measure `{name}`."
     parts = [_pictures(name), table(_COLUMNS, rows, 2), provenance()]
