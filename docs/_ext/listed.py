@@ -28,7 +28,8 @@ def modules(package: str) -> str:
         if path.stem.startswith("command_") or not ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))):
             continue
         directive = f".. automodule:: {name}\n   :members:\n   :undoc-members:"
-        found.append(f"## `{name}`\n\n```{{eval-rst}}\n{directive}\n```\n")
+        heading = f"## `{name}`\n\n" if name != package else ""  # the page has that one
+        found.append(f"{heading}```{{eval-rst}}\n{directive}\n```\n")
     return "\n".join(found)
 
 
@@ -130,9 +131,9 @@ def _command(name: str, command: Any) -> str:
     usage = " ".join(["airlight", name, *(_argument(one) for one in arguments), "[OPTIONS]"])
     words += ["```text", usage, "```", "", _prose(inspect.cleandoc(command.help or "")), ""]
     shown = [one for one in shown if not getattr(one, "hidden", False)]
-    rows = [(_option(one), _cell(one.help or ""), _default(one)) for one in shown]
+    rows = [(_option(one), _cell(one.help or "") + _default(one)) for one in shown]
     if rows:
-        words.append(table(("", "what it does", "default"), rows, 3))
+        words.append(table(("", "what it does"), rows, 2))
     return "\n".join(words)
 
 
@@ -152,7 +153,8 @@ def _option(one: Any) -> str:
 
 
 def _default(one: Any) -> str:
+    """Return what is added to an option's words: its default, where it has one that says something."""
     value = one.default
     if value is None or callable(value) or value in (False, (), []) or one.required:
         return ""
-    return f"`{value}`" if value is not True else "yes"
+    return " On by default." if value is True else f" Default: `{value}`."
