@@ -7,7 +7,8 @@ For each point or spot light and each medium that a ray crosses, from x0 to x1,
 
 (T transmittance, V visibility) is estimated at distances that `reference.distance_sampling` draws. A surface at the end
 of the ray adds f cos I/r^2 V T T, which needs no sampling. Intensity I, phase function, material f and the coefficients
-of the media are the answers of Mitsuba's own plugins, and only they.
+of the media are the answers of Mitsuba's own plugins, and only they. A directional light has its irradiance E in the
+place of I/r^2; its distances come from `reference.plain_sampling`.
 
 In a scene whose extinction depends on the channel all channels use the same distances, with the density of the mixture
 over the channels, so that no channel's variance can become infinite.
@@ -25,6 +26,7 @@ from reference.boundary_walk import (
     transmittance,
 )
 from reference.distance_sampling import Span, closest_approach, cone_ends, mixture_of, sample_distance
+from reference.plain_sampling import sample_stretch
 from reference.scatter_task import Light, Task
 
 
@@ -144,6 +146,8 @@ def _airlight(task: Task, sampler, ray: Ray, stretch: _Stretch, active):
     active = active & (dr.max(stretch.sigma_s) > 0)
     for number in range(len(task.lights)):
         total += _light_airlight(task, number, sampler, ray, stretch, active)
+    for emitter in task.directional:
+        total += _directional_airlight(task, emitter, sampler, ray, stretch, active)
     return total
 
 
@@ -182,6 +186,44 @@ def _light_airlight(task: Task, number: int, sampler, ray: Ray, stretch: _Stretc
     return dr.while_loop(state, lambda index, *_: index < task.samples, add_sample, label="distances")[1]
 
 
+def _directional_airlight(task: Task, emitter, sampler, ray: Ray, stretch: _Stretch, active):
+    """Estimate what a light at infinity sends from a stretch of the ray, likewise."""
+    import drjit as dr
+    import mitsuba as mi
+
+    length = stretch.end - stretch.start
+    active = active & (length > 0) & (length < dr.inf)
+    length = dr.select(active, length, 1)
+    rates = [stretch.sigma_t[0]] if task.grey else list(stretch.sigma_t)
+    shift = sampler.next_1d(active)
+
+    def add_sample(index, total, sampler):
+        cell, width = _cell(index, shift, task.samples)
+        y, density = sample_stretch(cell + width * sampler.next_1d(active), length, rates)
+        point = _point_on(ray, ray.origin + ray.direction * (stretch.start + y))
+        arriving, from_light = _arriving(task, emitter, point, active)
+        phase, _ = stretch.medium.phase_function().eval_pdf(mi.PhaseFunctionContext(), point, -from_light, active)
+        value = stretch.sigma_s * phase * arriving * dr.exp(-stretch.depth - stretch.sigma_t * y) * (width / density)
+        return index + 1, total + dr.select(active, value, 0), sampler
+
+    state = (mi.UInt32(0), dr.zeros(mi.Spectrum, dr.width(active)), sampler)
+    return dr.while_loop(state, lambda index, *_: index < task.samples, add_sample, label="plain distances")[1]
+
+
+def _arriving(task: Task, emitter, interaction, active) -> tuple[Any, Any]:
+    """Return the irradiance of a directional light that reaches points, and its direction.
+
+    The emitter names a point of the light's way that lies beyond everything: the leg begins there, in clear air.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    sample, irradiance = emitter.sample_direction(interaction, mi.Point2f(0.5), active)
+    media = Leg(dr.zeros(mi.MediumPtr), dr.zeros(mi.Spectrum, dr.width(active)))
+    leg = transmittance(task.around, sample.p, -sample.d, sample.dist, media=media, active=active)
+    return irradiance * leg, -sample.d
+
+
 def _cell(number, shift, count: int) -> tuple[Any, Any]:
     """Return where a cell of the unit interval begins, and its width.
 
@@ -199,17 +241,25 @@ def _cell(number, shift, count: int) -> tuple[Any, Any]:
     return low / (count - 1), (high - low) / (count - 1)
 
 
-def _scattered(task: Task, number: int, ray: Ray, stretch: _Stretch, from_light, r, active):
-    """Return sigma_s p/(4 pi) I V T of points at a distance r from a light, in a unit direction from there."""
+def _point_on(ray: Ray, position):
+    """Return a point of a medium on camera rays."""
     import drjit as dr
     import mitsuba as mi
 
-    light = task.lights[number]
     point = dr.zeros(mi.MediumInteraction3f)
-    position = mi.Point3f(light.position)
-    point.p = position + from_light * r
+    point.p = position
     point.wi = -ray.direction
     point.sh_frame = mi.Frame3f(ray.direction)
+    return point
+
+
+def _scattered(task: Task, number: int, ray: Ray, stretch: _Stretch, from_light, r, active):
+    """Return sigma_s p/(4 pi) I V T of points at a distance r from a light, in a unit direction from there."""
+    import mitsuba as mi
+
+    light = task.lights[number]
+    position = mi.Point3f(light.position)
+    point = _point_on(ray, position + from_light * r)
     phase, _ = stretch.medium.phase_function().eval_pdf(mi.PhaseFunctionContext(), point, -from_light, active)
     intensity = _intensity(light, point, active)
     media = Leg(stretch.at_lights[number], stretch.sigma_t)
@@ -234,6 +284,10 @@ def _surface(task: Task, hit, stretch: _Stretch, active):
         leg = transmittance(task.around, position, from_light, r, media=media, active=active)
         sent = material * _intensity(light, hit, active) * leg / (r * r)
         total += dr.select(active, sent * dr.exp(-camera_leg), 0)
+    for emitter in task.directional:
+        arriving, from_light = _arriving(task, emitter, hit, active)
+        material = hit.bsdf().eval(mi.BSDFContext(), hit, hit.to_local(-from_light), active)
+        total += dr.select(active, material * arriving * dr.exp(-camera_leg), 0)
     return total
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from analytic.errors import InputError
 from reference.boundary_walk import Surroundings, coefficients, read_surroundings, require_homogeneous
+from reference.directional_light import endless_medium, is_directional
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,8 @@ class Task:
     """What is fixed while a scene is traced."""
 
     around: Surroundings
-    lights: tuple[Light, ...]
+    lights: tuple[Light, ...]  #: point and spot lights
+    directional: tuple[Any, ...]  #: Mitsuba's directional emitters
     samples: int  #: distances for each ray, light and medium
     grey: bool  #: no medium's extinction depends on the channel
 
@@ -54,13 +56,29 @@ def read_task(scene, medium, samples: int) -> Task:
     """
     import mitsuba as mi
 
-    lights = tuple(_read_light(emitter) for emitter in scene.emitters())
+    directional = tuple(one for one in scene.emitters() if is_directional(one))
+    lights = tuple(_read_light(emitter) for emitter in scene.emitters() if not is_directional(emitter))
     around, media = read_surroundings(scene)
+    if directional:
+        _refuse_endless(scene, medium, directional[0])
     if isinstance(medium, mi.Medium):
         require_homogeneous(medium)
         media = [*media, medium]
     known = medium is None or isinstance(medium, mi.Medium)
-    return Task(around, lights, samples, grey=known and all(_is_grey(one) for one in media))
+    return Task(around, lights, directional, samples, grey=known and all(_is_grey(one) for one in media))
+
+
+def _refuse_endless(scene, medium, emitter) -> None:
+    """Refuse a medium without bounds: what camera rays start in where nothing bounds it, or the exterior of a bound."""
+    import mitsuba as mi
+
+    inside = [shape.interior_medium() for shape in scene.shapes()]
+    around = [shape.exterior_medium() for shape in scene.shapes()]
+    if isinstance(medium, mi.Medium) and medium not in inside:
+        around.append(medium)
+    for one in around:
+        if one is not None and max(float(np.ravel(c)[0]) for c in coefficients(mi.MediumPtr(one), mi.Bool(True))[1]):
+            raise InputError(f"single-scatter: {endless_medium(emitter)}")
 
 
 def _is_grey(medium) -> bool:
@@ -76,7 +94,9 @@ def _read_light(emitter) -> Light:
 
     name = emitter.class_name()
     if name not in ("PointLight", "SpotLight"):
-        raise InputError(f"single-scatter: the scene has an emitter of class {name}; wanted 'point' or 'spot' only")
+        raise InputError(
+            f"single-scatter: the scene has an emitter of class {name}; wanted 'point', 'spot' or 'directional' only"
+        )
     sample, _ = emitter.sample_direction(dr.zeros(mi.Interaction3f), mi.Point2f(0.5))
     position = mi.Point3d(sample.p)
     if name == "PointLight":

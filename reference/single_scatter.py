@@ -48,7 +48,7 @@ def _integrator_class(variant: str):
     import mitsuba as mi
 
     class SingleScatterIntegrator(mi.SamplingIntegrator):
-        """Exactly one scattering of point and spot lights (see `reference.single_scatter`)."""
+        """Exactly one scattering of point, spot and directional lights (see `reference.single_scatter`)."""
 
         def __init__(self, properties):
             super().__init__(properties)

