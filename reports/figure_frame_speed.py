@@ -31,6 +31,8 @@ _HEADER = (
 def compute(folder: Path | str, *, report: Path | str) -> None:
     """Write `frame-speed.csv` into a folder: times [ms] and errors of every method in every scene of a report.
 
+    `frame-speed-labels.csv` names all methods of the report in its order.
+
     Parameters
     ----------
     folder
@@ -49,6 +51,9 @@ def compute(folder: Path | str, *, report: Path | str) -> None:
             errors = (error["relative_rmse"], error["relative_bias"], error["p99"], error["nonfinite"])
             rows.append((scene["name"], *scene["size"], one["label"], one["method"], *times, *errors))
     write_csv(target / f"{NAME}.csv", _HEADER, rows)
+    # All labels, those without a point too: variants are numbered in the report's order, as on its page.
+    labels = dict.fromkeys((one["method"], one["label"]) for scene in data["scenes"] for one in scene["methods"])
+    write_csv(target / f"{NAME}-labels.csv", ("method", "label"), labels)
     write_provenance(target, NAME, **report_origin(report, data), timed=data["settings"].get("timed"))
 
 
@@ -61,7 +66,8 @@ def _draw(folder: Path, column: str):
     rows = read_csv(folder / f"{NAME}.csv", NAME)
     scenes = list(dict.fromkeys(row["scene"] for row in rows))
     by_scene = {scene: [row for row in rows if row["scene"] == scene] for scene in scenes}
-    styles = report_styles([{"methods": by_scene[scene]} for scene in scenes])
+    known = report_styles([{"methods": read_csv(folder / f"{NAME}-labels.csv", NAME)}])
+    styles = {label: style for label, style in known.items() if label in {row["label"] for row in rows}}
     width = WIDTHS[column]
     across = min(len(scenes), 3 if column == "double" else 1)
     down = -(-len(scenes) // across)
