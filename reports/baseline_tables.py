@@ -18,8 +18,7 @@ def print_moves(found: Mapping[str, Baseline], moves: Mapping[str, Sequence[Move
     if rows:
         print_words(rows, ("scene", "configuration", "what", "baseline", "now", "allowed"))
     for name, data in found.items():
-        left = f", {len(data['left_out'])} left out" if data["left_out"] else ""
-        print(f"{name}: {len(data['configurations'])} configurations{left}, {len(moves[name])} moved")
+        print(f"{name}: {len(data['configurations'])} configurations, {len(moves[name])} moved")
     for name in stray:
         print(f"{name}: a baseline without its scene: remove the file")
 

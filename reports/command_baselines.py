@@ -50,7 +50,7 @@ def baselines(
             def scene_progress(share: float, what: str, number: int = number) -> None:
                 tell((number + share) / len(names), what)
 
-            found[name] = measure_baseline(name, times=times, progress=scene_progress)
+            found[name] = measure_baseline(name, kept=kept[name], times=times, progress=scene_progress)
     moves = {name: compare_baseline(kept[name], found[name]) for name in names}
     stray = [] if scenes else stray_baselines(SCENES)
     if update:

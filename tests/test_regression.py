@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Is every method as accurate as it was? Every standard configuration of every scene against its baseline.
+
+`airlight baselines` prints the same as a table; `airlight baselines --update --because ...` writes what moved.
+"""
+
+import pytest
+
+from validation.baseline_runs import measure_baseline
+from validation.baselines import compare_baseline, read_baseline
+from validation.scenes import SCENES
+
+QUICK = ("open-fog", "sphere-spot")  # every method and every kernel; the other scenes take longer
+
+
+@pytest.mark.parametrize(
+    "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in SCENES]
+)
+def test_errors_are_those_of_the_baseline(name, variant):
+    # Times are left to the command: a test may share the machine with others.
+    moves = compare_baseline(read_baseline(name), measure_baseline(name, times=False))
+    assert moves == [], "\n".join(str(move) for move in moves)
+
+
+def test_a_fault_of_a_thousandth_is_found(monkeypatch, variant):
+    import validation.configurations
+    from validation import baseline_runs
+    from validation.baseline_runs import YARDSTICK
+
+    find = validation.configurations.find_kernel
+    monkeypatch.setattr(
+        validation.configurations, "find_kernel", lambda name: lambda *args, **known: 1.001 * find(name)(*args, **known)
+    )
+    monkeypatch.setattr(baseline_runs, "baseline_configurations", lambda name, plan: (YARDSTICK,))
+    moves = compare_baseline(read_baseline("open-fog"), measure_baseline("open-fog", times=False))
+    moved = {one.what: one for one in moves if one.label == YARDSTICK.label}
+    assert moved["airlight relative_bias"].new == pytest.approx(1e-3, rel=1e-3)
+    assert {"airlight relative_rmse", "airlight p50", "airlight p99", "airlight max"} <= set(moved)
+    # What was not measured is missed too.
+    assert {one.what for one in moves if one.label != YARDSTICK.label} == {"a baseline without its configuration"}
