@@ -76,7 +76,8 @@ def words(value: Any) -> str:
     if isinstance(value, Mapping):
         return ", ".join(f"{key} {words(one)}" for key, one in value.items())
     if isinstance(value, list | tuple):
-        return ", ".join(words(one) for one in value)
+        size = len(value) == 2 and all(isinstance(one, int) for one in value)  # width and height
+        return (" \N{MULTIPLICATION SIGN} " if size else ", ").join(words(one) for one in value) or DASH
     return str(value)
 
 

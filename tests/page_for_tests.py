@@ -63,6 +63,22 @@ class Page(HTMLParser):
         return " ".join(" ".join(self.words).split())
 
 
+def widths(table):
+    """The columns of each row of a table."""
+    found = []
+    for tag, attributes in table:
+        if tag == "tr":
+            found.append(0)
+        if tag in ("td", "th"):
+            found[-1] += int(attributes.get("colspan", 1))
+    return found
+
+
+def table_of(page, caption):
+    """The table whose caption begins so."""
+    return page.tables[next(place for place, words in enumerate(page.captions) if words.startswith(caption))]
+
+
 def timing(median):
     return {"median_ms": median, "low_ms": 0.9 * median, "high_ms": 1.2 * median, "repetitions": 7}
 

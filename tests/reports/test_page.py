@@ -9,7 +9,18 @@ from reports.charts import speed_error_chart
 from reports.page import SCRIPTS, render_page
 from reports.page_words import DASH, first_sentence, interval, kept_words, number, percent, rate, words
 from reports.pictures import png_bytes
-from tests.page_for_tests import DATA, Page, engine_image, method, refused, report_data, timing, write_files
+from tests.page_for_tests import (
+    DATA,
+    Page,
+    engine_image,
+    method,
+    refused,
+    report_data,
+    table_of,
+    timing,
+    widths,
+    write_files,
+)
 
 
 @pytest.fixture
@@ -84,22 +95,6 @@ def test_tables_have_headers_and_captions(page):
         rows = sum(tag == "tr" for tag, _ in table)
         # Every row begins with a header of its own but for the row of column headers.
         assert sum(attributes["scope"] == "row" for attributes in headers) >= rows - 1
-
-
-def widths(table):
-    """The columns of each row of a table."""
-    found = []
-    for tag, attributes in table:
-        if tag == "tr":
-            found.append(0)
-        if tag in ("td", "th"):
-            found[-1] += int(attributes.get("colspan", 1))
-    return found
-
-
-def table_of(page, caption):
-    """The table whose caption begins so."""
-    return page.tables[next(place for place, words in enumerate(page.captions) if words.startswith(caption))]
 
 
 def test_rows_of_the_methods_are_as_wide_as_their_headers(data, folder):
@@ -299,7 +294,8 @@ def test_percent_interval_rate_and_words():
     assert percent(0.01234) == "1.23 %"
     assert interval([-0.001, 0.0123456]) == "-0.100 … +1.235 %"
     assert (rate(3.21), rate(321)) == ("312", "3.1")
-    assert words({"a": [1, 2], "b": True}) == "a 1, 2, b yes"
+    assert words({"a": [1, 2, 3], "b": True, "c": []}) == f"a 1, 2, 3, b yes, c {DASH}"
+    assert words([320, 240]) == "320 \N{MULTIPLICATION SIGN} 240"
     assert first_sentence("One. Two.") == first_sentence("One.") == "One"
 
 
@@ -307,6 +303,15 @@ def test_page_says_what_came_from_earlier_runs(data, folder):
     assert kept_words(data) == ""
     data["kept"] = 7
     assert "7 of 16 results were kept from earlier runs" in render(data, folder).text
+
+
+def test_page_says_where_the_time_went_and_when_it_was_measured(data, folder):
+    data["measured"] = {"first": "2026-11-20 01:02:03 +0000", "last": "2026-11-21 04:05:06 +0000"}
+    data["scenes"][0]["seconds"] = {"truth": 0.9, "methods": 16.2}
+    page = render(data, folder)
+    assert "between 2026-11-20 01:02:03 +0000 and 2026-11-21 04:05:06 +0000" in page.text
+    assert set(widths(table_of(page, "Where the time went"))) == {3}
+    assert "16.2" in page.text
 
 
 def test_same_picture_gives_the_same_bytes():
