@@ -63,15 +63,17 @@ def build_docs(source: Path, output: Path) -> str:
         complaints = Path(kept) / "complaints.txt"
         command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "--no-color", "-b", "html"]
         command += ["-d", str(Path(kept) / "doctrees"), str(source), str(output)]
-        with complaints.open("w", encoding="utf-8") as stream:
-            process = subprocess.Popen(
+        with (
+            complaints.open("w", encoding="utf-8") as stream,
+            subprocess.Popen(
                 command, stdout=subprocess.PIPE, stderr=stream, text=True, encoding="utf-8", errors="replace"
-            )
+            ) as process,
+        ):
             assert process.stdout is not None
             for line in process.stdout:
                 found = _PROGRESS.search(line)
                 if found:
                     begin, length = _PARTS[found[1]]
                     tell(begin + length * int(found[2]) / 100, found[3])
-            status = process.wait()
+        status = process.returncode
         return complaints.read_text(encoding="utf-8").strip() or f"Sphinx ended with {status}" if status else ""

@@ -32,6 +32,8 @@ def markup(latex: str, *, block: bool) -> str:
         found = convert(latex, display="block" if block else "inline")
     except Exception as error:  # every slip in a formula has a class of its own
         raise ExtensionError(f"formula {latex!r}: {error or type(error).__name__}") from error
+    if "\\" in found:  # an unknown command is handed on as a name
+        raise ExtensionError(f"formula {latex!r}: unknown command, found in {found!r}")
     spaced = re.sub(rf"(?<=</mi>)(?={_FUNCTION})", _SPACE, found)
     return re.sub(rf"({_FUNCTION})(?=<mi>)", rf"\1{_SPACE}", spaced)
 
