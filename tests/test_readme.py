@@ -94,7 +94,10 @@ def commands() -> dict:
     from reports.cli import app
 
     found = typer.main.get_group(app).commands
-    return {name: {option for one in command.params for option in one.opts} for name, command in found.items()}
+    return {
+        name: {option for one in command.params for option in [*one.opts, *one.secondary_opts]}
+        for name, command in found.items()
+    }
 
 
 def named_commands(text: str) -> list[tuple[str, list[str]]]:
