@@ -174,7 +174,7 @@ class Viewer {
   describe(bad) {
     const {index} = this.images, {state, layer} = this;
     const label = this.labels[state.method];
-    const holes = (count) => count ? `; ${count} pixels not finite (hatched in magenta)` : "";
+    const holes = (count) => count ? `; ${count} pixel${count > 1 ? "s" : ""} not finite (hatched in magenta)` : "";
     const other = layer === state.layer ? "" : ` (it has no ${state.layer}: its ${layer} is shown)`;
     const map = this.mode === "difference" ? `${MAPS.difference.words}, ${state.gain} times` : MAPS[this.mode].words;
     const missing = this.mode === state.mode ? "" : " (no HDR-FLIP here)";

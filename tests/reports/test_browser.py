@@ -129,7 +129,7 @@ def test_error_map_is_that_of_the_pictures(page, folder):
     # A step of the map where the coded difference falls on the other side of a bound.
     assert np.abs(got - wanted)[~hole].max() <= 6
     assert tuple(got[5, 7]) in {(255, 0, 255), (122, 0, 122)}
-    assert "1 pixels not finite" in viewer(page).locator(".error .what").inner_text()
+    assert "1 pixel not finite" in viewer(page).locator(".error .what").inner_text()
 
 
 def test_probe_reads_all_images_at_once(page, folder):
