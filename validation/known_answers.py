@@ -22,6 +22,7 @@ With L = albedo sigma_t / (4 pi) int I p exp(-sigma_t (x + r)) / r^2 dx, summed 
 - An absorbing medium has no airlight and dims a surface by exp(-sigma_t path); the path through a ball of radius R is a
   chord of length 2 sqrt(R^2 - b^2), b the distance of its centre from the ray.
 - A light in a closed box gives exactly nothing outside.
+- What directional lights obey is in `validation.directional_answers`.
 
 Scale factors are powers of two and coordinates multiples of 1/1024, so that float32 scenes obey the laws exactly, too.
 Monte Carlo estimators are held against them with the same random numbers on both sides.
@@ -29,7 +30,7 @@ Monte Carlo estimators are held against them with the same random numbers on bot
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -38,33 +39,12 @@ from numpy.typing import NDArray
 from analytic.geometry import foot_and_height
 from reference.quadrature import quadrature_image, ray_values
 from reference.scene import TruthScene, read_truth
-from reference.single_scatter import single_scatter_batch
-from reference.volpath import volpath_batch
+from validation.directional_answers import directional_answers
 from validation.fog_model import SIZE, FogBall, FogBox, FogLight, FogScene, FogScreen, Matrix, load_fog, mitsuba_dict
 from validation.fog_scenes import fog_scenes
+from validation.known_answer import ESTIMATORS, EXACT, FLOAT32, KnownAnswer, largest_difference, layers
 
 Array = NDArray[np.float64]
-
-ESTIMATORS = ("quadrature", "single-scatter", "volpath")
-_SAMPLES = 32
-_EXACT = (1e-10, "tolerance of the integrals")
-_FLOAT32 = (2e-5, "float32 arithmetic, the same random numbers on both sides")
-
-
-@dataclass(frozen=True)
-class KnownAnswer:
-    """How far an estimator is from an answer that is known."""
-
-    name: str
-    estimator: str
-    measured: float  #: largest difference, relative to the largest pixel unless the reason says otherwise
-    bound: float
-    reason: str  #: why the bound is what it is
-
-    @property
-    def passed(self) -> bool:
-        """Whether the difference is within the bound."""
-        return self.measured <= self.bound
 
 
 def base_scene() -> FogScene:
@@ -79,7 +59,8 @@ def known_answers() -> list[KnownAnswer]:
     found = [law(estimator) for law in (albedo_linear, intensity_linear, units, enclosed) for estimator in ESTIMATORS]
     quadrature = (lights_add_up, turned, moved, mirrored, vacuum_limit, vacuum, fluence, absorbing_medium)
     found += [law() for law in quadrature]
-    return found + [absorbing_ball(estimator) for estimator in ("quadrature", "single-scatter")]
+    found += [absorbing_ball(estimator) for estimator in ("quadrature", "single-scatter")]
+    return found + directional_answers()
 
 
 def albedo_linear(estimator: str = "quadrature") -> KnownAnswer:
@@ -110,7 +91,7 @@ def lights_add_up() -> KnownAnswer:
     """Add the images of one light each."""
     scene = base_scene()
     parts = sum(_airlight(replace(scene, lights=(light,)), "quadrature") for light in scene.lights)
-    difference = _difference(_airlight(scene, "quadrature"), np.asarray(parts))
+    difference = largest_difference(_airlight(scene, "quadrature"), np.asarray(parts))
     return KnownAnswer(
         "airlight adds up over lights", "quadrature", difference, 1e-13, "the same sums in another order"
     )
@@ -142,8 +123,8 @@ def mirrored() -> KnownAnswer:
         lights=tuple(replace(one, matrix=one.matrix and _handed(one.matrix)) for one in image.lights),
     )
     expected = _airlight(scene, "quadrature").reshape(SIZE, SIZE, 3)[:, ::-1]
-    difference = _difference(_airlight(image, "quadrature"), expected.reshape(-1, 3))
-    return KnownAnswer("a mirrored scene has a mirrored image", "quadrature", difference, *_EXACT)
+    difference = largest_difference(_airlight(image, "quadrature"), expected.reshape(-1, 3))
+    return KnownAnswer("a mirrored scene has a mirrored image", "quadrature", difference, *EXACT)
 
 
 def vacuum_limit() -> KnownAnswer:
@@ -230,12 +211,12 @@ def absorbing_ball(estimator: str = "quadrature") -> KnownAnswer:
     images = []
     for one in (empty, ball):
         truth = read_truth(load_fog(clear | {"ball": one}))
-        images.append(_layers(truth, estimator)[1])
+        images.append(layers(truth, estimator)[1])
     towards = centre - truth.origin
     closest = np.linalg.norm(np.cross(towards, truth.direction), axis=1)
     chord = 2 * np.sqrt(np.maximum(radius**2 - closest**2, 0))
     difference = float(np.max(np.abs(images[1] / images[0] / np.exp(-sigma_t * chord)[:, None] - 1)))
-    bound, reason = (1e-6, "relative: float32 ball") if estimator == "quadrature" else _FLOAT32
+    bound, reason = (1e-6, "relative: float32 ball") if estimator == "quadrature" else FLOAT32
     return KnownAnswer("an absorbing ball", estimator, difference, bound, reason)
 
 
@@ -244,30 +225,17 @@ def enclosed(estimator: str = "quadrature") -> KnownAnswer:
     light = FogLight((0.125, 0.25, 1.0), (8.0, 8.0, 8.0))
     box = FogBox((0.125, 0.25, 1.0), ((0.25, 0.0625, 0.0), (-0.0625, 0.25, 0.03125), (0.0, 0.0, 0.25)))
     scene = replace(base_scene(), lights=(light,), occluders=(*base_scene().occluders[:1], box))
-    most = np.abs(_layers(read_truth(load_fog(_white(mitsuba_dict(scene)))), estimator)).max()
+    most = np.abs(layers(read_truth(load_fog(_white(mitsuba_dict(scene)))), estimator)).max()
     return KnownAnswer("a light in a closed box", estimator, float(most), 0.0, "exactly zero, surfaces included")
 
 
 def _compared(name: str, estimator: str, one: FogScene, other: FogScene, *, factor: float = 1.0) -> KnownAnswer:
-    difference = _difference(_airlight(other, estimator), factor * _airlight(one, estimator))
-    return KnownAnswer(name, estimator, difference, *(_EXACT if estimator == "quadrature" else _FLOAT32))
+    difference = largest_difference(_airlight(other, estimator), factor * _airlight(one, estimator))
+    return KnownAnswer(name, estimator, difference, *(EXACT if estimator == "quadrature" else FLOAT32))
 
 
 def _airlight(scene: FogScene, estimator: str) -> Array:
-    return _layers(read_truth(load_fog(mitsuba_dict(scene))), estimator)[0]
-
-
-def _layers(truth: TruthScene, estimator: str) -> Array:
-    """Return airlight and surface by an estimator, (2, pixels, 3)."""
-    if estimator == "quadrature":
-        image = quadrature_image(truth)
-        return np.stack([image.airlight, image.surface]).reshape(2, -1, 3)
-    batch = single_scatter_batch if estimator == "single-scatter" else volpath_batch
-    return batch(truth, 1, _SAMPLES).mean
-
-
-def _difference(found: Array, expected: Array) -> float:
-    return float(np.abs(found - expected).max() / np.abs(expected).max())
+    return layers(read_truth(load_fog(mitsuba_dict(scene))), estimator)[0]
 
 
 def _mapped(scene: FogScene, matrix: Array) -> FogScene:
