@@ -92,6 +92,7 @@ def kept_of_report(report: dict[str, Any]) -> dict[str, Any]:
             "created": report["created"],
             "command": report["command"],
             "effort": report["settings"]["name"],
+            "timed": report["settings"]["timed"],
             "processor": environment["processor"],
             "threads": environment["threads"],
             "variant": environment["variant"],

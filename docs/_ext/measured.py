@@ -26,13 +26,14 @@ def provenance() -> str:
     versions = report["versions"]
     command = report["command"].split(" -o ")[0]
     sizes = dict.fromkeys("{} x {}".format(*scene["size"]) for scene in data()["scenes"])
+    timed = "{} x {}".format(*report["timed"])
     return (
         f"*Measured {report['created'][:10]} on {report['processor']}, {report['threads']} threads, "
         f"{report['variant']}, mitsuba {versions['mitsuba']}, drjit {versions['drjit']}, by "
-        f"`{command}`. Images of {' and '.join(sizes)} pixels. Times are medians of whole frames, kernels "
-        "compiled before, the geometry static; `rebuilt`: after the light moved. Errors are those of the airlight "
-        "against the `quadrature` truth: relative RMSE and bias over the mean, and quantiles of |test - ref| / "
-        "max(ref, 0.001 mean(ref)).*"
+        f"`{command}`. Times are medians of whole frames of {timed} pixels, kernels compiled before, the "
+        "geometry static; `rebuilt`: after the light moved. Errors are those of the airlight of images of "
+        f"{' and '.join(sizes)} pixels against the `quadrature` truth: relative RMSE and bias over the mean, and "
+        "quantiles of |test - ref| / max(ref, 0.001 mean(ref)).*"
     )
 
 

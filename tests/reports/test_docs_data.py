@@ -49,7 +49,7 @@ def report(**changes):
         "schema": "airlight-report/2",
         "created": "2026-11-21 12:00:00 +0000",
         "command": "airlight report",
-        "settings": {"name": "quick"},
+        "settings": {"name": "quick", "timed": [8, 6]},
         "environment": {"processor": "P", "threads": 2, "variant": "llvm_ad_rgb", "versions": {"mitsuba": "3.9.1"}},
         "claims": [{"kind": "truth", "text": "All is well.", "good": True}],
         "scenes": [scene, {**scene, "name": "own", "path": "own.xml"}],
