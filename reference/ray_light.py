@@ -201,8 +201,8 @@ def _directional_airlight(task: Task, emitter, sampler, ray: Ray, stretch: _Stre
         cell, width = _cell(index, shift, task.samples)
         y, density = sample_stretch(cell + width * sampler.next_1d(active), length, rates)
         point = _point_on(ray, ray.origin + ray.direction * (stretch.start + y))
-        arriving, from_light = _arriving(task, emitter, point, active)
-        phase, _ = stretch.medium.phase_function().eval_pdf(mi.PhaseFunctionContext(), point, -from_light, active)
+        arriving, towards = _arriving(task, emitter, point, active)
+        phase, _ = stretch.medium.phase_function().eval_pdf(mi.PhaseFunctionContext(), point, towards, active)
         value = stretch.sigma_s * phase * arriving * dr.exp(-stretch.depth - stretch.sigma_t * y) * (width / density)
         return index + 1, total + dr.select(active, value, 0), sampler
 
@@ -211,7 +211,7 @@ def _directional_airlight(task: Task, emitter, sampler, ray: Ray, stretch: _Stre
 
 
 def _arriving(task: Task, emitter, interaction, active) -> tuple[Any, Any]:
-    """Return the irradiance of a directional light that reaches points, and its direction.
+    """Return the irradiance of a directional light that reaches points, and the direction towards it.
 
     The emitter names a point of the light's way that lies beyond everything: the leg begins there, in clear air.
     """
@@ -221,7 +221,7 @@ def _arriving(task: Task, emitter, interaction, active) -> tuple[Any, Any]:
     sample, irradiance = emitter.sample_direction(interaction, mi.Point2f(0.5), active)
     media = Leg(dr.zeros(mi.MediumPtr), dr.zeros(mi.Spectrum, dr.width(active)))
     leg = transmittance(task.around, sample.p, -sample.d, sample.dist, media=media, active=active)
-    return irradiance * leg, -sample.d
+    return irradiance * leg, sample.d
 
 
 def _cell(number, shift, count: int) -> tuple[Any, Any]:
@@ -285,8 +285,8 @@ def _surface(task: Task, hit, stretch: _Stretch, active):
         sent = material * _intensity(light, hit, active) * leg / (r * r)
         total += dr.select(active, sent * dr.exp(-camera_leg), 0)
     for emitter in task.directional:
-        arriving, from_light = _arriving(task, emitter, hit, active)
-        material = hit.bsdf().eval(mi.BSDFContext(), hit, hit.to_local(-from_light), active)
+        arriving, towards = _arriving(task, emitter, hit, active)
+        material = hit.bsdf().eval(mi.BSDFContext(), hit, hit.to_local(towards), active)
         total += dr.select(active, material * arriving * dr.exp(-camera_leg), 0)
     return total
 

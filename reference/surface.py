@@ -105,7 +105,7 @@ def _lit_from_infinity(truth: TruthScene, interaction: Any, light: DirectionalLi
     hidden = truth.occluders.ray_test(interaction.spawn_ray(towards.d), facing)
     reflected = interaction.bsdf().eval(mi.BSDFContext(), interaction, interaction.to_local(towards.d), facing)
     lit = np.array(facing, dtype=bool) & ~np.array(hidden, dtype=bool)
-    return lit, np.array(reflected * arriving, dtype=np.float64).T
+    return lit, np.array(arriving * reflected, dtype=np.float64).T
 
 
 def _leg_depth(truth: TruthScene, point: Array, light: Array, shadow_scale: float) -> Array:

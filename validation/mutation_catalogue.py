@@ -8,11 +8,12 @@ formula moves its mutation too.
 from collections.abc import Sequence
 
 from analytic.errors import InputError
+from validation import directional_mutations, quadrature_mutations, single_scatter_mutations
 from validation.load import nearest
 from validation.mutation import Mutation
-from validation.quadrature_mutations import MUTATIONS as QUADRATURE
-from validation.single_scatter_mutations import MUTATIONS as SINGLE_SCATTER
 
+QUADRATURE = quadrature_mutations.MUTATIONS + directional_mutations.QUADRATURE
+SINGLE_SCATTER = single_scatter_mutations.MUTATIONS + directional_mutations.SINGLE_SCATTER
 MUTATIONS: tuple[Mutation, ...] = QUADRATURE + SINGLE_SCATTER
 
 
