@@ -57,13 +57,17 @@ def report(**changes):
     return found | changes
 
 
+def noise(height, width):
+    """The hardest there is to compress."""
+    return np.random.default_rng(7).integers(0, 256, (height, width, 3), dtype=np.uint8)
+
+
 @pytest.fixture
 def folder(tmp_path):
     target = tmp_path / "results"
     (target / "open-fog").mkdir(parents=True)
-    noise = np.random.default_rng(7).integers(0, 256, (600, 800, 3), dtype=np.uint8)
-    Image.fromarray(noise).save(target / "open-fog/a.png")
-    Image.fromarray(noise[:6, :8]).save(target / "open-fog/b.png")
+    for name in ("a", "b"):
+        Image.fromarray(noise(6, 8)).save(target / f"open-fog/{name}.png")
     (target / "report.json").write_text(json.dumps(report()))
     return target
 
@@ -124,8 +128,11 @@ def test_nothing_is_written_where_a_picture_is_missing(variant, folder, tmp_path
     assert not (tmp_path / "data").exists()
 
 
-def test_pictures_are_small(folder):
-    noisy = small(folder / "open-fog/a.png")  # the hardest there is to compress
-    assert len(noisy) <= LARGEST
-    assert Image.open(io.BytesIO(noisy)).width <= WIDTH
-    assert Image.open(io.BytesIO(small(folder / "open-fog/b.png"))).size == (8, 6)
+def test_pictures_are_small(tmp_path):
+    large, little = tmp_path / "large.png", tmp_path / "little.png"
+    Image.fromarray(noise(300, 500)).save(large)
+    Image.fromarray(noise(6, 8)).save(little)
+    found = small(large)
+    assert len(found) <= LARGEST
+    assert Image.open(io.BytesIO(found)).width < WIDTH
+    assert Image.open(io.BytesIO(small(little))).size == (8, 6)
