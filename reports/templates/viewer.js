@@ -100,7 +100,12 @@ class Viewer {
   // --- drawing ---
 
   async load() {
-    await this.images.loadMethod(this.state.method);
+    try {
+      await this.images.loadMethod(this.state.method);
+    } catch (error) {
+      this.find(".method figcaption").textContent = `This browser cannot show the images: ${error.message}`;
+      throw error;
+    }
     this.draw();
   }
 

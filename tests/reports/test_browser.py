@@ -13,6 +13,7 @@ from reports.colour_maps import unsigned_colours
 from reports.page import render_page
 from reports.pictures import error_map, tone_mapped
 from tests.page_for_tests import HEIGHT, WIDTH, engine_image, report_data, write_files, write_large_report
+from tests.published_for_tests import BILLETER, BIRI, MUTATIONS, STABILITY
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright drives the browser; install the dev extra")
@@ -40,6 +41,7 @@ def path(folder):
     second = report_data()["scenes"][0] | {"name": "pens"}
     second["methods"] = [second["methods"][1], engine_image()]
     data["scenes"].append(second)
+    data |= {"stability": STABILITY, "mutations": MUTATIONS, "published": {"biri": BIRI, "billeter": BILLETER}}
     page = folder / "report.html"
     page.write_text(render_page(data, folder), encoding="utf-8")
     return page
@@ -331,17 +333,28 @@ def test_colours_can_be_chosen(page):
     assert ground() != light
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("width", [1300, 390])
+@pytest.mark.parametrize(
+    ("scheme", "width"),
+    [
+        ("light", 1300),
+        ("dark", 390),
+        pytest.param("dark", 1300, marks=pytest.mark.slow),
+        pytest.param("light", 390, marks=pytest.mark.slow),
+    ],
+)
 def test_axe_finds_nothing(browser, path, scheme, width):
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe checks the page; see the dev extra")
     opened, told = watched(browser, color_scheme=scheme)
     opened.set_viewport_size({"width": width, "height": 900})
     opened.goto(path.as_uri())
     opened.wait_for_selector("html[data-drawn]")
+    opened.keyboard.press("f")  # one picture
     found = axe.Axe().run(opened)
+    opened.keyboard.press("?")
+    helped = axe.Axe().run(opened)
     opened.close()
-    assert found.violations_count == 0, found.generate_report()
+    for one in (found, helped):
+        assert one.violations_count == 0, one.generate_report()
     assert [one for one in told if not one.startswith("request file:")] == []
 
 

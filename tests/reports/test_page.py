@@ -21,6 +21,7 @@ from tests.page_for_tests import (
     widths,
     write_files,
 )
+from tests.published_for_tests import MUTATIONS, STABILITY
 
 
 @pytest.fixture
@@ -320,22 +321,7 @@ def test_same_picture_gives_the_same_bytes():
 
 
 def test_kernels_have_a_table_where_they_were_tried(data, folder):
-    errors = {
-        "rays": 77,
-        "refused": 5,
-        "median": 1.5e-7,
-        "p99": 2.5e-6,
-        "max": 4.5e-6,
-        "nan": 0,
-        "infinite": 0,
-        "negative": 2,
-    }
-    kernel = {
-        "kernel": "my-kernel",
-        "broken": ["law of scale"],
-        "sets": [{"name": "certified", "single": {"all": errors}, "double": {"all": errors}}],
-    }
-    page = render(data | {"stability": [kernel]}, folder)
+    page = render(data | {"stability": STABILITY}, folder)
     assert "my-kernel" in page.text
     assert "4.5·10⁻⁶" in page.text
     assert "my-kernel breaks what it claims: law of scale" in page.text
@@ -352,8 +338,7 @@ def test_missing_flip_is_a_note_and_a_dash(data, folder):
 
 
 def test_mutations_have_a_table_where_they_were_tried(data, folder):
-    one = {"name": "no-falloff", "meaning": "1/r not squared", "estimator": "quadrature", "caught": False}
-    data["mutations"] = {"caught": 0, "count": 1, "passed": False, "results": [one | {"reason": "too small"}]}
+    data["mutations"] = MUTATIONS
     text = render(data, folder).text
     assert "0 of 1 faults of the physics" in text
     assert "no-falloff" in text
