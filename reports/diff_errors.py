@@ -69,7 +69,7 @@ def _errors(old: Report | None, new: Report | None, tolerance: float, *, prefix:
             if before is not after:  # not-a-number is null
                 found.append(("worse" if after is None else "better", what, before, after))
             continue
-        band = error_band(name, before, tolerance=tolerance, pixels=old["pixels"])
+        band = error_band(name, before, tolerance=tolerance, pixels=old["pixels"], rmse=old.get("relative_rmse") or 0.0)
         grown = abs(after) - abs(before)
         if abs(grown) > band:
             found.append(("worse" if grown > 0 else "better", what, before, after))

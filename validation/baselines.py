@@ -170,7 +170,8 @@ def _numbers(
                 yield Move(scene, label, f"{layer} {name}", before, after)
             continue
         scale = abs(before) if name == "mean" else 1.0  # its floor is relative to itself
-        band = error_band(name, before / (scale or 1.0), tolerance=tolerance, pixels=pixels) * scale
+        rmse = old.get("relative_rmse") or 0.0
+        band = error_band(name, before / (scale or 1.0), tolerance=tolerance, pixels=pixels, rmse=rmse) * scale
         # Half a unit of the last of the digits that are kept.
         band += 0.5e-5 * abs(before)
         if abs(after - before) > band:

@@ -22,6 +22,12 @@ def test_the_band_of_an_error_is_relative_plus_rounding():
     assert error_band("p99", 0.0) == FLOORS["p99"]
 
 
+def test_a_bias_in_which_errors_cancel_has_the_band_of_a_tenth_of_the_rmse():
+    assert error_band("relative_bias", 1e-6, rmse=0.1) == pytest.approx(error_band("relative_bias", 0.01))
+    assert error_band("relative_bias", 0.05, rmse=0.1) == error_band("relative_bias", 0.05)
+    assert error_band("relative_rmse", 0.1, rmse=5.0) == error_band("relative_rmse", 0.1)
+
+
 def test_counts_have_bands_of_their_own():
     assert error_band("nonfinite", 100) == 0
     assert error_band("negative", 0, pixels=3072) == pytest.approx(3.072)
