@@ -12,6 +12,11 @@ face (`realtime.light_heights`) a plane is
 as w . (P - camera) = w . (light - camera + (axis + u across + v up) / s). So a box in (u, v, s) that lies beyond one of
 the five planes misses the beam. Those through the light have gs = 0: they bound the footprint of the beam on the map,
 which others alone do not, since a box at a depth discontinuity is long in s.
+
+Where the rays of the light are parallel, "through the light" is along its axis, and with
+P = (light + depth axis) + u across + v up - s axis the coefficients are
+
+    (gu, gv) = w . (across, up),   g0 = w . (light + depth axis - camera),   gs = -w . axis.
 """
 
 from dataclasses import dataclass
@@ -28,7 +33,8 @@ class Beam:
     normals: list[Any]  #: of the four planes through the camera
     middle: Any  #: unit direction
     end: Any  #: no ray goes farther along the middle [m]
-    light: Any  #: light - camera [m]
+    light: Any  #: light - camera; of a directional light, less the camera, the middle of the plane where s = 0 [m]
+    parallel: bool = False  #: whether the rays of the light are parallel
 
 
 @dataclass
@@ -42,7 +48,7 @@ class BeamPlanes:
     slack: list[Any]
 
 
-def make_beam(directions, end, light) -> Beam:
+def make_beam(directions, end, light, axis=None) -> Beam:
     """Return the beams about rays.
 
     Parameters
@@ -52,7 +58,9 @@ def make_beam(directions, end, light) -> Beam:
     end
         Largest distance to a surface, by tile, infinite where a ray meets none [m].
     light
-        The light less the camera [m].
+        The light less the camera, see `Beam` [m].
+    axis
+        Direction of a directional light.
     """
     import drjit as dr
 
@@ -65,10 +73,11 @@ def make_beam(directions, end, light) -> Beam:
     up = dr.cross(middle, across)
     corners, sides = _rectangle(directions, middle, across, up)
     # Planes through the light bound the footprint of the beam on the map, planes across them its heights.
-    (left, right), found = _pair_about(corners, light)
-    above, below = _pair_about(corners, dr.cross(light, middle))[0]
+    toward = light if axis is None else axis
+    (left, right), found = _pair_about(corners, toward)
+    above, below = _pair_about(corners, dr.cross(toward, middle))[0]
     normals = [dr.select(found, one, side) for one, side in zip((left, right, above, below), sides)]
-    return Beam(normals, middle, end, light)
+    return Beam(normals, middle, end, light, axis is not None)
 
 
 def _pair_about(corners, axis):
@@ -105,12 +114,33 @@ def beam_planes(beam: Beam, products) -> BeamPlanes:
     """Return the planes of a beam on a face; `products` gives the scalar products of a vector with its base."""
     import drjit as dr
 
+    if beam.parallel:
+        return _parallel_planes(beam, products)
     coefficients = [(*products(normal), dr.dot(normal, beam.light)) for normal in beam.normals]
     ends = dr.isfinite(beam.end)
     beyond = beam.end * (1 + 1e-5) - dr.dot(beam.middle, beam.light)
     coefficients.append(tuple(dr.select(ends, g, 0) for g in (*(-g for g in products(beam.middle)), beyond)))
     u, v, one, s = ([plane[k] for plane in coefficients] for k in range(4))
     slack = [_SLACK * (dr.abs(gu) + dr.abs(gv) + dr.abs(g0)) for gu, gv, g0, _ in coefficients]
+    return BeamPlanes(u, v, one, s, slack)
+
+
+def _parallel_planes(beam: Beam, products) -> BeamPlanes:
+    """Return what `beam_planes` does where the rays of the light are parallel."""
+    import drjit as dr
+
+    length = dr.norm(beam.light)
+    planes, slack = [], []
+    for normal in beam.normals:
+        gu, gv, along = products(normal)
+        planes.append((gu, gv, dr.dot(normal, beam.light), -along))
+        slack.append(_SLACK * (dr.abs(gu) + dr.abs(gv) + dr.norm(normal) * length))
+    gu, gv, along = products(beam.middle)
+    ends = dr.isfinite(beam.end)
+    beyond = dr.select(ends, beam.end, 0) * (1 + 1e-5) - dr.dot(beam.middle, beam.light)
+    planes.append(tuple(dr.select(ends, g, 0) for g in (-gu, -gv, beyond, along)))
+    slack.append(_SLACK * (dr.abs(gu) + dr.abs(gv) + length))
+    u, v, one, s = ([plane[k] for plane in planes] for k in range(4))
     return BeamPlanes(u, v, one, s, slack)
 
 

@@ -47,6 +47,7 @@ from realtime.gauss import unit_nodes
 from realtime.geometry import clip_to_cone, distance_to_light, falloff, stretches
 from realtime.media_rays import MediaRay, Piece, light_leg
 from realtime.medium import Medium, least_extinction
+from realtime.parallel_airlight import ParallelRay, parallel_airlight, parallel_source
 from realtime.phase import evaluate
 
 FORMS = ("exact", "paper")
@@ -55,8 +56,8 @@ _NODES_BETWEEN = 24  # from where legs enter a body on their way, or not: the ki
 _OPTICAL_REACH = 18.0  # e^-18 = 1.5e-8 of the light is left
 
 
-def bounded_airlight(ray: MediaRay, x0, x1):
-    """Return sum_j albedo_j sigma_j J_j over the lit segment [x0, x1], RGB [1/m^2].
+def bounded_airlight(ray: MediaRay | ParallelRay, x0, x1):
+    """Return sum_j albedo_j sigma_j J_j over the lit segment [x0, x1], RGB [1/m^2]; without unit for parallel light.
 
     Parameters
     ----------
@@ -71,6 +72,8 @@ def bounded_airlight(ray: MediaRay, x0, x1):
     """
     import drjit as dr
 
+    if isinstance(ray, ParallelRay):
+        return parallel_airlight(ray, x0, x1)
     if ray.light.kind == "spot":
         x0, x1 = clip_to_cone(ray.geometry, x0, x1)
     panels = stretches(ray.geometry, ray.light, x0, x1)
@@ -89,10 +92,12 @@ def bounded_airlight(ray: MediaRay, x0, x1):
     return total
 
 
-def bounded_source(ray: MediaRay, x):
+def bounded_source(ray: MediaRay | ParallelRay, x):
     """Return albedo sigma exp(-tau) p at the distance x of the rays, RGB [1/m], 0 where nothing scatters."""
     import drjit as dr
 
+    if isinstance(ray, ParallelRay):
+        return parallel_source(ray, x)
     Color = type(ray.medium.albedo)
     total = dr.zeros(Color, dr.width(x))
     r = distance_to_light(ray.geometry, x)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from realtime.casters import Casters, read_casters, with_positions
+from realtime.plan import check_places
 from realtime.plane_index import light_frame, shadow_planes
 from realtime.plane_view import bodies_in_view
 from realtime.scene import Scene
@@ -39,8 +40,9 @@ def caster_plan(scene: Scene) -> CasterPlan:
     Raises
     ------
     InputError
-        For a caster without triangles.
+        For a caster without triangles, and a directional light.
     """
+    check_places(scene.plan, "shadow-planes")
     casters = with_positions(read_casters(scene.geometry), scene.positions)
     lights = tuple(_light_plan(casters, scene, light) for light in scene.lights)
     return CasterPlan(

@@ -94,8 +94,10 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
         if medium.bodies:
             corners = _corners(camera, pixel)
             depths = camera_depths(medium, camera.origin, direction, seen.distance, corners=corners)
-        asked = {"medium": medium, "depths": depths, "shadows": not lights_surfaces}
-        colors = [lit_surface(geometry, seen, light=light, **asked) for light in lights]
+        # A map of a light at infinity shows the media alone, but not all that is lit.
+        asked = [light.kind == "directional" or not lights_surfaces for light in lights]
+        shown = {"medium": medium, "depths": depths}
+        colors = [lit_surface(geometry, seen, light=light, shadows=one, **shown) for light, one in zip(lights, asked)]
         return seen.distance, tuple(colors) if lights_surfaces else (sum(colors),)
 
     def run_method(geometry, pixel, camera, medium, lights, prepared, distance, by_light):
@@ -219,6 +221,10 @@ def _visible(geometry, point, light):
     import drjit as dr
     import mitsuba as mi
 
+    if light.kind == "directional":
+        # From the point on, where a ray is exact, though not from the surface that it may lie on.
+        away = 2e-6 * dr.abs(dr.dot(point - light.position, light.axis))
+        return ~geometry.ray_test(mi.Ray3f(mi.Point3f(point - light.axis * away), mi.Vector3f(-light.axis)))
     start = mi.Point3f(light.position)
     direction = mi.Vector3f(point) - mi.Vector3f(start)
     length = dr.norm(direction)

@@ -52,7 +52,7 @@ def ray_geometry(origin, direction, light: Light, *, low=None) -> RayGeometry:
 
     Notes
     -----
-    Valid for any ray. A ray through the light has height 0.
+    Valid for any ray and a light that has a place. A ray through the light has height 0.
     """
     import drjit as dr
 

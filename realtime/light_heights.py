@@ -10,6 +10,9 @@ and (u, v, s) are projective coordinates of P: planes stay planes and lines stay
 displaced grid are triangles over the texels of the map, linear in s; a camera ray is a straight line; and a point is
 lit where its s is above the height field. Where nothing is hit s = 0: a vertex at infinity.
 
+The map of a directional light has parallel rays: P = position + u across + v up + (depth - s) axis, with s the height
+above the plane behind which there are no media; what is hit beyond it has s = 0. All the rest is the same.
+
 A texel is cut along the diagonal from its corner (0, 0) to (1, 1), into
 
     s00 + x (s10 - s00) + y (s11 - s10)   where x >= y,
@@ -32,17 +35,23 @@ FINEST = 1024  #: nodes across the last level, at most
 
 @dataclass(frozen=True)
 class LightHeights:
-    """Inverse planar depths over the faces of a shadow map, with their bounds."""
+    """Inverse planar depths over the faces of a shadow map, or heights for parallel rays, with their bounds."""
 
     size: int  #: texels on a side
     frame: tuple[Any, Any, Any] | None  #: of a spot's face, see `realtime.shadow_map`; None for a cube
     texels: Any  #: the heights s00, s10, s01, s11 of every texel, face by face, row by row [1/m]
     bounds: Any  #: least and largest height of every node of the pyramid, face by face [1/m]
+    depth: Any = None  #: of a directional light: how deep the plane is that heights are above, see `ShadowMap`
 
     @property
     def faces(self) -> int:
         """How many faces the map has."""
         return 1 if self.frame else 6
+
+    @property
+    def axis(self) -> Any:
+        """The direction of a directional light, None for others."""
+        return self.frame[2] if self.frame and self.depth is not None else None
 
     @property
     def finest(self) -> int:
@@ -81,7 +90,8 @@ def light_heights(shadow_map: ShadowMap) -> LightHeights:
     import mitsuba as mi
 
     size = shadow_map.size
-    height = inverse_depth(shadow_map)
+    depth = shadow_map.depth
+    height = inverse_depth(shadow_map) if depth is None else dr.maximum(depth - shadow_map.distance, 0)
     dr.eval(height)
     Float = type(height)
     index = dr.arange(mi.UInt32, shadow_map.faces * size * size)
@@ -97,7 +107,7 @@ def light_heights(shadow_map: ShadowMap) -> LightHeights:
     for level in reversed(range(found.finest + 1)):
         _write_level(found, bounds, level)
         dr.eval(bounds)
-    return LightHeights(size, shadow_map.frame, texels, bounds)
+    return LightHeights(size, shadow_map.frame, texels, bounds, depth)
 
 
 def node_bounds(heights: LightHeights, face, level, i, j, active=True):

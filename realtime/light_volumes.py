@@ -78,7 +78,8 @@ def light_volumes(
 
     Notes
     -----
-    Valid for point and spot lights and any shapes that rays can be cast against. Exact with respect to the shadow map:
+    Valid for all lights and any shapes that rays can be cast against; the map of a directional light covers the media,
+    and its shadows on surfaces always come from rays. Exact with respect to the shadow map:
     what it misses of the scene falls as the size of a texel (`validation.map_study`). A map that sees nothing lights
     everything; a light inside a closed occluder lights nothing outside it. Bounded media are for evaluation=walk; they
     have nodes of their own, the kernel is not asked.
@@ -101,7 +102,8 @@ def light_volumes(
         else:
             value, reached = airlight.radiance(airlight.integral(*airlight.segment)), True
         total += value
-        lit.append(reached)
+        # A surface may be beside the map of a directional light, whose shadows on surfaces come from rays.
+        lit.append(True if light.kind == "directional" else reached)
     return (total, tuple(lit)) if finds_lit_surfaces({"evaluation": evaluation, "surface": surface}) else total
 
 
@@ -116,8 +118,9 @@ def _walk(heights: LightHeights, airlight: RayAirlight):
 
     view = airlight.view
     toward = airlight.light.position - view.origin
+    middle = toward if heights.axis is None else dr.fma(heights.axis, heights.depth, toward)
     leaves = tile_leaves(
-        heights, lambda lane: view.rays(lane)[0], view.distance, light=toward, square=view.square_tiles
+        heights, lambda lane: view.rays(lane)[0], view.distance, light=middle, square=view.square_tiles
     )
     zero = dr.zeros(integral_type(view), dr.width(view.distance))
     place = {"away": -toward, "direction": view.direction, "segment": airlight.segment}
@@ -177,7 +180,7 @@ def _check(map: int, evaluation: str, tessellation: str, threshold: float, surfa
 def _memory_of(light: Light, size: int, evaluation: str) -> int:
     """Return about how much the volume of a light takes, an upper bound where it is adaptive [bytes]."""
     number = 4 if is_single(type(light.position.x)) else 8
-    faces = 1 if light.kind == "spot" else 6
+    faces = 6 if light.kind == "point" else 1
     corners = map_memory(light, size)
     if evaluation == "mesh":
         # Drawing it takes four doubles for each vertex as it is, and four for it in the image.

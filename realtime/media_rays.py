@@ -12,6 +12,7 @@ from realtime.clipping import Seen, inverse_crossings, near_line, passage, seen_
 from realtime.geometry import RayGeometry
 from realtime.lights import Light
 from realtime.medium import Body, Medium
+from realtime.parallel_light import parallel_legs, seen_along
 
 _FEW_PLANES = 12  # which are read as fast as listed
 _RANGES = 5  # of a chord, in which a tile's list of planes for the legs from a light is made
@@ -159,6 +160,12 @@ def path_transmittance(medium: Medium, light: Light, *, depths, point, active):
     """
     import drjit as dr
 
+    if light.kind == "directional":
+        still = dr.zeros(type(point))
+        for body in medium.bodies:
+            (inside,) = parallel_legs(seen_along(body, light.axis), point, still, [type(point.x)(0)], active)
+            depths = [dr.fma(own, inside, depth) for own, depth in zip(body.medium.sigma_t, depths)]
+        return type(medium.albedo)(*(dr.exp(-depth) for depth in depths))
     vector = point - light.position
     length = dr.norm(vector)
     depths = [dr.fma(sigma, length, depth) for depth, sigma in zip(depths, medium.sigma_t)]

@@ -17,7 +17,7 @@ from realtime.arrays import types_of
 from realtime.casters import Casters
 from realtime.errors import InputError
 from realtime.facets import read_facets
-from realtime.lights import Light
+from realtime.lights import Light, directional_fields
 from realtime.medium import Medium
 from realtime.scene import Scene
 
@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 
 def turned_light(light: Light, about: Array, turn: Array) -> Light:
-    """Return a light turned about a point, with its axis if it is a spot.
+    """Return a light turned about a point, with its axis if it has one; a light at infinity only turns its axis.
 
     Parameters
     ----------
@@ -36,6 +36,8 @@ def turned_light(light: Light, about: Array, turn: Array) -> Light:
     turn
         Rotation matrix, (3, 3).
     """
+    if light.kind == "directional":
+        return replace(light, **_turned_sun(light, turn))
     position = np.array(light.position, dtype=np.float64).ravel()
     arrays = {"position": _like(light.position, about + turn @ (position - about))}
     if light.axis is not None:
@@ -44,6 +46,19 @@ def turned_light(light: Light, about: Array, turn: Array) -> Light:
         arrays["axis"] = _like(light.axis, axis)
         arrays["axis_low"] = _like(light.axis_low, axis - np.array(arrays["axis"], dtype=np.float64).ravel())
     return replace(light, **arrays)
+
+
+def _turned_sun(light: Light, turn: Array) -> dict[str, Any]:
+    import drjit as dr
+
+    high, low, centre = (
+        np.array(part, dtype=np.float64).ravel() for part in (light.axis, light.axis_low, light.centre)
+    )
+    types = types_of(type(light.reach))
+    reach, back = float(light.reach[0]), float(light.back[0])
+    fields = directional_fields(turn @ (high + low), centre, reach=reach, back=back, types=types)
+    dr.make_opaque(*fields.values())
+    return fields
 
 
 def coloured_light(light: Light, share: float) -> Light:

@@ -3,6 +3,8 @@
 
 from dataclasses import dataclass
 
+from realtime.errors import InputError
+
 
 @dataclass(frozen=True)
 class Plan:
@@ -17,15 +19,24 @@ class Plan:
     point_lights: int
     spot_lights: int
     soft_spots: bool  #: a spot's intensity falls off inside its cone
+    directional_lights: int = 0
     clear: bool = False  #: bounded: nothing fills the space between the media
     notes: tuple[str, ...] = ()  #: what the user should know of this scene
 
 
+def check_places(plan: Plan, method: str) -> None:
+    """Refuse a directional light for a method whose planes or slices go through the place of a light."""
+    if plan.directional_lights:
+        raise InputError(
+            f"{method}: the scene has a directional light, wanted lights that have a place (point, spot); use "
+            "--method light-volumes or ray-march"
+        )
+
+
 def describe(plan: Plan) -> dict[str, str]:
     """Return the plan in words, one entry for each decision."""
-    lights = [f"{plan.point_lights} point"] * bool(plan.point_lights) + [f"{plan.spot_lights} spot"] * bool(
-        plan.spot_lights
-    )
+    counts = (("point", plan.point_lights), ("spot", plan.spot_lights), ("directional", plan.directional_lights))
+    lights = [f"{count} {kind}" for kind, count in counts if count]
     words = {
         "surfaces": "lit surfaces" if plan.surfaces else "none: no ray is cast for the camera",
         "shadows": "visibility tests" if plan.shadows else "none: nothing casts a shadow",

@@ -5,10 +5,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from realtime.bounded_media import bounded_airlight
-from realtime.geometry import RayGeometry, clip_to_cone, ray_geometry
+from realtime.geometry import clip_to_cone, ray_geometry
 from realtime.kernels import airlight_integral, gamma
 from realtime.lights import Light
 from realtime.media_rays import MediaRay
+from realtime.parallel_airlight import ParallelRay
 from realtime.view import View, bounded_radiance, radiance
 
 
@@ -18,8 +19,10 @@ def integral_type(view: View) -> Any:
     return type(view.distance) if grey else type(view.medium.albedo)
 
 
-def ray_airlight(view: View, light: Light, kernel, media: MediaRay | None = None) -> "RayAirlight":
+def ray_airlight(view: View, light: Light, kernel, media: MediaRay | ParallelRay | None = None) -> "RayAirlight":
     """Return the airlight of a light along the rays of a view; `media` where media are bounded."""
+    if light.kind == "directional":
+        return RayAirlight(view, light, None, kernel, media)
     geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
     return RayAirlight(view, light, geometry, kernel, media)
 
@@ -30,9 +33,9 @@ class RayAirlight:
 
     view: View
     light: Light
-    geometry: RayGeometry
+    geometry: Any  #: a `RayGeometry`; None for a light at infinity
     kernel: Any
-    media: MediaRay | None  #: where media are bounded
+    media: MediaRay | ParallelRay | None  #: where media are bounded
 
     @property
     def segment(self) -> tuple[Any, Any]:

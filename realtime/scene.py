@@ -13,7 +13,7 @@ from realtime.arrays import ArrayTypes, array_types, is_single
 from realtime.camera import Camera
 from realtime.errors import InputError
 from realtime.facets import Facets, read_facets
-from realtime.lights import Light, spot_fields
+from realtime.lights import Light, directional_fields, spot_fields
 from realtime.medium import Medium
 from realtime.plan import Plan
 from realtime.scene_media import opaque_scene, read_medium, sort_shapes
@@ -51,9 +51,14 @@ def read_scene(scene, precision: str = "single") -> Scene:
     camera, sensor = _read_camera(scene, types)
     opaque, boundaries = sort_shapes(scene)
     medium = read_medium(sensor, boundaries, types)
-    lights = tuple(_read_light(emitter, types) for emitter in scene.emitters())
-    if not lights:
-        raise InputError("the scene has no light; wanted at least one emitter of type 'point' or 'spot'")
+    if not scene.emitters():
+        raise InputError("the scene has no light; wanted at least one emitter of type 'point', 'spot' or 'directional'")
+    lights = tuple(
+        _read_directional(emitter, medium, opaque, types)
+        if emitter.class_name() == "DirectionalEmitter"
+        else _read_light(emitter, types)
+        for emitter in scene.emitters()
+    )
     geometry = opaque_scene(scene, opaque)
     return Scene(geometry, camera, medium, lights, _make_plan(opaque, medium, lights), read_facets(geometry, types))
 
@@ -94,18 +99,13 @@ def _read_light(emitter, types: ArrayTypes) -> Light:
     kind = {"PointLight": "point", "SpotLight": "spot"}.get(emitter.class_name())
     if kind is None:
         raise InputError(
-            f"the scene has an emitter of class {emitter.class_name()}; wanted emitters of type 'point' or 'spot' "
-            "only: replace it or remove it"
+            f"the scene has an emitter of class {emitter.class_name()}; wanted emitters of type 'point', 'spot' or "
+            "'directional' only: replace it or remove it"
         )
     parameters = mi.traverse(emitter)
     if "intensity.value" not in parameters or (kind == "spot" and "texture.value" not in parameters):
         raise InputError(f"the {kind} light has a textured or spectral intensity; wanted a constant 'rgb' intensity")
-    intensity = np.array(parameters["intensity.value"], dtype=np.float64).reshape(-1)
-    intensity = np.broadcast_to(intensity, 3) if intensity.size == 1 else intensity
-    if not np.all(np.isfinite(intensity)) or np.any(intensity < 0):
-        raise InputError(
-            f"the {kind} light's intensity is {intensity.tolist()}; wanted finite values of 0 or more [W/sr]"
-        )
+    intensity = _read_colour(parameters["intensity.value"], f"the {kind} light's intensity", "W/sr")
     matrix = np.array(emitter.world_transform().matrix, dtype=np.float64).reshape(4, 4)
     position = np.array(parameters["position"], dtype=np.float64).reshape(-1) if kind == "point" else matrix[:3, 3]
     arrays: dict[str, Any] = {
@@ -119,6 +119,58 @@ def _read_light(emitter, types: ArrayTypes) -> Light:
         arrays |= spot_fields(matrix[:3, 2] / np.linalg.norm(matrix[:3, 2]), cutoff, beam, types)
     dr.make_opaque(*arrays.values())
     return Light(kind, soft, **arrays)
+
+
+def _read_directional(emitter, medium: Medium, opaque, types: ArrayTypes) -> Light:
+    import drjit as dr
+    import mitsuba as mi
+    import numpy as np
+
+    if not (medium.bodies and medium.clear):
+        raise InputError(
+            "the scene has a directional light and a medium without bounds, which lets nothing of it through from "
+            "infinity: wanted media with bounds in clear air; give the medium bounds, or use a 'point' or 'spot' light"
+        )
+    parameters = mi.traverse(emitter)
+    if "irradiance.value" not in parameters:
+        raise InputError("the directional light has a textured or spectral irradiance; wanted a constant 'rgb' one")
+    irradiance = _read_colour(parameters["irradiance.value"], "the directional light's irradiance", "W/m^2")
+    matrix = np.array(emitter.world_transform().matrix, dtype=np.float64).reshape(4, 4)
+    axis = matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])
+    arrays: dict[str, Any] = {"intensity": types.color(*(float(c) for c in irradiance))}
+    centre, reach, back = _lit_ball(medium, opaque)
+    arrays |= directional_fields(axis, centre, reach=reach, back=back, types=types)
+    dr.make_opaque(*arrays.values())
+    return Light("directional", False, **arrays)
+
+
+def _lit_ball(medium: Medium, opaque):
+    """Return middle and radius of a ball that holds all bodies, and how far from there nothing is any more [m].
+
+    An object that turns about the middle of its box stays within the ball about the box.
+    """
+    import numpy as np
+
+    middles = np.array([np.array(body.centre, dtype=np.float64).ravel() for body in medium.bodies])
+    radii = np.array([float(body.radius[0]) for body in medium.bodies])
+    centre = 0.5 * ((middles - radii[:, None]).min(axis=0) + (middles + radii[:, None]).max(axis=0))
+    reach = 1.001 * float((np.linalg.norm(middles - centre, axis=1) + radii).max())
+    back = reach
+    for shape in opaque:
+        low, high = (np.array(corner, dtype=np.float64).ravel() for corner in (shape.bbox().min, shape.bbox().max))
+        back = max(back, float(np.linalg.norm(0.5 * (low + high) - centre) + 0.5 * np.linalg.norm(high - low)))
+    return centre, reach, 1.001 * back
+
+
+def _read_colour(value, name: str, unit: str):
+    """Return three values of 0 or more."""
+    import numpy as np
+
+    colour = np.array(value, dtype=np.float64).reshape(-1)
+    colour = np.broadcast_to(colour, 3) if colour.size == 1 else colour
+    if not np.all(np.isfinite(colour)) or np.any(colour < 0):
+        raise InputError(f"{name} is {colour.tolist()}; wanted finite values of 0 or more [{unit}]")
+    return colour
 
 
 def _read_angles(parameters) -> tuple[float, float]:
@@ -153,6 +205,7 @@ def _make_plan(opaque, medium: Medium, lights: tuple[Light, ...]) -> Plan:
         vacuum=any(float(sigma_t[0]) == 0 for sigma_t in medium.sigma_t),
         point_lights=sum(light.kind == "point" for light in lights),
         spot_lights=sum(light.kind == "spot" for light in lights),
+        directional_lights=sum(light.kind == "directional" for light in lights),
         soft_spots=any(light.soft for light in lights),
         notes=tuple(dict.fromkeys(notes)),
     )

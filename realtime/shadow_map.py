@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Shadow maps by ray casting into plain arrays: one face for a spot, six for a point light.
+"""Shadow maps by ray casting into plain arrays: one face for a spot or a directional light, six for a point light.
 
 A face looks along an axis with two vectors across it: the direction through (u, v) in [-1, 1]^2 is axis + u across +
 v up, with |across| = |up| = 1 for a cube face and tan(cutoff) for a spot, whose cone just fits. Each face is cut into
@@ -7,6 +7,10 @@ size^2 texels; a map holds at each of their (size + 1)^2 *corners* the distance 
 first surface [m], infinite where there is none. So the outermost values lie on the edges of the face, where the faces
 of a cube meet with the same values. The planar depth, along the axis, is the distance over the length of axis + u
 across + v up (`realtime.light_heights`).
+
+The face of a directional light is a square across it, before all shapes, as large as the ball that holds the media:
+|across| = |up| = the radius of that ball [m]. The ray of (u, v) starts at position + u across + v up and goes along the
+axis, and its distance is the planar depth. Surfaces beside that square are in no map: rays find their shadows.
 
 Directions are computed in float64 and rounded once, to the float32 that rays are cast in: a ray that passes an edge
 closely meets the same surface whatever the precision of the method, and one map can stand for both.
@@ -26,7 +30,8 @@ class ShadowMap:
 
     size: int  #: texels on a side
     distance: Any  #: faces (size + 1)^2 values along the rays [m]
-    frame: tuple[Any, Any, Any] | None  #: of a spot: across, up and axis; None for a cube
+    frame: tuple[Any, Any, Any] | None  #: of a spot or directional light: across, up and axis; None for a cube
+    depth: Any = None  #: of a directional light: how deep the media end, at most; its rays are parallel [m]
 
     @property
     def faces(self) -> int:
@@ -49,7 +54,7 @@ def check_size(size) -> None:
 def map_memory(light: Light, size: int) -> int:
     """Return how much the distances of the shadow map of a light take [bytes]."""
     number = 4 if is_single(type(light.position.x)) else 8
-    return number * (1 if light.kind == "spot" else 6) * (size + 1) ** 2
+    return number * (6 if light.kind == "point" else 1) * (size + 1) ** 2
 
 
 def cast_shadow_map(scene, light: Light, size: int) -> ShadowMap:
@@ -60,7 +65,7 @@ def cast_shadow_map(scene, light: Light, size: int) -> ShadowMap:
     scene
         The Mitsuba scene that holds the occluders.
     light
-        A point or spot light.
+        The light.
     size
         Texels on a side, a power of two.
 
@@ -75,6 +80,7 @@ def cast_shadow_map(scene, light: Light, size: int) -> ShadowMap:
     check_size(size)
     Float = type(light.position.x)
     Double, Vector = mi.Float64, mi.Vector3d
+    parallel = light.kind == "directional"
     frame = None if light.kind == "point" else _frame(light)
     side = size + 1
     index = dr.arange(mi.UInt32, (1 if frame else 6) * side * side)
@@ -83,17 +89,22 @@ def cast_shadow_map(scene, light: Light, size: int) -> ShadowMap:
     # Whole numbers and powers of two: exact, so that neighbouring faces cast the same rays along their common edge.
     u = dr.fma(Double(index - row * side), 2.0 / size, -1.0)
     v = dr.fma(Double(row - face * side), 2.0 / size, -1.0)
-    if frame:
+    start = mi.Point3f(light.position)
+    if parallel and frame is not None:
+        start = mi.Point3f(mi.Vector3d(light.position) + frame[0] * u + frame[1] * v)
+        unit = frame[2]
+    elif frame is not None:
         unit = dr.normalize(frame[0] * u + frame[1] * v + frame[2])
     else:
         # In this order the sum does not depend on which coordinate is which.
         unit = cube_direction(Vector, face, u, v) * dr.rsqrt((dr.square(u) + dr.square(v)) + 1)
-    ray = mi.Ray3f(mi.Point3f(light.position), mi.Vector3f(unit))
+    ray = mi.Ray3f(start, mi.Vector3f(unit))
     hit = scene.ray_intersect_preliminary(ray, coherent=True)
     distance = dr.select(hit.is_valid(), Float(hit.t), dr.inf)
     frame = frame and tuple(type(light.position)(one) for one in frame)
-    dr.eval(distance, frame)  # once: whoever reads it would cast the rays again
-    return ShadowMap(size, distance, frame)
+    depth = light.back + light.reach if parallel else None
+    dr.eval(distance, frame, depth)  # once: whoever reads it would cast the rays again
+    return ShadowMap(size, distance, frame, depth)
 
 
 def lit_in_map(shadow_map: ShadowMap, light: Light, point):
@@ -103,17 +114,21 @@ def lit_in_map(shadow_map: ShadowMap, light: Light, point):
 
     Float = type(point.x)
     d = point - light.position
+    depth = None
     if shadow_map.frame is None:
         face, u, v = cube_coordinates(d)
+    elif shadow_map.depth is not None:
+        face = mi.UInt32(0)
+        u, v, depth = face_coordinates(shadow_map.frame, face, d)
     else:
         face = mi.UInt32(0)
-        a, b, depth = face_coordinates(shadow_map.frame, face, d)
-        u, v = a / depth, b / depth
+        a, b, c = face_coordinates(shadow_map.frame, face, d)
+        u, v = a / c, b / c
     size = shadow_map.size
     column = mi.UInt32(dr.clip(dr.fma(u, 0.5 * size, 0.5 * (size + 1)), 0, size))
     row = mi.UInt32(dr.clip(dr.fma(v, 0.5 * size, 0.5 * (size + 1)), 0, size))
     stored = dr.gather(Float, shadow_map.distance, (face * (size + 1) + row) * (size + 1) + column)
-    return dr.squared_norm(d) <= dr.square(stored)
+    return dr.squared_norm(d) <= dr.square(stored) if depth is None else depth <= stored
 
 
 def face_products(frame, face, vector):
@@ -140,7 +155,7 @@ def face_coordinates(frame, face, vector):
 
 
 def _frame(light: Light):
-    """Return two vectors of length tan(cutoff) across a spot's axis, and its axis, in float64."""
+    """Return two vectors across a light's axis and the axis, in float64; their length is tan(cutoff) or the reach."""
     import drjit as dr
     import mitsuba as mi
 
@@ -148,6 +163,9 @@ def _frame(light: Light):
     # Any vector that is not parallel to the axis will do to start from.
     helper = dr.select(dr.abs(axis.x) < 0.5, type(axis)(1, 0, 0), type(axis)(0, 1, 0))
     across = dr.normalize(dr.cross(helper, axis))
+    if light.kind == "directional":
+        reach = mi.Float64(light.reach)
+        return across * reach, dr.cross(axis, across) * reach, axis
     square = mi.Float64(light.cone.square_sin) + mi.Float64(light.cone.square_sin_low)
     scale = dr.sqrt(square / (1 - square))
     return across * scale, dr.cross(axis, across) * scale, axis

@@ -28,6 +28,8 @@ from realtime.casters import Casters, read_casters, with_positions
 from realtime.errors import InputError
 from realtime.lights import Light
 from realtime.media_rays import MediaRay
+from realtime.parallel_airlight import ParallelRay
+from realtime.plan import check_places
 from realtime.plane_cone import cone_ring
 from realtime.plane_crossings import Buffer, sum_crossings
 from realtime.plane_index import PlaneIndex, index_planes
@@ -68,9 +70,10 @@ def prepare_shadow_planes(scene: Scene, **settings) -> PlanePreparation:
     Raises
     ------
     InputError
-        For a parameter out of range and for casters without triangles.
+        For a parameter out of range, casters without triangles and directional lights.
     """
     _check(**settings)
+    check_places(scene.plan, "shadow-planes")
     return PlanePreparation(read_casters(scene.geometry), settings["cone"])
 
 
@@ -153,7 +156,7 @@ def shadow_planes(
 
     total = type(view.medium.albedo)(0)
     lit = []
-    in_media: tuple[MediaRay, ...] = ()
+    in_media: tuple[MediaRay | ParallelRay, ...] = ()
     if view.plan.bounded:
         check_form(view.medium, media)
         _check_bounded(evaluation)

@@ -5,8 +5,9 @@ Biri, Arques, Michelin 2006, section 5.1.2, with the extinction to the eye of eq
 
     L = rho I cos(theta_p) / (pi r_p^2) exp(-sigma_t r_p) exp(-sigma_t distance),
 
-zero where a shadow ray is blocked. With bounded media both exponents are sums over the media that the two legs cross
-(`realtime.media_rays`). A one-sided surface is black from behind, as in Mitsuba's `diffuse`.
+zero where a shadow ray is blocked; of a directional light rho E cos(theta_p) / pi arrives at once. With bounded media
+both exponents are sums over the media that the two legs cross (`realtime.media_rays`). A one-sided surface is black
+from behind, as in Mitsuba's `diffuse`.
 """
 
 from dataclasses import dataclass
@@ -116,6 +117,8 @@ def lit_surface(scene, surface: VisibleSurface, *, medium: Medium, light: Light,
     import drjit as dr
     import mitsuba as mi
 
+    if light.kind == "directional":
+        return _sunlit(scene, surface, medium=medium, light=light, depths=depths, shadows=shadows)
     to_light = light.position - surface.point
     r = dr.norm(to_light)
     cosine = dr.dot(surface.normal, to_light) / r
@@ -128,6 +131,20 @@ def lit_surface(scene, surface: VisibleSurface, *, medium: Medium, light: Light,
         kept = path_transmittance(medium, light, depths=depths, point=surface.point, active=lit)
     else:
         kept = transmittance(medium, dr.select(lit, surface.distance + r, 0))
+    return dr.select(lit, reflected * kept, type(medium.albedo)(0))
+
+
+def _sunlit(scene, surface: VisibleSurface, *, medium: Medium, light: Light, depths, shadows: bool):
+    """Return what `lit_surface` does for a directional light, through bounded media."""
+    import drjit as dr
+    import mitsuba as mi
+
+    cosine = -dr.dot(surface.normal, light.axis)
+    lit = surface.seen & (cosine > 0)
+    if shadows:
+        lit &= ~scene.ray_test(surface.interaction.spawn_ray(mi.Vector3f(-light.axis)), lit)
+    reflected = surface.albedo * light.intensity * (dr.inv_pi * cosine)
+    kept = path_transmittance(medium, light, depths=depths, point=surface.point, active=lit)
     return dr.select(lit, reflected * kept, type(medium.albedo)(0))
 
 

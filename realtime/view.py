@@ -11,6 +11,7 @@ from realtime.geometry import ray_geometry
 from realtime.lights import Light
 from realtime.media_rays import MediaRay, camera_pieces, media_ray
 from realtime.medium import Medium
+from realtime.parallel_airlight import ParallelRay, parallel_ray
 from realtime.plan import Plan
 
 
@@ -46,14 +47,18 @@ def radiance(medium: Medium, light: Light, integral):
     return medium.albedo * light.intensity * (sigma_t * (integral * (0.25 * dr.inv_pi)))
 
 
-def rays_in_media(view: View, form: str = "exact") -> tuple[MediaRay, ...]:
+def rays_in_media(view: View, form: str = "exact") -> tuple[MediaRay | ParallelRay, ...]:
     """Return the rays of a view in bounded media, by light; `form` is one of `realtime.bounded_media.FORMS`."""
     import drjit as dr
 
     corners = tile_corners(view.rays, dr.width(view.direction)) if view.square_tiles else None
     pieces = camera_pieces(view.medium, view.origin, view.direction, corners=corners)
-    rays = []
+    rays: list[MediaRay | ParallelRay] = []
     for light in view.lights:
+        if light.kind == "directional":
+            place = {"origin": view.origin, "direction": view.direction, "pieces": pieces, "form": form}
+            rays.append(parallel_ray(view.medium, light, **place))
+            continue
         geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
         ends = {"origin": view.origin, "direction": view.direction, "corners": corners, "form": form}
         rays.append(media_ray(view.medium, light, geometry, **ends, pieces=pieces))

@@ -9,6 +9,9 @@ has
 and y = x / c. All four are linear along the projective line: with t from 0 to 1 between two points of the ray, each is
 (1 - t) its value at one and t its value at the other, and x = y / s. At the end of an endless ray s = 0 and y = 1 / dc.
 
+Of a directional light's face u, v and s = depth - c are linear in x itself, so y = x with weight 1 in place of s; the
+ray is cut where s = 0, and all before the largest height is lit.
+
 The part of the ray in the face is cut out by c + a >= 0, c - a >= 0, c + b >= 0, c - b >= 0. A ray that stays on the
 border of two faces is in one of them, that of the first axis: neighbours compute the same numbers there, with opposite
 signs. The line t goes over the part of it beyond the nearest height of the face: all before that is lit.
@@ -34,10 +37,11 @@ class FaceRay:
     u: tuple[Any, Any]  #: columns [texels]
     v: tuple[Any, Any]  #: rows [texels]
     s: tuple[Any, Any]  #: [1/m]
-    y: tuple[Any, Any]  #: x s
+    y: tuple[Any, Any]  #: x s, or x itself where rays of light are parallel
     per_u: Any  #: dt/du, positive where u stays the same
     per_v: Any
     per_diagonal: Any  #: dt/d(v - u)
+    parallel: bool = False  #: whether the rays of the light are parallel
 
 
 def in_face(heights: LightHeights, face, away, direction, segment):
@@ -47,6 +51,9 @@ def in_face(heights: LightHeights, face, away, direction, segment):
     a0, b0, c0 = face_coordinates(heights.frame, face, away)
     da, db, dc = face_coordinates(heights.frame, face, direction)
     begin, end = segment
+    if heights.depth is not None:
+        begin, end = _cut(begin, end, heights.depth - c0, -dc)
+        c0, dc = type(c0)(1), type(dc)(0)
     # The neighbours across come later in the order of axes, but for the last axis; those above only for the first one.
     for start, slope, is_first in (
         (c0 + a0, dc + da, face < 4),
@@ -82,13 +89,24 @@ def face_ray(heights: LightHeights, face, away, direction, segment) -> FaceRay:
     begin, end = segment
     zero = mi.UInt32(0)
     _, highest = node_bounds(heights, face, zero, zero, zero)
+    if heights.depth is not None:
+        s0 = heights.depth - c0
+        t0, t1 = _cut(begin, end, highest / _NEARER - s0, dc)
+        walks = (t0 < t1) & (highest > 0)
+        ends = [_parallel_coordinates(heights.size, x, (a0, b0, s0), (da, db, -dc), walks) for x in (t0, t1)]
+        return _face_ray(begin, end, walks, ends, parallel=True)
     nearest = _NEARER / highest  # infinite where nothing is hit: all is lit
     t0, t1 = _cut(begin, end, c0 - nearest, dc)
     walks = (t0 < t1) & (highest > 0)
     ends = [_coordinates(heights.size, x, (a0, b0, c0), (da, db, dc), nearest) for x in (t0, t1)]
+    return _face_ray(begin, end, walks, ends)
+
+
+def _face_ray(begin, end, walks, ends, *, parallel: bool = False) -> FaceRay:
     u, v, s, y = zip(*ends)
     across, upward = u[1] - u[0], v[1] - v[0]
-    return FaceRay(begin, end, walks, u, v, s, y, _inverse(across), _inverse(upward), _inverse(upward - across))
+    per_u, per_v, per_diagonal = (_inverse(length) for length in (across, upward, upward - across))
+    return FaceRay(begin, end, walks, u, v, s, y, per_u, per_v, per_diagonal, parallel)
 
 
 def _cut(begin, end, start, slope):
@@ -116,6 +134,18 @@ def _coordinates(size: int, x, origin, direction, nearest):
     return u, v, dr.select(finite, inverse, 0), dr.select(finite, at * inverse, inverse)
 
 
+def _parallel_coordinates(size: int, x, origin, direction, walks):
+    """Return u, v [texels], s and x of the point at x, or of any point where the line does not walk."""
+    import drjit as dr
+
+    at = dr.select(walks, x, 0)
+    a, b, s = (dr.fma(at, d, o) for o, d in zip(origin, direction))
+    half = 0.5 * size
+    last = size * (1 - dr.epsilon(type(x)))
+    u, v = (dr.clip(dr.fma(half, p, half), 0, last) for p in (a, b))
+    return u, v, s, at
+
+
 def _inverse(length):
     import drjit as dr
 
@@ -131,4 +161,4 @@ def at_line(pair, t):
 
 def distance_at(ray: FaceRay, t):
     """Return the distance x along the ray at t [m]."""
-    return at_line(ray.y, t) / at_line(ray.s, t)
+    return at_line(ray.y, t) if ray.parallel else at_line(ray.y, t) / at_line(ray.s, t)

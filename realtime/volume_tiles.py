@@ -67,7 +67,7 @@ def tile_leaves(heights: LightHeights, rays, distance, *, light, square: bool) -
     distance
         At which every ray ends, infinite where it does not [m].
     light
-        The light less the camera [m].
+        The light less the camera, see `realtime.beams.Beam` [m].
     square
         Whether every tile is a square of 4 x 4 pixels: then its corners bound it.
     """
@@ -93,8 +93,8 @@ def tile_leaves(heights: LightHeights, rays, distance, *, light, square: bool) -
     end = dr.gather(Float, ends, members[0])
     for member in members[1:]:
         end = dr.maximum(end, dr.gather(Float, ends, member))
-    beam = make_beam(about, end, light)
-    return _tile_lists(heights, make_beam(directions, ends, light), *_block_lists(heights, beam, face))
+    beam = make_beam(about, end, light, heights.axis)
+    return _tile_lists(heights, make_beam(directions, ends, light, heights.axis), *_block_lists(heights, beam, face))
 
 
 def _block_lists(heights: LightHeights, beam: Beam, face):

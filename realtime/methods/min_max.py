@@ -39,6 +39,7 @@ from realtime.lights import Light
 from realtime.medium import transmittance
 from realtime.memory import check_memory
 from realtime.phase import evaluate
+from realtime.plan import check_places
 from realtime.ray_airlight import RayAirlight, integral_type, ray_airlight
 from realtime.scene import Scene
 from realtime.shadow_map import ShadowMap, cast_shadow_map, check_size, map_memory
@@ -122,9 +123,10 @@ def prepare_min_max(
     Raises
     ------
     InputError
-        For parameters out of range, and for more memory than the machine has.
+        For parameters out of range, directional lights, and more memory than the machine has.
     """
     check_size(map)
+    check_places(scene.plan, "min-max")
     if sampling not in SAMPLINGS:
         raise InputError(f"sampling: got {sampling!r}, wanted one of {', '.join(SAMPLINGS)}")
     for name, value in (("slices", slices), ("samples", samples)):

@@ -5,8 +5,8 @@ Two spacings of the same number of steps:
 
 * `uniform` in the distance x, weight dx exp(-sigma_t (x + r)) p / r^2. What most shaders do; it misses the peak near
   the light. Where nothing ends the ray it stops at 20 optical depths (e^-20 = 2e-9 is left).
-* `equiangular` in theta, the angle at the light. With x = foot + h tan theta, dx / r^2 = dtheta / h: the peak is gone
-  and the weight is dtheta/h exp(-sigma_t (x + r)) p.
+* `equiangular` in theta, the angle at the light; for a light at infinity these are equal steps in x. With x = foot + h
+  tan theta, dx / r^2 = dtheta / h: the peak is gone and the weight is dtheta/h exp(-sigma_t (x + r)) p.
 
 The order of convergence in the number of steps is 2 on a ray without shadows and 1 where shadow edges fall between
 steps.
@@ -21,6 +21,7 @@ from realtime.lights import Light
 from realtime.media_rays import MediaRay
 from realtime.medium import least_extinction, per_extinction
 from realtime.memory import check_memory
+from realtime.parallel_airlight import ParallelRay
 from realtime.phase import evaluate
 from realtime.scene import Scene
 from realtime.shadow_map import ShadowMap, cast_shadow_map, check_size, lit_in_map, map_memory
@@ -67,16 +68,21 @@ def ray_march(
     total = type(view.medium.albedo)(0)
     in_media = rays_in_media(view) if view.plan.bounded else ()
     for number, light in enumerate(view.lights):
-        geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
         x0, x1 = type(view.distance)(0), view.distance
+        media = in_media[number] if in_media else None
+        if isinstance(media, ParallelRay):
+            lit = _visibility(view, number, shadow)
+            integral = _march_parallel(view, media, _within(media, x0, x1), steps=steps, lit=lit)
+            total += bounded_radiance(light, integral)
+            continue
+        geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
         if light.kind == "spot":
             x0, x1 = clip_to_cone(geometry, x0, x1)
         if spacing == "uniform" and not view.medium.clear:
             x1 = dr.minimum(x1, x0 + _OPTICAL_REACH / least_extinction(view.medium))
-        if view.medium.clear:
-            x0, x1 = _within(in_media[number], x0, x1)
+        if media and view.medium.clear:
+            x0, x1 = _within(media, x0, x1)
         lit = _visibility(view, number, shadow)
-        media = in_media[number] if in_media else None
         integral = _march(view, light, geometry, (x0, x1), steps=steps, spacing=spacing, lit=lit, media=media)
         total += bounded_radiance(light, integral) if media else radiance(view.medium, light, integral)
     return total
@@ -118,7 +124,7 @@ def _visibility(view: View, number: int, shadow: str):
     return lambda point: view.visible(point, light)
 
 
-def _within(media: MediaRay, x0, x1):
+def _within(media: MediaRay | ParallelRay, x0, x1):
     """Return the part of a segment from the first to the last body."""
     import drjit as dr
 
@@ -167,3 +173,26 @@ def _march(
         labels=("index", "total"),
     )
     return total * width
+
+
+def _march_parallel(view: View, media: ParallelRay, segment, *, steps: int, lit):
+    """Sum equal steps of every ray under a directional light; see `_march`."""
+    import drjit as dr
+    import mitsuba as mi
+
+    x0, x1 = segment
+    Float = type(view.distance)
+    width = (x1 - x0) / steps
+
+    def step(index, total):
+        x = dr.fma(Float(index) + 0.5, width, x0)
+        reached = (width > 0) & lit(view.origin + view.direction * x)
+        return index + 1, total + dr.select(reached, bounded_source(media, x), 0)
+
+    _, total = dr.while_loop(
+        state=(mi.UInt32(0), type(view.medium.albedo)(0) + dr.zeros(Float, dr.width(width))),
+        cond=lambda index, total: index < steps,
+        body=step,
+        labels=("index", "total"),
+    )
+    return dr.select(width > 0, total * width, 0)
