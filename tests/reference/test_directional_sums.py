@@ -192,3 +192,24 @@ def test_surface_is_dimmed_by_the_bodies_before_it_and_above(variant):
     assert image.surface.reshape(-1, 3)[hit] == pytest.approx(
         expected, rel=2e-5
     )  # surfaces are met in float32, and the ball at a grazing angle
+
+
+def test_mean_over_pixels(variant):
+    """The mean over the area against that of 15 x 15 rays: to what these miss at edges of shadows, and the bound."""
+    from dataclasses import replace
+
+    from reference.camera import film_directions
+    from reference.quadrature import ray_values
+
+    caster = {"type": "sphere", "center": [-0.71875, 0.25, 1.21875], "radius": 0.1875}
+    truth, image = truth_and_image(sunny(brick=brick(), pearl=pearl(), caster=caster, size=(8, 6)), pixel="area")
+    row, column = np.divmod(np.arange(48), 8)
+    sub = (np.arange(15) + 0.5) / 15
+    at = np.stack([(column[:, None, None] + sub[:, None] + 0 * sub), (row[:, None, None] + 0 * sub[:, None] + sub)], -1)
+    direction = film_directions(truth.scene.sensors()[0], at.reshape(-1, 2), (8, 6))
+    many = ray_values(replace(truth, direction=direction)).airlight.reshape(48, 225, 3)
+    # A row of 15 points that an edge crosses is off by up to half a point: 1/15/sqrt(12) of the pixel's spread.
+    allowed = np.ptp(many, axis=1) / 15 / np.sqrt(12) * 2 + image.airlight_bound.reshape(48, 3)
+    assert np.all(np.abs(image.airlight.reshape(48, 3) - many.mean(axis=1)) <= allowed)
+    assert image.airlight.max() > 0
+    assert image.airlight_bound.max() < 0.03 * image.airlight.max()
