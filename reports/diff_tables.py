@@ -23,7 +23,10 @@ def print_difference(found: Difference) -> None:
 
 
 def _row(one: Finding) -> tuple[str, ...]:
-    return (one.verdict, one.scene, one.method, one.what, number(one.old, 4), number(one.new, 4), _change(one))
+    from rich.markup import escape  # units and refusals have brackets
+
+    words = (one.verdict, *(escape(part) for part in (one.scene, one.method, one.what)))
+    return (*words, number(one.old, 4), number(one.new, 4), _change(one))
 
 
 def _change(one: Finding) -> str:

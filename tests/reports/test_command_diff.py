@@ -57,6 +57,16 @@ def test_what_cannot_be_seen_on_a_busy_machine_is_said(files, capsys):
     assert "the machine was busy" in capsys.readouterr().out
 
 
+def test_brackets_are_printed(files, capsys):
+    new = report()
+    slow_down(method(new), 2.0)
+    method(new, "fog").update(refused="wanted a mesh [obj] in [0, 1]", times=None, error=None)
+    assert run(["diff", *files(report(), new)]) == 1
+    out = capsys.readouterr().out
+    assert "frame [ms]" in out
+    assert "wanted a mesh [obj] in [0, 1]" in out
+
+
 def test_everything_slower_is_one_finding():
     new = report(machine=2.0)
     found = compare_reports(report(), new)
