@@ -50,6 +50,8 @@ def load_report(path: Path | str) -> tuple[dict[str, Any], Path]:
     if fault:
         raise InputError(f"{file} does not keep to {wanted}: {fault}; make the report again")
     for name in named_files(data):
+        if Path(name).is_absolute() or ".." in Path(name).parts:
+            raise InputError(f"{file} names {name}, which is not in its folder; make the report again")
         if not (file.parent / name).is_file():
             raise InputError(f"{file} names {name}, which is not beside it; move a report with its whole folder")
     return data, file.parent

@@ -45,8 +45,8 @@ def _faults(value: Any, schema: Mapping[str, Any], root: Mapping[str, Any], plac
     if "anyOf" in schema:
         several = [list(_faults(value, one, root, place)) for one in schema["anyOf"]]
         if all(several):
-            # The choice that comes furthest into the value is the one that was meant.
-            yield max((one[0] for one in several), key=lambda fault: fault.partition(": ")[0].count("."))
+            # The choice that comes furthest into the value is the one that was meant; the last where several do.
+            yield max((one[0] for one in reversed(several)), key=lambda fault: fault.partition(": ")[0].count("."))
     if "const" in schema and value != schema["const"]:
         yield f"{place}: got {value!r}, wanted {schema['const']!r}"
     if "enum" in schema and value not in schema["enum"]:

@@ -38,6 +38,7 @@ class Effort:
     seconds: float  #: spent on each timing
     samples: int = 64  #: a pixel in each batch of these comparisons
     batches: int = 256  #: of these comparisons at most
+    multiple: tuple[int, int] = (32, 4)  #: batches, and samples a pixel in each, for the share of multiple scattering
     patience: float = 60.0  #: seconds after which an estimator that has not decided is stopped
     slow: float = 2.0  #: stages of a frame that takes longer are timed once [s]
     limit: float = 60.0  #: a frame that would take longer is not measured, and the report says so [s]
@@ -81,6 +82,7 @@ EFFORTS: dict[str, Effort] = {
             _margins(0.0005, 0.002),
             0.6,
             batches=4096,
+            multiple=(32, 16),
             patience=120.0,
             slow=2.0,
             limit=40.0,
@@ -169,7 +171,8 @@ def check_truth(study: SceneStudy, *, progress: Progress | None = None) -> dict[
 
 def study_multiple(study: SceneStudy) -> MultipleScattering:
     """Measure what single scattering leaves out of the image."""
-    return multiple_scattering_share(study.at(_MULTIPLE).scene)
+    batches, samples = study.effort.multiple
+    return multiple_scattering_share(study.at(_MULTIPLE).scene, batches=batches, samples=samples)
 
 
 def study_configuration(study: SceneStudy, chosen: Configuration) -> Measurement:

@@ -35,14 +35,24 @@ SCENE = """<scene version="3.0.0">
     <shape type="rectangle"><transform name="to_world"><scale value="6.3"/></transform></shape>
 </scene>
 """
-TINY = Effort("tiny", (20, 15), (12, 9), (10, 8), {"single-scatter": 0.2, "volpath": 0.5}, 0.01)
+TINY = Effort(
+    "tiny", (20, 15), (12, 9), (10, 8), {"single-scatter": 0.2, "volpath": 0.5}, 0.01, samples=4, multiple=(4, 1)
+)
 MARCH = Configuration("ray-march", None, (("steps", 50),))
 CHOSEN = (Configuration("unshadowed", "taylor"), Configuration("unshadowed", "quadrature"), MARCH)
 
 
 @pytest.fixture(scope="module")
-def written(variant, tmp_path_factory):
+def monkeypatch_of_module():
+    with pytest.MonkeyPatch.context() as patch:
+        yield patch
+
+
+@pytest.fixture(scope="module")
+def written(variant, tmp_path_factory, monkeypatch_of_module):
     """A report of one small scene; taylor refuses its tabulated phase function."""
+    # The cache that all tests share: what each of them finds in it is what this one left.
+    monkeypatch_of_module.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path_factory.getbasetemp() / "airlight-cache"))
     folder = tmp_path_factory.mktemp("report")
     (folder / "my <fog>.xml").write_text(SCENE)
     told = []
@@ -148,9 +158,9 @@ def test_every_number_of_the_data_is_on_the_page(written):
     (scene,) = written.data["scenes"]
     for one in scene["methods"][1:]:
         for name in ("frame", "airlight", "surface", "rebuild"):
-            assert f">{number(one['times'][name]['median_ms'])}<" in page
+            assert number(one["times"][name]["median_ms"]) in page
         for name in ("relative_rmse", "relative_bias", "p50", "p99"):
-            assert f">{percent(one['error'][name])}<" in page
+            assert percent(one["error"][name]) in page
     for agreed in scene["agreement"].values():
         assert percent(agreed["statistics"]["relative_bias"]) in page
         assert percent(agreed["uncorrected_bias"]) in page
@@ -166,7 +176,8 @@ def test_progress_rises_to_one(written):
     assert shares == sorted(shares)
     assert shares[0] == 0.0
     assert shares[-1] == pytest.approx(1.0)
-    assert all(what.startswith("my <fog>: ") for _, what in written.told)
+    assert all(what.startswith("my <fog>: ") for _, what in written.told[:-2])
+    assert [what for _, what in written.told[-2:]] == ["the page", "done"]
 
 
 def again(written, tmp_path, **options):
@@ -200,10 +211,19 @@ def test_fresh_measures_again_and_finds_the_same_errors(written, variant, tmp_pa
     assert written.data["scenes"][0]["agreement"] == found["scenes"][0]["agreement"]
 
 
-def test_a_changed_scene_is_measured_again(written, variant, tmp_path):
-    (tmp_path / "my <fog>.xml").write_text(SCENE.replace("0.31", "0.37"))
-    found = again(written, tmp_path, scenes=[str(tmp_path / "my <fog>.xml")], configurations=())
-    assert found["kept"] == 0
+def test_a_changed_scene_is_measured_again(written, variant, tmp_path, monkeypatch, own_cache):
+    """In a cache of its own: what it finds anew replaces what was kept."""
+    multiple = written.data["scenes"][0]["multiple"]
+    monkeypatch.setattr("reports.report_scene.check_truth", lambda study, progress: {})
+    monkeypatch.setattr("reports.report_scene.study_multiple", lambda study: multiple)
+    path = tmp_path / "mine.xml"
+    counts = []
+    for sigma_t in ("0.31", "0.31", "0.37"):
+        path.write_text(SCENE.replace("0.31", sigma_t))
+        found = again(written, tmp_path, scenes=[str(path)], configurations=())
+        counts.append((found["kept"], found["computed"]))
+    assert counts == [(0, 3), (3, 0), (0, 3)]
+    assert found["scenes"][0]["truth"]["mean"] != written.data["scenes"][0]["truth"]["mean"]
 
 
 def test_ctrl_c_leaves_nothing_half_written_and_says_what_is_kept(written, variant, tmp_path, monkeypatch):
