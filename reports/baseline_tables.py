@@ -10,10 +10,8 @@ from validation.baselines import Baseline, Move, changelog_line
 
 def print_moves(found: Mapping[str, Baseline], moves: Mapping[str, Sequence[Move]], stray: Sequence[str]) -> None:
     """Print what moved, and a line for each scene."""
-    from rich.markup import escape  # refusals may have brackets
-
     rows = [
-        (one.scene, one.label, escape(one.what), number(one.old, 6), number(one.new, 6), number(one.allowed, 2))
+        (one.scene, one.label, one.what, number(one.old, 6), number(one.new, 6), number(one.allowed, 2))
         for changed in moves.values()
         for one in changed
     ]

@@ -23,9 +23,7 @@ def print_difference(found: Difference) -> None:
 
 
 def _row(one: Finding) -> tuple[str, ...]:
-    from rich.markup import escape  # units and refusals have brackets
-
-    words = (one.verdict, *(escape(part) for part in (one.scene, one.method, one.what)))
+    words = (one.verdict, one.scene, one.method, one.what)
     return (*words, number(one.old, 4), number(one.new, 4), _change(one))
 
 

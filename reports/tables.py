@@ -41,9 +41,9 @@ def _print(table) -> None:
     """Print a table as wide as the terminal, or as it needs where piped."""
     from rich.console import Console
 
-    console = Console(highlight=False)
+    console = Console(highlight=False, markup=False)
     if not console.is_terminal:
-        console = Console(highlight=False, width=240)
+        console = Console(highlight=False, markup=False, width=240)
     console.print(table)
 
 
