@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Point, spot and directional lights as Dr.Jit values.
 
-A directional light is at infinity. What it lights is the media with bounds, all within a ball; a plane across the light
-before all shapes stands for its place, and depths along the light are measured from there.
+A directional light is at infinity. What it lights is media with bounds; the middle of a face across it, before all
+shapes, stands for its place (`realtime.parallel_face`), and depths along the light are measured from there.
 """
 
 import math
@@ -22,14 +22,24 @@ class Cone:
 
 
 @dataclass(frozen=True)
+class Face:
+    """A rectangle across a directional light, before all shapes, and the media behind it."""
+
+    across: Any  #: half of one side, a three-vector [m]
+    up: Any  #: half of the other [m]
+    depth: Any  #: how far behind it the media end, at most [m]
+    media: Any  #: middles of balls whose hull holds the media, several entries [m]
+    radii: Any  #: their radii [m]
+    back: Any  #: how far before the middle of the media the face is, in any direction [m]
+
+
+@dataclass(frozen=True)
 class Light:
     """A light. The arrays hold one entry and are opaque, so a light that moves recompiles nothing."""
 
     kind: str  #: 'point', 'spot' or 'directional'
     soft: bool  #: spot: the intensity falls off between beam and cut-off; else constant inside the cone
-    position: (
-        Any  #: three-vector; directional: a point before all shapes, on the line through the middle of the media [m]
-    )
+    position: Any  #: three-vector; directional: the middle of `face` [m]
     intensity: Any  #: radiant intensity on the axis [W/sr], RGB; directional: irradiance of a plane across it [W/m^2]
     axis: Any = None  #: spot: unit vector from the light along its axis; directional: in which the light travels
     axis_low: Any = None  #: spot, directional: what rounding took from `axis`
@@ -37,9 +47,7 @@ class Light:
     cone: Any = None  #: spot: the `Cone` of the cut-off
     beam: Any = None  #: soft spot: the `Cone` in which the intensity is full
     inverse_transition: Any = None  #: soft spot: 1 / (cutoff - beam) [1/rad]
-    centre: Any = None  #: directional: middle of a ball that holds all media, whatever the direction [m]
-    reach: Any = None  #: directional: radius of that ball [m]
-    back: Any = None  #: directional: from `position` to `centre` [m]
+    face: Any = None  #: directional: the `Face` through which all light of the media comes
 
     @property
     def cos_cutoff(self) -> Any:
@@ -72,33 +80,6 @@ def spot_fields(axis, cutoff: float, beam: float, types: ArrayTypes) -> dict[str
     if beam < cutoff:
         fields |= {"beam": _cone(beam, types), "inverse_transition": types.scalar(1 / (cutoff - beam))}
     return fields
-
-
-def directional_fields(axis, centre, *, reach: float, back: float, types: ArrayTypes) -> dict[str, Any]:
-    """Return the fields of a directional `Light` that follow from where it comes from and what it lights.
-
-    Parameters
-    ----------
-    axis
-        Unit vector in which the light travels, in float64.
-    centre, reach
-        Of the ball that holds the media [m].
-    back
-        How far before its centre nothing is any more [m].
-    types
-        Of the arrays.
-    """
-    import numpy as np
-
-    high, low = with_low(axis, types)
-    vectors = {
-        "position": np.asarray(centre, dtype=np.float64) - back * np.asarray(axis, dtype=np.float64),
-        "axis": high,
-        "axis_low": low,
-        "centre": centre,
-    }
-    fields: dict[str, Any] = {name: types.vector(*(float(one) for one in vector)) for name, vector in vectors.items()}
-    return fields | {"reach": types.scalar(reach), "back": types.scalar(back)}
 
 
 def with_low(values, types: ArrayTypes):

@@ -17,8 +17,9 @@ from realtime.arrays import types_of
 from realtime.casters import Casters
 from realtime.errors import InputError
 from realtime.facets import read_facets
-from realtime.lights import Light, directional_fields
+from realtime.lights import Light
 from realtime.medium import Medium
+from realtime.parallel_face import directional_fields, face_balls
 from realtime.scene import Scene
 
 Array = NDArray[np.float64]
@@ -49,16 +50,9 @@ def turned_light(light: Light, about: Array, turn: Array) -> Light:
 
 
 def _turned_sun(light: Light, turn: Array) -> dict[str, Any]:
-    import drjit as dr
-
-    high, low, centre = (
-        np.array(part, dtype=np.float64).ravel() for part in (light.axis, light.axis_low, light.centre)
-    )
-    types = types_of(type(light.reach))
-    reach, back = float(light.reach[0]), float(light.back[0])
-    fields = directional_fields(turn @ (high + low), centre, reach=reach, back=back, types=types)
-    dr.make_opaque(*fields.values())
-    return fields
+    high, low = (np.array(part, dtype=np.float64).ravel() for part in (light.axis, light.axis_low))
+    types = types_of(type(light.face.back))
+    return directional_fields(turn @ (high + low), face_balls(light.face), float(light.face.back[0]), types)
 
 
 def coloured_light(light: Light, share: float) -> Light:

@@ -13,8 +13,9 @@ from realtime.arrays import ArrayTypes, array_types, is_single
 from realtime.camera import Camera
 from realtime.errors import InputError
 from realtime.facets import Facets, read_facets
-from realtime.lights import Light, directional_fields, spot_fields
+from realtime.lights import Light, spot_fields
 from realtime.medium import Medium
+from realtime.parallel_face import directional_fields, distance_before, media_balls
 from realtime.plan import Plan
 from realtime.scene_media import opaque_scene, read_medium, sort_shapes
 
@@ -138,28 +139,10 @@ def _read_directional(emitter, medium: Medium, opaque, types: ArrayTypes) -> Lig
     matrix = np.array(emitter.world_transform().matrix, dtype=np.float64).reshape(4, 4)
     axis = matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])
     arrays: dict[str, Any] = {"intensity": types.color(*(float(c) for c in irradiance))}
-    centre, reach, back = _lit_ball(medium, opaque)
-    arrays |= directional_fields(axis, centre, reach=reach, back=back, types=types)
+    balls = media_balls(medium.bodies)
+    arrays |= directional_fields(axis, balls, distance_before(balls, opaque), types)
     dr.make_opaque(*arrays.values())
     return Light("directional", False, **arrays)
-
-
-def _lit_ball(medium: Medium, opaque):
-    """Return middle and radius of a ball that holds all bodies, and how far from there nothing is any more [m].
-
-    An object that turns about the middle of its box stays within the ball about the box.
-    """
-    import numpy as np
-
-    middles = np.array([np.array(body.centre, dtype=np.float64).ravel() for body in medium.bodies])
-    radii = np.array([float(body.radius[0]) for body in medium.bodies])
-    centre = 0.5 * ((middles - radii[:, None]).min(axis=0) + (middles + radii[:, None]).max(axis=0))
-    reach = 1.001 * float((np.linalg.norm(middles - centre, axis=1) + radii).max())
-    back = reach
-    for shape in opaque:
-        low, high = (np.array(corner, dtype=np.float64).ravel() for corner in (shape.bbox().min, shape.bbox().max))
-        back = max(back, float(np.linalg.norm(0.5 * (low + high) - centre) + 0.5 * np.linalg.norm(high - low)))
-    return centre, reach, 1.001 * back
 
 
 def _read_colour(value, name: str, unit: str):

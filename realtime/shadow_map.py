@@ -8,9 +8,9 @@ first surface [m], infinite where there is none. So the outermost values lie on 
 of a cube meet with the same values. The planar depth, along the axis, is the distance over the length of axis + u
 across + v up (`realtime.light_heights`).
 
-The face of a directional light is a square across it, before all shapes, as large as the ball that holds the media:
-|across| = |up| = the radius of that ball [m]. The ray of (u, v) starts at position + u across + v up and goes along the
-axis, and its distance is the planar depth. Surfaces beside that square are in no map: rays find their shadows.
+The face of a directional light is a rectangle across it, before all shapes, that just covers the media, and |across|,
+|up| are half its sides [m]. The ray of (u, v) starts at position + u across + v up and goes along the axis; its
+distance is the planar depth. Surfaces beside that rectangle are in no map: rays find their shadows.
 
 Directions are computed in float64 and rounded once, to the float32 that rays are cast in: a ray that passes an edge
 closely meets the same surface whatever the precision of the method, and one map can stand for both.
@@ -102,7 +102,7 @@ def cast_shadow_map(scene, light: Light, size: int) -> ShadowMap:
     hit = scene.ray_intersect_preliminary(ray, coherent=True)
     distance = dr.select(hit.is_valid(), Float(hit.t), dr.inf)
     frame = frame and tuple(type(light.position)(one) for one in frame)
-    depth = light.back + light.reach if parallel else None
+    depth = light.face.depth if parallel else None
     dr.eval(distance, frame, depth)  # once: whoever reads it would cast the rays again
     return ShadowMap(size, distance, frame, depth)
 
@@ -119,7 +119,7 @@ def lit_in_map(shadow_map: ShadowMap, light: Light, point):
         face, u, v = cube_coordinates(d)
     elif shadow_map.depth is not None:
         face = mi.UInt32(0)
-        u, v, depth = face_coordinates(shadow_map.frame, face, d)
+        u, v, depth = parallel_coordinates(shadow_map.frame, d)
     else:
         face = mi.UInt32(0)
         a, b, c = face_coordinates(shadow_map.frame, face, d)
@@ -154,18 +154,25 @@ def face_coordinates(frame, face, vector):
     return a, b, c
 
 
+def parallel_coordinates(frame, vector):
+    """Return (u, v, c) of a vector u across + v up + c axis of the face of a directional light."""
+    import drjit as dr
+
+    a, b, c = face_products(frame, None, vector)
+    return a * dr.rcp(dr.squared_norm(frame[0])), b * dr.rcp(dr.squared_norm(frame[1])), c
+
+
 def _frame(light: Light):
-    """Return two vectors across a light's axis and the axis, in float64; their length is tan(cutoff) or the reach."""
+    """Return two vectors across a light's axis and the axis, in float64; of a spot they have the length tan(cutoff)."""
     import drjit as dr
     import mitsuba as mi
 
     axis = mi.Vector3d(light.axis) + mi.Vector3d(light.axis_low)
+    if light.kind == "directional":
+        return mi.Vector3d(light.face.across), mi.Vector3d(light.face.up), axis
     # Any vector that is not parallel to the axis will do to start from.
     helper = dr.select(dr.abs(axis.x) < 0.5, type(axis)(1, 0, 0), type(axis)(0, 1, 0))
     across = dr.normalize(dr.cross(helper, axis))
-    if light.kind == "directional":
-        reach = mi.Float64(light.reach)
-        return across * reach, dr.cross(axis, across) * reach, axis
     square = mi.Float64(light.cone.square_sin) + mi.Float64(light.cone.square_sin_low)
     scale = dr.sqrt(square / (1 - square))
     return across * scale, dr.cross(axis, across) * scale, axis

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from realtime.light_heights import LightHeights, node_bounds
-from realtime.shadow_map import face_coordinates
+from realtime.shadow_map import face_coordinates, parallel_coordinates
 
 _NEARER = 1 - 1e-4  # of the nearest height, with room for rounding
 _STEEP = 1e30  # stands for 1/0: lines that are never crossed lie far beyond [0, 1]
@@ -52,6 +52,7 @@ def in_face(heights: LightHeights, face, away, direction, segment):
     da, db, dc = face_coordinates(heights.frame, face, direction)
     begin, end = segment
     if heights.depth is not None:
+        (a0, b0, c0), (da, db, dc) = (parallel_coordinates(heights.frame, one) for one in (away, direction))
         begin, end = _cut(begin, end, heights.depth - c0, -dc)
         c0, dc = type(c0)(1), type(dc)(0)
     # The neighbours across come later in the order of axes, but for the last axis; those above only for the first one.
@@ -90,6 +91,7 @@ def face_ray(heights: LightHeights, face, away, direction, segment) -> FaceRay:
     zero = mi.UInt32(0)
     _, highest = node_bounds(heights, face, zero, zero, zero)
     if heights.depth is not None:
+        (a0, b0, c0), (da, db, dc) = (parallel_coordinates(heights.frame, one) for one in (away, direction))
         s0 = heights.depth - c0
         t0, t1 = _cut(begin, end, highest / _NEARER - s0, dc)
         walks = (t0 < t1) & (highest > 0)

@@ -182,7 +182,9 @@ def _march_parallel(view: View, media: ParallelRay, segment, *, steps: int, lit)
 
     x0, x1 = segment
     Float = type(view.distance)
-    width = (x1 - x0) / steps
+    # Rays that miss all bodies march on the spot: a map has no place for points at infinity.
+    meets = x1 > x0
+    x0, width = dr.select(meets, x0, 0), dr.select(meets, (x1 - x0) / steps, 0)
 
     def step(index, total):
         x = dr.fma(Float(index) + 0.5, width, x0)
@@ -195,4 +197,4 @@ def _march_parallel(view: View, media: ParallelRay, segment, *, steps: int, lit)
         body=step,
         labels=("index", "total"),
     )
-    return dr.select(width > 0, total * width, 0)
+    return total * width
