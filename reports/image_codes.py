@@ -59,7 +59,7 @@ class Precision:
 
 
 #: From fine to coarse.
-PRECISIONS = (Precision(1000, 5e-5), Precision(250, 1e-4))
+PRECISIONS = (Precision(1000, 5e-5), Precision(250, 1e-4), Precision(100, 1e-4))
 
 
 @dataclass(frozen=True)

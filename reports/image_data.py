@@ -2,9 +2,9 @@
 """The images of a report as data for its page: packed, with an index that the page's script reads.
 
 Each scene becomes one string of base64 that holds all of its packed planes, and an entry of the index that says where
-each lies and how it was coded (`reports.image_codes`). A page has a limit of bytes; each scene gets its share of what
-is left of it, and the finest of `LADDER` that fits (`reports.image_kept`): first the differences are coded more
-coarsely, then every second, third ... pixel is kept. What was done is in the index, and the page says so.
+each lies and how it was coded (`reports.image_codes`). A page has a limit of bytes; the largest scenes go down `LADDER`
+until all fit (`reports.image_kept`): first the differences are coded more coarsely, then every second, third ... pixel
+is kept. What was done is in the index, and the page says so.
 """
 
 import base64
@@ -41,7 +41,7 @@ DARK = 1e-3  #: share of the mean of the reference below which a relative error 
 #: Precision of the differences, and which pixels are kept: from the finest down.
 LADDER: tuple[tuple[Precision, int], ...] = (
     *((precision, 1) for precision in PRECISIONS),
-    *((precision, stride) for stride in (2, 3, 4, 6, 8, 12, 16) for precision in PRECISIONS),
+    *((PRECISIONS[1], stride) for stride in (2, 3, 4, 6, 8, 12, 16)),
 )
 
 

@@ -7,7 +7,7 @@ that packs; so nothing is ever out of date, and a damaged entry is made again.
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -21,39 +21,50 @@ from reports.image_data import LADDER, SceneImages, packed_scene, read_images
 _CODE = ("image_codes.py", "image_data.py")
 
 
-def scene_images(scene: Mapping[str, Any], folder: Path, limit: int) -> SceneImages:
-    """Return the images of a scene, in no more than so many characters.
+def page_images(scenes: Sequence[Mapping[str, Any]], folder: Path, limit: int) -> list[SceneImages]:
+    """Return the images of scenes, all together in no more than so many characters.
+
+    Every scene begins with the finest rung of `LADDER`; while the page is too large the largest goes a rung down.
 
     Parameters
     ----------
-    scene
-        A scene of report.json.
+    scenes
+        Scenes of report.json.
     folder
-        Where the files that it names lie.
+        Where the files that they name lie.
     limit
-        Of the length of `data`.
+        Of the sum of the lengths of `data`.
 
     Raises
     ------
     InputError
         If a file is missing or cannot be read, its size is not that of the reference, or nothing of `LADDER` fits.
     """
-    name = _name(scene, folder)
-    images = None
-    for precision, stride in LADDER:
-        rung = f"{name}-{precision.k:g}-{stride}"
-        found = _load(rung)
-        if found is None:
-            images = images or read_images(scene, folder)
-            found = packed_scene(scene, images, precision, stride)
-            _keep(rung, found)
-        size = len(found.data)
-        if size <= limit:
-            return found
-    raise InputError(
-        f"report: the images of {scene['name']} take {size / 1e6:.1f} MB of the page even with one pixel in "
-        f"{stride} along both axes, wanted at most {limit / 1e6:.1f} MB; report fewer scenes or methods at once"
-    )
+    names = [_name(scene, folder) for scene in scenes]
+    rungs = [0] * len(scenes)
+    found = [_scene_images(scene, folder, name, 0) for scene, name in zip(scenes, names)]
+    while (total := sum(len(one.data) for one in found)) > limit:
+        coarser = [place for place, rung in enumerate(rungs) if rung + 1 < len(LADDER)]
+        if not coarser:
+            raise InputError(
+                f"report: the images take {total / 1e6:.1f} MB of the page even with one pixel in {LADDER[-1][1]} "
+                f"along both axes, wanted at most {limit / 1e6:.1f} MB; report fewer scenes or methods at once"
+            )
+        largest = max(coarser, key=lambda place: len(found[place].data))
+        rungs[largest] += 1
+        found[largest] = _scene_images(scenes[largest], folder, names[largest], rungs[largest])
+    return found
+
+
+def _scene_images(scene: Mapping[str, Any], folder: Path, name: str, rung: int) -> SceneImages:
+    """Return the images of a scene at a rung of the ladder, kept or packed now."""
+    precision, stride = LADDER[rung]
+    kept = f"{name}-{precision.k:g}-{stride}"
+    found = _load(kept)
+    if found is None:
+        found = packed_scene(scene, read_images(scene, folder), precision, stride)
+        _keep(kept, found)
+    return found
 
 
 def _name(scene: Mapping[str, Any], folder: Path) -> str:

@@ -16,7 +16,7 @@ from reports.charts import speed_error_chart
 from reports.claims import verdict
 from reports.colour_maps import signed_colours, unsigned_colours
 from reports.image_data import SceneImages
-from reports.image_kept import scene_images
+from reports.image_kept import page_images
 from reports.page_published import BILLETER_PASSES, BILLETER_SIZE
 from reports.page_published import FILTERS as PUBLISHED_FILTERS
 from reports.page_words import FILTERS, KEYS, KINDS, MARKS, kept_words, precision_words, viewer_words
@@ -57,7 +57,7 @@ def render_page(data: dict[str, Any], folder: Path, *, limit: int = PAGE_LIMIT) 
     environment.filters |= {**FILTERS, **PUBLISHED_FILTERS, "verdict": verdict}
     # A scene of which nothing could be shown has no viewer, and no images in the page.
     with_images = [scene for scene in data["scenes"] if any(one["files"] for one in scene["methods"])]
-    images = _images(with_images, Path(folder), limit - WORDS_LIMIT)
+    images = page_images(with_images, Path(folder), limit - WORDS_LIMIT)
     number_of = {id(scene): number for number, scene in enumerate(with_images)}
     page = environment.get_template("report.html.j2").render(
         report=data,
@@ -84,15 +84,6 @@ def render_page(data: dict[str, Any], folder: Path, *, limit: int = PAGE_LIMIT) 
             "report fewer scenes or methods at once"
         )
     return page
-
-
-def _images(scenes: Sequence[Mapping[str, Any]], folder: Path, limit: int) -> list[SceneImages]:
-    """Return the images of the scenes; each may take its share of what those before it left."""
-    found: list[SceneImages] = []
-    for place, scene in enumerate(scenes):
-        left = limit - sum(len(one.data) for one in found)
-        found.append(scene_images(scene, folder, left // (len(scenes) - place)))
-    return found
 
 
 def _viewer(scene: Mapping[str, Any], number: int, images: SceneImages) -> dict[str, Any]:

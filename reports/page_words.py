@@ -111,7 +111,8 @@ def viewer_words(index: Mapping[str, Any]) -> str:
     size = f"{width} \N{MULTIPLICATION SIGN} {height} pixels"
     if stride > 1:
         size += f", of which the page holds one in {stride} along both axes to stay small; the files have all"
-    return f"{size}. Exposure {number(index['exposure'])}\N{MULTIPLICATION SIGN} at 0 stops."
+    exposure = f"Exposure {number(index['exposure'])}\N{MULTIPLICATION SIGN} at 0 stops."
+    return f"{size}, differences rounded to {percent(index['of_difference'], 2)} of themselves. {exposure}"
 
 
 def precision_words(indices: Sequence[Mapping[str, Any]]) -> str:

@@ -9,7 +9,7 @@ from reference.exr import Image, read_exr, write_exr
 from reports.image_codes import DIFFERENCE_BITS, REFERENCE_BITS, Packed, decode_planes, difference_values
 from reports.image_codes import reference_values as values_of
 from reports.image_data import DARK, LADDER, relative_difference
-from reports.image_kept import scene_images
+from reports.image_kept import page_images
 from tests.page_for_tests import HEIGHT, WIDTH, engine_image, images, report_data, write_files
 
 
@@ -21,6 +21,10 @@ def folder(tmp_path_factory):
 @pytest.fixture
 def scene():
     return report_data()["scenes"][0]
+
+
+def scene_images(scene, folder, limit):
+    return page_images([scene], folder, limit)[0]
 
 
 def planes(found, entry, bits):
@@ -89,10 +93,13 @@ def test_limit_is_kept_by_coarser_differences_then_fewer_pixels(scene, folder):
             assert "one pixel in 16" in str(error)  # noqa: PT017
             break
         assert len(found.data) <= limit
-        seen.append((found.index["stride"], -found.index["s"]))
+        seen.append((found.index["stride"], found.index["of_difference"]))
         limit = len(found.data) - 1
-    assert seen == sorted(seen, key=lambda one: (one[0], -one[1]))
-    assert seen[0][0] == 1
+    strides = [stride for stride, _ in seen]
+    assert strides == sorted(strides)
+    whole_pixels = [rounding for stride, rounding in seen if stride == 1]
+    assert whole_pixels == sorted(whole_pixels)
+    assert len(whole_pixels) > 1
     assert seen[-1][0] > 1
     assert LADDER[0][1] == 1
 
@@ -150,3 +157,11 @@ def test_damaged_entry_is_made_again(scene, tmp_path, own_cache):
     (kept,) = own_cache.glob("page-*.npz")
     kept.write_bytes(kept.read_bytes()[:-9])
     assert scene_images(scene, tmp_path, 10**8) == first
+
+
+def test_largest_scene_gives_way_first(scene, folder):
+    small = scene | {"methods": scene["methods"][:1]}
+    both = page_images([small, scene], folder, 10**8)
+    fitted = page_images([small, scene], folder, sum(len(one.data) for one in both) - 1)
+    assert fitted[0] == both[0]
+    assert fitted[1].index["of_difference"] > both[1].index["of_difference"]
