@@ -14,9 +14,9 @@ the five planes misses the beam. Those through the light have gs = 0: they bound
 which others alone do not, since a box at a depth discontinuity is long in s.
 
 Where the rays of the light are parallel, "through the light" is along its axis, and with
-P = (light + depth axis) + u across + v up - s axis the coefficients are
+P = light + u across + v up - s axis the coefficients are
 
-    (gu, gv) = w . (across, up),   g0 = w . (light + depth axis - camera),   gs = -w . axis.
+    (gu, gv) = w . (across, up),   g0 = w . (light - camera),   gs = -w . axis.
 """
 
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ class Beam:
     normals: list[Any]  #: of the four planes through the camera
     middle: Any  #: unit direction
     end: Any  #: no ray goes farther along the middle [m]
-    light: Any  #: light - camera; of a directional light, less the camera, the middle of the plane where s = 0 [m]
+    light: Any  #: light - camera [m]
     parallel: bool = False  #: whether the rays of the light are parallel
 
 
@@ -58,7 +58,7 @@ def make_beam(directions, end, light, axis=None) -> Beam:
     end
         Largest distance to a surface, by tile, infinite where a ray meets none [m].
     light
-        The light less the camera, see `Beam` [m].
+        The light less the camera [m].
     axis
         Direction of a directional light.
     """

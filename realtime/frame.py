@@ -223,7 +223,7 @@ def _visible(geometry, point, light):
 
     if light.kind == "directional":
         # From the point on, where a ray is exact, though not from the surface that it may lie on.
-        away = 2e-6 * dr.abs(dr.dot(point - light.position, light.axis))
+        away = 2e-6 * light.face.depth
         return ~geometry.ray_test(mi.Ray3f(mi.Point3f(point - light.axis * away), mi.Vector3f(-light.axis)))
     start = mi.Point3f(light.position)
     direction = mi.Vector3f(point) - mi.Vector3f(start)

@@ -10,8 +10,8 @@ and (u, v, s) are projective coordinates of P: planes stay planes and lines stay
 displaced grid are triangles over the texels of the map, linear in s; a camera ray is a straight line; and a point is
 lit where its s is above the height field. Where nothing is hit s = 0: a vertex at infinity.
 
-The map of a directional light has parallel rays: P = position + u across + v up + (depth - s) axis, with s the height
-above the plane behind which there are no media; what is hit beyond it has s = 0. All the rest is the same.
+The map of a directional light has parallel rays: P = light + u across + v up - s axis, with s the height above the
+plane through "light" behind which there are no media; what is hit beyond it has s = 0. All the rest is the same.
 
 A texel is cut along the diagonal from its corner (0, 0) to (1, 1), into
 
@@ -41,7 +41,7 @@ class LightHeights:
     frame: tuple[Any, Any, Any] | None  #: of a spot's face, see `realtime.shadow_map`; None for a cube
     texels: Any  #: the heights s00, s10, s01, s11 of every texel, face by face, row by row [1/m]
     bounds: Any  #: least and largest height of every node of the pyramid, face by face [1/m]
-    depth: Any = None  #: of a directional light: how deep the plane is that heights are above, see `ShadowMap`
+    depth: Any = None  #: of a directional light: distance of the plane that heights are above, see `ShadowMap` [m]
 
     @property
     def faces(self) -> int:

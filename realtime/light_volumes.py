@@ -118,9 +118,8 @@ def _walk(heights: LightHeights, airlight: RayAirlight):
 
     view = airlight.view
     toward = airlight.light.position - view.origin
-    middle = toward if heights.axis is None else dr.fma(heights.axis, heights.depth, toward)
     leaves = tile_leaves(
-        heights, lambda lane: view.rays(lane)[0], view.distance, light=middle, square=view.square_tiles
+        heights, lambda lane: view.rays(lane)[0], view.distance, light=toward, square=view.square_tiles
     )
     zero = dr.zeros(integral_type(view), dr.width(view.distance))
     place = {"away": -toward, "direction": view.direction, "segment": airlight.segment}

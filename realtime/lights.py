@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Point, spot and directional lights as Dr.Jit values.
 
-A directional light is at infinity. What it lights is media with bounds; the middle of a face across it, before all
-shapes, stands for its place (`realtime.parallel_face`), and depths along the light are measured from there.
+A directional light is at infinity. What it lights is media with bounds; the middle of a face across it, where these
+end, stands for its place (`realtime.parallel_face`).
 """
 
 import math
@@ -23,14 +23,14 @@ class Cone:
 
 @dataclass(frozen=True)
 class Face:
-    """A rectangle across a directional light, before all shapes, and the media behind it."""
+    """A rectangle across a directional light where the media end, and the media before it."""
 
     across: Any  #: half of one side, a three-vector [m]
     up: Any  #: half of the other [m]
-    depth: Any  #: how far behind it the media end, at most [m]
+    depth: Any  #: how far before it there are no shapes any more [m]
     media: Any  #: middles of balls whose hull holds the media, several entries [m]
     radii: Any  #: their radii [m]
-    back: Any  #: how far before the middle of the media the face is, in any direction [m]
+    back: Any  #: how far from the middle of the media there are none, in any direction [m]
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The face of a directional light: the smallest rectangle across it through which all light of the media comes.
 
+Light enters there before all shapes, and leaves through the same rectangle behind the media. Heights above that end are
+small numbers where depths may be large ones, so its middle stands for the place of the light.
+
 The media lie in the hull of some balls: the corners of bodies of few planes, which are balls of radius 0, and the balls
-about the others. Seen along the light their rectangle is wanted at the angle at which it has the least area. It stands
-before all shapes, and depths along the light are measured from it.
+about the others. Seen along the light their rectangle is wanted at the angle at which it has the least area.
 """
 
 from itertools import combinations
@@ -20,12 +22,19 @@ Array = NDArray[np.float64]
 
 _FEW_PLANES = 12  # of which every three are met
 _ANGLES = 90  # that are tried, in a quarter of a turn
+_BITS = 14  # of the numbers of a ball
 _MARGIN = 1.001  # so that rounding leaves nothing outside
 
 
 def media_balls(bodies: tuple[Body, ...]) -> Array:
-    """Return balls whose hull holds bodies: middles and radii [m], (balls, 4)."""
-    return np.concatenate([_balls(body) for body in bodies])
+    """Return balls whose hull holds bodies: middles and radii [m], (balls, 4).
+
+    Numbers are rounded, and the balls grown by as much: what the precision of the bodies puts in their last digits must
+    not move the rays of a map.
+    """
+    balls = np.concatenate([_balls(body) for body in bodies])
+    grain = 2.0 ** np.ceil(np.log2(np.ptp(balls[:, :3], axis=0).max() + balls[:, 3].max()) - _BITS)
+    return grain * (np.round(balls / grain) + np.array([0, 0, 0, 2]))
 
 
 def distance_before(balls: Array, shapes) -> float:
@@ -39,7 +48,7 @@ def distance_before(balls: Array, shapes) -> float:
         low, high = (np.array(corner, dtype=np.float64).ravel() for corner in (shape.bbox().min, shape.bbox().max))
         ball = np.linalg.norm(0.5 * (low + high) - middle) + 0.5 * np.linalg.norm(high - low)
         reach = np.append(reach, ball)
-    return _MARGIN * float(reach.max())
+    return float(np.float32(_MARGIN * reach.max()))
 
 
 def directional_fields(axis: Array, balls: Array, back: float, types: ArrayTypes) -> dict[str, Any]:
@@ -63,12 +72,12 @@ def directional_fields(axis: Array, balls: Array, back: float, types: ArrayTypes
     high, low = with_low(axis, types)
     middle = _middle(balls)
     across, up, corner = _least_rectangle(axis, balls[:, :3] - middle, balls[:, 3])
-    depth = back + _MARGIN * float(((balls[:, :3] - middle) @ axis + balls[:, 3]).max())
-    vectors = {"position": middle + corner - back * axis, "across": across, "up": up}
+    behind = _MARGIN * float(((balls[:, :3] - middle) @ axis + balls[:, 3]).max())
+    vectors = {"position": middle + corner + behind * axis, "across": across, "up": up}
     made = {name: _vector(vector.astype(np.float32), types) for name, vector in vectors.items()}
     position = made.pop("position")
     media = types.vector(*(types.scalar(column) for column in balls[:, :3].T))
-    numbers = {"depth": types.scalar(float(np.float32(depth))), "back": types.scalar(back)}
+    numbers = {"depth": types.scalar(float(np.float32(back + behind))), "back": types.scalar(back)}
     face = Face(**made, **numbers, media=media, radii=types.scalar(balls[:, 3]))
     fields = {"position": position, "axis": _vector(high, types), "axis_low": _vector(low, types), "face": face}
     dr.make_opaque(*fields.values())

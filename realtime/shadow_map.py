@@ -8,9 +8,9 @@ first surface [m], infinite where there is none. So the outermost values lie on 
 of a cube meet with the same values. The planar depth, along the axis, is the distance over the length of axis + u
 across + v up (`realtime.light_heights`).
 
-The face of a directional light is a rectangle across it, before all shapes, that just covers the media, and |across|,
-|up| are half its sides [m]. The ray of (u, v) starts at position + u across + v up and goes along the axis; its
-distance is the planar depth. Surfaces beside that rectangle are in no map: rays find their shadows.
+The face of a directional light is a rectangle across it that just covers the media, and |across|, |up| are half its
+sides [m]. It lies where the media end; the ray of (u, v) starts at position + u across + v up - depth axis, before all
+shapes, and goes along the axis. Surfaces beside that rectangle are in no map: rays find their shadows.
 
 Directions are computed in float64 and rounded once, to the float32 that rays are cast in: a ray that passes an edge
 closely meets the same surface whatever the precision of the method, and one map can stand for both.
@@ -31,7 +31,7 @@ class ShadowMap:
     size: int  #: texels on a side
     distance: Any  #: faces (size + 1)^2 values along the rays [m]
     frame: tuple[Any, Any, Any] | None  #: of a spot or directional light: across, up and axis; None for a cube
-    depth: Any = None  #: of a directional light: how deep the media end, at most; its rays are parallel [m]
+    depth: Any = None  #: of a directional light: distance at which the media end; its rays are parallel [m]
 
     @property
     def faces(self) -> int:
@@ -91,7 +91,8 @@ def cast_shadow_map(scene, light: Light, size: int) -> ShadowMap:
     v = dr.fma(Double(row - face * side), 2.0 / size, -1.0)
     start = mi.Point3f(light.position)
     if parallel and frame is not None:
-        start = mi.Point3f(mi.Vector3d(light.position) + frame[0] * u + frame[1] * v)
+        before = mi.Vector3d(light.position) - frame[2] * mi.Float64(light.face.depth)
+        start = mi.Point3f(before + frame[0] * u + frame[1] * v)
         unit = frame[2]
     elif frame is not None:
         unit = dr.normalize(frame[0] * u + frame[1] * v + frame[2])
@@ -128,7 +129,7 @@ def lit_in_map(shadow_map: ShadowMap, light: Light, point):
     column = mi.UInt32(dr.clip(dr.fma(u, 0.5 * size, 0.5 * (size + 1)), 0, size))
     row = mi.UInt32(dr.clip(dr.fma(v, 0.5 * size, 0.5 * (size + 1)), 0, size))
     stored = dr.gather(Float, shadow_map.distance, (face * (size + 1) + row) * (size + 1) + column)
-    return dr.squared_norm(d) <= dr.square(stored) if depth is None else depth <= stored
+    return dr.squared_norm(d) <= dr.square(stored) if depth is None else depth <= stored - shadow_map.depth
 
 
 def face_products(frame, face, vector):

@@ -9,7 +9,7 @@ has
 and y = x / c. All four are linear along the projective line: with t from 0 to 1 between two points of the ray, each is
 (1 - t) its value at one and t its value at the other, and x = y / s. At the end of an endless ray s = 0 and y = 1 / dc.
 
-Of a directional light's face u, v and s = depth - c are linear in x itself, so y = x with weight 1 in place of s; the
+Of a directional light's face u, v and s = -c are linear in x itself, so y = x with weight 1 in place of s; the
 ray is cut where s = 0, and all before the largest height is lit.
 
 The part of the ray in the face is cut out by c + a >= 0, c - a >= 0, c + b >= 0, c - b >= 0. A ray that stays on the
@@ -53,7 +53,7 @@ def in_face(heights: LightHeights, face, away, direction, segment):
     begin, end = segment
     if heights.depth is not None:
         (a0, b0, c0), (da, db, dc) = (parallel_coordinates(heights.frame, one) for one in (away, direction))
-        begin, end = _cut(begin, end, heights.depth - c0, -dc)
+        begin, end = _cut(begin, end, -c0, -dc)
         c0, dc = type(c0)(1), type(dc)(0)
     # The neighbours across come later in the order of axes, but for the last axis; those above only for the first one.
     for start, slope, is_first in (
@@ -92,10 +92,9 @@ def face_ray(heights: LightHeights, face, away, direction, segment) -> FaceRay:
     _, highest = node_bounds(heights, face, zero, zero, zero)
     if heights.depth is not None:
         (a0, b0, c0), (da, db, dc) = (parallel_coordinates(heights.frame, one) for one in (away, direction))
-        s0 = heights.depth - c0
-        t0, t1 = _cut(begin, end, highest / _NEARER - s0, dc)
+        t0, t1 = _cut(begin, end, highest / _NEARER + c0, dc)
         walks = (t0 < t1) & (highest > 0)
-        ends = [_parallel_coordinates(heights.size, x, (a0, b0, s0), (da, db, -dc), walks) for x in (t0, t1)]
+        ends = [_parallel_coordinates(heights.size, x, (a0, b0, -c0), (da, db, -dc), walks) for x in (t0, t1)]
         return _face_ray(begin, end, walks, ends, parallel=True)
     nearest = _NEARER / highest  # infinite where nothing is hit: all is lit
     t0, t1 = _cut(begin, end, c0 - nearest, dc)

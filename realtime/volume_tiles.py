@@ -67,7 +67,7 @@ def tile_leaves(heights: LightHeights, rays, distance, *, light, square: bool) -
     distance
         At which every ray ends, infinite where it does not [m].
     light
-        The light less the camera, see `realtime.beams.Beam` [m].
+        The light less the camera [m].
     square
         Whether every tile is a square of 4 x 4 pixels: then its corners bound it.
     """
