@@ -32,6 +32,7 @@ from reference.intervals import Certificate, LitIntervals
 from reference.media import camera_segments, scattering_range
 from reference.media_sums import sum_media
 from reference.scene import TruthLight, TruthScene
+from reference.shadow_start import reached_by_shadow_rays
 from reference.shapes import Shapes, exact_distance, read_shapes
 from reference.surface import lit_surface, surface_hits
 from reference.visibility import lit_intervals
@@ -90,7 +91,8 @@ def quadrature_image(
         Visibility samples of each ray and light; an eighth as many random ones check the lit intervals.
     shadow_scale
         Attenuate the leg from the light over this share of its length: 1 is the truth, 1 - epsilon what a renderer with
-        a shadow-ray epsilon converges to (DESIGN section 6.1).
+        a shadow-ray epsilon converges to (DESIGN section 6.1). Such a renderer also starts its shadow rays off the
+        surface, and so do those for `surface` then (`reference.shadow_start`).
     pixel
         "centre": the radiance along the ray through the centre. "area": the mean over the pixel.
     edges
@@ -169,7 +171,11 @@ def ray_values(
         intervals += np.bincount(found.lit.ray, minlength=count)
         transitions += found.lit.transitions
         certificates.append(found.lit.certificate)
-        reached.append(found.reached)
+        seen = found.reached
+        if seen is not None and shadow_scale != 1:
+            what = {"scene": truth.occluders, "shapes": shapes}
+            seen = reached_by_shadow_rays(hits.interaction, light.position, seen, **what)
+        reached.append(seen)
         if progress is not None:
             progress(number + 1, total, "quadrature")
     for number, far in enumerate(truth.directional, start=len(truth.lights)):

@@ -32,7 +32,9 @@ def truth_image(
     # Only what differs from the usual is named, so that images that were kept before are found.
     settings: dict[str, Any] = {"samples": samples, "shadow_scale": shadow_scale}
     settings |= {} if pixel == "centre" else {"pixel": pixel}
-    key = cache_key(scene, "quadrature", settings)
+    # What a renderer's own shadow rays see also depends on where they start.
+    named = settings if shadow_scale == 1 else settings | {"shadow_start": True}
+    key = cache_key(scene, "quadrature", named)
     stored = load_arrays(key)
     if stored is not None and set(stored) == {field.name for field in fields(TruthImage)}:
         return TruthImage(**{field.name: _as_kept(field, stored[field.name]) for field in fields(TruthImage)})
