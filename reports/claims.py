@@ -38,6 +38,17 @@ def claims(scenes: Scenes) -> list[Claim]:
     return found + _without_flip(scenes)
 
 
+def unstudied(names: Sequence[str], known: Sequence[str]) -> list[Claim]:
+    """Return which built-in scenes were left out by the effort; nothing where the user named the scenes."""
+    left = [name for name in known if name not in names]
+    if not left:
+        return []
+    text = (
+        f"Scenes not studied, for the time that they take: {', '.join(left)}. `--scenes` names them, `--full` has all."
+    )
+    return [_claim("not-measured", text)]
+
+
 def confirmed(scenes: Scenes) -> bool:
     """Return whether no comparison speaks against the truth, and each layer is confirmed by at least one."""
     for scene in scenes:

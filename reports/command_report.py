@@ -16,7 +16,9 @@ def report(
     full: Annotated[bool, typer.Option("--full", help="Large images, many samples, all tables: an hour.")] = False,
     scenes: Annotated[
         str | None,
-        typer.Option(help="Comma-separated built-in scenes and Mitsuba XML files; by default all, three with --quick."),
+        typer.Option(
+            help="Comma-separated built-in scenes and Mitsuba XML files; three by default with --quick, all with --full."
+        ),
     ] = None,
     methods: Annotated[str | None, typer.Option(help="Comma-separated methods; all by default.")] = None,
     method: Annotated[
@@ -71,7 +73,8 @@ def report(
         print_json(data)
     else:
         print("\n".join(f"- {claim['text']}" for claim in data["claims"]))
-        print(f"{target / 'report.html'}: {len(data['scenes'])} scenes, {done}")
+        count = len(data["scenes"])
+        print(f"{target / 'report.html'}: {count} scene{'' if count == 1 else 's'}, {done}")
     if not confirmed(data["scenes"]):
         raise typer.Exit(1)
 
@@ -97,6 +100,7 @@ def _measured(
     fresh: bool,
 ) -> dict[str, Any]:
     """Measure and write a report; what cannot be used is refused before the work begins."""
+    from analytic.errors import InputError
     from realtime.scene import read_scene
     from reference.files import ensure_folder
     from reports.environment import activate
@@ -105,16 +109,21 @@ def _measured(
     from validation.engine_images import find_images
     from validation.load import load_scene
     from validation.scenes import SCENES
-    from validation.study import EFFORTS, QUICK_SCENES
+    from validation.study import EFFORTS
 
     asked = [name.strip() for name in scenes.split(",")] if scenes else []
-    names = asked or list(QUICK_SCENES if effort_name == "quick" else SCENES)
+    names = asked or list(EFFORTS[effort_name].scenes)
     shown = {}
     if images is not None:
         shown = find_images(images, {Path(name).stem: name for name in [*SCENES, *asked]})
         if not asked:
             names = list(shown)
-        shown = {name: several for name, several in shown.items() if name in {Path(one).stem for one in names}}
+        wanted = {Path(one).stem for one in names}
+        if not wanted & set(shown):
+            raise InputError(
+                f"--images: {images} has no image of {', '.join(sorted(wanted))}, only of {', '.join(shown)}"
+            )
+        shown = {name: several for name, several in shown.items() if name in wanted}
     chosen = _configurations(effort_name, methods, own)
     ensure_folder(target)
     activate()

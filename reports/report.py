@@ -16,7 +16,7 @@ from typing import Any
 
 from analytic.errors import InputError
 from reference.files import ensure_folder
-from reports.claims import claims
+from reports.claims import claims, unstudied
 from reports.data import SCHEMA, plain
 from reports.environment import describe_environment
 from reports.page import render_page
@@ -27,6 +27,7 @@ from reports.staging import staged
 from validation.configurations import STANDARD, Configuration
 from validation.engine_images import EngineImage, images_size
 from validation.kept import Kept, keeper, now, sweep_results
+from validation.scenes import SCENES
 from validation.study import Effort, open_study
 
 #: Modules that make what is kept, besides the four sides.
@@ -126,7 +127,7 @@ def write_report(
                 **_counts(results),
                 "settings": plain(asdict(effort)),
                 "environment": environment,
-                "claims": claims(found),
+                "claims": claims(found) + (unstudied(scenes, list(SCENES)) if tuple(scenes) == effort.scenes else []),
                 "scenes": found,
                 "stability": stability,
                 "mutations": mutations,

@@ -20,6 +20,7 @@ from realtime.scene import Scene
 #: Of a frame that takes longer than this the stages are timed once, in one more frame: its spread matters little, and
 #: some thirty such frames, as others have, would take minutes [s].
 SLOW = 8.0
+_TURNS = 3.0  # about so long is spent on frames that are timed stage by stage, one to five of them [s]
 
 
 @dataclass(frozen=True)
@@ -147,7 +148,7 @@ def time_frame(renderer: FrameRenderer, *, seconds: float = 0.6, slow: float | N
     dr.sync_thread()
     took = time.perf_counter() - begin
     if took > (SLOW if slow is None else slow):
-        return _slow_frame(renderer, turns=int(np.clip(SLOW / took, 1, 5)))
+        return _slow_frame(renderer, turns=int(np.clip(_TURNS / took, 1, 5)))
 
     def surface():
         dr.eval(run_surface(renderer))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import copy
 
-from reports.claims import claims, confirmed, verdict
+from reports.claims import claims, confirmed, unstudied, verdict
 
 
 def timing(median):
@@ -235,3 +235,10 @@ def test_what_takes_too_long_is_not_among_the_refused():
     kinds = {one["kind"]: one["text"] for one in claims(data)}
     assert "refused" not in kinds
     assert kinds["not-measured"].endswith("in the tables: slow in fog.")
+
+
+def test_scenes_that_the_effort_leaves_out_are_named():
+    assert unstudied(["fog", "hall"], ["fog", "hall"]) == []
+    (found,) = unstudied(["fog"], ["fog", "hall", "tangle"])
+    assert (found["kind"], found["good"]) == ("not-measured", None)
+    assert found["text"].startswith("Scenes not studied, for the time that they take: hall, tangle.")

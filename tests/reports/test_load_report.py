@@ -80,6 +80,7 @@ def small_report():
     }
     settings = {
         "name": "tiny",
+        "scenes": [],
         "image": [4, 3],
         "timed": [4, 3],
         "checked": [4, 3],
@@ -204,7 +205,7 @@ def test_files_elsewhere_are_refused(folder, name):
     """A report is copied with its files: none may lie, or be written, outside of its folder."""
     (folder.parent / "outside.exr").write_text("x")
     changed(folder, lambda data: data["scenes"][0]["methods"][0]["files"].update(exr=name))
-    with pytest.raises(InputError, match="names .*, which is not in its folder"):
+    with pytest.raises(InputError, match=r"names .*, which is not in its folder"):
         load_report(folder)
 
 
@@ -222,7 +223,7 @@ def test_the_command_needs_no_mitsuba_to_draw_a_page_again(folder):
     )
     ran = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
     assert ran.returncode == 0, ran.stderr
-    assert "1 scenes, drawn again" in ran.stdout
+    assert "1 scene, drawn again" in ran.stdout
     assert (folder / "report.html").is_file()
 
 
