@@ -17,7 +17,7 @@ def report(
     scenes: Annotated[
         str | None,
         typer.Option(
-            help="Comma-separated built-in scenes and Mitsuba XML files; three by default with --quick, all with --full."
+            help="Comma-separated built-in scenes and Mitsuba XML files; three with --quick, all with --full."
         ),
     ] = None,
     methods: Annotated[str | None, typer.Option(help="Comma-separated methods; all by default.")] = None,

@@ -39,7 +39,7 @@ class Effort:
     seconds: float  #: spent on each timing
     scenes: tuple[str, ...] = ()  #: studied unless others are named
     samples: int = 16  #: a pixel in each batch of the comparisons of the truth
-    batches: int = 256  #: of these comparisons at most
+    batches: int = 1024  #: of these comparisons at most
     multiple: tuple[int, int] = (16, 4)  #: batches, and samples a pixel in each, for the share of multiple scattering
     patience: float = 12.0  #: seconds after which an estimator that has not decided is stopped
     slow: float = 0.15  #: where the airlight takes longer, whole frames are timed stage by stage [s]
@@ -79,6 +79,7 @@ EFFORTS: dict[str, Effort] = {
             checked=(120, 90),
             margins=_margins(0.0005, 0.01),
             seconds=0.2,
+            patience=25.0,
             flip=True,
             rays=20_000,
             papers=("biri",),
@@ -92,7 +93,7 @@ EFFORTS: dict[str, Effort] = {
             margins=_margins(0.0005, 0.002),
             seconds=0.6,
             samples=64,
-            batches=1024,
+            batches=4096,
             multiple=(32, 16),
             patience=120.0,
             slow=0.5,
