@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from reference.camera import camera_matrix
+from reference.directional_light import DirectionalLight
 from reference.scene import TruthLight, TruthMedium, TruthScene, read_truth
 from validation.load import LoadedScene
 
@@ -20,6 +21,8 @@ _FALLOFF = {
     "hard": "full intensity within the cut-off angle of the axis, none beyond; then 1/r^2 exp(-sigma_t r)",
     "soft": "full intensity within the beam angle of the axis, none beyond the cut-off angle, between them "
     "intensity (cutoff - angle)/(cutoff - beam), linear in the angle; then 1/r^2 exp(-sigma_t r)",
+    "directional": "from infinity, parallel: the same irradiance everywhere, times exp(-sigma_t length) of its way in "
+    "the media",
 }
 CONVENTION = (
     "Linear RGB radiance in W/(m^2 sr), as the light's intensity in W/sr gives it: no exposure, no tone mapping, no "
@@ -62,7 +65,7 @@ def describe_scene(loaded: LoadedScene) -> dict[str, Any]:
         "bounded_media": [
             {"name": medium.name, **(_medium(medium) or {}), "bounds": _bounds(medium.bounds)} for medium in truth.media
         ],
-        "lights": [_light(light) for light in truth.lights],
+        "lights": [*map(_light, truth.lights), *map(_directional, truth.directional)],
         "surfaces": [surface(shape) for shape in truth.occluders.shapes()],
         "radiance": CONVENTION,
         "file": {
@@ -174,6 +177,15 @@ def _light(light: TruthLight) -> dict[str, Any]:
         "cutoff_angle": _number(np.rad2deg(light.cutoff)),
         "beam_angle": _number(np.rad2deg(light.beam)),
         "falloff": _FALLOFF["soft" if light.is_soft else "hard"],
+    }
+
+
+def _directional(light: DirectionalLight) -> dict[str, Any]:
+    return {
+        "kind": "directional",
+        "axis": _numbers(light.direction),
+        "irradiance": _numbers(light.irradiance),
+        "falloff": _FALLOFF["directional"],
     }
 
 

@@ -67,6 +67,12 @@ def _medium(name: str, medium: dict[str, Any] | None) -> list[str]:
 
 
 def _light(light: dict[str, Any]) -> list[str]:
+    if light["kind"] == "directional":
+        return [
+            *_row("light", f"directional, travels along {_vector(light['axis'])}"),
+            _item("irradiance", f"{_colour(light['irradiance'])} W/m^2 on a plane that faces it"),
+            *_row("", light["falloff"]),
+        ]
     lines = _row("light", f"{light['kind']}, at {_vector(light['position'])}")
     lines.append(
         _item("intensity", f"{_colour(light['intensity'])} W/sr" + (" on the axis" if "axis" in light else ""))

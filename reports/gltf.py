@@ -157,16 +157,21 @@ def _camera_matrix(camera: dict[str, Any], turn: Array) -> list[float]:
     return _matrix(np.array([camera["right"], camera["up"], backward]).T, camera["position"], turn)
 
 
+_KEYS = {"W/sr": "w_per_sr", "W/m^2": "w_per_m2"}
+
+
 def _light(light: dict[str, Any]) -> dict[str, Any]:
-    intensity = np.array(light["intensity"])
+    # Of a directional light the format wants lux in the place of candela.
+    quantity, unit = ("irradiance", "W/m^2") if light["kind"] == "directional" else ("intensity", "W/sr")
+    intensity = np.array(light[quantity])
     largest = float(intensity.max())
     found: dict[str, Any] = {
         "type": light["kind"],
         "intensity": largest,
         "color": (intensity / largest if largest > 0 else np.ones(3)).tolist(),
         "extras": {
-            "intensity_w_per_sr": light["intensity"],
-            "unit": "the intensity of this light is in W/sr: no factor of 683 lm/W is in it",
+            f"{quantity}_{_KEYS[unit]}": light[quantity],
+            "unit": f"the intensity of this light is in {unit}: no factor of 683 lm/W is in it",
             "falloff": light["falloff"],
         },
     }
@@ -181,12 +186,13 @@ def _light(light: dict[str, Any]) -> dict[str, Any]:
 
 def _light_matrix(light: dict[str, Any], turn: Array) -> list[float]:
     """Return the transform of a light, which shines along its own -z."""
+    position = light.get("position", [0.0, 0.0, 0.0])  # one at infinity has none
     if "axis" not in light:
-        return _matrix(np.eye(3), light["position"], turn)
+        return _matrix(np.eye(3), position, turn)
     backward = -np.array(light["axis"])
     side = np.cross(np.eye(3)[np.argmin(np.abs(backward))], backward)
     side /= np.linalg.norm(side)
-    return _matrix(np.array([side, np.cross(backward, side), backward]).T, light["position"], turn)
+    return _matrix(np.array([side, np.cross(backward, side), backward]).T, position, turn)
 
 
 def _matrix(axes: Array, position: list[float], turn: Array) -> list[float]:

@@ -230,17 +230,24 @@ def _frames(scene: Scene, about: tuple[float, float, float] | None, turn: int, f
 
 def _truth_of(known: TruthScene, moved: Scene) -> Array:
     """Return the true airlight with the lights where they moved to."""
-    lights = tuple(_truth_light(one, other) for one, other in zip(known.lights, moved.lights, strict=True))
-    return quadrature_image(replace(known, lights=lights)).airlight
+    near = [light for light in moved.lights if light.kind != "directional"]
+    far = [light for light in moved.lights if light.kind == "directional"]
+    lights = tuple(_truth_light(one, other) for one, other in zip(known.lights, near, strict=True))
+    directional = tuple(replace(one, direction=_axis(other)) for one, other in zip(known.directional, far, strict=True))
+    return quadrature_image(replace(known, lights=lights, directional=directional)).airlight
 
 
 def _truth_light(known: TruthLight, light: Light) -> TruthLight:
     position = np.array(light.position, dtype=np.float64).reshape(3)
     if light.axis is None:
         return replace(known, position=position)
+    return replace(known, position=position, axis=_axis(light))
+
+
+def _axis(light: Light) -> Array:
     high, low = (np.array(part, dtype=np.float64).reshape(3) for part in (light.axis, light.axis_low))
     axis = high + low
-    return replace(known, position=position, axis=axis / np.linalg.norm(axis))
+    return axis / np.linalg.norm(axis)
 
 
 def _rendered(scene: Scene, chosen: Configuration, frames: Iterator[Scene]) -> Array:

@@ -8,7 +8,7 @@ from reports.cli import run
 from reports.describe import describe_scene, up_axis
 from reports.describe_text import description_text
 from tests.scenes_for_tests import body, spot, tiny_scene
-from validation.load import LoadedScene
+from validation.load import LoadedScene, load_scene
 from validation.scenes import SCENES
 
 
@@ -80,6 +80,19 @@ def test_lights_have_what_their_kind_needs(variant):
     assert "full intensity within the cut-off" in hard["falloff"]
     axis = np.array([0.1, 0.1, 0.4]) - [0.7, -0.3, 2.6]
     np.testing.assert_allclose(soft["axis"], axis / np.linalg.norm(axis), atol=1e-6)
+
+
+def test_a_light_at_infinity_has_a_direction_and_no_place(variant):
+    loaded = load_scene("windows", (8, 6))
+    (sun,) = describe_scene(loaded)["lights"]
+    assert sun["kind"] == "directional"
+    assert "position" not in sun
+    assert sun["irradiance"] == [33.1, 28.7, 22.3]
+    direction = np.array([0.737, -0.271, -0.419])
+    np.testing.assert_allclose(sun["axis"], direction / np.linalg.norm(direction), atol=1e-6)
+    text = description_text(describe_scene(loaded))
+    assert "directional, travels along (0.828" in text
+    assert "(33.1, 28.7, 22.3) W/m^2 on a plane that faces it" in text
 
 
 def test_surfaces_have_their_reflectance(variant):

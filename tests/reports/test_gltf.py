@@ -247,3 +247,17 @@ def test_a_camera_that_mirrors_is_refused(variant, tmp_path):
     with pytest.raises(InputError, match="mirrors"):
         write_gltf(tmp_path / "tiny.glb", loaded(sensor=sensor | {"to_world": view}))
     assert not (tmp_path / "tiny.glb").exists()
+
+
+def test_a_light_at_infinity_is_directional_in_watts_a_square_metre(variant, tmp_path):
+    write_gltf(tmp_path / "windows.glb", load_scene("windows", (8, 6)))
+    document, _ = parts(tmp_path / "windows.glb")
+    (light,) = document["extensions"]["KHR_lights_punctual"]["lights"]
+    assert light["type"] == "directional"
+    np.testing.assert_allclose(light["intensity"] * np.array(light["color"]), [33.1, 28.7, 22.3], rtol=1e-12)
+    assert light["extras"]["irradiance_w_per_m2"] == [33.1, 28.7, 22.3]
+    (node,) = [node for node in document["nodes"] if "KHR_lights_punctual" in node.get("extensions", {})]
+    matrix = np.array(node["matrix"]).reshape(4, 4).T
+    x, y, z = np.array([0.737, -0.271, -0.419]) / np.linalg.norm([0.737, -0.271, -0.419])
+    # It shines along its own -z; y of glTF is the scene's z.
+    np.testing.assert_allclose(-matrix[:3, 2], [x, z, -y], atol=1e-6)

@@ -120,3 +120,11 @@ def test_what_cannot_be_studied_is_refused(variant):
         map_flicker(scene, "ray-march", parameters=MARCH, frames=1)
     with pytest.raises(InputError, match="step: got 0, wanted an angle above 0"):
         map_flicker(scene, "ray-march", parameters=MARCH, step=0.0)
+
+
+def test_a_sun_moves_in_the_truth_too(variant):
+    from validation.load import load_scene
+
+    found = map_flicker(load_scene("windows", (16, 12)).scene, "ray-march", parameters=MARCH, sizes=(64,), frames=3)
+    assert found.truth_change > 1e-4  # of the mean: the shafts moved
+    assert found.nonfinite == 0

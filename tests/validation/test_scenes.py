@@ -81,6 +81,9 @@ def test_sphere_turns_its_axis_to_the_light_and_lies_in_the_cone():
         ("three-media", 14_785),
         ("clutter", 20_747),
         ("hall", 107_514),
+        ("omni-box", 166),
+        ("tangle", 188_082),
+        ("windows", 1_748),
     ],
 )
 def test_triangle_counts(variant, name, triangles):
@@ -111,8 +114,14 @@ def test_methods_and_truth_can_read_every_scene_alike(variant, name):
     # Mitsuba holds both in float32: 6e-8.
     np.testing.assert_allclose(np.broadcast_to(sigma_t, 3), truth.medium.sigma_t, rtol=3e-7)
     np.testing.assert_allclose(np.array(scene.medium.albedo).reshape(-1), truth.medium.albedo, rtol=3e-7)
-    assert len(scene.lights) == len(truth.lights) == 1
-    np.testing.assert_allclose(np.array(scene.lights[0].position).reshape(-1), truth.lights[0].position, rtol=3e-7)
+    (light,) = scene.lights
+    (other,) = truth.lights + truth.directional
+    if light.kind == "directional":
+        one, two = light.axis, other.direction
+        np.testing.assert_allclose(np.array(light.intensity).reshape(-1), other.irradiance, rtol=3e-7)
+    else:
+        one, two = light.position, other.position
+    np.testing.assert_allclose(np.array(one).reshape(-1), two, rtol=3e-7)
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -125,7 +134,9 @@ def test_no_number_of_a_scene_is_round(variant, name):
     scene = load_scene(name).scene
     parameters = mi.traverse(scene)
     for key in parameters.keys():  # noqa: SIM118 - SceneParameters iterates over items
-        if key.endswith(("albedo.value.value", "intensity.value", "position", "x_fov", "reflectance.value")):
+        if key.endswith(
+            ("albedo.value.value", "intensity.value", "irradiance.value", "position", "x_fov", "reflectance.value")
+        ):
             for value in np.array(parameters[key], dtype=np.float64).reshape(-1):
                 assert value % 0.5 != 0 or value > 10, (key, value)
 

@@ -15,6 +15,7 @@ from validation.scenes.sphere_spot import sphere_spot
 from validation.scenes.tangle import SCENE as TANGLE
 from validation.scenes.three_media import SCENE as THREE_MEDIA
 from validation.scenes.two_pens import two_pens
+from validation.scenes.windows import SCENE as WINDOWS
 
 SCENES: dict[str, SceneRecord] = {
     record.name: record
@@ -52,5 +53,6 @@ SCENES: dict[str, SceneRecord] = {
         HALL,
         OMNI_BOX,
         TANGLE,
+        WINDOWS,
     )
 }
