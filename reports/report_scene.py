@@ -68,7 +68,9 @@ def scene_report(
     asked = {name: getattr(study.effort, name) for name in ("checked", "margins", "samples", "batches", "patience")}
     checks = parts.result("agreement", lambda: _checks(study, tell), asked=asked)
     tell(0.5, "multiple scattering")
-    multiple = parts.result("multiple", lambda: (plain(study_multiple(study)), {}), asked={"multiple": study.effort.multiple})
+    multiple = parts.result(
+        "multiple", lambda: (plain(study_multiple(study)), {}), asked={"multiple": study.effort.multiple}
+    )
     chosen = configurations_for(study.scene.plan, configurations)
     stems = file_stems([*(one.label for one in chosen), *(one.label for one in images)])
     methods = parts.methods(chosen, stems, factor, lambda share, what: tell(0.55 + 0.4 * share, what))
