@@ -40,7 +40,7 @@ class Effort:
     scenes: tuple[str, ...] = ()  #: studied unless others are named
     samples: int = 16  #: a pixel in each batch of the comparisons of the truth
     batches: int = 1024  #: of these comparisons at most
-    multiple: tuple[int, int] = (16, 4)  #: batches, and samples a pixel in each, for the share of multiple scattering
+    multiple: tuple[int, int] = (12, 4)  #: batches, and samples a pixel in each, for the share of multiple scattering
     patience: float = 12.0  #: seconds after which an estimator that has not decided is stopped
     slow: float = 0.15  #: where the airlight takes longer, whole frames are timed stage by stage [s]
     limit: float = 20.0  #: a frame that would take longer is not measured, and the report says so [s]
@@ -65,21 +65,22 @@ EFFORTS: dict[str, Effort] = {
         Effort(
             "quick",
             scenes=QUICK_SCENES,
-            image=(320, 240),
-            timed=(320, 240),
+            image=(240, 180),
+            timed=(240, 180),
             checked=(80, 60),
             margins=_margins(0.002, 0.02),
-            seconds=0.15,
+            seconds=0.1,
+            patience=8.0,
         ),
         Effort(
             "default",
             scenes=tuple(name for name in SCENES if name != "tangle"),
-            image=(400, 300),
-            timed=(400, 300),
-            checked=(120, 90),
+            image=(320, 240),
+            timed=(320, 240),
+            checked=(96, 72),
             margins=_margins(0.0005, 0.01),
-            seconds=0.2,
-            patience=25.0,
+            seconds=0.15,
+            patience=15.0,
             flip=True,
             rays=20_000,
             papers=("biri",),

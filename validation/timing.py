@@ -20,7 +20,7 @@ from realtime.scene import Scene
 #: Of a frame that takes longer than this the stages are timed once, in one more frame: its spread matters little, and
 #: some thirty such frames, as others have, would take minutes [s].
 SLOW = 8.0
-_TURNS = 3.0  # about so long is spent on frames that are timed stage by stage, one to five of them [s]
+_TURNS = 1.5  # about so long is spent on frames that are timed stage by stage, one to five of them [s]
 
 
 @dataclass(frozen=True)

@@ -155,8 +155,30 @@ def test_moved_builds_the_acceleration_structure_again_and_rebuild_does_not(vari
     assert list(measured.values()) == [0, 0, 0, 0, 1]  # frame, surface, airlight, rebuild, moved
 
 
-def test_a_slow_frame_is_timed_once(variant, monkeypatch):
-    """A frame that takes minutes must not be rendered fifty times."""
+@pytest.mark.parametrize(("spent", "turns"), [(0.0, 1), (1e6, 5)])
+def test_a_slow_frame_is_timed_a_few_times(variant, monkeypatch, spent, turns):
+    """A frame that takes minutes must not be rendered thirty times."""
+    import mitsuba as mi
+
+    from realtime.frame import frame_renderer
+    from realtime.methods import METHODS
+    from realtime.scene import read_scene
+    from validation import timing
+
+    monkeypatch.setattr(timing, "_TURNS", spent)
+    scene = read_scene(mi.load_dict(tiny_scene(size=(16, 12))))
+    renderer = frame_renderer(scene, METHODS["ray-march"], steps=3)
+    assert time_frame(renderer, seconds=0.01).frame.repetitions >= 5  # not slow
+    times = time_frame(renderer, slow=-1.0)
+    each = (times.frame, times.surface, times.airlight, times.rebuild, times.moved)
+    assert {one.repetitions for one in each} == {turns}
+    assert times.frame.median_ms <= times.rebuild.median_ms <= times.moved.median_ms
+    if turns == 1:
+        assert times.frame.median_ms == pytest.approx(times.surface.median_ms + times.airlight.median_ms)
+        assert all(one.low_ms == one.median_ms == one.high_ms for one in each)
+
+
+def test_frames_above_the_usual_limit_are_slow(variant, monkeypatch):
     import mitsuba as mi
 
     from realtime.frame import frame_renderer
@@ -165,8 +187,6 @@ def test_a_slow_frame_is_timed_once(variant, monkeypatch):
     from validation import timing
 
     monkeypatch.setattr(timing, "SLOW", -1.0)
+    monkeypatch.setattr(timing, "_TURNS", 0.0)
     scene = read_scene(mi.load_dict(tiny_scene(size=(16, 12))))
-    times = time_frame(frame_renderer(scene, METHODS["ray-march"], steps=3))
-    assert times.frame.repetitions == times.airlight.repetitions == 1
-    assert times.frame.median_ms == pytest.approx(times.surface.median_ms + times.airlight.median_ms)
-    assert times.frame.median_ms <= times.rebuild.median_ms <= times.moved.median_ms
+    assert time_frame(frame_renderer(scene, METHODS["ray-march"], steps=3)).frame.repetitions == 1
