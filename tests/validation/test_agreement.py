@@ -127,3 +127,18 @@ def test_progress_is_told(variant):
         (number, 33, "volpath") for number in range(9, 34)
     ]
     assert told == expected
+
+
+def test_out_of_time_is_said_and_is_no_verdict(scene, own_cache):
+    """Two batches are traced whatever the time; they do not decide about a bias of one in ten million."""
+    found = agreement(scene, estimator="single-scatter", margin=1e-7, batches=40, samples=4, seconds=0.0)
+    assert {one.batches for one in found.values()} == {2}
+    assert not found["airlight"].finished
+    assert found["airlight"].statistics.equivalent is False
+
+
+def test_what_became_narrow_enough_is_finished(scene):
+    assert all(one.finished for one in agreement(scene, **BUDGET).values())
+    # Out of batches, not of time, before the interval was narrow: the same.
+    short = agreement(scene, margin=1e-6, batches=3, samples=4)
+    assert not short["airlight"].finished

@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -162,3 +163,54 @@ def test_a_method_of_ones_own_that_is_not_frozen_has_a_note(tmp_path, variant):
         measure(read_scene(loaded), configuration(f"{path}:{name}"), truth=truth, seconds=0.01).note for name in "fg"
     ]
     assert notes == ["not frozen: its Python runs again for every frame", None]
+
+
+def probed(loaded, monkeypatch, chosen, *, seconds, limit):
+    """Measure a configuration whose small frame takes so long."""
+    import mitsuba as mi
+
+    from realtime.scene import read_scene
+    from validation import bench as module
+    from validation.truth import truth_image
+
+    monkeypatch.setattr(module, "_DOUBTFUL", -1.0)
+    render = module.render_frame
+
+    def slowed(renderer):
+        if renderer.scene.camera.width == 8:
+            time.sleep(seconds)
+        return render(renderer)
+
+    monkeypatch.setattr(module, "render_frame", slowed)
+    scene, truth = read_scene(loaded.scene), truth_image(loaded.scene)
+    small = read_scene(mi.load_dict(tiny_scene(size=(8, 6))))
+    return measure(scene, chosen, truth=truth, seconds=0.01, limit=limit, probe=lambda: small)
+
+
+def test_what_would_take_too_long_is_left_out_with_what_it_would_take(loaded, monkeypatch):
+    # 16 x 12 pixels are four times 8 x 6: 0.05 s there are at least 0.2 s here.
+    found = probed(loaded, monkeypatch, MARCH, seconds=0.05, limit=0.1)
+    assert found.left_out
+    assert found.frame is found.times is found.error is None
+    assert "by one of 8 x 6 pixels" in found.refused
+    assert "more than the limit of 0.1 s" in found.refused
+
+
+def test_what_takes_less_than_the_limit_is_measured(loaded, monkeypatch):
+    found = probed(loaded, monkeypatch, MARCH, seconds=0.05, limit=60.0)
+    assert not found.left_out
+    assert found.refused is None
+    assert found.error.relative_rmse < 0.02
+
+
+def test_a_quick_preparation_asks_for_no_small_frame(loaded, measured, monkeypatch):
+    from realtime.scene import read_scene
+    from validation import bench as module
+    from validation.truth import truth_image
+
+    def never():
+        raise AssertionError("no doubt about this one")
+
+    monkeypatch.setattr(module, "_DOUBTFUL", 1e6)
+    scene, truth = read_scene(loaded.scene), truth_image(loaded.scene)
+    assert measure(scene, MARCH, truth=truth, seconds=0.01, limit=1e-9, probe=never).refused is None
