@@ -97,10 +97,10 @@ def _scenes_and_images(scenes: Any, images: Any, effort: str) -> tuple[list[str]
     from realtime.scene import read_scene
     from validation.engine_images import find_images
     from validation.scenes import SCENES
-    from validation.study import QUICK_SCENES
+    from validation.study import EFFORTS
 
     asked = [os.fspath(one) for one in several(scenes)] if scenes else []
-    names = asked or list(QUICK_SCENES if effort == "quick" else SCENES)
+    names = asked or list(EFFORTS[effort].scenes)
     shown: dict[str, Any] = {}
     if images is not None:
         shown = find_images(images, {Path(name).stem: name for name in [*SCENES, *asked]})

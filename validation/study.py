@@ -55,16 +55,16 @@ def _margins(single_scatter: float, volpath: float) -> Mapping[str, float]:
     return {"single-scatter": single_scatter, "volpath": volpath}
 
 
-#: What `report --quick` looks at unless told otherwise: scenes that take seconds. The default leaves out `tangle`, of
-#: which a frame takes up to minutes.
-QUICK_SCENES = ("open-fog", "sphere-spot", "two-pens")
+# What `report --quick` looks at unless told otherwise: scenes that take seconds. The default leaves out `tangle`, of
+# which a frame takes up to minutes.
+_QUICK = ("open-fog", "sphere-spot", "two-pens")
 
 EFFORTS: dict[str, Effort] = {
     effort.name: effort
     for effort in (
         Effort(
             "quick",
-            scenes=QUICK_SCENES,
+            scenes=_QUICK,
             image=(240, 180),
             timed=(240, 180),
             checked=(80, 60),
