@@ -31,7 +31,15 @@ from validation.scenes import SCENES
 from validation.study import Effort, open_study
 
 #: Modules that make what is kept, besides the four sides.
-_MAKERS = ("data.py", "pictures.py", "colour_maps.py", "report_scene.py", "report_papers.py")
+_MAKERS = (
+    "data.py",
+    "pictures.py",
+    "colour_maps.py",
+    "biri_tables.py",
+    "billeter_tables.py",
+    "report_scene.py",
+    "report_papers.py",
+)
 _SCENES = 0.85  # share of the scenes in the progress
 
 
