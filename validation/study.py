@@ -70,7 +70,7 @@ EFFORTS: dict[str, Effort] = {
             timed=(240, 180),
             checked=(80, 60),
             margins=_margins(0.002, 0.02),
-            seconds=0.1,
+            seconds=0.05,
             patience=8.0,
         ),
         Effort(
