@@ -22,7 +22,7 @@ from validation.engine_images import EngineImage, ImageMeasurement, image_flip, 
 from validation.flip import Flip
 from validation.kept import Computed, Keeper, Kept, Slot, find_kept, keep, kept_result, slot, source_digest
 from validation.references import layered_frame, layered_truth
-from validation.study import SceneStudy, check_truth, study_configuration, study_multiple, with_flips
+from validation.study import SceneStudy, check_truth, study_configuration, study_multiple, wants_flip, with_flips
 
 Tell = Callable[[float, str], None]
 
@@ -158,8 +158,8 @@ class _Parts:
 
     def _asked(self, chosen: Configuration) -> dict[str, Any]:
         effort = self._study.effort
-        names = ("image", "timed", "seconds", "slow", "limit", "flip")
-        return asdict(chosen) | {name: getattr(effort, name) for name in names}
+        names = ("image", "timed", "seconds", "slow", "limit")
+        return asdict(chosen) | {name: getattr(effort, name) for name in names} | {"flip": wants_flip(effort, chosen)}
 
 
 def file_stems(labels: Sequence[str]) -> list[str]:
@@ -228,7 +228,7 @@ def _measured(study: SceneStudy, measured: Measurement, factor: float) -> Comput
 def _judged(study: SceneStudy, shown: EngineImage, factor: float) -> Computed:
     truth = study.truth
     measured = measure_image(shown, truth, surfaces=study.scene.plan.surfaces)
-    if study.effort.flip:
+    if study.effort.flip != "none":
         measured = replace(measured, flip=image_flip(measured, truth))
     expected = truth.airlight if measured.layer == "airlight" else truth.airlight + truth.surface
     test = np.asarray(measured.image.layers[measured.layer], dtype=np.float64)

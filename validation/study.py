@@ -14,7 +14,7 @@ from reference.cache import scene_digest
 from reference.quadrature import TruthImage
 from validation.agreement import Agreement, agreements
 from validation.bench import Measurement, measure
-from validation.configurations import Configuration
+from validation.configurations import QUICK, Configuration
 from validation.flip import flip_hdr
 from validation.load import LoadedScene, load_scene
 from validation.multiple import MultipleScattering, multiple_scattering_share
@@ -44,7 +44,7 @@ class Effort:
     patience: float = 10.0  #: seconds after which an estimator that has not decided is stopped
     slow: float = 0.15  #: where the airlight takes longer, whole frames are timed stage by stage [s]
     limit: float = 20.0  #: a frame that would take longer is not measured, and the report says so [s]
-    flip: bool = False  #: compute HDR-FLIP of every image
+    flip: str = "none"  #: of which configurations HDR-FLIP is computed: 'none', one of each 'kinds' (`QUICK`), 'all'
     mutations: bool = False  #: count how many faults of the physics the checks of the truth find
     rays: int = 0  #: generated rays on which kernels are tried, besides the certified ones; 0 leaves this out
     papers: tuple[str, ...] = ()  #: whose tables are measured again: 'biri', 'billeter'
@@ -68,7 +68,7 @@ EFFORTS: dict[str, Effort] = {
             scenes=_QUICK,
             image=(240, 180),
             timed=(240, 180),
-            checked=(80, 60),
+            checked=(48, 36),
             margins=_margins(0.002, 0.02),
             seconds=0.05,
             patience=8.0,
@@ -78,11 +78,12 @@ EFFORTS: dict[str, Effort] = {
             scenes=tuple(name for name in SCENES if name not in _HEAVY),
             image=(320, 240),
             timed=(320, 240),
-            checked=(96, 72),
+            checked=(64, 48),
             margins=_margins(0.0005, 0.01),
             seconds=0.1,
-            patience=10.0,
-            flip=True,
+            samples=16,
+            patience=15.0,
+            flip="kinds",
             rays=20_000,
             papers=("biri",),
         ),
@@ -100,7 +101,7 @@ EFFORTS: dict[str, Effort] = {
             patience=75.0,
             slow=0.5,
             limit=40.0,
-            flip=True,
+            flip="all",
             mutations=True,
             rays=100_000,
             papers=("biri", "billeter"),
@@ -210,15 +211,18 @@ def with_flips(study: SceneStudy, measured: Sequence[Measurement], *, workers: i
     FLIP runs on one processor, in a process of its own: several at once take no longer than one. They must not run
     while anything is timed.
     """
-    if not study.effort.flip:
-        return list(measured)
-    truth = study.truth.airlight + study.truth.surface
 
     def one(measurement: Measurement) -> Measurement:
         frame = measurement.frame
-        return (
-            measurement if frame is None else replace(measurement, flip=flip_hdr(truth, frame.airlight + frame.surface))
-        )
+        if frame is None or not wants_flip(study.effort, measurement.configuration):
+            return measurement
+        light = study.truth.airlight + study.truth.surface
+        return replace(measurement, flip=flip_hdr(light, frame.airlight + frame.surface))
 
     with ThreadPoolExecutor(workers) as pool:
         return list(pool.map(one, measured))
+
+
+def wants_flip(effort: Effort, chosen: Configuration) -> bool:
+    """Return whether an effort asks for HDR-FLIP of a configuration."""
+    return effort.flip == "all" or (effort.flip == "kinds" and (chosen in QUICK or ":" in chosen.method))

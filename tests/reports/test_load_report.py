@@ -92,7 +92,7 @@ def small_report():
         "patience": 1.0,
         "slow": 1.0,
         "limit": 1.0,
-        "flip": False,
+        "flip": "none",
         "mutations": False,
         "rays": 0,
         "papers": [],
