@@ -12,6 +12,7 @@ A claim is {"kind", "text", "good"}: `good` is true or false for what is a verdi
     not-measured   what was left out for the time it takes, HDR-FLIP that could not be had
 """
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -218,7 +219,9 @@ def _without_flip(scenes: Scenes) -> list[Claim]:
     for name, m in everything:
         flip = m.get("flip")
         if flip and flip["value"] is None:
-            reasons.setdefault(flip["note"], []).append(f"{m['label']} in {name}")
+            # How many pixels it is differs from image to image and is in the tables: the reason is the same.
+            reason = re.sub(r"^\d+ pixels of the (reference|test image) are", r"pixels of the \1 are", flip["note"])
+            reasons.setdefault(reason, []).append(f"{m['label']} in {name}")
     return [
         _claim(
             "not-measured", f"No HDR-FLIP ({reason}): {'; '.join(names) if len(names) < 8 else f'{len(names)} images'}."

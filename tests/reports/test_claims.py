@@ -229,6 +229,16 @@ def test_missing_flip_is_said_once_for_each_reason():
     assert found == ("No HDR-FLIP (flip-evaluator is not installed): fast in fog; good in fog; slow in fog.")
 
 
+def test_missing_flip_of_different_counts_is_one_reason():
+    data = scenes()
+    for count, one in zip((3, 185), data[0]["methods"]):
+        one["flip"] = {"value": None, "note": f"{count} pixels of the test image are negative: FLIP is not defined"}
+    (found,) = [one["text"] for one in claims(data) if one["kind"] == "not-measured"]
+    assert found == (
+        "No HDR-FLIP (pixels of the test image are negative: FLIP is not defined): fast in fog; good in fog."
+    )
+
+
 def test_what_takes_too_long_is_not_among_the_refused():
     data = scenes()
     data[0]["methods"].append(method("slow", None, 0, refused="a frame would take 8 min") | {"left_out": True})
