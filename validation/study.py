@@ -39,7 +39,7 @@ class Effort:
     seconds: float  #: spent on each timing
     scenes: tuple[str, ...] = ()  #: studied unless others are named
     samples: int = 8  #: a pixel in each batch of the comparisons of the truth
-    batches: int = 1024  #: of these comparisons at most
+    batches: int = 2048  #: of these comparisons at most
     multiple: tuple[int, int] = (8, 4)  #: batches, and samples a pixel in each, for the share of multiple scattering
     patience: float = 10.0  #: seconds after which an estimator that has not decided is stopped
     slow: float = 0.15  #: where the airlight takes longer, whole frames are timed stage by stage [s]
@@ -82,7 +82,7 @@ EFFORTS: dict[str, Effort] = {
             margins=_margins(0.0005, 0.01),
             seconds=0.1,
             samples=16,
-            patience=15.0,
+            patience=25.0,
             flip="kinds",
             rays=20_000,
             papers=("biri",),
