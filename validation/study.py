@@ -82,9 +82,9 @@ EFFORTS: dict[str, Effort] = {
             margins=_margins(0.0005, 0.01),
             seconds=0.1,
             samples=16,
-            patience=25.0,
+            patience=18.0,
             flip="kinds",
-            rays=20_000,
+            rays=10_000,
             papers=("biri",),
         ),
         Effort(
