@@ -137,5 +137,8 @@ def falloff(geometry: RayGeometry, light: Light, x):
     s = x - geometry.foot
     t = dr.fma(geometry.slant, s, -geometry.slide)
     away = dr.sqrt(dr.fma(t, t, dr.square(geometry.gap)))
-    angle = dr.atan2(away, dr.fma(geometry.axial, s, geometry.offset))
-    return dr.clip((light.cutoff - angle) * light.inverse_transition, 0, 1)
+    along = dr.fma(geometry.axial, s, geometry.offset)
+    # As one angle: at the dim edge the difference of two has lost what is left of it.
+    cos, sin = light.cone.cos, dr.sqrt(light.cone.square_sin)
+    within = dr.atan2(sin * along - cos * away, dr.fma(cos, along, sin * away))
+    return dr.clip(within * light.inverse_transition, 0, 1)
