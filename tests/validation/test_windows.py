@@ -73,9 +73,12 @@ def test_sun_comes_in_by_the_windows_alone(variant):
 
 
 @pytest.mark.statistical
-@pytest.mark.parametrize(("estimator", "margin"), [("single-scatter", 0.005), ("volpath", 0.03)])
+@pytest.mark.parametrize(("estimator", "margin"), [("single-scatter", 0.005), ("volpath", 0.012)])
 def test_estimators_agree(variant, estimator, margin):
-    """Margins for a quick run of one seed; `airlight report` asks for a tenth of them."""
+    """Margins for a quick run of one seed; `airlight report` asks for less.
+
+    That of volpath takes some hundred batches: of 32 the noise of single pixels is still skewed, and one was rejected.
+    """
     from validation.agreement import agreement
 
     for layer, one in agreement(loaded((24, 18)), estimator=estimator, margin=margin, samples=64).items():
