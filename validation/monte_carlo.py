@@ -145,8 +145,7 @@ def _all(done: Batches | None) -> Batches:
 def _tracer(scene, estimator: str, samples: int, max_depth: int, counts: NDArray[np.integer] | None) -> Trace:
     truth = read_truth(scene)
     if estimator == "volpath":
-        own = {} if counts is None else {"counts": counts}
-        return lambda seed: volpath_batch(truth, seed, samples, max_depth=max_depth, **own)
+        return lambda seed: volpath_batch(truth, seed, samples, max_depth=max_depth, counts=counts)
     if estimator == "single-scatter" and max_depth == 2 and counts is None:
         return lambda seed: single_scatter_batch(truth, seed, samples)
     raise ValueError(f"estimator: got {estimator!r} with max_depth {max_depth}, wanted one of {', '.join(ESTIMATORS)}")

@@ -30,7 +30,7 @@ def traced(monkeypatch, own_cache):
     """Put random numbers in the place of the tracer, and list the seeds that were asked for."""
     seeds = []
 
-    def trace(truth, seed, samples, *, max_depth=2):
+    def trace(truth, seed, samples, *, max_depth=2, counts=None):
         seeds.append(seed)
         mean = np.random.default_rng([seed, samples, max_depth]).exponential(size=(2, 12, 3))
         return single_batch(seed, samples, mean)
