@@ -67,7 +67,7 @@ def measurement_data(measured: Measurement) -> dict[str, Any]:
     """Return what one configuration costs and how wrong it is."""
     return {
         "label": measured.configuration.label,
-        "kind": "function" if ":" in measured.configuration.method else "built-in",
+        "kind": "function" if measured.configuration.own else "built-in",
         "layer": "airlight",
         "method": measured.configuration.method,
         "kernel": measured.configuration.kernel,

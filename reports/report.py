@@ -98,7 +98,7 @@ def write_report(
     watch = _Watch(progress)
     here = Path(__file__).parent
     machine = {name: str(environment.get(name)) for name in ("processor", "threads", "variant", "llvm", "device")}
-    common = keeper(machine, more=[here / name for name in _MAKERS if (here / name).is_file()], fresh=fresh)
+    common = keeper(machine, more=[here / name for name in _MAKERS], fresh=fresh)
     try:
         with staged(target) as hidden:
             found = []
@@ -201,15 +201,14 @@ def _try_own(study, configurations: Sequence[Configuration]) -> None:
     """Render a small frame with every method of the user's own: what is at fault there is said before the work."""
     from realtime.errors import InputError as MethodError
     from realtime.frame import render_frame
-    from validation.bench import Measurement
     from validation.configurations import prepared
 
     for one in configurations:
-        if ":" in one.method:
+        if one.own:
             try:
                 render_frame(prepared(study.probe, one))
             except MethodError as error:
-                raise_own_error(Measurement(one, None, None, None, None, refused=str(error)))
+                raise_own_error(one, str(error))
 
 
 def _refuse_twins(scenes: Sequence[str]) -> None:

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from analytic.errors import InputError
 from reference.exr import Image, write_exr
 from reports.data import image_data, measurement_data, plain, scene_facts, truth_data
 from reports.environment import stamped, threads
@@ -127,7 +128,7 @@ class _Parts:
         self, chosen: Sequence[Configuration], stems: Sequence[str], factor: float, tell: Tell
     ) -> list[dict[str, Any]]:
         """Return the entries of all configurations."""
-        slots = [self.slot("method", self._asked(one), _own_source(one.method)) for one in chosen]
+        slots = [self.slot("method", self._asked(one), _own_source(one)) for one in chosen]
         entries = []
         workers = threads()
         # As many at once as there are processors, for HDR-FLIP: nothing is lost of those before if this is stopped.
@@ -140,7 +141,7 @@ class _Parts:
                 tell(number / len(chosen), chosen[number].label)
                 start = time.monotonic()
                 measured.append(study_configuration(self._study, chosen[number]))
-                raise_own_error(measured[-1])
+                raise_own_error(chosen[number], measured[-1].refused)
                 seconds.append(time.monotonic() - start)
             start = time.monotonic()
             measured = with_flips(self._study, measured, workers=workers)
@@ -180,7 +181,7 @@ def file_stems(labels: Sequence[str]) -> list[str]:
     return stems
 
 
-def raise_own_error(measured: Measurement) -> None:
+def raise_own_error(chosen: Configuration, refused: str | None) -> None:
     """Raise what a method of the user's own did wrong: what it refuses by name is a result, its faults are not.
 
     Raises
@@ -188,11 +189,8 @@ def raise_own_error(measured: Measurement) -> None:
     InputError
         With the words of `realtime.methods.own`, which begin with the name of the method.
     """
-    from analytic.errors import InputError
-
-    name = measured.configuration.method
-    if ":" in name and measured.refused and measured.refused.startswith(f"method {name}:"):
-        raise InputError(measured.refused)
+    if chosen.own and refused and refused.startswith(f"method {chosen.method}:"):
+        raise InputError(refused)
 
 
 def _truth(study: SceneStudy) -> Computed:
@@ -260,11 +258,11 @@ def _exr_bytes(image: Image) -> bytes:
         return path.read_bytes()
 
 
-def _own_source(method: str) -> dict[str, Any]:
+def _own_source(chosen: Configuration) -> dict[str, Any]:
     """Return what else the numbers of a method depend on: its source where it is the user's own, HDR-FLIP."""
-    if ":" not in method:
+    if not chosen.own:
         return _flip_version()
-    module = method.rpartition(":")[0]
+    module = chosen.method.rpartition(":")[0]
     file = module if module.endswith(".py") or os.sep in module else getattr(sys.modules.get(module), "__file__", None)
     # Of a function typed into a notebook there is no file: its results are never found again.
     source = Path(file).read_bytes().hex() if file else f"no file, {time.time_ns()}"

@@ -88,7 +88,7 @@ def measure(
     try:
         begin = time.perf_counter()
         renderer = prepared(scene, chosen)
-        doubtful = time.perf_counter() - begin > _DOUBTFUL or ":" in chosen.method
+        doubtful = time.perf_counter() - begin > _DOUBTFUL or chosen.own
         if limit is not None and probe is not None and doubtful:
             reason = _too_long(probe(), chosen, scene, limit)
             if reason:
@@ -102,7 +102,7 @@ def measure(
     if timed is not None and took > _LONG:
         timed = None
         notes.append(f"timed at {scene.camera.width} x {scene.camera.height}: larger frames take minutes")
-    if ":" in chosen.method and not isinstance(renderer.airlight, Frozen):
+    if chosen.own and not isinstance(renderer.airlight, Frozen):
         notes.append("not frozen: its Python runs again for every frame")
     times = time_frame(renderer if timed is None else prepared(timed, chosen), seconds=seconds, slow=slow)
     return Measurement(

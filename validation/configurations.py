@@ -32,6 +32,11 @@ class Configuration:
         inside = ", ".join(([self.kernel] if self.kernel else []) + values)
         return f"{self.method} ({inside})" if inside else self.method
 
+    @property
+    def own(self) -> bool:
+        """Whether the method is the user's own, named 'module:function'."""
+        return ":" in self.method
+
 
 #: What `bench` and `report` measure unless told otherwise.
 STANDARD: tuple[Configuration, ...] = (

@@ -225,4 +225,4 @@ def with_flips(study: SceneStudy, measured: Sequence[Measurement], *, workers: i
 
 def wants_flip(effort: Effort, chosen: Configuration) -> bool:
     """Return whether an effort asks for HDR-FLIP of a configuration."""
-    return effort.flip == "all" or (effort.flip == "kinds" and (chosen in QUICK or ":" in chosen.method))
+    return effort.flip == "all" or (effort.flip == "kinds" and (chosen in QUICK or chosen.own))
