@@ -132,10 +132,10 @@ def run(arguments: Sequence[str]) -> int:
         if not packages:
             raise
         return _fail(f"system libraries are missing, install them with `{install_line(packages)}`", MISSING)
-    except Exception as error:
-        if isinstance(error, _input_errors()):
-            return _fail(str(error), WRONG_INPUT)
-        if not hasattr(error, "format_message"):  # what Typer raises for wrong usage
+    except _input_errors() as error:
+        return _fail(str(error), WRONG_INPUT)
+    except Exception as error:  # what Typer raises for wrong usage has its class in one of Typer's private modules
+        if not hasattr(error, "format_message"):
             raise
         return _usage(error)
     if status == INTERRUPTED:

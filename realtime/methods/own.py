@@ -220,7 +220,7 @@ def _own_errors(what: str, file: str | None = None) -> Iterator[None]:
         yield
     except InputError:  # what it refuses by name
         raise
-    except Exception as error:
+    except Exception as error:  # the user's code may raise anything, and that is his to mend: never a failure of ours
         root: BaseException = error
         while root.__cause__ is not None:  # Dr.Jit wraps what is raised in the body of a loop
             root = root.__cause__
