@@ -53,6 +53,11 @@ def is_single(Float) -> bool:
     return dr.is_array_v(Float) and dr.itemsize_v(Float) == 4
 
 
+def bytes_of(Float) -> int:
+    """Return how much memory a number of a type takes in arrays [bytes]."""
+    return 4 if is_single(Float) else 8
+
+
 def two_numbers(Float):
     """Return the type of two numbers of a type, which a gather reads at once."""
     import mitsuba as mi

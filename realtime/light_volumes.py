@@ -20,7 +20,7 @@ in any order. The boundary is the height field of `realtime.light_heights`, and 
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from realtime.arrays import is_single
+from realtime.arrays import bytes_of
 from realtime.errors import InputError
 from realtime.light_heights import LightHeights, level_start, light_heights
 from realtime.lights import Light
@@ -178,7 +178,7 @@ def _check(map: int, evaluation: str, tessellation: str, threshold: float, surfa
 
 def _memory_of(light: Light, size: int, evaluation: str) -> int:
     """Return about how much the volume of a light takes, an upper bound where it is adaptive [bytes]."""
-    number = 4 if is_single(type(light.position.x)) else 8
+    number = bytes_of(type(light.position.x))
     faces = 6 if light.kind == "point" else 1
     corners = map_memory(light, size)
     if evaluation == "mesh":

@@ -19,7 +19,7 @@ closely meets the same surface whatever the precision of the method, and one map
 from dataclasses import dataclass
 from typing import Any
 
-from realtime.arrays import is_single
+from realtime.arrays import bytes_of
 from realtime.errors import InputError
 from realtime.lights import Light
 
@@ -53,7 +53,7 @@ def check_size(size) -> None:
 
 def map_memory(light: Light, size: int) -> int:
     """Return how much the distances of the shadow map of a light take [bytes]."""
-    number = 4 if is_single(type(light.position.x)) else 8
+    number = bytes_of(type(light.position.x))
     return number * (6 if light.kind == "point" else 1) * (size + 1) ** 2
 
 

@@ -16,7 +16,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from realtime.arrays import is_single
+from realtime.arrays import bytes_of
 from realtime.camera import Camera
 from realtime.epipolar import Slices, image_point, image_slices, neighbour, pixel_number, slice_coordinate
 from realtime.epipolar_heights import SliceHeights, slice_heights
@@ -155,7 +155,7 @@ def _whole_words(samples: int, camera: Camera) -> int:
 
 def _memory_of_slices(scene: Scene, light: Light, size: int, slices: int, samples: int) -> int:
     """Return about how much the slices of a light take [bytes]: per leaf its value, two bounds, four of the tree."""
-    number = 4 if is_single(type(light.position.x)) else 8
+    number = bytes_of(type(light.position.x))
     leaves = size if light.kind == "spot" else 2 * size
     lanes = _whole_words(samples, scene.camera)
     return (slices or _usual_slices(scene.camera)) * (number * 7 * leaves + lanes * (4 + 3 * number))
