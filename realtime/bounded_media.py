@@ -45,7 +45,7 @@ from realtime.errors import InputError
 from realtime.exponential import exp_bounded
 from realtime.gauss import unit_nodes
 from realtime.geometry import clip_to_cone, distance_to_light, falloff, stretches
-from realtime.media_rays import MediaRay, Piece, light_leg
+from realtime.media_rays import MediaRay, Piece, light_leg, sum_over_pieces
 from realtime.medium import Medium, least_extinction
 from realtime.parallel_airlight import ParallelRay, parallel_airlight, parallel_source
 from realtime.phase import evaluate
@@ -77,19 +77,8 @@ def bounded_airlight(ray: MediaRay | ParallelRay, x0, x1):
     if ray.light.kind == "spot":
         x0, x1 = clip_to_cone(ray.geometry, x0, x1)
     panels = stretches(ray.geometry, ray.light, x0, x1)
-    Float, Color = type(ray.geometry.height), type(ray.medium.albedo)
-    zero = dr.zeros(Color, dr.width(ray.geometry.height, x0, x1))
-    total = zero
-    for piece in ray.pieces:
-        for low, high in panels:
-            begin, end = dr.maximum(low, piece.begin), dr.minimum(high, piece.end)
-            total += dr.if_stmt(
-                args=(begin, end),
-                cond=end > begin,
-                true_fn=lambda begin, end, piece=piece: _integral(ray, piece, begin, end),
-                false_fn=lambda begin, end: Color(Float(0)),
-            )
-    return total
+    zero = dr.zeros(type(ray.medium.albedo), dr.width(ray.geometry.height, x0, x1))
+    return sum_over_pieces(ray.pieces, panels, lambda *segment: _integral(ray, *segment), zero)
 
 
 def bounded_source(ray: MediaRay | ParallelRay, x):

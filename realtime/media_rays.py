@@ -44,6 +44,36 @@ class MediaRay:
     form: str  #: of `FORMS`
 
 
+def sum_over_pieces(pieces: tuple[Piece, ...], segments, integral, zero):
+    """Add up an integral over the parts of segments that lie in the pieces.
+
+    Parameters
+    ----------
+    pieces
+        Of the rays.
+    segments
+        Pairs of distances (x0, x1), `x1` may be infinite [m].
+    integral
+        Function (piece, x0, x1) -> colour; only lanes with x0 < x1 count.
+    zero
+        The colour of no segment, of the rays' width.
+    """
+    import drjit as dr
+
+    Color = type(zero)
+    total = zero
+    for piece in pieces:
+        for x0, x1 in segments:
+            begin, end = dr.maximum(x0, piece.begin), dr.minimum(x1, piece.end)
+            total += dr.if_stmt(
+                args=(begin, end),
+                cond=end > begin,
+                true_fn=lambda begin, end, piece=piece: integral(piece, begin, end),
+                false_fn=lambda begin, end: Color(0),
+            )
+    return total
+
+
 def camera_pieces(medium: Medium, origin, direction, *, corners=None) -> tuple[Piece, ...]:
     """Return the pieces of the camera rays in which something scatters.
 

@@ -30,7 +30,7 @@ from realtime.errors import InputError
 from realtime.exponential import exp_bounded
 from realtime.gauss import unit_nodes
 from realtime.lights import Light
-from realtime.media_rays import Piece
+from realtime.media_rays import Piece, sum_over_pieces
 from realtime.medium import Medium, least_extinction
 from realtime.parallel_light import ParallelSeen, cylinder_bend, parallel_legs, seen_along, slope_from
 from realtime.phase import evaluate_half
@@ -79,16 +79,8 @@ def parallel_airlight(ray: ParallelRay, x0, x1):
     import drjit as dr
 
     Color = type(ray.medium.albedo)
-    total = dr.zeros(Color, dr.width(x0, x1, ray.direction))
-    for piece in ray.pieces:
-        begin, end = dr.maximum(x0, piece.begin), dr.minimum(x1, piece.end)
-        total += dr.if_stmt(
-            args=(begin, end),
-            cond=end > begin,
-            true_fn=lambda begin, end, piece=piece: _integral(ray, piece, begin, end),
-            false_fn=lambda begin, end: Color(0),
-        )
-    return total
+    zero = dr.zeros(Color, dr.width(x0, x1, ray.direction))
+    return sum_over_pieces(ray.pieces, [(x0, x1)], lambda *segment: _integral(ray, *segment), zero)
 
 
 def parallel_source(ray: ParallelRay, x):
