@@ -6,6 +6,9 @@ faces the camera, beyond which there is shadow, adds its Gamma if the stencil is
 faces away subtracts its Gamma if the stencil is zero and puts its layers on (Biri 2006, section 5.1.5). From the camera
 on (order=exact) the same rule reads: a plane that brings the count from zero up adds, one that brings it back to zero
 subtracts. Without an order every plane counts.
+
+The list of a tile is in order, but for a tile that found no room for a list of its own and reads the longer one that it
+would have drawn on. Its rays look for each next crossing in the whole of that list.
 """
 
 from dataclasses import dataclass
@@ -33,7 +36,8 @@ class Buffer:
 class _Draw:
     """What has been drawn of a ray's planes."""
 
-    place: Any  #: next entry to read
+    place: Any  #: next entry to read; in a list without order the one that was drawn last, or its end
+    key: Any  #: of the crossing drawn last, in a list without order: larger come first
     stencil: Any
     quotient: Any  #: of the plane to draw
     number: Any  #: of the plane to draw
@@ -80,6 +84,7 @@ def sum_crossings(
     begin = Float(index.layers) + dr.zeros(Float, width) if order == "exact" else over_surface
     draw = _Draw(
         dr.zeros(mi.UInt32, width),
+        dr.full(Float, dr.inf, width),
         begin,
         dr.zeros(Float, width),
         dr.zeros(mi.UInt32, width),
@@ -105,10 +110,12 @@ def sum_crossings(
 
 
 def _next(index: PlaneIndex, lists: Lists, ray: RayPlanes, ray_end, draw: _Draw, order: str) -> _Draw:
-    """Read one plane."""
+    """Read one plane: the next of the list, or the next crossing of a list without order."""
     import drjit as dr
 
-    quotient, crossed, gain, number = read_plane(index, lists, ray, draw.place, draw.place < ray.source.count)
+    found, key = _sought(index, lists, ray, ray_end, draw, order)
+    place = dr.select(ray.sorted, draw.place, found)
+    quotient, crossed, gain, number = read_plane(index, lists, ray, place, place < ray.source.count)
     crossed &= quotient > ray_end
     if order == "none":
         factor, stencil = gain, draw.stencil
@@ -121,13 +128,44 @@ def _next(index: PlaneIndex, lists: Lists, ray: RayPlanes, ray_end, draw: _Draw,
         begins, ends = (draw.stencil <= 0) & (stencil > 0), (draw.stencil > 0) & (stencil <= 0)
         factor = dr.select(begins, 1, dr.select(ends, -1, 0))
     return _Draw(
-        draw.place + 1,
+        dr.select(ray.sorted, draw.place + 1, place),
+        key,
         dr.select(crossed, stencil, draw.stencil),
         quotient,
         number,
         dr.select(crossed, type(gain)(factor), 0),
         draw.total,
     )
+
+
+def _sought(index: PlaneIndex, lists: Lists, ray: RayPlanes, ray_end, draw: _Draw, order: str):
+    """Return the place in a list without order of the crossing that comes after the last one, and its key.
+
+    That is the largest key below the last, of crossings of one key the first in the list that was not drawn: the order
+    in which `realtime.plane_tiles` puts lists, but that the ray's own crossings tell it, not those of the middle ray.
+    Behind the last crossing the place is the end of the list. Lists in order are not read.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    Float, width = type(ray.x), dr.width(ray.x)
+    count = dr.select(ray.sorted, 0, ray.source.count)
+
+    def body(k, place, key):
+        quotient, crossed, _, number = read_plane(index, lists, ray, k, k < count)
+        crossed &= quotient > ray_end
+        own = -dr.gather(Float, index.spans, number * 4 + 3, crossed) if order == "paper" else quotient
+        waits = (own < draw.key) | ((own == draw.key) & (k > draw.place))
+        nearer = crossed & waits & (own > key)
+        return k + 1, dr.select(nearer, k, place), dr.select(nearer, own, key)
+
+    _, place, key = dr.while_loop(
+        state=(dr.zeros(mi.UInt32, width), count + dr.zeros(mi.UInt32, width), dr.full(Float, -dr.inf, width)),
+        cond=lambda k, place, key: k < count,
+        body=body,
+        labels=("k", "place", "key"),
+    )
+    return place, key
 
 
 def _layers_at_end(index: PlaneIndex, lists: Lists, ray: RayPlanes, ray_end):
