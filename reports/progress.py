@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 Progress = Callable[[float, str], None]
+Steps = Callable[[int, int, str], None]  # (done, total, what)
 
 
 class Interrupted(Exception):
@@ -27,6 +28,31 @@ def progress_bar(title: str) -> Iterator[Progress]:
         yield from _rich_bar(title)
     else:
         yield _plain_lines(title)
+
+
+def part_of(tell: Progress | None, first: float, last: float, *, before: str = "") -> Progress:
+    """Return what a part of some work tells its share to: `tell` hears of shares from `first` to `last` of all of it.
+
+    Parameters
+    ----------
+    tell
+        Told the share of all the work and what comes next; nobody is without it.
+    first, last
+        What share of the work is done when the part begins and when it ends.
+    before
+        Put before what comes next.
+    """
+    if tell is None:
+        return lambda share, what: None
+    # Not first + share (last - first): both ends are met to the last digit.
+    return lambda share, what: tell((1 - share) * first + share * last, before + what)
+
+
+def counted(tell: Progress | None) -> Steps:
+    """Return what work that counts its steps, (done, total, what), tells them to: `tell` hears of shares."""
+    if tell is None:
+        return lambda done, total, what: None
+    return lambda done, total, what: tell(done / total, what)
 
 
 def _rich_bar(title: str) -> Iterator[Progress]:

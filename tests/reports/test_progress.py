@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import io
+import itertools
 import re
 from types import SimpleNamespace
 
 import pytest
 
 import reports.progress
-from reports.progress import progress_bar
+from reports.progress import counted, part_of, progress_bar
 
 
 @pytest.fixture
@@ -98,3 +99,18 @@ def test_bar_goes_away_after_a_failure(monkeypatch, clock):
     with pytest.raises(KeyError):
         fail()
     assert screen.getvalue().endswith("\x1b[2K") or "\x1b[?25h" in screen.getvalue()  # the cursor is back
+
+
+def test_parts_tell_shares_of_the_whole():
+    """From end to end, where the parts meet too, to the last digit; and nothing goes wrong where nobody listens."""
+    told = []
+    whole = [0.0, 0.3, 0.9, 1.0]  # 0.3 + (0.9 - 0.3) is not 0.9
+    for first, last in itertools.pairwise(whole):
+        tell = counted(part_of(lambda share, what: told.append((share, what)), first, last, before="map: "))
+        for done in range(3):
+            tell(done, 2, str(done))
+    assert [share for share, _ in told] == pytest.approx([0, 0.15, 0.3, 0.3, 0.6, 0.9, 0.9, 0.95, 1])
+    assert [share for share, what in told if what != "map: 1"] == [0, 0.3, 0.3, 0.9, 0.9, 1]
+    assert told[1][1] == "map: 1"
+    counted(part_of(None, 0, 1))(1, 2, "nobody")
+    counted(None)(1, 2, "nobody")
