@@ -63,7 +63,7 @@ def figures(
     """
     from analytic.errors import InputError
     from reference.files import ensure_folder
-    from reports.progress import progress_bar
+    from reports.progress import part_of, progress_bar
     from reports.style import WIDTHS
     from validation.load import nearest
 
@@ -86,11 +86,8 @@ def figures(
     folder = ensure_folder(output or "airlight-figures")
     with progress_bar("figures") as tell:
         for number, name in enumerate(chosen):
-
-            def told(share: float, what: str, number: int = number, name: str = name) -> None:
-                tell((number + share) / len(chosen), f"{name}: {what}")
-
             tell(number / len(chosen), name)
+            told = part_of(tell, number / len(chosen), (number + 1) / len(chosen), before=f"{name}: ")
             _compute(name, folder, given | {"progress": told})
             _module(name).plot(folder, **drawing)
             _print_files(name, folder)

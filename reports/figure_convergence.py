@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from reference.files import ensure_folder
-from reports.figure_files import draw_figure, new_figure, read_csv, values, write_csv, write_provenance
+from reports.figure_files import draw_figure, name_sizes, new_figure, read_data, values, write_data
+from reports.progress import counted, part_of
 from reports.style import COLOURS, WIDTHS, kernel_style
 
 NAME = "convergence"
@@ -66,32 +67,23 @@ def compute(
         rows += [(promise.kind, name, size, error, *law) for size, error in zip(found.sizes, found.errors)]
     image, batches = ((32, 24), 16) if quick else ((64, 48), 64)
     for number, estimator in enumerate(ESTIMATORS):
-
-        def told(done: int, total: int, what: str, number: int = number) -> None:
-            tell(0.4 + 0.3 * (number + done / total), what)
-
+        told = counted(part_of(tell, 0.4 + 0.3 * number, 0.7 + 0.3 * number))
         rows += _estimator_rows(scene, image, estimator, batches, told)
-    write_csv(target / f"{NAME}.csv", _HEADER, rows)
-    write_provenance(target, NAME, scene=scene, image=image, batches=batches, samples=_SAMPLES)
+    write_data(target, NAME, _HEADER, rows, scene=scene, image=image, batches=batches, samples=_SAMPLES)
 
 
 def _estimator_rows(scene: str, image: tuple[int, int], estimator: str, batches: int, progress) -> list[tuple]:
     """Return rows of the error over samples of an estimator; every number of batches begins with those before."""
     import numpy as np
 
-    from reference.epsilon import measure_shadow_epsilon
-    from reference.scene import read_truth
-    from validation.agreement import layer_masks, layer_mean
+    from validation.agreement import layer_mean
+    from validation.estimator_truth import estimator_truth
     from validation.load import load_scene
     from validation.map_study import fitted_slope
     from validation.monte_carlo import monte_carlo_batches
-    from validation.truth import truth_image
 
     loaded = load_scene(scene, image).scene
-    epsilon = measure_shadow_epsilon() if estimator == "volpath" else 0.0
-    truth = truth_image(loaded, shadow_scale=1 - epsilon)
-    mask = layer_masks(read_truth(loaded), truth)["airlight"]
-    expected = truth.airlight[mask]
+    expected, mask = estimator_truth(loaded, estimator)
     counts = [2**k for k in range(1, batches.bit_length())]
     errors = []
     for count in counts:
@@ -109,7 +101,7 @@ def plot(folder: Path | str, **options: Any) -> None:
 
 
 def _draw(folder: Path, column: str):
-    rows = read_csv(folder / f"{NAME}.csv", NAME)
+    rows = read_data(folder, NAME)
     width = WIDTHS[column]
     double = column == "double"
     figure = new_figure(width, 0.42 * width if double else 2.5 * width)
@@ -120,19 +112,9 @@ def _draw(folder: Path, column: str):
             _curve(panel, kind, [row for row in chosen if row["name"] == name], name)
         panel.set(xlabel=across, ylabel=up, yscale="log", xscale="linear" if kind == "rate" else "log")
         if kind != "rate":
-            _powers_of_two(panel, values(chosen, "size"), every=1 if kind == "order" else 2)
+            name_sizes(panel, sorted(set(values(chosen, "size")))[:: 1 if kind == "order" else 2])
         panel.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2 if double else -0.18))
     return figure
-
-
-def _powers_of_two(panel, sizes: list[float], *, every: int) -> None:
-    """Name the sizes along the axis: what lies between powers of ten would overlap."""
-    from matplotlib.ticker import FixedLocator, NullLocator
-
-    shown = sorted(set(sizes))[::every]
-    panel.xaxis.set_major_locator(FixedLocator(shown))
-    panel.xaxis.set_minor_locator(NullLocator())
-    panel.set_xticklabels([f"{size:g}" for size in shown])
 
 
 def _curve(panel, kind: str, rows: list[dict[str, str]], name: str) -> None:

@@ -19,6 +19,7 @@ from reference.files import write_bytes, write_text
 from reports.style import figure_style
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 Row = Mapping[str, str]
@@ -68,6 +69,42 @@ def new_figure(width: float, height: float) -> "Figure":
     return Figure(figsize=(width, height), layout="constrained")
 
 
+def name_sizes(panel: "Axes", sizes: Iterable[float]) -> None:
+    """Name these sizes along the axis and nothing else: what lies between powers of ten would overlap."""
+    from matplotlib.ticker import FixedLocator, NullLocator
+
+    shown = sorted(set(sizes))
+    panel.xaxis.set_major_locator(FixedLocator(shown))
+    panel.xaxis.set_minor_locator(NullLocator())
+    panel.set_xticklabels([f"{size:g}" for size in shown])
+
+
+def write_table(
+    name: str, folder: Path | str, tabular: Callable[[list[dict[str, str]]], str], output: Path | str | None = None
+) -> None:
+    """Write a table from the data of a figure as LaTeX.
+
+    Parameters
+    ----------
+    name, folder, output
+        See `draw_figure`.
+    tabular
+        Returns the table from the rows of the data.
+    """
+    write_text(Path(output or folder) / f"{name}.tex", tabular(read_data(folder, name)))
+
+
+def write_data(folder: Path, name: str, header: Sequence[str], rows: Iterable[Sequence[Any]], **made_by: Any) -> None:
+    """Write the data of a figure, `NAME.csv`, and what made them, when and on what, `NAME.json`."""
+    write_csv(folder / f"{name}.csv", header, rows)
+    _write_provenance(folder, name, **made_by)
+
+
+def read_data(folder: Path | str, name: str) -> list[dict[str, str]]:
+    """Return the rows of the data of a figure by column; raises InputError where they are missing."""
+    return read_csv(Path(folder) / f"{name}.csv", name)
+
+
 def write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
     """Write a table: nine digits of every number, nothing for None."""
     buffer = io.StringIO()
@@ -113,8 +150,7 @@ def pixels(row: Row) -> str:
     return f"{row['width']} \N{MULTIPLICATION SIGN} {row['height']}"
 
 
-def write_provenance(folder: Path | str, name: str, **made_by: Any) -> None:
-    """Write `NAME.json`: what made the data of a figure, when and on what."""
+def _write_provenance(folder: Path, name: str, **made_by: Any) -> None:
     from reports.environment import describe_environment
 
     content = {
@@ -124,7 +160,7 @@ def write_provenance(folder: Path | str, name: str, **made_by: Any) -> None:
         "environment": made_by.get("environment") or describe_environment(),
     }
     text = json.dumps(content, indent=1, ensure_ascii=False, default=str)
-    write_text(Path(folder) / f"{name}.json", text + "\n")
+    write_text(folder / f"{name}.json", text + "\n")
 
 
 def _cell(value: Any) -> Any:

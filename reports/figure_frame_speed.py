@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from reference.files import ensure_folder
-from reports.figure_files import draw_figure, new_figure, read_csv, value, write_csv, write_provenance
+from reports.figure_files import draw_figure, new_figure, read_csv, read_data, value, write_csv, write_data
 from reports.figure_report import measured, read_report, report_origin
 from reports.style import WIDTHS, report_styles
 
@@ -50,11 +50,10 @@ def compute(folder: Path | str, *, report: Path | str) -> None:
             times = (frame["median_ms"], frame["low_ms"], frame["high_ms"])
             errors = (error["relative_rmse"], error["relative_bias"], error["p99"], error["nonfinite"])
             rows.append((scene["name"], *scene["size"], one["label"], one["method"], *times, *errors))
-    write_csv(target / f"{NAME}.csv", _HEADER, rows)
     # All labels, those without a point too: variants are numbered in the report's order, as on its page.
     labels = dict.fromkeys((one["method"], one["label"]) for scene in data["scenes"] for one in scene["methods"])
     write_csv(target / f"{NAME}-labels.csv", ("method", "label"), labels)
-    write_provenance(target, NAME, **report_origin(report, data), timed=data["settings"].get("timed"))
+    write_data(target, NAME, _HEADER, rows, **report_origin(report, data), timed=data["settings"].get("timed"))
 
 
 def plot(folder: Path | str, **options: Any) -> None:
@@ -63,7 +62,7 @@ def plot(folder: Path | str, **options: Any) -> None:
 
 
 def _draw(folder: Path, column: str):
-    rows = read_csv(folder / f"{NAME}.csv", NAME)
+    rows = read_data(folder, NAME)
     scenes = list(dict.fromkeys(row["scene"] for row in rows))
     by_scene = {scene: [row for row in rows if row["scene"] == scene] for scene in scenes}
     known = report_styles([{"methods": read_csv(folder / f"{NAME}-labels.csv", NAME)}])

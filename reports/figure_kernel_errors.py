@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from reference.files import ensure_folder
-from reports.figure_files import draw_figure, new_figure, read_csv, write_csv, write_provenance
+from reports.figure_files import draw_figure, new_figure, read_data, write_data
 from reports.style import WIDTHS
 
 NAME = "kernel-errors"
@@ -53,8 +53,8 @@ def compute(folder: Path | str, *, quick: bool = False, progress: Callable[[floa
             continue
         error = relative_error(found.J, np.asarray(cases.value), "single")
         rows += [(name, *row) for row in zip(depth.tolist(), angle.tolist(), error.tolist())]
-    write_csv(target / f"{NAME}.csv", ("kernel", "optical_depth", "angle_degrees", "relative_error"), rows)
-    write_provenance(target, NAME, rays=len(depth), phase="isotropic", precision="single", reach=_REACH)
+    made_by = {"rays": len(depth), "phase": "isotropic", "precision": "single", "reach": _REACH}
+    write_data(target, NAME, ("kernel", "optical_depth", "angle_degrees", "relative_error"), rows, **made_by)
 
 
 def _rays(columns: int, lines: int):
@@ -86,7 +86,7 @@ def _draw(folder: Path, column: str):
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import LogNorm
 
-    rows = read_csv(folder / f"{NAME}.csv", NAME)
+    rows = read_data(folder, NAME)
     kernels = list(dict.fromkeys(row["kernel"] for row in rows))
     across = 4 if column == "double" else 3
     down = -(-len(kernels) // across)

@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from reference.files import ensure_folder
-from reports.figure_files import draw_figure, new_figure, read_csv, value, write_csv, write_provenance
+from reports.figure_files import draw_figure, new_figure, read_data, value, write_data
+from reports.progress import counted
 from reports.style import WIDTHS, kernel_style
 
 NAME = "kernel-speed"
@@ -41,12 +42,7 @@ def compute(
 
     target = ensure_folder(folder)
     rays, seconds = (RAYS // 16, 0.02) if quick else (RAYS // 2, 0.1)
-
-    def tell(done: int, total: int, what: str) -> None:
-        if progress is not None:
-            progress(done / total, what)
-
-    found = bench_kernels(names, phases=PHASES[:1], rays=rays, seconds=seconds, progress=tell)
+    found = bench_kernels(names, phases=PHASES[:1], rays=rays, seconds=seconds, progress=counted(progress))
     rows = []
     for cost in found.costs:
         time = cost.device or cost.wall
@@ -55,8 +51,8 @@ def compute(
         spread = (time.median, time.low, time.high)
         errors = (cost.median, cost.p99, cost.max, cost.nonfinite)
         rows.append((cost.kernel, cost.family, cost.size, cost.phase, cost.rays, *spread, *errors))
-    write_csv(target / f"{NAME}.csv", _HEADER, rows)
-    write_provenance(target, NAME, rays=rays, seconds=seconds, phase=PHASES[0][0], precision="single", quick=quick)
+    made_by = {"rays": rays, "seconds": seconds, "phase": PHASES[0][0], "precision": "single", "quick": quick}
+    write_data(target, NAME, _HEADER, rows, **made_by)
 
 
 def plot(folder: Path | str, **options: Any) -> None:
@@ -65,7 +61,7 @@ def plot(folder: Path | str, **options: Any) -> None:
 
 
 def _draw(folder: Path, column: str):
-    rows = read_csv(folder / f"{NAME}.csv", NAME)
+    rows = read_data(folder, NAME)
     width = WIDTHS[column]
     double = column == "double"
     figure = new_figure(width, 0.42 * width if double else 1.9 * width)

@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from reference.files import ensure_folder
-from reports.figure_files import draw_figure, new_figure, read_csv, values, write_csv, write_provenance
+from reports.figure_files import draw_figure, name_sizes, new_figure, read_data, values, write_data
+from reports.progress import counted, part_of
 from reports.style import WIDTHS, method_style
 
 NAME = "map-size"
@@ -59,19 +60,14 @@ def compute(
     loaded = load_scene(scene, image)
     rows: list[tuple] = []
     for number, (method, parameters) in enumerate(METHODS):
-
-        def tell(done: int, total: int, what: str, number: int = number) -> None:
-            if progress is not None:
-                progress((number + done / total) / len(METHODS), what)
-
+        tell = counted(part_of(progress, number / len(METHODS), (number + 1) / len(METHODS)))
         found = map_errors(loaded.scene, method, parameters=parameters, sizes=chosen, progress=tell)
         order = (found.slope.order, found.slope.standard_error)
         name = found.configuration.label
         for size, error in zip(found.sizes, found.metrics):
             errors = (error.relative_rmse, error.relative_bias, error.p99)
             rows.append((name, method, loaded.name, size, *errors, *order))
-    write_csv(target / f"{NAME}.csv", _HEADER, rows)
-    write_provenance(target, NAME, scene=scene, image=image, sizes=chosen)
+    write_data(target, NAME, _HEADER, rows, scene=scene, image=image, sizes=chosen)
 
 
 def plot(folder: Path | str, **options: Any) -> None:
@@ -81,9 +77,8 @@ def plot(folder: Path | str, **options: Any) -> None:
 
 def _draw(folder: Path, column: str):
     import numpy as np
-    from matplotlib.ticker import FixedLocator, NullLocator
 
-    rows = read_csv(folder / f"{NAME}.csv", NAME)
+    rows = read_data(folder, NAME)
     width = WIDTHS[column]
     figure = new_figure(width, 0.45 * width if column == "double" else 1.05 * width)
     panel = figure.subplots()
@@ -97,9 +92,6 @@ def _draw(folder: Path, column: str):
         panel.plot(sizes, level * sizes**-order, color=style["color"])
     panel.set(xscale="log", yscale="log", title=rows[0]["scene"])
     panel.set(xlabel="side of the shadow map [texels]", ylabel="relative RMSE of the airlight [1]")
-    shown = sorted({int(row["map"]) for row in rows})
-    panel.xaxis.set_major_locator(FixedLocator(shown))
-    panel.xaxis.set_minor_locator(NullLocator())
-    panel.set_xticklabels([str(size) for size in shown])
+    name_sizes(panel, values(rows, "map"))
     panel.legend(loc="best")
     return figure

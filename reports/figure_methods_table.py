@@ -4,8 +4,8 @@
 from pathlib import Path
 from typing import Any
 
-from reference.files import ensure_folder, write_text
-from reports.figure_files import pixels, read_csv, value, write_csv, write_provenance
+from reference.files import ensure_folder
+from reports.figure_files import pixels, value, write_data, write_table
 from reports.figure_report import read_report, report_origin
 from reports.latex import escape, number, table, with_quartiles
 
@@ -55,24 +55,16 @@ def compute(folder: Path | str, *, report: Path | str) -> None:
             frame, moved = times.get("frame") or {}, times.get("moved") or {}
             shown = (*_spread(frame), frame.get("repetitions"), *_spread(moved))
             rows.append((*what, *shown, *errors, bound, one["refused"]))
-    write_csv(target / f"{NAME}.csv", _HEADER, rows)
     settings = {name: data["settings"].get(name) for name in ("image", "timed")}
-    write_provenance(target, NAME, **report_origin(report, data), settings=settings)
+    write_data(target, NAME, _HEADER, rows, **report_origin(report, data), settings=settings)
 
 
 def plot(folder: Path | str, *, output: Path | str | None = None, **options: Any) -> None:
-    """Write `methods-table.tex` from the data in a folder.
+    """Write `methods-table.tex` from the data in a folder; a table has no use for the options of drawings."""
+    write_table(NAME, folder, _tabular, output)
 
-    Parameters
-    ----------
-    folder
-        Where the data are.
-    output
-        Where the table goes; the same folder by default.
-    options
-        Of drawings: a table has no use for them.
-    """
-    rows = read_csv(Path(folder) / f"{NAME}.csv", NAME)
+
+def _tabular(rows: list[dict[str, str]]) -> str:
     headers = (
         ("method", "frame", "light moved", "rel. RMSE", "rel. bias", "99\\,\\%"),
         ("", "[ms]", "[ms]", "[1]", "[1]", "[1]"),
@@ -88,7 +80,7 @@ def plot(folder: Path | str, *, output: Path | str | None = None, **options: Any
         "Needs \\usepackage{booktabs}. Times: medians with the distances to the quartiles, kernels compiled before.",
         "Errors of the airlight against the quadrature truth; 99 %: quantile of |error| / max(truth, mean / 1000).",
     )
-    write_text(Path(output or folder) / f"{NAME}.tex", table("lrrrrr", headers, body, comment=comment))
+    return table("lrrrrr", headers, body, comment=comment)
 
 
 def _spread(timing: dict[str, Any]) -> tuple[float | None, ...]:

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from reference.files import ensure_folder
-from reports.figure_files import draw_figure, new_figure, read_csv, values, write_csv, write_provenance
+from reports.figure_files import draw_figure, new_figure, read_data, values, write_csv, write_data
 from reports.style import WIDTHS, kernel_style, truth_style
 
 NAME = "polynomials"
@@ -45,14 +45,13 @@ def compute(folder: Path | str, *, rays: int = 100_000) -> None:
         for a in THICKNESSES:
             curves = _curves(phase, a, theta)
             rows += [(phase, a, *values) for values in zip(theta, *(curves[name] for name in _CURVES))]
-    write_csv(target / f"{NAME}.csv", ("phase", "a", "theta", *_CURVES), rows)
     shares = [
         (one.phase, one.region, one.kernel, one.rays, one.within_1_percent, one.within_10_percent)
         for one in printed_against_derived(rays)
     ]
     header = ("phase", "region", "kernel", "rays", "within_1_percent", "within_10_percent")
     write_csv(target / f"{NAME}-shares.csv", header, shares)
-    write_provenance(target, NAME, rays=rays)
+    write_data(target, NAME, ("phase", "a", "theta", *_CURVES), rows, rays=rays)
 
 
 def _curves(phase: str, a: float, theta):
@@ -80,7 +79,7 @@ def plot(folder: Path | str, **options: Any) -> None:
 def _draw(folder: Path, column: str):
     import numpy as np
 
-    rows = read_csv(folder / f"{NAME}.csv", NAME)
+    rows = read_data(folder, NAME)
     styles = {
         "exact": truth_style(),
         "taylor": {"color": kernel_style("taylor")["color"], "linestyle": "--"},

@@ -10,10 +10,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from reference.files import ensure_folder, write_text
-from reports.figure_files import draw_figure, new_figure, pixels, read_csv, value, write_csv, write_provenance
+from reference.files import ensure_folder
+from reports.figure_files import draw_figure, new_figure, pixels, read_data, value, write_data, write_table
 from reports.figure_published_rows import HEADER, billeter_entries, biri_entries, measured_papers
-from reports.figure_report import read_report, report_origin
+from reports.figure_report import reported_papers
 from reports.latex import escape, number, table, with_quartiles
 from reports.style import WIDTHS, method_style
 
@@ -43,36 +43,21 @@ def compute(
         Told the share done and what comes next.
     """
     target = ensure_folder(folder)
-    data = read_report(report) if report is not None else {}
-    papers, origin = data.get("published") or {}, {}
-    if any(papers.values()):
-        origin = report_origin(report or "", data)
-    else:
-        papers = measured_papers(quick, progress)
+    papers, origin = reported_papers(report)
+    if not any(papers.values()):
+        papers, origin = measured_papers(quick, progress), {}
     rows = biri_entries(papers.get("biri") or {}) + billeter_entries(papers.get("billeter") or {})
-    write_csv(target / f"{NAME}.csv", HEADER, rows)
-    write_provenance(target, NAME, **origin)
+    write_data(target, NAME, HEADER, rows, **origin)
 
 
 def plot(folder: Path | str, *, output: Path | str | None = None, **options: Any) -> None:
-    """Draw `published.pdf` and `.png` and write `published.tex` from the data in a folder.
-
-    Parameters
-    ----------
-    folder
-        Where the data are.
-    output
-        Where the drawings go; the same folder by default.
-    options
-        See `reports.figure_files.draw_figure`.
-    """
+    """Draw `published.pdf` and `.png` and write `published.tex`; options: see `reports.figure_files.draw_figure`."""
     draw_figure(NAME, folder, _draw, output=output, **options)
-    rows = read_csv(Path(folder) / f"{NAME}.csv", NAME)
-    write_text(Path(output or folder) / f"{NAME}.tex", _tabular(rows))
+    write_table(NAME, folder, _tabular, output)
 
 
 def _draw(folder: Path, column: str):
-    rows = read_csv(folder / f"{NAME}.csv", NAME)
+    rows = read_data(folder, NAME)
     names = dict.fromkeys(row["table"] for row in rows)
     tables = {name: [row for row in rows if row["table"] == name] for name in names}
     lines = [len({row["row"] for row in chosen}) for chosen in tables.values()]

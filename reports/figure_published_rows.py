@@ -4,6 +4,8 @@
 from collections.abc import Callable
 from typing import Any
 
+from reports.progress import part_of
+
 HEADER = (
     "paper",
     "table",
@@ -45,14 +47,11 @@ def measured_papers(quick: bool, progress: Callable[[float, str], None] | None) 
     size = (round(scale * SIZE[0]), round(scale * SIZE[1]))
     seconds = 0.1 if quick else 0.6
 
-    def part(first: float, last: float) -> Callable[[float, str], None]:
-        tell = progress or (lambda share, what: None)
-        return lambda share, what: tell(first + (last - first) * share, what)
-
-    biri = rows_data(biri_rows(scale=scale, seconds=seconds, progress=part(0.0, 0.3)), [])
-    figures = figure_rows(size=size, seconds=seconds, limit=_LIMIT, progress=part(0.3, 0.6))
+    biri = rows_data(biri_rows(scale=scale, seconds=seconds, progress=part_of(progress, 0.0, 0.3)), [])
+    figures = figure_rows(size=size, seconds=seconds, limit=_LIMIT, progress=part_of(progress, 0.3, 0.6))
     maps = MAPS[:1] if quick else MAPS
-    views = table_rows(maps=maps, size=size, seconds=seconds, limit=_LIMIT, progress=part(0.6, 1.0))
+    told = part_of(progress, 0.6, 1.0)
+    views = table_rows(maps=maps, size=size, seconds=seconds, limit=_LIMIT, progress=told)
     return {"biri": biri, "billeter": billeter_data(figures, views)}
 
 

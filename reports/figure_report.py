@@ -34,11 +34,19 @@ def read_report(folder: Path | str) -> dict[str, Any]:
 
 
 def report_origin(folder: Path | str, data: dict[str, Any]) -> dict[str, Any]:
-    """Return what `reports.figure_files.write_provenance` says of a report: its date and machine, not ours."""
+    """Return what `reports.figure_files.write_data` says of a report: its date and machine, not ours."""
     return {
         "report": {"created": data["created"], "command": data["command"], "folder": Path(folder).name},
         "environment": data["environment"],
     }
+
+
+def reported_papers(folder: Path | str | None) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return what a report holds of the papers, and its origin as of `report_origin`; nothing without a report."""
+    if folder is None:
+        return {}, {}
+    data = read_report(folder)
+    return data.get("published") or {}, report_origin(folder, data)
 
 
 def measured(scene: dict[str, Any], layer: str = "airlight") -> Iterator[dict[str, Any]]:

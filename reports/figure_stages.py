@@ -8,9 +8,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from reference.files import ensure_folder, write_text
-from reports.figure_files import draw_figure, new_figure, pixels, read_csv, value, values, write_csv, write_provenance
-from reports.figure_report import read_report, report_origin
+from reference.files import ensure_folder
+from reports.figure_files import draw_figure, new_figure, pixels, read_data, value, values, write_data, write_table
+from reports.figure_report import reported_papers
 from reports.latex import escape, number, table
 from reports.style import COLOURS, WIDTHS
 
@@ -44,12 +44,10 @@ def compute(
         Told the share done and what comes next.
     """
     target = ensure_folder(folder)
-    data = read_report(report) if report is not None else {}
-    found, origin = (data.get("published") or {}).get("biri"), {}
-    if found and any(row["published"]["shares"] for row in found["rows"]):
-        origin = report_origin(report or "", data)
-    else:
-        found = _measured(0.25 if quick else 1.0, progress)
+    papers, origin = reported_papers(report)
+    found = papers.get("biri")
+    if not found or not any(row["published"]["shares"] for row in found["rows"]):
+        found, origin = _measured(0.25 if quick else 1.0, progress), {}
     rows: list[tuple] = []
     shown = set()
     for row in found["rows"]:
@@ -65,8 +63,7 @@ def compute(
         named = (one["scene"], one["where"], f"{row['kernel']}{cone}", *row["size"])
         parts = zip(found["stages"], row["shares"], row["stages_ms"])
         rows += [(*named, stage, share, ms, *frame) for stage, share, ms in parts]
-    write_csv(target / f"{NAME}.csv", _HEADER, rows)
-    write_provenance(target, NAME, **origin)
+    write_data(target, NAME, _HEADER, rows, **origin)
 
 
 def _measured(scale: float, progress: Callable[[float, str], None] | None) -> dict[str, Any]:
@@ -77,20 +74,9 @@ def _measured(scale: float, progress: Callable[[float, str], None] | None) -> di
 
 
 def plot(folder: Path | str, *, output: Path | str | None = None, **options: Any) -> None:
-    """Draw `stages.pdf` and `.png` and write `stages.tex` from the data in a folder.
-
-    Parameters
-    ----------
-    folder
-        Where the data are.
-    output
-        Where the drawings go; the same folder by default.
-    options
-        See `reports.figure_files.draw_figure`.
-    """
+    """Draw `stages.pdf` and `.png` and write `stages.tex`; options: see `reports.figure_files.draw_figure`."""
     draw_figure(NAME, folder, _draw, output=output, **options)
-    rows = read_csv(Path(folder) / f"{NAME}.csv", NAME)
-    write_text(Path(output or folder) / f"{NAME}.tex", _tabular(rows))
+    write_table(NAME, folder, _tabular, output)
 
 
 def _groups(rows: list[dict[str, str]]) -> dict[tuple[str, str], list[dict[str, str]]]:
@@ -104,7 +90,7 @@ def _groups(rows: list[dict[str, str]]) -> dict[tuple[str, str], list[dict[str, 
 def _draw(folder: Path, column: str):
     import numpy as np
 
-    rows = read_csv(folder / f"{NAME}.csv", NAME)
+    rows = read_data(folder, NAME)
     groups = _groups(rows)
     stages = list(dict.fromkeys(row["stage"] for row in rows))
     shares = np.array([values(group, "share_percent") for group in groups.values()])

@@ -11,7 +11,7 @@ from typing import Any
 
 from analytic.errors import InputError
 from reference.files import ensure_folder
-from reports.figure_files import draw_figure, new_figure, read_csv, value, write_csv, write_provenance
+from reports.figure_files import draw_figure, new_figure, read_data, value, write_data
 from reports.figure_report import measured, read_report, report_origin
 from reports.style import COLOURS, WIDTHS
 
@@ -70,8 +70,7 @@ def compute(
         error = one["error"]["relative_rmse"] if one else None
         label = one["label"] if one else "reference"
         rows.append((name, label, *shared, error, *corners[0], *corners[1], side))
-    write_csv(target / f"{NAME}.csv", _HEADER, rows)
-    write_provenance(target, NAME, **report_origin(report, data), scene=found["name"])
+    write_data(target, NAME, _HEADER, rows, **report_origin(report, data), scene=found["name"])
 
 
 def _scene(data: dict[str, Any], name: str | None) -> dict[str, Any]:
@@ -165,7 +164,7 @@ def _draw(folder: Path, column: str):
 
     from reports.pictures import error_map, tone_mapped
 
-    rows = read_csv(folder / f"{NAME}.csv", NAME)
+    rows = read_data(folder, NAME)
     first = rows[0]
     images = [np.asarray(_pixels(folder / row["file"], row["layer"]), dtype=np.float64) for row in rows]
     corners = [(int(first["x0"]), int(first["y0"])), (int(first["x1"]), int(first["y1"]))]

@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from reference.files import ensure_folder
-from reports.figure_files import draw_figure, new_figure, read_csv, values, write_csv, write_provenance
+from reports.figure_files import draw_figure, new_figure, read_data, values, write_data
+from reports.progress import counted, part_of
 from reports.style import COLOURS, WIDTHS, truth_style
 
 NAME = "z-distribution"
@@ -58,38 +59,28 @@ def compute(
     outer[[0, -1]] = -np.inf, np.inf
     rows: list[tuple] = []
     for number, (estimator, samples) in enumerate(ESTIMATORS.items()):
-
-        def tell(done: int, total: int, what: str, number: int = number) -> None:
-            if progress is not None:
-                progress((number + done / total) / len(ESTIMATORS), what)
-
+        tell = counted(part_of(progress, number / len(ESTIMATORS), (number + 1) / len(ESTIMATORS)))
         z = _z(loaded, estimator, samples, tell)
         counts = np.histogram(z, outer)[0]
         laws = (len(z) * np.diff(law) for law in (t.cdf(outer, _BATCHES - 1), norm.cdf(outer)))
         shared = (len(z), _BATCHES, float(z.mean()), float(z.std()))
         bins = zip(edges[:-1].tolist(), edges[1:].tolist(), counts.tolist(), *(law.tolist() for law in laws))
         rows += [(estimator, *one, *shared) for one in bins]
-    write_csv(target / f"{NAME}.csv", _HEADER, rows)
-    write_provenance(target, NAME, scene=scene, image=image, batches=_BATCHES, samples=ESTIMATORS)
+    write_data(target, NAME, _HEADER, rows, scene=scene, image=image, batches=_BATCHES, samples=ESTIMATORS)
 
 
 def _z(scene, estimator: str, samples: int, progress):
     """Return z of the compared pixels that have a standard error, (n,)."""
     import numpy as np
 
-    from reference.epsilon import measure_shadow_epsilon
-    from reference.scene import read_truth
-    from validation.agreement import batch_estimate, layer_masks
+    from validation.agreement import batch_estimate
+    from validation.estimator_truth import estimator_truth
     from validation.monte_carlo import monte_carlo_batches
-    from validation.truth import truth_image
 
-    epsilon = measure_shadow_epsilon() if estimator == "volpath" else 0.0
-    truth = truth_image(scene, shadow_scale=1 - epsilon)
-    mask = layer_masks(read_truth(scene), truth)["airlight"]
+    expected, mask = estimator_truth(scene, estimator)
     found = monte_carlo_batches(scene, estimator, batches=_BATCHES, samples=samples, progress=progress).batches
     estimate = batch_estimate(found, "airlight", mask)
     error, mean = (np.asarray(one)[mask] for one in (estimate.standard_error, estimate.mean))
-    expected = truth.airlight[mask]
     channel = int(np.argmax(expected.sum(axis=0) > 0))
     tested = error[:, channel] > 0
     return ((mean - expected)[:, channel] / np.where(tested, error[:, channel], 1.0))[tested]
@@ -103,7 +94,7 @@ def plot(folder: Path | str, **options: Any) -> None:
 def _draw(folder: Path, column: str):
     import numpy as np
 
-    rows = read_csv(folder / f"{NAME}.csv", NAME)
+    rows = read_data(folder, NAME)
     width = WIDTHS[column]
     double = column == "double"
     names = list(dict.fromkeys(row["estimator"] for row in rows))
