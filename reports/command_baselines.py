@@ -26,7 +26,7 @@ def baselines(
     from analytic.errors import InputError
     from reports.baseline_tables import print_moves, print_updates
     from reports.environment import activate
-    from reports.progress import progress_bar
+    from reports.progress import part_of, progress_bar
     from reports.tables import print_json
     from validation.baseline_runs import measure_baseline
     from validation.baselines import FOLDER, compare_baseline, read_baseline, stray_baselines, updated, write_baseline
@@ -46,11 +46,8 @@ def baselines(
     found = {}
     with progress_bar("baselines") as tell:
         for number, name in enumerate(names):
-
-            def scene_progress(share: float, what: str, number: int = number) -> None:
-                tell((number + share) / len(names), what)
-
-            found[name] = measure_baseline(name, kept=kept[name], times=times, progress=scene_progress)
+            told = part_of(tell, number / len(names), (number + 1) / len(names))
+            found[name] = measure_baseline(name, kept=kept[name], times=times, progress=told)
     moves = {name: compare_baseline(kept[name], found[name]) for name in names}
     stray = [] if scenes else stray_baselines(SCENES)
     if update:

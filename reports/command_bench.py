@@ -38,7 +38,7 @@ def bench(
     from realtime.scene import read_scene
     from reports.bench_tables import print_bench
     from reports.environment import activate
-    from reports.progress import progress_bar
+    from reports.progress import part_of, progress_bar
     from reports.tables import print_json
     from validation.configurations import chosen_configurations
     from validation.load import load_scene, parse_size
@@ -56,11 +56,8 @@ def bench(
     found = []
     with progress_bar("bench") as tell:
         for number, name in enumerate(names):
-
-            def scene_progress(share: float, what: str, number: int = number) -> None:
-                tell((number + share) / len(names), what)
-
-            found.append(_bench_scene(name, pixels, chosen, with_truth=truth, tell=scene_progress))
+            told = part_of(tell, number / len(names), (number + 1) / len(names))
+            found.append(_bench_scene(name, pixels, chosen, with_truth=truth, tell=told))
     if json:
         from reports.environment import describe_environment
 
@@ -101,7 +98,7 @@ def _bench_kernels(names: list[str] | None, *, json: bool, markdown: bool) -> No
     from reports.bench_tables import print_heading, print_markdown
     from reports.environment import activate, describe_environment
     from reports.kernel_tables import convergence_data, print_convergence, print_kernel_bench
-    from reports.progress import progress_bar
+    from reports.progress import counted, progress_bar
     from reports.tables import print_json, print_table
     from validation.convergence import convergence, declared
     from validation.kernel_bench import bench_kernels
@@ -110,7 +107,7 @@ def _bench_kernels(names: list[str] | None, *, json: bool, markdown: bool) -> No
     wanted = [split_name(name)[0].name for name in names] if names else list(KERNELS)
     activate()
     with progress_bar("bench") as tell:
-        found = bench_kernels(names, progress=lambda done, total, what: tell(done / total, what))
+        found = bench_kernels(names, progress=counted(tell))
         rates = [convergence(name) for name in declared() if name in wanted]
     if json:
         from reports.data import plain

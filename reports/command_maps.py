@@ -34,7 +34,7 @@ def maps(
     from reports.bench_tables import print_heading
     from reports.environment import activate, describe_environment
     from reports.map_tables import map_data, parse_map_sizes, print_maps
-    from reports.progress import progress_bar
+    from reports.progress import counted, part_of, progress_bar
     from reports.tables import print_json
     from validation.configurations import configuration, parse_settings, prepared
     from validation.load import load_scene, parse_size
@@ -60,8 +60,8 @@ def maps(
                 studies.append(partial(map_flicker, one.scene, method, **moves))
             results = []
             for study in studies:
-                told = _told(tell, f"{one.name}, ", number, len(loaded))
-                results.append(study(kernel=kernel, parameters=parameters, sizes=texels, progress=told))
+                told = part_of(tell, number / len(loaded), (number + 1) / len(loaded), before=f"{one.name}, ")
+                results.append(study(kernel=kernel, parameters=parameters, sizes=texels, progress=counted(told)))
             found.append((one.name, results[0], results[1] if flicker else None))
     if json:
         scenes_data = [{"name": name} | map_data(errors, moving) for name, errors, moving in found]
@@ -71,8 +71,3 @@ def maps(
         print_heading()
     for name, errors, moving in found:
         print_maps(name, pixels, errors, moving, markdown=markdown)
-
-
-def _told(tell, name: str, number: int, total: int):
-    """Return the function that tells how far the work on one of some scenes is."""
-    return lambda done, of, what: tell((number + done / of) / total, name + what)

@@ -20,7 +20,7 @@ from reports.claims import claims, unstudied
 from reports.data import SCHEMA, plain
 from reports.environment import describe_environment
 from reports.page import render_page
-from reports.progress import Interrupted, Progress
+from reports.progress import Interrupted, Progress, part_of
 from reports.report_papers import mutations_part, published_part, stability_part
 from reports.report_scene import raise_own_error, scene_report
 from reports.staging import staged
@@ -166,12 +166,7 @@ class _Watch:
 
     def within(self, first: float, width: float, before: str = "") -> Progress:
         """Return a function to tell the share done of a part that is a share of the whole."""
-
-        def tell(share: float, what: str) -> None:
-            if self._progress is not None:
-                self._progress(first + width * share, before + what)
-
-        return tell
+        return part_of(self._progress, first, first + width, before=before)
 
     def part(self, name: str) -> None:
         """Note that a part is over."""

@@ -7,6 +7,7 @@ from typing import Any
 from reports.billeter_tables import billeter_data
 from reports.biri_tables import rows_data
 from reports.data import mutations_data, plain
+from reports.progress import part_of
 from validation.kept import Computed, Keeper, Kept, kept_result, slot
 from validation.study import Effort
 
@@ -69,9 +70,7 @@ def _biri(effort: Effort, scenes: Sequence[str], keeper: Keeper, results: list[K
         share, width = number / len(entries), 1 / len(entries)
 
         def compute(one=one, share=share, width=width) -> Computed:
-            def told(done: float, what: str) -> None:
-                tell(share + width * done, f"Biri 2006, {what}")
-
+            told = part_of(tell, share, share + width, before="Biri 2006, ")
             return rows_data(biri_rows([one], kernels, seconds=seconds, progress=told), []), {}
 
         identity = {"scene": one.scene, "size": one.size, "kernels": kernels, "seconds": seconds}
