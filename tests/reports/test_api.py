@@ -6,7 +6,6 @@ import doctest
 import importlib
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,25 +13,8 @@ import pytest
 import airlight
 from realtime.errors import InputError as RealtimeInputError
 from reports.api_inputs import one_error, telling
+from tests.api_for_tests import FUNCTIONS, ROOT, TINY, brighter, third
 from validation.scenes import SCENES
-
-ROOT = Path(__file__).resolve().parents[2]
-TINY = (16, 12)
-FUNCTIONS = ("load_scene", "render", "reference", "compare", "integrate", "bench", "report")
-
-
-def brighter(view, *, kernel=None, times=2.0):
-    """A method of one's own: all of the airlight, unshadowed, times something."""
-    from realtime.methods.unshadowed import unshadowed
-
-    return times * unshadowed(view, kernel=kernel)
-
-
-def third(geometry, x0, x1, medium, light):
-    """A kernel of one's own."""
-    from realtime.kernels.exact import exact
-
-    return exact(geometry, x0, x1, medium, light) / 3
 
 
 def gone(view):

@@ -6,7 +6,6 @@ import os
 import re
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,24 +13,7 @@ import pytest
 import airlight
 from analytic.cases import read_cases
 from reports import api_studies
-
-ROOT = Path(__file__).resolve().parents[2]
-TINY = (16, 12)
-FUNCTIONS = ("load_scene", "render", "reference", "compare", "integrate", "bench", "report")
-
-
-def brighter(view, *, kernel=None, times=2.0):
-    """A method of one's own: all of the airlight, unshadowed, times something."""
-    from realtime.methods.unshadowed import unshadowed
-
-    return times * unshadowed(view, kernel=kernel)
-
-
-def third(geometry, x0, x1, medium, light):
-    """A kernel of one's own."""
-    from realtime.kernels.exact import exact
-
-    return exact(geometry, x0, x1, medium, light) / 3
+from tests.api_for_tests import FUNCTIONS, ROOT, TINY, brighter, third
 
 
 def test_examples_of_the_docstrings(variant):
