@@ -8,14 +8,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from reports.results import Array, as_array, read_only
+from reports.results import Array, Pictured, as_array, read_only
 from reports.tables import number
 from validation.compare import Comparison
 from validation.metrics import FLOOR, colours
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class ImageComparison(Comparison):
+class ImageComparison(Comparison, Pictured):
     """How far an image is from a reference: the numbers of `airlight compare`, and the images."""
 
     reference: Array  #: the layer of the reference, (height, width[, channels]) [W/(m^2 sr)]
@@ -54,15 +54,6 @@ class ImageComparison(Comparison):
         shape = (*self.reference.shape[:2], -1)
         one, two = (np.asarray(v, dtype=np.float64).reshape(shape) for v in (self.reference, self.test))
         return colours(one), colours(two)
-
-    @cached_property
-    def _png(self) -> bytes:
-        from reports.pictures import png_bytes
-
-        return png_bytes(self.picture())
-
-    def _repr_png_(self) -> bytes:
-        return self._png
 
     def _repr_html_(self) -> str:
         from reports.api_html import block, bullets, picture, table

@@ -40,8 +40,25 @@ def read_only(values: Any) -> Array:
     return view
 
 
+class Pictured:
+    """What a notebook shows as the PNG file of its picture."""
+
+    def picture(self) -> NDArray[np.uint8]:
+        """Return the picture, (height, width, 3)."""
+        raise NotImplementedError
+
+    @cached_property
+    def _png(self) -> bytes:
+        from reports.pictures import png_bytes
+
+        return png_bytes(self.picture())
+
+    def _repr_png_(self) -> bytes:
+        return self._png
+
+
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class LayeredImage:
+class LayeredImage(Pictured):
     """What renderings and references share: layers of radiance and the depth, see the module."""
 
     scene: str  #: name of the scene
@@ -128,15 +145,6 @@ class LayeredImage:
     def title(self) -> str:
         """What to call the image."""
         return self.scene
-
-    @cached_property
-    def _png(self) -> bytes:
-        from reports.pictures import png_bytes
-
-        return png_bytes(self.picture())
-
-    def _repr_png_(self) -> bytes:
-        return self._png
 
     def _repr_html_(self) -> str:
         from reports.api_html import block, picture, table
