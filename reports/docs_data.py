@@ -14,6 +14,7 @@ from typing import Any
 
 from analytic.errors import InputError
 from reference.files import ensure_folder, write_bytes, write_text
+from reports.json_files import read_json
 
 SCHEMA = "airlight-docs/1"
 REPORTS = ("airlight-report/1", "airlight-report/2")
@@ -24,25 +25,6 @@ WIDTH, LARGEST = 480, 60_000  # pixels, bytes: of a picture
 _ERRORS = ("relative_rmse", "relative_bias", "p50", "p99", "max", "nonfinite", "negative")
 _METHOD = ("label", "method", "kernel", "parameters", "knows_shadows", "refused", "note")
 _COST = ("kernel", "family", "size", "phase", "g", "device", "wall", "median", "p99", "max", "nonfinite", "refused")
-
-
-def read_json(path: Path, what: str) -> dict[str, Any]:
-    """Return the object in a JSON file.
-
-    Raises
-    ------
-    InputError
-        If the file is not there or holds something else.
-    """
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror}; wanted {what}") from error
-    except ValueError as error:
-        raise InputError(f"{path}: not JSON ({error}); wanted {what}") from error
-    if not isinstance(data, dict):
-        raise InputError(f"{path}: wanted {what}")
-    return data
 
 
 def refresh(data: Path, *, report: Path | None = None, kernels: Path | None = None) -> list[Path]:
@@ -65,23 +47,31 @@ def refresh(data: Path, *, report: Path | None = None, kernels: Path | None = No
     path = data / "report.json"
     found: dict[str, Any] = {"schema": SCHEMA, "kernels": None}
     if path.exists():
-        found = read_json(path, "the data of the documentation")
+        found = _read_object(path, "the data of the documentation")
     pictures: dict[str, bytes] = {}
     if report is not None:
-        content = read_json(report / "report.json", "the folder of a report")
+        content = _read_object(report / "report.json", "the folder of a report")
         if content.get("schema") not in REPORTS:
             wanted = " or ".join(REPORTS)
             raise InputError(f"{report / 'report.json'}: schema {content.get('schema')!r}, wanted {wanted}")
         found |= kept_of_report(content)
         pictures = pictures_of(report, content, found)
     if kernels is not None:
-        costs = read_json(kernels, "what `airlight bench --kernels --json` prints")
+        costs = _read_object(kernels, "what `airlight bench --kernels --json` prints")
         found["kernels"] = kept_of_kernels(costs, kernels)
     ensure_folder(data)
     for name, content_of in pictures.items():
         write_bytes(data / name, content_of)
     write_text(path, json.dumps(found, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
     return [path, *(data / name for name in pictures)]
+
+
+def _read_object(path: Path, what: str) -> dict[str, Any]:
+    """Return the object in a JSON file; raises InputError if the file is not there or holds something else."""
+    data = read_json(path, what)
+    if not isinstance(data, dict):
+        raise InputError(f"{path}: wanted {what}")
+    return data
 
 
 def kept_of_report(report: dict[str, Any]) -> dict[str, Any]:

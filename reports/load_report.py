@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from analytic.errors import InputError
+from reports.json_files import read_json
 from reports.schema_check import first_fault
 
 SCHEMA_FILE = Path(__file__).parent / "schema" / "report-2.json"
@@ -34,12 +35,7 @@ def load_report(path: Path | str) -> tuple[dict[str, Any], Path]:
     """
     file = Path(path)
     file = file / "report.json" if file.is_dir() else file
-    try:
-        data = json.loads(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"cannot read {file}: {error.strerror}; wanted report.json of an airlight report") from error
-    except ValueError as error:
-        raise InputError(f"{file} is no JSON ({error}); wanted report.json of an airlight report") from error
+    data = read_json(file, "report.json of an airlight report")
     schema = json.loads(SCHEMA_FILE.read_text(encoding="utf-8"))
     wanted = schema["properties"]["schema"]["const"]
     given = data.get("schema") if isinstance(data, dict) else None

@@ -109,7 +109,7 @@ def test_costs_of_kernels_come_and_stay(variant, folder, tmp_path):
     [
         ('{"schema": "airlight-report/9"}', "wanted airlight-report/1 or airlight-report/2"),
         ("[1]", "wanted the folder of a report"),
-        ("{", "not JSON"),
+        ("{", "is no JSON"),
     ],
 )
 def test_what_is_no_report_is_refused(content, words, folder, tmp_path):
