@@ -13,17 +13,22 @@ ball, from where Mitsuba starts it. What that says holds. So a fault of the lit 
 comparison, for the exact test from the moved start contradicts it then.
 """
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.lit_geometry import balls_around
 from reference.shapes import Shapes
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
+Index = NDArray[np.int64]
 
-_CHUNK = 1 << 21  # pairs of rays and triangles tested at once
+_CHUNK = 1 << 18  # pairs of rays and triangles tested at once
+_GROUP = 32  # rays that start close together, for which the triangles are looked through once
+_SLACK = 1e-9  # of how far away a triangle is: float64 rounding is 1e-15
 
 
 def reached_by_shadow_rays(interaction: Any, light: Array, reached: Bools, *, scene: Any, shapes: Shapes) -> Bools:
@@ -66,7 +71,9 @@ def _share(ray: Any, start: Array, light: Array, chosen: NDArray[np.int64]) -> A
 
 
 def segments_blocked(start: Array, end: Array, shapes: Shapes) -> Bools:
-    """Return which segments meet a triangle or the surface of a ball, tested one by one.
+    """Return which segments meet a triangle or the surface of a ball.
+
+    Segments are tested one by one, against the triangles that come close to those that start beside them.
 
     Parameters
     ----------
@@ -83,13 +90,50 @@ def segments_blocked(start: Array, end: Array, shapes: Shapes) -> Bools:
     blocked = np.zeros(len(start), dtype=bool)
     corner = shapes.triangles[:, 0]
     edges = shapes.triangles[:, 1] - corner, shapes.triangles[:, 2] - corner
-    step = max(1, _CHUNK // max(1, len(corner)))
-    for first in range(0, len(start), step):
-        part = slice(first, first + step)
-        blocked[part] = _meets_triangle(start[part, None], way[part, None], corner, edges).any(axis=1)
+    balls = balls_around(shapes.triangles)
+    for group in _groups(start):
+        near = _near_triangles(start[group], end[group], *balls)
+        step = max(1, _CHUNK // max(1, len(near)))
+        for first in range(0, len(group), step):
+            part = group[first : first + step]
+            chosen = corner[near], (edges[0][near], edges[1][near])
+            blocked[part] = _meets_triangle(start[part, None], way[part, None], *chosen).any(axis=1)
     for centre, radius in zip(shapes.centre, shapes.radius, strict=True):
         blocked |= _meets_sphere(start - centre, way, radius)
     return blocked
+
+
+def _groups(point: Array) -> Iterator[Index]:
+    """Yield the numbers of points that lie together, `_GROUP` at most: halved again and again where widest."""
+    waiting = [np.arange(len(point))] if len(point) else []
+    while waiting:
+        part = waiting.pop()
+        if len(part) <= _GROUP:
+            yield part
+            continue
+        axis = np.argmax(np.ptp(point[part], axis=0))
+        part = part[np.argsort(point[part, axis])]
+        waiting += [part[: len(part) // 2], part[len(part) // 2 :]]
+
+
+def _near_triangles(start: Array, end: Array, centre: Array, radius: Array) -> Index:
+    """Return the triangles that some of the segments may meet, given balls that hold the triangles.
+
+    The distance from a line is convex along a segment, so the tube about any line that holds all ends holds all
+    segments.
+    """
+    middle = start.mean(axis=0)
+    way = end.mean(axis=0) - middle
+    with np.errstate(divide="ignore", invalid="ignore"):
+        line = middle, way / np.linalg.norm(way)
+        tube = _from_line(np.concatenate([start, end]), *line).max()
+        reach = radius + tube + _SLACK * np.linalg.norm(centre - middle, axis=1)
+        beyond = _from_line(centre, *line) > reach
+    return np.flatnonzero(~beyond)  # all of them where the line has no direction
+
+
+def _from_line(point: Array, place: Array, direction: Array) -> Array:
+    return np.linalg.norm(np.cross(point - place, direction), axis=1)
 
 
 def _meets_triangle(start: Array, way: Array, corner: Array, edges: tuple[Array, Array]) -> Bools:

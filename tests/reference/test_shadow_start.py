@@ -79,6 +79,33 @@ def test_segments_are_blocked_as_rays_are(variant):
     assert np.sum(segments_blocked(start, end, shapes) != cast) <= 2
 
 
+def test_triangles_that_are_left_out_block_nothing(monkeypatch):
+    """Rays to one light from points here and there, among small triangles: as with all triangles tested."""
+    import reference.shadow_start as module
+
+    random = np.random.default_rng(7)
+    place = random.uniform(-1, 1, (400, 1, 3))
+    triangles = place + random.uniform(0.02, 0.3, (400, 1, 1)) * random.normal(size=(400, 3, 3))
+    shapes = Shapes(triangles, np.empty((0, 3)), np.empty(0))
+    start = random.uniform(-1.4, 1.4, (700, 3))
+    start[::7] = LIGHT  # no way at all: no direction
+    end = np.broadcast_to(LIGHT, start.shape)
+    found = segments_blocked(start, end, shapes)
+    left = [
+        len(module._near_triangles(start[group], end[group], *module.balls_around(triangles)))
+        for group in module._groups(start)
+    ]
+    assert np.median(left) < 200
+    monkeypatch.setattr(module, "_SLACK", np.inf)
+    assert np.array_equal(found, segments_blocked(start, end, shapes))
+    assert 0.2 < found.mean() < 0.8
+
+
+def test_no_segments_are_no_trouble():
+    shapes = Shapes(np.ones((2, 3, 3)), np.empty((0, 3)), np.empty(0))
+    assert len(segments_blocked(np.empty((0, 3)), np.empty((0, 3)), shapes)) == 0
+
+
 @pytest.mark.parametrize(
     ("start", "end", "blocked"),
     [
