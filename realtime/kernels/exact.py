@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The default kernel: as few Gauss-Legendre nodes as float32 accuracy needs, placed by the phase function's own lobe.
+"""The default kernel: as few Gauss-Legendre nodes as a segment needs, placed by the phase function's own lobe.
 
 With E = q/h as in `realtime.kernels.quadrature`,
 
@@ -17,29 +17,23 @@ is even where E < d and logarithmic above. It takes both pairs of singularities,
 foot point. For the lobes cos^16 and cos^64 of half the angle ("hazy", "murky"), whose poles lie at +-i already, d is
 their width.
 
-The numbers of nodes are the smallest with which the certified cases (tests/data) and random rays of optical depth 1e-6
-to 50, heights down to 1e-7 of the distance and |g| up to 0.95 stay below 5e-6 in float32 and 1e-10 in float64, rounding
-left aside.
-
-From the near end on everything is a sum of positive terms: with F = E0/d, C = sqrt(1 + F^2) and the offset u from v0
-
-    E - E0 = d (F (cosh u - 1) + C sinh u),    cosh v = C cosh u + F sinh u,    cosh u - 1 = 2 sinh^2(u/2).
-
-The isotropic case has no lobe, and pairs of nodes about the centre share their exponentials: it is `quadrature` with 16
-nodes.
+In float32 every segment takes as many panels of eight nodes as its width in v and its optical depth ask for, see
+`realtime.kernels.panels`; they leave 4e-7. In float64 the numbers of nodes are the same for all, the
+smallest with which the certified cases (tests/data) and random rays of optical depth 1e-6 to 50, heights down to 1e-7
+of the distance and |g| up to 0.95 stay below 1e-10; the isotropic case has no lobe, and pairs of nodes about the centre
+share their exponentials: it is `quadrature` with 40 nodes.
 """
 
 from realtime.arrays import is_single
-from realtime.exponential import exp_bounded
 from realtime.gauss import unit_nodes
 from realtime.geometry import RayGeometry, falloff, stretches
+from realtime.kernels.panels import panels_mean
 from realtime.kernels.quadrature import path_interval, quadrature
 from realtime.lights import Light
 from realtime.medium import Medium, per_extinction
 from realtime.phase import Phase, evaluate_half
 
-#: Nodes in float32, and the scale d of the substitution (Henyey-Greenstein: by g).
-_NODES = {"isotropic": 16, "rayleigh": 26, "hazy": 32, "murky": 40, "hg": 40, "tabulated": 64}
+#: The scale d of the substitution (Henyey-Greenstein: by g).
 _SCALE = {"hazy": 0.7, "murky": 0.5}
 #: In float64: nodes of the isotropic case, and for the others panels of equal width in v and the nodes of each.
 _ISOTROPIC_DOUBLE, _PANELS, _PANEL_NODES = 40, 10, 24
@@ -61,7 +55,7 @@ def exact(geometry: RayGeometry, x0, x1, medium: Medium, light: Light):
 
     Largest relative error found on the certified cases: see `airlight integrate`; in float32 below 3e-5 for |g| <= 0.9.
     A tabulated phase function is integrated across its kinks: about 1e-4 for a coarse table. Where a spot's intensity
-    falls off between beam and cut-off, each of three panels has these nodes.
+    falls off between beam and cut-off, the segment is cut into three; those that are empty cost nothing.
     """
     import drjit as dr
 
@@ -74,15 +68,14 @@ def exact(geometry: RayGeometry, x0, x1, medium: Medium, light: Light):
 
 def _integral(geometry: RayGeometry, segment, sigma_t, medium: Medium, light: Light):
     x0, x1 = segment
-    if medium.phase.name == "isotropic":
-        nodes = _NODES["isotropic"] if is_single(type(geometry.height)) else _ISOTROPIC_DOUBLE
+    if medium.phase.name == "isotropic" and not is_single(type(geometry.height)):
         grey = Medium((sigma_t,), medium.albedo, medium.phase)
-        return quadrature(geometry, x0, x1, grey, light, nodes=nodes)
+        return quadrature(geometry, x0, x1, grey, light, nodes=_ISOTROPIC_DOUBLE)
     panels = stretches(geometry, light, x0, x1)
-    return sum(_panel(geometry, a, b, sigma_t, medium.phase, light) for a, b in panels)
+    return sum(_stretch(geometry, a, b, sigma_t, medium.phase, light) for a, b in panels)
 
 
-def _panel(geometry: RayGeometry, x0, x1, sigma_t, phase: Phase, light: Light):
+def _stretch(geometry: RayGeometry, x0, x1, sigma_t, phase: Phase, light: Light):
     import drjit as dr
 
     Float = type(geometry.height)
@@ -91,40 +84,39 @@ def _panel(geometry: RayGeometry, x0, x1, sigma_t, phase: Phase, light: Light):
     f0, f1 = e0 / scale, e1 / scale
     c0, c1 = dr.sqrt(dr.fma(f0, f0, 1)), dr.sqrt(dr.fma(f1, f1, 1))
     width = dr.asinh((difference / scale) * ((f0 + f1) / dr.fma(f1, c0, f0 * c1)))
-    decay = -sigma_t * h
 
-    def node(fraction):
-        """Evaluate the integrand at a share of the way from v0 to v1."""
-        grown = exp_bounded(width * (0.5 * fraction))
-        shrunk = dr.rcp(grown)
-        sinh_half, cosh_half = 0.5 * (grown - shrunk), 0.5 * (grown + shrunk)
-        sinh, cosh_less = 2 * sinh_half * cosh_half, 2 * dr.square(sinh_half)
-        step = scale * dr.fma(f0, cosh_less, c0 * sinh)
-        e = e0 + step
-        up = dr.rcp(dr.fma(e, e, 1))
-        density = dr.fma(c0, cosh_less, dr.fma(f0, sinh, c0)) * up
-        value = exp_bounded(decay * step) * density * evaluate_half(phase, dr.square(e) * up, up)
-        if light.soft:
-            value *= falloff(geometry, light, geometry.foot + 0.5 * h * (e - dr.rcp(e)))
-        return value
+    def weight(e):
+        return falloff(geometry, light, geometry.foot + 0.5 * h * (e - dr.rcp(e)))
 
+    add_up = panels_mean if is_single(Float) else _sum_double
+    mean = add_up(phase, (f0, c0), scale, width, sigma_t * h, weight if light.soft else None)
     r0 = dr.sqrt(dr.fma(x0 - geometry.foot, x0 - geometry.foot, h * h))
-    scale_of_sum = (width * scale) * (2 / h) * dr.exp(-sigma_t * (x0 + r0))
-    return _sum_nodes(node, phase, width) * scale_of_sum
+    return mean * (width * scale) * (2 / h) * dr.exp(-sigma_t * (x0 + r0))
 
 
-def _sum_nodes(node, phase: Phase, width):
-    """Sum one panel of nodes in float32; in float64 a loop over equal panels, which compiles fast."""
+def _sum_double(phase: Phase, start, scale, width, decay, weight):
+    """Do what `panels_mean` does, in float64: a loop over panels whose number is the same for all."""
     import drjit as dr
     import mitsuba as mi
 
     Float = type(width)
-    if is_single(Float):
-        return sum(weight * node(fraction) for fraction, weight in unit_nodes(_NODES[phase.name]))
+    f0, c0 = start
+
+    def node(fraction):
+        grown = dr.exp(width * (0.5 * fraction))
+        shrunk = dr.rcp(grown)
+        sinh_half, cosh_half = 0.5 * (grown - shrunk), 0.5 * (grown + shrunk)
+        sinh, cosh_less = 2 * sinh_half * cosh_half, 2 * dr.square(sinh_half)
+        step = scale * dr.fma(f0, cosh_less, c0 * sinh)
+        e = scale * f0 + step
+        up = dr.rcp(dr.fma(e, e, 1))
+        lobe = dr.fma(c0, cosh_less, dr.fma(f0, sinh, c0)) * up * evaluate_half(phase, dr.square(e) * up, up)
+        value = dr.exp(-decay * step) * lobe
+        return value if weight is None else value * weight(e)
 
     def panel(index, total):
         start = Float(index)
-        part = sum(weight * node((start + fraction) * (1 / _PANELS)) for fraction, weight in unit_nodes(_PANEL_NODES))
+        part = sum(share * node((start + fraction) * (1 / _PANELS)) for fraction, share in unit_nodes(_PANEL_NODES))
         return index + 1, total + part * (1 / _PANELS)
 
     _, total = dr.while_loop(
