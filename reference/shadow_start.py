@@ -19,7 +19,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.lit_geometry import balls_around
 from reference.shapes import Shapes
 
 Array = NDArray[np.float64]
@@ -90,9 +89,10 @@ def segments_blocked(start: Array, end: Array, shapes: Shapes) -> Bools:
     blocked = np.zeros(len(start), dtype=bool)
     corner = shapes.triangles[:, 0]
     edges = shapes.triangles[:, 1] - corner, shapes.triangles[:, 2] - corner
-    balls = balls_around(shapes.triangles)
+    # Balls about the first corners; nothing of this is shared with the search for lit intervals, which it judges.
+    longest = np.sqrt(np.maximum(*(np.sum(edge * edge, axis=1) for edge in edges)))
     for group in _groups(start):
-        near = _near_triangles(start[group], end[group], *balls)
+        near = _near_triangles(start[group], end[group], corner, longest)
         step = max(1, _CHUNK // max(1, len(near)))
         for first in range(0, len(group), step):
             part = group[first : first + step]

@@ -91,11 +91,12 @@ def test_triangles_that_are_left_out_block_nothing(monkeypatch):
     start[::7] = LIGHT  # no way at all: no direction
     end = np.broadcast_to(LIGHT, start.shape)
     found = segments_blocked(start, end, shapes)
-    left = [
-        len(module._near_triangles(start[group], end[group], *module.balls_around(triangles)))
-        for group in module._groups(start)
-    ]
-    assert np.median(left) < 200
+    corner = triangles[:, 0]
+    longest = np.linalg.norm(triangles - corner[:, None], axis=2).max(axis=1)
+    groups = list(module._groups(start))
+    left = [len(module._near_triangles(start[group], end[group], corner, longest)) for group in groups]
+    assert sorted(np.concatenate(groups).tolist()) == list(range(700))
+    assert np.median(left) < 250
     monkeypatch.setattr(module, "_SLACK", np.inf)
     assert np.array_equal(found, segments_blocked(start, end, shapes))
     assert 0.2 < found.mean() < 0.8
