@@ -20,6 +20,8 @@ from realtime.cone import axis_distance, axis_geometry, cone_interval
 from realtime.error_free import difference_of_products, two_sum
 from realtime.lights import Light
 
+_PARALLEL = 1e-6  #: sine between a ray and the axis of a spot below which their distance is the same everywhere
+
 
 @dataclass(frozen=True)
 class RayGeometry:
@@ -112,10 +114,19 @@ def clip_to_cone(geometry: RayGeometry, x0, x1):
 
 
 def stretches(geometry: RayGeometry, light: Light, x0, x1):
-    """Cut [x0, x1] where a soft spot's `falloff` has kinks, at the cone of the beam; one stretch for other lights."""
+    """Cut [x0, x1] where a soft spot's `falloff` has kinks, at the cone of the beam; one stretch for other lights.
+
+    A ray that misses the beam is cut where it is closest to the axis: the closer it passes, the more like a kink.
+    """
+    import drjit as dr
+
     if not light.soft:
         return [(x0, x1)]
     inner0, inner1 = _clip(geometry.beam_enter, geometry.beam_leave, x0, x1)
+    crosses = geometry.slant > _PARALLEL
+    closest = dr.clip(geometry.foot + dr.select(crosses, geometry.slide / geometry.slant, 0), x0, x1)
+    misses = crosses & (inner0 >= inner1)
+    inner0, inner1 = dr.select(misses, closest, inner0), dr.select(misses, closest, inner1)
     return [(x0, inner0), (inner0, inner1), (inner1, x1)]
 
 

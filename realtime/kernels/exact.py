@@ -68,7 +68,7 @@ def exact(geometry: RayGeometry, x0, x1, medium: Medium, light: Light):
 
 def _integral(geometry: RayGeometry, segment, sigma_t, medium: Medium, light: Light):
     x0, x1 = segment
-    if medium.phase.name == "isotropic" and not is_single(type(geometry.height)):
+    if medium.phase.name == "isotropic" and not light.soft and not is_single(type(geometry.height)):
         grey = Medium((sigma_t,), medium.albedo, medium.phase)
         return quadrature(geometry, x0, x1, grey, light, nodes=_ISOTROPIC_DOUBLE)
     panels = stretches(geometry, light, x0, x1)

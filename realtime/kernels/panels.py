@@ -46,6 +46,7 @@ _DEPTH = 10.5  # T1
 _WIDTH = {"isotropic": 2.9, "rayleigh": 1.7, "hazy": 1.4, "murky": 0.9, "tabulated": 0.4}
 #: w for Henyey and Greenstein: a backward lobe rises within the range of integration.
 _FORWARD, _BACKWARD = 2.4, 1.7
+_SOFT = 0.85  #: and for a light whose intensity falls off
 _NO_RATE = 1e-30
 
 
@@ -116,7 +117,7 @@ def panel_count(phase: Phase, width, depth, *, soft: bool = False):
     else:
         widest = Float(_WIDTH[phase.name])
     if soft:
-        widest *= 0.5
+        widest = dr.minimum(widest, _SOFT)
     count = dr.maximum(width / widest, depth * (1 / _DEPTH))
     return dr.select(width > 0, mi.UInt32(dr.ceil(dr.minimum(count, _MOST))), 0)
 
