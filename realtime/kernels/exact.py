@@ -24,6 +24,8 @@ of the distance and |g| up to 0.95 stay below 1e-10; the isotropic case has no l
 share their exponentials: it is `quadrature` with 40 nodes.
 """
 
+from functools import reduce
+
 from realtime.arrays import is_single
 from realtime.gauss import unit_nodes
 from realtime.geometry import RayGeometry, falloff, stretches
@@ -59,28 +61,36 @@ def exact(geometry: RayGeometry, x0, x1, medium: Medium, light: Light):
     """
     import drjit as dr
 
+    if is_single(type(geometry.height)):
+        # The extinctions share their nodes.
+        values = _over_stretches(geometry, (x0, x1), medium.sigma_t, medium.phase, light)
+        J = values[0] if len(values) == 1 else type(medium.albedo)(*values)
+    else:
+        J = per_extinction(medium, lambda sigma_t: _in_double(geometry, (x0, x1), sigma_t, medium, light))
     meets = (geometry.height == 0) & (x0 <= geometry.foot) & (geometry.foot <= x1) & (x0 < x1)
-    return per_extinction(
-        medium,
-        lambda sigma_t: dr.select(meets, dr.inf, _integral(geometry, (x0, x1), sigma_t, medium, light)),
-    )
+    return dr.select(meets, dr.inf, J)
 
 
-def _integral(geometry: RayGeometry, segment, sigma_t, medium: Medium, light: Light):
-    x0, x1 = segment
-    if medium.phase.name == "isotropic" and not light.soft and not is_single(type(geometry.height)):
+def _in_double(geometry: RayGeometry, segment, sigma_t, medium: Medium, light: Light):
+    if medium.phase.name == "isotropic" and not light.soft:
+        x0, x1 = segment
         grey = Medium((sigma_t,), medium.albedo, medium.phase)
         return quadrature(geometry, x0, x1, grey, light, nodes=_ISOTROPIC_DOUBLE)
-    panels = stretches(geometry, light, x0, x1)
-    return sum(_stretch(geometry, a, b, sigma_t, medium.phase, light) for a, b in panels)
+    return _over_stretches(geometry, segment, (sigma_t,), medium.phase, light)[0]
 
 
-def _stretch(geometry: RayGeometry, x0, x1, sigma_t, phase: Phase, light: Light):
+def _over_stretches(geometry: RayGeometry, segment, extinctions, phase: Phase, light: Light):
+    """Return one value per extinction."""
+    parts = [_stretch(geometry, a, b, extinctions, phase, light) for a, b in stretches(geometry, light, *segment)]
+    return [sum(values) for values in zip(*parts)]
+
+
+def _stretch(geometry: RayGeometry, x0, x1, extinctions, phase: Phase, light: Light):
     import drjit as dr
 
     Float = type(geometry.height)
     scale, tail = _lobe_scales(phase, Float)
-    h, e0, e1, difference = path_interval(geometry, x0, x1, sigma_t, tail=tail)
+    h, e0, e1, difference = path_interval(geometry, x0, x1, reduce(dr.minimum, extinctions), tail=tail)
     f0, f1 = e0 / scale, e1 / scale
     c0, c1 = dr.sqrt(dr.fma(f0, f0, 1)), dr.sqrt(dr.fma(f1, f1, 1))
     width = dr.asinh((difference / scale) * ((f0 + f1) / dr.fma(f1, c0, f0 * c1)))
@@ -88,19 +98,22 @@ def _stretch(geometry: RayGeometry, x0, x1, sigma_t, phase: Phase, light: Light)
     def weight(e):
         return falloff(geometry, light, geometry.foot + 0.5 * h * (e - dr.rcp(e)))
 
-    add_up = panels_mean if is_single(Float) else _sum_double
-    mean = add_up(phase, (f0, c0), scale, width, sigma_t * h, weight if light.soft else None)
+    add_up = panels_mean if is_single(Float) else _double_mean
+    decays = [sigma_t * h for sigma_t in extinctions]
+    means = add_up(phase, (f0, c0), scale, width, decays, weight if light.soft else None)
     r0 = dr.sqrt(dr.fma(x0 - geometry.foot, x0 - geometry.foot, h * h))
-    return mean * (width * scale) * (2 / h) * dr.exp(-sigma_t * (x0 + r0))
+    shared = (width * scale) * (2 / h)
+    return [mean * shared * dr.exp(-sigma_t * (x0 + r0)) for mean, sigma_t in zip(means, extinctions)]
 
 
-def _sum_double(phase: Phase, start, scale, width, decay, weight):
-    """Do what `panels_mean` does, in float64: a loop over panels whose number is the same for all."""
+def _double_mean(phase: Phase, start, scale, width, decays, weight):
+    """Do what `panels_mean` does, in float64 and for one extinction: a loop over as many panels for all."""
     import drjit as dr
     import mitsuba as mi
 
     Float = type(width)
     f0, c0 = start
+    (decay,) = decays
 
     def node(fraction):
         grown = dr.exp(width * (0.5 * fraction))
@@ -125,7 +138,7 @@ def _sum_double(phase: Phase, start, scale, width, decay, weight):
         body=panel,
         labels=("index", "total"),
     )
-    return total
+    return [total]
 
 
 def _lobe_scales(phase: Phase, Float):

@@ -29,10 +29,12 @@ panel, with F = E/d and C = sqrt(1 + F^2) there,
 
     F' - F = F (cosh u - 1) + C sinh u,     C' = C cosh u + F sinh u,
 
-are sums of positive terms, for its nodes and for its end, where the next begins.
+are sums of positive terms, for its nodes and for its end, where the next begins. The extinctions of a coloured medium
+share all but the exponential: the range is that of the smallest, T that of the largest.
 """
 
 from collections.abc import Callable
+from functools import reduce
 from typing import Any
 
 from realtime.exponential import LOG2_E, exp2_bounded, sinh_bounded
@@ -40,7 +42,7 @@ from realtime.gauss import unit_nodes
 from realtime.phase import Phase, evaluate_half
 
 _NODES = 8
-_MOST = 40  # panels; more than any segment needs: what is not a number must end too
+_MOST = 160  # panels; more than any segment needs: what is not a number must end too
 _DEPTH = 10.5  # T1
 #: w. A table has kinks, and no accuracy to speak of between them.
 _WIDTH = {"isotropic": 2.9, "rayleigh": 1.7, "hazy": 1.4, "murky": 0.9, "tabulated": 0.4}
@@ -48,10 +50,11 @@ _WIDTH = {"isotropic": 2.9, "rayleigh": 1.7, "hazy": 1.4, "murky": 0.9, "tabulat
 _FORWARD, _BACKWARD = 2.4, 1.7
 _SOFT = 0.85  #: and for a light whose intensity falls off
 _NO_RATE = 1e-30
+_DEEPEST = 116.0  # e^-80
 
 
-def panels_mean(phase: Phase, start, scale, width, decay, weight: Callable[[Any], Any] | None):
-    """Return I/(d (v1 - v0)), the mean over the range of v.
+def panels_mean(phase: Phase, start, scale, width, decays, weight: Callable[[Any], Any] | None):
+    """Return I/(d (v1 - v0)), the mean over the range of v, for each extinction.
 
     Parameters
     ----------
@@ -63,47 +66,56 @@ def panels_mean(phase: Phase, start, scale, width, decay, weight: Callable[[Any]
         d, see above.
     width
         v1 - v0; 0 where there is nothing to integrate.
-    decay
-        a = sigma_t h.
+    decays
+        a = sigma_t h, one or more.
     weight
         Relative intensity of the light by E, or None where it is 1 everywhere.
 
     Notes
     -----
-    Valid for an optical depth between the ends of at most 80.
+    Valid for any decay. The values are 0 where e^-80 is.
     """
     import drjit as dr
     import mitsuba as mi
 
     Float = type(width)
     f, c = start
-    count = panel_count(phase, width, decay * scale * c * width, soft=weight is not None)
+    largest = reduce(dr.maximum, decays)
+    count = panel_count(phase, width, largest * scale * c * width, soft=weight is not None)
     part = width / dr.maximum(Float(count), 1)
     nodes = [(share, *_offset(part * fraction)) for fraction, share in unit_nodes(_NODES)]
     sinh_end, less_end = _offset(part)
     # Not 0 in a vacuum: Dr.Jit must not find the depth to be the same in all turns of the loop.
-    rate = dr.minimum(-decay * scale * LOG2_E, -_NO_RATE)
+    rates = [dr.minimum(-decay * scale * LOG2_E, -_NO_RATE) for decay in decays]
 
-    def panel(index, f, c, depth, total):
+    def panel(index, f, c, depths, totals):
         for share, sinh, less in nodes:
             step = dr.fma(f, less, c * sinh)
-            value = exp2_bounded(dr.fma(rate, step, depth))
-            value *= density(phase, f + step, dr.fma(f, sinh, dr.fma(c, less, c)), scale)
+            value = share * density(phase, f + step, dr.fma(f, sinh, dr.fma(c, less, c)), scale)
             if weight is not None:
                 value *= weight(scale * (f + step))
-            total = dr.fma(value, share, total)
+            kept = [_kept(dr.fma(rate, step, depth)) for rate, depth in zip(rates, depths)]
+            totals = [dr.fma(value, one, total) for one, total in zip(kept, totals)]
         step = dr.fma(f, less_end, c * sinh_end)
         c = dr.fma(f, sinh_end, dr.fma(c, less_end, c))
-        return index + 1, f + step, c, dr.fma(rate, step, depth), total
+        return index + 1, f + step, c, [dr.fma(rate, step, depth) for rate, depth in zip(rates, depths)], totals
 
-    lanes = dr.zeros(Float, dr.width(width, f))
-    *_, total = dr.while_loop(
-        state=(mi.UInt32(0) + dr.zeros(mi.UInt32, dr.width(lanes)), f + lanes, c + lanes, lanes, lanes + 0),
-        cond=lambda index, f, c, depth, total: index < count,
+    lanes = dr.zeros(Float, dr.width(width, f, *decays))
+    none = [lanes + 0 for _ in decays]
+    *_, totals = dr.while_loop(
+        state=(mi.UInt32(0) + dr.zeros(mi.UInt32, dr.width(lanes)), f + lanes, c + lanes, none, [*none]),
+        cond=lambda index, f, c, depths, totals: index < count,
         body=panel,
-        labels=("index", "f", "c", "depth", "total"),
+        labels=("index", "f", "c", "depths", "totals"),
     )
-    return total / dr.maximum(Float(count), 1)
+    share = dr.rcp(dr.maximum(Float(count), 1))
+    return [total * share for total in totals]
+
+
+def _kept(depth):
+    import drjit as dr
+
+    return exp2_bounded(dr.maximum(depth, -_DEEPEST))
 
 
 def panel_count(phase: Phase, width, depth, *, soft: bool = False):
