@@ -2,14 +2,11 @@
 """A short queue of crossings in registers, nearest first.
 
 A crossing is a quotient D/x (larger is nearer) with the layers that it gains; a quotient of 0 is no crossing. All
-places of the queue are compared at every operation, without branches: a dozen instructions a place, far less than
-reading one more plane.
+places of the queue are compared at every operation, without branches: a dozen instructions a place.
 """
 
 from dataclasses import dataclass
 from typing import Any
-
-PLACES = 8
 
 
 @dataclass
@@ -20,12 +17,12 @@ class Queue:
     gain: list[Any]
 
 
-def filled(quotient: float, Float, width: int) -> Queue:
+def filled(quotient: float, places: int, Float, width: int) -> Queue:
     """Return a queue that holds one quotient in all places, without gain."""
     import drjit as dr
 
     return Queue(
-        [dr.full(Float, quotient, width) for _ in range(PLACES)], [dr.zeros(Float, width) for _ in range(PLACES)]
+        [dr.full(Float, quotient, width) for _ in range(places)], [dr.zeros(Float, width) for _ in range(places)]
     )
 
 
@@ -45,7 +42,7 @@ def pushed(queue: Queue, quotient, gain, active):
     out = dr.select(first, quotient, queue.quotient[0]), dr.select(first, gain, queue.gain[0])
     carried = dr.select(first, queue.quotient[0], quotient), dr.select(first, queue.gain[0], gain)
     quotients, gains = [], []
-    for place in range(1, PLACES):
+    for place in range(1, len(queue.quotient)):
         q, g = queue.quotient[place], queue.gain[place]
         before = carried[0] > q
         quotients.append(dr.select(before, carried[0], q))
@@ -61,7 +58,7 @@ def inserted(queue: Queue, quotient, gain, active) -> Queue:
 
     carried = quotient, gain
     quotients, gains = [], []
-    for place in range(PLACES):
+    for place in range(len(queue.quotient)):
         q, g = queue.quotient[place], queue.gain[place]
         same, before = carried[0] == q, carried[0] > q
         quotients.append(dr.select(before, carried[0], q))

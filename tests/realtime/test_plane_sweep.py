@@ -56,9 +56,11 @@ def test_double_precision_is_right_to_more_digits(variant):
     assert_same(walked(index, lists, ways, end), lit_lengths(index, ways, end, weight=weight), tolerance=1e-11)
 
 
-@pytest.mark.parametrize("order", ["shuffled", "backwards", "two changed", "said to be unsorted"])
+@pytest.mark.parametrize(
+    "order", ["shuffled", "backwards", "two changed", "five at a time backwards", "said to be unsorted"]
+)
 def test_rays_notice_an_order_that_is_wrong(variant, order):
-    """And find their segments by selection."""
+    """And find their segments with a longer queue, or by selection."""
     import mitsuba as mi
 
     index = index_of(casters_of("torus", "open cylinder", "crossing spheres"))
@@ -74,6 +76,8 @@ def test_rays_notice_an_order_that_is_wrong(variant, order):
             entries[places] = entries[rng.permutation(places)]
         elif order == "backwards":
             entries[places] = entries[places[::-1]]
+        elif order == "five at a time backwards" and count:  # too much for a queue of two, nothing for one of eight
+            entries[places] = entries[np.concatenate([places[k : k + 5][::-1] for k in range(0, count, 5)])]
         elif order == "two changed" and count > 3:
             entries[places[[0, -1]]] = entries[places[[-1, 0]]]
         changed += count > 3
