@@ -18,7 +18,7 @@ foot point. For the lobes cos^16 and cos^64 of half the angle ("hazy", "murky"),
 their width.
 
 In float32 every segment takes as many panels of eight nodes as its width in v and its optical depth ask for, see
-`realtime.kernels.panels`; they leave 4e-7. In float64 the numbers of nodes are the same for all, the
+`realtime.kernels.panels`; they leave less than 1e-6. In float64 the numbers of nodes are the same for all, the
 smallest with which the certified cases (tests/data) and random rays of optical depth 1e-6 to 50, heights down to 1e-7
 of the distance and |g| up to 0.95 stay below 1e-10; the isotropic case has no lobe, and pairs of nodes about the centre
 share their exponentials: it is `quadrature` with 40 nodes.

@@ -15,12 +15,12 @@ the left of the panel like exp(T t), with t the distance in widths of the panel 
     T = a d cosh(v0) (v1 - v0)
 
 the optical depth that the segment would have, if all of it were as dense in v as its beginning. For a pure exponential
-the rule errs by T^2n (n!)^4 / ((2n + 1) (2n)!^3) of the first value, 1e-7 for n = 8 and T = 9: a panel may also have
-some T. So there are
+the rule errs by less than T^2n (n!)^4 / ((2n + 1) (2n)!^3) of the first value, 4e-7 for n = 8 and T = 10.5: a panel may
+also have some T. So there are
 
     m = ceil(max((v1 - v0)/w, T/T1))
 
-equal panels. w and T1 are the largest that keep random rays of every magnitude within 4e-7 of the integral, rounding
+equal panels. w and T1 are the largest that keep random rays of every magnitude within 1e-6 of the integral, rounding
 left aside, for each phase function; `tests/realtime/kernels/test_panels.py` tries others.
 
 **What they cost.** All rays of a packet take part in as many steps as the one that needs most, no more. Panels of a ray
@@ -45,7 +45,7 @@ _NODES = 8
 _MOST = 160  # panels; more than any segment needs: what is not a number must end too
 _DEPTH = 10.5  # T1
 #: w. A table has kinks, and no accuracy to speak of between them.
-_WIDTH = {"isotropic": 2.9, "rayleigh": 1.7, "hazy": 1.4, "murky": 0.9, "tabulated": 0.4}
+_WIDTH = {"isotropic": 2.9, "rayleigh": 1.5, "hazy": 1.15, "murky": 0.75, "tabulated": 0.4}
 #: w for Henyey and Greenstein: a backward lobe rises within the range of integration.
 _FORWARD, _BACKWARD = 2.4, 1.7
 _SOFT = 0.85  #: and for a light whose intensity falls off
@@ -82,7 +82,8 @@ def panels_mean(phase: Phase, start, scale, width, decays, weight: Callable[[Any
     f, c = start
     largest = reduce(dr.maximum, decays)
     count = panel_count(phase, width, largest * scale * c * width, soft=weight is not None)
-    part = width / dr.maximum(Float(count), 1)
+    part_of_all = dr.rcp(dr.maximum(Float(count), 1))
+    part = width * part_of_all
     nodes = [(share, *_offset(part * fraction)) for fraction, share in unit_nodes(_NODES)]
     sinh_end, less_end = _offset(part)
     # Not 0 in a vacuum: Dr.Jit must not find the depth to be the same in all turns of the loop.
@@ -108,8 +109,7 @@ def panels_mean(phase: Phase, start, scale, width, decays, weight: Callable[[Any
         body=panel,
         labels=("index", "f", "c", "depths", "totals"),
     )
-    share = dr.rcp(dr.maximum(Float(count), 1))
-    return [total * share for total in totals]
+    return [total * part_of_all for total in totals]
 
 
 def _kept(depth):

@@ -136,7 +136,8 @@ def path_interval(geometry: RayGeometry, x0, x1, sigma_t, *, tail=1.0):
 def _path_over_height(s, r, h):
     import drjit as dr
 
-    return dr.select(s >= 0, (s + r) / h, h / (r - s))
+    behind = s >= 0
+    return dr.select(behind, s + r, h) / dr.select(behind, h, r - s)
 
 
 def _pairs(geometry: RayGeometry, ray, panel, *, phase, light: Light, nodes):
