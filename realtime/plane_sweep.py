@@ -25,8 +25,9 @@ from typing import Any
 from realtime.arrays import four_numbers, two_numbers
 from realtime.crossing_queue import filled, inserted, popped, pushed
 from realtime.diamond import diamond_angle
+from realtime.plane_boxes import TILE
 from realtime.plane_index import FULL, GAIN_SHIFT, GAIN_ZERO, NUMBER, PlaneIndex
-from realtime.plane_tiles import TILE, Lists, Source, entry_at
+from realtime.plane_tiles import Lists, Source, entry_at
 
 FEW, MANY = 2, 8  #: crossings that wait for others which may come before them, or are collected at once
 _DUE = 3  # in the last bits of a place: there waiting integrals are asked for

@@ -100,7 +100,8 @@ def drawn_lists(index, ways, end, *, order="exact"):
     import drjit as dr
     import mitsuba as mi
 
-    from realtime.plane_tiles import tile_boxes, tile_lists
+    from realtime.plane_boxes import tile_boxes
+    from realtime.plane_tiles import tile_lists
 
     Float = type(index.distance)
     parts = [Float(np.ascontiguousarray(part)) for part in ways.T]
