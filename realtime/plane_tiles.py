@@ -186,10 +186,13 @@ def _visit(index: PlaneIndex, box: Box, entries, source: Source, write, *, lanes
     import mitsuba as mi
 
     width = dr.width(box.x) * lanes
-    lane = dr.arange(mi.UInt32, width)
-    first = lane % lanes
     if lanes > 1:
+        # Each takes a run of the places, in their order: the list is the same as one lane would write.
+        lane = dr.arange(mi.UInt32, width)
         box, source = dr.gather(Box, box, lane // lanes), dr.gather(Source, source, lane // lanes)
+        run = (source.count + lanes - 1) // lanes
+        begin = dr.minimum(lane % lanes * run, source.count)
+        source = Source(source.first + begin, dr.minimum(run, source.count - begin), source.all_before)
 
     def body(k, found):
         entry, counts = entry_at(entries, source, k, dr.full(mi.Bool, True, width))
@@ -197,10 +200,10 @@ def _visit(index: PlaneIndex, box: Box, entries, source: Source, write, *, lanes
         if write is not None:
             marked = (entry & (FULL - 1)) | FIRST | dr.select(full, mi.UInt32(FULL), 0)
             write(found, marked, quotient, hit)
-        return k + lanes, found + dr.select(hit, mi.UInt32(1), mi.UInt32(0))
+        return k + 1, found + dr.select(hit, mi.UInt32(1), mi.UInt32(0))
 
     _, found = dr.while_loop(
-        state=(first, dr.zeros(mi.UInt32, width)),
+        state=(dr.zeros(mi.UInt32, width), dr.zeros(mi.UInt32, width)),
         cond=lambda k, found: k < source.count,
         body=body,
         labels=("k", "found"),
