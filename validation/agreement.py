@@ -34,6 +34,7 @@ Progress = Callable[[int, int, str], None]
 MASK_PIXELS = 2.0
 #: Below 32 batches the standard error of a standard error exceeds 13 %; those of single-scatter cost little.
 _LEAST_BATCHES = {"volpath": 32, "single-scatter": 96}
+_SAMPLES = 64  # a pixel in each batch
 _PILOT = 8  # batches that say where volpath's samples go, with seeds that no run reaches
 
 
@@ -60,7 +61,7 @@ def agreement(
     estimator: str = "volpath",
     margin: float = 0.005,
     batches: int = 256,
-    samples: int = 64,
+    samples: int = _SAMPLES,
     seconds: float | None = None,
     progress: Progress | None = None,
 ) -> dict[str, Agreement]:
@@ -157,7 +158,7 @@ def agreements(
     margins: Mapping[str, float],
     *,
     batches: int = 256,
-    samples: int = 64,
+    samples: Mapping[str, int] | None = None,
     seconds: float | None = None,
     progress: Callable[[float, str], None] | None = None,
 ) -> dict[str, Agreement]:
@@ -169,7 +170,9 @@ def agreements(
         The `mi.Scene`.
     margins
         By estimator, the margin.
-    batches, samples, seconds
+    samples
+        By estimator, see `agreement`; its default otherwise.
+    batches, seconds
         Of each estimator, see `agreement`.
     progress
         Called with (share done, what).
@@ -191,7 +194,7 @@ def agreements(
             estimator=estimator,
             margin=margin,
             batches=batches,
-            samples=samples,
+            samples=(samples or {}).get(estimator, _SAMPLES),
             seconds=seconds,
             progress=told,
         )

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 from realtime.scene import Scene, read_scene
 from reference.cache import scene_digest
@@ -36,9 +37,9 @@ class Effort:
     timed: tuple[int, int]  #: width and height of the frames that are timed [pixels]
     checked: tuple[int, int]  #: width and height of the comparisons of the truth [pixels]
     margins: Mapping[str, float]  #: by estimator, of its relative bias
+    samples: Mapping[str, int]  #: by estimator, a pixel in each batch of these comparisons
     seconds: float  #: spent on each timing
     scenes: tuple[str, ...] = ()  #: studied unless others are named
-    samples: int = 8  #: a pixel in each batch of the comparisons of the truth
     batches: int = 2048  #: of these comparisons at most
     multiple: tuple[int, int] = (8, 4)  #: batches, and samples a pixel in each, for the share of multiple scattering
     patience: float = 10.0  #: seconds after which an estimator that has not decided is stopped
@@ -51,7 +52,7 @@ class Effort:
     paper_kernels: tuple[str, ...] = ("exact",)  #: with these kernels
 
 
-def _margins(single_scatter: float, volpath: float) -> Mapping[str, float]:
+def _by_estimator(single_scatter: Any, volpath: Any) -> Mapping[str, Any]:
     return {"single-scatter": single_scatter, "volpath": volpath}
 
 
@@ -60,6 +61,8 @@ def _margins(single_scatter: float, volpath: float) -> Mapping[str, float]:
 _QUICK = ("open-fog", "sphere-spot", "two-pens")
 _HEAVY = ("clutter", "tangle")
 
+# Samples: a batch of few takes as long as it needs to be launched, and those of `single-scatter` are spread evenly over
+# the ray, so that four times as many are worth more than four times.
 EFFORTS: dict[str, Effort] = {
     effort.name: effort
     for effort in (
@@ -69,9 +72,10 @@ EFFORTS: dict[str, Effort] = {
             image=(240, 180),
             timed=(240, 180),
             checked=(48, 36),
-            margins=_margins(0.002, 0.02),
+            margins=_by_estimator(0.002, 0.02),
+            samples=_by_estimator(32, 8),
             seconds=0.05,
-            patience=8.0,
+            patience=16.0,
         ),
         Effort(
             "default",
@@ -79,9 +83,9 @@ EFFORTS: dict[str, Effort] = {
             image=(320, 240),
             timed=(320, 240),
             checked=(64, 48),
-            margins=_margins(0.0005, 0.01),
+            margins=_by_estimator(0.0005, 0.01),
+            samples=_by_estimator(128, 16),
             seconds=0.1,
-            samples=16,
             patience=18.0,
             flip="kinds",
             rays=10_000,
@@ -93,9 +97,9 @@ EFFORTS: dict[str, Effort] = {
             image=(640, 480),
             timed=(800, 600),
             checked=(160, 120),
-            margins=_margins(0.0005, 0.002),
+            margins=_by_estimator(0.0005, 0.002),
+            samples=_by_estimator(128, 64),
             seconds=0.4,
-            samples=64,
             batches=4096,
             multiple=(16, 8),
             patience=75.0,

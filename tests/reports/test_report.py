@@ -36,7 +36,14 @@ SCENE = """<scene version="3.0.0">
 </scene>
 """
 TINY = Effort(
-    "tiny", (20, 15), (12, 9), (10, 8), {"single-scatter": 0.2, "volpath": 0.5}, 0.01, samples=4, multiple=(4, 1)
+    "tiny",
+    (20, 15),
+    (12, 9),
+    (10, 8),
+    {"single-scatter": 0.2, "volpath": 0.5},
+    {"single-scatter": 4, "volpath": 4},
+    0.01,
+    multiple=(4, 1),
 )
 MARCH = Configuration("ray-march", None, (("steps", 50),))
 CHOSEN = (Configuration("unshadowed", "taylor"), Configuration("unshadowed", "quadrature"), MARCH)

@@ -11,7 +11,7 @@ from validation.configurations import QUICK, STANDARD, Configuration
 from validation.scenes import SCENES
 from validation.study import EFFORTS, Effort, open_study, wants_flip, with_flips
 
-TINY = Effort("tiny", (16, 12), (16, 12), (8, 6), {"volpath": 0.5}, 0.01)
+TINY = Effort("tiny", (16, 12), (16, 12), (8, 6), {"volpath": 0.5}, {"volpath": 8}, 0.01)
 OWN = Configuration("mine.py:fog")
 
 
