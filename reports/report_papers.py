@@ -37,7 +37,8 @@ def mutations_part(effort: Effort, keeper: Keeper, results: list[Kept], tell: Te
 
     tell(0.0, "faults of the physics")
     place = slot(keeper, "mutations", identity={}, fingerprint={})
-    results.append(kept_result(place, lambda: (mutations_data(study_mutations()), {})))
+    told = part_of(tell, 0.0, 1.0, before="faults of the physics, ")
+    results.append(kept_result(place, lambda: (mutations_data(study_mutations(progress=told)), {})))
     return results[-1].data
 
 
