@@ -29,11 +29,12 @@ def test_float64_of_either_sum_is_the_truth(found):
     assert max(one.p99 for one in found if one.precision == "double") < 1e-6
 
 
-def test_adding_up_gamma_loses_more(found):
-    """Cancellation: worst where fog is thick."""
-    by_sum = {one.sum: one for one in found if one.case == "thick fog" and one.precision == "single"}
-    assert by_sum["gamma"].p99 > 2 * by_sum["segments"].p99
-    assert by_sum["planes"].p99 > 2 * by_sum["segments"].p99
+@pytest.mark.parametrize("case", hard_cases())
+def test_adding_up_gamma_loses_more(found, case):
+    """Cancellation: little within a segment, whose two Gammas share their rounding, much where all planes add up."""
+    by_sum = {one.sum: one for one in found if one.case == case and one.precision == "single"}
+    assert by_sum["gamma"].p99 > by_sum["segments"].p99
+    assert by_sum["planes"].p99 > 20 * by_sum["segments"].p99
 
 
 def test_errors_are_counted_in_units_of_the_true_value():
