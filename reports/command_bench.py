@@ -79,7 +79,7 @@ def bench(
 
 def _bench_scene(name: str, pixels, chosen, *, margin: float | None, tell) -> dict:
     from reports.data import measurement_data, plain
-    from reports.progress import part_of
+    from reports.progress import counted, part_of
     from validation.agreement import agreements
     from validation.bench import bench as run
     from validation.load import load_scene
@@ -89,12 +89,12 @@ def _bench_scene(name: str, pixels, chosen, *, margin: float | None, tell) -> di
     share = 1.0 if margin is None else 0.6
     rows, camera = [], None
     tell(0.0, f"{loaded.name}: the truth")
-    for scene, measured in run(loaded, chosen, progress=lambda done, total, what: tell(share * done / total, what)):
+    for scene, measured in run(loaded, chosen, progress=counted(part_of(tell, 0.0, share))):
         rows.append(measurement_data(measured))
         camera = scene.camera
     agreed = {}
     if margin is not None:
-        margins = {"single-scatter": EFFORTS["default"].margins["single-scatter"], "volpath": margin}
+        margins = {**EFFORTS["default"].margins, "volpath": margin}
         agreed = plain(
             agreements(
                 load_scene(name, (160, 120)).scene,

@@ -7,7 +7,7 @@ from typing import Any
 from reports.billeter_tables import billeter_data
 from reports.biri_tables import rows_data
 from reports.data import mutations_data, plain
-from reports.progress import part_of
+from reports.progress import counted, part_of
 from validation.kept import Computed, Keeper, Kept, kept_result, slot
 from validation.study import Effort
 
@@ -21,8 +21,8 @@ def stability_part(effort: Effort, keeper: Keeper, results: list[Kept], tell: Te
     from validation.stability import stability
 
     def compute() -> Computed:
-        told = stability(count=effort.rays, progress=lambda done, total, what: tell(done / total, f"stability, {what}"))
-        return {"kernels": plain(told)}, {}
+        told = counted(part_of(tell, 0.0, 1.0, before="stability, "))
+        return {"kernels": plain(stability(count=effort.rays, progress=told))}, {}
 
     place = slot(keeper, "stability", identity={"rays": effort.rays}, fingerprint={})
     results.append(kept_result(place, compute))
@@ -48,11 +48,9 @@ def published_part(
     """Return the tables of the papers, measured again in those of their scenes that are studied; None without any."""
     found: dict[str, Any] = {}
     if "biri" in effort.papers:
-        found["biri"] = _biri(effort, scenes, keeper, results, lambda share, what: tell(0.4 * share, what))
+        found["biri"] = _biri(effort, scenes, keeper, results, part_of(tell, 0.0, 0.4))
     if "billeter" in effort.papers:
-        found["billeter"] = _billeter(
-            effort, scenes, keeper, results, lambda share, what: tell(0.4 + 0.6 * share, what)
-        )
+        found["billeter"] = _billeter(effort, scenes, keeper, results, part_of(tell, 0.4, 1.0))
     found = {paper: data for paper, data in found.items() if data is not None}
     return ({"biri": None, "billeter": None} | found) if found else None
 

@@ -8,6 +8,7 @@ truth, whose error is far below what float32 can hold; `.numpy(numpy.float32)` c
 
 import math
 import os
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -40,12 +41,12 @@ def read_only(values: Any) -> Array:
     return view
 
 
-class Pictured:
+class Pictured(ABC):
     """What a notebook shows as the PNG file of its picture."""
 
+    @abstractmethod
     def picture(self) -> NDArray[np.uint8]:
         """Return the picture, (height, width, 3)."""
-        raise NotImplementedError
 
     @cached_property
     def _png(self) -> bytes:
