@@ -121,7 +121,6 @@ def listed(
 
     count = _visit(index, box, entries, source, None, lanes=lanes)
     offset = dr.prefix_sum(count) + 0
-    dr.eval(count, offset)
     # Lists stand behind what they were drawn from, so that a box without one reads on from there in the same array.
     behind = dr.width(entries)
     pool = dr.empty(mi.UInt32, behind + room)
@@ -133,7 +132,7 @@ def listed(
         dr.select(fits, end - first, source.count),
         dr.select(fits, end + behind, source.all_before),
     )
-    dr.eval(pool, found, fits)
+    dr.eval(pool, count, offset, found, fits)
     if order is None:
         has_room = dr.repeat(fits, lanes)
 
