@@ -48,20 +48,29 @@ def read_facets(scene, types: ArrayTypes) -> Facets | None:
     return table
 
 
-def facet_at(facets: Facets, hit, active):
-    """Return the unit normal, whether it is lit from both sides, and the albedo, at a preliminary intersection."""
+def facet_number(facets: Facets, hit, active):
+    """Return the number of the triangle of a preliminary intersection."""
     import drjit as dr
     import mitsuba as mi
 
     shape = dr.reinterpret_array(mi.UInt32, hit.shape)
-    number = dr.gather(mi.UInt32, facets.first, shape, active) + hit.prim_index
+    return dr.gather(mi.UInt32, facets.first, shape, active) + hit.prim_index
+
+
+def facet_at(facets: Facets, number, uv, active):
+    """Return the unit normal, whether it is lit from both sides, and the albedo of triangles by their numbers.
+
+    `uv`, barycentric coordinates, is only read where normals are interpolated.
+    """
+    import drjit as dr
+
     Four = four_numbers(type(facets.normals))
     red, green, blue, _ = dr.gather(Four, facets.albedos, number, active)
     if not facets.smooth:
         x, y, z, two_sided = dr.gather(Four, facets.normals, number, active)
         return (x, y, z), two_sided > 0, (red, green, blue)
     Float = type(red)
-    u, v = Float(hit.prim_uv.x), Float(hit.prim_uv.y)
+    u, v = Float(uv.x), Float(uv.y)
     corners = [dr.gather(Four, facets.normals, 3 * number + k, active) for k in range(3)]
     x, y, z = (dr.fma(u, b, dr.fma(v, c, (1 - u - v) * a)) for a, b, c in list(zip(*corners))[:3])
     scale = dr.rsqrt(x * x + y * y + z * z)

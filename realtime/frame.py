@@ -1,28 +1,26 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A frame: primary rays, the lit surface and the airlight, each stage one frozen function.
+"""A frame: camera rays, the lit surface, what the method sorts by tiles, and the airlight; each stage one frozen
+function.
 
 Frozen functions (`drjit.freeze`) record their kernels on the first call and replay them afterwards, so a frame costs
 its kernels and little else. A method whose arrays change their sizes from frame to frame cannot be frozen. All that
-moves (camera, lights, medium, shadow maps) is passed in as opaque arrays.
+moves (camera, lights, medium, shadow maps) is passed in as opaque arrays. What of a frame serves the next one too:
+`realtime.next_frame`.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
-from realtime.body_tiles import tile_corners
-from realtime.camera import Camera, ray_directions, tiled_pixels
+from realtime.camera import ray_directions, tiled_pixels
 from realtime.errors import InputError
+from realtime.frame_view import frame_view, view_corners
 from realtime.frozen import Frozen
 from realtime.kernels.table import resident_tables
-from realtime.lights import Light
-from realtime.media_rays import camera_depths
-from realtime.medium import Medium
+from realtime.media_rays import camera_insides, optical_depths
 from realtime.methods import Method
-from realtime.plan import Plan
 from realtime.scene import Scene
-from realtime.surface import lit_surface, visible_surface, visible_triangle
-from realtime.view import View
+from realtime.surface import Cast, cast_rays, lit_surface, visible_surface
 
 
 @dataclass(frozen=True)
@@ -30,16 +28,26 @@ class FrameRenderer:
     """The stages of a frame of one scene with one method, ready to be run any number of times."""
 
     scene: Scene
+    method: Method
     pixel: Any  #: pixel numbers in the order of the lanes
     prepare: Callable[[Scene], Any]  #: what the method needs before the frame: shadow maps, shadow planes
-    surface: Callable[..., Any]  #: -> distance, and surface radiance: by light where `airlight` finds shadows, or a sum
+    cast: Callable[..., Cast]  #: -> what camera rays meet
+    shade: Callable[..., Any]  #: -> surface radiance: by light where `airlight` finds shadows, or a sum
+    tiles: Callable[..., Any] | None  #: -> what the method sorts by tiles; None where it does not
     airlight: Callable[..., Any]  #: -> airlight radiance, and that of the surface where this finds its shadows, or None
+    shade_casts_rays: bool  #: whether shading asks Mitsuba for shapes or shadows
     casts_rays: bool  #: whether the method casts rays of its own
-    check: Callable[[Any], None] | None = None  #: airlight (height, width, 3) -> raises what is wrong with it
+
+    # A frozen function reads all shapes of a scene that it is given anew at every call.
+
+    @property
+    def shade_geometry(self) -> Any:
+        """The Mitsuba scene if shading needs it."""
+        return self.scene.geometry if self.shade_casts_rays else None
 
     @property
     def geometry(self) -> Any:
-        """The Mitsuba scene if the method needs it: a frozen function reads all of its shapes anew at every call."""
+        """The Mitsuba scene if the method needs it."""
         return self.scene.geometry if self.casts_rays else None
 
 
@@ -85,23 +93,35 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
     plan, camera = scene.plan, scene.camera
     lights_surfaces = method.lights_surfaces(settings)
     pixel = mi.UInt32(tiled_pixels(camera.width, camera.height))
+    # A map of a light at infinity shows the media alone, but not all that is lit.
+    asked = [light.kind == "directional" or not lights_surfaces for light in scene.lights]
 
     @Frozen
-    def surface(geometry, facets, pixel, camera, medium, lights):
+    def cast(geometry, facets, pixel, camera, medium):
         direction, _ = ray_directions(camera, pixel)
-        seen = visible_surface(geometry, facets, camera.origin, direction, color=type(medium.albedo))
-        depths = None
-        if medium.bodies:
-            corners = _corners(camera, pixel)
-            depths = camera_depths(medium, camera.origin, direction, seen.distance, corners=corners)
-        # A map of a light at infinity shows the media alone, but not all that is lit.
-        asked = [light.kind == "directional" or not lights_surfaces for light in lights]
+        found = cast_rays(geometry, facets, camera.origin, direction)
+        if not medium.bodies:
+            return found
+        corners = view_corners(camera, pixel)
+        insides = camera_insides(medium, camera.origin, direction, found.distance, corners=corners)
+        return replace(found, insides=insides)
+
+    @Frozen
+    def shade(geometry, facets, pixel, camera, medium, lights, cast):
+        direction, _ = ray_directions(camera, pixel)
+        seen = visible_surface(cast, facets, camera.origin, direction, color=type(medium.albedo))
+        depths = optical_depths(medium, cast.distance, cast.insides) if medium.bodies else None
         shown = {"medium": medium, "depths": depths}
         colors = [lit_surface(geometry, seen, light=light, shadows=one, **shown) for light, one in zip(lights, asked)]
-        return seen.distance, tuple(colors) if lights_surfaces else (sum(colors),)
+        return tuple(colors) if lights_surfaces else (sum(colors),)
 
-    def run_method(geometry, pixel, camera, medium, lights, prepared, distance, by_light):
-        shown = {"geometry": geometry, "medium": medium, "lights": lights, "prepared": prepared}
+    def sort_tiles(pixel, camera, medium, lights, prepared, distance):
+        assert method.tiles is not None
+        shown = {"geometry": None, "medium": medium, "lights": lights, "prepared": prepared}
+        return method.tiles(frame_view(camera, pixel, distance, plan=plan, **shown), **settings)
+
+    def run_method(geometry, pixel, camera, medium, lights, prepared, tiles, distance, by_light):
+        shown = {"geometry": geometry, "medium": medium, "lights": lights, "prepared": prepared, "tiles": tiles}
         view = frame_view(camera, pixel, distance, plan=plan, **shown)
         found = method.function(view, kernel=kernel, **settings)
         if not lights_surfaces:
@@ -114,19 +134,31 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
     if not plan.shadows:
         prepare = _nothing
     casts_rays = method.casts_rays(settings)
+    tiles = sort_tiles if method.tiles and plan.shadows else None
     airlight = run_method
     if method.frozen(settings):
         # Trace one pixel without launching anything: what the method refuses must not be raised while a frozen function
         # is being recorded, which Dr.Jit 1.5 answers by aborting a later recording.
         one = type(camera.origin.x)(1)
-        one_pixel = (scene.geometry if casts_rays else None, mi.UInt32(0), camera, scene.medium, scene.lights)
-        _, dark = _no_surface(None, None, *one_pixel[1:])
-        run_method(*one_pixel, prepare(scene), one, dark)
+        one_pixel = (mi.UInt32(0), camera, scene.medium, scene.lights)
+        dark = _no_surface(None, None, *one_pixel, None)
+        run_method(scene.geometry if casts_rays else None, *one_pixel, prepare(scene), None, one, dark)
         resident = resident_tables()
         airlight = Frozen(run_method, state_fn=lambda *_, **__: resident)
+        tiles = tiles and Frozen(sort_tiles)
     dr.eval(pixel)
-    shown = surface if plan.surfaces else _no_surface
-    return FrameRenderer(scene, pixel, prepare, shown, airlight, casts_rays, method.check)
+    return FrameRenderer(
+        scene,
+        method,
+        pixel,
+        prepare,
+        cast=cast if plan.surfaces else _nothing_met,
+        shade=shade if plan.surfaces else _no_surface,
+        tiles=tiles,
+        airlight=airlight,
+        shade_casts_rays=scene.facets is None or any(asked),
+        casts_rays=casts_rays,
+    )
 
 
 def render_frame(renderer: FrameRenderer) -> Frame:
@@ -139,8 +171,8 @@ def image_frame(renderer: FrameRenderer, stages) -> Frame:
     distance, surface, airlight = stages
     height, width = renderer.scene.camera.height, renderer.scene.camera.width
     light = _image(renderer, airlight, (height, width, 3))
-    if renderer.check is not None:
-        renderer.check(light)
+    if renderer.method.check is not None:
+        renderer.method.check(light)
     return Frame(
         light,
         _image(renderer, surface, (height, width, 3)),
@@ -150,97 +182,80 @@ def image_frame(renderer: FrameRenderer, stages) -> Frame:
 
 def run_stages(renderer: FrameRenderer, prepared):
     """Run the stages on the device and return distance, surface and airlight, evaluated, in the order of the lanes."""
+    cast = run_cast(renderer)
+    by_light = run_shade(renderer, cast)
+    tiles = run_tiles(renderer, prepared, cast.distance)
+    return evaluated(cast, by_light, run_airlight(renderer, prepared, cast.distance, by_light, tiles))
+
+
+def evaluated(cast: Cast, by_light, found):
+    """Return distance, surface and airlight, evaluated, from what the stages returned."""
     import drjit as dr
 
-    distance, by_light = run_surface(renderer)
-    airlight, lit_surface = run_airlight(renderer, prepared, distance, by_light)
+    airlight, lit_surface = found
     surface = by_light[0] if lit_surface is None else lit_surface
-    dr.eval(distance, surface, airlight)
-    return distance, surface, airlight
+    dr.eval(cast.distance, surface, airlight)
+    return cast.distance, surface, airlight
+
+
+def run_cast(renderer: FrameRenderer) -> Cast:
+    """Run the stage of the camera rays."""
+    scene = renderer.scene
+    return renderer.cast(scene.geometry, scene.facets, renderer.pixel, scene.camera, scene.medium)
+
+
+def run_shade(renderer: FrameRenderer, cast: Cast):
+    """Run the stage of the lit surface on what `run_cast` returned."""
+    scene = renderer.scene
+    arguments = (scene.facets, renderer.pixel, scene.camera, scene.medium, scene.lights, cast)
+    return renderer.shade(renderer.shade_geometry, *arguments)
 
 
 def run_surface(renderer: FrameRenderer):
-    """Run the stage of the surface and return what it does, not evaluated."""
-    scene = renderer.scene
-    return renderer.surface(scene.geometry, scene.facets, renderer.pixel, scene.camera, scene.medium, scene.lights)
+    """Run the stages of camera rays and lit surface, and return the distance and what `run_shade` returns."""
+    cast = run_cast(renderer)
+    return cast.distance, run_shade(renderer, cast)
 
 
-def run_airlight(renderer: FrameRenderer, prepared, distance, by_light):
-    """Run the stage of the airlight on what `run_surface` returned, and return what it does, not evaluated."""
+def run_tiles(renderer: FrameRenderer, prepared, distance):
+    """Run the stage of what the method sorts by tiles; None where it has none."""
     scene = renderer.scene
-    arguments = (renderer.pixel, scene.camera, scene.medium, scene.lights, prepared, distance, by_light)
+    if renderer.tiles is None:
+        return None
+    return renderer.tiles(renderer.pixel, scene.camera, scene.medium, scene.lights, prepared, distance)
+
+
+def run_airlight(renderer: FrameRenderer, prepared, distance, by_light, tiles=None):
+    """Run the stage of the airlight, and return what it does, not evaluated.
+
+    Parameters
+    ----------
+    renderer, prepared
+        The stages, and what their `prepare` returned.
+    distance, by_light
+        From `run_surface`.
+    tiles
+        From `run_tiles`; None if the method is to build its own on the way.
+    """
+    scene = renderer.scene
+    arguments = (renderer.pixel, scene.camera, scene.medium, scene.lights, prepared, tiles, distance, by_light)
     return renderer.airlight(renderer.geometry, *arguments)
-
-
-def frame_view(
-    camera: Camera, pixel, distance, *, plan: Plan, geometry, medium: Medium, lights: tuple[Light, ...], prepared
-) -> View:
-    """Return what a method is given for some pixels; `geometry` may be None where the method casts no rays."""
-    direction, low = ray_directions(camera, pixel)
-    return View(
-        origin=camera.origin,
-        direction=direction,
-        direction_low=low,
-        distance=distance,
-        lights=lights,
-        medium=medium,
-        plan=plan,
-        visible=lambda point, light: _visible(geometry, point, light),
-        camera=camera,
-        pixel=pixel,
-        rays=_rays(camera, pixel),
-        square_tiles=_in_square_tiles(camera, pixel),
-        visible_triangle=lambda: visible_triangle(geometry, camera.origin, direction),
-        prepared=prepared,
-    )
-
-
-def _rays(camera: Camera, pixel):
-    """Return the function from lanes to the directions of their rays."""
-    import drjit as dr
-    import mitsuba as mi
-
-    return lambda lane: ray_directions(camera, dr.gather(mi.UInt32, pixel, lane))
-
-
-def _in_square_tiles(camera: Camera, pixel) -> bool:
-    import drjit as dr
-
-    return camera.width % 4 == 0 and camera.height % 4 == 0 and dr.width(pixel) > 1
-
-
-def _corners(camera: Camera, pixel):
-    """Return the directions at the corners of the tiles, or None where pixels do not come in tiles."""
-    import drjit as dr
-
-    return tile_corners(_rays(camera, pixel), dr.width(pixel)) if _in_square_tiles(camera, pixel) else None
-
-
-def _visible(geometry, point, light):
-    """Cast a shadow ray from the light, where nothing can block it at once, to just before the point."""
-    import drjit as dr
-    import mitsuba as mi
-
-    if light.kind == "directional":
-        # From the point on, where a ray is exact, though not from the surface that it may lie on.
-        away = 2e-6 * light.face.depth
-        return ~geometry.ray_test(mi.Ray3f(mi.Point3f(point - light.axis * away), mi.Vector3f(-light.axis)))
-    start = mi.Point3f(light.position)
-    direction = mi.Vector3f(point) - mi.Vector3f(start)
-    length = dr.norm(direction)
-    # Twenty units in the last place before the point: on a surface the point itself must not block the light.
-    return ~geometry.ray_test(mi.Ray3f(start, direction / length, length * (1 - 2e-6), 0.0, []))
 
 
 def _nothing(scene: Scene) -> tuple[()]:
     return ()
 
 
-def _no_surface(geometry, facets, pixel, camera, medium, lights):
+def _nothing_met(geometry, facets, pixel, camera, medium) -> Cast:
     import drjit as dr
 
-    Float, Color = type(camera.origin.x), type(medium.albedo)
-    return dr.full(Float, dr.inf, dr.width(pixel)), tuple(dr.zeros(Color, dr.width(pixel)) for _ in lights)
+    return Cast(dr.full(type(camera.origin.x), dr.inf, dr.width(pixel)))
+
+
+def _no_surface(geometry, facets, pixel, camera, medium, lights, cast):
+    import drjit as dr
+
+    return tuple(dr.zeros(type(medium.albedo), dr.width(pixel)) for _ in lights)
 
 
 def _image(renderer: FrameRenderer, values, shape):

@@ -31,7 +31,7 @@ from realtime.shadow_map import cast_shadow_map, check_size, map_memory
 from realtime.view import View, rays_in_media
 from realtime.volume_mesh import THRESHOLD, memory_needed, volume_mesh
 from realtime.volume_sum import mesh_airlight
-from realtime.volume_tiles import tile_leaves
+from realtime.volume_tiles import Leaves, tile_leaves
 from realtime.volume_walk import sum_lit_pieces
 
 EVALUATIONS = ("walk", "mesh")
@@ -98,7 +98,8 @@ def light_volumes(
             continue
         airlight = ray_airlight(view, light, kernel, in_media[number] if in_media else None)
         if view.plan.shadows:
-            value, reached = _walk(view.prepared[number], airlight)
+            leaves = view.tiles[number] if view.tiles else _leaves(view, number)
+            value, reached = _walk(view.prepared[number], leaves, airlight)
         else:
             value, reached = airlight.radiance(airlight.integral(*airlight.segment)), True
         total += value
@@ -112,17 +113,27 @@ def finds_lit_surfaces(settings: Mapping[str, Any]) -> bool:
     return settings["evaluation"] == "walk" and settings["surface"] == "map"
 
 
-def _walk(heights: LightHeights, airlight: RayAirlight):
+def light_volume_tiles(view: View, *, evaluation: str, **_) -> tuple[Leaves, ...] | None:
+    """Return by light the leaves of its height field that concern each tile; a mesh has none."""
+    if evaluation == "mesh":
+        return None
+    return tuple(_leaves(view, number) for number in range(len(view.lights)))
+
+
+def _leaves(view: View, number: int) -> Leaves:
+    toward = view.lights[number].position - view.origin
+    place = {"light": toward, "square": view.square_tiles}
+    return tile_leaves(view.prepared[number], lambda lane: view.rays(lane)[0], view.distance, **place)
+
+
+def _walk(heights: LightHeights, leaves: Leaves, airlight: RayAirlight):
     """Return the airlight of one light along the rays [W/(m^2 sr)], and whether it reaches their ends."""
     import drjit as dr
 
     view = airlight.view
-    toward = airlight.light.position - view.origin
-    leaves = tile_leaves(
-        heights, lambda lane: view.rays(lane)[0], view.distance, light=toward, square=view.square_tiles
-    )
     zero = dr.zeros(integral_type(view), dr.width(view.distance))
-    place = {"away": -toward, "direction": view.direction, "segment": airlight.segment}
+    away = view.origin - airlight.light.position
+    place = {"away": away, "direction": view.direction, "segment": airlight.segment}
     value, reached = sum_lit_pieces(heights, leaves, **place, integral=airlight.integral, zero=zero)
     return airlight.radiance(value), reached
 

@@ -160,15 +160,24 @@ def _leg_lists(seen: Seen, origin, start, corners) -> PlaneLists | None:
     return plane_lists(seen, slices, near, leaves=False)
 
 
-def camera_depths(medium: Medium, origin, direction, distance, *, corners=None) -> tuple[Any, ...]:
-    """Return the optical depth of camera rays up to a distance, by channel; arguments as in `camera_pieces`."""
+def camera_insides(medium: Medium, origin, direction, distance, *, corners=None) -> tuple[Any, ...]:
+    """Return what of camera rays up to a distance lies in each body [m]; arguments as in `camera_pieces`."""
     import drjit as dr
 
-    depths = [type(distance)(0) if medium.clear else sigma * distance for sigma in medium.sigma_t]
+    insides = []
     for body in medium.bodies:
         ends = _passage(seen_from(body, origin), direction, corners)
         enter, leave = (dr.minimum(end, distance) for end in ends)
-        inside = dr.select(leave > enter, leave - enter, 0)
+        insides.append(dr.select(leave > enter, leave - enter, 0))
+    return tuple(insides)
+
+
+def optical_depths(medium: Medium, distance, insides) -> tuple[Any, ...]:
+    """Return the optical depth up to a distance, by channel; `insides` is what of it lies in each body [m]."""
+    import drjit as dr
+
+    depths = [type(distance)(0) if medium.clear else sigma * distance for sigma in medium.sigma_t]
+    for body, inside in zip(medium.bodies, insides, strict=True):
         excess = [own - sigma for own, sigma in zip(body.medium.sigma_t, medium.sigma_t)]
         depths = [dr.fma(more, inside, depth) for more, depth in zip(excess, depths)]
     return tuple(depths)
@@ -182,7 +191,7 @@ def path_transmittance(medium: Medium, light: Light, *, depths, point, active):
     medium, light
         What the light crosses and where it comes from.
     depths
-        From `camera_depths`.
+        Of the camera rays, from `optical_depths`.
     point
         The points.
     active

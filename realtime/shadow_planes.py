@@ -170,7 +170,7 @@ def shadow_planes(
             lit.append(True)
             continue
         index = view.prepared[number]
-        lists = tile_planes(view, index, order=order)
+        lists = view.tiles[number] if view.tiles else tile_planes(view, index, order=order)
         rays = ray_planes(lists, *in_light_frame(index, view.direction, view.direction_low))
         if order == "exact" and evaluation == "pixel" and buffer == "float":
             value, reached = _segments(index, lists, rays, airlight, differences=sum == "gamma")
@@ -189,6 +189,11 @@ def shadow_planes(
         for_channel = [1 - dr.exp(-sigma_t * distance) for sigma_t in view.medium.sigma_t]
         total += view.medium.albedo * ambient * type(total)(*for_channel)
     return total, tuple(lit)
+
+
+def shadow_plane_tiles(view: View, *, order: str, **_) -> tuple[Lists, ...]:
+    """Return by light the planes that concern each tile of the image."""
+    return tuple(tile_planes(view, index, order=order) for index in view.prepared)
 
 
 def tile_planes(view: View, index: PlaneIndex, *, order: str) -> Lists:

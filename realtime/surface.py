@@ -13,11 +13,22 @@ from behind, as in Mitsuba's `diffuse`.
 from dataclasses import dataclass
 from typing import Any
 
-from realtime.facets import Facets, facet_at
+from realtime.facets import Facets, facet_at, facet_number
 from realtime.geometry import falloff, ray_geometry
 from realtime.lights import Light
 from realtime.media_rays import path_transmittance
 from realtime.medium import Medium, transmittance
+
+
+@dataclass(frozen=True)
+class Cast:
+    """What camera rays meet first: all of a frame that depends on the camera and the geometry alone."""
+
+    distance: Any  #: infinite where there is nothing [m]
+    triangle: Any = None  #: its number in the table of facets, where there is one
+    uv: Any = None  #: barycentric coordinates in it, where its normals are interpolated
+    hit: Any = None  #: without a table, Mitsuba's preliminary intersection
+    insides: tuple[Any, ...] = ()  #: what of the ray up to there lies in each bounded medium [m]
 
 
 @dataclass
@@ -32,7 +43,7 @@ class VisibleSurface:
     interaction: Any  #: Mitsuba's, for shadow rays
 
 
-def visible_surface(scene, facets: Facets | None, origin, direction, *, color) -> VisibleSurface:
+def cast_rays(scene, facets: Facets | None, origin, direction) -> Cast:
     """Cast the camera rays.
 
     Parameters
@@ -40,32 +51,41 @@ def visible_surface(scene, facets: Facets | None, origin, direction, *, color) -
     scene
         The Mitsuba scene.
     facets
-        Its triangles, or None: then Mitsuba is asked for the surfaces.
+        Its triangles, or None: then Mitsuba will be asked for the surfaces.
     origin, direction
         Rays in any precision; they are cast in float32.
-    color
-        The type of an albedo.
     """
     import drjit as dr
-    import mitsuba as mi
 
-    Vector, Float = type(direction), type(origin.x)
-    ray = mi.Ray3f(mi.Point3f(origin), mi.Vector3f(direction))
-    hit = scene.ray_intersect_preliminary(ray, coherent=True)
+    Float = type(origin.x)
+    hit = scene.ray_intersect_preliminary(_ray(origin, direction), coherent=True)
     valid = hit.is_valid()
     distance = dr.select(valid, Float(hit.t), dr.inf)
     if facets is None:
-        interaction = hit.compute_surface_interaction(ray, ray_flags=mi.RayFlags.All)
+        return Cast(distance, hit=hit)
+    return Cast(distance, facet_number(facets, hit, valid), hit.prim_uv if facets.smooth else None)
+
+
+def visible_surface(cast: Cast, facets: Facets | None, origin, direction, *, color) -> VisibleSurface:
+    """Return the surfaces that camera rays meet, arguments as for `cast_rays`; `color` is the type of an albedo."""
+    import drjit as dr
+    import mitsuba as mi
+
+    Vector = type(direction)
+    distance = cast.distance
+    valid = dr.isfinite(distance)
+    if facets is None:
+        interaction = cast.hit.compute_surface_interaction(_ray(origin, direction), ray_flags=mi.RayFlags.All)
         bsdf = interaction.bsdf()
         albedo = color(bsdf.eval_diffuse_reflectance(interaction))
         point, normal = Vector(interaction.p), Vector(interaction.sh_frame.n)
         two_sided = mi.has_flag(bsdf.flags(), mi.BSDFFlags.BackSide)
     else:
-        unit, two_sided, reflectance = facet_at(facets, hit, valid)
+        unit, two_sided, reflectance = facet_at(facets, cast.triangle, cast.uv, valid)
         normal, albedo = Vector(*unit), color(*reflectance)
         point = dr.fma(direction, dr.select(valid, distance, 0), origin)
         interaction = dr.zeros(mi.Interaction3f)
-        interaction.t, interaction.p, interaction.n = hit.t, mi.Point3f(point), mi.Normal3f(normal)
+        interaction.t, interaction.p, interaction.n = mi.Float(distance), mi.Point3f(point), mi.Normal3f(normal)
     facing = -dr.dot(normal, direction)
     normal = dr.select(two_sided & (facing < 0), -normal, normal)
     return VisibleSurface(distance, point, normal, albedo, valid & (two_sided | (facing > 0)), interaction)
@@ -86,8 +106,7 @@ def visible_triangle(scene, origin, direction):
     import drjit as dr
     import mitsuba as mi
 
-    ray = mi.Ray3f(mi.Point3f(origin), mi.Vector3f(direction))
-    hit = scene.ray_intersect_preliminary(ray, coherent=True)
+    hit = scene.ray_intersect_preliminary(_ray(origin, direction), coherent=True)
     mesh = mi.MeshPtr(hit.shape)
     seen = hit.is_valid() & hit.shape.is_mesh()
     mesh = dr.select(seen, mesh, dr.zeros(mi.MeshPtr))
@@ -96,6 +115,12 @@ def visible_triangle(scene, origin, direction):
     Float = type(direction.x)
     u, v = Float(hit.prim_uv.x), Float(hit.prim_uv.y)
     return corners, (1 - u - v, u, v), seen
+
+
+def _ray(origin, direction):
+    import mitsuba as mi
+
+    return mi.Ray3f(mi.Point3f(origin), mi.Vector3f(direction))
 
 
 def lit_surface(scene, surface: VisibleSurface, *, medium: Medium, light: Light, depths=None, shadows: bool = True):
@@ -110,7 +135,7 @@ def lit_surface(scene, surface: VisibleSurface, *, medium: Medium, light: Light,
     medium, light
         What the light crosses and where it comes from.
     depths
-        With bounded media, the optical depths from `realtime.media_rays.camera_depths`.
+        With bounded media, the optical depths of the camera rays, from `realtime.media_rays.optical_depths`.
     shadows
         Whether to cast shadow rays; a method that finds out otherwise what is lit leaves them to that.
     """

@@ -37,6 +37,9 @@ class View:
     square_tiles: bool  #: whether every 16 rays that follow one another are 4 x 4 pixels
     visible_triangle: Callable[[], tuple[Any, Any, Any]]  #: -> corners [m], barycentric weights, whether there is one
     prepared: tuple[Any, ...] = ()  #: by light what the method's `prepare` made: a shadow map, shadow planes
+    tiles: tuple[Any, ...] | None = (
+        None  #: by light what the method's `tiles` made; None where the method makes its own
+    )
 
 
 def radiance(medium: Medium, light: Light, integral):

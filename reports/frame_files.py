@@ -8,6 +8,8 @@ from typing import Any
 
 from reports.progress import Interrupted, Progress
 
+STAGES = ("cast", "shade", "tiles", "airlight")  #: the functions of a frame that are frozen, of a `FrameRenderer`
+
 
 def numbered(path: Path, number: int, frames: int) -> Path:
     """Return name-0001.exr for name.exr; the first frame has the number 1."""
@@ -70,7 +72,7 @@ def write_frames(
         "move_ms": moved,
         "prepare_ms": prepared,
         "stages_ms": stages,
-        "recordings": {name: getattr(getattr(renderer, name), "n_recordings", 0) for name in ("surface", "airlight")},
+        "recordings": {name: getattr(getattr(renderer, name), "n_recordings", 0) for name in STAGES},
         "files": [str(path) for path in _files(outputs, frames)],
     }
 

@@ -20,7 +20,8 @@ from typing import Any
 
 import numpy as np
 
-from realtime.frame import FrameRenderer, frame_view, render_frame, run_airlight, run_stages, run_surface
+from realtime.frame import FrameRenderer, render_frame, run_airlight, run_stages, run_surface
+from realtime.frame_view import frame_view
 from realtime.frozen import Frozen
 from realtime.plane_view import bodies_in_view
 from realtime.scene import Scene, read_scene

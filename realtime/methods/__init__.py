@@ -9,13 +9,13 @@ import difflib
 from types import MappingProxyType
 
 from realtime.errors import InputError
-from realtime.light_volumes import finds_lit_surfaces, light_volumes, prepare_light_volumes
+from realtime.light_volumes import finds_lit_surfaces, light_volume_tiles, light_volumes, prepare_light_volumes
 from realtime.methods.min_max import min_max, prepare_min_max
 from realtime.methods.own import own_method
 from realtime.methods.ray_march import prepare_maps, ray_march
 from realtime.methods.record import Method
 from realtime.methods.unshadowed import unshadowed
-from realtime.shadow_planes import prepare_shadow_planes, shadow_planes
+from realtime.shadow_planes import prepare_shadow_planes, shadow_plane_tiles, shadow_planes
 
 METHODS: dict[str, Method] = {
     "unshadowed": Method(
@@ -32,6 +32,7 @@ METHODS: dict[str, Method] = {
         "Billeter, Sintorn, Assarsson 2010, section 2; Kulla and Fajardo 2012 (equi-angular steps)",
         uses_kernel=False,
         prepare=prepare_maps,
+        prepared_from=frozenset({"geometry", "light"}),
         casts_rays=lambda settings: settings["shadow"] == "ray",
         parameters=MappingProxyType({"steps": 100, "spacing": "equiangular", "shadow": "ray", "map": 512}),
     ),
@@ -41,6 +42,8 @@ METHODS: dict[str, Method] = {
         "silhouettes extruded to planes; lit segments between their crossings",
         "Biri, Arques, Michelin 2006",
         prepare=prepare_shadow_planes,
+        prepared_from=frozenset({"camera", "geometry", "light"}),
+        tiles=shadow_plane_tiles,
         casts_rays=lambda settings: settings["evaluation"] == "vertex",  # to know the triangle of a surface
         lights_surfaces=lambda settings: True,
         parameters=MappingProxyType(
@@ -63,6 +66,8 @@ METHODS: dict[str, Method] = {
         "the volume between the light and its shadow map, crossed without marching",
         "Billeter, Sintorn, Assarsson 2010",
         prepare=prepare_light_volumes,
+        prepared_from=frozenset({"geometry", "light"}),
+        tiles=light_volume_tiles,
         lights_surfaces=finds_lit_surfaces,
         frozen=lambda settings: settings["evaluation"] == "walk",  # the crossings of a mesh are counted on the way
         parameters=MappingProxyType(
@@ -75,6 +80,7 @@ METHODS: dict[str, Method] = {
         "epipolar slices with 1D min/max trees over the shadow map; airlight interpolated between samples",
         "Chen, Baran, Durand, Jarosz 2011; Yusov 2013",
         prepare=prepare_min_max,
+        prepared_from=frozenset({"geometry", "light"}),
         parameters=MappingProxyType({"map": 512, "slices": 0, "samples": 0, "step": 16, "sampling": "slices"}),
     ),
 }

@@ -6,6 +6,9 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
+#: What of a scene may change from frame to frame; `look` is all that moves nothing: the medium and the lights' colours.
+MOVABLE = ("camera", "geometry", "light", "look")
+
 
 @dataclass(frozen=True)
 class Method:
@@ -17,6 +20,10 @@ class Method:
     source: str
     uses_kernel: bool = True
     prepare: Callable[..., Any] | None = None  #: (scene, **parameters) -> function of the scene, run when things moved
+    prepared_from: frozenset[str] = frozenset(MOVABLE)  #: what `prepare` looks at; while it stands still, it is not run
+    tiles: Callable[..., tuple[Any, ...] | None] | None = (
+        None  #: (view, **parameters) -> `view.tiles`, from camera, geometry and lights, without their colours and media
+    )
     lights_surfaces: Callable[[Mapping[str, Any]], bool] = lambda settings: (
         False
     )  #: parameters -> whether it returns, after the radiance, by light whether it reaches the surface

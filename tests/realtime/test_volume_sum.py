@@ -61,13 +61,13 @@ def view_of(scene):
     import mitsuba as mi
 
     from realtime.camera import ray_directions, tiled_pixels
-    from realtime.frame import frame_view
-    from realtime.surface import visible_surface
+    from realtime.frame_view import frame_view
+    from realtime.surface import cast_rays
 
     camera = scene.camera
     pixel = mi.UInt32(tiled_pixels(camera.width, camera.height))
     direction = ray_directions(camera, pixel)[0]
-    distance = visible_surface(scene.geometry, None, camera.origin, direction, color=mi.Color3f).distance
+    distance = cast_rays(scene.geometry, None, camera.origin, direction).distance
     parts = {"plan": scene.plan, "geometry": scene.geometry, "medium": scene.medium, "lights": scene.lights}
     return frame_view(camera, pixel, distance, **parts, prepared=())
 

@@ -95,7 +95,7 @@ def test_frames_record_nothing_and_compile_nothing(variant, name, moves):
         if number:
             assert not compiled
     assert renderer.airlight.n_recordings == 1
-    assert getattr(renderer.surface, "n_recordings", 1) == 1
+    assert all(getattr(stage, "n_recordings", 1) == 1 for stage in (renderer.cast, renderer.shade, renderer.tiles))
 
 
 def test_turning_objects_record_the_surface_once_more_at_most(variant):
@@ -107,7 +107,8 @@ def test_turning_objects_record_the_surface_once_more_at_most(variant):
     for moved in animate(scene, animation, 5):
         run_stages(replace(renderer, scene=moved), renderer.prepare(moved))
     assert renderer.airlight.n_recordings == 1
-    assert renderer.surface.n_recordings <= 2
+    assert renderer.cast.n_recordings <= 2
+    assert renderer.shade.n_recordings == 1
 
 
 def test_shapes_keep_their_names_beside_bounded_media(variant):

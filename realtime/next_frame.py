@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The next frame of an animation: what did not change since the last one is kept.
+
+| moved | made anew |
+| --- | --- |
+| camera | camera rays, tiles, and what was prepared if it depends on the camera |
+| geometry | everything |
+| light | what was prepared, tiles |
+| medium, colours | nothing of these |
+
+Surface and airlight are computed for every frame. Who calls says what moved: nothing is compared, so what moved without
+being named stays where it was.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from realtime.frame import FrameRenderer, evaluated, run_airlight, run_cast, run_shade, run_tiles
+from realtime.scene import Scene
+from realtime.surface import Cast
+
+
+@dataclass(frozen=True)
+class Kept:
+    """What a frame leaves to the next one, by what it depends on."""
+
+    cast: Cast  #: camera and geometry
+    prepared: Any  #: lights and geometry, shadow planes also the camera: `Method.prepared_from`
+    tiles: Any  #: camera, geometry and lights
+
+
+def next_frame(
+    renderer: FrameRenderer,
+    scene: Scene,
+    kept: Kept | None,
+    *,
+    camera_moved: bool,
+    geometry_moved: bool,
+    light_moved: bool,
+) -> tuple[tuple[Any, Any, Any], Kept]:
+    """Render a scene after the one that left something.
+
+    Parameters
+    ----------
+    renderer
+        The stages of the frame.
+    scene
+        The scene as it is now: that of the renderer but for camera, positions, lights, colours and medium.
+    kept
+        What the last frame left; None for the first, for which everything is made.
+    camera_moved, geometry_moved, light_moved
+        What is elsewhere than in the last frame, or turned: the camera, shapes or the bounds of media, a light. The
+        medium and the colours of lights may have changed in any case.
+
+    Returns
+    -------
+    stages
+        As from `realtime.frame.run_stages`: bit by bit what it returns for this scene.
+    kept
+        For the next frame.
+    """
+    renderer = replace(renderer, scene=scene)
+    moved = {"camera": camera_moved, "geometry": geometry_moved, "light": light_moved, "look": True}
+    cast = kept.cast if kept and not (camera_moved or geometry_moved) else run_cast(renderer)
+    by_light = run_shade(renderer, cast)
+    if kept and not any(moved[what] for what in renderer.method.prepared_from):
+        prepared = kept.prepared
+    else:
+        prepared = renderer.prepare(scene)
+    if kept and not (camera_moved or geometry_moved or light_moved):
+        tiles = kept.tiles
+    else:
+        tiles = run_tiles(renderer, prepared, cast.distance)
+    stages = evaluated(cast, by_light, run_airlight(renderer, prepared, cast.distance, by_light, tiles))
+    return stages, Kept(cast, prepared, tiles)
