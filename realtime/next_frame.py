@@ -12,19 +12,19 @@ Surface and airlight are computed for every frame. Who calls says what moved: no
 being named stays where it was.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
 from realtime.frame import FrameRenderer, evaluated, run_airlight, run_cast, run_shade, run_tiles
 from realtime.scene import Scene
-from realtime.surface import Cast
 
 
 @dataclass(frozen=True)
 class Kept:
     """What a frame leaves to the next one, by what it depends on."""
 
-    cast: Cast  #: camera and geometry
+    cast: Any  #: camera and geometry
     prepared: Any  #: lights and geometry, shadow planes also the camera: `Method.prepared_from`
     tiles: Any  #: camera, geometry and lights
 
@@ -60,16 +60,28 @@ def next_frame(
         For the next frame.
     """
     renderer = replace(renderer, scene=scene)
+    if kept is None:
+        kept, camera_moved, geometry_moved, light_moved = Kept(None, None, None), True, True, True
     moved = {"camera": camera_moved, "geometry": geometry_moved, "light": light_moved, "look": True}
-    cast = kept.cast if kept and not (camera_moved or geometry_moved) else run_cast(renderer)
+    again = any(moved[what] for what in renderer.method.prepared_from)
+    finish = _started(renderer.prepare, scene) if again else None
+    cast = run_cast(renderer) if camera_moved or geometry_moved else kept.cast
     by_light = run_shade(renderer, cast)
-    if kept and not any(moved[what] for what in renderer.method.prepared_from):
-        prepared = kept.prepared
-    else:
-        prepared = renderer.prepare(scene)
-    if kept and not (camera_moved or geometry_moved or light_moved):
-        tiles = kept.tiles
-    else:
+    prepared = finish() if finish else kept.prepared
+    tiles = kept.tiles
+    if camera_moved or geometry_moved or light_moved:
         tiles = run_tiles(renderer, prepared, cast.distance)
     stages = evaluated(cast, by_light, run_airlight(renderer, prepared, cast.distance, by_light, tiles))
     return stages, Kept(cast, prepared, tiles)
+
+
+def _started(prepare: Callable[[Scene], Any], scene: Scene) -> Callable[[], Any]:
+    """Return what finishes the preparation.
+
+    One that works on the host has a method `start`: it reads what it needs of the scene, for which the device must have
+    come to rest, and returns the rest of the work, which is done while the device is busy with the surface.
+    """
+    if hasattr(prepare, "start"):
+        return prepare.start(scene)
+    prepared = prepare(scene)
+    return lambda: prepared

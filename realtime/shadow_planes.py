@@ -20,7 +20,9 @@ themselves in shadow. `order` chooses how that is decided:
 difference of the two Gammas instead, as the paper does.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 from realtime.arrays import types_of
 from realtime.bounded_media import FORMS, ambient_radiance, check_form
@@ -56,8 +58,13 @@ class PlanePreparation:
 
     def __call__(self, scene: Scene) -> tuple[PlaneIndex, ...]:
         """Return the planes of every light of a scene."""
+        return self.start(scene)()
+
+    def start(self, scene: Scene) -> Callable[[], tuple[PlaneIndex, ...]]:
+        """Read what the host needs of a scene, which waits for the device; return what then finds the planes."""
         here = self.standing(scene)
-        return tuple(light_planes(here, scene, light, cone=self.cone) for light in scene.lights)
+        each = [plane_finder(here, scene, light, cone=self.cone) for light in scene.lights]
+        return lambda: tuple(find() for find in each)
 
     def standing(self, scene: Scene) -> Casters:
         """Return the casters where they are in a scene."""
@@ -77,8 +84,8 @@ def prepare_shadow_planes(scene: Scene, **settings) -> PlanePreparation:
     return PlanePreparation(read_casters(scene.geometry), settings["cone"])
 
 
-def light_planes(casters: Casters, scene: Scene, light: Light, *, cone: int = 0) -> PlaneIndex:
-    """Return the shadow planes of one light of a scene, as its camera needs them; `cone` edges bound a spot."""
+def plane_finder(casters: Casters, scene: Scene, light: Light, *, cone: int = 0) -> Callable[[], PlaneIndex]:
+    """Return what finds the shadow planes of one light, as the scene's camera needs them; `cone` edges bound a spot."""
     import numpy as np
 
     position, camera = (np.array(point, dtype=np.float64).ravel() for point in (light.position, scene.camera.origin))
@@ -87,7 +94,7 @@ def light_planes(casters: Casters, scene: Scene, light: Light, *, cone: int = 0)
     if cone and light.kind == "spot":
         ring = cone_ring(np.array(light.axis, dtype=np.float64).ravel(), float(light.cos_cutoff[0]), cone)
     types = types_of(type(scene.camera.origin.x))
-    return index_planes(casters, position, camera, used=used, types=types, ring=ring)
+    return partial(index_planes, casters, position, camera, used=used, types=types, ring=ring)
 
 
 def shadow_planes(

@@ -119,7 +119,7 @@ def counting(renderer: FrameRenderer, counts: Counter) -> FrameRenderer:
             counts[name] += 1
             return work(*arguments)
 
-        return run
+        return run  # without the method `start` of a preparation: the order of the stages is another, nothing else
 
     return replace(renderer, **{name: counted(name) for name in ("prepare", "cast", "shade", "tiles", "airlight")})
 
