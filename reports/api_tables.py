@@ -84,7 +84,8 @@ class BenchTable:
 
     A row has `scene`, `width`, `height`, `label`, `method`, `kernel`; medians `frame_ms` with its quartiles
     `frame_low_ms` and `frame_high_ms`, `airlight_ms`, `surface_ms`, `rebuild_ms` (after the light moved), `moved_ms`
-    (after objects moved) [ms]; of the airlight `relative_rmse`, `relative_bias`, `p50`, `p99`, `max`, `nonfinite` and
+    (after objects moved), `relit_ms` (after the light moved, camera rays kept), `recoloured_ms` (after only medium or
+    colours changed) [ms]; of the airlight `relative_rmse`, `relative_bias`, `p50`, `p99`, `max`, `nonfinite` and
     `negative`; `refused`, why the method cannot render the scene, and `note`. What there is none of is None.
     """
 

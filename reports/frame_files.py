@@ -43,18 +43,19 @@ def write_frames(
     import numpy as np
 
     from realtime.frame import image_frame
-    from validation.animation import animate
+    from validation.animation import animate, moved_parts
     from validation.timing import timed_frame
 
-    cost: list[tuple[float, float, float]] = []
+    cost: list[tuple[float, float]] = []
+    kept = None
     factor: float | None = None  # the exposure of the first frame serves for all: a lamp that fades must look so
     done = 0
     try:
         start = time.perf_counter()
         for number, scene in enumerate(animate(renderer.scene, animation, frames), 1):
             moved = 1e3 * (time.perf_counter() - start)
-            stages, prepare_ms, stages_ms = timed_frame(renderer, scene)
-            cost.append((moved, prepare_ms, stages_ms))
+            stages, kept, render_ms = timed_frame(renderer, scene, kept, **moved_parts(animation))
+            cost.append((moved, render_ms))
             frame = image_frame(renderer, stages)
             numbers = {kind: path and numbered(path, number, frames) for kind, path in outputs.items()}
             factor = write_frame(name, chosen, frame, outputs=numbers, factor=factor)
@@ -64,14 +65,13 @@ def write_frames(
     except KeyboardInterrupt:
         raise Interrupted(_kept(outputs, done, frames)) from None
     later = np.array(cost[1:] or cost)
-    moved, prepared, stages = (float(value) for value in np.median(later, axis=0))
+    moved, rendered = (float(value) for value in np.median(later, axis=0))
     return {
         "frames": frames,
         "moves": list(animation.moves),
-        "frame_ms": moved + prepared + stages,
+        "frame_ms": moved + rendered,
         "move_ms": moved,
-        "prepare_ms": prepared,
-        "stages_ms": stages,
+        "render_ms": rendered,
         "recordings": {name: getattr(getattr(renderer, name), "n_recordings", 0) for name in STAGES},
         "files": [str(path) for path in _files(outputs, frames)],
     }

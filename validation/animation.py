@@ -9,7 +9,7 @@ One turn over all frames, so that the last leads on to the first:
 * `medium`: the extinction swings between half and one and a half times its value, as 1 + sin(turn) / 2.
 * `colour`: the lights' red, green and blue go round, with the same sum.
 
-Only what moves is made anew; kernels are those of the first frame.
+Only what moves is made anew (`moved_parts`, `realtime.next_frame`); kernels are those of the first frame.
 """
 
 from collections.abc import Callable, Iterator
@@ -42,6 +42,15 @@ def parse_moves(text: str) -> tuple[str, ...]:
         if move not in MOVES:
             raise InputError(f"--animate: got {move!r}, wanted some of {', '.join(MOVES)}, separated by commas")
     return moves
+
+
+def moved_parts(animation: Animation) -> dict[str, bool]:
+    """Return what of each frame is elsewhere than in the last, as `realtime.next_frame.next_frame` takes it."""
+    return {
+        "camera_moved": False,
+        "geometry_moved": "objects" in animation.moves,
+        "light_moved": "light" in animation.moves,
+    }
 
 
 def animate(scene: Scene, animation: Animation, frames: int) -> Iterator[Scene]:

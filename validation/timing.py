@@ -7,14 +7,15 @@ recorded before. The wall clock is used on purpose: launch and replay are part o
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.frame import FrameRenderer, run_airlight, run_stages, run_surface
+from realtime.frame import FrameRenderer, run_airlight, run_cast, run_shade, run_stages, run_surface, run_tiles
 from realtime.motion import Objects, read_objects, turned_objects
+from realtime.next_frame import Kept, next_frame
 from realtime.scene import Scene
 
 #: Of a frame that takes longer than this the stages are timed once, in one more frame: its spread matters little, and
@@ -99,52 +100,83 @@ def times_in_turns(
     return np.array(times)
 
 
-def timed_frame(renderer: FrameRenderer, scene: Scene):
-    """Render a scene in which something moved, once; return the stages, and the times to prepare and to render [ms]."""
+def timed_frame(renderer: FrameRenderer, scene: Scene, kept: Kept | None, **moved: bool):
+    """Render the next frame, as `realtime.next_frame.next_frame`; return stages, what is kept, and the time [ms]."""
     import drjit as dr
 
     begin = time.perf_counter()
-    prepared = renderer.prepare(scene)
+    stages, kept = next_frame(renderer, scene, kept, **moved)
     dr.sync_thread()
-    middle = time.perf_counter()
-    stages = run_stages(replace(renderer, scene=scene), prepared)
-    dr.sync_thread()
-    return stages, 1e3 * (middle - begin), 1e3 * (time.perf_counter() - middle)
+    return stages, kept, 1e3 * (time.perf_counter() - begin)
+
+
+def moved_light(renderer: FrameRenderer) -> Callable[[], Any]:
+    """Return a frame after the light moved, the camera rays cast again: all but the acceleration structure is anew."""
+    return _step(renderer, None, light_moved=True)
+
+
+def moved_light_alone(renderer: FrameRenderer, kept: Kept) -> Callable[[], Any]:
+    """Return a frame after the light moved, camera and geometry as they stood: camera rays are kept."""
+    return _step(renderer, kept, light_moved=True)
+
+
+def changed_look(renderer: FrameRenderer, kept: Kept) -> Callable[[], Any]:
+    """Return a frame after the medium or colours of lights changed: only surface and airlight are computed."""
+    return _step(renderer, kept, light_moved=False)
+
+
+def _step(renderer: FrameRenderer, kept: Kept | None, *, light_moved: bool) -> Callable[[], Any]:
+    still = {"camera_moved": False, "geometry_moved": False}
+    return lambda: next_frame(renderer, renderer.scene, kept, **still, light_moved=light_moved)
+
+
+def first_frame(renderer: FrameRenderer) -> Kept:
+    """Render the frame of the renderer's scene and return what it leaves."""
+    return next_frame(renderer, renderer.scene, None, camera_moved=True, geometry_moved=True, light_moved=True)[1]
 
 
 @dataclass(frozen=True)
 class FrameTimes:
     """What a frame costs [ms]."""
 
-    frame: Timing  #: everything but what is static: camera rays, lit surface, airlight
+    frame: Timing  #: camera rays, lit surface, tiles and airlight; shadow maps or planes are there
     surface: Timing  #: camera rays and lit surface
-    airlight: Timing  #: the airlight alone: the kernel with its ray set-up, or the marching
+    airlight: Timing  #: tiles and airlight: the kernel with its ray set-up, or the marching
     rebuild: Timing  #: a frame after the light moved: shadow maps or silhouettes and planes, all stages
     moved: Timing  #: a frame after the objects moved too: acceleration structure, adjacent planes, all of the above
+    relit: Timing  #: a frame after the light alone moved: that of `rebuild` with the camera rays of the last frame
+    recoloured: (
+        Timing  #: a frame after nothing moved, medium or colours changed: surface and airlight from what is there
+    )
 
 
 def time_frame(renderer: FrameRenderer, *, seconds: float = 0.6, slow: float | None = None) -> FrameTimes:
-    """Time the stages of a frame, the whole frame, a frame after the light moved and one after the objects moved.
+    """Time the stages of a frame, the whole frame, and frames after light, objects or only colours changed.
 
     Parameters
     ----------
     renderer
         Of the frame.
     seconds
-        Time to spend on each of the five.
+        Time to spend on each of the first three, and half of it on each of the others.
     slow
-        If the airlight takes longer than this, whole frames are run stage by stage and the five are added up from
-        them: up to five frames in place of some thirty; `SLOW` by default [s].
+        If the airlight takes longer than this, whole frames are run stage by stage and the seven are added up from
+        them: up to five frames in place of some forty; `SLOW` by default [s].
     """
     import drjit as dr
 
     scene = renderer.scene
-    prepared = renderer.prepare(scene)
-    distance, by_light = run_surface(renderer)
+    kept = first_frame(renderer)
+    prepared, distance = kept.prepared, kept.cast.distance
+    by_light = run_shade(renderer, kept.cast)
     dr.eval(distance, by_light)
+
+    def airlight():
+        dr.eval(run_airlight(renderer, prepared, distance, by_light, run_tiles(renderer, prepared, distance)))
+
     dr.sync_thread()
     begin = time.perf_counter()
-    dr.eval(run_airlight(renderer, prepared, distance, by_light))
+    airlight()
     dr.sync_thread()
     took = time.perf_counter() - begin
     if took > (SLOW if slow is None else slow):
@@ -153,25 +185,24 @@ def time_frame(renderer: FrameRenderer, *, seconds: float = 0.6, slow: float | N
     def surface():
         dr.eval(run_surface(renderer))
 
-    def airlight():
-        dr.eval(run_airlight(renderer, prepared, distance, by_light))
-
-    def rebuild():
-        run_stages(renderer, renderer.prepare(scene))
-
     objects = _objects(scene)
 
     def moved():
         # Where they stand: the work is that of any other place.
         there = turned_objects(scene, objects, np.eye(3)) if objects else scene
-        run_stages(renderer, renderer.prepare(there))
+        next_frame(renderer, there, None, camera_moved=False, geometry_moved=True, light_moved=True)
+
+    def few(work: Callable[[], Any]) -> Timing:
+        return time_repeated(work, seconds=0.5 * seconds, least=3)
 
     return FrameTimes(
         frame=time_repeated(lambda: run_stages(renderer, prepared), seconds=seconds),
         surface=time_repeated(surface, seconds=seconds),
         airlight=time_repeated(airlight, seconds=seconds),
-        rebuild=time_repeated(rebuild, seconds=0.5 * seconds, least=3),
-        moved=time_repeated(moved, seconds=0.5 * seconds, least=3),
+        rebuild=few(moved_light(renderer)),
+        moved=few(moved),
+        relit=few(moved_light_alone(renderer, kept)),
+        recoloured=few(changed_look(renderer, kept)),
     )
 
 
@@ -193,21 +224,35 @@ def _slow_frame(renderer: FrameRenderer, *, turns: int) -> FrameTimes:
         done()
         prepared = renderer.prepare(there)
         done()
-        distance, by_light = run_surface(renderer)
-        dr.eval(distance, by_light)
+        cast = run_cast(renderer)
+        dr.eval(cast)
         done()
-        dr.eval(run_airlight(renderer, prepared, distance, by_light))
+        by_light = run_shade(renderer, cast)
+        dr.eval(by_light)
+        done()
+        tiles = run_tiles(renderer, prepared, cast.distance)
+        done()
+        dr.eval(run_airlight(renderer, prepared, cast.distance, by_light, tiles))
         done()
         steps.append(1e3 * np.diff(times))
-    move, prepare, surface, airlight = np.array(steps).T
+    move, prepare, rays, shade, in_tiles, rest = np.array(steps).T
+    needed = renderer.method.prepared_from
 
     def timing(milliseconds: NDArray[np.float64]) -> Timing:
         low, median, high = (float(value) for value in np.percentile(milliseconds, [25, 50, 75]))
         return Timing(median, low, high, turns)
 
-    frame = surface + airlight
-    rebuild = prepare + frame
-    return FrameTimes(timing(frame), timing(surface), timing(airlight), timing(rebuild), timing(move + rebuild))
+    surface, airlight = rays + shade, in_tiles + rest
+    rebuild = prepare + surface + airlight
+    return FrameTimes(
+        frame=timing(surface + airlight),
+        surface=timing(surface),
+        airlight=timing(airlight),
+        rebuild=timing(rebuild),
+        moved=timing(move + rebuild),
+        relit=timing(shade + airlight + prepare * bool(needed & {"light", "look"})),
+        recoloured=timing(shade + rest + prepare * ("look" in needed)),
+    )
 
 
 def _objects(scene: Scene) -> Objects | None:

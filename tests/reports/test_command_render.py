@@ -30,7 +30,7 @@ def test_frames_are_numbered_files_that_differ(variant, tmp_path, capfd):
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names)
     assert [path.rsplit("/", 1)[-1] for path in found["files"]] == names
     assert found["moves"] == ["light"]
-    assert found["frame_ms"] == pytest.approx(found["move_ms"] + found["prepare_ms"] + found["stages_ms"])
+    assert found["frame_ms"] == pytest.approx(found["move_ms"] + found["render_ms"])
     images = [read_exr(tmp_path / f"fog-000{number}.exr").layers["airlight"] for number in (1, 2, 3)]
     assert not np.array_equal(images[0], images[1])
     assert not np.array_equal(images[1], images[2])
@@ -92,3 +92,5 @@ def test_render_warns_of_open_casters_once_each(variant, capfd):
     times = json.loads(out)
     assert times["rebuild_ms"] > 0
     assert times["moved_ms"] > 0
+    assert times["relit_ms"] > 0
+    assert times["recoloured_ms"] > 0

@@ -159,7 +159,7 @@ def test_save_writes_exr_and_png_and_refuses_others(tmp_path):
 
 def test_times_and_oddities_stand_in_the_table():
     timing = Timing(12.5, 12.0, 13.0, 9)
-    frame = rendering(times=FrameTimes(timing, timing, Timing(7.5, 7, 8, 9), timing, timing))
+    frame = rendering(times=FrameTimes(timing, timing, Timing(7.5, 7, 8, 9), timing, timing, timing, timing))
     facts = frame.facts()
     assert "12.5 ms" in facts["a frame"]
     assert facts["of it airlight"] == "7.5 ms"

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from realtime.frame import run_stages
-from validation.animation import animate, middle, parse_moves, vertical
+from realtime.next_frame import next_frame
+from validation.animation import animate, middle, moved_parts, parse_moves, vertical
 from validation.scenes import SCENES
 from validation.scenes.record import MOVES, Animation
 
@@ -87,10 +87,11 @@ def test_frames_record_nothing_and_compile_nothing(variant, name, moves):
 
     scene, animation = read(name)
     renderer = prepared(scene, configuration("shadow-planes"))
-    for number, moved in enumerate(animate(scene, replace(animation, moves=moves), 6)):
+    animation, kept = replace(animation, moves=moves), None
+    for number, moved in enumerate(animate(scene, animation, 6)):
         with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
             dr.kernel_history_clear()
-            run_stages(replace(renderer, scene=moved), renderer.prepare(moved))
+            _, kept = next_frame(renderer, moved, kept, **moved_parts(animation))
             compiled = [one for one in dr.kernel_history() if one.get("cache_hit") is False]
         if number:
             assert not compiled
@@ -104,8 +105,9 @@ def test_turning_objects_record_the_surface_once_more_at_most(variant):
 
     scene, animation = read("two-pens")
     renderer = prepared(scene, configuration("shadow-planes"))
+    kept = None
     for moved in animate(scene, animation, 5):
-        run_stages(replace(renderer, scene=moved), renderer.prepare(moved))
+        _, kept = next_frame(renderer, moved, kept, **moved_parts(animation))
     assert renderer.airlight.n_recordings == 1
     assert renderer.cast.n_recordings <= 2
     assert renderer.shade.n_recordings == 1
@@ -124,3 +126,29 @@ def test_shapes_keep_their_names_beside_bounded_media(variant):
     ]
     assert np.abs(moved[1][0] - moved[0][0]).max() > 1
     np.testing.assert_allclose(moved[1][1], 1.5 * np.array(base), rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("moves", "casts", "prepared_frames"),
+    [(("light",), 1, 4), (("medium", "colour"), 1, 1), (("light", "colour"), 1, 4), (("objects", "medium"), 4, 4)],
+)
+def test_what_stands_still_is_kept(variant, moves, casts, prepared_frames):
+    """Four frames: camera rays are cast again where objects move alone, planes are found again where the light does."""
+    from validation.configurations import configuration, prepared
+
+    scene, animation = read("two-pens")
+    animation = replace(animation, moves=moves)
+    renderer = prepared(scene, configuration("shadow-planes"))
+    calls = {"cast": 0, "prepare": 0}
+
+    def counted(name):
+        def run(*arguments):
+            calls[name] += 1
+            return getattr(renderer, name)(*arguments)
+
+        return run
+
+    counting, kept = replace(renderer, cast=counted("cast"), prepare=counted("prepare")), None
+    for moved in animate(scene, animation, 4):
+        _, kept = next_frame(counting, moved, kept, **moved_parts(animation))
+    assert calls == {"cast": casts, "prepare": prepared_frames}

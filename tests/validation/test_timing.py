@@ -99,7 +99,7 @@ def renderer(variant):
 
 def test_every_stage_of_a_frame_is_timed(renderer):
     times = time_frame(renderer, seconds=0.02)
-    for name in ("frame", "surface", "airlight", "rebuild", "moved"):
+    for name in ("frame", "surface", "airlight", "rebuild", "moved", "relit", "recoloured"):
         timing = getattr(times, name)
         assert 0 < timing.low_ms <= timing.median_ms <= timing.high_ms, name
         assert timing.repetitions >= 3
@@ -152,7 +152,8 @@ def test_moved_builds_the_acceleration_structure_again_and_rebuild_does_not(vari
 
     monkeypatch.setattr(timing, "time_repeated", counted)
     time_frame(renderer)
-    assert list(measured.values()) == [0, 0, 0, 0, 1]  # frame, surface, airlight, rebuild, moved
+    # frame, surface, airlight, rebuild, moved, relit, recoloured
+    assert list(measured.values()) == [0, 0, 0, 0, 1, 0, 0]
 
 
 @pytest.mark.parametrize(("spent", "turns"), [(0.0, 1), (1e6, 5)])
@@ -170,9 +171,10 @@ def test_a_slow_frame_is_timed_a_few_times(variant, monkeypatch, spent, turns):
     renderer = frame_renderer(scene, METHODS["ray-march"], steps=3)
     assert time_frame(renderer, seconds=0.01).frame.repetitions >= 5  # not slow
     times = time_frame(renderer, slow=-1.0)
-    each = (times.frame, times.surface, times.airlight, times.rebuild, times.moved)
+    each = (times.frame, times.surface, times.airlight, times.rebuild, times.moved, times.relit, times.recoloured)
     assert {one.repetitions for one in each} == {turns}
     assert times.frame.median_ms <= times.rebuild.median_ms <= times.moved.median_ms
+    assert times.recoloured.median_ms <= times.relit.median_ms <= times.rebuild.median_ms
     if turns == 1:
         assert times.frame.median_ms == pytest.approx(times.surface.median_ms + times.airlight.median_ms)
         assert all(one.low_ms == one.median_ms == one.high_ms for one in each)
