@@ -184,8 +184,7 @@ def run_stages(renderer: FrameRenderer, prepared):
     """Run the stages on the device and return distance, surface and airlight, evaluated, in the order of the lanes."""
     cast = run_cast(renderer)
     by_light = run_shade(renderer, cast)
-    tiles = run_tiles(renderer, prepared, cast.distance)
-    return evaluated(cast, by_light, run_airlight(renderer, prepared, cast.distance, by_light, tiles))
+    return evaluated(cast, by_light, run_tiles_and_airlight(renderer, prepared, cast.distance, by_light))
 
 
 def evaluated(cast: Cast, by_light, found):
@@ -223,6 +222,12 @@ def run_tiles(renderer: FrameRenderer, prepared, distance):
     if renderer.tiles is None:
         return None
     return renderer.tiles(renderer.pixel, scene.camera, scene.medium, scene.lights, prepared, distance)
+
+
+def run_tiles_and_airlight(renderer: FrameRenderer, prepared, distance, by_light):
+    """Run all that comes after the surface; arguments and result as of `run_airlight`."""
+    tiles = run_tiles(renderer, prepared, distance)
+    return run_airlight(renderer, prepared, distance, by_light, tiles)
 
 
 def run_airlight(renderer: FrameRenderer, prepared, distance, by_light, tiles=None):

@@ -77,15 +77,26 @@ def _row(one: dict[str, Any]) -> tuple[str, ...]:
     )
 
 
-def rate_cells(row: Any, published: float | None) -> tuple[str, str, str, str]:
-    """Return the rate after the light moved, its share of a published one, the static one and the quartiles [ms].
+#: What `rate_cells` returns: what is made anew, in frames a second, and the quartiles of the first rate.
+RATES = (
+    "light moved: all anew",
+    "of published",
+    "light moved: camera rays kept",
+    "colours changed: surface and airlight anew",
+    "quartiles ms of all anew",
+)
 
-    `row` has the timings `rebuilt` and `static`; `published` is None where nothing comparable was.
+
+def rate_cells(row: Any, published: float | None) -> tuple[str, ...]:
+    """Return the cells of `RATES`.
+
+    `row` has the timings `rebuilt`, `relit` and `recoloured`; `published` is None where nothing comparable was.
     """
     rebuilt = row.rebuilt
     of_published = f"{1000 / rebuilt.median_ms / published:.2g} x" if published else "-"
     quartiles = f"{number(rebuilt.low_ms)}..{number(rebuilt.high_ms)}"
-    return rate(rebuilt.median_ms), of_published, rate(row.static.median_ms), quartiles
+    kept = rate(row.relit.median_ms), rate(row.recoloured.median_ms)
+    return rate(rebuilt.median_ms), of_published, *kept, quartiles
 
 
 def rate(milliseconds: float) -> str:

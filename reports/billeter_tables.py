@@ -4,7 +4,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-from reports.bench_tables import print_heading, print_markdown, rate_cells
+from reports.bench_tables import RATES, print_heading, print_markdown, rate_cells
 from reports.tables import number, print_table
 
 
@@ -70,10 +70,7 @@ def _print_figures(rows: Sequence, show) -> None:
     headers = (
         "frames a second",
         "published",
-        "light moved",
-        "of published",
-        "static",
-        "quartiles ms",
+        *RATES,
         "rel. RMSE",
         "p99",
         "against the map",
@@ -83,7 +80,7 @@ def _print_figures(rows: Sequence, show) -> None:
     for row in rows:
         name, fps = f"{row.entry.where}, {_image(row)}", row.entry.fps
         if row.rebuilt is None:
-            cells.append((name, number(fps), *["-"] * 8))
+            cells.append((name, number(fps), *["-"] * 9))
             continue
         errors = [number(value, 2) for one in (row.error, row.map_error) for value in (one.relative_rmse, one.p99)]
         cells.append((name, number(fps), *_rates(row, fps), *errors))
@@ -95,16 +92,13 @@ def _print_rates(rows: Sequence, show) -> None:
         "frames a second",
         "triangles",
         "published",
-        "light moved",
-        "of published",
-        "static light",
-        "quartiles ms",
+        *RATES,
         "rel. RMSE to the static mesh",
     )
     cells = []
     for row in rows:
         if row.rebuilt is None:
-            cells.append((_view(row), "-", number(row.published_fps), *["-"] * 5))
+            cells.append((_view(row), "-", number(row.published_fps), *["-"] * 6))
             continue
         against = "-" if row.against_static is None else number(row.against_static.relative_rmse, 2)
         triangles = str(row.triangles) if row.triangles else "-"

@@ -34,8 +34,8 @@ def published(
 
     biri: Tables 1 and 2 with `shadow-planes`: share of time by stage, frames a second. billeter: Figures 6 and 7 and
     Table 1 with `light-volumes` and its peers: frames a second, static against adaptive tessellation, the passes, and
-    which of the paper's conclusions hold here. Each at the published sizes, everything rebuilt after the light moved,
-    beside the published figures, with the error of the airlight.
+    which of the paper's conclusions hold here. Each at the published sizes, after the light moved, everything rebuilt
+    or camera rays kept, beside the published figures, with the error of the airlight.
     """
     from analytic.errors import InputError
     from reports.environment import activate, describe_environment

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The figure of the stages: Table 1 of Biri, Arques, Michelin 2006, the share of each in a frame, published and here.
 
-The shares are of a frame after the light moved. How the stages are told apart: `validation.biri_tables`.
+The shares are of the sum of the stages of a frame after the light moved. How the stages are told apart:
+`validation.biri_tables`.
 """
 
 from collections.abc import Callable
@@ -107,7 +108,7 @@ def _draw(folder: Path, column: str):
         start += shares[:, place]
     panel.set_yticks(rows_at, [_words(*name, group) for name, group in groups.items()])
     panel.invert_yaxis()
-    panel.set(xlabel="share of a frame after the light moved [%]", xlim=(0, 100))
+    panel.set(xlabel="share of all stages after the light moved [%]", xlim=(0, 100))
     panel.grid(False, axis="y")
     figure.legend(loc="outside lower center", ncols=len(stages) if double else 2)
     return figure

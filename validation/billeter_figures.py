@@ -14,6 +14,7 @@ is its steps and, as it looks texels up without interpolation, the steps of the 
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +29,7 @@ from reference.scene import TruthScene, read_truth
 from validation.configurations import Configuration, configuration, prepared
 from validation.load import load_scene
 from validation.metrics import Metrics, error_metrics
-from validation.timing import Timing, time_in_turns
+from validation.timing import Timing, changed_look, first_frame, moved_light, moved_light_alone, time_in_turns
 from validation.volume_twin import twin_airlight
 
 Array = NDArray[np.float64]
@@ -83,7 +84,9 @@ class FigureRow:
     entry: FigureEntry
     size: tuple[int, int]  #: [pixels]
     rebuilt: Timing | None = None  #: a frame after the light moved: shadow map, volume, all stages
-    static: Timing | None = None  #: a frame with static light and geometry
+    static: Timing | None = None  #: a frame with static light and geometry, of a camera that moved
+    relit: Timing | None = None  #: a frame after the light moved, the camera rays of the last one kept
+    recoloured: Timing | None = None  #: a frame after only medium or colours changed: map, tiles, camera rays are kept
     error: Metrics | None = None  #: of the airlight against the truth
     map_error: Metrics | None = None  #: of the airlight against what the shadow map stands for
     missing: str | None = None
@@ -122,7 +125,7 @@ def figure_rows(
     size
         Of the frames [pixels].
     seconds
-        Time to spend on each of two timings.
+        Time to spend on a timing, about.
     limit
         A frame that takes longer is not measured [s].
     progress
@@ -178,12 +181,10 @@ def _figure_row(
         distance = stage.compared(np.asarray(frame.distance, dtype=np.float64))
         twins[entry.map] = twin_airlight(stage.truth, maps, distance=distance)
     shown = stage.compared(frame.airlight)
-    rebuilt, static = time_rates(renderer, seconds)
     return FigureRow(
         entry,
         size,
-        rebuilt,
-        static,
+        **time_rates(renderer, seconds),
         error=error_metrics(stage.airlight, shown),
         map_error=error_metrics(twins[entry.map], shown),
     )
@@ -205,15 +206,13 @@ def frame_within(renderer: FrameRenderer, limit: float) -> Frame:
     return frame
 
 
-def time_rates(renderer: FrameRenderer, seconds: float) -> tuple[Timing, Timing]:
-    """Time a frame after the light moved and one with everything static, in turns."""
-    ready = renderer.prepare(renderer.scene)
-    rebuilt, static = time_in_turns(
-        [
-            lambda: run_stages(renderer, renderer.prepare(renderer.scene)),
-            lambda: run_stages(renderer, ready),
-        ],
-        seconds=2 * seconds,
-        least=3,
-    )
-    return rebuilt, static
+def time_rates(renderer: FrameRenderer, seconds: float) -> dict[str, Any]:
+    """Time frames after the light moved and with less than that, in turns; the fields of a row by name."""
+    kept = first_frame(renderer)
+    works = {
+        "rebuilt": moved_light(renderer),
+        "static": lambda: run_stages(renderer, kept.prepared),
+        "relit": moved_light_alone(renderer, kept),
+        "recoloured": changed_look(renderer, kept),
+    }
+    return dict(zip(works, time_in_turns(list(works.values()), seconds=3 * seconds, least=3), strict=True))

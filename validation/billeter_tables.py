@@ -12,7 +12,8 @@ The passes, on the wall clock:
 - prepare: all before the airlight, so the shadow map with the mesh or the height field that is made of it.
 - volume: the triangles against the pixels, and the signed sum; for `walk` the airlight.
 
-Times of frames are those after the light moved, with everything rebuilt, as published.
+Times of frames are those after the light moved, with everything rebuilt, as published; and beside them those of frames
+that keep what stood still.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -23,7 +24,7 @@ import numpy as np
 
 from analytic.errors import InputError
 from realtime.errors import InputError as RealtimeError
-from realtime.frame import Frame, FrameRenderer, run_airlight, run_surface
+from realtime.frame import Frame, FrameRenderer, run_surface, run_tiles_and_airlight
 from realtime.scene import Scene, read_scene
 from realtime.shadow_map import ShadowMap, cast_shadow_map
 from realtime.volume_mesh import tessellation_stages
@@ -89,6 +90,8 @@ class TableRow:
     triangles: int = 0  #: of the light volume; 0 for `walk`
     rebuilt: Timing | None = None
     static: Timing | None = None
+    relit: Timing | None = None
+    recoloured: Timing | None = None
     passes: Mapping[str, float] = field(default_factory=dict)  #: [ms]
     against_static: Metrics | None = None  #: of the airlight against that of the static mesh
     missing: str | None = None
@@ -184,15 +187,14 @@ def _measured(
         renderer = prepared(scene, configuration("light-volumes", kernel, values))
         frame = frames[empty.evaluation] = frame_within(renderer, limit)
         passes, triangles = _passes(renderer, empty, seconds)
-        rebuilt, static = time_rates(renderer, seconds)
+        rates = time_rates(renderer, seconds)
     except (InputError, RealtimeError, MemoryError, TimeoutError) as reason:
         return replace(empty, missing=str(reason) or "out of memory")
     against = frames["static"].airlight if "static" in frames and empty.evaluation != "static" else None
     return replace(
         empty,
         triangles=triangles,
-        rebuilt=rebuilt,
-        static=static,
+        **rates,
         passes=passes,
         against_static=None if against is None else error_metrics(against, frame.airlight),
     )
@@ -210,7 +212,7 @@ def _passes(renderer: FrameRenderer, row: TableRow, seconds: float) -> tuple[dic
         "surface": lambda: dr.eval(run_surface(renderer)),
         "shadow map": lambda: _shadow_maps(scene, row.map),
         "prepare": lambda: renderer.prepare(scene),
-        "volume": lambda: dr.eval(run_airlight(renderer, ready, distance, by_light)),
+        "volume": lambda: dr.eval(run_tiles_and_airlight(renderer, ready, distance, by_light)),
     }
     times = {name: time_repeated(work, seconds=seconds, least=3).median_ms for name, work in works.items()}
     if row.evaluation == "adaptive":

@@ -9,9 +9,10 @@ How each stage of Table 1 is measured, on the wall clock, medians, all in turns 
 3. the medium's contribution of the scene, unshadowed: the airlight of the method `unshadowed` with the same kernel. The
    method under test never computes it by itself, each lit segment has its part of it: this is what one evaluation a ray
    costs, and stage 5 is lessened by it.
-4. sorting: the planes with their bins (the rest of what is prepared on the host) and the tile lists, a frozen function
-   of their own.
-5. shadow planes: what remains of the frame with the light moved.
+4. sorting: the planes with their bins (the rest of what is prepared on the host) and the tile lists.
+5. shadow planes: the airlight from the tile lists on, less stage 3.
+
+A frame takes less than their sum: the host finds planes while the device casts and shades.
 """
 
 from collections.abc import Callable, Sequence
@@ -20,17 +21,24 @@ from typing import Any
 
 import numpy as np
 
-from realtime.frame import FrameRenderer, render_frame, run_airlight, run_stages, run_surface
-from realtime.frame_view import frame_view
-from realtime.frozen import Frozen
+from realtime.frame import (
+    FrameRenderer,
+    render_frame,
+    run_airlight,
+    run_shade,
+    run_stages,
+    run_surface,
+    run_tiles,
+)
+from realtime.next_frame import Kept
 from realtime.plane_view import bodies_in_view
 from realtime.scene import Scene, read_scene
-from realtime.shadow_planes import PlanePreparation, tile_planes
+from realtime.shadow_planes import PlanePreparation
 from realtime.silhouettes import silhouette
 from validation.configurations import Configuration, prepared
 from validation.load import load_scene
 from validation.metrics import Metrics, error_metrics
-from validation.timing import Timing, time_in_turns
+from validation.timing import Timing, changed_look, first_frame, moved_light, moved_light_alone, time_in_turns
 from validation.truth import truth_image
 
 STAGES = ("silhouettes", "scene", "airlight of the scene", "sorting", "shadow planes")
@@ -78,13 +86,15 @@ class TableRow:
     triangles: int
     stages_ms: tuple[float, ...]  #: of Table 1, in the order of `STAGES`
     rebuilt: Timing  #: a frame after the light moved: all stages
-    static: Timing  #: a frame with static light and geometry
+    static: Timing  #: a frame whose planes are there: camera rays, surface, tile lists, airlight
+    relit: Timing  #: a frame after the light moved, the camera rays of the last one kept
+    recoloured: Timing  #: a frame after only medium or colours changed: planes, tile lists, camera rays are kept
     error: Metrics  #: of the airlight at pixel centres, at `error_size`
     error_size: tuple[int, int]
 
     @property
     def shares(self) -> tuple[float, ...]:
-        """Share of each stage in the frame after the light moved [%]."""
+        """Share of each stage in the sum of all, for a frame after the light moved [%]."""
         total = sum(self.stages_ms)
         return tuple(100 * stage / total for stage in self.stages_ms)
 
@@ -113,7 +123,7 @@ def biri_row(
     error_size
         Of the frame that is compared with the truth [pixels].
     seconds
-        Time to spend on each of five timings.
+        Time to spend on a timing, about.
     """
     chosen = Configuration("shadow-planes", kernel, (("cone", cone),) if cone else ())
     small = load_scene(published.scene, error_size).scene
@@ -122,22 +132,26 @@ def biri_row(
     loaded = load_scene(published.scene, size).scene
     scene = read_scene(loaded)
     renderer = prepared(scene, chosen)
-    ready = renderer.prepare(scene)
+    kept = first_frame(renderer)
     works = [
-        lambda: run_stages(renderer, renderer.prepare(scene)),
-        lambda: run_stages(renderer, ready),
-        *_stages(renderer, kernel),
+        moved_light(renderer),
+        lambda: run_stages(renderer, kept.prepared),
+        moved_light_alone(renderer, kept),
+        changed_look(renderer, kept),
+        *_stages(renderer, kernel, kept),
     ]
-    rebuilt, static, *stages = time_in_turns(works, seconds=5 * seconds)
+    rebuilt, static, relit, recoloured, *stages = time_in_turns(works, seconds=7 * seconds)
     return TableRow(
         published,
         kernel,
         cone,
         size,
         sum(shape.face_count() for shape in loaded.shapes()),
-        _shared(rebuilt.median_ms, [stage.median_ms for stage in stages]),
+        _shared([stage.median_ms for stage in stages]),
         rebuilt,
         static,
+        relit,
+        recoloured,
         error,
         error_size,
     )
@@ -160,7 +174,7 @@ def biri_rows(
     scale
         Of the width and height of all images, for a quick look; 1 for the published sizes.
     seconds
-        Time to spend on each of five timings.
+        Time to spend on a timing, about.
     progress
         Told the share done and what comes next.
     """
@@ -175,29 +189,29 @@ def biri_rows(
     return rows
 
 
-def _shared(total: float, measured: Sequence[float]) -> tuple[float, ...]:
-    """Return what each stage of Table 1 costs [ms], from the times of `_stages`; the last is the rest of the total."""
-    silhouettes, surface, unshadowed, host, in_tiles = measured
-    first = (silhouettes, surface, unshadowed, max(0.0, host - silhouettes) + in_tiles)
-    return (*first, max(0.0, total - sum(first)))
+def _shared(measured: Sequence[float]) -> tuple[float, ...]:
+    """Return what each stage of Table 1 costs [ms], from the times of `_stages`."""
+    silhouettes, surface, unshadowed, host, in_tiles, airlight = measured
+    sorting = max(0.0, host - silhouettes) + in_tiles
+    return silhouettes, surface, unshadowed, sorting, max(0.0, airlight - unshadowed)
 
 
-def _stages(renderer: FrameRenderer, kernel: str) -> list[Callable[[], Any]]:
-    """Return the work of silhouettes, scene, unshadowed airlight, all that is prepared on the host, and tile lists."""
+def _stages(renderer: FrameRenderer, kernel: str, kept: Kept) -> list[Callable[[], Any]]:
+    """Return the work of silhouettes, scene, unshadowed airlight, all that is on the host, tile lists, and airlight."""
     import drjit as dr
 
     scene = renderer.scene
-    ready = renderer.prepare(scene)
-    distance, _ = run_surface(renderer)
-    dr.eval(distance)
+    distance = kept.cast.distance
+    by_light = run_shade(renderer, kept.cast)
+    dr.eval(distance, by_light)
     plain = prepared(scene, Configuration("unshadowed", kernel))
-    lists = _sorting(renderer)
     return [
         lambda: _silhouettes(renderer, scene),
         lambda: dr.eval(run_surface(renderer)),
         lambda: dr.eval(run_airlight(plain, (), distance, ())),
         lambda: renderer.prepare(scene),
-        lambda: dr.eval(lists(renderer.pixel, scene.camera, scene.medium, scene.lights, ready, distance)),
+        lambda: run_tiles(renderer, kept.prepared, distance),
+        lambda: dr.eval(run_airlight(renderer, kept.prepared, distance, by_light, kept.tiles)),
     ]
 
 
@@ -207,17 +221,3 @@ def _silhouettes(renderer: FrameRenderer, scene: Scene) -> None:
     for light in scene.lights:
         position = np.array(light.position, dtype=np.float64).ravel()
         silhouette(casters, position, used=bodies_in_view(casters, scene.camera, position))
-
-
-def _sorting(renderer: FrameRenderer):
-    """Return the tile lists of a frame as a frozen function of their own."""
-    plan = renderer.scene.plan  # a frozen function takes what it names of its surroundings for inputs: not the renderer
-
-    @Frozen
-    def lists(pixel, camera, medium, lights, prepared, distance):
-        shown = {"geometry": None, "medium": medium, "lights": lights, "prepared": prepared}
-        view = frame_view(camera, pixel, distance, plan=plan, **shown)
-        found = [tile_planes(view, index, order="exact") for index in prepared]
-        return [(one.entries, one.source.first, one.source.count, one.sorted) for one in found]
-
-    return lists

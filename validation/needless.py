@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from realtime.frame import run_airlight, run_stages, run_surface
+from realtime.frame import run_stages, run_surface, run_tiles_and_airlight
 from realtime.scene import Scene, read_scene
 from validation.configurations import Configuration, prepared
 from validation.load import load_scene, resize
@@ -71,7 +71,7 @@ def _airlight(scene: Scene) -> Callable[[], Any]:
     distance, by_light = run_surface(renderer)
     dr.eval(distance, by_light)
     ready = renderer.prepare(scene)
-    return lambda: dr.eval(run_airlight(renderer, ready, distance, by_light))
+    return lambda: dr.eval(run_tiles_and_airlight(renderer, ready, distance, by_light))
 
 
 def _compared(what: str, works: list[Callable[[], Any]], *, turns: int) -> Needless:

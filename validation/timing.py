@@ -13,7 +13,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.frame import FrameRenderer, run_airlight, run_cast, run_shade, run_stages, run_surface, run_tiles
+from realtime.frame import (
+    FrameRenderer,
+    run_airlight,
+    run_cast,
+    run_shade,
+    run_stages,
+    run_surface,
+    run_tiles,
+    run_tiles_and_airlight,
+)
 from realtime.motion import Objects, read_objects, turned_objects
 from realtime.next_frame import Kept, next_frame
 from realtime.scene import Scene
@@ -172,7 +181,7 @@ def time_frame(renderer: FrameRenderer, *, seconds: float = 0.6, slow: float | N
     dr.eval(distance, by_light)
 
     def airlight():
-        dr.eval(run_airlight(renderer, prepared, distance, by_light, run_tiles(renderer, prepared, distance)))
+        dr.eval(run_tiles_and_airlight(renderer, prepared, distance, by_light))
 
     dr.sync_thread()
     begin = time.perf_counter()
