@@ -10,7 +10,7 @@ def test_map_agrees_with_rays_away_from_edges(variant, kind):
     import drjit as dr
     import mitsuba as mi
 
-    from realtime.frame import _visible
+    from realtime.frame_view import _visible
     from realtime.scene import read_scene
     from realtime.shadow_map import cast_shadow_map, lit_in_map
 
