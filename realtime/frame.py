@@ -9,18 +9,18 @@ moves (camera, lights, medium, shadow maps) is passed in as opaque arrays. What 
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
-from realtime.camera import ray_directions, tiled_pixels
+from realtime.camera import tiled_pixels
 from realtime.errors import InputError
-from realtime.frame_view import frame_view, view_corners
+from realtime.frame_view import frame_view
 from realtime.frozen import Frozen
 from realtime.kernels.table import resident_tables
-from realtime.media_rays import camera_insides, optical_depths
 from realtime.methods import Method
 from realtime.scene import Scene
-from realtime.surface import Cast, cast_rays, lit_surface, visible_surface
+from realtime.surface import Cast
+from realtime.surface_stages import no_surface, surface_stages
 
 
 @dataclass(frozen=True)
@@ -93,27 +93,7 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
     plan, camera = scene.plan, scene.camera
     lights_surfaces = method.lights_surfaces(settings)
     pixel = mi.UInt32(tiled_pixels(camera.width, camera.height))
-    # A map of a light at infinity shows the media alone, but not all that is lit.
-    asked = [light.kind == "directional" or not lights_surfaces for light in scene.lights]
-
-    @Frozen
-    def cast(geometry, facets, pixel, camera, medium):
-        direction, _ = ray_directions(camera, pixel)
-        found = cast_rays(geometry, facets, camera.origin, direction)
-        if not medium.bodies:
-            return found
-        corners = view_corners(camera, pixel)
-        insides = camera_insides(medium, camera.origin, direction, found.distance, corners=corners)
-        return replace(found, insides=insides)
-
-    @Frozen
-    def shade(geometry, facets, pixel, camera, medium, lights, cast):
-        direction, _ = ray_directions(camera, pixel)
-        seen = visible_surface(cast, facets, camera.origin, direction, color=type(medium.albedo))
-        depths = optical_depths(medium, cast.distance, cast.insides) if medium.bodies else None
-        shown = {"medium": medium, "depths": depths}
-        colors = [lit_surface(geometry, seen, light=light, shadows=one, **shown) for light, one in zip(lights, asked)]
-        return tuple(colors) if lights_surfaces else (sum(colors),)
+    cast, shade, shade_casts_rays = surface_stages(scene, lights_surfaces=lights_surfaces)
 
     def sort_tiles(pixel, camera, medium, lights, prepared, distance):
         assert method.tiles is not None
@@ -141,7 +121,7 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
         # is being recorded, which Dr.Jit 1.5 answers by aborting a later recording.
         one = type(camera.origin.x)(1)
         one_pixel = (mi.UInt32(0), camera, scene.medium, scene.lights)
-        dark = _no_surface(None, None, *one_pixel, None)
+        dark = no_surface(None, None, *one_pixel, None)
         run_method(scene.geometry if casts_rays else None, *one_pixel, prepare(scene), None, one, dark)
         resident = resident_tables()
         airlight = Frozen(run_method, state_fn=lambda *_, **__: resident)
@@ -152,11 +132,11 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
         method,
         pixel,
         prepare,
-        cast=cast if plan.surfaces else _nothing_met,
-        shade=shade if plan.surfaces else _no_surface,
+        cast=cast,
+        shade=shade,
         tiles=tiles,
         airlight=airlight,
-        shade_casts_rays=scene.facets is None or any(asked),
+        shade_casts_rays=shade_casts_rays,
         casts_rays=casts_rays,
     )
 
@@ -249,18 +229,6 @@ def run_airlight(renderer: FrameRenderer, prepared, distance, by_light, tiles=No
 
 def _nothing(scene: Scene) -> tuple[()]:
     return ()
-
-
-def _nothing_met(geometry, facets, pixel, camera, medium) -> Cast:
-    import drjit as dr
-
-    return Cast(dr.full(type(camera.origin.x), dr.inf, dr.width(pixel)))
-
-
-def _no_surface(geometry, facets, pixel, camera, medium, lights, cast):
-    import drjit as dr
-
-    return tuple(dr.zeros(type(medium.albedo), dr.width(pixel)) for _ in lights)
 
 
 def _image(renderer: FrameRenderer, values, shape):
