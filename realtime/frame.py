@@ -31,7 +31,7 @@ class FrameRenderer:
     method: Method
     pixel: Any  #: pixel numbers in the order of the lanes
     prepare: Callable[[Scene], Any]  #: what the method needs before the frame: shadow maps, shadow planes
-    cast: Callable[..., Cast]  #: -> what camera rays meet
+    surface: Callable[..., Any]  #: -> what camera rays meet, and what `shade` returns for it
     shade: Callable[..., Any]  #: -> surface radiance: by light where `airlight` finds shadows, or a sum
     tiles: Callable[..., Any] | None  #: -> what the method sorts by tiles; None where it does not
     airlight: Callable[..., Any]  #: -> airlight radiance, and that of the surface where this finds its shadows, or None
@@ -93,7 +93,7 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
     plan, camera = scene.plan, scene.camera
     lights_surfaces = method.lights_surfaces(settings)
     pixel = mi.UInt32(tiled_pixels(camera.width, camera.height))
-    cast, shade, shade_casts_rays = surface_stages(scene, lights_surfaces=lights_surfaces)
+    surface, shade, shade_casts_rays = surface_stages(scene, lights_surfaces=lights_surfaces)
 
     def sort_tiles(pixel, camera, medium, lights, prepared, distance):
         assert method.tiles is not None
@@ -132,7 +132,7 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
         method,
         pixel,
         prepare,
-        cast=cast,
+        surface=surface,
         shade=shade,
         tiles=tiles,
         airlight=airlight,
@@ -162,8 +162,7 @@ def image_frame(renderer: FrameRenderer, stages) -> Frame:
 
 def run_stages(renderer: FrameRenderer, prepared):
     """Run the stages on the device and return distance, surface and airlight, evaluated, in the order of the lanes."""
-    cast = run_cast(renderer)
-    by_light = run_shade(renderer, cast)
+    cast, by_light = run_cast_and_shade(renderer)
     return evaluated(cast, by_light, run_tiles_and_airlight(renderer, prepared, cast.distance, by_light))
 
 
@@ -177,23 +176,23 @@ def evaluated(cast: Cast, by_light, found):
     return cast.distance, surface, airlight
 
 
-def run_cast(renderer: FrameRenderer) -> Cast:
-    """Run the stage of the camera rays."""
+def run_cast_and_shade(renderer: FrameRenderer) -> tuple[Cast, Any]:
+    """Run the stage of camera rays and lit surface; return what the rays meet, and what `run_shade` returns for it."""
     scene = renderer.scene
-    return renderer.cast(scene.geometry, scene.facets, renderer.pixel, scene.camera, scene.medium)
+    return renderer.surface(scene.geometry, scene.facets, renderer.pixel, scene.camera, scene.medium, scene.lights)
 
 
 def run_shade(renderer: FrameRenderer, cast: Cast):
-    """Run the stage of the lit surface on what `run_cast` returned."""
+    """Run the stage of the lit surface on what was cast for an earlier frame."""
     scene = renderer.scene
     arguments = (scene.facets, renderer.pixel, scene.camera, scene.medium, scene.lights, cast)
     return renderer.shade(renderer.shade_geometry, *arguments)
 
 
 def run_surface(renderer: FrameRenderer):
-    """Run the stages of camera rays and lit surface, and return the distance and what `run_shade` returns."""
-    cast = run_cast(renderer)
-    return cast.distance, run_shade(renderer, cast)
+    """Run the stage of camera rays and lit surface; return the distance, and what `run_shade` returns."""
+    cast, by_light = run_cast_and_shade(renderer)
+    return cast.distance, by_light
 
 
 def run_tiles(renderer: FrameRenderer, prepared, distance):

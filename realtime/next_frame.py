@@ -16,7 +16,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from realtime.frame import FrameRenderer, evaluated, run_airlight, run_cast, run_shade, run_tiles
+from realtime.frame import FrameRenderer, evaluated, run_airlight, run_cast_and_shade, run_shade, run_tiles
 from realtime.scene import Scene
 
 
@@ -47,7 +47,8 @@ def next_frame(
     scene
         The scene as it is now: that of the renderer but for camera, positions, lights, colours and medium.
     kept
-        What the last frame left; None for the first, for which everything is made.
+        What the last frame left; None for the first, for which everything is made. If nothing is said to move in it,
+        it is shaded by the function that the next ones will use: then these record nothing.
     camera_moved, geometry_moved, light_moved
         What is elsewhere than in the last frame, or turned: the camera, shapes or the bounds of media, a light. The
         medium and the colours of lights may have changed in any case.
@@ -60,17 +61,19 @@ def next_frame(
         For the next frame.
     """
     renderer = replace(renderer, scene=scene)
-    if kept is None:
-        kept, camera_moved, geometry_moved, light_moved = Kept(None, None, None), True, True, True
+    cast_again = camera_moved or geometry_moved
+    tile_again = cast_again or light_moved or kept is None
     moved = {"camera": camera_moved, "geometry": geometry_moved, "light": light_moved, "look": True}
-    again = any(moved[what] for what in renderer.method.prepared_from)
-    finish = _started(renderer.prepare, scene) if again else None
-    cast = run_cast(renderer) if camera_moved or geometry_moved else kept.cast
-    by_light = run_shade(renderer, cast)
+    prepare_again = kept is None or any(moved[what] for what in renderer.method.prepared_from)
+    kept = kept or Kept(None, None, None)
+    finish = _started(renderer.prepare, scene) if prepare_again else None
+    if cast_again:
+        cast, by_light = run_cast_and_shade(renderer)
+    else:
+        cast = kept.cast or run_cast_and_shade(renderer)[0]
+        by_light = run_shade(renderer, cast)
     prepared = finish() if finish else kept.prepared
-    tiles = kept.tiles
-    if camera_moved or geometry_moved or light_moved:
-        tiles = run_tiles(renderer, prepared, cast.distance)
+    tiles = run_tiles(renderer, prepared, cast.distance) if tile_again else kept.tiles
     stages = evaluated(cast, by_light, run_airlight(renderer, prepared, cast.distance, by_light, tiles))
     return stages, Kept(cast, prepared, tiles)
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from reports.progress import Interrupted, Progress
 
-STAGES = ("cast", "shade", "tiles", "airlight")  #: the functions of a frame that are frozen, of a `FrameRenderer`
+STAGES = ("surface", "shade", "tiles", "airlight")  #: the functions of a frame that are frozen, of a `FrameRenderer`
 
 
 def numbered(path: Path, number: int, frames: int) -> Path:

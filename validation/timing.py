@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from realtime.frame import (
     FrameRenderer,
     run_airlight,
-    run_cast,
+    run_cast_and_shade,
     run_shade,
     run_stages,
     run_surface,
@@ -135,8 +135,8 @@ def changed_look(renderer: FrameRenderer, kept: Kept) -> Callable[[], Any]:
 
 
 def _step(renderer: FrameRenderer, kept: Kept | None, *, light_moved: bool) -> Callable[[], Any]:
-    still = {"camera_moved": False, "geometry_moved": False}
-    return lambda: next_frame(renderer, renderer.scene, kept, **still, light_moved=light_moved)
+    moved = {"camera_moved": kept is None, "geometry_moved": False, "light_moved": light_moved}
+    return lambda: next_frame(renderer, renderer.scene, kept, **moved)
 
 
 def first_frame(renderer: FrameRenderer) -> Kept:
@@ -233,25 +233,24 @@ def _slow_frame(renderer: FrameRenderer, *, turns: int) -> FrameTimes:
         done()
         prepared = renderer.prepare(there)
         done()
-        cast = run_cast(renderer)
-        dr.eval(cast)
+        cast, by_light = run_cast_and_shade(renderer)
+        dr.eval(cast, by_light)
         done()
-        by_light = run_shade(renderer, cast)
-        dr.eval(by_light)
+        dr.eval(run_shade(renderer, cast))
         done()
         tiles = run_tiles(renderer, prepared, cast.distance)
         done()
         dr.eval(run_airlight(renderer, prepared, cast.distance, by_light, tiles))
         done()
         steps.append(1e3 * np.diff(times))
-    move, prepare, rays, shade, in_tiles, rest = np.array(steps).T
+    move, prepare, surface, shade, in_tiles, rest = np.array(steps).T
     needed = renderer.method.prepared_from
 
     def timing(milliseconds: NDArray[np.float64]) -> Timing:
         low, median, high = (float(value) for value in np.percentile(milliseconds, [25, 50, 75]))
         return Timing(median, low, high, turns)
 
-    surface, airlight = rays + shade, in_tiles + rest
+    airlight = in_tiles + rest
     rebuild = prepare + surface + airlight
     return FrameTimes(
         frame=timing(surface + airlight),

@@ -121,20 +121,20 @@ def counting(renderer: FrameRenderer, counts: Counter) -> FrameRenderer:
 
         return run  # without the method `start` of a preparation: the order of the stages is another, nothing else
 
-    return replace(renderer, **{name: counted(name) for name in ("prepare", "cast", "shade", "tiles", "airlight")})
+    return replace(renderer, **{name: counted(name) for name in ("prepare", "surface", "shade", "tiles", "airlight")})
 
 
 @pytest.mark.parametrize(
     ("method", "moved", "ran"),
     [
-        ("shadow-planes", (), ()),
-        ("shadow-planes", ("light",), ("prepare", "tiles")),
-        ("shadow-planes", ("camera",), ("cast", "prepare", "tiles")),
-        ("shadow-planes", ("geometry",), ("cast", "prepare", "tiles")),
-        ("light-volumes", (), ()),
-        ("light-volumes", ("light",), ("prepare", "tiles")),
-        ("light-volumes", ("camera",), ("cast", "tiles")),
-        ("light-volumes", ("geometry",), ("cast", "prepare", "tiles")),
+        ("shadow-planes", (), ("shade",)),
+        ("shadow-planes", ("light",), ("shade", "prepare", "tiles")),
+        ("shadow-planes", ("camera",), ("surface", "prepare", "tiles")),
+        ("shadow-planes", ("geometry",), ("surface", "prepare", "tiles")),
+        ("light-volumes", (), ("shade",)),
+        ("light-volumes", ("light",), ("shade", "prepare", "tiles")),
+        ("light-volumes", ("camera",), ("surface", "tiles")),
+        ("light-volumes", ("geometry",), ("surface", "prepare", "tiles")),
     ],
 )
 def test_nothing_runs_that_nothing_asks_for(variant, method, moved, ran):
@@ -144,7 +144,7 @@ def test_nothing_runs_that_nothing_asks_for(variant, method, moved, ran):
     assert set(counts.values()) == {1}
     counts.clear()
     next_frame(renderer, renderer.scene, kept, **STILL | {f"{what}_moved": True for what in moved})
-    assert counts == Counter((*ran, "shade", "airlight"))
+    assert counts == Counter((*ran, "airlight"))
 
 
 def test_what_a_method_of_ones_own_prepares_is_made_anew_unless_it_says_otherwise(variant):
@@ -170,5 +170,5 @@ def test_frames_replay_whatever_moves(variant):
     _, kept = next_frame(renderer, renderer.scene, None, **STILL)
     for now, moved in frames(renderer.scene, STEPS):
         _, kept = next_frame(renderer, now, kept, **moved)
-    assert renderer.cast.n_recordings <= 2
+    assert renderer.surface.n_recordings <= 2
     assert [stage.n_recordings for stage in (renderer.shade, renderer.tiles, renderer.airlight)] == [1, 1, 1]

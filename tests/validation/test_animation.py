@@ -96,7 +96,7 @@ def test_frames_record_nothing_and_compile_nothing(variant, name, moves):
         if number:
             assert not compiled
     assert renderer.airlight.n_recordings == 1
-    assert all(getattr(stage, "n_recordings", 1) == 1 for stage in (renderer.cast, renderer.shade, renderer.tiles))
+    assert all(getattr(stage, "n_recordings", 1) == 1 for stage in (renderer.surface, renderer.shade, renderer.tiles))
 
 
 def test_turning_objects_record_the_surface_once_more_at_most(variant):
@@ -109,8 +109,7 @@ def test_turning_objects_record_the_surface_once_more_at_most(variant):
     for moved in animate(scene, animation, 5):
         _, kept = next_frame(renderer, moved, kept, **moved_parts(animation))
     assert renderer.airlight.n_recordings == 1
-    assert renderer.cast.n_recordings <= 2
-    assert renderer.shade.n_recordings == 1
+    assert renderer.surface.n_recordings <= 2
 
 
 def test_shapes_keep_their_names_beside_bounded_media(variant):
@@ -139,7 +138,7 @@ def test_what_stands_still_is_kept(variant, moves, casts, prepared_frames):
     scene, animation = read("two-pens")
     animation = replace(animation, moves=moves)
     renderer = prepared(scene, configuration("shadow-planes"))
-    calls = {"cast": 0, "prepare": 0}
+    calls = {"surface": 0, "prepare": 0}
 
     def counted(name):
         def run(*arguments):
@@ -148,7 +147,7 @@ def test_what_stands_still_is_kept(variant, moves, casts, prepared_frames):
 
         return run
 
-    counting, kept = replace(renderer, cast=counted("cast"), prepare=counted("prepare")), None
+    counting, kept = replace(renderer, surface=counted("surface"), prepare=counted("prepare")), None
     for moved in animate(scene, animation, 4):
         _, kept = next_frame(counting, moved, kept, **moved_parts(animation))
-    assert calls == {"cast": casts, "prepare": prepared_frames}
+    assert calls == {"surface": casts, "prepare": prepared_frames}

@@ -174,7 +174,7 @@ def test_a_slow_frame_is_timed_a_few_times(variant, monkeypatch, spent, turns):
     each = (times.frame, times.surface, times.airlight, times.rebuild, times.moved, times.relit, times.recoloured)
     assert {one.repetitions for one in each} == {turns}
     assert times.frame.median_ms <= times.rebuild.median_ms <= times.moved.median_ms
-    assert times.recoloured.median_ms <= times.relit.median_ms <= times.rebuild.median_ms
+    assert times.recoloured.median_ms <= times.relit.median_ms
     if turns == 1:
         assert times.frame.median_ms == pytest.approx(times.surface.median_ms + times.airlight.median_ms)
         assert all(one.low_ms == one.median_ms == one.high_ms for one in each)
