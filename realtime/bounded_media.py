@@ -11,8 +11,10 @@ then sigma_j (x - x_j). Light: the leg from the light to x has the part l_k in t
 
     tau_light = sigma_0 r + sum_k (sigma_k - sigma_0) l_k,        sigma_0 = 0 in clear air.
 
-The nodes are those of Gauss and Legendre in the angle theta at the light, dx / r^2 = dtheta / h, between the ends of
-the segment: with s = x - foot and the angle u from the near end, s_0, on
+In a body, where the legs meet no other one, the segment is cut where the leg passes from facet to facet of the body,
+and further as depth and angle need it (`realtime.media_panels`). Elsewhere, and for the published approximation, the
+nodes are those of Gauss and Legendre in the angle theta at the light, dx / r^2 = dtheta / h, between the ends of the
+segment: with s = x - foot and the angle u from the near end, s_0, on
 
     s = h (s_0 cos u + h sin u)/(h cos u - s_0 sin u),     u_1 = atan2(h (s_1 - s_0), h^2 + s_0 s_1),
 
@@ -45,14 +47,14 @@ from realtime.errors import InputError
 from realtime.exponential import exp_bounded
 from realtime.gauss import unit_nodes
 from realtime.geometry import clip_to_cone, distance_to_light, falloff, stretches
-from realtime.media_rays import MediaRay, Piece, light_leg, sum_over_pieces
+from realtime.media_panels import BodySegment, body_integral
+from realtime.media_rays import MediaRay, Piece, light_leg, other_bodies_near, sum_over_pieces
 from realtime.medium import Medium, least_extinction
 from realtime.parallel_airlight import ParallelRay, parallel_airlight, parallel_source
 from realtime.phase import evaluate
 
 FORMS = ("exact", "paper")
-_NODES, _NODES_DOUBLE, _NODES_PAPER = 10, 24, 6
-_NODES_BETWEEN = 24  # from where legs enter a body on their way, or not: the kinks are sharper there
+_NODES, _NODES_PAPER = 24, 6
 _OPTICAL_REACH = 18.0  # e^-18 = 1.5e-8 of the light is left
 
 
@@ -78,7 +80,7 @@ def bounded_airlight(ray: MediaRay | ParallelRay, x0, x1):
         x0, x1 = clip_to_cone(ray.geometry, x0, x1)
     panels = stretches(ray.geometry, ray.light, x0, x1)
     zero = dr.zeros(type(ray.medium.albedo), dr.width(ray.geometry.height, x0, x1))
-    return sum_over_pieces(ray.pieces, panels, lambda *segment: _integral(ray, *segment), zero)
+    return sum_over_pieces(ray.pieces, panels, lambda *segment: _piece_integral(ray, *segment), zero)
 
 
 def bounded_source(ray: MediaRay | ParallelRay, x):
@@ -121,6 +123,35 @@ def check_form(medium: Medium, form: str) -> None:
         raise InputError("media=paper: wanted clear air around the bounded media; use media=exact")
 
 
+def _piece_integral(ray: MediaRay, piece: Piece, x0, x1):
+    """Integrate one segment in one piece."""
+    import drjit as dr
+
+    if piece.number is None or ray.form != "exact":
+        return _integral(ray, piece, x0, x1)
+    number = piece.number
+    one = BodySegment(
+        medium=piece.medium,
+        around=None if ray.medium.clear else ray.medium.sigma_t,
+        light=ray.light,
+        geometry=ray.geometry,
+        start=ray.start,
+        direction=ray.direction,
+        begin=piece.begin,
+        before=piece.before,
+        seen=ray.seen[number],
+        planes=ray.entries[number],
+    )
+    if len(ray.seen) == 1:
+        return body_integral(one, x0, x1)
+    return dr.if_stmt(
+        args=(x0, x1),
+        cond=other_bodies_near(ray, number, x0, x1),
+        true_fn=lambda x0, x1: _integral(ray, piece, x0, x1),
+        false_fn=lambda x0, x1: body_integral(one, x0, x1),
+    )
+
+
 def _integral(ray: MediaRay, piece: Piece, x0, x1):
     """Integrate one segment in one piece."""
     import drjit as dr
@@ -149,9 +180,7 @@ def _integral(ray: MediaRay, piece: Piece, x0, x1):
 def _node_count(ray: MediaRay, piece: Piece, *, single: bool) -> int:
     if ray.form == "paper":
         return _NODES_PAPER
-    if piece.number is None:
-        return _NODES_BETWEEN if single else 2 * _NODES_BETWEEN
-    return _NODES if single else _NODES_DOUBLE
+    return _NODES if single else 2 * _NODES
 
 
 def _scattered(ray: MediaRay, piece: Piece, transmittance: list[Any], x, r):

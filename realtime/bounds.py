@@ -128,6 +128,22 @@ def _refusal(name: str, found: str, wanted: str) -> InputError:
     return InputError(f"shape '{name}' bounds a medium and {found}; wanted {wanted}")
 
 
+def plane_neighbours(bounds: Bounds) -> NDArray[np.uint32]:
+    """Return by plane the planes that share an edge with it, filled up with its own number, (planes, most of any).
+
+    Planes through the same two corners, to the precision of the corners: where facets are tiny that may be more.
+    """
+    corners = np.unique(bounds.corners.reshape(-1, 3), axis=0)
+    on = np.abs(corners @ bounds.normals.T - bounds.offsets) < 4 * _FLAT * bounds.radius
+    shared = on.T.astype(np.float32) @ on.astype(np.float32)
+    np.fill_diagonal(shared, 0)
+    rows = [np.flatnonzero(row >= 2) for row in shared]
+    table = np.repeat(np.arange(len(rows), dtype=np.uint32)[:, None], max(len(row) for row in rows), axis=1)
+    for number, row in enumerate(rows):
+        table[number, : len(row)] = row
+    return table
+
+
 def holds(bounds: Bounds, point: Array) -> bool:
     """Return whether a point lies inside."""
     if bounds.is_ball:

@@ -4,12 +4,13 @@
 Planes are read by lists, one for each tile, where a body has many (`realtime.body_tiles`).
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
-from realtime.body_tiles import PlaneLists, ball_range, plane_lists
+from realtime.body_tiles import ball_range, plane_lists
 from realtime.clipping import Seen, inverse_crossings, near_line, passage, seen_from, share_inside
-from realtime.geometry import RayGeometry
+from realtime.entry_planes import EntryPlanes, clear_of, entry_planes, exit_planes
+from realtime.geometry import RayGeometry, distance_to_light
 from realtime.lights import Light
 from realtime.medium import Body, Medium
 from realtime.parallel_light import parallel_legs, seen_along
@@ -40,7 +41,8 @@ class MediaRay:
     direction: Any
     pieces: tuple[Piece, ...]
     seen: tuple[Seen, ...]  #: the bodies as the light sees them
-    lists: tuple[PlaneLists | None, ...]  #: by body, the planes where legs to points within it enter
+    entries: tuple[EntryPlanes | None, ...]  #: by body, the planes where legs to points within it enter
+    exits: tuple[EntryPlanes | None, ...]  #: by body, the planes where legs leave it; only where there are several
     form: str  #: of `FORMS`
 
 
@@ -132,8 +134,9 @@ def media_ray(
     bodies = medium.bodies if form == "exact" else ()
     seen = tuple(seen_from(body, light.position) for body in bodies)
     start = origin - light.position
-    lists = tuple(_leg_lists(one, origin, start, corners) for one in seen)
-    return MediaRay(medium, light, geometry, start, direction, pieces, seen, lists, form)
+    entries = tuple(entry_planes(one) for one in seen)
+    exits = tuple(exit_planes(one) for one in seen) if len(seen) > 1 else ()
+    return MediaRay(medium, light, geometry, start, direction, pieces, seen, entries, exits, form)
 
 
 def _worth_lists(body: Body, corners) -> bool:
@@ -147,17 +150,6 @@ def _passage(seen: Seen, direction, corners):
         _, _, near = ball_range(seen, corners)
         lists = plane_lists(seen, [corners], near)
     return passage(seen, direction, lists=lists)
-
-
-def _leg_lists(seen: Seen, origin, start, corners) -> PlaneLists | None:
-    """Return the planes at which legs from the light enter the body to reach the parts of the rays in it."""
-    if not _worth_lists(seen.body, corners):
-        return None
-    # The ball as the camera sees it.
-    low, high, near = ball_range(replace(seen, toward=seen.body.centre - origin), corners)
-    distances = [low + (high * (1 + 1e-4) - low) * (k / _RANGES) for k in range(_RANGES + 1)]
-    slices = [[start + corner * x for corner in corners] for x in distances]
-    return plane_lists(seen, slices, near, leaves=False)
 
 
 def camera_insides(medium: Medium, origin, direction, distance, *, corners=None) -> tuple[Any, ...]:
@@ -226,12 +218,40 @@ def light_leg(ray: MediaRay, piece: Piece, xs, rs) -> list[list[Any]]:
     for number, seen in enumerate(ray.seen):
         own = number == piece.number
         near = dr.full(dr.mask_t(xs[0]), True, dr.width(xs[0])) if own else _near_legs(ray, seen, xs, rs)
-        lists = ray.lists[number] if own else None
-        enter, leave = inverse_crossings(seen, ray.start, ray.direction, xs, near, leaves=not own, lists=lists)
+        enter, leave = inverse_crossings(seen, ray.start, ray.direction, xs, near, leaves=not own)
         ends = [None] * len(xs) if own else leave
         shares = [share_inside(one, other) for one, other in zip(enter, ends)]
         insides.append([dr.select(near, share * r, 0) for share, r in zip(shares, rs)])
     return insides
+
+
+def other_bodies_near(ray: MediaRay, number: int, x0, x1):
+    """Return whether legs from the light to points of a segment in a body may meet another body."""
+    import drjit as dr
+
+    xs = [x0, x1]
+    rs = [distance_to_light(ray.geometry, x) for x in xs]
+    meets: Any = False
+    for other, seen in enumerate(ray.seen):
+        if other == number:
+            continue
+        near = _near_legs(ray, seen, xs, rs)
+        if seen.planes is not None:
+            near = dr.if_stmt(
+                args=(x0, x1),
+                cond=near,
+                true_fn=lambda x0, x1, other=other: ~_clear_of(ray, other, x0, x1),
+                false_fn=lambda x0, x1: dr.mask_t(x0)(False),
+            )
+        meets = near | meets
+    return meets
+
+
+def _clear_of(ray: MediaRay, other: int, x0, x1):
+    entering, leaving = ray.entries[other], ray.exits[other]
+    assert entering is not None
+    assert leaving is not None
+    return clear_of((entering, leaving), ray.start, ray.direction, x0, x1)
 
 
 def _near_legs(ray: MediaRay, seen: Seen, xs, rs):

@@ -29,6 +29,8 @@ class Body:
     centre: Any  #: of the ball, or of one that holds the body [m]
     radius: Any  #: of that ball [m]
     mean_distance: Any  #: R, see `realtime.bounds.mean_distance` [m]
+    neighbours: Any = None  #: `sides` numbers a half space: planes that share an edge with it, or itself; None: a ball
+    sides: int = 0
 
 
 def per_extinction(medium: Medium, function: Callable[[Any], Any]):

@@ -8,7 +8,7 @@ All bodies lie in one medium, the camera's own or, for a camera inside a body, t
 from dataclasses import replace
 
 from realtime.arrays import ArrayTypes
-from realtime.bounds import Bounds, holds, mean_distance, overlap, read_bounds
+from realtime.bounds import Bounds, holds, mean_distance, overlap, plane_neighbours, read_bounds
 from realtime.errors import InputError
 from realtime.medium import Body, Medium
 from realtime.phase import Phase
@@ -93,7 +93,7 @@ def read_medium(sensor, boundaries, types: ArrayTypes) -> Medium:
     media = [_homogeneous(shape.interior_medium(), types) for shape in boundaries]
     ambient = _clear(types) if around is None else _homogeneous(around, types)
     channels = max(len(medium.sigma_t) for medium in [ambient, *media])
-    bodies = tuple(_body(_in_channels(medium, channels), one, types) for medium, one in zip(media, bounds))
+    bodies = tuple(convex_body(_in_channels(medium, channels), one, types) for medium, one in zip(media, bounds))
     return replace(_in_channels(ambient, channels), bodies=bodies)
 
 
@@ -127,17 +127,22 @@ def _check_disjoint(bounds: list[Bounds]) -> None:
                 raise InputError(f"the media of shapes '{other.name}' and '{one.name}' overlap; wanted disjoint bounds")
 
 
-def _body(medium: Medium, bounds: Bounds, types: ArrayTypes) -> Body:
+def convex_body(medium: Medium, bounds: Bounds, types: ArrayTypes) -> Body:
+    """Return a medium within bounds."""
     import drjit as dr
+    import mitsuba as mi
 
     centre = types.vector(*(float(c) for c in bounds.centre))
     radius, distance = (dr.opaque(types.scalar, value) for value in (bounds.radius, mean_distance(bounds)))
-    planes = None
-    if not bounds.is_ball:
-        planes = tuple(types.scalar(column) for column in (*bounds.normals.T, bounds.offsets))
-        dr.eval(*planes)
     dr.make_opaque(centre)
-    return Body(medium, planes, len(bounds.offsets), centre, radius, distance)
+    body = Body(medium, None, len(bounds.offsets), centre, radius, distance)
+    if bounds.is_ball:
+        return body
+    planes = tuple(types.scalar(column) for column in (*bounds.normals.T, bounds.offsets))
+    table = plane_neighbours(bounds)
+    neighbours = mi.UInt32(table.ravel())
+    dr.eval(neighbours, *planes)
+    return replace(body, planes=planes, neighbours=neighbours, sides=table.shape[1])
 
 
 def _clear(types: ArrayTypes) -> Medium:

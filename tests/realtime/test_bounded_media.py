@@ -288,8 +288,10 @@ def test_three_media_against_the_truth(variant):
     scene["sensor"]["film"] |= {"width": 160, "height": 120}
     truth = truth_image(mi.load_dict(scene))
     frame = render(scene, "shadow-planes", precision="single")
-    # Measured 8.1e-4, nearly all of it kinks of the leg's length within ten nodes (1.6e-4 with the 24 of float64).
-    assert relative_rmse(frame.airlight, truth.airlight) < 1e-3
+    # Panels end where the leg's length has kinks: measured 6e-6, half of it a pixel at a silhouette.
+    assert relative_rmse(frame.airlight, truth.airlight) < 2e-5
+    error = np.abs(frame.airlight - truth.airlight) / np.maximum(truth.airlight, 1e-3 * truth.airlight.mean())
+    assert np.quantile(error, 0.99) < 5e-5
     # One pixel at a silhouette sees another surface.
     assert np.quantile(np.abs(frame.surface - truth.surface), 0.999) < 1e-5 * truth.surface.mean() + 1e-5
     assert relative_rmse(render(scene, "shadow-planes", precision="single", media="paper").airlight, truth.airlight) > 1

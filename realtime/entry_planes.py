@@ -1,0 +1,221 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Where legs from a light enter a body of planes on their way to the points of a ray within it.
+
+Of the planes that the light is outside of, the leg to the point v(x) = v_0 + x d from the light enters through the one
+with the least
+
+    u_k(x) = g_k . v(x) = c_k + s_k x
+
+(`realtime.clipping`), a line along the ray. The least of lines is concave, with *bends* where the leg passes from one
+facet to the next, which shares an edge with it. So from the plane k the next bend is the first of
+
+    (c_j - c_k)/(s_k - s_j)
+
+over the few neighbours j with s_j < s_k. Every bend makes s less: a walk along the ray never goes round in circles.
+
+The first plane is found in the same way: while a neighbour has a less u at the start, go to the least. Seen from the
+light the facets tile the convex image of the body, and v(x) lies in it. On the straight way from a point of the facet k
+to v(x) the neighbour beyond the edge where k is left has a less u from there on, since the difference is linear: where
+no neighbour has less, none of all planes has.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+from realtime.arrays import four_numbers
+from realtime.clipping import Seen
+
+_UNROLLED = 4  # neighbours, as many as facets of boxes have
+
+
+@dataclass(frozen=True)
+class EntryPlanes:
+    """The planes that a light is outside of, each with its neighbours among them."""
+
+    sides: int  #: neighbours of a plane
+    count: int  #: planes
+    middle: Any  #: g of the plane before the middle of the body, 0 where the light is in the body [1/m]
+    number: Any  #: of that plane
+    within: Any  #: whether the light is in the body
+    entries: Any  #: four numbers a neighbour: its g [1/m] and its number; where there is none those of the plane itself
+
+
+@dataclass
+class Entry:
+    """The plane through which a leg enters: 1/f = constant + slope x."""
+
+    number: Any
+    constant: Any
+    slope: Any  #: [1/m]
+
+
+def entry_planes(seen: Seen) -> EntryPlanes | None:
+    """Return the planes where legs enter a body, as the light sees it; None for a ball."""
+    return _facing_planes(seen, 1)
+
+
+def exit_planes(seen: Seen) -> EntryPlanes | None:
+    """Return the planes where legs leave a body: those that the light is inside of, with -g for g; None for a ball."""
+    return _facing_planes(seen, -1)
+
+
+def _facing_planes(seen: Seen, side: int) -> EntryPlanes | None:
+    import drjit as dr
+    import mitsuba as mi
+
+    body = seen.body
+    if body.planes is None:
+        return None
+    Float = type(seen.planes)
+    Four = four_numbers(Float)
+    place = dr.arange(mi.UInt32, body.count * body.sides)
+    own = place // body.sides
+    outside = dr.gather(Float, seen.planes, 4 * body.neighbours + 3) > 0
+    number = dr.select(outside == (side > 0), body.neighbours, own)
+    values = dr.gather(Four, seen.planes, number)
+    g = dr.select((values.w > 0) == (side > 0), values.xyz * side, 0)
+    entries = dr.zeros(Float, 4 * body.count * body.sides)
+    for column, value in enumerate((*g, Float(number))):
+        dr.scatter(entries, value, 4 * place + column)
+    found, middle = _middle_plane(seen, side)
+    within = found >= body.count
+    number = dr.select(within, 0, found)
+    dr.eval(entries, middle, number, within)
+    return EntryPlanes(body.sides, body.count, middle, number, within, entries)
+
+
+def _middle_plane(seen: Seen, side: int):
+    """Return the number and g of the plane that the line to the middle of the body meets, if there is one."""
+    import drjit as dr
+    import mitsuba as mi
+
+    Float = type(seen.planes)
+    Four = four_numbers(Float)
+
+    def nearer(number, least, found, g):
+        values = dr.gather(Four, seen.planes, number)
+        own = values.xyz * side
+        value = dr.dot(own, seen.toward)
+        less = ((values.w > 0) == (side > 0)) & (value < least)
+        return number + 1, dr.select(less, value, least), dr.select(less, number, found), dr.select(less, own, g)
+
+    _, _, found, g = dr.while_loop(
+        state=(
+            dr.zeros(mi.UInt32, 1),
+            dr.full(Float, dr.inf, 1),
+            dr.full(mi.UInt32, seen.body.count, 1),
+            dr.zeros(type(seen.toward), 1),
+        ),
+        cond=lambda number, least, found, g: number < seen.body.count,
+        body=nearer,
+        labels=("number", "least", "found", "g"),
+    )
+    return found, g
+
+
+def first_entry(planes: EntryPlanes, start, direction, x) -> Entry:
+    """Return the plane through which the legs to the points start + x direction enter.
+
+    Parameters
+    ----------
+    planes
+        As the light sees them.
+    start, direction
+        From the light to the camera, and of the rays [m].
+    x
+        Distances of points within the body [m].
+
+    Notes
+    -----
+    Valid for points within the body. Where the light itself is, there is no such plane, and 0 for u.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    def step(turn, number, constant, slope, searches):
+        def nearer(best, other, line):
+            at, least = dr.fma(best[2], x, best[1]), dr.fma(line[1], x, line[0])
+            less = least < at
+            return tuple(dr.select(less, new, old) for new, old in zip((other, *line), best))
+
+        found = _over_neighbours(planes, number, (number, constant, slope), start, direction, nearer)
+        return turn + 1, *found, searches & (found[0] != number)
+
+    width = dr.width(start, direction, x)
+    _, number, constant, slope, _ = dr.while_loop(
+        state=(
+            dr.zeros(mi.UInt32, width),
+            dr.zeros(mi.UInt32, width) + planes.number,
+            dr.dot(planes.middle, start) + dr.zeros(type(x), width),
+            dr.dot(planes.middle, direction) + dr.zeros(type(x), width),
+            dr.full(mi.Bool, True, width),
+        ),
+        cond=lambda turn, number, constant, slope, searches: searches & (turn < planes.count),
+        body=step,
+        labels=("turn", "number", "constant", "slope", "searches"),
+    )
+    return Entry(number, constant, slope)
+
+
+def clear_of(planes: tuple[EntryPlanes, EntryPlanes], start, direction, x0, x1):
+    """Return whether no leg to a segment meets the body whose entry and exit planes are given; never wrongly yes.
+
+    With u the entering plane's and -w the leaving one's, legs that meet the body have u > 1 and u > -w. Both are linear
+    along the ray: where u - max(1, -w) is below 0 at both ends with the planes of one point between, no leg does.
+    """
+    import drjit as dr
+
+    clear = dr.mask_t(x0)(False)
+    for x in (0.5 * (x0 + x1), x0, x1):
+        enter, leave = (first_entry(one, start, direction, x) for one in planes)
+        short, beside = dr.mask_t(x)(True), dr.mask_t(x)(True)
+        for end in (x0, x1):
+            u = dr.fma(enter.slope, end, enter.constant)
+            short &= u < 1
+            beside &= u + dr.fma(leave.slope, end, leave.constant) < 0
+        clear |= short | beside
+    return clear & ~planes[0].within
+
+
+def next_bend(planes: EntryPlanes, start, direction, entry: Entry):
+    """Return where legs pass to another plane next [m], infinite where they do not, and that plane.
+
+    A bend that lies behind by rounding is returned as it is: whoever walks goes on from where he is.
+    """
+    import drjit as dr
+
+    def sooner(best, other, line):
+        closing = entry.slope - line[1]
+        at = dr.select(closing > 0, (line[0] - entry.constant) / closing, dr.inf)
+        less = at < best[0]
+        return tuple(dr.select(less, new, old) for new, old in zip((at, other, *line), best))
+
+    none = (type(entry.constant)(dr.inf), entry.number, entry.constant, entry.slope)
+    until, *found = _over_neighbours(planes, entry.number, none, start, direction, sooner)
+    return until, Entry(*found)
+
+
+def _over_neighbours(planes: EntryPlanes, number, state, start, direction, function):
+    """Go over the neighbours of a plane: state = function(state, number, (constant, slope))."""
+    import drjit as dr
+    import mitsuba as mi
+
+    Four = four_numbers(type(start.x))
+    place = number * planes.sides
+
+    def at(side, state):
+        values = dr.gather(Four, planes.entries, place + side)
+        g = values.xyz
+        return function(state, mi.UInt32(values.w), (dr.dot(g, start), dr.dot(g, direction)))
+
+    if planes.sides <= _UNROLLED:
+        for side in range(planes.sides):
+            state = at(side, state)
+        return state
+    _, state = dr.while_loop(
+        state=(mi.UInt32(0), state),
+        cond=lambda side, state: side < planes.sides,
+        body=lambda side, state: (side + 1, at(side, state)),
+        labels=("side", "state"),
+    )
+    return state
