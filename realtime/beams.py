@@ -10,8 +10,8 @@ face (`realtime.light_heights`) a plane is
     gu u + gv v + g0 + gs s >= 0,   (gu, gv, g0) = w . (across, up, axis),   gs = w . (light - camera),
 
 as w . (P - camera) = w . (light - camera + (axis + u across + v up) / s). So a box in (u, v, s) that lies beyond one of
-the five planes misses the beam. Those through the light have gs = 0: they bound the footprint of the beam on the map,
-which others alone do not, since a box at a depth discontinuity is long in s.
+the planes misses the beam. Those through the light have gs = 0: they bound the footprint of the beam on the map, which
+others alone do not, since a box at a depth discontinuity is long in s. So do two lines where the beam begins and ends.
 
 Where the rays of the light are parallel, "through the light" is along its axis, and with
 P = light + u across + v up - s axis the coefficients are
@@ -21,6 +21,7 @@ P = light + u across + v up - s axis the coefficients are
 
 from dataclasses import dataclass
 from functools import reduce
+from operator import add
 from typing import Any
 
 _SLACK = 2e-6  # of the terms of a sum: float32 rounding, with room to spare
@@ -39,13 +40,21 @@ class Beam:
 
 @dataclass
 class BeamPlanes:
-    """The planes of a beam in the coordinates of a face: lists of gu, gv, g0, gs, and the rounding error of each."""
+    """The planes of a beam in the coordinates of a face: lists of gu, gv, g0, gs, and the rounding error of each.
+
+    The first four bound it sideways, two of them through the light, the next where it ends. The last two are lines on
+    the map, gs = 0.
+    """
 
     u: list[Any]
     v: list[Any]
     one: list[Any]
     s: list[Any]
     slack: list[Any]
+
+
+_LINES = (5, 6)  # of the planes: lines on the map where a beam begins and ends
+_NARROW = (0, 1, 6)  # planes that tell the texels of a leaf apart best
 
 
 def make_beam(directions, end, light, axis=None) -> Beam:
@@ -120,9 +129,37 @@ def beam_planes(beam: Beam, products) -> BeamPlanes:
     ends = dr.isfinite(beam.end)
     beyond = beam.end * (1 + 1e-5) - dr.dot(beam.middle, beam.light)
     coefficients.append(tuple(dr.select(ends, g, 0) for g in (*(-g for g in products(beam.middle)), beyond)))
-    u, v, one, s = ([plane[k] for plane in coefficients] for k in range(4))
     slack = [_SLACK * (dr.abs(gu) + dr.abs(gv) + dr.abs(g0)) for gu, gv, g0, _ in coefficients]
+    start = *products(beam.middle), dr.dot(beam.middle, beam.light)
+    return _with_lines(coefficients, slack, start)
+
+
+def _with_lines(planes, slack, start) -> BeamPlanes:
+    """Return planes, and the lines on the map where a beam begins and ends.
+
+    A box that is long in s lies on both sides of every plane that is not steep, also behind the camera or beyond the
+    end. A sum of two planes with positive weights bounds the beam too; one of those above and below it takes s away.
+    """
+    lines = [_line(one, slack[4], planes[2:4], slack[2:4]) for one in (start, planes[4])]
+    planes = [*planes, *(line for line, _ in lines)]
+    slack = [*slack, *(reach for _, reach in lines)]
+    u, v, one, s = ([plane[k] for plane in planes] for k in range(4))
     return BeamPlanes(u, v, one, s, slack)
+
+
+def _line(plane, slack, others, slacks):
+    """Return the line on the map in which a plane and one of two others add up, and its rounding error."""
+    import drjit as dr
+
+    first = others[0][3] * plane[3] < 0
+    other = [dr.select(first, a, b) for a, b in zip(*others)]
+    share, own = dr.abs(plane[3]), dr.abs(other[3])
+    adds_up = other[3] * plane[3] < 0
+    line = [dr.select(adds_up, dr.fma(own, a, share * b), 0) for a, b in zip(plane[:3], other[:3])]
+    reach = dr.fma(own, slack, share * dr.select(first, *slacks))
+    # Large terms are added and rounded anew, and what is left of s is taken for 0.
+    reach += 4 * _SLACK * reduce(add, (own * dr.abs(a) + share * dr.abs(b) for a, b in zip(plane[:3], other[:3])))
+    return (*line, type(share)(0)), reach
 
 
 def _parallel_planes(beam: Beam, products) -> BeamPlanes:
@@ -140,19 +177,46 @@ def _parallel_planes(beam: Beam, products) -> BeamPlanes:
     beyond = dr.select(ends, beam.end, 0) * (1 + 1e-5) - dr.dot(beam.middle, beam.light)
     planes.append(tuple(dr.select(ends, g, 0) for g in (-gu, -gv, beyond, along)))
     slack.append(_SLACK * (dr.abs(gu) + dr.abs(gv) + length))
-    u, v, one, s = ([plane[k] for plane in planes] for k in range(4))
-    return BeamPlanes(u, v, one, s, slack)
+    return _with_lines(planes, slack, (gu, gv, dr.dot(beam.middle, beam.light), -along))
 
 
-def may_meet(planes: BeamPlanes, centre, half, low, high):
-    """Return whether a beam may meet the box about `centre` = (u, v), `half` a side, from height `low` to `high`."""
+def over_square(planes: BeamPlanes, centre, half):
+    """Return for every plane gu u + gv v + g0 where it is largest over the square about `centre`, `half` a side."""
     import drjit as dr
 
     u, v = centre
-    s, reach_s = 0.5 * (low + high), 0.5 * (high - low) + 1e-5 * high
+    return [
+        dr.fma(gu, u, dr.fma(gv, v, dr.fma(dr.abs(gu) + dr.abs(gv), half, g0 + slack)))
+        for gu, gv, g0, slack in zip(planes.u, planes.v, planes.one, planes.slack)
+    ]
+
+
+def may_meet(planes: BeamPlanes, values, low, high):
+    """Return whether a beam may meet the box from height `low` to `high`; `values` from `over_square`."""
+    import drjit as dr
+
+    low, high = dr.fma(-1e-5, high, low), dr.fma(1e-5, high, high)
     met = dr.mask_t(low)(True)
-    for gu, gv, g0, gs, slack in zip(planes.u, planes.v, planes.one, planes.s, planes.slack):
-        value = dr.fma(gu, u, dr.fma(gv, v, dr.fma(gs, s, g0)))
-        reach = dr.fma(dr.abs(gu) + dr.abs(gv), half, dr.fma(dr.abs(gs), reach_s, slack))
-        met &= value + reach >= 0
+    for k, (value, gs) in enumerate(zip(values, planes.s)):
+        met &= (value if k in _LINES else value + dr.maximum(gs * low, gs * high)) >= 0
+    return met
+
+
+def parts_within(planes: BeamPlanes, values, half, low, high):
+    """Return bit 4 row + column of each of the 4 x 4 parts of a square that is not beyond a plane through the light."""
+    import drjit as dr
+    import mitsuba as mi
+
+    low, high = dr.fma(-1e-5, high, low), dr.fma(1e-5, high, high)
+    sides = []
+    for k in _NARROW:
+        gu, gv, gs = planes.u[k], planes.v[k], planes.s[k]
+        value = values[k] - 0.75 * half * (dr.abs(gu) + dr.abs(gv))
+        value = value if k in _LINES else value + dr.maximum(gs * low, gs * high)
+        sides.append((value, 0.5 * half * gu, 0.5 * half * gv))
+    met = mi.UInt32(0)
+    for k in range(16):
+        x, y = k % 4 - 1.5, k // 4 - 1.5
+        least = reduce(dr.minimum, (dr.fma(along, x, dr.fma(upward, y, value)) for value, along, upward in sides))
+        met |= dr.select(least >= 0, mi.UInt32(1 << k), 0)
     return met

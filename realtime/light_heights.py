@@ -18,9 +18,13 @@ A texel is cut along the diagonal from its corner (0, 0) to (1, 1), into
     s00 + x (s10 - s00) + y (s11 - s10)   where x >= y,
     s00 + y (s01 - s00) + x (s11 - s01)   where y >= x.
 
-The bounds of the heights over squares of texels form a pyramid: level 0 is the whole face, and the last level squares
-of `LEAF` texels, larger ones of maps beyond `FINEST` of them. Its nodes stand level by level, row by row; 1 + 4 + ... +
-4^(d - 1) = (4^d - 1) / 3 of them, in binary 0101...01, come before level d.
+The bounds of the heights over squares of texels form a pyramid: level 0 is the whole face, the last level leaves of 4 x
+4 texels. Its nodes stand level by level, row by row; 1 + 4 + ... + 4^(d - 1) = (4^d - 1) / 3 of them, in binary
+0101...01, come before level d.
+
+At an edge of what the light sees, a leaf's bounds go from the near side to the far side, and all that passes behind the
+near one lies within them. So the texels of a leaf are sorted by a height between the bounds: those below it, those
+above it, and those on both sides. Between the two groups there is a gap, where rays meet only texels on both sides.
 """
 
 from dataclasses import dataclass
@@ -30,7 +34,7 @@ from realtime.arrays import four_numbers, two_numbers
 from realtime.shadow_map import ShadowMap
 
 LEAF = 4  #: texels on a side of a node of the last level: smaller nodes cost more to find than they save
-FINEST = 1024  #: nodes across the last level, at most
+_DIVIDE = 0.7  # from the least height of a leaf to the largest, of the height that divides its texels
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,8 @@ class LightHeights:
     frame: tuple[Any, Any, Any] | None  #: of a spot's face, see `realtime.shadow_map`; None for a cube
     texels: Any  #: the heights s00, s10, s01, s11 of every texel, face by face, row by row [1/m]
     bounds: Any  #: least and largest height of every node of the pyramid, face by face [1/m]
+    gaps: Any = None  #: by leaf: largest height of the texels below the height that divides them, least of those above
+    sides: Any = None  #: by leaf: bit 4 row + column of texels below that height, and 16 more of those on both sides
     depth: Any = None  #: of a directional light: distance of the plane that heights are above, see `ShadowMap` [m]
 
     @property
@@ -56,7 +62,7 @@ class LightHeights:
     @property
     def finest(self) -> int:
         """The last level of the pyramid, 2^finest nodes across."""
-        return min(self.size // LEAF, FINEST).bit_length() - 1
+        return (self.size // LEAF).bit_length() - 1
 
     @property
     def nodes(self) -> int:
@@ -104,10 +110,11 @@ def light_heights(shadow_map: ShadowMap) -> LightHeights:
     dr.eval(texels)
     found = LightHeights(size, shadow_map.frame, texels, dr.empty(Float, 0))
     bounds = dr.empty(Float, 2 * found.faces * found.nodes)
-    for level in reversed(range(found.finest + 1)):
+    gaps, sides = _write_leaves(found, bounds)
+    for level in reversed(range(found.finest)):
         _write_level(found, bounds, level)
         dr.eval(bounds)
-    return LightHeights(size, shadow_map.frame, texels, bounds, depth)
+    return LightHeights(size, shadow_map.frame, texels, bounds, gaps, sides, depth)
 
 
 def node_bounds(heights: LightHeights, face, level, i, j, active=True):
@@ -129,8 +136,77 @@ def texel_heights(heights: LightHeights, face, i, j, active=True):
     return dr.gather(four_numbers(type(heights.texels)), heights.texels, texel, active)
 
 
+@dataclass
+class Leaf:
+    """The texels of a leaf, sorted by a height that divides them."""
+
+    below: Any  #: largest height of those that lie below it [1/m]
+    above: Any  #: least height of those that lie above it [1/m]
+    low: Any  #: bit 4 row + column of each texel below it
+    both: Any  #: and of each on both sides
+
+
+def leaf_sides(heights: LightHeights, face, i, j, active=True) -> Leaf:
+    """Return how the texels of the leaf in column `i` and row `j` are sorted."""
+    import drjit as dr
+    import mitsuba as mi
+
+    leaf = (((face << heights.finest) + j) << heights.finest) + i
+    gap = dr.gather(two_numbers(type(heights.gaps)), heights.gaps, leaf, active)
+    sides = dr.gather(mi.UInt32, heights.sides, leaf, active)
+    return Leaf(gap.x, gap.y, sides & 0xFFFF, sides >> 16)
+
+
+def _write_leaves(heights: LightHeights, bounds):
+    """Write the bounds of the leaves; return their gaps and sides."""
+    import drjit as dr
+    import mitsuba as mi
+
+    side = 1 << heights.finest
+    leaf = dr.arange(mi.UInt32, heights.faces * side * side)
+    row = leaf // side
+    face, i = row // side, leaf - row * side
+    j = row - face * side
+    Float = type(bounds)
+
+    def corners(k):
+        return texel_heights(heights, face, i * LEAF + k % LEAF, j * LEAF + k // LEAF)
+
+    def bound(k, low, high):
+        four = corners(k)
+        return k + 1, dr.minimum(low, dr.min(four)), dr.maximum(high, dr.max(four))
+
+    def sort(k, below, above, sides):
+        four = corners(k)
+        least, largest = dr.min(four), dr.max(four)
+        is_below, is_above = largest < divide, least >= divide
+        below = dr.select(is_below, dr.maximum(below, largest), below)
+        above = dr.select(is_above, dr.minimum(above, least), above)
+        bits = dr.select(is_below, mi.UInt32(1), dr.select(is_above, mi.UInt32(0), 1 << 16)) << k
+        return k + 1, below, above, sides | bits
+
+    zero, none = dr.zeros(mi.UInt32, dr.width(leaf)), dr.full(Float, dr.inf, dr.width(leaf))
+    state = (zero, none, dr.zeros(Float, dr.width(leaf)))
+    _, low, high = dr.while_loop(
+        state=state, cond=lambda k, *_: k < LEAF * LEAF, body=bound, labels=("k", "low", "high")
+    )
+    divide = dr.fma(_DIVIDE, high - low, low)
+    _, below, above, sides = dr.while_loop(
+        state=(zero + 0, low + 0, high + 0, zero + 0),
+        cond=lambda k, *_: k < LEAF * LEAF,
+        body=sort,
+        labels=("k", "below", "above", "sides"),
+    )
+    gaps = dr.empty(Float, 2 * dr.width(leaf))
+    node = face * heights.nodes + level_start(heights.finest) + j * side + i
+    dr.scatter(bounds, two_numbers(Float)(low, high), node)
+    dr.scatter(gaps, two_numbers(Float)(below, above), leaf)
+    dr.eval(bounds, gaps, sides)
+    return gaps, sides
+
+
 def _write_level(heights: LightHeights, bounds, level: int) -> None:
-    """Write the bounds of the nodes of a level, from those of the next one, or from the texels."""
+    """Write the bounds of the nodes of a level, from those of the next one."""
     import drjit as dr
     import mitsuba as mi
 
@@ -139,36 +215,11 @@ def _write_level(heights: LightHeights, bounds, level: int) -> None:
     row = index // side
     face, i = row // side, index - row * side
     j = row - face * side
-    if level == heights.finest:
-        low, high = _texel_bounds(heights, face, i, j)
-    else:
-        full = LightHeights(heights.size, heights.frame, heights.texels, bounds)
-        four = [node_bounds(full, face, level + 1, 2 * i + k % 2, 2 * j + k // 2) for k in range(4)]
-        low, high = four[0]
-        for lower, higher in four[1:]:
-            low, high = dr.minimum(low, lower), dr.maximum(high, higher)
+    full = LightHeights(heights.size, heights.frame, heights.texels, bounds)
+    four = [node_bounds(full, face, level + 1, 2 * i + k % 2, 2 * j + k // 2) for k in range(4)]
+    low, high = four[0]
+    for lower, higher in four[1:]:
+        low, high = dr.minimum(low, lower), dr.maximum(high, higher)
     node = face * heights.nodes + level_start(level) + j * side + i
     dr.eval(low, high)  # Dr.Jit would copy an array that one kernel both reads and writes
     dr.scatter(bounds, two_numbers(type(bounds))(low, high), node)
-
-
-def _texel_bounds(heights: LightHeights, face, i, j):
-    """Return the bounds over the texels of a node of the last level."""
-    import drjit as dr
-    import mitsuba as mi
-
-    across = heights.size >> heights.finest
-    Float = type(heights.texels)
-
-    def body(k, low, high):
-        four = texel_heights(heights, face, i * across + k % across, j * across + k // across)
-        return k + 1, dr.minimum(low, dr.min(four)), dr.maximum(high, dr.max(four))
-
-    zero = dr.zeros(mi.UInt32, dr.width(i))
-    _, low, high = dr.while_loop(
-        state=(zero, dr.full(Float, dr.inf, dr.width(i)), dr.zeros(Float, dr.width(i))),
-        cond=lambda k, low, high: k < across * across,
-        body=body,
-        labels=("k", "low", "high"),
-    )
-    return low, high

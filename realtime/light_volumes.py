@@ -195,6 +195,8 @@ def _memory_of(light: Light, size: int, evaluation: str) -> int:
     if evaluation == "mesh":
         # Drawing it takes four doubles for each vertex as it is, and four for it in the image.
         return corners + memory_needed(faces, size) + faces * (size + 1) ** 2 * 8 * 8
-    # Distances and heights at the corners, four heights a texel, two bounds a node.
+    # Distances and heights at the corners, four heights a texel, two bounds a node, a gap and sides a leaf.
     heights = LightHeights(size, None, None, None)
-    return 2 * corners + number * faces * (4 * size**2 + 2 * level_start(heights.finest + 1))
+    leaves = 4**heights.finest
+    numbers = 4 * size**2 + 2 * level_start(heights.finest + 1) + 2 * leaves
+    return 2 * corners + faces * (number * numbers + 4 * leaves)

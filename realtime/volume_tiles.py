@@ -3,25 +3,27 @@
 
 A tile is sixteen rays that follow one another (4 x 4 pixels), a block sixteen tiles. Where a beam of rays (see
 `realtime.beams`) misses the box of a node of the pyramid of heights, no ray of it meets the height field there: all of
-the node that they pass is lit, or all is dark. Blocks walk the pyramid from its top down to squares of some leaves,
-tiles from those of their block down to leaves, the last level, which a ray then looks at one by one. Lists have a fixed
-length: a tile whose leaves do not fit takes larger ones, and the whole face if need be.
+the node that they pass is lit, or all is dark. Blocks walk the pyramid from its top down to leaves, the last level, and
+tiles choose from those of their block. Of a leaf they list only the texels that the beam passes, and of those below or
+above the gap in the leaf's heights (see `realtime.light_heights`) only what it may meet. Lists have a fixed length: a
+tile whose leaves do not fit takes nodes of twice the size, without telling texels apart, and the whole face if need be.
 
 The walk needs no stack: the node after (i, j) at some level is its first child, or the next of its parent's four
 children, or what follows the parent.
 """
 
 from dataclasses import dataclass
-from functools import partial
+from functools import partial, reduce
 from typing import Any
 
 from realtime.arrays import is_single
-from realtime.beams import Beam, BeamPlanes, beam_planes, make_beam, may_meet
-from realtime.light_heights import LightHeights, node_bounds
+from realtime.beams import Beam, BeamPlanes, beam_planes, make_beam, may_meet, over_square, parts_within
+from realtime.light_heights import LightHeights, leaf_sides, node_bounds
 from realtime.shadow_map import face_products
 
 TILE = 16  #: rays in a tile, and tiles in a block
-COARSE = 1  #: levels above the leaves of what a block lists
+CHUNK = 4  #: leaves that a ray looks at together
+LARGER = 1 << 31  #: added to the first place of a list of nodes that are no leaves
 _BLOCK_ROOM = 256  # entries of the list of a block and face
 _TILE_ROOM = 96  # of a tile, for all faces together
 _CORNERS = (0, 3, 12, 15)  # lanes of a square tile at its corners
@@ -32,6 +34,7 @@ class Leaves:
     """The leaves that concern each tile, face by face."""
 
     entries: Any  #: level, row and column of a node
+    texels: Any  #: of a leaf, bit 4 row + column of each texel that the tile's rays may cross
     first: Any  #: by tile and face, the place of the first entry
     last: Any  #: the place behind the last one
 
@@ -43,6 +46,15 @@ class Node:
     level: Any
     i: Any  #: column
     j: Any  #: row
+
+
+@dataclass
+class _Box:
+    """A node as a beam meets it."""
+
+    low: Any  #: its bounds
+    high: Any
+    values: list[Any]  #: see `over_square`
 
 
 def packed(node: Node):
@@ -77,7 +89,6 @@ def tile_leaves(heights: LightHeights, rays, distance, *, light, square: bool) -
     Float, Vector = type(distance), type(light)
     count = dr.width(distance)
     tiles = -(-count // TILE)
-    blocks = -(-tiles // TILE)
     tile = dr.arange(mi.UInt32, tiles)
     lanes = [dr.minimum(tile * TILE + k, count - 1) for k in range(TILE)]
     directions = [rays(lanes[k]) for k in (_CORNERS if square else range(TILE))]
@@ -86,19 +97,18 @@ def tile_leaves(heights: LightHeights, rays, distance, *, light, square: bool) -
         ends = dr.maximum(ends, dr.gather(Float, distance, lane))
     dr.eval(directions, ends)
 
+    blocks = -(-tiles // TILE)
     lane = dr.arange(mi.UInt32, blocks * heights.faces)
-    block, face = lane // heights.faces, lane % heights.faces
+    face, block = lane // blocks, lane % blocks  # neighbours look at one face
     members = [dr.minimum(block * TILE + k, tiles - 1) for k in range(TILE)]
     about = [dr.gather(Vector, direction, member) for direction in directions for member in members]
-    end = dr.gather(Float, ends, members[0])
-    for member in members[1:]:
-        end = dr.maximum(end, dr.gather(Float, ends, member))
-    beam = make_beam(about, end, light, heights.axis)
-    return _tile_lists(heights, make_beam(directions, ends, light, heights.axis), *_block_lists(heights, beam, face))
+    end = reduce(dr.maximum, (dr.gather(Float, ends, member) for member in members))
+    lists = _block_lists(heights, make_beam(about, end, light, heights.axis), face)
+    return _tile_lists(heights, make_beam(directions, ends, light, heights.axis), *lists)
 
 
 def _block_lists(heights: LightHeights, beam: Beam, face):
-    """Return the nodes of level `finest - COARSE` that beams may meet, `_BLOCK_ROOM` places each, and how many."""
+    """Return the leaves that beams may meet, `_BLOCK_ROOM` places each, and how many; more than these are not there."""
     import drjit as dr
     import mitsuba as mi
 
@@ -106,97 +116,132 @@ def _block_lists(heights: LightHeights, beam: Beam, face):
     entries = dr.empty(mi.UInt32, dr.width(face) * _BLOCK_ROOM)
     planes = beam_planes(beam, partial(face_products, heights.frame, face))
     write = _writer(entries, lane * _BLOCK_ROOM, _BLOCK_ROOM)
-    level = mi.UInt32(max(0, heights.finest - COARSE))
-    count = _descend(heights, planes, face, _root(), level, dr.zeros(mi.UInt32, dr.width(face)), write, True)
+    zero = dr.zeros(mi.UInt32, dr.width(face))
+    count = _descend(heights, planes, face, mi.UInt32(heights.finest), zero, write, True)
     dr.eval(entries, count)
     return entries, count
 
 
 def _tile_lists(heights: LightHeights, beam: Beam, entries, found) -> Leaves:
-    """Return the leaves that beams may meet, drawn from the lists of their blocks."""
+    """Return the leaves that beams may meet, drawn from the lists of their blocks, and which of their texels."""
     import drjit as dr
     import mitsuba as mi
 
     tiles = dr.width(beam.end)
     tile = dr.arange(mi.UInt32, tiles)
     faces = heights.faces
-    leaves = dr.empty(mi.UInt32, tiles * _TILE_ROOM)
+    blocks = dr.width(found) // faces
+    leaves, texels = (dr.empty(mi.UInt32, tiles * _TILE_ROOM + CHUNK) for _ in range(2))
     first, last = dr.empty(mi.UInt32, tiles * faces), dr.empty(mi.UInt32, tiles * faces)
 
     def of_face(face, total):
         planes = beam_planes(beam, partial(face_products, heights.frame, face))
-        source = (tile // TILE) * faces + face
+        room = _TILE_ROOM - (faces - 1 - face)  # a place is left for every face to come
+        write = _leaf_writer(heights, planes, face, (leaves, texels), tile * _TILE_ROOM, room)
+        source = face * blocks + tile // TILE
         listed = dr.gather(mi.UInt32, found, source)
         whole = listed > _BLOCK_ROOM  # the block has no list
-        listed = dr.select(whole, 1, listed)
-        room = _TILE_ROOM - (faces - 1 - face)  # a place is left for every face to come
-        write = _writer(leaves, tile * _TILE_ROOM, room)
+        listed = dr.select(whole, 0, listed)
 
-        def of_entry(k, count, level):
-            entry = dr.gather(mi.UInt32, entries, source * _BLOCK_ROOM + k, k < listed)
-            start = unpacked(dr.select(whole, 0, entry))
-            count = _descend(heights, planes, face, start, level, count, write, k < listed)
-            # No room: again from the first entry, with leaves of twice the size.
-            again = (k + 1 == listed) & (count > room) & (level > start.level)
-            return dr.select(again, 0, k + 1), dr.select(again, total, count), dr.select(again, level - 1, level)
+        def of_entry(k, count):
+            node = unpacked(dr.gather(mi.UInt32, entries, source * _BLOCK_ROOM + k))
+            met, box = _meets(heights, planes, face, node, k < listed)
+            return k + 1, write(node, box, count, met)
 
-        _, count, _ = dr.while_loop(
-            state=(dr.zeros(mi.UInt32, tiles), total + 0, dr.full(mi.UInt32, heights.finest, tiles)),
-            cond=lambda k, count, level: k < listed,
+        _, count = dr.while_loop(
+            state=(dr.zeros(mi.UInt32, tiles), total + 0),
+            cond=lambda k, count: k < listed,
             body=of_entry,
-            labels=("k", "count", "level"),
+            labels=("k", "count"),
         )
+
+        def of_level(level, count, again):
+            count = dr.select(again, total, count)
+            count = _descend(heights, planes, face, level, count, write, again)
+            again &= (count > room) & (level > 0)
+            return dr.select(again, level - 1, level), count, again
+
+        # No list, or no room: down from the top, to leaves of twice the size and more if need be.
         full = count > room
-        dr.scatter(leaves, packed(_root()), tile * _TILE_ROOM + total, full)
-        count = dr.select(full, total + 1, count)
-        dr.scatter(first, tile * _TILE_ROOM + total, tile * faces + face)
+        level = dr.select(full, mi.UInt32(max(0, heights.finest - 1)), heights.finest)
+        level, count, _ = dr.while_loop(
+            state=(level, count, full | whole),
+            cond=lambda level, count, again: again,
+            body=of_level,
+            labels=("level", "count", "again"),
+        )
+        larger = dr.select(level < heights.finest, mi.UInt32(LARGER), 0)
+        dr.scatter(first, (tile * _TILE_ROOM + total) | larger, tile * faces + face)
         dr.scatter(last, tile * _TILE_ROOM + count, tile * faces + face)
         return face + 1, count
 
     zero = dr.zeros(mi.UInt32, tiles)
     dr.while_loop(state=(zero, zero + 0), cond=lambda face, total: face < faces, body=of_face, labels=("face", "total"))
-    dr.eval(leaves, first, last)
-    return Leaves(leaves, first, last)
-
-
-def _root() -> Node:
-    import mitsuba as mi
-
-    return Node(mi.UInt32(0), mi.UInt32(0), mi.UInt32(0))
+    dr.eval(leaves, texels, first, last)
+    return Leaves(leaves, texels, first, last)
 
 
 def _writer(target, first, room):
-    """Return the function that writes a node to its place in a list, if there is room."""
+    """Return the function that writes a node to its place in a list, if there is room, and counts it."""
     import drjit as dr
 
-    def write(node: Node, count, active):
+    def write(node: Node, box: _Box, count, active):
         def store(entry, place):
             dr.scatter(target, entry, place)
             return entry
 
         # A branch: most steps of a walk write nothing, and a scatter costs much even so.
-        args = (packed(node), first + count)
+        args = packed(node), first + count
         dr.if_stmt(args=args, cond=active & (count < room), true_fn=store, false_fn=lambda entry, place: entry)
+        return dr.select(active, count + 1, count)
 
     return write
 
 
-def _descend(heights: LightHeights, planes: BeamPlanes, face, start: Node, leaf, count, write, active):
-    """Count and write the nodes of level `leaf` below a node that beams may meet."""
+def _leaf_writer(heights: LightHeights, planes: BeamPlanes, face, targets, first, room):
+    """Return the function that writes a leaf, if any of its texels matters and there is room, and counts it."""
+    import drjit as dr
+
+    def write(node: Node, box: _Box, count, active):
+        def store(node, box, count):
+            texels = _texels_met(heights, planes, face, node, box)
+            some = texels != 0
+            for target, value in zip(targets, (packed(node), texels)):
+                dr.scatter(target, value, first + count, some & (count < room))
+            return dr.select(some, count + 1, count)
+
+        return dr.if_stmt(args=(node, box, count), cond=active, true_fn=store, false_fn=lambda node, box, count: count)
+
+    return write
+
+
+def _texels_met(heights: LightHeights, planes: BeamPlanes, face, node: Node, box: _Box):
+    """Return bit 4 row + column of each texel of a leaf that the beam may meet; 1 for larger nodes."""
+    import drjit as dr
+
+    fine = node.level == heights.finest
+    leaf = leaf_sides(heights, face, node.i, node.j, fine)
+    met = leaf.both
+    met |= dr.select(may_meet(planes, box.values, box.low, leaf.below), leaf.low, 0)
+    met |= dr.select(may_meet(planes, box.values, leaf.above, box.high), ~(leaf.low | leaf.both), 0)
+    met &= parts_within(planes, box.values, 2.0**-heights.finest, box.low, box.high)
+    return dr.select(fine, met, 1)
+
+
+def _descend(heights: LightHeights, planes: BeamPlanes, face, leaf, count, write, active):
+    """Count and write the nodes of level `leaf` that beams may meet."""
     import drjit as dr
     import mitsuba as mi
 
     def body(node: Node, count, going):
-        met = going & _meets(heights, planes, face, node, going)
+        met, box = _meets(heights, planes, face, node, going)
         at_leaf = met & (node.level == leaf)
-        write(node, count, at_leaf)
-        count += dr.select(at_leaf, mi.UInt32(1), 0)
+        count = write(node, box, count, at_leaf)
         down = met & ~at_leaf
         # The last of four children, of which the parent is the last of four, and so on: back to the first that is not.
         back = dr.select(down, 0, dr.tzcnt(~(node.i & node.j)))
-        level = node.level - back
-        i, j = node.i >> back, node.j >> back
-        going &= down | (level > start.level)
+        going &= down | (node.level > back)
+        level, i, j = node.level - back, node.i >> back, node.j >> back
         odd = (i & 1) != 0
         node = Node(
             dr.select(down, level + 1, level),
@@ -208,7 +253,7 @@ def _descend(heights: LightHeights, planes: BeamPlanes, face, start: Node, leaf,
     width = dr.width(face, planes.slack[0])
     _, count, _ = dr.while_loop(
         state=(
-            Node(*(part + dr.zeros(mi.UInt32, width) for part in (start.level, start.i, start.j))),
+            Node(*(dr.zeros(mi.UInt32, width) for _ in range(3))),
             count,
             dr.full(mi.Bool, True, width) & active,
         ),
@@ -220,14 +265,15 @@ def _descend(heights: LightHeights, planes: BeamPlanes, face, start: Node, leaf,
 
 
 def _meets(heights: LightHeights, planes: BeamPlanes, face, node: Node, active):
-    """Return whether a beam may meet the height field over a node."""
+    """Return whether a beam may meet the height field over a node, and what it was found from."""
     import drjit as dr
 
     low, high = node_bounds(heights, face, node.level, node.i, node.j, active)
     half = _half(type(low), node.level)
     u = dr.fma(dr.fma(2.0, type(low)(node.i), 1.0), half, -1.0)
     v = dr.fma(dr.fma(2.0, type(low)(node.j), 1.0), half, -1.0)
-    return may_meet(planes, (u, v), half, low, high)
+    box = _Box(low, high, over_square(planes, (u, v), half))
+    return active & may_meet(planes, box.values, low, high), box
 
 
 def _half(Float, level):

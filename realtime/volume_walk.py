@@ -12,6 +12,9 @@ texel's diagonal, to the other; within a triangle D is linear in t. Which texels
 not matter (Billeter, Sintorn, Assarsson 2010, eq. 3), and what `realtime.volume_tiles` leaves out has no change of
 sign. A ray that is lit at its beginning is lit at its end after an even number of crossings: no tolerance can break it.
 
+A leaf's texels are looked at only where the tile may cross them and the ray passes: one bit each, 64 bits for four
+leaves. What is found to be crossed is computed again to be kept, since most is not.
+
 Crossings are kept in order of distance, the nearest eight. A ray with more goes over its texels again for those that
 are farther; two may lie at the same distance, so it counts anew how many it has passed. Between crossings the kernel
 integrates each lit piece by itself: a sum of positive terms, where a sum of J(0, x) of both signs would lose digits.
@@ -19,15 +22,13 @@ integrates each lit piece by itself: a sum of positive terms, where a sum of J(0
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import reduce
 from itertools import pairwise
 from typing import Any
 
-from realtime.light_heights import LightHeights, texel_heights
-from realtime.volume_rays import FaceRay, at_line, distance_at, face_ray, in_face
-from realtime.volume_tiles import TILE, Leaves, unpacked
-
-_ROUNDING = 1e-5  # of a height of the map, with room
+from realtime.light_heights import LightHeights
+from realtime.volume_rays import FaceRay, distance_at, face_ray, in_face
+from realtime.volume_texels import Line, Pieces, borders, cell_at, line_of, slope_of, texel_pieces, texels_on
+from realtime.volume_tiles import CHUNK, LARGER, TILE, Leaves, unpacked
 
 PLACES = 8  #: crossings that a ray keeps; even, so that it is lit after them as before
 
@@ -72,7 +73,8 @@ def sum_lit_pieces(
         def add(total, reached):
             ray = face_ray(heights, face, away, direction, (begin, end))
             place = tile * heights.faces + face
-            source = leaves.entries, *(dr.gather(mi.UInt32, ends, place) for ends in (leaves.first, leaves.last))
+            first, last = (dr.gather(mi.UInt32, ends, place) for ends in (leaves.first, leaves.last))
+            source = leaves, first & (LARGER - 1), last, (first & LARGER) != 0
             total, lit = _face_sum(heights, face, ray, source, total, integral)
             return total, dr.select(end >= segment[1], lit, reached)
 
@@ -97,7 +99,7 @@ def _face_sum(heights, face, ray: FaceRay, source, total, integral):
     """Add the lit pieces of one face to a total; return also whether the ray is lit where it leaves the face."""
     import drjit as dr
 
-    line = _line_of(heights, face, ray)
+    line = line_of(heights, face, ray)
     # All is lit before the line begins, and after it ends early.
     lit = ~ray.walks | (line.excess[0] > 0)
     reached = ~ray.walks | (line.excess[1] > -line.slack)
@@ -118,61 +120,6 @@ def _face_sum(heights, face, ray: FaceRay, source, total, integral):
 
 
 @dataclass
-class _Line:
-    """A ray's line over a face, with D at its ends."""
-
-    ray: FaceRay
-    right: Any  #: whether columns rise along it
-    up: Any  #: whether rows do
-    excess: tuple[Any, Any]  #: D at t = 0 and t = 1
-    slack: Any  #: how far below the height field a point at t = 1 may seem that lies on what it samples
-
-
-def _line_of(heights: LightHeights, face, ray: FaceRay) -> _Line:
-    """Return the line of a ray; D at its ends is that of the texel whose own borders are on either side of them."""
-    import drjit as dr
-    import mitsuba as mi
-
-    right, up = ray.per_u > 0, ray.per_v > 0
-    excess, slack = [], type(ray.begin)(0)
-    for t in (0, 1):
-        at = type(ray.begin)(t)
-        i, j = (
-            _cell(pair, per, at, mi.UInt32(0), mi.UInt32(heights.size))
-            for pair, per in ((ray.u, ray.per_u), (ray.v, ray.per_v))
-        )
-        s00, s10, s01, s11 = texel_heights(heights, face, i, j, ray.walks)
-        x, y = ray.u[t] - type(at)(i), ray.v[t] - type(at)(j)
-        below = x >= y
-        along, upward = dr.select(below, s10 - s00, s11 - s01), dr.select(below, s11 - s10, s01 - s00)
-        excess.append(ray.s[t] - dr.fma(x, along, dr.fma(y, upward, s00)))
-        heights_there = (s00, s10, s01, s11)
-        slack = dr.fma(ray.s[t], _ROUNDING, reduce(dr.maximum, heights_there) - reduce(dr.minimum, heights_there))
-    return _Line(ray, right, up, (excess[0], excess[1]), slack)
-
-
-def _cell(pair, per, t, low, side):
-    """Return the column (or row) of a strip of texels whose own borders are on either side of t."""
-    import drjit as dr
-    import mitsuba as mi
-
-    first, last = mi.Int32(low), mi.Int32(low + side) - 1
-    cell = dr.clip(mi.Int32(dr.floor(at_line(pair, t))), first, last)
-    # Rounding may have put it one too far, or not far enough.
-    begin, end = _borders(type(t)(cell), pair[0], per)
-    step = dr.select(per > 0, mi.Int32(1), mi.Int32(-1))
-    return mi.UInt32(dr.clip(dr.select(t >= end, cell + step, dr.select(t < begin, cell - step, cell)), first, last))
-
-
-def _borders(low, start, per, across=1.0):
-    """Return the t at which a line enters and leaves a strip of texels."""
-    import drjit as dr
-
-    one, other = (low - start) * per, (low + across - start) * per
-    return dr.minimum(one, other), dr.maximum(one, other)
-
-
-@dataclass
 class _Crossings:
     """Crossings of rays, beyond some distance."""
 
@@ -181,125 +128,114 @@ class _Crossings:
     odd: Any  #: whether an odd number of them is not beyond that distance
 
 
-def _nearest_crossings(heights, face, line: _Line, source, after, active):
+def _nearest_crossings(heights, face, line: Line, source, after, active):
     """Return the nearest crossings beyond `after`, and whether there are more."""
     import drjit as dr
     import mitsuba as mi
 
-    entries, first, last = source
+    leaves, first, last, coarse = source
     Float = type(after)
     width = dr.width(after)
     last = dr.select(active, last, first)
+    slope = slope_of(line, heights.size)
 
-    def of_entry(k, found):
-        node = unpacked(dr.gather(mi.UInt32, entries, k, k < last))
+    def of_chunk(k, found):
+        bits = _chunk_bits(line, slope, leaves, k, last)
+
+        def texel(bits):
+            bit = mi.UInt32(dr.tzcnt(bits))
+            node = unpacked(dr.gather(mi.UInt32, leaves.entries, k + (bit >> 4)))
+            return (node.i << 2) + (bit & 3), (node.j << 2) + ((bit >> 2) & 3)
+
+        def look(bits, crossed):
+            lowest = bits & (~bits + 1)
+            one, other = texel_pieces(heights, face, line, texel(bits)).changes
+            return bits ^ lowest, crossed | dr.select(one | other, lowest, 0)
+
+        _, crossed = dr.while_loop(
+            state=(bits, mi.UInt64(0)), cond=lambda bits, crossed: bits != 0, body=look, labels=("bits", "crossed")
+        )
+
+        def keep(crossed, found):
+            found = _with_crossings(texel_pieces(heights, face, line, texel(crossed)), line.ray, found, after)
+            return crossed & (crossed - 1), found
+
+        _, found = dr.while_loop(
+            state=(crossed, found), cond=lambda crossed, found: crossed != 0, body=keep, labels=("crossed", "found")
+        )
+        return k + CHUNK, found
+
+    def of_larger(k, found):
+        node = unpacked(dr.gather(mi.UInt32, leaves.entries, k))
         side = mi.UInt32(heights.size) >> node.level
-        return k + 1, _leaf_crossings(heights, face, line, (node.i * side, node.j * side, side), found, after)
+        return k + 1, _square_crossings(heights, face, line, (node.i * side, node.j * side, side), found, after)
 
     queue, no = [dr.full(Float, dr.inf, width) for _ in range(PLACES)], dr.full(mi.Bool, False, width)
-    _, found = dr.while_loop(
-        state=(first + dr.zeros(mi.UInt32, width), _Crossings(queue, no, no & True)),
-        cond=lambda k, found: k < last,
-        body=of_entry,
-        labels=("k", "found"),
-    )
+    found = _Crossings(queue, no, no & True)
+    for kind, body in ((~coarse, of_chunk), (coarse, of_larger)):
+        _, found = dr.while_loop(
+            state=(dr.select(kind, first, last), found),
+            cond=lambda k, found: k < last,
+            body=body,
+            labels=("k", "found"),
+        )
     return found
 
 
-def _leaf_crossings(heights, face, line: _Line, square, found: _Crossings, after) -> _Crossings:
-    """Add the crossings in a square of texels."""
+def _chunk_bits(line: Line, slope, leaves, k, last):
+    """Return 16 bits for each leaf of a chunk: which of its texels the tile may cross and the ray passes."""
+    import drjit as dr
+    import mitsuba as mi
+
+    bits = mi.UInt64(0)
+    for place in range(CHUNK):
+        node = unpacked(dr.gather(mi.UInt32, leaves.entries, k + place))
+        texels = dr.gather(mi.UInt32, leaves.texels, k + place) & texels_on(line, slope, node)
+        bits |= mi.UInt64(dr.select(k + place < last, texels, 0)) << (16 * place)
+    return bits
+
+
+def _with_crossings(pieces: Pieces, ray: FaceRay, found: _Crossings, after) -> _Crossings:
+    """Add the crossings of two pieces."""
+    import drjit as dr
+
+    queue, lost, odd = found.queue, found.lost, found.odd
+    for k, changes in enumerate(pieces.changes):
+        (t0, t1), (d0, d1) = pieces.t[k : k + 2], pieces.excess[k : k + 2]
+        x = distance_at(ray, dr.fma(d0 / (d0 - d1), t1 - t0, t0))
+        queue, out = _inserted(queue, dr.select(changes & (x > after), x, dr.inf))
+        lost = lost | (out < dr.inf)
+        odd = odd ^ (changes & (x <= after))
+    return _Crossings(queue, lost, odd)
+
+
+def _square_crossings(heights, face, line: Line, square, found: _Crossings, after) -> _Crossings:
+    """Add the crossings in a square of texels, one after the other."""
     import drjit as dr
 
     column, row, side = square
     ray, Float = line.ray, type(after)
-    in_u, out_u = _borders(Float(column), ray.u[0], ray.per_u, Float(side))
-    in_v, out_v = _borders(Float(row), ray.v[0], ray.per_v, Float(side))
+    in_u, out_u = borders(Float(column), ray.u[0], ray.per_u, Float(side))
+    in_v, out_v = borders(Float(row), ray.v[0], ray.per_v, Float(side))
     begin, end = dr.maximum(dr.maximum(in_u, in_v), 0), dr.minimum(dr.minimum(out_u, out_v), 1)
-    i, j = _cell(ray.u, ray.per_u, begin, column, side), _cell(ray.v, ray.per_v, begin, row, side)
+    i, j = cell_at(ray.u, ray.per_u, begin, column, side), cell_at(ray.v, ray.per_v, begin, row, side)
     by_u = in_u >= begin
     i = dr.select(by_u, dr.select(line.right, column, column + side - 1), i)
     j = dr.select((in_v >= begin) & ~by_u, dr.select(line.up, row, row + side - 1), j)
-    near_near, near_far, far_near, _ = _as_seen(line, texel_heights(heights, face, i, j, begin < end))
-    excess = _excess_on_border(line, (i, j), begin, by_u, near_near, dr.select(by_u, near_far, far_near))
-    excess = dr.select(dr.maximum(in_u, in_v) < 0, line.excess[0], excess)
 
-    def step(i, j, t, excess, found):
-        found, t, excess, by_u = _cross_texel(heights, face, line, (i, j), t, excess, found, after)
+    def step(i, j, t, found):
+        pieces = texel_pieces(heights, face, line, (i, j))
+        found = _with_crossings(pieces, ray, found, after)
+        by_u = borders(Float(i), ray.u[0], ray.per_u)[1] <= pieces.t[2]
         i = dr.select(by_u, dr.select(line.right, i + 1, i - 1), i)
-        return i, dr.select(by_u, j, dr.select(line.up, j + 1, j - 1)), t, excess, found
+        return i, dr.select(by_u, j, dr.select(line.up, j + 1, j - 1)), pieces.t[2], found
 
     return dr.while_loop(
-        state=(i, j, begin, excess, found),
-        cond=lambda i, j, t, excess, found: t < end,
+        state=(i, j, begin, found),
+        cond=lambda i, j, t, found: t < end,
         body=step,
-        labels=("i", "j", "t", "excess", "found"),
+        labels=("i", "j", "t", "found"),
     )[-1]
-
-
-def _as_seen(line: _Line, four):
-    """Return the heights of a texel's corners near or far in u, then near or far in v, as the line goes."""
-    import drjit as dr
-
-    s00, s10, s01, s11 = four
-    low = dr.select(line.right, s00, s10), dr.select(line.right, s10, s00)
-    high = dr.select(line.right, s01, s11), dr.select(line.right, s11, s01)
-    near_near, near_far = dr.select(line.up, low[0], high[0]), dr.select(line.up, high[0], low[0])
-    far_near, far_far = dr.select(line.up, low[1], high[1]), dr.select(line.up, high[1], low[1])
-    return near_near, near_far, far_near, far_far
-
-
-def _excess_on_border(line: _Line, texel, t, on_u, base, other):
-    """Return D on the border of a texel, between the height `base` of its nearer corner and that of the other."""
-    import drjit as dr
-
-    ray, Float = line.ray, type(t)
-    x, y = at_line(ray.u, t) - Float(texel[0]), at_line(ray.v, t) - Float(texel[1])
-    along = dr.select(on_u, dr.select(line.up, y, 1 - y), dr.select(line.right, x, 1 - x))
-    return at_line(ray.s, t) - dr.fma(along, other - base, base)
-
-
-def _cross_texel(heights, face, line: _Line, texel, t, excess, found: _Crossings, after):
-    """Add the crossings in a texel, which the line enters at t.
-
-    Returns
-    -------
-    found
-        The crossings so far.
-    end, excess
-        The t at which the line leaves the texel, and D there.
-    by_u
-        Whether it leaves it over the border of a column.
-    """
-    import drjit as dr
-
-    ray, Float = line.ray, type(t)
-    _, out_u = _borders(Float(texel[0]), ray.u[0], ray.per_u)
-    _, out_v = _borders(Float(texel[1]), ray.v[0], ray.per_v)
-    end = dr.minimum(dr.minimum(out_u, out_v), 1)
-    by_u = out_u <= end
-    four = texel_heights(heights, face, *texel)
-    _, near_far, far_near, far_far = _as_seen(line, four)
-    d1 = _excess_on_border(line, texel, end, by_u, dr.select(by_u, far_near, near_far), far_far)
-    d1 = dr.select(end < dr.minimum(out_u, out_v), line.excess[1], d1)
-    middle = ((ray.u[0] - Float(texel[0])) - (ray.v[0] - Float(texel[1]))) * ray.per_diagonal
-    bends = (middle > t) & (middle < end)
-    middle = dr.select(bends, middle, end)
-    on_diagonal = dr.fma(at_line(ray.u, middle) - Float(texel[0]), four[3] - four[0], four[0])
-    dm = dr.select(bends, at_line(ray.s, middle) - on_diagonal, d1)
-    first, second = (excess > 0) != (dm > 0), (dm > 0) != (d1 > 0)
-
-    def store(found):
-        queue, lost, odd = found.queue, found.lost, found.odd
-        for changes, ends, excesses in ((first, (t, middle), (excess, dm)), (second, (middle, end), (dm, d1))):
-            share = excesses[0] / (excesses[0] - excesses[1])
-            x = distance_at(ray, dr.fma(share, ends[1] - ends[0], ends[0]))
-            queue, out = _inserted(queue, dr.select(changes & (x > after), x, dr.inf))
-            lost = lost | (out < dr.inf)
-            odd = odd ^ (changes & (x <= after))
-        return _Crossings(queue, lost, odd)
-
-    found = dr.if_stmt(args=(found,), cond=(first | second) & (end > t), true_fn=store, false_fn=lambda found: found)
-    return found, end, d1, by_u
 
 
 def _inserted(queue, x):

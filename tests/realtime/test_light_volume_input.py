@@ -79,7 +79,8 @@ def test_memory_that_is_needed_is_what_the_arrays_hold(variant):
     scene = read_scene(loaded_scene())
     shadow_map = cast_shadow_map(scene.geometry, scene.lights[0], 64)
     heights = light_heights(shadow_map)
-    held = 4 * (2 * len(shadow_map.distance) + len(heights.texels) + len(heights.bounds))
+    arrays = heights.texels, heights.bounds, heights.gaps, heights.sides
+    held = 4 * (2 * len(shadow_map.distance) + sum(len(array) for array in arrays))
     assert realtime.light_volumes._memory_of(scene.lights[0], 64, "walk") == held
 
 
