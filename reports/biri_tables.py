@@ -4,7 +4,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-from reports.bench_tables import RATES, print_heading, print_markdown, rate_cells
+from reports.bench_tables import RATES, print_heading, print_markdown, rate, rate_cells
 from reports.tables import number, print_table
 
 
@@ -64,6 +64,7 @@ def _print_rates(rows: Sequence, show) -> None:
         "triangles",
         "published",
         *RATES,
+        "camera rays alone",
         "rel. RMSE",
         "rel. bias",
         "p99",
@@ -77,6 +78,7 @@ def _print_rates(rows: Sequence, show) -> None:
                 str(row.triangles),
                 number(row.published.fps),
                 *rate_cells(row, row.published.fps if row.size == row.published.size else None),
+                rate(row.rays.median_ms),
                 number(error.relative_rmse, 2),
                 number(error.relative_bias, 2),
                 number(error.p99, 2),

@@ -26,6 +26,7 @@ BIRI = {
             "static": timing(12.5),
             "relit": timing(16.0),
             "recoloured": timing(10.0),
+            "rays": timing(4.0),
             "error": {"relative_rmse": 0.002, "relative_bias": 0.001, "p99": 0.01},
             "error_size": [160, 120],
         }

@@ -38,7 +38,15 @@ from realtime.silhouettes import silhouette
 from validation.configurations import Configuration, prepared
 from validation.load import load_scene
 from validation.metrics import Metrics, error_metrics
-from validation.timing import Timing, changed_look, first_frame, moved_light, moved_light_alone, time_in_turns
+from validation.timing import (
+    Timing,
+    camera_rays,
+    changed_look,
+    first_frame,
+    moved_light,
+    moved_light_alone,
+    time_in_turns,
+)
 from validation.truth import truth_image
 
 STAGES = ("silhouettes", "scene", "airlight of the scene", "sorting", "shadow planes")
@@ -89,6 +97,7 @@ class TableRow:
     static: Timing  #: a frame whose planes are there: camera rays, surface, tile lists, airlight
     relit: Timing  #: a frame after the light moved, the camera rays of the last one kept
     recoloured: Timing  #: a frame after only medium or colours changed: planes, tile lists, camera rays are kept
+    rays: Timing  #: the camera rays alone
     error: Metrics  #: of the airlight at pixel centres, at `error_size`
     error_size: tuple[int, int]
 
@@ -138,9 +147,10 @@ def biri_row(
         lambda: run_stages(renderer, kept.prepared),
         moved_light_alone(renderer, kept),
         changed_look(renderer, kept),
+        camera_rays(renderer),
         *_stages(renderer, kernel, kept),
     ]
-    rebuilt, static, relit, recoloured, *stages = time_in_turns(works, seconds=7 * seconds)
+    rebuilt, static, relit, recoloured, rays, *stages = time_in_turns(works, seconds=8 * seconds)
     return TableRow(
         published,
         kernel,
@@ -152,6 +162,7 @@ def biri_row(
         static,
         relit,
         recoloured,
+        rays,
         error,
         error_size,
     )

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from realtime.camera import ray_directions
 from realtime.frame import (
     FrameRenderer,
     run_airlight,
@@ -23,9 +24,11 @@ from realtime.frame import (
     run_tiles,
     run_tiles_and_airlight,
 )
+from realtime.frozen import Frozen
 from realtime.motion import Objects, read_objects, turned_objects
 from realtime.next_frame import Kept, next_frame
 from realtime.scene import Scene
+from realtime.surface import cast_rays
 
 #: Of a frame that takes longer than this the stages are timed once, in one more frame: its spread matters little, and
 #: some thirty such frames, as others have, would take minutes [s].
@@ -132,6 +135,19 @@ def moved_light_alone(renderer: FrameRenderer, kept: Kept) -> Callable[[], Any]:
 def changed_look(renderer: FrameRenderer, kept: Kept) -> Callable[[], Any]:
     """Return a frame after the medium or colours of lights changed: only surface and airlight are computed."""
     return _step(renderer, kept, light_moved=False)
+
+
+def camera_rays(renderer: FrameRenderer) -> Callable[[], Any]:
+    """Return the camera rays of a frame alone, cast and not shaded: no frame that casts them takes less."""
+    import drjit as dr
+
+    scene = renderer.scene
+
+    @Frozen
+    def cast(geometry, facets, pixel, camera):
+        return cast_rays(geometry, facets, camera.origin, ray_directions(camera, pixel)[0]).distance
+
+    return lambda: dr.eval(cast(scene.geometry, scene.facets, renderer.pixel, scene.camera))
 
 
 def _step(renderer: FrameRenderer, kept: Kept | None, *, light_moved: bool) -> Callable[[], Any]:
