@@ -22,7 +22,7 @@ no neighbour has less, none of all planes has.
 from dataclasses import dataclass
 from typing import Any
 
-from realtime.arrays import four_numbers
+from realtime.arrays import four_numbers, types_of
 from realtime.clipping import Seen
 
 _UNROLLED = 4  # neighbours, as many as facets of boxes have
@@ -38,6 +38,7 @@ class EntryPlanes:
     number: Any  #: of that plane
     within: Any  #: whether the light is in the body
     entries: Any  #: four numbers a neighbour: its g [1/m] and its number; where there is none those of the plane itself
+    across: Any  #: three numbers a neighbour on the other side of the body: its g [1/m]; 0 where there is none
 
 
 @dataclass
@@ -77,11 +78,15 @@ def _facing_planes(seen: Seen, side: int) -> EntryPlanes | None:
     entries = dr.zeros(Float, 4 * body.count * body.sides)
     for column, value in enumerate((*g, Float(number))):
         dr.scatter(entries, value, 4 * place + column)
+    across = dr.zeros(Float, 3 * body.count * body.sides)
+    there = dr.gather(Four, seen.planes, body.neighbours)
+    for column, value in enumerate(dr.select(outside == (side > 0), 0, there.xyz * side)):
+        dr.scatter(across, value, 3 * place + column)
     found, middle = _middle_plane(seen, side)
     within = found >= body.count
     number = dr.select(within, 0, found)
-    dr.eval(entries, middle, number, within)
-    return EntryPlanes(body.sides, body.count, middle, number, within, entries)
+    dr.eval(entries, across, middle, number, within)
+    return EntryPlanes(body.sides, body.count, middle, number, within, entries, across)
 
 
 def _middle_plane(seen: Seen, side: int):
@@ -113,7 +118,7 @@ def _middle_plane(seen: Seen, side: int):
     return found, g
 
 
-def first_entry(planes: EntryPlanes, start, direction, x) -> Entry:
+def first_entry(planes: EntryPlanes, start, direction, x, active=True) -> Entry:
     """Return the plane through which the legs to the points start + x direction enter.
 
     Parameters
@@ -124,6 +129,8 @@ def first_entry(planes: EntryPlanes, start, direction, x) -> Entry:
         From the light to the camera, and of the rays [m].
     x
         Distances of points within the body [m].
+    active
+        Lanes to search in.
 
     Notes
     -----
@@ -141,20 +148,60 @@ def first_entry(planes: EntryPlanes, start, direction, x) -> Entry:
         found = _over_neighbours(planes, number, (number, constant, slope), start, direction, nearer)
         return turn + 1, *found, searches & (found[0] != number)
 
-    width = dr.width(start, direction, x)
+    width = dr.width(start, direction, x, active)
     _, number, constant, slope, _ = dr.while_loop(
         state=(
             dr.zeros(mi.UInt32, width),
             dr.zeros(mi.UInt32, width) + planes.number,
             dr.dot(planes.middle, start) + dr.zeros(type(x), width),
             dr.dot(planes.middle, direction) + dr.zeros(type(x), width),
-            dr.full(mi.Bool, True, width),
+            dr.full(mi.Bool, True, width) & active,
         ),
         cond=lambda turn, number, constant, slope, searches: searches & (turn < planes.count),
         body=step,
         labels=("turn", "number", "constant", "slope", "searches"),
     )
     return Entry(number, constant, slope)
+
+
+def line_crossings(planes: tuple[EntryPlanes, EntryPlanes], v, active):
+    """Return 1/f_in and 1/f_out for lines from the light along v, see `realtime.clipping`.
+
+    Parameters
+    ----------
+    planes
+        Those where legs enter the body, and those where they leave it.
+    v
+        Vectors from the light [m].
+    active
+        Lanes to compute.
+
+    Returns
+    -------
+    enter, leave
+        As from `realtime.clipping.inverse_crossings`: the line misses the body where enter is 0 or less.
+
+    Notes
+    -----
+    Where no plane next to the one that is found has less, the line enters by it if it meets its facet: if it is within
+    the planes next to it on the other side of the body, too.
+    """
+    import drjit as dr
+
+    entering, leaving = planes
+    still, zero = dr.zeros(type(v)), type(v.x)(0)
+    entry = first_entry(entering, v, still, zero, active & ~entering.within)
+    u = entry.constant
+    for side in range(entering.sides):
+        u = dr.select(dr.dot(_across(entering, entry.number, side), v) > u, -1, u)
+    u = dr.select(entering.within, dr.inf, u)
+    return u, -first_entry(leaving, v, still, zero, active & (u > 0)).constant
+
+
+def _across(planes: EntryPlanes, number, side: int):
+    import drjit as dr
+
+    return dr.gather(types_of(type(planes.across)).vector, planes.across, number * planes.sides + side)
 
 
 def clear_of(planes: tuple[EntryPlanes, EntryPlanes], start, direction, x0, x1):

@@ -9,7 +9,7 @@ from typing import Any
 
 from realtime.body_tiles import ball_range, plane_lists
 from realtime.clipping import Seen, inverse_crossings, near_line, passage, seen_from, share_inside
-from realtime.entry_planes import EntryPlanes, clear_of, entry_planes, exit_planes
+from realtime.entry_planes import EntryPlanes, clear_of, entry_planes, exit_planes, line_crossings
 from realtime.geometry import RayGeometry, distance_to_light
 from realtime.lights import Light
 from realtime.medium import Body, Medium
@@ -203,11 +203,19 @@ def path_transmittance(medium: Medium, light: Light, *, depths, point, active):
     for body in medium.bodies:
         seen = seen_from(body, light.position)
         near = active & near_line(seen, vector / length, length)
-        (enter,), (leave,) = inverse_crossings(seen, vector, dr.zeros(type(vector)), [type(length)(0)], near)
+        enter, leave = _line_crossings(seen, vector, near)
         inside = dr.select(near, share_inside(enter, leave) * length, 0)
         excess = [own - sigma for own, sigma in zip(body.medium.sigma_t, medium.sigma_t)]
         depths = [dr.fma(more, inside, depth) for more, depth in zip(excess, depths)]
     return type(medium.albedo)(*(dr.exp(-depth) for depth in depths))
+
+
+def _line_crossings(seen: Seen, v, active):
+    entering, leaving = entry_planes(seen), exit_planes(seen)
+    if entering is None or leaving is None:
+        (enter,), (leave,) = inverse_crossings(seen, v, v * 0, [type(v.x)(0)], active)
+        return enter, leave
+    return line_crossings((entering, leaving), v, active)
 
 
 def light_leg(ray: MediaRay, piece: Piece, xs, rs) -> list[list[Any]]:
