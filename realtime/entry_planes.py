@@ -25,6 +25,7 @@ from typing import Any
 from realtime.arrays import four_numbers, types_of
 from realtime.clipping import Seen
 
+_CELLS = 8  # of the image of a body along a side, for planes to begin at
 _UNROLLED = 4  # neighbours, as many as facets of boxes have
 
 
@@ -34,9 +35,10 @@ class EntryPlanes:
 
     sides: int  #: neighbours of a plane
     count: int  #: planes
-    middle: Any  #: g of the plane before the middle of the body, 0 where the light is in the body [1/m]
-    number: Any  #: of that plane
-    within: Any  #: whether the light is in the body
+    frame: tuple[Any, Any, Any]  #: axes of the image of the body: across, up, and towards its middle
+    starts: Any  #: by cell of that image the number of a plane to begin at
+    within: Any  #: whether the light is in the body: it is outside of no plane
+    g: Any  #: four numbers a plane: its g [1/m], and nothing
     entries: Any  #: four numbers a neighbour: its g [1/m] and its number; where there is none those of the plane itself
     across: Any  #: three numbers a neighbour on the other side of the body: its g [1/m]; 0 where there is none
 
@@ -71,51 +73,88 @@ def _facing_planes(seen: Seen, side: int) -> EntryPlanes | None:
     Four = four_numbers(Float)
     place = dr.arange(mi.UInt32, body.count * body.sides)
     own = place // body.sides
-    outside = dr.gather(Float, seen.planes, 4 * body.neighbours + 3) > 0
-    number = dr.select(outside == (side > 0), body.neighbours, own)
+    there = dr.gather(Four, seen.planes, body.neighbours)
+    facing = (there.w > 0) == (side > 0)
+    number = dr.select(facing, body.neighbours, own)
     values = dr.gather(Four, seen.planes, number)
     g = dr.select((values.w > 0) == (side > 0), values.xyz * side, 0)
-    entries = dr.zeros(Float, 4 * body.count * body.sides)
-    for column, value in enumerate((*g, Float(number))):
-        dr.scatter(entries, value, 4 * place + column)
-    across = dr.zeros(Float, 3 * body.count * body.sides)
-    there = dr.gather(Four, seen.planes, body.neighbours)
-    for column, value in enumerate(dr.select(outside == (side > 0), 0, there.xyz * side)):
-        dr.scatter(across, value, 3 * place + column)
-    found, middle = _middle_plane(seen, side)
-    within = found >= body.count
-    number = dr.select(within, 0, found)
-    dr.eval(entries, across, middle, number, within)
-    return EntryPlanes(body.sides, body.count, middle, number, within, entries, across)
+    entries = _columns(Float, 4, place, (*g, Float(number)))
+    across = _columns(Float, 3, place, dr.select(facing, 0, there.xyz * side))
+    frame = _image_frame(seen)
+    found = _nearest_planes(seen, side, frame)
+    within = dr.gather(mi.UInt32, found, mi.UInt32(0)) >= body.count
+    starts = dr.select(found >= body.count, 0, found)
+    every = dr.gather(Four, seen.planes, dr.arange(mi.UInt32, body.count))
+    own_g = dr.select(within, 0, every.xyz * side)
+    planes = _columns(Float, 4, dr.arange(mi.UInt32, body.count), (*own_g, Float(0)))
+    dr.eval(entries, across, frame, starts, within, planes)
+    return EntryPlanes(body.sides, body.count, frame, starts, within, planes, entries, across)
 
 
-def _middle_plane(seen: Seen, side: int):
-    """Return the number and g of the plane that the line to the middle of the body meets, if there is one."""
+def _columns(Float, width: int, place, columns):
+    """Return an array of `width` numbers a place."""
+    import drjit as dr
+
+    array = dr.zeros(Float, width * dr.width(place))
+    for column, value in enumerate(columns):
+        dr.scatter(array, value, width * place + column)
+    return array
+
+
+def _image_frame(seen: Seen):
+    """Return axes in which the body's ball is seen between -1 and 1: (v . across, v . up)/(v . middle)."""
+    import drjit as dr
+
+    toward, radius = seen.toward, seen.body.radius
+    distance = dr.maximum(dr.norm(toward), 1e-6 * radius)
+    # From within the ball there is no such image; any plane will do to begin at.
+    beside = dr.sqrt(dr.maximum((distance - radius) * (distance + radius), 0.01 * radius * radius))
+    middle = toward / distance
+    Vector = type(toward)
+    across = dr.normalize(dr.cross(middle, dr.select(dr.abs(middle.x) < 0.6, Vector(1, 0, 0), Vector(0, 1, 0))))
+    up = dr.cross(across, middle)
+    return across * (beside / radius), up * (beside / radius), middle
+
+
+def _nearest_planes(seen: Seen, side: int, frame):
+    """Return by cell of the image the plane that the line through its middle meets first; `count` if there is none."""
     import drjit as dr
     import mitsuba as mi
 
     Float = type(seen.planes)
     Four = four_numbers(Float)
+    cell = dr.arange(mi.UInt32, _CELLS * _CELLS)
+    across, up, middle = frame
+    scale = dr.rcp(dr.squared_norm(across))
+    first, second = (Float(part) * (2 / _CELLS) + (1 / _CELLS - 1) for part in (cell % _CELLS, cell // _CELLS))
+    v = middle + across * (first * scale) + up * (second * scale)
 
-    def nearer(number, least, found, g):
+    def nearer(number, least, found):
         values = dr.gather(Four, seen.planes, number)
-        own = values.xyz * side
-        value = dr.dot(own, seen.toward)
+        value = dr.dot(values.xyz * side, v)
         less = ((values.w > 0) == (side > 0)) & (value < least)
-        return number + 1, dr.select(less, value, least), dr.select(less, number, found), dr.select(less, own, g)
+        return number + 1, dr.select(less, value, least), dr.select(less, number, found)
 
-    _, _, found, g = dr.while_loop(
-        state=(
-            dr.zeros(mi.UInt32, 1),
-            dr.full(Float, dr.inf, 1),
-            dr.full(mi.UInt32, seen.body.count, 1),
-            dr.zeros(type(seen.toward), 1),
-        ),
-        cond=lambda number, least, found, g: number < seen.body.count,
+    width = dr.width(v)
+    _, _, found = dr.while_loop(
+        state=(mi.UInt32(0), dr.full(Float, dr.inf, width), dr.full(mi.UInt32, seen.body.count, width)),
+        cond=lambda number, least, found: number < seen.body.count,
         body=nearer,
-        labels=("number", "least", "found", "g"),
+        labels=("number", "least", "found"),
     )
-    return found, g
+    return found
+
+
+def _start(planes: EntryPlanes, v):
+    """Return a plane to begin at for lines along v."""
+    import drjit as dr
+    import mitsuba as mi
+
+    across, up, middle = planes.frame
+    scale = 0.5 * _CELLS / dr.maximum(dr.dot(v, middle), 1e-30)
+    places = (dr.clip(dr.fma(dr.dot(v, axis), scale, 0.5 * _CELLS), 0, _CELLS - 1) for axis in (across, up))
+    column, row = (mi.UInt32(place) for place in places)
+    return dr.gather(mi.UInt32, planes.starts, row * _CELLS + column)
 
 
 def first_entry(planes: EntryPlanes, start, direction, x, active=True) -> Entry:
@@ -149,12 +188,14 @@ def first_entry(planes: EntryPlanes, start, direction, x, active=True) -> Entry:
         return turn + 1, *found, searches & (found[0] != number)
 
     width = dr.width(start, direction, x, active)
+    number = _start(planes, dr.fma(direction, x, start))
+    g = dr.gather(four_numbers(type(x)), planes.g, number, active).xyz
     _, number, constant, slope, _ = dr.while_loop(
         state=(
             dr.zeros(mi.UInt32, width),
-            dr.zeros(mi.UInt32, width) + planes.number,
-            dr.dot(planes.middle, start) + dr.zeros(type(x), width),
-            dr.dot(planes.middle, direction) + dr.zeros(type(x), width),
+            dr.zeros(mi.UInt32, width) + number,
+            dr.dot(g, start) + dr.zeros(type(x), width),
+            dr.dot(g, direction) + dr.zeros(type(x), width),
             dr.full(mi.Bool, True, width) & active,
         ),
         cond=lambda turn, number, constant, slope, searches: searches & (turn < planes.count),

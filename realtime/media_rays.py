@@ -203,19 +203,27 @@ def path_transmittance(medium: Medium, light: Light, *, depths, point, active):
     for body in medium.bodies:
         seen = seen_from(body, light.position)
         near = active & near_line(seen, vector / length, length)
-        enter, leave = _line_crossings(seen, vector, near)
-        inside = dr.select(near, share_inside(enter, leave) * length, 0)
+        planes = entry_planes(seen), exit_planes(seen)
+        inside = dr.if_stmt(
+            args=(vector,),
+            cond=near,
+            true_fn=lambda vector, seen=seen, planes=planes: _share_of_line(seen, planes, vector) * dr.norm(vector),
+            false_fn=lambda vector: type(vector.x)(0),
+        )
         excess = [own - sigma for own, sigma in zip(body.medium.sigma_t, medium.sigma_t)]
         depths = [dr.fma(more, inside, depth) for more, depth in zip(excess, depths)]
     return type(medium.albedo)(*(dr.exp(-depth) for depth in depths))
 
 
-def _line_crossings(seen: Seen, v, active):
-    entering, leaving = entry_planes(seen), exit_planes(seen)
-    if entering is None or leaving is None:
-        (enter,), (leave,) = inverse_crossings(seen, v, v * 0, [type(v.x)(0)], active)
-        return enter, leave
-    return line_crossings((entering, leaving), v, active)
+def _share_of_line(seen: Seen, planes, v):
+    """Return the share of the line along v from the light that lies in a body."""
+    import drjit as dr
+
+    if seen.body.planes is None:
+        (enter,), (leave,) = inverse_crossings(seen, v, dr.zeros(type(v)), [type(v.x)(0)], True)
+    else:
+        enter, leave = line_crossings(planes, v, True)
+    return share_inside(enter, leave)
 
 
 def light_leg(ray: MediaRay, piece: Piece, xs, rs) -> list[list[Any]]:
