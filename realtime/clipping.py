@@ -20,7 +20,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from realtime.arrays import four_numbers
-from realtime.body_tiles import PlaneLists, plane_number
 from realtime.medium import Body
 
 
@@ -53,9 +52,7 @@ def seen_from(body: Body, point) -> Seen:
     return Seen(body, toward, numbers)
 
 
-def inverse_crossings(
-    seen: Seen, start, direction, distances, active, *, leaves: bool = True, lists: PlaneLists | None = None
-):
+def inverse_crossings(seen: Seen, start, direction, distances, active, *, leaves: bool = True):
     """Return 1/f_in and 1/f_out for the lines from the point to start + distance direction.
 
     Parameters
@@ -70,8 +67,6 @@ def inverse_crossings(
         Lanes to compute.
     leaves
         Whether f_out is wanted.
-    lists
-        The planes that concern each ray; all by default.
 
     Returns
     -------
@@ -87,13 +82,12 @@ def inverse_crossings(
         return [one for one, _ in found], [other for _, other in found]
     Float = type(start.x)
     width = dr.width(start, direction, active, *distances)
-    count = seen.body.count if lists is None else lists.count
     enter = [dr.full(Float, dr.inf, width) for _ in distances]
     leave = [dr.full(Float, -dr.inf, width) for _ in distances] if leaves else []
 
     def plane(number, enter, leave):
         # Four numbers at once: reading them is most of the work.
-        values = dr.gather(four_numbers(Float), seen.planes, plane_number(lists, number, active), active)
+        values = dr.gather(four_numbers(Float), seen.planes, number, active)
         g, outside = values.xyz, values.w > 0
         constant, slope = dr.dot(g, start), dr.dot(g, direction)
         first, last = dr.select(outside, constant, dr.inf), dr.select(outside, -dr.inf, constant)
@@ -103,7 +97,7 @@ def inverse_crossings(
 
     _, enter, leave = dr.while_loop(
         state=(mi.UInt32(0), enter, leave),
-        cond=lambda number, enter, leave: active & (number < count),
+        cond=lambda number, enter, leave: active & (number < seen.body.count),
         body=plane,
         labels=("number", "enter", "leave"),
     )
@@ -155,30 +149,3 @@ def near_line(seen: Seen, direction, length):
     nearest = dr.clip(along, 0, length)
     reach = seen.body.radius * 1.001
     return dr.squared_norm(dr.fma(-direction, nearest, seen.toward)) < reach * reach
-
-
-def passage(seen: Seen, direction, *, lists: PlaneLists | None = None):
-    """Return where rays from the point enter and leave the body [m], both infinite where they miss it.
-
-    Parameters
-    ----------
-    seen
-        The body and the point.
-    direction
-        Of the rays.
-    lists
-        The planes that concern each ray; all by default.
-
-    Notes
-    -----
-    Valid for unit directions, from outside and from inside (enter = 0).
-    """
-    import drjit as dr
-
-    Float = type(direction.x)
-    near = near_line(seen, direction, dr.inf)
-    still = dr.zeros(type(direction))
-    (enter,), (leave,) = inverse_crossings(seen, direction, still, [Float(0)], near, lists=lists)
-    begin, end = dr.rcp(enter), dr.select(leave > 0, dr.rcp(leave), dr.inf)
-    hit = near & (enter > 0) & (begin < end)
-    return dr.select(hit, begin, dr.inf), dr.select(hit, end, dr.inf)

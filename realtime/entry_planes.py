@@ -205,7 +205,7 @@ def first_entry(planes: EntryPlanes, start, direction, x, active=True) -> Entry:
     return Entry(number, constant, slope)
 
 
-def line_crossings(planes: tuple[EntryPlanes, EntryPlanes], v, active):
+def line_crossings(planes: tuple[EntryPlanes, EntryPlanes], v):
     """Return 1/f_in and 1/f_out for lines from the light along v, see `realtime.clipping`.
 
     Parameters
@@ -214,8 +214,6 @@ def line_crossings(planes: tuple[EntryPlanes, EntryPlanes], v, active):
         Those where legs enter the body, and those where they leave it.
     v
         Vectors from the light [m].
-    active
-        Lanes to compute.
 
     Returns
     -------
@@ -231,12 +229,12 @@ def line_crossings(planes: tuple[EntryPlanes, EntryPlanes], v, active):
 
     entering, leaving = planes
     still, zero = dr.zeros(type(v)), type(v.x)(0)
-    entry = first_entry(entering, v, still, zero, active & ~entering.within)
+    entry = first_entry(entering, v, still, zero)
     u = entry.constant
     for side in range(entering.sides):
         u = dr.select(dr.dot(_across(entering, entry.number, side), v) > u, -1, u)
     u = dr.select(entering.within, dr.inf, u)
-    return u, -first_entry(leaving, v, still, zero, active & (u > 0)).constant
+    return u, -first_entry(leaving, v, still, zero, u > 0).constant
 
 
 def _across(planes: EntryPlanes, number, side: int):

@@ -1,9 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The view of a frame, from its camera and what was found before the method's turn."""
 
-from typing import Any
-
-from realtime.body_tiles import tile_corners
 from realtime.camera import Camera, ray_directions
 from realtime.lights import Light
 from realtime.medium import Medium
@@ -57,13 +54,6 @@ def _in_square_tiles(camera: Camera, pixel) -> bool:
     import drjit as dr
 
     return camera.width % 4 == 0 and camera.height % 4 == 0 and dr.width(pixel) > 1
-
-
-def view_corners(camera: Camera, pixel) -> Any:
-    """Return the directions at the corners of the tiles, or None where pixels do not come in tiles."""
-    import drjit as dr
-
-    return tile_corners(_rays(camera, pixel), dr.width(pixel)) if _in_square_tiles(camera, pixel) else None
 
 
 def _visible(geometry, point, light):

@@ -1,22 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Rays through bounded media: the pieces of the camera rays, what of the legs from the light lies in each body.
 
-Planes are read by lists, one for each tile, where a body has many (`realtime.body_tiles`).
+Lines are followed over the facets of bodies (`realtime.entry_planes`), in packets in which any comes near.
 """
 
 from dataclasses import dataclass
 from typing import Any
 
-from realtime.body_tiles import ball_range, plane_lists
-from realtime.clipping import Seen, inverse_crossings, near_line, passage, seen_from, share_inside
+from realtime.clipping import Seen, inverse_crossings, near_line, seen_from, share_inside
 from realtime.entry_planes import EntryPlanes, clear_of, entry_planes, exit_planes, line_crossings
 from realtime.geometry import RayGeometry, distance_to_light
 from realtime.lights import Light
 from realtime.medium import Body, Medium
 from realtime.parallel_light import parallel_legs, seen_along
-
-_FEW_PLANES = 12  # which are read as fast as listed
-_RANGES = 5  # of a chord, in which a tile's list of planes for the legs from a light is made
 
 
 @dataclass(frozen=True)
@@ -76,7 +72,7 @@ def sum_over_pieces(pieces: tuple[Piece, ...], segments, integral, zero):
     return total
 
 
-def camera_pieces(medium: Medium, origin, direction, *, corners=None) -> tuple[Piece, ...]:
+def camera_pieces(medium: Medium, origin, direction) -> tuple[Piece, ...]:
     """Return the pieces of the camera rays in which something scatters.
 
     Parameters
@@ -85,13 +81,11 @@ def camera_pieces(medium: Medium, origin, direction, *, corners=None) -> tuple[P
         The medium with its bodies.
     origin, direction
         The camera, one for all lanes [m], and unit directions.
-    corners
-        Directions at the corners of the tiles (`realtime.body_tiles`), if the rays come in tiles.
     """
     import drjit as dr
 
     Float = type(direction.x)
-    passages = [_passage(seen_from(body, origin), direction, corners) for body in medium.bodies]
+    passages = [_passage(body, origin, direction) for body in medium.bodies]
 
     def piece(own: Medium, number, begin, end):
         before = []
@@ -127,7 +121,6 @@ def media_ray(
     origin,
     direction,
     pieces,
-    corners=None,
     form: str = "exact",
 ) -> MediaRay:
     """Return what the integrals of one light need; `pieces` is from `camera_pieces`, the paper's form needs no legs."""
@@ -139,26 +132,35 @@ def media_ray(
     return MediaRay(medium, light, geometry, start, direction, pieces, seen, entries, exits, form)
 
 
-def _worth_lists(body: Body, corners) -> bool:
-    return corners is not None and body.count > _FEW_PLANES
+def _passage(body: Body, origin, direction):
+    """Return where camera rays enter and leave a body [m], both infinite where they miss it."""
+    import drjit as dr
+
+    seen = seen_from(body, origin)
+    planes = entry_planes(seen), exit_planes(seen)
+    nothing = type(direction.x)(dr.inf)
+
+    def ends(direction):
+        enter, leave = line_ends(seen, planes, direction)
+        begin, end = dr.rcp(enter), dr.select(leave > 0, dr.rcp(leave), dr.inf)
+        hit = (enter > 0) & (begin < end)
+        return dr.select(hit, begin, dr.inf), dr.select(hit, end, dr.inf)
+
+    return dr.if_stmt(
+        args=(direction,),
+        cond=near_line(seen, direction, dr.inf),
+        true_fn=ends,
+        false_fn=lambda direction: (nothing, nothing),
+    )
 
 
-def _passage(seen: Seen, direction, corners):
-    """Return the passage of camera rays through a body, by lists of planes where there are many."""
-    lists = None
-    if _worth_lists(seen.body, corners):
-        _, _, near = ball_range(seen, corners)
-        lists = plane_lists(seen, [corners], near)
-    return passage(seen, direction, lists=lists)
-
-
-def camera_insides(medium: Medium, origin, direction, distance, *, corners=None) -> tuple[Any, ...]:
+def camera_insides(medium: Medium, origin, direction, distance) -> tuple[Any, ...]:
     """Return what of camera rays up to a distance lies in each body [m]; arguments as in `camera_pieces`."""
     import drjit as dr
 
     insides = []
     for body in medium.bodies:
-        ends = _passage(seen_from(body, origin), direction, corners)
+        ends = _passage(body, origin, direction)
         enter, leave = (dr.minimum(end, distance) for end in ends)
         insides.append(dr.select(leave > enter, leave - enter, 0))
     return tuple(insides)
@@ -207,7 +209,9 @@ def path_transmittance(medium: Medium, light: Light, *, depths, point, active):
         inside = dr.if_stmt(
             args=(vector,),
             cond=near,
-            true_fn=lambda vector, seen=seen, planes=planes: _share_of_line(seen, planes, vector) * dr.norm(vector),
+            true_fn=lambda vector, seen=seen, planes=planes: (
+                share_inside(*line_ends(seen, planes, vector)) * dr.norm(vector)
+            ),
             false_fn=lambda vector: type(vector.x)(0),
         )
         excess = [own - sigma for own, sigma in zip(body.medium.sigma_t, medium.sigma_t)]
@@ -215,15 +219,14 @@ def path_transmittance(medium: Medium, light: Light, *, depths, point, active):
     return type(medium.albedo)(*(dr.exp(-depth) for depth in depths))
 
 
-def _share_of_line(seen: Seen, planes, v):
-    """Return the share of the line along v from the light that lies in a body."""
+def line_ends(seen: Seen, planes, v):
+    """Return 1/f_in and 1/f_out of lines along v, as of `realtime.clipping.inverse_crossings`."""
     import drjit as dr
 
     if seen.body.planes is None:
         (enter,), (leave,) = inverse_crossings(seen, v, dr.zeros(type(v)), [type(v.x)(0)], True)
-    else:
-        enter, leave = line_crossings(planes, v, True)
-    return share_inside(enter, leave)
+        return enter, leave
+    return line_crossings(planes, v)
 
 
 def light_leg(ray: MediaRay, piece: Piece, xs, rs) -> list[list[Any]]:

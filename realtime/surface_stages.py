@@ -11,7 +11,6 @@ from dataclasses import replace
 from typing import Any
 
 from realtime.camera import ray_directions
-from realtime.frame_view import view_corners
 from realtime.frozen import Frozen
 from realtime.media_rays import camera_insides, optical_depths
 from realtime.scene import Scene
@@ -47,8 +46,7 @@ def surface_stages(scene: Scene, *, lights_surfaces: bool) -> tuple[Callable[...
         found = cast_rays(geometry, facets, camera.origin, direction)
         if not medium.bodies:
             return found
-        corners = view_corners(camera, pixel)
-        insides = camera_insides(medium, camera.origin, direction, found.distance, corners=corners)
+        insides = camera_insides(medium, camera.origin, direction, found.distance)
         return replace(found, insides=insides)
 
     def shade_all(geometry, facets, pixel, camera, medium, lights, cast):

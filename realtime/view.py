@@ -5,7 +5,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from realtime.body_tiles import tile_corners
 from realtime.camera import Camera
 from realtime.geometry import ray_geometry
 from realtime.lights import Light
@@ -52,10 +51,7 @@ def radiance(medium: Medium, light: Light, integral):
 
 def rays_in_media(view: View, form: str = "exact") -> tuple[MediaRay | ParallelRay, ...]:
     """Return the rays of a view in bounded media, by light; `form` is one of `realtime.bounded_media.FORMS`."""
-    import drjit as dr
-
-    corners = tile_corners(view.rays, dr.width(view.direction)) if view.square_tiles else None
-    pieces = camera_pieces(view.medium, view.origin, view.direction, corners=corners)
+    pieces = camera_pieces(view.medium, view.origin, view.direction)
     rays: list[MediaRay | ParallelRay] = []
     for light in view.lights:
         if light.kind == "directional":
@@ -63,7 +59,7 @@ def rays_in_media(view: View, form: str = "exact") -> tuple[MediaRay | ParallelR
             rays.append(parallel_ray(view.medium, light, **place))
             continue
         geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
-        ends = {"origin": view.origin, "direction": view.direction, "corners": corners, "form": form}
+        ends = {"origin": view.origin, "direction": view.direction, "form": form}
         rays.append(media_ray(view.medium, light, geometry, **ends, pieces=pieces))
     return tuple(rays)
 

@@ -297,25 +297,6 @@ def test_three_media_against_the_truth(variant):
     assert relative_rmse(render(scene, "shadow-planes", precision="single", media="paper").airlight, truth.airlight) > 1
 
 
-@pytest.mark.parametrize("media", ["exact", "paper"])
-def test_lists_of_planes_leave_nothing_out(variant, media, monkeypatch):
-    """A body of many facets, by lists of each tile and by all its planes: the same numbers."""
-    from realtime import media_rays
-    from validation.scenes.solids import icosphere
-
-    medium = {"type": "homogeneous", "sigma_t": 1.3, "scale": 1.0, "albedo": 0.7}
-    vertices, faces = icosphere(2)
-    scene = clear_scene(size=(32, 24), many=medium_boundary("many", (vertices * (0.9, 0.7, 0.6), faces), medium))
-    scene["floor"] = tiny_scene()["floor"]
-    listed = render(scene, "shadow-planes", precision="single", media=media)
-    monkeypatch.setattr(media_rays, "_FEW_PLANES", 1000)
-    whole = render(scene, "shadow-planes", precision="single", media=media)
-    assert whole.airlight.max() > 0
-    # The same planes give the same sums, whatever else is read; compilers may fuse a step more or less.
-    assert np.abs(listed.airlight - whole.airlight).max() < 1e-6 * whole.airlight.max()
-    assert np.abs(listed.surface - whole.surface).max() < 1e-6 * whole.surface.max()
-
-
 def test_a_thicker_medium_has_thicker_bodies(variant):
     import mitsuba as mi
 

@@ -56,7 +56,7 @@ def least_of_all(name, light, v):
     bounds = bounds_of(name)
     room = bounds.offsets - bounds.normals @ light
     u = v @ (bounds.normals / room[:, None]).T
-    return u[..., room < 0].min(axis=-1), u[..., room > 0].max(axis=-1)
+    return u[..., room < 0].min(axis=-1, initial=np.inf), u[..., room > 0].max(axis=-1)
 
 
 @pytest.mark.parametrize("precision", ["single", "double"])
@@ -122,6 +122,25 @@ def test_no_leg_to_a_segment_that_is_called_clear_meets_the_body(variant, name):
     assert not np.any(clear & meets)
     # Most that pass are found to.
     assert np.mean(clear[~meets]) > 0.9
+
+
+@pytest.mark.parametrize("light", [(1.7, 0.4, 2.9), (0.15, 0.1, 0.4)])
+@pytest.mark.parametrize("name", SOLIDS)
+def test_lines_enter_and_leave_by_the_planes_that_all_planes_name(variant, name, light):
+    """From outside and from within the body, towards it, past it and away from it."""
+    from realtime.entry_planes import entry_planes, exit_planes, line_crossings
+
+    light = np.array(light)
+    seen, types = seen_body(name, light)
+    v = CENTRE - light + np.random.default_rng(3).normal(size=(3000, 3)) * 1.3
+    found = line_crossings((entry_planes(seen), exit_planes(seen)), types.vector(*v.T))
+    enter, leave = (np.array(one) for one in found)
+    first, last = least_of_all(name, light, v)
+    hits = (first > 0) & (first > last)
+    assert hits.sum() > 0
+    assert np.array_equal(enter > 0, hits)
+    assert leave[hits] == pytest.approx(last[hits], rel=1e-9)
+    assert enter[hits] == pytest.approx(first[hits], rel=1e-9)
 
 
 def test_neighbours_share_an_edge():
