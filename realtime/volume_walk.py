@@ -133,7 +133,7 @@ def _nearest_crossings(heights, face, line: Line, source, after, active):
     import drjit as dr
     import mitsuba as mi
 
-    leaves, first, last, coarse = source
+    leaves, first, last, larger = source
     Float = type(after)
     width = dr.width(after)
     last = dr.select(active, last, first)
@@ -172,7 +172,7 @@ def _nearest_crossings(heights, face, line: Line, source, after, active):
 
     queue, no = [dr.full(Float, dr.inf, width) for _ in range(PLACES)], dr.full(mi.Bool, False, width)
     found = _Crossings(queue, no, no & True)
-    for kind, body in ((~coarse, of_chunk), (coarse, of_larger)):
+    for kind, body in ((~larger, of_chunk), (larger, of_larger)):
         _, found = dr.while_loop(
             state=(dr.select(kind, first, last), found),
             cond=lambda k, found: k < last,
