@@ -18,10 +18,11 @@ foot point. For the lobes cos^16 and cos^64 of half the angle ("hazy", "murky"),
 their width.
 
 In float32 every segment takes as many panels of eight nodes as its width in v and its optical depth ask for, see
-`realtime.kernels.panels`; they leave less than 1e-6. In float64 the numbers of nodes are the same for all, the
-smallest with which the certified cases (tests/data) and random rays of optical depth 1e-6 to 50, heights down to 1e-7
-of the distance and |g| up to 0.95 stay below 1e-10; the isotropic case has no lobe, and pairs of nodes about the centre
-share their exponentials: it is `quadrature` with 40 nodes.
+`realtime.kernels.panels`, or four or eight nodes in x if it is short, see `realtime.kernels.short`; they leave less
+than 1e-6. In float64 the numbers of nodes are the same for all, the smallest with which the certified cases
+(tests/data) and random rays of optical depth 1e-6 to 50, heights down to 1e-7 of the distance and |g| up to 0.95 stay
+below 1e-10; the isotropic case has no lobe, and pairs of nodes about the centre share their exponentials: it is
+`quadrature` with 40 nodes.
 """
 
 from functools import reduce
@@ -31,6 +32,7 @@ from realtime.gauss import unit_nodes
 from realtime.geometry import RayGeometry, falloff, stretches
 from realtime.kernels.panels import panels_mean
 from realtime.kernels.quadrature import path_interval, quadrature
+from realtime.kernels.short import FEW, MORE, extent, serves, short_segment
 from realtime.lights import Light
 from realtime.medium import Medium, per_extinction
 from realtime.phase import Phase, evaluate_half
@@ -63,12 +65,37 @@ def exact(geometry: RayGeometry, x0, x1, medium: Medium, light: Light):
 
     if is_single(type(geometry.height)):
         # The extinctions share their nodes.
-        values = _over_stretches(geometry, (x0, x1), medium.sigma_t, medium.phase, light)
+        values = _in_single(geometry, (x0, x1), medium.sigma_t, medium.phase, light)
         J = values[0] if len(values) == 1 else type(medium.albedo)(*values)
     else:
         J = per_extinction(medium, lambda sigma_t: _in_double(geometry, (x0, x1), sigma_t, medium, light))
     meets = (geometry.height == 0) & (x0 <= geometry.foot) & (geometry.foot <= x1) & (x0 < x1)
     return dr.select(meets, dr.inf, J)
+
+
+def _in_single(geometry: RayGeometry, segment, extinctions, phase: Phase, light: Light):
+    """Return one value per extinction."""
+    import drjit as dr
+
+    if light.soft:
+        return _over_stretches(geometry, segment, extinctions, phase, light)
+    x0, x1 = segment
+    found = extent(geometry, x0, x1, extinctions)
+
+    def longer(x0, x1):
+        return dr.if_stmt(
+            args=(x0, x1),
+            cond=serves(MORE, found, phase),
+            true_fn=lambda x0, x1: short_segment(geometry, x0, x1, phase, extinctions, rule=MORE),
+            false_fn=lambda x0, x1: _stretch(geometry, x0, x1, extinctions, phase, light),
+        )
+
+    return dr.if_stmt(
+        args=(x0, x1),
+        cond=serves(FEW, found, phase),
+        true_fn=lambda x0, x1: short_segment(geometry, x0, x1, phase, extinctions, rule=FEW),
+        false_fn=longer,
+    )
 
 
 def _in_double(geometry: RayGeometry, segment, sigma_t, medium: Medium, light: Light):

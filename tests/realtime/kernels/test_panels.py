@@ -223,7 +223,8 @@ def test_the_colours_of_a_medium_are_those_of_grey_ones(variant, name, g, extinc
         depth = sigma_t * (x0 + np.hypot(x0 - foot, height))
         grey = kernel_values((foot, height, x0, x1, np.full(2000, sigma_t)), name, g)
         seen = depth < 70  # what is dimmer is not worth a number
-        assert channel[seen] == pytest.approx(grey[seen], rel=5e-6)
+        # Each rounds its exponent, to 6e-8 of the depth, in its own way where they take different rules.
+        assert channel[seen] == pytest.approx(grey[seen], rel=1e-5)
 
 
 def soft_spot(types, cutoff, beam):
