@@ -84,7 +84,26 @@ def axis_geometry(away, direction, direction_low, light: Light) -> AxisGeometry:
 
 
 def cone_interval(ray: AxisGeometry, cone: Cone):
+    """Return the signed distances from the foot at which rays enter and leave a cone [m], see `cone_roots`."""
+    import drjit as dr
+
+    limit, limit_low = two_product(ray.square, cone.square_sin)
+    across, across_low = two_product(ray.across, ray.across)
+    low = dr.fma(ray.square_low, cone.square_sin, dr.fma(ray.square, cone.square_sin_low, limit_low))
+    return cone_roots(ray, (limit - across) + (low - (across_low + ray.shift)), cone)
+
+
+def cone_roots(ray: AxisGeometry, discriminant, cone: Cone):
     """Return the signed distances from the foot at which rays enter and leave a cone [m]; both -inf if they miss it.
+
+    Parameters
+    ----------
+    ray
+        The rays; neither `across` nor what rounding took is read.
+    discriminant
+        D [m^2].
+    cone
+        The cone.
 
     Notes
     -----
@@ -93,10 +112,6 @@ def cone_interval(ray: AxisGeometry, cone: Cone):
     """
     import drjit as dr
 
-    limit, limit_low = two_product(ray.square, cone.square_sin)
-    across, across_low = two_product(ray.across, ray.across)
-    low = dr.fma(ray.square_low, cone.square_sin, dr.fma(ray.square, cone.square_sin_low, limit_low))
-    discriminant = (limit - across) + (low - (across_low + ray.shift))
     # Of a ray through the light all that is left are signs, and `_TINY` times them.
     b = ray.axial * ray.offset
     c = (ray.offset - cone.cos * ray.height) * (ray.offset + cone.cos * ray.height)

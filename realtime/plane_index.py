@@ -24,6 +24,7 @@ azimuth bit by bit, and an edge holds phi if first <= phi < last: no ray slips b
 counted twice.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -34,7 +35,7 @@ from realtime.arrays import is_single
 from realtime.casters import Casters
 from realtime.diamond import TURN, host_diamond_angle
 from realtime.plane_cone import NEARNESS, is_outside, ring_edges
-from realtime.silhouettes import Silhouette, facing, silhouette
+from realtime.silhouettes import Silhouette, silhouette
 
 Array = NDArray[np.float64]
 
@@ -61,6 +62,7 @@ class PlaneIndex:
     spans: Any  #: first and last azimuth, layers gained when psi grows past it, Biri's cosine of every plane; flat
     ends: Any  #: ends of the edge of every plane in the frame [m], six numbers each, flat
     layers: Any  #: layers between the light and the camera
+    aim: Any = None  #: where the pixels of the camera aim in the frame, see `realtime.aim`
 
 
 @dataclass(frozen=True)
@@ -178,11 +180,11 @@ def layers_between(casters: Casters, light: Array, axes: Array, distance: float,
     # The axis runs through x = y = 0: most triangles lie aside, all three corners beyond it on one of four sides.
     x, y = axes[:2] @ casters.vertices.T - (axes[:2] @ light)[:, None]
     sides = (x > 0) | (x < 0).view(np.uint8) << 1 | (y > 0).view(np.uint8) << 2 | (y < 0).view(np.uint8) << 3
-    common = sides[casters.triangles[:, 0]] & sides[casters.triangles[:, 1]] & sides[casters.triangles[:, 2]]
-    number = np.flatnonzero(common == 0)
-    number = number[near[casters.body[number]]]
+    number = np.flatnonzero(near[casters.body])
+    one, other, third = casters.triangles[number].T
+    number = number[sides[one] & sides[other] & sides[third] == 0]
     crossed = number[_crosses(casters, number, light, camera)]
-    sign = facing(casters, light)[crossed]
+    sign = np.sign(casters.normals[crossed] @ light - casters.offsets[crossed])
     body = casters.body[crossed]
     bodies = len(casters.closed)
     front, back = np.bincount(body[sign > 0], minlength=bodies), np.bincount(body[sign < 0], minlength=bodies)
@@ -212,7 +214,14 @@ def _crosses(casters: Casters, number, light: Array, camera: Array) -> NDArray[n
 
 
 def index_planes(
-    casters: Casters, light: Array, camera: Array, *, used: NDArray[np.bool_], types, ring: Array | None = None
+    casters: Casters,
+    light: Array,
+    camera: Array,
+    *,
+    used: NDArray[np.bool_],
+    types,
+    ring: Array | None = None,
+    aim: Callable[[Array], Any] | None = None,
 ) -> PlaneIndex:
     """Find the shadow planes of a light and put them into bins for a camera.
 
@@ -228,6 +237,8 @@ def index_planes(
         The array types to use, see `realtime.arrays`.
     ring
         Of a spot whose cone is a caster, see `realtime.plane_cone`.
+    aim
+        Axes of the frame -> where the pixels of the camera aim in it.
     """
     import drjit as dr
     import mitsuba as mi
@@ -256,6 +267,7 @@ def index_planes(
         Float(_padded(spans.astype(real).ravel(), 5)),
         Float(_padded(planes.ends.astype(real).ravel(), 6)),
         Float(layers),
+        aim(axes) if aim else None,
     )
     dr.make_opaque(index)
     return index

@@ -19,11 +19,14 @@ def integral_type(view: View) -> Any:
     return type(view.distance) if grey else type(view.medium.albedo)
 
 
-def ray_airlight(view: View, light: Light, kernel, media: MediaRay | ParallelRay | None = None) -> "RayAirlight":
-    """Return the airlight of a light along the rays of a view; `media` where media are bounded."""
+def ray_airlight(
+    view: View, light: Light, kernel, media: MediaRay | ParallelRay | None = None, *, geometry: Any = None
+) -> "RayAirlight":
+    """Return the airlight of a light along the rays of a view; `media` where they are bounded, `geometry` if known."""
     if light.kind == "directional":
         return RayAirlight(view, light, None, kernel, media)
-    geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
+    if geometry is None:
+        geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
     return RayAirlight(view, light, geometry, kernel, media)
 
 

@@ -24,6 +24,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
+from realtime.aim import aim_at, read_camera, read_spot, seen_rays, seen_ways
 from realtime.arrays import types_of
 from realtime.bounded_media import FORMS, ambient_radiance, check_form
 from realtime.casters import Casters, read_casters, with_positions
@@ -36,7 +37,7 @@ from realtime.plane_cone import cone_ring
 from realtime.plane_crossings import Buffer, sum_crossings
 from realtime.plane_index import PlaneIndex, index_planes
 from realtime.plane_mesh import mesh_gamma, surface_gamma
-from realtime.plane_sweep import RayPlanes, in_light_frame, ray_planes, sum_lit_segments
+from realtime.plane_sweep import RayPlanes, ray_planes, sum_lit_segments
 from realtime.plane_tiles import Lists, tile_lists
 from realtime.plane_view import bodies_in_view
 from realtime.ray_airlight import RayAirlight, integral_type, ray_airlight
@@ -94,7 +95,9 @@ def plane_finder(casters: Casters, scene: Scene, light: Light, *, cone: int = 0)
     if cone and light.kind == "spot":
         ring = cone_ring(np.array(light.axis, dtype=np.float64).ravel(), float(light.cos_cutoff[0]), cone)
     types = types_of(type(scene.camera.origin.x))
-    return partial(index_planes, casters, position, camera, used=used, types=types, ring=ring)
+    seen = None if ring is not None else read_spot(light)
+    aim = partial(aim_at, read_camera(scene.camera), spot=seen, types=types)
+    return partial(index_planes, casters, position, camera, used=used, types=types, ring=ring, aim=aim)
 
 
 def shadow_planes(
@@ -171,14 +174,16 @@ def shadow_planes(
     for number, light in enumerate(view.lights):
         if cone and light.kind == "spot" and not light.soft and view.plan.shadows:
             light = replace(light, kind="point")  # planes bound it
-        airlight = ray_airlight(view, light, kernel, in_media[number] if in_media else None)
         if not view.plan.shadows:
+            airlight = ray_airlight(view, light, kernel, in_media[number] if in_media else None)
             total += airlight.radiance(airlight.integral(type(view.distance)(0), view.distance))
             lit.append(True)
             continue
         index = view.prepared[number]
         lists = view.tiles[number] if view.tiles else tile_planes(view, index, order=order)
-        rays = ray_planes(lists, *in_light_frame(index, view.direction, view.direction_low))
+        seen = seen_rays(index.aim, view.camera, view.pixel, index.distance, light)
+        rays = ray_planes(lists, seen.x, seen.y, seen.z)
+        airlight = ray_airlight(view, light, kernel, in_media[number] if in_media else None, geometry=seen.geometry)
         if order == "exact" and evaluation == "pixel" and buffer == "float":
             value, reached = _segments(index, lists, rays, airlight, differences=sum == "gamma")
         else:
@@ -205,9 +210,12 @@ def shadow_plane_tiles(view: View, *, order: str, **_) -> tuple[Lists, ...]:
 
 def tile_planes(view: View, index: PlaneIndex, *, order: str) -> Lists:
     """Return the planes that concern each tile of the image."""
+    import drjit as dr
+    import mitsuba as mi
 
     def rays(lane):
-        return in_light_frame(index, *view.rays(lane))
+        pixel = dr.gather(mi.UInt32, view.pixel, lane)
+        return seen_ways(index.aim, view.camera, pixel)
 
     return tile_lists(index, rays, view.distance, order=order, square=view.square_tiles)
 
