@@ -34,22 +34,19 @@ def pushed(queue: Queue, quotient, gain, active):
     queue
         The queue after that; as it was where `active` is false.
     quotient, gain
-        The crossing that was taken out.
+        The crossing that was taken out; an infinite quotient where `active` is false.
     """
     import drjit as dr
 
-    first = quotient > queue.quotient[0]
-    out = dr.select(first, quotient, queue.quotient[0]), dr.select(first, gain, queue.gain[0])
-    carried = dr.select(first, queue.quotient[0], quotient), dr.select(first, queue.gain[0], gain)
+    # What is nearer than all comes out at once.
+    carried, carried_gain = dr.select(active, quotient, dr.inf), dr.select(active, gain, 0)
     quotients, gains = [], []
-    for place in range(1, len(queue.quotient)):
-        q, g = queue.quotient[place], queue.gain[place]
-        before = carried[0] > q
-        quotients.append(dr.select(before, carried[0], q))
-        gains.append(dr.select(before, carried[1], g))
-        carried = dr.select(before, q, carried[0]), dr.select(before, g, carried[1])
-    moved = Queue([*quotients, carried[0]], [*gains, carried[1]])
-    return dr.select(active, moved, queue), *out
+    for q, g in zip(queue.quotient, queue.gain):
+        before = carried > q
+        quotients.append(dr.maximum(carried, q))
+        gains.append(dr.select(before, carried_gain, g))
+        carried, carried_gain = dr.minimum(carried, q), dr.select(before, g, carried_gain)
+    return Queue([*quotients[1:], carried], [*gains[1:], carried_gain]), quotients[0], gains[0]
 
 
 def inserted(queue: Queue, quotient, gain, active) -> Queue:

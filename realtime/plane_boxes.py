@@ -50,7 +50,7 @@ def tile_boxes(index: PlaneIndex, rays: Callable[[Any], tuple[Any, Any, Any]], d
         At which every ray ends [m].
     square
         Whether every tile is a square of 4 x 4 pixels: then its corners bound it, but for the curvature of the sphere
-        of directions, a share of 2e-6 that the slack of `touches` covers.
+        of directions.
     """
     import drjit as dr
     import mitsuba as mi
@@ -69,6 +69,10 @@ def tile_boxes(index: PlaneIndex, rays: Callable[[Any], tuple[Any, Any, Any]], d
     ends = [dr.gather(type(distance), distance, lane(k)) for k in range(TILE)]
     low = [reduce(dr.minimum, [w[axis] for w in directions]) for axis in range(3)]
     high = [reduce(dr.maximum, [w[axis] for w in directions]) for axis in range(3)]
+    if square:
+        # Between two directions at the angle a the sphere stands out by 1 - cos(a/2) < a^2/8.
+        bulge = 0.125 * sum(dr.square(b - a) for a, b in zip(low, high))
+        low, high = [a - bulge for a in low], [b + bulge for b in high]
     return _box(low, high, index.distance / reduce(dr.maximum, ends))
 
 

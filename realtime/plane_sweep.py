@@ -15,7 +15,8 @@ built-in scenes, one of eight in less than one in a thousand.
 
 Sixteen rays that follow one another walk together, and what one of them does all of them wait for. So a walk is one
 loop that reads a plane or goes over a crossing, and the integral of a segment that has ended waits until every fourth
-plane: neighbours whose segments end at two edges of one silhouette are then served at once.
+plane: neighbours whose segments end at two edges of one silhouette are then served at once. What is lit to the end of
+the ray is added behind the loop, which rays that cross nothing do not enter.
 """
 
 from collections.abc import Callable
@@ -43,13 +44,6 @@ class RayPlanes:
     azimuth: Any  #: diamond angle
     source: Source  #: the planes of its tile
     sorted: Any  #: whether they are in order
-
-
-def in_light_frame(index: PlaneIndex, direction, low):
-    """Return the components of directions in the frame of a light; `low` is what rounding took from them."""
-    import drjit as dr
-
-    return tuple(dr.dot(axis, direction) + dr.dot(axis, low) for axis in (index.x_axis, index.y_axis, index.z_axis))
 
 
 def ray_planes(lists: Lists, x, y, z) -> RayPlanes:
@@ -247,7 +241,7 @@ def _walked(passing: _Passing, active, *, places: int):
 
     Float, width = type(passing.ray_end), dr.width(passing.ray.x)
     count = passing.ray.source.count
-    end = count + places
+    end = dr.select(active & (count > 0), count + places, 0)
 
     def body(place, waiting, passed, lost):
         reads = place < count
@@ -256,21 +250,38 @@ def _walked(passing: _Passing, active, *, places: int):
         waiting, at, gained = pushed(waiting, quotient, gain, crossed | ~reads)
         crosses = (crossed | ~reads) & (at > 0)
         lost |= crosses & (at > passed.quotient)
-        last = place == end + 1
-        due = last | ((place & _DUE) == _DUE)
-        passed = _gone_over(passing, passed, at, gained, crosses=crosses, ends=place == end, due=due)
+        due = (place & _DUE) == _DUE
+        passed = _gone_over(passing, passed, at, gained, crosses=crosses, ends=mi.Bool(False), due=due)
         return place + 1, waiting, passed, lost
 
     # What comes out of the queue first has no place and no gain: nothing happens there.
     nothing_waits = filled(dr.inf, places, Float, width)
-    first = dr.select(active, dr.select(count == 0, mi.UInt32(places), 0), end + 2)
     _, _, passed, lost = dr.while_loop(
-        state=(first, nothing_waits, _start(passing), dr.full(mi.Bool, False, width)),
-        cond=lambda place, waiting, passed, lost: (place <= end + 1) & ~lost,
+        state=(dr.zeros(mi.UInt32, width), nothing_waits, _start(passing), dr.full(mi.Bool, False, width)),
+        cond=lambda place, waiting, passed, lost: (place < end) & ~lost,
         body=body,
         labels=("place", "waiting", "passed", "lost"),
     )
-    return passed.total, passed.layers <= 0, lost
+    return _ended(passing, passed, active & ~lost), passed.layers <= 0, lost
+
+
+def _ended(passing: _Passing, passed: _Passed, active):
+    """Return the total with the segment that waits, and with one that is lit to the end of the ray."""
+    import drjit as dr
+
+    lit = passed.layers <= 0
+
+    def body(total, waits, lit):
+        begun, ended = dr.select(waits, passed.begun, passed.opened), dr.select(waits, passed.ended, passing.ray_end)
+        return passing.with_segment(total, begun, ended), waits & False, waits & lit
+
+    total, _, _ = dr.while_loop(
+        state=(passed.total, passed.waits & active, lit & active),
+        cond=lambda total, waits, lit: waits | lit,
+        body=body,
+        labels=("total", "waits", "lit"),
+    )
+    return total
 
 
 def _collected(passing: _Passing):
