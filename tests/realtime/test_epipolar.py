@@ -121,7 +121,9 @@ def height_maps(scene, size=32, count=24):
 
 
 def trees(heights):
-    return np.array(heights.tree, dtype=float).reshape(heights.slices.count, 2 * heights.leaves, 2)
+    with np.errstate(invalid="ignore"):  # the first place of a tree is never written, and may hold anything
+        values = np.array(heights.tree).astype(float)
+    return values.reshape(heights.slices.count, 2 * heights.leaves, 2)
 
 
 def samples_of(heights):
