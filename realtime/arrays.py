@@ -72,6 +72,17 @@ def four_numbers(Float):
     return mi.Vector4f if is_single(Float) else mi.Vector4d
 
 
+def packed(numbers):
+    """Return an array with the four numbers of every lane side by side, for gathers that read them at once."""
+    import drjit as dr
+    import mitsuba as mi
+
+    width = dr.width(numbers)
+    array = dr.zeros(type(numbers.x), 4 * width)
+    dr.scatter(array, numbers, dr.arange(mi.UInt32, width))
+    return array
+
+
 def smallest(Float) -> float:
     """Return the smallest normal number of a type."""
     return 2.0**-126 if is_single(Float) else 2.0**-1022

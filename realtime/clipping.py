@@ -19,7 +19,7 @@ between P and P + v lies in the body: min(f_out, 1) - min(f_in, 1).
 from dataclasses import dataclass
 from typing import Any
 
-from realtime.arrays import four_numbers
+from realtime.arrays import four_numbers, packed
 from realtime.medium import Body
 
 
@@ -35,7 +35,6 @@ class Seen:
 def seen_from(body: Body, point) -> Seen:
     """Return what lines from a point, one for all lanes, need of a body."""
     import drjit as dr
-    import mitsuba as mi
 
     toward = body.centre - point
     if body.planes is None:
@@ -45,9 +44,7 @@ def seen_from(body: Body, point) -> Seen:
     # A point in the plane itself counts as just outside: the line is in from next to nothing on, or never.
     room = dr.select(dr.abs(room) < 1e-7 * body.radius, -1e-7 * body.radius, room)
     columns = (*(component / room for component in normal), dr.select(room < 0, type(room)(1), 0))
-    numbers = dr.zeros(type(room), 4 * body.count)
-    for place, column in enumerate(columns):
-        dr.scatter(numbers, column, 4 * dr.arange(mi.UInt32, body.count) + place)
+    numbers = packed(four_numbers(type(room))(*columns))
     dr.eval(numbers, toward)
     return Seen(body, toward, numbers)
 

@@ -22,7 +22,7 @@ no neighbour has less, none of all planes has.
 from dataclasses import dataclass
 from typing import Any
 
-from realtime.arrays import four_numbers, types_of
+from realtime.arrays import four_numbers, packed
 from realtime.clipping import Seen
 
 _CELLS = 8  # of the image of a body along a side, for planes to begin at
@@ -35,12 +35,13 @@ class EntryPlanes:
 
     sides: int  #: neighbours of a plane
     count: int  #: planes
+    side: int  #: 1 for planes where legs enter, -1 for those where they leave
     frame: tuple[Any, Any, Any]  #: axes of the image of the body: across, up, and towards its middle
-    starts: Any  #: by cell of that image the number of a plane to begin at
+    starts: Any  #: by cell of that image the number of a plane to begin at, `count` where there is none
     within: Any  #: whether the light is in the body: it is outside of no plane
-    g: Any  #: four numbers a plane: its g [1/m], and nothing
+    planes: Any  #: of `Seen`
     entries: Any  #: four numbers a neighbour: its g [1/m] and its number; where there is none those of the plane itself
-    across: Any  #: three numbers a neighbour on the other side of the body: its g [1/m]; 0 where there is none
+    across: Any  #: four numbers a neighbour on the other side of the body: its g [1/m]; 0 where there is none
 
 
 @dataclass
@@ -69,36 +70,18 @@ def _facing_planes(seen: Seen, side: int) -> EntryPlanes | None:
     body = seen.body
     if body.planes is None:
         return None
-    Float = type(seen.planes)
-    Four = four_numbers(Float)
-    place = dr.arange(mi.UInt32, body.count * body.sides)
-    own = place // body.sides
+    Four = four_numbers(type(seen.planes))
+    own = dr.arange(mi.UInt32, body.count * body.sides) // body.sides
     there = dr.gather(Four, seen.planes, body.neighbours)
     facing = (there.w > 0) == (side > 0)
     number = dr.select(facing, body.neighbours, own)
-    values = dr.gather(Four, seen.planes, number)
-    g = dr.select((values.w > 0) == (side > 0), values.xyz * side, 0)
-    entries = _columns(Float, 4, place, (*g, Float(number)))
-    across = _columns(Float, 3, place, dr.select(facing, 0, there.xyz * side))
-    frame = _image_frame(seen)
-    found = _nearest_planes(seen, side, frame)
-    within = dr.gather(mi.UInt32, found, mi.UInt32(0)) >= body.count
-    starts = dr.select(found >= body.count, 0, found)
-    every = dr.gather(Four, seen.planes, dr.arange(mi.UInt32, body.count))
-    own_g = dr.select(within, 0, every.xyz * side)
-    planes = _columns(Float, 4, dr.arange(mi.UInt32, body.count), (*own_g, Float(0)))
-    dr.eval(entries, across, frame, starts, within, planes)
-    return EntryPlanes(body.sides, body.count, frame, starts, within, planes, entries, across)
-
-
-def _columns(Float, width: int, place, columns):
-    """Return an array of `width` numbers a place."""
-    import drjit as dr
-
-    array = dr.zeros(Float, width * dr.width(place))
-    for column, value in enumerate(columns):
-        dr.scatter(array, value, width * place + column)
-    return array
+    entries = dr.gather(Four, seen.planes, number)
+    entries = packed(Four(*dr.select((entries.w > 0) == (side > 0), entries.xyz * side, 0), number))
+    across = packed(Four(*dr.select(facing, 0, there.xyz * side), 0))
+    starts = _nearest_planes(seen, side)
+    within = dr.gather(mi.UInt32, starts, mi.UInt32(0)) >= body.count
+    dr.eval(entries, across, starts)
+    return EntryPlanes(body.sides, body.count, side, _image_frame(seen), starts, within, seen.planes, entries, across)
 
 
 def _image_frame(seen: Seen):
@@ -116,7 +99,7 @@ def _image_frame(seen: Seen):
     return across * (beside / radius), up * (beside / radius), middle
 
 
-def _nearest_planes(seen: Seen, side: int, frame):
+def _nearest_planes(seen: Seen, side: int):
     """Return by cell of the image the plane that the line through its middle meets first; `count` if there is none."""
     import drjit as dr
     import mitsuba as mi
@@ -124,7 +107,7 @@ def _nearest_planes(seen: Seen, side: int, frame):
     Float = type(seen.planes)
     Four = four_numbers(Float)
     cell = dr.arange(mi.UInt32, _CELLS * _CELLS)
-    across, up, middle = frame
+    across, up, middle = _image_frame(seen)
     scale = dr.rcp(dr.squared_norm(across))
     first, second = (Float(part) * (2 / _CELLS) + (1 / _CELLS - 1) for part in (cell % _CELLS, cell // _CELLS))
     v = middle + across * (first * scale) + up * (second * scale)
@@ -154,7 +137,7 @@ def _start(planes: EntryPlanes, v):
     scale = 0.5 * _CELLS / dr.maximum(dr.dot(v, middle), 1e-30)
     places = (dr.clip(dr.fma(dr.dot(v, axis), scale, 0.5 * _CELLS), 0, _CELLS - 1) for axis in (across, up))
     column, row = (mi.UInt32(place) for place in places)
-    return dr.gather(mi.UInt32, planes.starts, row * _CELLS + column)
+    return dr.minimum(dr.gather(mi.UInt32, planes.starts, row * _CELLS + column), planes.count - 1)
 
 
 def first_entry(planes: EntryPlanes, start, direction, x, active=True) -> Entry:
@@ -189,7 +172,8 @@ def first_entry(planes: EntryPlanes, start, direction, x, active=True) -> Entry:
 
     width = dr.width(start, direction, x, active)
     number = _start(planes, dr.fma(direction, x, start))
-    g = dr.gather(four_numbers(type(x)), planes.g, number, active).xyz
+    g = dr.gather(four_numbers(type(x)), planes.planes, number, active).xyz
+    g = dr.select(planes.within, 0, g * planes.side)
     _, number, constant, slope, _ = dr.while_loop(
         state=(
             dr.zeros(mi.UInt32, width),
@@ -240,7 +224,7 @@ def line_crossings(planes: tuple[EntryPlanes, EntryPlanes], v):
 def _across(planes: EntryPlanes, number, side: int):
     import drjit as dr
 
-    return dr.gather(types_of(type(planes.across)).vector, planes.across, number * planes.sides + side)
+    return dr.gather(four_numbers(type(planes.across)), planes.across, number * planes.sides + side).xyz
 
 
 def clear_of(planes: tuple[EntryPlanes, EntryPlanes], start, direction, x0, x1):
