@@ -32,10 +32,8 @@ def view_planes(camera: Camera) -> tuple[Array, Array]:
     origin, forward, left, up = (
         np.array(vector, dtype=np.float64).ravel() for vector in (camera.origin, camera.forward, camera.left, camera.up)
     )
-    corner = [
-        forward + 0.5 * camera.width * i * left + 0.5 * camera.height * j * up
-        for i, j in ((1, 1), (-1, 1), (-1, -1), (1, -1))
-    ]
-    normals = [np.cross(corner[k], corner[k - 1]) for k in range(4)]
-    normals = [n if n @ forward > 0 else -n for n in normals]
-    return origin, np.stack([*normals, forward])
+    half = 0.5 * np.array([camera.width, camera.height])
+    corner = forward + (np.array([(1, 1), (-1, 1), (-1, -1), (1, -1)]) * half) @ np.stack([left, up])
+    normals = np.cross(corner, np.roll(corner, 1, axis=0))
+    normals[normals @ forward < 0] *= -1
+    return origin, np.vstack([normals, forward])
