@@ -27,9 +27,9 @@ for k^2 (m . d)^2 - q^2 (n . d)^2 = s^2 p^2 - (n . d)^2, since (m . d)^2 + (n . 
     (m . d)^2 + (s^2 - |m|^2) p^2,
 
 a sum of positive terms. The linear forms are affine in the pixel like w. Where a ray touches the cone one is zero, and
-the chord is the root of it: it is wanted to twice the digits. Columns and rows are whole numbers of at most 12 bits, so
-with coefficients of at most 11 bits, in units of one power of two, products and sums are exact; what the coefficients
-leave is added.
+the chord is the root of it: it is wanted to twice the digits. Columns and rows are whole numbers of some 12 bits, so
+with coefficients of 11 bits, in units of one power of two, products and sums are exact; what the coefficients leave is
+added.
 """
 
 from dataclasses import dataclass, replace
@@ -63,7 +63,7 @@ class Affine:
 class Tangents:
     """The discriminant of a cone over D^2: the product of two linear forms, plus a share of p^2."""
 
-    high: tuple[Affine, Affine]  #: of few bits, without a base
+    high: tuple[Affine, Affine]  #: of few bits
     low: tuple[Affine, Affine]
     share: Any
 
@@ -167,7 +167,7 @@ def seen_rays(aim: Aim, camera: Camera, pixel, distance, light: Light) -> SeenRa
     distance
         D [m].
     light
-        A point or spot light; a spot whose `Aim` has no cone is seen as a point.
+        A point or spot light; the `Aim` of a spot has its cones.
     """
     import drjit as dr
 
@@ -268,7 +268,6 @@ def _split(values: Array, types: ArrayTypes) -> tuple[Affine, Affine]:
     largest = float(np.max(np.abs(values[1:])))
     unit = 2.0 ** (np.ceil(np.log2(largest)) - _BITS) if largest > 0 and is_single(types.scalar) else 1.0
     high = np.round(values / unit) * unit
-    high[0] = 0
     few, rest = (Affine(*(types.scalar(float(one)) for one in part)) for part in (high, values - high))
     return few, rest
 
