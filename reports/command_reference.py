@@ -70,6 +70,7 @@ def reference(
     from reference.exr import write_exr
     from reference.files import ensure_writable
     from reports.environment import activate, stamped
+    from reports.frame_files import check_ending
     from reports.progress import progress_bar
     from validation.budget import Budget
     from validation.load import load_scene, parse_size
@@ -79,6 +80,7 @@ def reference(
     _check_options(estimator, {"--spp": spp, "--target-error": target_error, "--time-budget": time_budget}, pixel)
     usual = _USUAL_SPP if spp is None and target_error is None and time_budget is None else spp
     budget = Budget(samples=usual, error=target_error, seconds=time_budget, target=target.value) if sampled else None
+    check_ending("--output", output, ".exr")
     ensure_writable(output)
     activate()
     loaded = load_scene(scene, parse_size(size) if size else None)

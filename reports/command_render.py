@@ -65,8 +65,12 @@ def _check_outputs(outputs: dict[str, Path | None], frames: int | None, animate:
     """Refuse what could not be written, before any work."""
     from analytic.errors import InputError
     from reference.files import ensure_writable
-    from reports.frame_files import numbered
+    from reports.frame_files import check_ending, numbered
 
+    if outputs["exr"] is not None:
+        check_ending("--output", outputs["exr"], ".exr", instead="; --preview NAME.png writes a picture")
+    if outputs["png"] is not None:
+        check_ending("--preview", outputs["png"], ".png", instead="; --output NAME.exr writes the layers")
     if animate is not None and frames is None:
         raise InputError("--animate: got no number of frames; add --frames N")
     if frames is not None and not any(outputs.values()):

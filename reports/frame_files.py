@@ -11,6 +11,20 @@ from reports.progress import Interrupted, Progress
 STAGES = ("surface", "shade", "tiles", "airlight")  #: the functions of a frame that are frozen, of a `FrameRenderer`
 
 
+def check_ending(option: str, path: Path, ending: str, *, instead: str = "") -> None:
+    """Refuse a file whose name says that it is something else than what will be written.
+
+    Raises
+    ------
+    InputError
+        If the name does not end in `ending`, such as '.exr'; `instead` is said after that.
+    """
+    from analytic.errors import InputError
+
+    if path.suffix.lower() != ending:
+        raise InputError(f"{option}: got {str(path)!r}, wanted a name that ends in {ending}{instead}")
+
+
 def numbered(path: Path, number: int, frames: int) -> Path:
     """Return name-0001.exr for name.exr; the first frame has the number 1."""
     digits = max(4, len(str(frames)))

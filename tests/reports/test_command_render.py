@@ -94,3 +94,19 @@ def test_render_warns_of_open_casters_once_each(variant, capfd):
     assert times["moved_ms"] > 0
     assert times["relit_ms"] > 0
     assert times["recoloured_ms"] > 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "wanted"),
+    [
+        (["render", "open-fog", "-o", "frame.png"], "--output: got 'frame.png', wanted a name that ends in .exr"),
+        (
+            ["render", "open-fog", "--preview", "frame.exr"],
+            "--preview: got 'frame.exr', wanted a name that ends in .png",
+        ),
+        (["reference", "open-fog", "-o", "truth"], "--output: got 'truth', wanted a name that ends in .exr"),
+    ],
+)
+def test_a_file_whose_name_says_another_kind_is_refused(capsys, arguments, wanted):
+    assert cli.run(arguments) == cli.WRONG_INPUT
+    assert wanted in capsys.readouterr().err
