@@ -183,8 +183,8 @@ def _start(passing: _Passing) -> _Passed:
     )
 
 
-def _gone_over(passing: _Passing, passed: _Passed, quotient, gain, *, crosses, ends, due) -> _Passed:
-    """Go over a crossing where `crosses` is true, or the end of the ray where `ends` is.
+def _gone_over(passing: _Passing, passed: _Passed, quotient, gain, *, crosses, due) -> _Passed:
+    """Go over a crossing where `crosses` is true.
 
     The segment that ended before is added where it is `due`, or another one ends.
     """
@@ -192,7 +192,7 @@ def _gone_over(passing: _Passing, passed: _Passed, quotient, gain, *, crosses, e
 
     layers = passed.layers + dr.select(crosses, gain, 0)
     opens = crosses & (passed.layers > 0) & (layers <= 0)
-    closes = (passed.layers <= 0) & ((crosses & (layers > 0)) | ends)
+    closes = crosses & (passed.layers <= 0) & (layers > 0)
     total = dr.if_stmt(
         args=(passed.total, passed.begun, passed.ended),
         cond=passed.waits & (closes | due),
@@ -205,7 +205,7 @@ def _gone_over(passing: _Passing, passed: _Passed, quotient, gain, *, crosses, e
         dr.select(opens, quotient, passed.opened),
         total,
         dr.select(closes, passed.opened, passed.begun),
-        dr.select(closes, dr.select(ends, passing.ray_end, quotient), passed.ended),
+        dr.select(closes, quotient, passed.ended),
         closes | (passed.waits & ~due),
     )
 
@@ -251,7 +251,7 @@ def _walked(passing: _Passing, active, *, places: int):
         crosses = (crossed | ~reads) & (at > 0)
         lost |= crosses & (at > passed.quotient)
         due = (place & _DUE) == _DUE
-        passed = _gone_over(passing, passed, at, gained, crosses=crosses, ends=mi.Bool(False), due=due)
+        passed = _gone_over(passing, passed, at, gained, crosses=crosses, due=due)
         return place + 1, waiting, passed, lost
 
     # What comes out of the queue first has no place and no gain: nothing happens there.
@@ -301,18 +301,11 @@ def _collected(passing: _Passing):
         nearest = inserted(nearest, quotient, gain, crossed & (quotient < passed.quotient))
         more |= nearest.quotient[-1] > 0
         nearest, at, gained = popped(nearest, ~reads)
+        passed = _gone_over(passing, passed, at, gained, crosses=~reads & (at > 0), due=mi.Bool(False))
         empty = ~reads & (at <= 0)
-        ends = empty & ~more
-        last = place > count
-        passed = _gone_over(passing, passed, at, gained, crosses=~reads & (at > 0), ends=ends & ~last, due=last)
         again = empty & more
-        return (
-            dr.select(reads | ends, place + 1, dr.select(again, 0, place)),
-            nearest,
-            more & ~again,
-            passed,
-            done | last,
-        )
+        place = dr.select(reads, place + 1, dr.select(again, 0, place))
+        return place, nearest, more & ~again, passed, done | (empty & ~more)
 
     none, no = filled(0, MANY, Float, width), dr.full(mi.Bool, False, width)
     *_, passed, _ = dr.while_loop(
@@ -321,4 +314,4 @@ def _collected(passing: _Passing):
         body=body,
         labels=("place", "nearest", "more", "passed", "done"),
     )
-    return passed.total, passed.layers <= 0
+    return _ended(passing, passed, mi.Bool(True)), passed.layers <= 0
