@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from analytic.errors import InputError
+from reports.bench_tables import RATES
 from reports.charts import speed_error_chart
 from reports.claims import verdict
 from reports.colour_maps import signed_colours, unsigned_colours
@@ -70,6 +71,7 @@ def render_page(data: dict[str, Any], folder: Path, *, limit: int = PAGE_LIMIT) 
         scripts=[Markup((TEMPLATES / name).read_text(encoding="utf-8")) for name in SCRIPTS],
         images=Markup(_script_json({"scenes": [one.index for one in images], "maps": _maps()})),
         pixels=[Markup(one.data) for one in images],
+        rates_headers=list(RATES),
         billeter_passes=BILLETER_PASSES,
         billeter_size=BILLETER_SIZE,
         key_table=KEYS,
