@@ -39,7 +39,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realtime.arrays import ArrayTypes, is_single
-from realtime.camera import Camera
+from realtime.camera import Camera, HostCamera
 from realtime.cone import AxisGeometry, axis_distance, cone_roots
 from realtime.geometry import RayGeometry
 from realtime.lights import Light
@@ -91,29 +91,12 @@ class SeenRay:
 
 
 @dataclass(frozen=True)
-class HostCamera:
-    """A camera on the host, in float64."""
-
-    width: int
-    height: int
-    forward: Array
-    left: Array
-    up: Array
-
-
-@dataclass(frozen=True)
 class HostSpot:
     """The axis of a spot and the sines of its half angles, on the host, in float64."""
 
     axis: Array
     cutoff: float
     beam: float | None
-
-
-def read_camera(camera: Camera) -> HostCamera:
-    """Bring a camera to the host."""
-    forward, left = _both(camera.forward, camera.forward_low), _both(camera.left, camera.left_low)
-    return HostCamera(camera.width, camera.height, forward, left, _both(camera.up, camera.up_low))
 
 
 def read_spot(light: Light) -> HostSpot | None:
@@ -134,7 +117,7 @@ def aim_at(camera: HostCamera, axes: Array, spot: HostSpot | None, types: ArrayT
     Parameters
     ----------
     camera, spot
-        From `read_camera` and `read_spot`.
+        From `realtime.camera.read_camera` and `read_spot`.
     axes
         Of the frame, rows; the last leads from the light to the camera.
     types

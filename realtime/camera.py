@@ -38,6 +38,27 @@ class Camera:
     up_low: Any
 
 
+@dataclass(frozen=True)
+class HostCamera:
+    """A camera on the host, vectors as in `Camera` with what rounding took from them, in float64."""
+
+    width: int  #: [pixels]
+    height: int  #: [pixels]
+    origin: Any  #: [m]
+    forward: Any
+    left: Any
+    up: Any
+
+
+def read_camera(camera: Camera) -> HostCamera:
+    """Bring a camera to the host, which waits for the device."""
+    import numpy as np
+
+    pairs = (camera.forward, camera.forward_low), (camera.left, camera.left_low), (camera.up, camera.up_low)
+    vectors = (sum(np.array(part, dtype=np.float64).ravel() for part in pair) for pair in pairs)
+    return HostCamera(camera.width, camera.height, np.array(camera.origin, dtype=np.float64).ravel(), *vectors)
+
+
 def tiled_pixels(width: int, height: int, tile: int = 4):
     """Return the pixel numbers (row width + column) in square tiles, as uint32.
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from realtime.camera import read_camera
 from realtime.casters import Casters, read_casters, with_positions
 from realtime.plan import check_places
 from realtime.plane_index import light_frame, shadow_planes
@@ -72,9 +73,9 @@ def describe_casters(plan: CasterPlan) -> dict[str, str]:
 
 
 def _light_plan(casters: Casters, scene: Scene, light) -> LightPlan:
-    position, camera = (np.array(point, dtype=np.float64).ravel() for point in (light.position, scene.camera.origin))
-    used = bodies_in_view(casters, scene.camera, position)
-    axes, _ = light_frame(position, camera)
+    position, camera = np.array(light.position, dtype=np.float64).ravel(), read_camera(scene.camera)
+    used = bodies_in_view(casters, camera, position)
+    axes, _ = light_frame(position, camera.origin)
     seen = silhouette(casters, position, used=used)
     every = len(silhouette(casters, position).edges)
     return LightPlan(every, int(used.sum()), len(shadow_planes(casters, seen, position, axes).first))

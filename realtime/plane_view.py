@@ -10,13 +10,13 @@ does the same for bounded media).
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.camera import Camera
+from realtime.camera import HostCamera
 from realtime.casters import Casters
 
 Array = NDArray[np.float64]
 
 
-def bodies_in_view(casters: Casters, camera: Camera, light: Array) -> NDArray[np.bool_]:
+def bodies_in_view(casters: Casters, camera: HostCamera, light: Array) -> NDArray[np.bool_]:
     """Return by body whether its shadow can be seen."""
     origin, normals = view_planes(camera)
     choose = np.array([[i >> k & 1 for k in range(3)] for i in range(8)])
@@ -27,13 +27,11 @@ def bodies_in_view(casters: Casters, camera: Camera, light: Array) -> NDArray[np
     return ~outside.any(axis=1)
 
 
-def view_planes(camera: Camera) -> tuple[Array, Array]:
+def view_planes(camera: HostCamera) -> tuple[Array, Array]:
     """Return the pinhole and the normals, towards the view, of the planes through it that bound the view."""
-    origin, forward, left, up = (
-        np.array(vector, dtype=np.float64).ravel() for vector in (camera.origin, camera.forward, camera.left, camera.up)
-    )
     half = 0.5 * np.array([camera.width, camera.height])
-    corner = forward + (np.array([(1, 1), (-1, 1), (-1, -1), (1, -1)]) * half) @ np.stack([left, up])
+    signs = np.array([(1, 1), (-1, 1), (-1, -1), (1, -1)])
+    corner = camera.forward + (signs * half) @ np.stack([camera.left, camera.up])
     normals = np.cross(corner, np.roll(corner, 1, axis=0))
-    normals[normals @ forward < 0] *= -1
-    return origin, np.vstack([normals, forward])
+    normals[normals @ camera.forward < 0] *= -1
+    return camera.origin, np.vstack([normals, camera.forward])

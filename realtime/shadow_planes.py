@@ -24,9 +24,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
-from realtime.aim import aim_at, read_camera, read_spot, seen_rays, seen_ways
-from realtime.arrays import types_of
+from realtime.aim import aim_at, read_spot, seen_rays, seen_ways
+from realtime.arrays import ArrayTypes, types_of
 from realtime.bounded_media import FORMS, ambient_radiance, check_form
+from realtime.camera import HostCamera, read_camera
 from realtime.casters import Casters, read_casters, with_positions
 from realtime.errors import InputError
 from realtime.lights import Light
@@ -64,7 +65,9 @@ class PlanePreparation:
     def start(self, scene: Scene) -> Callable[[], tuple[PlaneIndex, ...]]:
         """Read what the host needs of a scene, which waits for the device; return what then finds the planes."""
         here = self.standing(scene)
-        each = [plane_finder(here, scene, light, cone=self.cone) for light in scene.lights]
+        camera = read_camera(scene.camera)
+        types = types_of(type(scene.camera.origin.x))
+        each = [plane_finder(here, camera, light, cone=self.cone, types=types) for light in scene.lights]
         return lambda: tuple(find() for find in each)
 
     def standing(self, scene: Scene) -> Casters:
@@ -85,19 +88,20 @@ def prepare_shadow_planes(scene: Scene, **settings) -> PlanePreparation:
     return PlanePreparation(read_casters(scene.geometry), settings["cone"])
 
 
-def plane_finder(casters: Casters, scene: Scene, light: Light, *, cone: int = 0) -> Callable[[], PlaneIndex]:
-    """Return what finds the shadow planes of one light, as the scene's camera needs them; `cone` edges bound a spot."""
+def plane_finder(
+    casters: Casters, camera: HostCamera, light: Light, *, cone: int = 0, types: ArrayTypes
+) -> Callable[[], PlaneIndex]:
+    """Return what finds the shadow planes of one light, as a camera needs them; `cone` edges bound a spot."""
     import numpy as np
 
-    position, camera = (np.array(point, dtype=np.float64).ravel() for point in (light.position, scene.camera.origin))
-    used = bodies_in_view(casters, scene.camera, position)
+    position = np.array(light.position, dtype=np.float64).ravel()
+    used = bodies_in_view(casters, camera, position)
     ring = None
     if cone and light.kind == "spot":
         ring = cone_ring(np.array(light.axis, dtype=np.float64).ravel(), float(light.cos_cutoff[0]), cone)
-    types = types_of(type(scene.camera.origin.x))
     seen = None if ring is not None else read_spot(light)
-    aim = partial(aim_at, read_camera(scene.camera), spot=seen, types=types)
-    return partial(index_planes, casters, position, camera, used=used, types=types, ring=ring, aim=aim)
+    aim = partial(aim_at, camera, spot=seen, types=types)
+    return partial(index_planes, casters, position, camera.origin, used=used, types=types, ring=ring, aim=aim)
 
 
 def shadow_planes(

@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from realtime.camera import read_camera
 from realtime.frame import (
     FrameRenderer,
     render_frame,
@@ -228,7 +229,7 @@ def _stages(renderer: FrameRenderer, kernel: str, kept: Kept) -> list[Callable[[
 
 def _silhouettes(renderer: FrameRenderer, scene: Scene) -> None:
     assert isinstance(renderer.prepare, PlanePreparation)
-    casters = renderer.prepare.standing(scene)
+    casters, camera = renderer.prepare.standing(scene), read_camera(scene.camera)
     for light in scene.lights:
         position = np.array(light.position, dtype=np.float64).ravel()
-        silhouette(casters, position, used=bodies_in_view(casters, scene.camera, position))
+        silhouette(casters, position, used=bodies_in_view(casters, camera, position))

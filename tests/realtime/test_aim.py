@@ -44,8 +44,9 @@ def geometries(place, spot=None):
     """Return the geometry in float32 by pixel and in float64 by ray, and both lights' cones."""
     import mitsuba as mi
 
-    from realtime.aim import aim_at, read_camera, read_spot, seen_rays
+    from realtime.aim import aim_at, read_spot, seen_rays
     from realtime.arrays import array_types
+    from realtime.camera import read_camera
     from realtime.geometry import ray_geometry
     from realtime.plane_index import light_frame
 

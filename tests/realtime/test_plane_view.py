@@ -10,19 +10,18 @@ from tests.scenes_for_tests import tiny_scene
 def camera_at(origin, target, size=(40, 30)):
     import mitsuba as mi
 
+    from realtime.camera import read_camera
     from realtime.scene import read_scene
 
     scene = tiny_scene(size=size, ball=None, floor=None)
     look = mi.ScalarTransform4f().look_at(list(origin), list(target), [0.1, 0.3, 1])
     scene["sensor"] = scene["sensor"] | {"to_world": look}
-    return read_scene(mi.load_dict(scene)).camera
+    return read_camera(read_scene(mi.load_dict(scene)).camera)
 
 
 def sees(camera, points):
     """Whether points lie in the image: along the ray through a pixel, by projection."""
-    origin, forward, left, up = (
-        np.array(part, dtype=float).ravel() for part in (camera.origin, camera.forward, camera.left, camera.up)
-    )
+    origin, forward, left, up = camera.origin, camera.forward, camera.left, camera.up
     away = points - origin
     depth = away @ forward
     across = away @ left / (left @ left) / np.where(depth > 0, depth, np.inf)
