@@ -48,6 +48,7 @@ class LightHeights:
     gaps: Any = None  #: by leaf: largest height of the texels below the height that divides them, least of those above
     sides: Any = None  #: by leaf: bit 4 row + column of texels below that height, and 16 more of those on both sides
     depth: Any = None  #: of a directional light: distance of the plane that heights are above, see `ShadowMap` [m]
+    walls: Any = None  #: by texel, where on its sides upright walls stand, see `realtime.map_walls`; None for none
 
     @property
     def faces(self) -> int:
@@ -86,7 +87,17 @@ def inverse_depth(shadow_map: ShadowMap):
     row = index // (size + 1)
     u = dr.fma(Float(index - row * (size + 1)), 2.0 / size, -1.0)
     v = dr.fma(Float(row % (size + 1)), 2.0 / size, -1.0)
-    across = dr.squared_norm(shadow_map.frame[0]) if shadow_map.frame else Float(1)
+    return height_at(shadow_map.frame, None, (u, v), distance)
+
+
+def height_at(frame, depth, place, distance):
+    """Return the height at (u, v) of a face whose map has a distance there [1/m]; `depth` as in `LightHeights`."""
+    import drjit as dr
+
+    if depth is not None:
+        return dr.maximum(depth - distance, 0)
+    u, v = place
+    across = dr.squared_norm(frame[0]) if frame else type(distance)(1)
     return dr.sqrt(dr.fma(across, dr.square(u) + dr.square(v), 1)) / distance
 
 
@@ -97,7 +108,7 @@ def light_heights(shadow_map: ShadowMap) -> LightHeights:
 
     size = shadow_map.size
     depth = shadow_map.depth
-    height = inverse_depth(shadow_map) if depth is None else dr.maximum(depth - shadow_map.distance, 0)
+    height = inverse_depth(shadow_map) if depth is None else height_at(None, depth, None, shadow_map.distance)
     dr.eval(height)
     Float = type(height)
     index = dr.arange(mi.UInt32, shadow_map.faces * size * size)
@@ -134,6 +145,14 @@ def texel_heights(heights: LightHeights, face, i, j, active=True):
 
     texel = (face * heights.size + j) * heights.size + i
     return dr.gather(four_numbers(type(heights.texels)), heights.texels, texel, active)
+
+
+def texel_walls(heights: LightHeights, face, i, j, active=True):
+    """Return the walls of the texel in column `i` and row `j` of a face."""
+    import drjit as dr
+    import mitsuba as mi
+
+    return dr.gather(mi.UInt32, heights.walls, (face * heights.size + j) * heights.size + i, active)
 
 
 @dataclass

@@ -11,7 +11,8 @@ in any order. The boundary is the height field of `realtime.light_heights`, and 
 
 * `walk`: each ray looks at the texels on its line (`realtime.volume_walk`) that a beam of rays about it may meet
   (`realtime.volume_tiles`); terms are put in order and integrated pair by pair, which keeps the digits that a
-  difference of two Gammas loses.
+  difference of two Gammas loses. Where the map jumps the boundary stands upright, at a place that rays from the light
+  find (`realtime.map_walls`).
 * `mesh`, as published: the boundary becomes triangles (`realtime.volume_mesh`), each is drawn over the pixels that it
   covers (`realtime.volume_raster`), and terms are added up as they come (`realtime.volume_sum`). The `static` mesh is
   the height field itself, an `adaptive` one has fewer triangles where the map is flat (`realtime.tessellation`).
@@ -24,6 +25,7 @@ from realtime.arrays import bytes_of
 from realtime.errors import InputError
 from realtime.light_heights import LightHeights, level_start, light_heights
 from realtime.lights import Light
+from realtime.map_walls import with_walls
 from realtime.memory import check_memory
 from realtime.ray_airlight import RayAirlight, integral_type, ray_airlight
 from realtime.scene import Scene
@@ -37,6 +39,7 @@ from realtime.volume_walk import sum_lit_pieces
 EVALUATIONS = ("walk", "mesh")
 TESSELLATIONS = ("static", "adaptive")
 SURFACES = ("map", "ray")
+WALLS = ("upright", "slanted")
 
 
 def light_volumes(
@@ -48,6 +51,7 @@ def light_volumes(
     tessellation: str = "static",
     threshold: float = THRESHOLD,
     surface: str = "map",
+    walls: str = "upright",
 ):
     """Return the airlight of every ray in the light volumes [W/(m^2 sr)].
 
@@ -68,6 +72,9 @@ def light_volumes(
     surface
         Where the shadows on surfaces come from: 'map', which costs nothing with evaluation=walk, or 'ray'. A mesh needs
         rays for them.
+    walls
+        What joins both sides of a jump of the map for evaluation=walk: 'upright', where rays from the light find it
+        between two samples (`realtime.map_walls`), or 'slanted', as published. A mesh has slanted ones.
 
     Returns
     -------
@@ -139,7 +146,7 @@ def _walk(heights: LightHeights, leaves: Leaves, airlight: RayAirlight):
 
 
 def prepare_light_volumes(
-    scene: Scene, *, map: int, evaluation: str, tessellation: str, threshold: float, surface: str
+    scene: Scene, *, map: int, evaluation: str, tessellation: str, threshold: float, surface: str, walls: str
 ) -> Callable[[Scene], tuple[Any, ...]]:
     """Return the function that makes the height field, or the mesh, of every light of a frame.
 
@@ -149,7 +156,7 @@ def prepare_light_volumes(
         For parameters out of range or that contradict each other, a mesh in bounded media, and more memory than the
         machine has.
     """
-    _check(map, evaluation, tessellation, threshold, surface)
+    _check(map, evaluation, tessellation, threshold, surface, walls)
     if evaluation == "mesh" and scene.plan.bounded:
         raise InputError(
             "evaluation=mesh: the scene has a medium with bounds, wanted one medium that fills all space; use "
@@ -162,18 +169,20 @@ def prepare_light_volumes(
     def volume(scene: Scene, light: Light):
         shadow_map = cast_shadow_map(scene.geometry, light, map)
         if evaluation == "walk":
-            return light_heights(shadow_map)
+            heights = light_heights(shadow_map)
+            return with_walls(heights, scene.geometry, light) if walls == "upright" else heights
         return volume_mesh(shadow_map, light, tessellation=tessellation, threshold=threshold)
 
     return lambda scene: tuple(volume(scene, light) for light in scene.lights)
 
 
-def _check(map: int, evaluation: str, tessellation: str, threshold: float, surface: str) -> None:
+def _check(map: int, evaluation: str, tessellation: str, threshold: float, surface: str, walls: str) -> None:
     check_size(map)
     words = (
         ("evaluation", evaluation, EVALUATIONS),
         ("tessellation", tessellation, TESSELLATIONS),
         ("surface", surface, SURFACES),
+        ("walls", walls, WALLS),
     )
     for name, value, allowed in words:
         if value not in allowed:
@@ -195,8 +204,8 @@ def _memory_of(light: Light, size: int, evaluation: str) -> int:
     if evaluation == "mesh":
         # Drawing it takes four doubles for each vertex as it is, and four for it in the image.
         return corners + memory_needed(faces, size) + faces * (size + 1) ** 2 * 8 * 8
-    # Distances and heights at the corners, four heights a texel, two bounds a node, a gap and sides a leaf.
+    # Distances and heights at the corners, four heights and walls a texel, two bounds a node, a gap and sides a leaf.
     heights = LightHeights(size, None, None, None)
     leaves = 4**heights.finest
     numbers = 4 * size**2 + 2 * level_start(heights.finest + 1) + 2 * leaves
-    return 2 * corners + faces * (number * numbers + 4 * leaves)
+    return 2 * corners + faces * (number * numbers + 4 * leaves + 4 * size**2)

@@ -78,9 +78,7 @@ def cast_shadow_map(scene, light: Light, size: int) -> ShadowMap:
     import mitsuba as mi
 
     check_size(size)
-    Float = type(light.position.x)
-    Double, Vector = mi.Float64, mi.Vector3d
-    parallel = light.kind == "directional"
+    Double = mi.Float64
     frame = None if light.kind == "point" else _frame(light)
     side = size + 1
     index = dr.arange(mi.UInt32, (1 if frame else 6) * side * side)
@@ -89,23 +87,47 @@ def cast_shadow_map(scene, light: Light, size: int) -> ShadowMap:
     # Whole numbers and powers of two: exact, so that neighbouring faces cast the same rays along their common edge.
     u = dr.fma(Double(index - row * side), 2.0 / size, -1.0)
     v = dr.fma(Double(row - face * side), 2.0 / size, -1.0)
-    start = mi.Point3f(light.position)
-    if parallel and frame is not None:
-        before = mi.Vector3d(light.position) - frame[2] * mi.Float64(light.face.depth)
-        start = mi.Point3f(before + frame[0] * u + frame[1] * v)
-        unit = frame[2]
-    elif frame is not None:
-        unit = dr.normalize(frame[0] * u + frame[1] * v + frame[2])
-    else:
-        # In this order the sum does not depend on which coordinate is which.
-        unit = cube_direction(Vector, face, u, v) * dr.rsqrt((dr.square(u) + dr.square(v)) + 1)
-    ray = mi.Ray3f(start, mi.Vector3f(unit))
-    hit = scene.ray_intersect_preliminary(ray, coherent=True)
-    distance = dr.select(hit.is_valid(), Float(hit.t), dr.inf)
+    distance = cast_map_rays(scene, light, (face, u, v))
     frame = frame and tuple(type(light.position)(one) for one in frame)
-    depth = light.face.depth if parallel else None
+    depth = light.face.depth if light.kind == "directional" else None
     dr.eval(distance, frame, depth)  # once: whoever reads it would cast the rays again
     return ShadowMap(size, distance, frame, depth)
+
+
+def cast_map_rays(scene, light: Light, place, active=True):
+    """Return the distances to the first surface along rays of a light's map, infinite where there is none [m].
+
+    Parameters
+    ----------
+    scene
+        The Mitsuba scene that holds the occluders.
+    light
+        The light.
+    place
+        The face and u and v there, in float64.
+    active
+        Lanes to cast rays in.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    face, u, v = place
+    Float = type(light.position.x)
+    start = mi.Point3f(light.position)
+    if light.kind == "point":
+        # In this order the sum does not depend on which coordinate is which.
+        unit = cube_direction(mi.Vector3d, face, u, v) * dr.rsqrt((dr.square(u) + dr.square(v)) + 1)
+    else:
+        across, up, axis = _frame(light)
+        if light.kind == "directional":
+            before = mi.Vector3d(light.position) - axis * mi.Float64(light.face.depth)
+            start = mi.Point3f(before + across * u + up * v)
+            unit = axis
+        else:
+            unit = dr.normalize(across * u + up * v + axis)
+    ray = mi.Ray3f(start, mi.Vector3f(unit))
+    hit = scene.ray_intersect_preliminary(ray, coherent=True, active=active)
+    return dr.select(hit.is_valid(), Float(hit.t), dr.inf)
 
 
 def lit_in_map(shadow_map: ShadowMap, light: Light, point):

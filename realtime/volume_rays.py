@@ -42,6 +42,7 @@ class FaceRay:
     per_v: Any
     per_diagonal: Any  #: dt/d(v - u)
     parallel: bool = False  #: whether the rays of the light are parallel
+    stops: Any = False  #: whether the ray ends in the face, and does not go on in another one
 
 
 def in_face(heights: LightHeights, face, away, direction, segment):

@@ -1,14 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lines of camera rays over the texels of a face, and the pieces of them that texels cut out: see
-`realtime.volume_walk`.
-"""
+"""Lines of camera rays over the texels of a face, and which texels are near them: see `realtime.volume_walk`."""
 
 from dataclasses import dataclass
-from functools import reduce
 from typing import Any
 
-from realtime.light_heights import LightHeights, texel_heights
+from realtime.light_heights import LightHeights, texel_heights, texel_walls
 from realtime.volume_rays import FaceRay, at_line
+from realtime.volume_walls import height_in, parts_of
 
 _ROUNDING = 1e-5  # of a height of the map, with room
 _STEEPEST = 1e6  # rows a column; what is steeper goes over all rows of its column
@@ -39,14 +37,32 @@ def line_of(heights: LightHeights, face, ray: FaceRay) -> Line:
             cell_at(pair, per, at, mi.UInt32(0), mi.UInt32(heights.size))
             for pair, per in ((ray.u, ray.per_u), (ray.v, ray.per_v))
         )
-        s00, s10, s01, s11 = texel_heights(heights, face, i, j, ray.walks)
+        four = texel_heights(heights, face, i, j, ray.walks)
         x, y = ray.u[t] - type(at)(i), ray.v[t] - type(at)(j)
-        below = x >= y
-        along, upward = dr.select(below, s10 - s00, s11 - s01), dr.select(below, s11 - s10, s01 - s00)
-        excess.append(ray.s[t] - dr.fma(x, along, dr.fma(y, upward, s00)))
-        heights_there = (s00, s10, s01, s11)
-        slack = dr.fma(ray.s[t], _ROUNDING, reduce(dr.maximum, heights_there) - reduce(dr.minimum, heights_there))
+        height, doubt = _height_in(heights, (face, i, j, ray.walks), four, x, y)
+        excess.append(ray.s[t] - height)
+        slack = dr.fma(ray.s[t], _ROUNDING, doubt)
     return Line(ray, right, up, (excess[0], excess[1]), slack)
+
+
+def _height_in(heights, texel, four, x, y):
+    """Return the height at a point of a texel with four heights, and how far below it a lit surface may seem to be.
+
+    That is the range of the heights, as the surface may do anything between the samples. Beside a wall it is half of
+    it: then it is a question of which of two surfaces the point lies on.
+    """
+    import drjit as dr
+
+    s00, s10, s01, s11 = four
+    below = x >= y
+    along, upward = dr.select(below, s10 - s00, s11 - s01), dr.select(below, s11 - s10, s01 - s00)
+    height, range_ = dr.fma(x, along, dr.fma(y, upward, s00)), dr.max(four) - dr.min(four)
+    if heights.walls is None:
+        return height, range_
+    walls = texel_walls(heights, *texel)
+    beside = walls != 0
+    walled = height_in(parts_of(four, walls, type(x)), x, y)
+    return dr.select(beside, walled, height), dr.select(beside, 0.5 * range_, range_)
 
 
 def cell_at(pair, per, t, low, side):
@@ -99,67 +115,3 @@ def texels_on(line: Line, slope, node):
         first, end = (mi.UInt32(dr.clip(dr.fma(step, float(k), one), 0, 20)) for one in (low, high))
         bits |= ((mi.UInt32(1) << end) - (mi.UInt32(1) << first)) & (0x1111 << k)
     return bits
-
-
-@dataclass
-class Pieces:
-    """The two pieces of a ray's line in a texel, on either side of its diagonal."""
-
-    t: tuple[Any, Any, Any]  #: where they begin, meet and end
-    excess: tuple[Any, Any, Any]  #: D there
-
-    @property
-    def changes(self):
-        """Whether D changes its sign over each of them."""
-        lit = [excess > 0 for excess in self.excess]
-        there = self.t[0] < self.t[2]
-        return there & (lit[0] != lit[1]), there & (lit[1] != lit[2])
-
-
-def texel_pieces(heights, face, line: Line, texel) -> Pieces:
-    """Return the pieces of a ray's line in a texel, computed from its own borders and heights alone."""
-    import drjit as dr
-
-    ray = line.ray
-    Float = type(ray.begin)
-    column, row = Float(texel[0]), Float(texel[1])
-    in_u, out_u = borders(column, ray.u[0], ray.per_u)
-    in_v, out_v = borders(row, ray.v[0], ray.per_v)
-    into, out = dr.maximum(in_u, in_v), dr.minimum(out_u, out_v)
-    begin, end = dr.maximum(into, 0), dr.minimum(out, 1)
-    by_u, out_by_u = in_u >= begin, out_u <= end
-    four = texel_heights(heights, face, *texel)
-    near_near, near_far, far_near, far_far = _as_seen(line, four)
-    d0 = _excess_on_border(line, (column, row), begin, by_u, near_near, dr.select(by_u, near_far, far_near))
-    d0 = dr.select(into < 0, line.excess[0], d0)
-    d1 = _excess_on_border(line, (column, row), end, out_by_u, dr.select(out_by_u, far_near, near_far), far_far)
-    d1 = dr.select(end < out, line.excess[1], d1)
-    middle = ((ray.u[0] - column) - (ray.v[0] - row)) * ray.per_diagonal
-    bends = (middle > begin) & (middle < end)
-    middle = dr.select(bends, middle, end)
-    on_diagonal = dr.fma(at_line(ray.u, middle) - column, four[3] - four[0], four[0])
-    dm = dr.select(bends, at_line(ray.s, middle) - on_diagonal, d1)
-    return Pieces((begin, middle, end), (d0, dm, d1))
-
-
-def _as_seen(line: Line, four):
-    """Return the heights of a texel's corners near or far in u, then near or far in v, as the line goes."""
-    import drjit as dr
-
-    s00, s10, s01, s11 = four
-    low = dr.select(line.right, s00, s10), dr.select(line.right, s10, s00)
-    high = dr.select(line.right, s01, s11), dr.select(line.right, s11, s01)
-    near_near, near_far = dr.select(line.up, low[0], high[0]), dr.select(line.up, high[0], low[0])
-    far_near, far_far = dr.select(line.up, low[1], high[1]), dr.select(line.up, high[1], low[1])
-    return near_near, near_far, far_near, far_far
-
-
-def _excess_on_border(line: Line, texel, t, on_u, base, other):
-    """Return D on the border of a texel, between the height `base` of its nearer corner and that of the other."""
-    import drjit as dr
-
-    ray = line.ray
-    pair = dr.select(on_u, ray.v[0], ray.u[0]), dr.select(on_u, ray.v[1], ray.u[1])
-    x = at_line(pair, t) - dr.select(on_u, texel[1], texel[0])
-    along = dr.select(dr.select(on_u, line.up, line.right), x, 1 - x)
-    return at_line(ray.s, t) - dr.fma(along, other - base, base)

@@ -21,13 +21,14 @@ integrates each lit piece by itself: a sum of positive terms, where a sum of J(0
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
 from realtime.light_heights import LightHeights
+from realtime.volume_passages import Passage, may_cross, passage, texel_crossings
 from realtime.volume_rays import FaceRay, distance_at, face_ray, in_face
-from realtime.volume_texels import Line, Pieces, borders, cell_at, line_of, slope_of, texel_pieces, texels_on
+from realtime.volume_texels import Line, borders, cell_at, line_of, slope_of, texels_on
 from realtime.volume_tiles import CHUNK, LARGER, TILE, Leaves, unpacked
 
 PLACES = 8  #: crossings that a ray keeps; even, so that it is lit after them as before
@@ -71,7 +72,7 @@ def sum_lit_pieces(
         begin, end = in_face(heights, face, away, direction, segment)
 
         def add(total, reached):
-            ray = face_ray(heights, face, away, direction, (begin, end))
+            ray = replace(face_ray(heights, face, away, direction, (begin, end)), stops=end >= segment[1])
             place = tile * heights.faces + face
             first, last = (dr.gather(mi.UInt32, ends, place) for ends in (leaves.first, leaves.last))
             source = leaves, first & (LARGER - 1), last, (first & LARGER) != 0
@@ -149,15 +150,15 @@ def _nearest_crossings(heights, face, line: Line, source, after, active):
 
         def look(bits, crossed):
             lowest = bits & (~bits + 1)
-            one, other = texel_pieces(heights, face, line, texel(bits)).changes
-            return bits ^ lowest, crossed | dr.select(one | other, lowest, 0)
+            found = may_cross(line, passage(heights, face, line, texel(bits)))
+            return bits ^ lowest, crossed | dr.select(found, lowest, 0)
 
         _, crossed = dr.while_loop(
             state=(bits, mi.UInt64(0)), cond=lambda bits, crossed: bits != 0, body=look, labels=("bits", "crossed")
         )
 
         def keep(crossed, found):
-            found = _with_crossings(texel_pieces(heights, face, line, texel(crossed)), line.ray, found, after)
+            found = _with_crossings(line, passage(heights, face, line, texel(crossed)), found, after)
             return crossed & (crossed - 1), found
 
         _, found = dr.while_loop(
@@ -195,18 +196,26 @@ def _chunk_bits(line: Line, slope, leaves, k, last):
     return bits
 
 
-def _with_crossings(pieces: Pieces, ray: FaceRay, found: _Crossings, after) -> _Crossings:
-    """Add the crossings of two pieces."""
+def _with_crossings(line: Line, over: Passage, found: _Crossings, after) -> _Crossings:
+    """Add the crossings of a texel; few rays have two, in a branch of their own."""
     import drjit as dr
 
-    queue, lost, odd = found.queue, found.lost, found.odd
-    for k, changes in enumerate(pieces.changes):
-        (t0, t1), (d0, d1) = pieces.t[k : k + 2], pieces.excess[k : k + 2]
-        x = distance_at(ray, dr.fma(d0 / (d0 - d1), t1 - t0, t0))
-        queue, out = _inserted(queue, dr.select(changes & (x > after), x, dr.inf))
-        lost = lost | (out < dr.inf)
-        odd = odd ^ (changes & (x <= after))
-    return _Crossings(queue, lost, odd)
+    here = texel_crossings(line, over)
+    found = _with_crossing(found, here.crosses, distance_at(line.ray, here.t), after)
+
+    def add(found, x):
+        return _with_crossing(found, dr.full(type(here.twice), True), x, after)
+
+    args = found, distance_at(line.ray, here.second)
+    return dr.if_stmt(args=args, cond=here.twice, true_fn=add, false_fn=lambda found, x: found)
+
+
+def _with_crossing(found: _Crossings, crosses, x, after) -> _Crossings:
+    """Add a crossing at distance `x` where there is one."""
+    import drjit as dr
+
+    queue, out = _inserted(found.queue, dr.select(crosses & (x > after), x, dr.inf))
+    return _Crossings(queue, found.lost | (out < dr.inf), found.odd ^ (crosses & (x <= after)))
 
 
 def _square_crossings(heights, face, line: Line, square, found: _Crossings, after) -> _Crossings:
@@ -224,11 +233,11 @@ def _square_crossings(heights, face, line: Line, square, found: _Crossings, afte
     j = dr.select((in_v >= begin) & ~by_u, dr.select(line.up, row, row + side - 1), j)
 
     def step(i, j, t, found):
-        pieces = texel_pieces(heights, face, line, (i, j))
-        found = _with_crossings(pieces, ray, found, after)
-        by_u = borders(Float(i), ray.u[0], ray.per_u)[1] <= pieces.t[2]
+        over = passage(heights, face, line, (i, j))
+        found = _with_crossings(line, over, found, after)
+        by_u = borders(Float(i), ray.u[0], ray.per_u)[1] <= over.t[1]
         i = dr.select(by_u, dr.select(line.right, i + 1, i - 1), i)
-        return i, dr.select(by_u, j, dr.select(line.up, j + 1, j - 1)), pieces.t[2], found
+        return i, dr.select(by_u, j, dr.select(line.up, j + 1, j - 1)), over.t[1], found
 
     return dr.while_loop(
         state=(i, j, begin, found),

@@ -100,7 +100,9 @@ def render(loaded, method="light-volumes", precision="single", **parameters):
 
 
 def render_both(loaded, precision="single", **parameters):
-    return [render(loaded, precision=precision, evaluation=one, **parameters) for one in EVALUATIONS]
+    """Render the same height field, as published, by both evaluations."""
+    shared = {"precision": precision, "walls": "slanted"} | parameters
+    return [render(loaded, evaluation=one, **shared) for one in EVALUATIONS]
 
 
 def differ(found, wanted):
@@ -108,8 +110,10 @@ def differ(found, wanted):
     return np.max(np.abs(found - wanted)) / np.max(wanted)
 
 
-def twin_of(loaded, frame, size, precision="single"):
+def twin_of(loaded, frame, size, precision="single", *, walls="slanted"):
     """Return the airlight of the map that a frame was rendered with, by another route."""
+    from realtime.light_heights import light_heights
+    from realtime.map_walls import with_walls
     from realtime.scene import read_scene
     from realtime.shadow_map import cast_shadow_map
     from reference.scene import read_truth
@@ -117,4 +121,8 @@ def twin_of(loaded, frame, size, precision="single"):
 
     scene = read_scene(loaded, precision)
     maps = [cast_shadow_map(scene.geometry, light, size) for light in scene.lights]
-    return twin_airlight(read_truth(loaded), maps, distance=frame.distance)
+    numbers = None
+    if walls == "upright":
+        pairs = zip(maps, scene.lights)
+        numbers = [np.array(with_walls(light_heights(one), scene.geometry, light).walls) for one, light in pairs]
+    return twin_airlight(read_truth(loaded), maps, distance=frame.distance, walls=numbers)

@@ -36,7 +36,6 @@ What is lit of a ray, faces and cones of spots taken into account, is integrated
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,63 +49,19 @@ from reference.intervals import LitIntervals
 from reference.scene import TruthLight, TruthScene
 from reference.shapes import exact_distance
 from reference.surface import surface_hits
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from validation.twin_field import Array, HeightField, Index, Path, by_ray, height_field, zero_angle
+from validation.walled_twin import walled_parts
 
 _CHUNK = 1 << 20  # crossings of rays and lines looked at together: 8 MB an array
 
 
-@dataclass(frozen=True)
-class HeightField:
-    """The height field of a light's shadow map."""
-
-    size: int  #: texels on a side
-    heights: Array  #: 1 / planar depth at the corners of the texels, (faces, size + 1, size + 1) by v, u [1/m]
-    coordinates: Array  #: matrices that give a, b, c of a vector a across + b up + c axis, (faces, 3, 3)
-
-    @property
-    def is_cube(self) -> bool:
-        """Whether the faces look all around."""
-        return len(self.heights) == 6
-
-
-def height_field(shadow_map: ShadowMap) -> HeightField:
-    """Return the height field of a shadow map.
-
-    With k = axis + u across + v up the first surface is at k / s = k distance / |k| from the light, so s = |k| /
-    distance, and 0 where the distance is infinite.
-
-    Raises
-    ------
-    InputError
-        If a distance is not above 0.
-    """
-    size = shadow_map.size
-    distance = np.array(shadow_map.distance, dtype=np.float64)
-    if not np.all(distance > 0):
-        raise InputError(f"shadow map: got a distance of {np.min(distance):g}, wanted distances above 0 [m]")
-    frames = _frames(shadow_map)
-    at = np.linspace(-1.0, 1.0, size + 1)
-    v, u = np.meshgrid(at, at, indexing="ij")
-    k = np.einsum("ijc,fcx->fijx", np.stack([u, v, np.ones_like(u)], axis=-1), frames)
-    heights = np.sqrt(np.sum(k * k, axis=-1)) / distance.reshape(len(frames), size + 1, size + 1)
-    return HeightField(size, heights, np.asarray(np.linalg.inv(np.swapaxes(frames, 1, 2)), dtype=np.float64))
-
-
-def _frames(shadow_map: ShadowMap) -> Array:
-    """Return across, up and axis of every face as rows, (faces, 3, 3)."""
-    if shadow_map.frame:
-        return np.array([np.array(one, dtype=np.float64).reshape(3) for one in shadow_map.frame])[None]
-    frames = np.zeros((6, 3, 3))
-    for face in range(6):
-        axis = face // 2
-        frames[face, 0, (axis + 1) % 3] = frames[face, 1, (axis + 2) % 3] = 1
-        frames[face, 2, axis] = -1 if face % 2 else 1
-    return frames
-
-
-def twin_airlight(truth: TruthScene, shadow_maps: Sequence[ShadowMap], *, distance: Array | None = None) -> Array:
+def twin_airlight(
+    truth: TruthScene,
+    shadow_maps: Sequence[ShadowMap],
+    *,
+    distance: Array | None = None,
+    walls: Sequence[NDArray[np.uint32]] | None = None,
+) -> Array:
     """Return the airlight that shadow maps stand for.
 
     Parameters
@@ -117,6 +72,8 @@ def twin_airlight(truth: TruthScene, shadow_maps: Sequence[ShadowMap], *, distan
         One for each light, in the order of `truth.lights`.
     distance
         To the visible surface by pixel, infinite where there is none [m]; computed in float64 by default.
+    walls
+        By light, the walls of the texels of its map, see `realtime.map_walls`; none by default.
 
     Returns
     -------
@@ -140,9 +97,9 @@ def twin_airlight(truth: TruthScene, shadow_maps: Sequence[ShadowMap], *, distan
         hits = surface_hits(truth)
         distance = exact_distance(truth, hits.interaction, hits.distance)
     total = np.zeros((len(truth.direction), 3))
-    for light, shadow_map in zip(truth.lights, shadow_maps, strict=True):
+    for number, (light, shadow_map) in enumerate(zip(truth.lights, shadow_maps, strict=True)):
         rays, ends = _rays_of(truth, light, np.reshape(distance, -1))
-        lit = volume_intervals(height_field(shadow_map), rays, ends)
+        lit = volume_intervals(height_field(shadow_map, walls[number] if walls else None), rays, ends)
         total += sum_intervals(truth.medium, light, rays, lit, 1.0)[0]
     return total.reshape(truth.height, truth.width, 3)
 
@@ -179,21 +136,16 @@ def volume_intervals(field: HeightField, rays: Rays, ends: tuple[Array, Array]) 
         step = max(1, _CHUNK // (4 * field.size))
         for first in range(0, len(inside), step):
             some = inside[first : first + step]
-            path = _Path(normal[some], direction[some], rays.height[some])
-            row, begin, end = _lit_parts(field, face, path, (low[some], high[some]))
+            path = Path(normal[some], direction[some], rays.height[some])
+            within = field, face, path, (low[some], high[some])
+            if field.walls is None:
+                row, begin, end = _lit_parts(*within)
+            else:
+                row, begin, end = walled_parts(*within, high[some] == ends[1][some])
             parts.append((some[row], begin, end))
     ray, low, high = (np.concatenate(column) for column in zip(*parts, strict=True))
     order = np.lexsort((low, ray))
     return LitIntervals(ray[order], low[order], high[order], len(ray), 0.0)
-
-
-@dataclass(frozen=True)
-class _Path:
-    """Some rays in the coordinates a, b, c of a face."""
-
-    normal: Array  # of n, (rays, 3)
-    direction: Array  # of w, (rays, 3)
-    height: Array  # (rays,) [m]
 
 
 def _within_face(face: int, normal: Array, direction: Array, ends: tuple[Array, Array]) -> tuple[Array, Array]:
@@ -214,11 +166,11 @@ def _within_face(face: int, normal: Array, direction: Array, ends: tuple[Array, 
     return low, high
 
 
-def _lit_parts(field: HeightField, face: int, path: _Path, ends: tuple[Array, Array]) -> tuple[Index, Array, Array]:
+def _lit_parts(field: HeightField, face: int, path: Path, ends: tuple[Array, Array]) -> tuple[Index, Array, Array]:
     """Return the rays and the angles at both ends of what is lit between two angles within a face."""
     low, high = ends[0][:, None], ends[1][:, None]
     lines = _lines(field.size).T
-    theta = np.sort(np.clip(_zero(path.normal @ lines, path.direction @ lines), low, high), axis=1)
+    theta = np.sort(np.clip(zero_angle(path.normal @ lines, path.direction @ lines), low, high), axis=1)
     theta = np.concatenate([low, theta, high], axis=1)
     f = _above(field, face, path, theta)
     lit = f >= 0
@@ -229,16 +181,9 @@ def _lit_parts(field: HeightField, face: int, path: _Path, ends: tuple[Array, Ar
     # Of each ray, what opens and what closes its intervals take turns, so that both lists go by the same intervals.
     opens = lit[row, column + 1]
     first, last = np.flatnonzero(lit[:, 0]), np.flatnonzero(lit[:, -1])
-    ray, begin = _by_ray(first, ends[0][first], row[opens], crossing[opens])
-    _, end = _by_ray(last, ends[1][last], row[~opens], crossing[~opens])
+    ray, begin = by_ray(first, ends[0][first], row[opens], crossing[opens])
+    _, end = by_ray(last, ends[1][last], row[~opens], crossing[~opens])
     return ray, begin, end
-
-
-def _by_ray(one: Index, one_angle: Array, other: Index, other_angle: Array) -> tuple[Index, Array]:
-    """Join two lists of angles of rays and sort them by ray and angle."""
-    ray, angle = np.concatenate([one, other]), np.concatenate([one_angle, other_angle])
-    order = np.lexsort((angle, ray))
-    return ray[order], angle[order]
 
 
 def _lines(size: int) -> Array:
@@ -254,12 +199,7 @@ def _lines(size: int) -> Array:
     return np.concatenate(list(rows))
 
 
-def _zero(cosine: Array, sine: Array) -> Array:
-    """Return where cosine cos(theta) + sine sin(theta) = 0, from -pi/2 to pi/2."""
-    return np.arctan2(np.where(sine < 0, cosine, -cosine), np.abs(sine))
-
-
-def _above(field: HeightField, face: int, path: _Path, theta: Array) -> Array:
+def _above(field: HeightField, face: int, path: Path, theta: Array) -> Array:
     """Return f, the s of the points at theta above the height field there, times h c."""
     size = field.size
     cosine, sine = np.cos(theta), np.sin(theta)

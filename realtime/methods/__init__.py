@@ -71,7 +71,14 @@ METHODS: dict[str, Method] = {
         lights_surfaces=finds_lit_surfaces,
         frozen=lambda settings: settings["evaluation"] == "walk",  # the crossings of a mesh are counted on the way
         parameters=MappingProxyType(
-            {"map": 512, "evaluation": "walk", "tessellation": "static", "threshold": 1e-3, "surface": "map"}
+            {
+                "map": 512,
+                "evaluation": "walk",
+                "tessellation": "static",
+                "threshold": 1e-3,
+                "surface": "map",
+                "walls": "upright",
+            }
         ),
     ),
     "min-max": Method(

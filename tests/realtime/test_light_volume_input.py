@@ -15,6 +15,7 @@ from tests.scenes_for_tests import body, clear_scene
         ({"map": 500}, "map: got 500, wanted a power of two from 4 to 8192"),
         ({"map": 2}, "map: got 2, wanted"),
         ({"evaluation": "march"}, "evaluation: got 'march', wanted one of walk, mesh"),
+        ({"walls": "round"}, "walls: got 'round', wanted one of upright, slanted"),
         ({"evaluation": "mesh", "tessellation": "fine"}, "tessellation: got 'fine', wanted one of static, adaptive"),
         ({"tessellation": "adaptive"}, "tessellation=adaptive: got evaluation=walk.*; wanted evaluation=mesh"),
         ({"threshold": 0.0}, "threshold: got 0.0, wanted a positive number"),
@@ -73,13 +74,14 @@ def test_memory_that_is_needed_is_what_the_arrays_hold(variant):
     """Of a map of 8192 texels by proportion: nothing grows faster."""
     import realtime.light_volumes
     from realtime.light_heights import light_heights
+    from realtime.map_walls import with_walls
     from realtime.scene import read_scene
     from realtime.shadow_map import cast_shadow_map
 
     scene = read_scene(loaded_scene())
     shadow_map = cast_shadow_map(scene.geometry, scene.lights[0], 64)
-    heights = light_heights(shadow_map)
-    arrays = heights.texels, heights.bounds, heights.gaps, heights.sides
+    heights = with_walls(light_heights(shadow_map), scene.geometry, scene.lights[0])
+    arrays = heights.texels, heights.bounds, heights.gaps, heights.sides, heights.walls
     held = 4 * (2 * len(shadow_map.distance) + sum(len(array) for array in arrays))
     assert realtime.light_volumes._memory_of(scene.lights[0], 64, "walk") == held
 
@@ -94,7 +96,10 @@ def test_the_command_renders_meshes(variant, tmp_path):
     from reference.exr import read_exr
 
     images = []
-    for mesh in ([], ["--set", "evaluation=mesh", "--set", "tessellation=adaptive", "--set", "threshold=1e-4"]):
+    for mesh in (
+        ["--set", "walls=slanted"],
+        ["--set", "evaluation=mesh", "--set", "tessellation=adaptive", "--set", "threshold=1e-4"],
+    ):
         arguments = ["sphere-spot", "--size", "20x15", "--frames", "1", "--set", "map=128", *mesh]
         assert run_command(*arguments, "-o", str(tmp_path / "image.exr")) == 0
         images.append(read_exr(tmp_path / "image-0001.exr").layers["airlight"])

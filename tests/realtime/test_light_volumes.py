@@ -57,6 +57,18 @@ def test_frames_are_exact_with_respect_to_the_map(variant, name, precision):
         assert differ(*(frame.airlight for frame in frames)) < 1e-12
 
 
+@pytest.mark.parametrize(("name", "precision"), ALL)
+def test_frames_with_upright_walls_are_exact_with_respect_to_the_map(variant, name, precision):
+    """As above, with the walls that the rays of the map found."""
+    loaded, size = loaded_scene(name), SCENES[name][1]
+    frame = render(loaded, precision=precision, map=size)
+    wanted = twin_of(loaded, frame, size, precision, walls="upright")
+    assert np.max(wanted) > 5e-4
+    error = np.abs(frame.airlight - wanted)
+    assert np.max(error) < (1e-5 if precision == "single" else 1e-7) * np.max(wanted)
+    assert np.mean(error <= 1e-4 * wanted) > (SHARES.get(name, 0.999) if precision == "single" else 0.999)
+
+
 def test_rays_cross_the_fence_more_often_than_a_queue_holds(variant):
     from realtime.scene import read_scene
     from realtime.shadow_map import cast_shadow_map
@@ -118,7 +130,7 @@ def renderers(kind, view):
 
     changes = camera(*VIEWS[view], size=(13, 9)) | ({"lamp": spot(cutoff=50.0, beam=50.0)} if kind == "spot" else {})
     loaded = loaded_scene(**changes)
-    both = [renderer_of(loaded, precision="double", map=SMALL, evaluation=one) for one in EVALUATIONS]
+    both = [renderer_of(loaded, precision="double", map=SMALL, evaluation=one, walls="slanted") for one in EVALUATIONS]
     scene = both[0].scene
     return loaded, both, cast_shadow_map(scene.geometry, scene.lights[0], SMALL)
 
@@ -170,7 +182,7 @@ def test_a_light_that_moves_between_frames(variant):
 
     from realtime.frame import image_frame, run_stages
 
-    renderer = {one: renderer_of(loaded_scene(), map=64, evaluation=one) for one in EVALUATIONS}
+    renderer = {one: renderer_of(loaded_scene(), map=64, evaluation=one, walls="slanted") for one in EVALUATIONS}
     scene = renderer["walk"].scene
     frames = []
     for height in (1.9, 2.3, 2.9):
@@ -188,7 +200,7 @@ def test_a_light_that_moves_between_frames(variant):
 def test_adaptive_meshes_come_closer_with_the_threshold(variant):
     """In a dome, which is curved everywhere."""
     loaded = loaded_scene(floor={"type": "sphere", "center": [0.3, 0.4, 0.2], "radius": 5.1})
-    exact = render(loaded, map=128).airlight
+    exact = render(loaded, map=128, walls="slanted").airlight
     thresholds = (1e-1, 1e-2, 1e-3)
     errors = []
     for threshold in thresholds:

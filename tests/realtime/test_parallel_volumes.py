@@ -85,7 +85,7 @@ def height_field(scene, size):
 def test_the_walk_against_steps_through_the_height_field(variant, size):
     """The same map, met by a sum over 10 000 steps of every ray in NumPy."""
     scene = read(shaded(size=(12, 8)))
-    frame = render(scene, "light-volumes", map=size)
+    frame = render(scene, "light-volumes", map=size, walls="slanted")
     found, distance = frame.airlight, frame.distance
     expected = summed(scene, [box_part()], distance=distance, lit=height_field(scene, size))
     without = render(scene).airlight
@@ -103,10 +103,17 @@ def test_the_error_falls_as_the_map_grows(variant):
     scene = shaded(size=(32, 24))
     truth = truth_image(mi.load_dict(scene)).airlight
     loaded = read(scene, "single")
-    errors = [relative_rmse(render(loaded, "light-volumes", map=size).airlight, truth) for size in (32, 128, 512, 2048)]
+
+    def error(size, walls):
+        return relative_rmse(render(loaded, "light-volumes", map=size, walls=walls).airlight, truth)
+
+    errors = [error(size, "slanted") for size in (32, 128, 512, 2048)]
     # As 1/size where shadow edges are crossed, as its root for the few rays that graze the shadow of the ball.
     assert all(other < 0.65 * one for one, other in pairwise(errors))
     assert errors[-1] < 5e-3
+    # Walls that stand upright where rays found them are worth a map of eight times the size.
+    assert error(128, "upright") < 1.5 * errors[2]
+    assert error(512, "upright") < errors[3]
 
 
 @pytest.mark.slow

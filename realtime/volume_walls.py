@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The height field over a texel on whose sides upright walls stand: see `realtime.map_walls`.
+
+On a side with a wall the height is that of the one corner up to the wall and that of the other beyond it; on a side
+without, it is linear. A side looks the same from both of its texels, so all that holds of crossings in
+`realtime.volume_walk` holds still: between two ends of a ray the number of changes of sign says whether both are lit.
+
+One straight line divides the texel into two parts, each under a plane; where these differ a wall stands on the line:
+
+* where walls on two sides that meet cut a corner off, the line joins them. The corner's part has its height, the other
+  the plane through the other three corners;
+* where walls stand on two sides across from each other, the line joins them. Each part has the heights of the side that
+  lies in it;
+* else the line is the diagonal from (0, 0) to (1, 1), between two triangles, as without walls.
+
+A plane through three corners may leave their range towards the fourth: it is cut off at the least and the largest
+height of the texel, which bound what tiles look at. Beside a corner that is cut off the border and the plane differ by
+the slope over a part of a texel, and of walls on three or four sides one or two end at the border: there a step stands
+on the border itself, and which side of it is lit says the border.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+from realtime.map_walls import BOTTOM, LEFT, RIGHT, TOP, Side, side_of
+
+Numbers = tuple[Any, Any, Any]
+
+
+@dataclass
+class Parts:
+    """The two parts of a texel; each triple c0, cx, cy stands for c0 + cx x + cy y."""
+
+    line: Numbers  #: above 0 in the second part
+    first: Numbers  #: height over the first part
+    second: Numbers  #: height over the second part
+    bounds: tuple[Any, Any]  #: least and largest height
+
+
+def parts_of(four, walls, Float) -> Parts:
+    """Return the parts of a texel with four heights and the walls of a number, see `realtime.map_walls`."""
+    import drjit as dr
+
+    s00, s10, s01, s11 = four
+    bottom, top, left, right = (side_of(walls, side, Float) for side in (BOTTOM, TOP, LEFT, RIGHT))
+    cut = (bottom.stands ^ top.stands) & (left.stands ^ right.stands)
+    upright = bottom.stands & top.stands
+    level = left.stands & right.stands & ~upright
+    zero, one = Float(0), Float(1)
+    line = _select(upright, (-bottom.place, one, bottom.place - top.place), (zero, one, -one))
+    line = _select(level, (-left.place, left.place - right.place, one), line)
+    line = _select(cut, _cut_line(bottom, top, left, right), line)
+    below, above, before, behind = s10 - s00, s11 - s01, s01 - s00, s11 - s10
+    corner = dr.select(right.stands, dr.select(top.stands, s11, s10), dr.select(top.stands, s01, s00))
+    first = (
+        dr.select(cut, corner, s00),
+        dr.select(cut | upright, zero, dr.select(level, below, above)),
+        dr.select(cut | level, zero, before),
+    )
+    at_zero = dr.select(bottom.stands & left.stands, s10 - above, s00)
+    second = (
+        dr.select(cut, at_zero, dr.select(upright, s10, dr.select(level, s01, s00))),
+        dr.select(upright, zero, dr.select(level | (cut & bottom.stands), above, below)),
+        dr.select(level, zero, dr.select(cut & ~left.stands, before, behind)),
+    )
+    return Parts(line, first, second, (dr.min(four), dr.max(four)))
+
+
+def _cut_line(bottom: Side, top: Side, left: Side, right: Side) -> Numbers:
+    """Return the line through the walls of two sides that meet, below 0 at the corner between them."""
+    import drjit as dr
+
+    Float = type(bottom.place)
+    x, y = dr.select(bottom.stands, bottom.place, top.place), dr.select(left.stands, left.place, right.place)
+    corner_x, corner_y = dr.select(right.stands, Float(1), 0), dr.select(top.stands, Float(1), 0)
+    # Distances from the corner over those of the walls from it: their sum is 1 on the line.
+    per_x, per_y = dr.rcp(x - corner_x), dr.rcp(y - corner_y)
+    return -1 - corner_x * per_x - corner_y * per_y, per_x, per_y
+
+
+def _select(condition, one: Numbers, other: Numbers) -> Numbers:
+    import drjit as dr
+
+    a, b, c = (dr.select(condition, *pair) for pair in zip(one, other))
+    return a, b, c
+
+
+def value_at(numbers: Numbers, x, y):
+    """Return c0 + cx x + cy y."""
+    import drjit as dr
+
+    return dr.fma(numbers[1], x, dr.fma(numbers[2], y, numbers[0]))
+
+
+def height_at(parts: Parts, second, x, y):
+    """Return the height at a point by the plane of the second part, or of the first."""
+    import drjit as dr
+
+    plane = dr.select(second, value_at(parts.second, x, y), value_at(parts.first, x, y))
+    return dr.clip(plane, *parts.bounds)
+
+
+def height_in(parts: Parts, x, y):
+    """Return the height at a point of a texel."""
+    return height_at(parts, value_at(parts.line, x, y) > 0, x, y)
