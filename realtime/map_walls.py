@@ -11,49 +11,20 @@ from the light halve the interval between the samples `_HALVINGS` times, each ti
 change of height. What is left of a slope is a small part of its change, and the side stays as it is; of a jump there is
 all of it: a wall stands in the middle of the last interval. That is the idea of silhouette maps (Sen, Cammarano,
 Hanrahan 2003), for volumes; the map itself stays as it was.
-
-A texel's walls are one whole number: a byte for each side, 0 or 1 + the number of the interval. Both texels of a side
-hold the same byte, so both see the same height there.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from realtime.light_heights import LEAF, LightHeights, height_at
 from realtime.lights import Light
 from realtime.shadow_map import cast_map_rays
+from realtime.volume_walls import BOTTOM, LEFT, PLACES, RIGHT, TOP, walled_heights
 
-_HALVINGS = 6
-PLACES = 1 << _HALVINGS  #: on a side, where a wall may stand
+_HALVINGS = PLACES.bit_length() - 1
 _JUMP = 0.02  # of the larger height: walls lower than that are left slanted
 _KEPT = 0.5  # of the change between the samples that a jump keeps in the last interval
 _SIDES = 2 * LEAF * (LEAF + 1)  # of the texels of a leaf
-
-BOTTOM, TOP, LEFT, RIGHT = range(4)  #: sides of a texel, v = 0, v = 1, u = 0 and u = 1, by their bytes
-
-
-@dataclass
-class Side:
-    """The wall on a side of a texel, which goes from its corner of lower u or v to the other."""
-
-    stands: Any  #: whether there is one
-    place: Any  #: where, from 0 to 1
-
-
-def side_of(walls, side: int, Float) -> Side:
-    """Return the wall on one side of a texel with the numbers `walls`."""
-    return _side((walls >> (8 * side)) & 0xFF, Float)
-
-
-def side_by(walls, shift, Float) -> Side:
-    """Return the wall on the side of a texel whose byte begins at a bit that depends on the lane."""
-    return _side((walls >> shift) & 0xFF, Float)
-
-
-def _side(number, Float) -> Side:
-    import drjit as dr
-
-    return Side(number != 0, dr.fma(Float(number), 1 / PLACES, -0.5 / PLACES))
 
 
 def with_walls(heights: LightHeights, scene, light: Light) -> LightHeights:
@@ -76,7 +47,7 @@ def with_walls(heights: LightHeights, scene, light: Light) -> LightHeights:
     if dr.width(leaf):
         _trace(heights, scene, light, (leaf, side), walls)
     dr.eval(walls)
-    return replace(heights, walls=walls)
+    return walled_heights(heights, walls)
 
 
 @dataclass

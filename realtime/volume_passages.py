@@ -9,10 +9,9 @@ from itertools import pairwise
 from typing import Any
 
 from realtime.light_heights import texel_heights, texel_walls
-from realtime.map_walls import BOTTOM, LEFT, RIGHT, TOP, Side, side_by
 from realtime.volume_rays import at_line
 from realtime.volume_texels import Line, borders
-from realtime.volume_walls import height_at, parts_of, value_at
+from realtime.volume_walls import BOTTOM, LEFT, RIGHT, TOP, Side, height_at, parts_of, side_by, value_at
 
 
 @dataclass
@@ -53,17 +52,18 @@ def passage(heights, face, line: Line, texel) -> Passage:
     in_v, out_v = borders(row, ray.v[0], ray.per_v)
     into, out = dr.maximum(in_u, in_v), dr.minimum(out_u, out_v)
     begin, end = dr.maximum(into, 0), dr.minimum(out, 1)
+    starts, ends = ((texel[0] == i) & (texel[1] == j) for i, j in line.cells)
     by_u, out_by_u = in_u >= begin, out_u <= end
     four = texel_heights(heights, face, *texel)
     walls = None if heights.walls is None else texel_walls(heights, face, *texel)
     near_near, near_far, far_near, far_far = _as_seen(line, four)
     pair = near_near, dr.select(by_u, near_far, far_near)
     d0 = _excess_on_border(line, place, begin, by_u, pair, _wall_on_border(line, walls, by_u, False))
-    d0 = dr.select(into < 0, line.excess[0], d0)
+    d0 = dr.select(starts, line.excess[0], d0)
     pair = dr.select(out_by_u, far_near, near_far), far_far
     d1 = _excess_on_border(line, place, end, out_by_u, pair, _wall_on_border(line, walls, out_by_u, True))
-    d1 = dr.select(end < out, line.excess[1], d1)
-    return Passage(place, four, walls, (begin, end), (d0, d1), ray.stops & (end < out))
+    d1 = dr.select(ends, line.excess[1], d1)
+    return Passage(place, four, walls, (begin, end), (d0, d1), ray.stops & ends)
 
 
 def may_cross(line: Line, over: Passage):

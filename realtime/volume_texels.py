@@ -21,6 +21,7 @@ class Line:
     right: Any  #: whether columns rise along it
     up: Any  #: whether rows do
     excess: tuple[Any, Any]  #: D at t = 0 and t = 1
+    cells: tuple[tuple[Any, Any], tuple[Any, Any]]  #: column and row of the texels that they lie in
     slack: Any  #: how far below the height field a point at t = 1 may seem that lies on what it samples
 
 
@@ -30,7 +31,7 @@ def line_of(heights: LightHeights, face, ray: FaceRay) -> Line:
     import mitsuba as mi
 
     right, up = ray.per_u > 0, ray.per_v > 0
-    excess, slack = [], type(ray.begin)(0)
+    excess, cells, slack = [], [], type(ray.begin)(0)
     for t in (0, 1):
         at = type(ray.begin)(t)
         i, j = (
@@ -41,8 +42,9 @@ def line_of(heights: LightHeights, face, ray: FaceRay) -> Line:
         x, y = ray.u[t] - type(at)(i), ray.v[t] - type(at)(j)
         height, doubt = _height_in(heights, (face, i, j, ray.walks), four, x, y)
         excess.append(ray.s[t] - height)
+        cells.append((i, j))
         slack = dr.fma(ray.s[t], _ROUNDING, doubt)
-    return Line(ray, right, up, (excess[0], excess[1]), slack)
+    return Line(ray, right, up, (excess[0], excess[1]), (cells[0], cells[1]), slack)
 
 
 def _height_in(heights, texel, four, x, y):

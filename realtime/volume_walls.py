@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The height field over a texel on whose sides upright walls stand: see `realtime.map_walls`.
 
-On a side with a wall the height is that of the one corner up to the wall and that of the other beyond it; on a side
-without, it is linear. A side looks the same from both of its texels, so all that holds of crossings in
-`realtime.volume_walk` holds still: between two ends of a ray the number of changes of sign says whether both are lit.
+A texel's walls are one whole number: a byte for each side, 0 or 1 + the number of the place where the wall stands. Both
+texels of a side hold the same byte. On a side with a wall the height is that of the one corner up to the wall and that
+of the other beyond it; on a side without, it is linear. A side looks the same from both of its texels, so all that
+holds of crossings in `realtime.volume_walk` holds still: between two ends of a ray the number of changes of sign says
+whether both are lit.
 
 One straight line divides the texel into two parts, each under a plane; where these differ a wall stands on the line:
 
@@ -13,18 +15,46 @@ One straight line divides the texel into two parts, each under a plane; where th
   lies in it;
 * else the line is the diagonal from (0, 0) to (1, 1), between two triangles, as without walls.
 
-A plane through three corners may leave their range towards the fourth: it is cut off at the least and the largest
-height of the texel, which bound what tiles look at. Beside a corner that is cut off the border and the plane differ by
-the slope over a part of a texel, and of walls on three or four sides one or two end at the border: there a step stands
-on the border itself, and which side of it is lit says the border.
+A plane through three corners may leave their range towards the fourth: `walled_heights` widens the bounds that tiles go
+by. Beside a corner that is cut off the border and the plane differ by the slope over a part of a texel, and of walls on
+three or four sides one or two end at the border: there a step stands on the border itself, and which side of it is lit
+says the border.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
-from realtime.map_walls import BOTTOM, LEFT, RIGHT, TOP, Side, side_of
+from realtime.light_heights import LightHeights, level_start, texel_heights
+
+PLACES = 64  #: on a side, where a wall may stand: what is smaller costs rays, and outlines between two sides are bent
+BOTTOM, TOP, LEFT, RIGHT = range(4)  #: sides of a texel, v = 0, v = 1, u = 0 and u = 1, by their bytes
+
 
 Numbers = tuple[Any, Any, Any]
+
+
+@dataclass
+class Side:
+    """The wall on a side of a texel, which goes from its corner of lower u or v to the other."""
+
+    stands: Any  #: whether there is one
+    place: Any  #: where, from 0 to 1
+
+
+def side_of(walls, side: int, Float) -> Side:
+    """Return the wall on one side of a texel with the numbers `walls`."""
+    return _side((walls >> (8 * side)) & 0xFF, Float)
+
+
+def side_by(walls, shift, Float) -> Side:
+    """Return the wall on the side of a texel whose byte begins at a bit that depends on the lane."""
+    return _side((walls >> shift) & 0xFF, Float)
+
+
+def _side(number, Float) -> Side:
+    import drjit as dr
+
+    return Side(number != 0, dr.fma(Float(number), 1 / PLACES, -0.5 / PLACES))
 
 
 @dataclass
@@ -34,7 +64,6 @@ class Parts:
     line: Numbers  #: above 0 in the second part
     first: Numbers  #: height over the first part
     second: Numbers  #: height over the second part
-    bounds: tuple[Any, Any]  #: least and largest height
 
 
 def parts_of(four, walls, Float) -> Parts:
@@ -63,7 +92,7 @@ def parts_of(four, walls, Float) -> Parts:
         dr.select(upright, zero, dr.select(level | (cut & bottom.stands), above, below)),
         dr.select(level, zero, dr.select(cut & ~left.stands, before, behind)),
     )
-    return Parts(line, first, second, (dr.min(four), dr.max(four)))
+    return Parts(line, first, second)
 
 
 def _cut_line(bottom: Side, top: Side, left: Side, right: Side) -> Numbers:
@@ -96,10 +125,53 @@ def height_at(parts: Parts, second, x, y):
     """Return the height at a point by the plane of the second part, or of the first."""
     import drjit as dr
 
-    plane = dr.select(second, value_at(parts.second, x, y), value_at(parts.first, x, y))
-    return dr.clip(plane, *parts.bounds)
+    return dr.select(second, value_at(parts.second, x, y), value_at(parts.first, x, y))
 
 
 def height_in(parts: Parts, x, y):
     """Return the height at a point of a texel."""
     return height_at(parts, value_at(parts.line, x, y) > 0, x, y)
+
+
+def walled_heights(heights: LightHeights, walls) -> LightHeights:
+    """Return a height field with walls in its texels, and the bounds of its nodes as these need them."""
+    import drjit as dr
+    import mitsuba as mi
+
+    texel = dr.compress(walls != 0)
+    bounds, gaps = heights.bounds + 0, heights.gaps + 0
+    if dr.width(texel):
+        size = heights.size
+        row = texel // size
+        face, i = row // size, texel - row * size
+        _widen(heights, (bounds, gaps), (face, i, row - face * size), dr.gather(mi.UInt32, walls, texel))
+    dr.eval(bounds, gaps)
+    return replace(heights, bounds=bounds, gaps=gaps, walls=walls)
+
+
+def _widen(heights: LightHeights, arrays, texel, walls) -> None:
+    """Widen bounds and gaps to hold the planes over texels with a corner cut off."""
+    import drjit as dr
+    import mitsuba as mi
+
+    (bounds, gaps), mode = arrays, dr.ReduceMode.Direct  # few: no copies of the arrays for each thread
+    face, i, j = texel
+    four = texel_heights(heights, face, i, j)
+    bottom, top, left, right = ((walls >> (8 * side)) & 0xFF != 0 for side in (BOTTOM, TOP, LEFT, RIGHT))
+    cut = (bottom ^ top) & (left ^ right)
+    # The plane at the corner that is cut off, the farthest that it can come to.
+    ends = dr.select(right == top, four[1] + four[2], four[0] + four[3])
+    value = ends - dr.select(right, dr.select(top, four[0], four[2]), dr.select(top, four[1], four[3]))
+    value = dr.maximum(value, 0)  # no ray comes below
+    low, high = cut & (value < dr.min(four)), cut & (value > dr.max(four))
+    for level in range(heights.finest + 1):
+        shift = heights.finest + 2 - level
+        node = face * heights.nodes + level_start(level) + ((j >> shift) << level) + (i >> shift)
+        dr.scatter_reduce(dr.ReduceOp.Min, bounds, value, 2 * node, low, mode)
+        dr.scatter_reduce(dr.ReduceOp.Max, bounds, value, 2 * node + 1, high, mode)
+    leaf = (((face << heights.finest) + (j >> 2)) << heights.finest) + (i >> 2)
+    bit = mi.UInt32(1) << ((i & 3) + 4 * (j & 3))
+    sides = dr.gather(mi.UInt32, heights.sides, leaf)
+    below, both = (sides & bit) != 0, (sides & (bit << 16)) != 0
+    dr.scatter_reduce(dr.ReduceOp.Max, gaps, value, 2 * leaf, high & below, mode)
+    dr.scatter_reduce(dr.ReduceOp.Min, gaps, value, 2 * leaf + 1, low & ~below & ~both, mode)

@@ -85,7 +85,7 @@ def _wanted_scenes(scenes: str | None, papers: Sequence[str]) -> list[str]:
 
     of_paper = {
         "biri": [one.scene for one in PUBLISHED if one.scene in SCENES],
-        "billeter": [one.scene for one in (*FIGURES, *TABLE)],
+        "billeter": [one.scene for one in FIGURES] + [one.scene for one in TABLE],
     }
     known = list(dict.fromkeys(name for paper in papers for name in of_paper[paper]))
     wanted = [name.strip() for name in scenes.split(",")] if scenes else known

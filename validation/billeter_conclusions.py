@@ -34,7 +34,7 @@ def pays_from(rates: Mapping[int, tuple[float, float]]) -> int | None:
 
 def conclusions(figures: Sequence[FigureRow], table: Sequence[TableRow]) -> list[str]:
     """Return the sentences that the rows allow."""
-    return [*_adaptive(table), *_walk(table), *_marching(figures), *_map_sizes(figures)]
+    return [*_adaptive(table), *_walk(table), *_marching(figures), *_walls(figures), *_map_sizes(figures)]
 
 
 def _adaptive(table: Sequence[TableRow]) -> Iterator[str]:
@@ -64,7 +64,7 @@ def _walk(table: Sequence[TableRow]) -> Iterator[str]:
             rates = {
                 row.evaluation: _rate(row.rebuilt) for row in table if (row.published, row.map) == (published, size)
             }
-            meshes = [rate for name, rate in rates.items() if name != "walk" and rate]
+            meshes = [rate for name in ("static", "adaptive") if (rate := rates.get(name))]
             if meshes and (walk := rates.get("walk")):
                 found.append(f"{walk / max(meshes):.2f} at {size}")
         if found:
@@ -93,6 +93,22 @@ def _marching(figures: Sequence[FigureRow]) -> Iterator[str]:
             enough = row.error.relative_rmse <= 1.1 * volume.error.relative_rmse
             verdict = "holds" if enough else "does not hold"
             yield f"About 400 samples for equal quality, by the error against the truth: {verdict} here."
+
+
+def _walls(figures: Sequence[FigureRow]) -> Iterator[str]:
+    pairs: dict[tuple[str, int], dict[str, tuple[float, float]]] = {}
+    for row in figures:
+        walls = dict(row.entry.parameters).get("walls")
+        if walls is not None and row.rebuilt is not None and row.error is not None:
+            measured = row.rebuilt.median_ms, row.error.relative_rmse
+            pairs.setdefault((row.entry.scene, row.entry.map), {})[str(walls)] = measured
+    for (scene, texels), found in pairs.items():
+        if len(found) == 2:
+            (slanted_ms, slanted), (upright_ms, upright) = found["slanted"], found["upright"]
+            yield (
+                f"{scene}, map {texels}: with upright walls a frame takes {upright_ms / slanted_ms:.2f} times as long "
+                f"as with slanted ones, and has {_ratio(upright, slanted):.2g} of their error against the truth."
+            )
 
 
 def _map_sizes(figures: Sequence[FigureRow]) -> Iterator[str]:

@@ -22,6 +22,8 @@ from numpy.typing import NDArray
 from analytic.errors import InputError
 from realtime.errors import InputError as RealtimeError
 from realtime.frame import Frame, FrameRenderer, render_frame, run_stages
+from realtime.light_heights import light_heights
+from realtime.map_walls import with_walls
 from realtime.scene import Scene, read_scene
 from realtime.shadow_map import cast_shadow_map
 from reference.quadrature import quadrature_image
@@ -54,25 +56,30 @@ class FigureEntry:
         values = dict(self.parameters) | {"map": self.map}
         return configuration(self.method, None if self.method == "ray-march" else kernel, values)
 
+    @property
+    def upright(self) -> bool:
+        """Whether the walls of its light volume stand upright."""
+        return dict(self.parameters).get("walls") == "upright"
 
-_WALK, _MESH = ("evaluation", "walk"), ("evaluation", "mesh")
+
+_MESH: tuple[tuple[str, int | str], ...] = (("evaluation", "mesh"),)
+#: The height field of the mesh without triangles, and with upright walls where the map jumps.
+_WALK, _UPRIGHT = ((("evaluation", "walk"), ("walls", walls)) for walls in ("slanted", "upright"))
 
 
 def _march(steps: int) -> tuple[tuple[str, int | str], ...]:
     return (("steps", steps), ("spacing", "uniform"), ("shadow", "map"))
 
 
-FIGURES = (
-    FigureEntry("Fig. 6a", "omni-box", 32, "light-volumes", (_MESH,), 230),
-    FigureEntry("Fig. 6a", "omni-box", 32, "light-volumes", (_WALK,), 230),
-    FigureEntry("Fig. 6b", "omni-box", 128, "light-volumes", (_MESH,), 165),
-    FigureEntry("Fig. 6b", "omni-box", 128, "light-volumes", (_WALK,), 165),
-    FigureEntry("Fig. 6c", "omni-box", 512, "light-volumes", (_MESH,), 25),
-    FigureEntry("Fig. 6c", "omni-box", 512, "light-volumes", (_WALK,), 25),
+FIGURES: tuple[FigureEntry, ...] = (
+    *(
+        FigureEntry(where, "omni-box", size, "light-volumes", how, fps)
+        for where, size, fps in (("Fig. 6a", 32, 230), ("Fig. 6b", 128, 165), ("Fig. 6c", 512, 25))
+        for how in (_MESH, _WALK, _UPRIGHT)
+    ),
     FigureEntry("Fig. 7a", "colonnade", 512, "ray-march", _march(150), 25),
     FigureEntry("Fig. 7b", "colonnade", 512, "ray-march", _march(400), 10),
-    FigureEntry("Fig. 7c", "colonnade", 512, "light-volumes", (_MESH,), 96),
-    FigureEntry("Fig. 7c", "colonnade", 512, "light-volumes", (_WALK,), 96),
+    *(FigureEntry("Fig. 7c", "colonnade", 512, "light-volumes", how, 96) for how in (_MESH, _WALK, _UPRIGHT)),
     FigureEntry("peer", "colonnade", 512, "min-max"),
 )
 
@@ -133,7 +140,7 @@ def figure_rows(
     """
     rows: list[FigureRow] = []
     stage: _Stage | None = None
-    twins: dict[int, Array] = {}
+    twins: dict[tuple[int, bool], Array] = {}
     shown = None
     for entry in entries:
         chosen = entry.configuration(kernel)
@@ -167,7 +174,13 @@ def sampled_truth(truth: TruthScene, stride: int) -> TruthScene:
 
 
 def _figure_row(
-    entry: FigureEntry, stage: _Stage, chosen: Configuration, twins: dict[int, Array], *, seconds: float, limit: float
+    entry: FigureEntry,
+    stage: _Stage,
+    chosen: Configuration,
+    twins: dict[tuple[int, bool], Array],
+    *,
+    seconds: float,
+    limit: float,
 ) -> FigureRow:
     camera = stage.scene.camera
     size = camera.width, camera.height
@@ -176,18 +189,31 @@ def _figure_row(
         frame = frame_within(renderer, limit)
     except (InputError, RealtimeError, MemoryError, TimeoutError) as reason:
         return FigureRow(entry, size, missing=str(reason) or "out of memory")
-    if entry.map not in twins:
-        maps = [cast_shadow_map(stage.scene.geometry, light, entry.map) for light in stage.scene.lights]
+    key = entry.map, entry.upright
+    if key not in twins:
         distance = stage.compared(np.asarray(frame.distance, dtype=np.float64))
-        twins[entry.map] = twin_airlight(stage.truth, maps, distance=distance)
+        twins[key] = _twin(entry, stage, distance)
     shown = stage.compared(frame.airlight)
     return FigureRow(
         entry,
         size,
         **time_rates(renderer, seconds),
         error=error_metrics(stage.airlight, shown),
-        map_error=error_metrics(twins[entry.map], shown),
+        map_error=error_metrics(twins[key], shown),
     )
+
+
+def _twin(entry: FigureEntry, stage: _Stage, distance: Array) -> Array:
+    """Return what the shadow maps of an entry stand for."""
+    scene = stage.scene
+    maps = [cast_shadow_map(scene.geometry, light, entry.map) for light in scene.lights]
+    if not entry.upright:
+        return twin_airlight(stage.truth, maps, distance=distance)
+    fields = [
+        with_walls(light_heights(one), scene.geometry, light) for one, light in zip(maps, scene.lights, strict=True)
+    ]
+    walls = [np.array(field.walls) for field in fields]
+    return twin_airlight(stage.truth, maps, distance=distance, walls=walls)
 
 
 def frame_within(renderer: FrameRenderer, limit: float) -> Frame:

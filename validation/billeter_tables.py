@@ -10,7 +10,7 @@ The passes, on the wall clock:
 - surface: camera rays and lit surface. shadow map: its casting.
 - laplacian, edge map, tessellate, vertices: those of `realtime.volume_mesh.tessellation_stages`.
 - prepare: all before the airlight, so the shadow map with the mesh or the height field that is made of it.
-- volume: the triangles against the pixels, and the signed sum; for `walk` the airlight.
+- volume: the triangles against the pixels, and the signed sum; without triangles the airlight.
 
 Times of frames are those after the light moved, with everything rebuilt, as published; and beside them those of frames
 that keep what stood still.
@@ -36,11 +36,12 @@ from validation.scenes.colonnade import colonnade
 from validation.timing import Timing, time_repeated
 
 MAPS = (1024, 2048, 4096)  #: of the published table [texels]
-#: How the volume is evaluated: static and adaptive as published, and without triangles.
+#: How the volume is evaluated: static and adaptive as published, the same without triangles, and with upright walls.
 EVALUATIONS: Mapping[str, Mapping[str, str]] = {
     "static": {"evaluation": "mesh", "tessellation": "static"},
     "adaptive": {"evaluation": "mesh", "tessellation": "adaptive"},
-    "walk": {"evaluation": "walk"},
+    "walk": {"evaluation": "walk", "walls": "slanted"},
+    "upright": {"evaluation": "walk", "walls": "upright"},
 }
 PASSES = ("surface", "shadow map", "laplacian", "edge map", "tessellate", "vertices", "prepare", "volume")
 
@@ -87,7 +88,7 @@ class TableRow:
     evaluation: str  #: of `EVALUATIONS`
     size: tuple[int, int]  #: of the frame [pixels]
     faces: int = 1  #: of the shadow map
-    triangles: int = 0  #: of the light volume; 0 for `walk`
+    triangles: int = 0  #: of the light volume; 0 where it has none
     rebuilt: Timing | None = None
     static: Timing | None = None
     relit: Timing | None = None
@@ -217,7 +218,7 @@ def _passes(renderer: FrameRenderer, row: TableRow, seconds: float) -> tuple[dic
     times = {name: time_repeated(work, seconds=seconds, least=3).median_ms for name, work in works.items()}
     if row.evaluation == "adaptive":
         times |= _tessellation(scene, row.map)
-    triangles = 0 if row.evaluation == "walk" else sum(len(mesh.triangles) for mesh in ready)
+    triangles = 0 if row.evaluation in ("walk", "upright") else sum(len(mesh.triangles) for mesh in ready)
     return {name: times[name] for name in PASSES if name in times}, triangles
 
 

@@ -15,6 +15,13 @@ order 1, but for the root of a logarithm, and over sizes of N the slope is 1 - 1
 edge that the camera sees edge-on hides the rays within epsilon of it whole: there the order is 1/2. Occluders that are
 thinner than a texel do not converge before the map resolves them.
 
+**Upright walls.** Where rays have found the jumps on the sides of texels (`realtime.map_walls`) the edge of a shadow is
+known to epsilon = 1/64 of a texel, or to O(1/N^2) where it is a smooth outline between two sides. What is left of order
+1 has a constant that is smaller by as much. Corners of outlines lie within a texel, which has the wrong shape there: a
+share of O(1/N) of the rays that cross the edge is wrong by O(1/N), a root mean square of O(N^(-3/2)). So the order lies
+between 1 and 3/2; occluders that are thinner than a texel and smooth ones that are met at a grazing angle take from it
+as above.
+
 **The order of the flicker.** An edge in the map stays where it is while the light moves by less than a texel, and then
 jumps by one. Let the light move by m texels a frame, m = N step / 2 at a step in radians. For m < 1 a share m of the
 edges jumps in a frame, by O(1/N) each: their root mean square is sqrt(m) / N, and at a given step it falls as

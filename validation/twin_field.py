@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
-from realtime.map_walls import PLACES
 from realtime.shadow_map import ShadowMap
+from realtime.volume_walls import PLACES
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

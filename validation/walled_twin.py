@@ -26,11 +26,10 @@ class _Texels:
     line: Array  # (3, ...), above 0 in the second part
     first: Array  # height over the first part
     second: Array
-    bounds: tuple[Array, Array]  # least and largest height
 
     def height(self, second: NDArray[np.bool_], x: Array, y: Array) -> Array:
         """Return the height at points by the plane of one of the parts."""
-        return np.clip(np.where(second, _value(self.second, x, y), _value(self.first, x, y)), *self.bounds)
+        return np.where(second, _value(self.second, x, y), _value(self.first, x, y))
 
 
 def walled_parts(
@@ -110,9 +109,9 @@ def _zero_between(one: Array, other: Array, f1: Array, f2: Array) -> Array:
 
 
 def _borders(size: int) -> Array:
-    """Return (p, q, r) of the lines p a + q b + r c = 0 along x = i, then y = i, (2 size + 2, 3)."""
-    half, border = 0.5 * size, np.arange(size + 1.0)
-    zero, level = np.zeros(size + 1), np.full(size + 1, half)
+    """Return (p, q, r) of the lines p a + q b + r c = 0 along x = i, then y = i, inside a face, (2 size - 2, 3)."""
+    half, border = 0.5 * size, np.arange(1.0, size)
+    zero, level = np.zeros(size - 1), np.full(size - 1, half)
     rows = np.stack([level, zero, half - border], axis=1), np.stack([zero, level, half - border], axis=1)
     return np.concatenate(rows)
 
@@ -153,17 +152,14 @@ def _above_border(field: HeightField, face: int, path: Path, theta: Array, numbe
     assert field.walls is not None
     size = field.size
     x, y = _place(size, _at(path, theta))
-    across_x = number <= size
-    line = np.where(across_x, number, number - size - 1)
+    across_x = number < size - 1
+    line = 1 + np.where(across_x, number, number - (size - 1))
     along = np.where(across_x, y, x)
     first = np.clip(np.floor(along), 0, size - 1).astype(np.int64)
-    inner = np.minimum(line, size - 1)
     row, column = np.where(across_x, first, line), np.where(across_x, line, first)
     low = field.heights[face][row, column]
     high = field.heights[face][row + across_x, column + ~across_x]
-    # The far border of the map is the top or right side of its last texels.
-    side = np.where(across_x, 2, 0) + (line == size)
-    place = field.walls[face][np.where(across_x, first, inner), np.where(across_x, inner, first), side]
+    place = field.walls[face][row, column, np.where(across_x, 2, 0)]  # on the left, or at the bottom
     along = along - first
     step = np.where(along < place, low, high)
     return _f(path, theta, np.where(np.isnan(place), low + along * (high - low), step))
@@ -204,8 +200,7 @@ def _texels_at(field: HeightField, face: int, column: Index, row: Index) -> _Tex
         new = (-1 - i * per_x - j * per_y, per_x, per_y), (corners[i, j], zero, zero), plane
         line, first, second = _replace(meet, (line, first, second), new)
     line, first, second = (np.stack([c[0] - c[1] * column - c[2] * row, c[1], c[2]]) for c in (line, first, second))
-    four = np.stack([s00, s10, s01, s11])
-    return _Texels(has.any(axis=0), line, first, second, (four.min(axis=0), four.max(axis=0)))
+    return _Texels(has.any(axis=0), line, first, second)
 
 
 def _through(*triples) -> list[Array]:

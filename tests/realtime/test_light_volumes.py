@@ -175,6 +175,45 @@ def test_any_map(variant, kind, data):
     assert np.max(np.abs(walked.airlight - wanted)) < 1e-7 * scale
 
 
+def any_walls(rng, faces, share):
+    """Return the numbers of walls of texels of which a share of the sides has one, anywhere."""
+    from realtime.volume_walls import PLACES
+
+    level, upright = rng.integers(1, PLACES + 1, (2, faces, SMALL + 1, SMALL + 1), dtype=np.uint32)
+    level[rng.random(level.shape) >= share] = 0
+    upright[rng.random(upright.shape) >= share] = 0
+    sides = level[:, :-1, :-1], level[:, 1:, :-1], upright[:, :-1, :-1], upright[:, :-1, 1:]
+    return sum(side << np.uint32(8 * k) for k, side in enumerate(sides)).ravel()
+
+
+@pytest.mark.parametrize("kind", ["point", pytest.param("spot", marks=pytest.mark.slow)])
+@settings(max_examples=20, deadline=None, derandomize=True, database=None)
+@given(data=st.data())
+def test_any_walls_in_any_map(variant, kind, data):
+    """Wherever walls stand, on any number of a texel's sides, between heights that jump or do not."""
+    import mitsuba as mi
+
+    from realtime.frame import image_frame, run_stages
+    from realtime.light_heights import inverse_depth, light_heights
+    from realtime.volume_walls import walled_heights
+    from reference.scene import read_truth
+    from validation.volume_twin import twin_airlight
+
+    loaded, (walk, _), shadow_map = renderers(kind, data.draw(st.integers(0, len(VIEWS) - 1)))
+    vertex = vertices_of(shadow_map)
+    rng = np.random.default_rng(data.draw(st.integers(0, 2**32)))
+    # Heights of no two corners are the same, so that no ray lies in the height field over a length.
+    heights = (rng.choice(HEIGHTS[1:], vertex.max() + 1) * rng.uniform(0.9, 1.1, vertex.max() + 1))[vertex]
+    length = np.array(inverse_depth(replace(shadow_map, distance=mi.Float64(np.ones(len(vertex))))))
+    found = replace(shadow_map, distance=mi.Float64(length / heights))
+    walls = any_walls(rng, found.faces, data.draw(st.sampled_from([0.0, 0.2, 0.5, 1.0])))
+    field = walled_heights(light_heights(found), mi.UInt32(walls))
+    walked = image_frame(walk, run_stages(walk, (field,)))
+    wanted = twin_airlight(read_truth(loaded), [found], distance=walked.distance, walls=[walls])
+    scale = np.max(np.array(walk.scene.lights[0].intensity))
+    assert np.max(np.abs(walked.airlight - wanted)) < 1e-7 * scale
+
+
 def test_a_light_that_moves_between_frames(variant):
     """The frozen frame of the walk replays with it, the mesh has other sizes."""
     import drjit as dr

@@ -17,7 +17,8 @@ def test_command_prints_errors_with_their_slope(variant, capfd):
     assert errors["sizes"] == [64, 128, 256]
     rmse = [one["relative_rmse"] for one in errors["metrics"]]
     assert rmse[0] > rmse[1] > rmse[2] > 0
-    assert errors["slope"]["order"] == pytest.approx(1, abs=0.25)  # scatter of 768 pixels, grazing rays
+    # 1.5 by corners of outlines; a map of 64 texels resolves few of these, and 768 pixels scatter.
+    assert 1.2 < errors["slope"]["order"] < 2.2
     assert scene["flicker"] is None
     assert cli.run([*arguments, "--markdown"]) == 0
     out = capfd.readouterr().out

@@ -14,7 +14,7 @@ def test_every_parameter_is_explained_with_its_values_and_its_default_first():
     explained = {name: values.replace("`", "").split(", ") for name, values in rows}
     defaults = METHODS["light-volumes"].parameters
     assert set(explained) == set(defaults)
-    words = {"evaluation": "EVALUATIONS", "tessellation": "TESSELLATIONS", "surface": "SURFACES"}
+    words = {"evaluation": "EVALUATIONS", "tessellation": "TESSELLATIONS", "surface": "SURFACES", "walls": "WALLS"}
     for name, default in defaults.items():
         assert explained[name][0] == str(default), name
         if name in words:

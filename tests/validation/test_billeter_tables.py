@@ -53,21 +53,24 @@ def test_pixels_of_the_truth_are_those_of_the_frame(variant):
 
 def test_a_figure_is_judged_against_truth_and_map(variant):
     entries = [
-        FigureEntry("Fig. 6", "omni-box", 16, "light-volumes", (("evaluation", "walk"),), 230),
+        FigureEntry("Fig. 6", "omni-box", 16, "light-volumes", (("walls", "slanted"),), 230),
         FigureEntry("Fig. 6", "omni-box", 16, "light-volumes", (("evaluation", "mesh"),), 230),
+        FigureEntry("Fig. 6", "omni-box", 16, "light-volumes", (("walls", "upright"),), 230),
         FigureEntry("Fig. 7", "omni-box", 16, "ray-march", (("steps", 16), ("spacing", "uniform"), ("shadow", "map"))),
     ]
     told = []
     rows = figure_rows(entries, progress=lambda *what: told.append(what), **SMALL)
-    assert [share for share, _ in told] == [0, 1 / 3, 2 / 3]
-    walk, mesh, march = rows
+    assert [share for share, _ in told] == [0, 1 / 4, 2 / 4, 3 / 4]
+    walk, mesh, upright, march = rows
     assert walk.error is not None
     assert walk.error.relative_rmse > 0.01  # a map of 16 texels is coarse
-    for row in (walk, mesh):
+    for row in (walk, mesh, upright):
         assert row.map_error is not None
-        assert row.map_error.relative_rmse < 1e-5  # both are exact with respect to their map
+        assert row.map_error.relative_rmse < 1e-5  # all are exact with respect to their map, and what it has of walls
         assert row.rebuilt is not None
         assert row.rebuilt.median_ms > 0
+    assert upright.error is not None
+    assert upright.error.relative_rmse < 0.7 * walk.error.relative_rmse
     assert march.map_error is not None
     assert march.map_error.relative_rmse > 0.01
 
@@ -75,10 +78,10 @@ def test_a_figure_is_judged_against_truth_and_map(variant):
 def test_table_has_every_evaluation_and_its_passes(variant):
     rows = table_rows(TABLE[1:], maps=(16, 32), **SMALL)
     assert [(row.map, row.evaluation) for row in rows] == [(size, name) for size in (16, 32) for name in EVALUATIONS]
-    static, adaptive, walk = rows[3:]
+    static, adaptive, walk, upright = rows[4:]
     assert static.triangles == 2 * 32 * 32 + 4 * 32  # the texels, and the sides up to the light
     assert 0 < adaptive.triangles < static.triangles
-    assert walk.triangles == 0
+    assert walk.triangles == upright.triangles == 0
     assert list(adaptive.passes) == [
         "surface",
         "shadow map",
@@ -94,6 +97,8 @@ def test_table_has_every_evaluation_and_its_passes(variant):
     for row in (adaptive, walk):
         assert row.against_static is not None
         assert row.against_static.relative_rmse < 1e-3  # the threshold of the tessellation; rounding for walk
+    assert upright.against_static is not None
+    assert upright.against_static.relative_rmse > 0.01  # by which the slanted walls are wrong
 
 
 def test_hall_of_the_table_has_one_map(variant):
@@ -106,7 +111,7 @@ def test_what_takes_too_long_is_left_out_and_said(variant):
     rows = table_rows(TABLE[1:], maps=(16, 32), limit=1e-6, **SMALL)
     assert all(row.rebuilt is None for row in rows)
     assert "more than the limit" in rows[0].missing
-    assert rows[3].missing.startswith("not begun after map 16: a frame takes")
+    assert rows[4].missing.startswith("not begun after map 16: a frame takes")
     assert any("could not be compared" in one for one in conclusions([], rows))
 
 
@@ -121,7 +126,7 @@ def test_a_row_that_must_be_expected_to_take_too_long_is_not_begun(variant, monk
     # Of 1 s at 16 texels follows up to 4 s at 32 and, as 32 was measured with 1 s too, 4 s at 64.
     assert not any(row.missing for row in rows)
     rows = table_rows(TABLE[1:], maps=(16, 64), limit=5.0, **SMALL)
-    assert rows[3].missing == "a frame may take 16 s, by that of map 16: more than the limit of 5 s"
+    assert rows[4].missing == "a frame may take 16 s, by that of map 16: more than the limit of 5 s"
 
 
 def test_too_much_memory_is_a_reason_and_no_crash(variant, monkeypatch):
@@ -173,7 +178,7 @@ def figure_row(entry: FigureEntry, milliseconds: float, error: float, map_error:
 
 @pytest.mark.parametrize(("milliseconds", "map_error", "reached"), [(10.0, 1e-4, True), (11.0, 1e-4, False)])
 def test_conclusions_about_marching(milliseconds, map_error, reached):
-    found = {(one.where, dict(one.parameters).get("evaluation")): one for one in FIGURES}
+    found = {(one.where, dict(one.parameters).get("evaluation")): one for one in FIGURES if not one.upright}
     rows = [
         figure_row(found["Fig. 7b", None], 101.0, 0.05, 0.01),
         figure_row(found["Fig. 7c", "walk"], milliseconds, 0.05, map_error),
@@ -184,6 +189,15 @@ def test_conclusions_about_marching(milliseconds, map_error, reached):
     assert "has 0.01 of its error, against the truth 1." in first
     assert goal.endswith(": reached." if reached else ": not reached.")
     assert equal.endswith("holds here.")
+
+
+def test_conclusions_about_walls():
+    found = {dict(one.parameters).get("walls"): one for one in FIGURES if one.where == "Fig. 6b"}
+    rows = [figure_row(found["slanted"], 20.0, 0.05, 1e-5), figure_row(found["upright"], 23.0, 0.002, 1e-5)]
+    (words, *rest) = conclusions(rows, [])
+    assert words.startswith("omni-box, map 128: with upright walls a frame takes 1.15 times as long as with slanted")
+    assert words.endswith("and has 0.04 of their error against the truth.")
+    assert rest == []
 
 
 @pytest.fixture
@@ -206,7 +220,7 @@ def test_command_prints_the_table(variant, quick, capfd):
     found = json.loads(capfd.readouterr().out)
     assert set(found) == {"environment", "billeter"}
     rows = found["billeter"]["table"]
-    assert [row["evaluation"] for row in rows] == 2 * ["static", "adaptive", "walk"]
+    assert [row["evaluation"] for row in rows] == 2 * ["static", "adaptive", "walk", "upright"]
     assert rows[0]["scene"] == "tangle"
     assert found["billeter"]["figures"] == []
     assert found["billeter"]["conclusions"]
@@ -215,11 +229,11 @@ def test_command_prints_the_table(variant, quick, capfd):
 def test_command_prints_the_figures(variant, quick, monkeypatch, capfd):
     from validation import billeter_figures
 
-    monkeypatch.setattr(billeter_figures, "FIGURES", FIGURES[:2])
+    monkeypatch.setattr(billeter_figures, "FIGURES", FIGURES[:3])
     arguments = ["published", "--paper", "billeter", "--scenes", "omni-box", "--scale", "0.02", "--limit", "100"]
     assert cli.run([*arguments, "--markdown"]) == 0
     out = capfd.readouterr().out
-    assert "| Fig. 6a, omni-box, 20 x 20: light-volumes (map=32, evaluation=walk) | 230 |" in out
+    assert "| Fig. 6a, omni-box, 20 x 20: light-volumes (map=32, evaluation=walk, walls=slanted) | 230 |" in out
     assert "Table 1" not in out
     assert "Not measured" not in out
 
