@@ -28,6 +28,8 @@ above it, and those on both sides. Between the two groups there is a gap, where 
 """
 
 from dataclasses import dataclass
+from functools import reduce
+from itertools import pairwise
 from typing import Any
 
 from realtime.arrays import four_numbers, two_numbers
@@ -121,7 +123,7 @@ def light_heights(shadow_map: ShadowMap) -> LightHeights:
     dr.eval(texels)
     found = LightHeights(size, shadow_map.frame, texels, dr.empty(Float, 0))
     bounds = dr.empty(Float, 2 * found.faces * found.nodes)
-    gaps, sides = _write_leaves(found, bounds)
+    gaps, sides = _write_leaves(found, height, bounds)
     for level in reversed(range(found.finest)):
         _write_level(found, bounds, level)
         dr.eval(bounds)
@@ -176,8 +178,8 @@ def leaf_sides(heights: LightHeights, face, i, j, active=True) -> Leaf:
     return Leaf(gap.x, gap.y, sides & 0xFFFF, sides >> 16)
 
 
-def _write_leaves(heights: LightHeights, bounds):
-    """Write the bounds of the leaves; return their gaps and sides."""
+def _write_leaves(heights: LightHeights, corners, bounds):
+    """Write the bounds of the leaves from the heights at all corners; return their gaps and sides."""
     import drjit as dr
     import mitsuba as mi
 
@@ -187,41 +189,30 @@ def _write_leaves(heights: LightHeights, bounds):
     face, i = row // side, leaf - row * side
     j = row - face * side
     Float = type(bounds)
-
-    def corners(k):
-        return texel_heights(heights, face, i * LEAF + k % LEAF, j * LEAF + k // LEAF)
-
-    def bound(k, low, high):
-        four = corners(k)
-        return k + 1, dr.minimum(low, dr.min(four)), dr.maximum(high, dr.max(four))
-
-    def sort(k, below, above, sides):
-        four = corners(k)
-        least, largest = dr.min(four), dr.max(four)
-        is_below, is_above = largest < divide, least >= divide
-        below = dr.select(is_below, dr.maximum(below, largest), below)
-        above = dr.select(is_above, dr.minimum(above, least), above)
-        bits = dr.select(is_below, mi.UInt32(1), dr.select(is_above, mi.UInt32(0), 1 << 16)) << k
-        return k + 1, below, above, sides | bits
-
-    zero, none = dr.zeros(mi.UInt32, dr.width(leaf)), dr.full(Float, dr.inf, dr.width(leaf))
-    state = (zero, none, dr.zeros(Float, dr.width(leaf)))
-    _, low, high = dr.while_loop(
-        state=state, cond=lambda k, *_: k < LEAF * LEAF, body=bound, labels=("k", "low", "high")
-    )
+    across = heights.size + 1
+    first = (face * across + j * LEAF) * across + i * LEAF
+    rows = [[dr.gather(Float, corners, first + (k * across + m)) for m in range(LEAF + 1)] for k in range(LEAF + 1)]
+    least, largest = _of_texels(rows, dr.minimum), _of_texels(rows, dr.maximum)
+    low, high = reduce(dr.minimum, least), reduce(dr.maximum, largest)
     divide = dr.fma(_DIVIDE, high - low, low)
-    _, below, above, sides = dr.while_loop(
-        state=(zero + 0, low + 0, high + 0, zero + 0),
-        cond=lambda k, *_: k < LEAF * LEAF,
-        body=sort,
-        labels=("k", "below", "above", "sides"),
-    )
+    below, above, sides = low, high, mi.UInt32(0)
+    for k, (lower, upper) in enumerate(zip(least, largest)):
+        is_below, is_above = upper < divide, lower >= divide
+        below = dr.select(is_below, dr.maximum(below, upper), below)
+        above = dr.select(is_above, dr.minimum(above, lower), above)
+        sides |= dr.select(is_below, mi.UInt32(1 << k), dr.select(is_above, mi.UInt32(0), mi.UInt32(1 << (16 + k))))
     gaps = dr.empty(Float, 2 * dr.width(leaf))
     node = face * heights.nodes + level_start(heights.finest) + j * side + i
     dr.scatter(bounds, two_numbers(Float)(low, high), node)
     dr.scatter(gaps, two_numbers(Float)(below, above), leaf)
     dr.eval(bounds, gaps, sides)
     return gaps, sides
+
+
+def _of_texels(rows, smaller):
+    """Return the least (or largest) of the four heights of each texel, from rows of heights at corners."""
+    pairs = [[smaller(*pair) for pair in pairwise(row)] for row in rows]
+    return [smaller(*pair) for two in pairwise(pairs) for pair in zip(*two)]
 
 
 def _write_level(heights: LightHeights, bounds, level: int) -> None:

@@ -22,7 +22,7 @@ from realtime.shadow_map import cast_map_rays
 from realtime.volume_walls import BOTTOM, LEFT, PLACES, RIGHT, TOP, walled_heights
 
 _HALVINGS = PLACES.bit_length() - 1
-_JUMP = 0.02  # of the larger height: walls lower than that are left slanted
+_JUMP = 0.05  # of the larger height: walls lower than that are left slanted
 _KEPT = 0.5  # of the change between the samples that a jump keeps in the last interval
 _SIDES = 2 * LEAF * (LEAF + 1)  # of the texels of a leaf
 
@@ -44,10 +44,8 @@ def with_walls(heights: LightHeights, scene, light: Light) -> LightHeights:
 
     walls = dr.zeros(mi.UInt32, heights.faces * heights.size**2)
     leaf, side = _jumping_sides(heights)
-    if dr.width(leaf):
-        _trace(heights, scene, light, (leaf, side), walls)
-    dr.eval(walls)
-    return walled_heights(heights, walls)
+    texels = _trace(heights, scene, light, (leaf, side), walls) if dr.width(leaf) else leaf
+    return walled_heights(heights, walls, texels)
 
 
 @dataclass
@@ -111,8 +109,8 @@ def _ends(heights: LightHeights, edge: _Edge):
     return tuple(dr.gather(type(heights.texels), heights.texels, place) for place in (first, first + step))
 
 
-def _trace(heights: LightHeights, scene, light: Light, sides, walls) -> None:
-    """Find the walls on sides and write them to both texels of each."""
+def _trace(heights: LightHeights, scene, light: Light, sides, walls):
+    """Find the walls on sides and write them to both texels of each; return the numbers of these texels."""
     import drjit as dr
     import mitsuba as mi
 
@@ -139,12 +137,12 @@ def _trace(heights: LightHeights, scene, light: Light, sides, walls) -> None:
         labels=("step", "number", "one", "other"),
     )
     jumps = dr.abs(low - high) > _KEPT * dr.abs(one - other)
-    texel = (edge.face * size + edge.j) * size + edge.i
-    along_u, along_v = jumps & ~edge.upright, jumps & edge.upright
-    for side, place, active in (
-        (BOTTOM, texel, along_u & (edge.j < size)),
-        (TOP, texel - size, along_u & (edge.j > 0)),
-        (LEFT, texel, along_v & (edge.i < size)),
-        (RIGHT, texel - 1, along_v & (edge.i > 0)),
-    ):
-        dr.scatter_reduce(dr.ReduceOp.Or, walls, (number + 1) << (8 * side), place, active)
+    behind = (edge.face * size + edge.j) * size + edge.i
+    before = behind - dr.select(edge.upright, mi.UInt32(1), mi.UInt32(size))
+    place = dr.select(edge.upright, edge.i, edge.j)
+    for shifts, texel, active in (((BOTTOM, LEFT), behind, place < size), ((TOP, RIGHT), before, place > 0)):
+        level, upright = (mi.UInt32(8 * side) for side in shifts)
+        number_there = (number + 1) << dr.select(edge.upright, upright, level)
+        dr.scatter_reduce(dr.ReduceOp.Or, walls, number_there, texel, jumps & active)
+    dr.eval(walls)
+    return dr.concat((dr.select(place < size, behind, before), dr.select(place > 0, before, behind)))

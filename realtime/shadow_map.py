@@ -80,18 +80,34 @@ def cast_shadow_map(scene, light: Light, size: int) -> ShadowMap:
     check_size(size)
     Double = mi.Float64
     frame = None if light.kind == "point" else _frame(light)
-    side = size + 1
-    index = dr.arange(mi.UInt32, (1 if frame else 6) * side * side)
-    row = index // side
-    face = row // side
+    side, faces = size + 1, 1 if frame else 6
+    face, row, column = _tiled_corners(faces, side)
+    there = (row < side) & (column < side)
     # Whole numbers and powers of two: exact, so that neighbouring faces cast the same rays along their common edge.
-    u = dr.fma(Double(index - row * side), 2.0 / size, -1.0)
-    v = dr.fma(Double(row - face * side), 2.0 / size, -1.0)
-    distance = cast_map_rays(scene, light, (face, u, v))
+    u, v = (dr.fma(Double(one), 2.0 / size, -1.0) for one in (column, row))
+    found = cast_map_rays(scene, light, (face, u, v), there)
+    distance = dr.empty(type(found), faces * side * side)
+    dr.scatter(distance, found, (face * side + row) * side + column, there)
     frame = frame and tuple(type(light.position)(one) for one in frame)
     depth = light.face.depth if light.kind == "directional" else None
     dr.eval(distance, frame, depth)  # once: whoever reads it would cast the rays again
     return ShadowMap(size, distance, frame, depth)
+
+
+def _tiled_corners(faces: int, side: int):
+    """Return face, row and column of corners in squares of 4 x 4, so that rays side by side in a packet stay close.
+
+    The last squares reach beyond the face.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    across = -(-side // 4)
+    lane = dr.arange(mi.UInt32, faces * across * across * 16)
+    square, within = lane // 16, lane % 16
+    row = square // across
+    face = row // across
+    return face, 4 * (row - face * across) + within // 4, 4 * (square - row * across) + within % 4
 
 
 def cast_map_rays(scene, light: Light, place, active=True):

@@ -133,18 +133,27 @@ def height_in(parts: Parts, x, y):
     return height_at(parts, value_at(parts.line, x, y) > 0, x, y)
 
 
-def walled_heights(heights: LightHeights, walls) -> LightHeights:
-    """Return a height field with walls in its texels, and the bounds of its nodes as these need them."""
+def walled_heights(heights: LightHeights, walls, texels) -> LightHeights:
+    """Return a height field with walls in its texels, and the bounds of its nodes as these need them.
+
+    Parameters
+    ----------
+    heights
+        The height field.
+    walls
+        The number of each texel.
+    texels
+        Those that may have walls; some may be there more than once.
+    """
     import drjit as dr
     import mitsuba as mi
 
-    texel = dr.compress(walls != 0)
     bounds, gaps = heights.bounds + 0, heights.gaps + 0
-    if dr.width(texel):
+    if dr.width(texels):
         size = heights.size
-        row = texel // size
-        face, i = row // size, texel - row * size
-        _widen(heights, (bounds, gaps), (face, i, row - face * size), dr.gather(mi.UInt32, walls, texel))
+        row = texels // size
+        face, i = row // size, texels - row * size
+        _widen(heights, (bounds, gaps), (face, i, row - face * size), dr.gather(mi.UInt32, walls, texels))
     dr.eval(bounds, gaps)
     return replace(heights, bounds=bounds, gaps=gaps, walls=walls)
 

@@ -207,7 +207,7 @@ def test_any_walls_in_any_map(variant, kind, data):
     length = np.array(inverse_depth(replace(shadow_map, distance=mi.Float64(np.ones(len(vertex))))))
     found = replace(shadow_map, distance=mi.Float64(length / heights))
     walls = any_walls(rng, found.faces, data.draw(st.sampled_from([0.0, 0.2, 0.5, 1.0])))
-    field = walled_heights(light_heights(found), mi.UInt32(walls))
+    field = walled_heights(light_heights(found), mi.UInt32(walls), mi.UInt32(np.flatnonzero(walls)))
     walked = image_frame(walk, run_stages(walk, (field,)))
     wanted = twin_airlight(read_truth(loaded), [found], distance=walked.distance, walls=[walls])
     scale = np.max(np.array(walk.scene.lights[0].intensity))
