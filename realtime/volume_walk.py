@@ -8,9 +8,10 @@ two neighbours see the same number t between them, and the same two heights: the
     D(t) = s of the ray - height
 
 there, lit or not, is the same for both. Crossings are where D changes its sign from one end of a piece, over the
-texel's diagonal, to the other; within a triangle D is linear in t. Which texels are looked at, and in what order, does
-not matter (Billeter, Sintorn, Assarsson 2010, eq. 3), and what `realtime.volume_tiles` leaves out has no change of
-sign. A ray that is lit at its beginning is lit at its end after an even number of crossings: no tolerance can break it.
+texel's diagonal or the wall in it (`realtime.volume_passages`), to the other; between these D is linear in t. Which
+texels are looked at, and in what order, does not matter (Billeter, Sintorn, Assarsson 2010, eq. 3), and what
+`realtime.volume_tiles` leaves out has no change of sign. A ray that is lit at its beginning is lit at its end after an
+even number of crossings: no tolerance can break it.
 
 A leaf's texels are looked at only where the tile may cross them and the ray passes: one bit each, 64 bits for four
 leaves. What is found to be crossed is computed again to be kept, since most is not.
