@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from realtime.camera import read_camera
+from realtime.camera import HostCamera, read_camera
 from realtime.casters import Casters, read_casters, with_positions
 from realtime.plan import check_places
 from realtime.plane_index import light_frame, shadow_planes
@@ -45,7 +45,8 @@ def caster_plan(scene: Scene) -> CasterPlan:
     """
     check_places(scene.plan, "shadow-planes")
     casters = with_positions(read_casters(scene.geometry), scene.positions)
-    lights = tuple(_light_plan(casters, scene, light) for light in scene.lights)
+    camera = read_camera(scene.camera)
+    lights = tuple(_light_plan(casters, camera, light) for light in scene.lights)
     return CasterPlan(
         shapes=len(casters.shapes),
         bodies=len(casters.closed),
@@ -72,8 +73,8 @@ def describe_casters(plan: CasterPlan) -> dict[str, str]:
     return words
 
 
-def _light_plan(casters: Casters, scene: Scene, light) -> LightPlan:
-    position, camera = np.array(light.position, dtype=np.float64).ravel(), read_camera(scene.camera)
+def _light_plan(casters: Casters, camera: HostCamera, light) -> LightPlan:
+    position = np.array(light.position, dtype=np.float64).ravel()
     used = bodies_in_view(casters, camera, position)
     axes, _ = light_frame(position, camera.origin)
     seen = silhouette(casters, position, used=used)

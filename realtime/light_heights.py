@@ -79,7 +79,7 @@ def level_start(level: int) -> int:
 
 
 def inverse_depth(shadow_map: ShadowMap):
-    """Return the inverse planar depth at every corner of the texels, in the order of the map [1/m]."""
+    """Return the inverse planar depth [1/m], or the height for parallel rays [m], at every corner of the texels."""
     import drjit as dr
     import mitsuba as mi
 
@@ -89,7 +89,7 @@ def inverse_depth(shadow_map: ShadowMap):
     row = index // (size + 1)
     u = dr.fma(Float(index - row * (size + 1)), 2.0 / size, -1.0)
     v = dr.fma(Float(row % (size + 1)), 2.0 / size, -1.0)
-    return height_at(shadow_map.frame, None, (u, v), distance)
+    return height_at(shadow_map.frame, shadow_map.depth, (u, v), distance)
 
 
 def height_at(frame, depth, place, distance):
@@ -110,7 +110,7 @@ def light_heights(shadow_map: ShadowMap) -> LightHeights:
 
     size = shadow_map.size
     depth = shadow_map.depth
-    height = inverse_depth(shadow_map) if depth is None else height_at(None, depth, None, shadow_map.distance)
+    height = inverse_depth(shadow_map)
     dr.eval(height)
     Float = type(height)
     index = dr.arange(mi.UInt32, shadow_map.faces * size * size)

@@ -11,7 +11,7 @@ from typing import Any
 from realtime.light_heights import texel_heights, texel_walls
 from realtime.volume_rays import at_line
 from realtime.volume_texels import Line, borders
-from realtime.volume_walls import BOTTOM, LEFT, RIGHT, TOP, Side, height_at, parts_of, side_by, value_at
+from realtime.volume_walls import BOTTOM, LEFT, RIGHT, TOP, Side, height_at, parts_of, side_of, value_at
 
 
 @dataclass
@@ -179,9 +179,9 @@ def _wall_on_border(line: Line, walls, on_u, behind: bool) -> Side | None:
     if walls is None:
         return None
     across, upward = (line.right, line.up) if not behind else (~line.right, ~line.up)
-    shift = [mi.UInt32(8 * side) for side in (BOTTOM, TOP, LEFT, RIGHT)]
-    side = dr.select(on_u, dr.select(across, shift[LEFT], shift[RIGHT]), dr.select(upward, shift[BOTTOM], shift[TOP]))
-    wall = side_by(walls, side, type(line.ray.begin))
+    bottom, top, left, right = (mi.UInt32(side) for side in (BOTTOM, TOP, LEFT, RIGHT))
+    side = dr.select(on_u, dr.select(across, left, right), dr.select(upward, bottom, top))
+    wall = side_of(walls, side, type(line.ray.begin))
     return Side(wall.stands, dr.select(dr.select(on_u, line.up, line.right), wall.place, 1 - wall.place))
 
 

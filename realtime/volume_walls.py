@@ -41,19 +41,11 @@ class Side:
     place: Any  #: where, from 0 to 1
 
 
-def side_of(walls, side: int, Float) -> Side:
-    """Return the wall on one side of a texel with the numbers `walls`."""
-    return _side((walls >> (8 * side)) & 0xFF, Float)
-
-
-def side_by(walls, shift, Float) -> Side:
-    """Return the wall on the side of a texel whose byte begins at a bit that depends on the lane."""
-    return _side((walls >> shift) & 0xFF, Float)
-
-
-def _side(number, Float) -> Side:
+def side_of(walls, side, Float) -> Side:
+    """Return the wall on one side of a texel with the numbers `walls`; `side` may depend on the lane."""
     import drjit as dr
 
+    number = (walls >> (8 * side)) & 0xFF
     return Side(number != 0, dr.fma(Float(number), 1 / PLACES, -0.5 / PLACES))
 
 
@@ -71,8 +63,8 @@ def parts_of(four, walls, Float) -> Parts:
     import drjit as dr
 
     s00, s10, s01, s11 = four
-    bottom, top, left, right = (side_of(walls, side, Float) for side in (BOTTOM, TOP, LEFT, RIGHT))
-    cut = (bottom.stands ^ top.stands) & (left.stands ^ right.stands)
+    bottom, top, left, right = sides = _sides_of(walls, Float)
+    cut = _cuts_corner(sides)
     upright = bottom.stands & top.stands
     level = left.stands & right.stands & ~upright
     zero, one = Float(0), Float(1)
@@ -93,6 +85,17 @@ def parts_of(four, walls, Float) -> Parts:
         dr.select(level, zero, dr.select(cut & ~left.stands, before, behind)),
     )
     return Parts(line, first, second)
+
+
+def _sides_of(walls, Float) -> list[Side]:
+    """Return the walls on the bottom, top, left and right of a texel."""
+    return [side_of(walls, side, Float) for side in (BOTTOM, TOP, LEFT, RIGHT)]
+
+
+def _cuts_corner(sides: list[Side]):
+    """Return whether there are two walls, on sides that meet."""
+    bottom, top, left, right = (side.stands for side in sides)
+    return (bottom ^ top) & (left ^ right)
 
 
 def _cut_line(bottom: Side, top: Side, left: Side, right: Side) -> Numbers:
@@ -166,8 +169,8 @@ def _widen(heights: LightHeights, arrays, texel, walls) -> None:
     (bounds, gaps), mode = arrays, dr.ReduceMode.Direct  # few: no copies of the arrays for each thread
     face, i, j = texel
     four = texel_heights(heights, face, i, j)
-    bottom, top, left, right = ((walls >> (8 * side)) & 0xFF != 0 for side in (BOTTOM, TOP, LEFT, RIGHT))
-    cut = (bottom ^ top) & (left ^ right)
+    sides = _sides_of(walls, type(bounds))
+    cut, (_, top, _, right) = _cuts_corner(sides), (side.stands for side in sides)
     # The plane at the corner that is cut off, the farthest that it can come to.
     ends = dr.select(right == top, four[1] + four[2], four[0] + four[3])
     value = ends - dr.select(right, dr.select(top, four[0], four[2]), dr.select(top, four[1], four[3]))
@@ -180,7 +183,7 @@ def _widen(heights: LightHeights, arrays, texel, walls) -> None:
         dr.scatter_reduce(dr.ReduceOp.Max, bounds, value, 2 * node + 1, high, mode)
     leaf = (((face << heights.finest) + (j >> 2)) << heights.finest) + (i >> 2)
     bit = mi.UInt32(1) << ((i & 3) + 4 * (j & 3))
-    sides = dr.gather(mi.UInt32, heights.sides, leaf)
-    below, both = (sides & bit) != 0, (sides & (bit << 16)) != 0
+    sorted_as = dr.gather(mi.UInt32, heights.sides, leaf)
+    below, both = (sorted_as & bit) != 0, (sorted_as & (bit << 16)) != 0
     dr.scatter_reduce(dr.ReduceOp.Max, gaps, value, 2 * leaf, high & below, mode)
     dr.scatter_reduce(dr.ReduceOp.Min, gaps, value, 2 * leaf + 1, low & ~below & ~both, mode)

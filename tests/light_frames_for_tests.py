@@ -112,17 +112,12 @@ def differ(found, wanted):
 
 def twin_of(loaded, frame, size, precision="single", *, walls="slanted"):
     """Return the airlight of the map that a frame was rendered with, by another route."""
-    from realtime.light_heights import light_heights
-    from realtime.map_walls import with_walls
     from realtime.scene import read_scene
     from realtime.shadow_map import cast_shadow_map
     from reference.scene import read_truth
-    from validation.volume_twin import twin_airlight
+    from validation.volume_twin import traced_walls, twin_airlight
 
     scene = read_scene(loaded, precision)
     maps = [cast_shadow_map(scene.geometry, light, size) for light in scene.lights]
-    numbers = None
-    if walls == "upright":
-        pairs = zip(maps, scene.lights)
-        numbers = [np.array(with_walls(light_heights(one), scene.geometry, light).walls) for one, light in pairs]
+    numbers = traced_walls(scene, maps) if walls == "upright" else None
     return twin_airlight(read_truth(loaded), maps, distance=frame.distance, walls=numbers)

@@ -22,8 +22,6 @@ from numpy.typing import NDArray
 from analytic.errors import InputError
 from realtime.errors import InputError as RealtimeError
 from realtime.frame import Frame, FrameRenderer, render_frame, run_stages
-from realtime.light_heights import light_heights
-from realtime.map_walls import with_walls
 from realtime.scene import Scene, read_scene
 from realtime.shadow_map import cast_shadow_map
 from reference.quadrature import quadrature_image
@@ -32,7 +30,7 @@ from validation.configurations import Configuration, configuration, prepared
 from validation.load import load_scene
 from validation.metrics import Metrics, error_metrics
 from validation.timing import Timing, changed_look, first_frame, moved_light, moved_light_alone, time_in_turns
-from validation.volume_twin import twin_airlight
+from validation.volume_twin import traced_walls, twin_airlight
 
 Array = NDArray[np.float64]
 
@@ -207,12 +205,7 @@ def _twin(entry: FigureEntry, stage: _Stage, distance: Array) -> Array:
     """Return what the shadow maps of an entry stand for."""
     scene = stage.scene
     maps = [cast_shadow_map(scene.geometry, light, entry.map) for light in scene.lights]
-    if not entry.upright:
-        return twin_airlight(stage.truth, maps, distance=distance)
-    fields = [
-        with_walls(light_heights(one), scene.geometry, light) for one, light in zip(maps, scene.lights, strict=True)
-    ]
-    walls = [np.array(field.walls) for field in fields]
+    walls = traced_walls(scene, maps) if entry.upright else None
     return twin_airlight(stage.truth, maps, distance=distance, walls=walls)
 
 

@@ -218,7 +218,8 @@ def _passes(renderer: FrameRenderer, row: TableRow, seconds: float) -> tuple[dic
     times = {name: time_repeated(work, seconds=seconds, least=3).median_ms for name, work in works.items()}
     if row.evaluation == "adaptive":
         times |= _tessellation(scene, row.map)
-    triangles = 0 if row.evaluation in ("walk", "upright") else sum(len(mesh.triangles) for mesh in ready)
+    is_mesh = EVALUATIONS[row.evaluation]["evaluation"] == "mesh"
+    triangles = sum(len(mesh.triangles) for mesh in ready) if is_mesh else 0
     return {name: times[name] for name in PASSES if name in times}, triangles
 
 

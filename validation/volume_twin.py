@@ -42,6 +42,9 @@ from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from analytic.geometry import foot_and_height
+from realtime.light_heights import light_heights
+from realtime.map_walls import with_walls
+from realtime.scene import Scene
 from realtime.shadow_map import ShadowMap
 from reference.cone import cone_interval, perpendicular
 from reference.interval_sums import Rays, sum_intervals
@@ -53,6 +56,12 @@ from validation.twin_field import Array, HeightField, Index, Path, by_ray, heigh
 from validation.walled_twin import walled_parts
 
 _CHUNK = 1 << 20  # crossings of rays and lines looked at together: 8 MB an array
+
+
+def traced_walls(scene: Scene, shadow_maps: Sequence[ShadowMap]) -> list[NDArray[np.uint32]]:
+    """Return by light the walls that its rays find between the samples of its map, for `twin_airlight`."""
+    pairs = zip(shadow_maps, scene.lights, strict=True)
+    return [np.array(with_walls(light_heights(one), scene.geometry, light).walls) for one, light in pairs]
 
 
 def twin_airlight(

@@ -146,15 +146,24 @@ def vertices_of(shadow_map):
     return np.unique(lattice, axis=1, return_inverse=True)[1].ravel()
 
 
+def with_heights(shadow_map, heights):
+    """Return a map that has these inverse depths at its corners."""
+    import mitsuba as mi
+
+    from realtime.light_heights import inverse_depth
+
+    length = np.array(inverse_depth(replace(shadow_map, distance=mi.Float64(np.ones(len(heights))))))
+    with np.errstate(divide="ignore"):
+        return replace(shadow_map, distance=mi.Float64(length / heights))
+
+
 @pytest.mark.parametrize("kind", ["point", pytest.param("spot", marks=pytest.mark.slow)])
 @settings(max_examples=20, deadline=None, derandomize=True, database=None)
 @given(data=st.data())
 def test_any_map(variant, kind, data):
     """Whatever the heights: three routes to the same volume."""
-    import mitsuba as mi
-
     from realtime.frame import image_frame, run_stages
-    from realtime.light_heights import inverse_depth, light_heights
+    from realtime.light_heights import light_heights
     from realtime.volume_mesh import volume_mesh
     from reference.scene import read_truth
     from validation.volume_twin import twin_airlight
@@ -163,9 +172,7 @@ def test_any_map(variant, kind, data):
     vertex = vertices_of(shadow_map)
     count = int(np.max(vertex)) + 1
     heights = data.draw(st.lists(st.sampled_from(HEIGHTS), min_size=count, max_size=count))
-    length = np.array(inverse_depth(replace(shadow_map, distance=mi.Float64(np.ones(len(vertex))))))
-    with np.errstate(divide="ignore"):
-        found = replace(shadow_map, distance=mi.Float64(length / np.array(heights)[vertex]))
+    found = with_heights(shadow_map, np.array(heights)[vertex])
     walked = image_frame(walk, run_stages(walk, (light_heights(found),)))
     drawn = image_frame(mesh, run_stages(mesh, (volume_mesh(found, walk.scene.lights[0]),)))
     wanted = twin_airlight(read_truth(loaded), [found], distance=walked.distance)
@@ -194,7 +201,7 @@ def test_any_walls_in_any_map(variant, kind, data):
     import mitsuba as mi
 
     from realtime.frame import image_frame, run_stages
-    from realtime.light_heights import inverse_depth, light_heights
+    from realtime.light_heights import light_heights
     from realtime.volume_walls import walled_heights
     from reference.scene import read_truth
     from validation.volume_twin import twin_airlight
@@ -204,8 +211,7 @@ def test_any_walls_in_any_map(variant, kind, data):
     rng = np.random.default_rng(data.draw(st.integers(0, 2**32)))
     # Heights of no two corners are the same, so that no ray lies in the height field over a length.
     heights = (rng.choice(HEIGHTS[1:], vertex.max() + 1) * rng.uniform(0.9, 1.1, vertex.max() + 1))[vertex]
-    length = np.array(inverse_depth(replace(shadow_map, distance=mi.Float64(np.ones(len(vertex))))))
-    found = replace(shadow_map, distance=mi.Float64(length / heights))
+    found = with_heights(shadow_map, heights)
     walls = any_walls(rng, found.faces, data.draw(st.sampled_from([0.0, 0.2, 0.5, 1.0])))
     field = walled_heights(light_heights(found), mi.UInt32(walls), mi.UInt32(np.flatnonzero(walls)))
     walked = image_frame(walk, run_stages(walk, (field,)))
