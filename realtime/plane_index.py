@@ -183,6 +183,8 @@ def layers_between(casters: Casters, light: Array, axes: Array, distance: float,
     number = np.flatnonzero(near[casters.body])
     one, other, third = casters.triangles[number].T
     number = number[sides[one] & sides[other] & sides[third] == 0]
+    if not len(number):
+        return 0
     crossed = number[_crosses(casters, number, light, camera)]
     sign = np.sign(casters.normals[crossed] @ light - casters.offsets[crossed])
     body = casters.body[crossed]

@@ -91,17 +91,24 @@ def prepare_shadow_planes(scene: Scene, **settings) -> PlanePreparation:
 def plane_finder(
     casters: Casters, camera: HostCamera, light: Light, *, cone: int = 0, types: ArrayTypes
 ) -> Callable[[], PlaneIndex]:
-    """Return what finds the shadow planes of one light, as a camera needs them; `cone` edges bound a spot."""
+    """Return what finds the shadow planes of one light, as a camera needs them; `cone` edges bound a spot.
+
+    All that is on the device is read here, and nothing else done: until then the device stands still.
+    """
     import numpy as np
 
     position = np.array(light.position, dtype=np.float64).ravel()
-    used = bodies_in_view(casters, camera, position)
     ring = None
     if cone and light.kind == "spot":
         ring = cone_ring(np.array(light.axis, dtype=np.float64).ravel(), float(light.cos_cutoff[0]), cone)
     seen = None if ring is not None else read_spot(light)
-    aim = partial(aim_at, camera, spot=seen, types=types)
-    return partial(index_planes, casters, position, camera.origin, used=used, types=types, ring=ring, aim=aim)
+
+    def find() -> PlaneIndex:
+        used = bodies_in_view(casters, camera, position)
+        aim = partial(aim_at, camera, spot=seen, types=types)
+        return index_planes(casters, position, camera.origin, used=used, types=types, ring=ring, aim=aim)
+
+    return find
 
 
 def shadow_planes(

@@ -18,6 +18,7 @@ from typing import Any
 
 from realtime.arrays import is_single
 from realtime.beams import Beam, BeamPlanes, beam_planes, make_beam, may_meet, over_square, parts_within
+from realtime.faces_passed import faces_passed
 from realtime.light_heights import LightHeights, leaf_sides, node_bounds
 from realtime.shadow_map import face_products
 
@@ -37,6 +38,7 @@ class Leaves:
     texels: Any  #: of a leaf, bit 4 row + column of each texel that the tile's rays may cross
     first: Any  #: by tile and face, the place of the first entry
     last: Any  #: the place behind the last one
+    faces: Any  #: by tile, bit k for each face k that its rays may pass; `first` and `last` are of these alone
 
 
 @dataclass
@@ -104,7 +106,8 @@ def tile_leaves(heights: LightHeights, rays, distance, *, light, square: bool) -
     about = [dr.gather(Vector, direction, member) for direction in directions for member in members]
     end = reduce(dr.maximum, (dr.gather(Float, ends, member) for member in members))
     lists = _block_lists(heights, make_beam(about, end, light, heights.axis), face)
-    return _tile_lists(heights, make_beam(directions, ends, light, heights.axis), *lists)
+    faces = mi.UInt32(1) if heights.faces == 1 else faces_passed(directions, ends, -light)
+    return _tile_lists(heights, make_beam(directions, ends, light, heights.axis), faces, *lists)
 
 
 def _block_lists(heights: LightHeights, beam: Beam, face):
@@ -122,7 +125,7 @@ def _block_lists(heights: LightHeights, beam: Beam, face):
     return entries, count
 
 
-def _tile_lists(heights: LightHeights, beam: Beam, entries, found) -> Leaves:
+def _tile_lists(heights: LightHeights, beam: Beam, passed, entries, found) -> Leaves:
     """Return the leaves that beams may meet, drawn from the lists of their blocks, and which of their texels."""
     import drjit as dr
     import mitsuba as mi
@@ -134,7 +137,8 @@ def _tile_lists(heights: LightHeights, beam: Beam, entries, found) -> Leaves:
     leaves, texels = (dr.empty(mi.UInt32, tiles * _TILE_ROOM + CHUNK) for _ in range(2))
     first, last = dr.empty(mi.UInt32, tiles * faces), dr.empty(mi.UInt32, tiles * faces)
 
-    def of_face(face, total):
+    def of_face(to_come, total):
+        face = mi.UInt32(dr.tzcnt(to_come))
         planes = beam_planes(beam, partial(face_products, heights.frame, face))
         room = _TILE_ROOM - (faces - 1 - face)  # a place is left for every face to come
         write = _leaf_writer(heights, planes, face, (leaves, texels), tile * _TILE_ROOM, room)
@@ -173,12 +177,17 @@ def _tile_lists(heights: LightHeights, beam: Beam, entries, found) -> Leaves:
         larger = dr.select(level < heights.finest, mi.UInt32(LARGER), 0)
         dr.scatter(first, (tile * _TILE_ROOM + total) | larger, tile * faces + face)
         dr.scatter(last, tile * _TILE_ROOM + count, tile * faces + face)
-        return face + 1, count
+        return to_come & (to_come - 1), count
 
-    zero = dr.zeros(mi.UInt32, tiles)
-    dr.while_loop(state=(zero, zero + 0), cond=lambda face, total: face < faces, body=of_face, labels=("face", "total"))
-    dr.eval(leaves, texels, first, last)
-    return Leaves(leaves, texels, first, last)
+    passed = passed + dr.zeros(mi.UInt32, tiles)
+    dr.while_loop(
+        state=(passed + 0, dr.zeros(mi.UInt32, tiles)),
+        cond=lambda to_come, total: to_come != 0,
+        body=of_face,
+        labels=("to_come", "total"),
+    )
+    dr.eval(leaves, texels, first, last, passed)
+    return Leaves(leaves, texels, first, last, passed)
 
 
 def _writer(target, first, room):

@@ -69,7 +69,8 @@ def sum_lit_pieces(
     width = dr.width(direction, zero)
     tile = dr.arange(mi.UInt32, width) // TILE
 
-    def of_face(face, total, reached):
+    def of_face(to_come, total, reached):
+        face = mi.UInt32(dr.tzcnt(to_come))
         begin, end = in_face(heights, face, away, direction, segment)
 
         def add(total, reached):
@@ -83,16 +84,16 @@ def sum_lit_pieces(
         total, reached = dr.if_stmt(
             args=(total, reached), cond=begin < end, true_fn=add, false_fn=lambda total, reached: (total, reached)
         )
-        return face + 1, total, reached
+        return to_come & (to_come - 1), total, reached
 
     if heights.faces == 1:
-        _, total, reached = of_face(mi.UInt32(0), zero, dr.full(mi.Bool, False, width))
+        _, total, reached = of_face(mi.UInt32(1), zero, dr.full(mi.Bool, False, width))
         return total, reached
     _, total, reached = dr.while_loop(
-        state=(dr.zeros(mi.UInt32, width), zero, dr.full(mi.Bool, False, width)),
-        cond=lambda face, total, reached: face < heights.faces,
+        state=(dr.gather(mi.UInt32, leaves.faces, tile), zero, dr.full(mi.Bool, False, width)),
+        cond=lambda to_come, total, reached: to_come != 0,
         body=of_face,
-        labels=("face", "total", "reached"),
+        labels=("to_come", "total", "reached"),
     )
     return total, reached
 
