@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which faces of a cube of shadow maps the rays of a tile pass: the others cost nothing.
+"""Which faces of a cube of shadow maps the rays of a tile pass, and in which order: the others cost nothing.
 
 A face of the cube about a light is seen through a pyramid that four of the six planes |p| = |q|, p and q two of the
 coordinates x, y, z from the light, cut out of space: the face along +x is where x + y, x - y, x + z and x - z are
@@ -14,6 +14,9 @@ and where this is negative for one of the four planes no ray comes into the pyra
 from functools import reduce
 from itertools import combinations
 from typing import Any
+
+FACE_BITS = 3  #: of the number of a face in an order of faces
+NO_FACE = (1 << FACE_BITS) - 1  #: stands behind the last
 
 _SLACK = 1e-6  # of a coordinate or a slope: float32 rounding, with room
 _FAR = 1e30  # stands for the end of endless rays [m]
@@ -55,3 +58,27 @@ def faces_passed(directions, end, away) -> Any:
         planes = [missed[axis, side, other, sign] for other in range(3) if other != axis for sign in (1, -1)]
         passed |= dr.select(reduce(lambda a, b: a | b, planes), 0, mi.UInt32(1 << face))
     return passed
+
+
+def faces_in_order(passed, begins) -> Any:
+    """Return the faces that rays may pass in the order of their beginnings, three bits each, the first in the lowest.
+
+    Parameters
+    ----------
+    passed
+        From `faces_passed`.
+    begins
+        Where a ray of the tile comes into each of the six faces, infinite where it does not [m].
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    there = [(passed >> face & 1) != 0 for face in range(6)]
+    order = mi.UInt32(NO_FACE) << (FACE_BITS * dr.popcnt(passed))
+    for face, begin in enumerate(begins):
+        rank = mi.UInt32(0)
+        for other, its_begin in enumerate(begins):
+            before = its_begin <= begin if other < face else its_begin < begin
+            rank += dr.select(there[other] & before, mi.UInt32(1), 0)
+        order |= dr.select(there[face], mi.UInt32(face) << (FACE_BITS * rank), 0)
+    return order

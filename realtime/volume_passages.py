@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The passage of a camera ray over one texel, and where it crosses the height field there: see `realtime.volume_walk`.
+"""The passage of a camera ray over one texel, and where it crosses the height field there.
+
+This is one step of `realtime.volume_crossings`.
 
 With D = s of the ray - height, a ray is lit where D > 0. On the borders of texels, D is the same number for both.
 """

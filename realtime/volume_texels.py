@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lines of camera rays over the texels of a face, and which texels are near them: see `realtime.volume_walk`."""
+"""Lines of camera rays over the texels of a face, and which texels are near them: see `realtime.volume_crossings`."""
 
 from dataclasses import dataclass
 from typing import Any

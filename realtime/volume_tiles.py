@@ -7,24 +7,24 @@ the node that they pass is lit, or all is dark. Blocks walk the pyramid from its
 tiles choose from those of their block. Of a leaf they list only the texels that the beam passes, and of those below or
 above the gap in the leaf's heights (see `realtime.light_heights`) only what it may meet. Lists have a fixed length: a
 tile whose leaves do not fit takes nodes of twice the size, without telling texels apart, and the whole face if need be.
-
-The walk needs no stack: the node after (i, j) at some level is its first child, or the next of its parent's four
-children, or what follows the parent.
 """
 
 from dataclasses import dataclass
 from functools import partial, reduce
 from typing import Any
 
-from realtime.arrays import is_single
-from realtime.beams import Beam, BeamPlanes, beam_planes, make_beam, may_meet, over_square, parts_within
-from realtime.faces_passed import faces_passed
-from realtime.light_heights import LightHeights, leaf_sides, node_bounds
+from realtime.beams import Beam, BeamPlanes, beam_planes, make_beam, may_meet, parts_within
+from realtime.faces_passed import faces_in_order, faces_passed
+from realtime.light_heights import LightHeights, leaf_sides
 from realtime.shadow_map import face_products
+from realtime.volume_nodes import Box, Node, descend, meets, packed, unpacked
+from realtime.volume_rays import face_ray, in_face
+from realtime.volume_texels import line_of
 
 TILE = 16  #: rays in a tile, and tiles in a block
 CHUNK = 4  #: leaves that a ray looks at together
 LARGER = 1 << 31  #: added to the first place of a list of nodes that are no leaves
+LIT = 1 << 30  #: added to that of an empty list where all is lit that the tile's rays pass of the face
 _BLOCK_ROOM = 256  # entries of the list of a block and face
 _TILE_ROOM = 96  # of a tile, for all faces together
 _CORNERS = (0, 3, 12, 15)  # lanes of a square tile at its corners
@@ -38,35 +38,7 @@ class Leaves:
     texels: Any  #: of a leaf, bit 4 row + column of each texel that the tile's rays may cross
     first: Any  #: by tile and face, the place of the first entry
     last: Any  #: the place behind the last one
-    faces: Any  #: by tile, bit k for each face k that its rays may pass; `first` and `last` are of these alone
-
-
-@dataclass
-class Node:
-    """Squares of texels: those of level 0 are whole faces."""
-
-    level: Any
-    i: Any  #: column
-    j: Any  #: row
-
-
-@dataclass
-class _Box:
-    """A node as a beam meets it."""
-
-    low: Any  #: its bounds
-    high: Any
-    values: list[Any]  #: see `over_square`
-
-
-def packed(node: Node):
-    """Return a node as one number."""
-    return (node.level << 26) | (node.j << 13) | node.i
-
-
-def unpacked(entry) -> Node:
-    """Return the node that `packed` made a number of."""
-    return Node(entry >> 26, entry & 0x1FFF, (entry >> 13) & 0x1FFF)
+    faces: Any  #: by tile, the faces that its rays may pass, see `faces_in_order`; `first`, `last` are of these alone
 
 
 def tile_leaves(heights: LightHeights, rays, distance, *, light, square: bool) -> Leaves:
@@ -106,8 +78,9 @@ def tile_leaves(heights: LightHeights, rays, distance, *, light, square: bool) -
     about = [dr.gather(Vector, direction, member) for direction in directions for member in members]
     end = reduce(dr.maximum, (dr.gather(Float, ends, member) for member in members))
     lists = _block_lists(heights, make_beam(about, end, light, heights.axis), face)
+    beam = make_beam(directions, ends, light, heights.axis)
     faces = mi.UInt32(1) if heights.faces == 1 else faces_passed(directions, ends, -light)
-    return _tile_lists(heights, make_beam(directions, ends, light, heights.axis), faces, *lists)
+    return _tile_lists(heights, beam, faces, *lists)
 
 
 def _block_lists(heights: LightHeights, beam: Beam, face):
@@ -120,7 +93,7 @@ def _block_lists(heights: LightHeights, beam: Beam, face):
     planes = beam_planes(beam, partial(face_products, heights.frame, face))
     write = _writer(entries, lane * _BLOCK_ROOM, _BLOCK_ROOM)
     zero = dr.zeros(mi.UInt32, dr.width(face))
-    count = _descend(heights, planes, face, mi.UInt32(heights.finest), zero, write, True)
+    count = descend(heights, planes, face, mi.UInt32(heights.finest), zero, write, True)
     dr.eval(entries, count)
     return entries, count
 
@@ -149,7 +122,7 @@ def _tile_lists(heights: LightHeights, beam: Beam, passed, entries, found) -> Le
 
         def of_entry(k, count):
             node = unpacked(dr.gather(mi.UInt32, entries, source * _BLOCK_ROOM + k))
-            met, box = _meets(heights, planes, face, node, k < listed)
+            met, box = meets(heights, planes, face, node, k < listed)
             return k + 1, write(node, box, count, met)
 
         _, count = dr.while_loop(
@@ -161,7 +134,7 @@ def _tile_lists(heights: LightHeights, beam: Beam, passed, entries, found) -> Le
 
         def of_level(level, count, again):
             count = dr.select(again, total, count)
-            count = _descend(heights, planes, face, level, count, write, again)
+            count = descend(heights, planes, face, level, count, write, again)
             again &= (count > room) & (level > 0)
             return dr.select(again, level - 1, level), count, again
 
@@ -174,8 +147,9 @@ def _tile_lists(heights: LightHeights, beam: Beam, passed, entries, found) -> Le
             body=of_level,
             labels=("level", "count", "again"),
         )
-        larger = dr.select(level < heights.finest, mi.UInt32(LARGER), 0)
-        dr.scatter(first, (tile * _TILE_ROOM + total) | larger, tile * faces + face)
+        marks = dr.select(level < heights.finest, mi.UInt32(LARGER), 0)
+        marks |= dr.select(_is_lit(heights, face, beam, count == total), mi.UInt32(LIT), 0)
+        dr.scatter(first, (tile * _TILE_ROOM + total) | marks, tile * faces + face)
         dr.scatter(last, tile * _TILE_ROOM + count, tile * faces + face)
         return to_come & (to_come - 1), count
 
@@ -186,15 +160,36 @@ def _tile_lists(heights: LightHeights, beam: Beam, passed, entries, found) -> Le
         body=of_face,
         labels=("to_come", "total"),
     )
+    if faces > 1:
+        segment = type(beam.end)(0), beam.end
+        begins = [in_face(heights, mi.UInt32(face), -beam.light, beam.middle, segment) for face in range(faces)]
+        passed = faces_in_order(passed, [dr.select(begin < end, begin, dr.inf) for begin, end in begins])
     dr.eval(leaves, texels, first, last, passed)
     return Leaves(leaves, texels, first, last, passed)
+
+
+def _is_lit(heights: LightHeights, face, beam: Beam, active):
+    """Return whether all of a face is lit that beams pass which meet nothing there: whether their middle rays are."""
+    import drjit as dr
+
+    def looked_up(middle, end):
+        begin, end = in_face(heights, face, -beam.light, middle, (type(end)(0), end))
+        ray = face_ray(heights, face, -beam.light, middle, (begin, end))
+        return (begin < end) & (~ray.walks | (line_of(heights, face, ray).excess[0] > 0))
+
+    return dr.if_stmt(
+        args=(beam.middle, beam.end),
+        cond=active,
+        true_fn=looked_up,
+        false_fn=lambda middle, end: dr.mask_t(end)(False),
+    )
 
 
 def _writer(target, first, room):
     """Return the function that writes a node to its place in a list, if there is room, and counts it."""
     import drjit as dr
 
-    def write(node: Node, box: _Box, count, active):
+    def write(node: Node, box: Box, count, active):
         def store(entry, place):
             dr.scatter(target, entry, place)
             return entry
@@ -211,7 +206,7 @@ def _leaf_writer(heights: LightHeights, planes: BeamPlanes, face, targets, first
     """Return the function that writes a leaf, if any of its texels matters and there is room, and counts it."""
     import drjit as dr
 
-    def write(node: Node, box: _Box, count, active):
+    def write(node: Node, box: Box, count, active):
         def store(node, box, count):
             texels = _texels_met(heights, planes, face, node, box)
             some = texels != 0
@@ -224,7 +219,7 @@ def _leaf_writer(heights: LightHeights, planes: BeamPlanes, face, targets, first
     return write
 
 
-def _texels_met(heights: LightHeights, planes: BeamPlanes, face, node: Node, box: _Box):
+def _texels_met(heights: LightHeights, planes: BeamPlanes, face, node: Node, box: Box):
     """Return bit 4 row + column of each texel of a leaf that the beam may meet; 1 for larger nodes."""
     import drjit as dr
 
@@ -235,61 +230,3 @@ def _texels_met(heights: LightHeights, planes: BeamPlanes, face, node: Node, box
     met |= dr.select(may_meet(planes, box.values, leaf.above, box.high), ~(leaf.low | leaf.both), 0)
     met &= parts_within(planes, box.values, 2.0**-heights.finest, box.low, box.high)
     return dr.select(fine, met, 1)
-
-
-def _descend(heights: LightHeights, planes: BeamPlanes, face, leaf, count, write, active):
-    """Count and write the nodes of level `leaf` that beams may meet."""
-    import drjit as dr
-    import mitsuba as mi
-
-    def body(node: Node, count, going):
-        met, box = _meets(heights, planes, face, node, going)
-        at_leaf = met & (node.level == leaf)
-        count = write(node, box, count, at_leaf)
-        down = met & ~at_leaf
-        # The last of four children, of which the parent is the last of four, and so on: back to the first that is not.
-        back = dr.select(down, 0, dr.tzcnt(~(node.i & node.j)))
-        going &= down | (node.level > back)
-        level, i, j = node.level - back, node.i >> back, node.j >> back
-        odd = (i & 1) != 0
-        node = Node(
-            dr.select(down, level + 1, level),
-            dr.select(down, i << 1, dr.select(odd, i - 1, i + 1)),
-            dr.select(down, j << 1, dr.select(odd, j + 1, j)),
-        )
-        return node, count, going
-
-    width = dr.width(face, planes.slack[0])
-    _, count, _ = dr.while_loop(
-        state=(
-            Node(*(dr.zeros(mi.UInt32, width) for _ in range(3))),
-            count,
-            dr.full(mi.Bool, True, width) & active,
-        ),
-        cond=lambda node, count, going: going,
-        body=body,
-        labels=("node", "count", "going"),
-    )
-    return count
-
-
-def _meets(heights: LightHeights, planes: BeamPlanes, face, node: Node, active):
-    """Return whether a beam may meet the height field over a node, and what it was found from."""
-    import drjit as dr
-
-    low, high = node_bounds(heights, face, node.level, node.i, node.j, active)
-    half = _half(type(low), node.level)
-    u = dr.fma(dr.fma(2.0, type(low)(node.i), 1.0), half, -1.0)
-    v = dr.fma(dr.fma(2.0, type(low)(node.j), 1.0), half, -1.0)
-    box = _Box(low, high, over_square(planes, (u, v), half))
-    return active & may_meet(planes, box.values, low, high), box
-
-
-def _half(Float, level):
-    """Return half the side of a node, where a face goes from -1 to 1: 2^-level."""
-    import drjit as dr
-    import mitsuba as mi
-
-    if is_single(Float):
-        return dr.reinterpret_array(Float, (127 - level) << 23)
-    return 1 / Float(mi.UInt32(1) << level)

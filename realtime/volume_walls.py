@@ -4,8 +4,8 @@
 A texel's walls are one whole number: a byte for each side, 0 or 1 + the number of the place where the wall stands. Both
 texels of a side hold the same byte. On a side with a wall the height is that of the one corner up to the wall and that
 of the other beyond it; on a side without, it is linear. A side looks the same from both of its texels, so all that
-holds of crossings in `realtime.volume_walk` holds still: between two ends of a ray the number of changes of sign says
-whether both are lit.
+holds of crossings in `realtime.volume_crossings` holds still: between two ends of a ray the number of changes of sign
+says whether both are lit.
 
 One straight line divides the texel into two parts, each under a plane; where these differ a wall stands on the line:
 

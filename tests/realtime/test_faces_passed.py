@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from realtime.faces_passed import faces_passed
+from realtime.faces_passed import FACE_BITS, NO_FACE, faces_in_order, faces_passed
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -84,3 +84,17 @@ def test_few_faces_are_found_that_no_ray_passes(variant):
         found += len(found_for(np.repeat(ray[None], 4, axis=0), np.inf, away))
         passed += len(set(faces_of(away + x[:, None] * ray).tolist()))
     assert passed <= found <= 1.2 * passed
+
+
+@given(
+    passed=st.integers(0, 63), begins=st.lists(st.sampled_from([0.0, 0.5, 2.0, 7.0, np.inf]), min_size=6, max_size=6)
+)
+def test_every_face_that_is_passed_comes_once_and_in_order(variant, passed, begins):
+    import mitsuba as mi
+
+    order = int(faces_in_order(mi.UInt32(passed), [mi.Float(begin) for begin in begins])[0])
+    found = []
+    while order != NO_FACE:
+        found.append(order & NO_FACE)
+        order >>= FACE_BITS
+    assert found == sorted((face for face in range(6) if passed >> face & 1), key=lambda face: (begins[face], face))

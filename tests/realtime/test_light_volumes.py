@@ -72,9 +72,9 @@ def test_frames_with_upright_walls_are_exact_with_respect_to_the_map(variant, na
 def test_rays_cross_the_fence_more_often_than_a_queue_holds(variant):
     from realtime.scene import read_scene
     from realtime.shadow_map import cast_shadow_map
+    from realtime.volume_crossings import PLACES
     from realtime.volume_mesh import volume_mesh
     from realtime.volume_raster import signed_crossings
-    from realtime.volume_walk import PLACES
 
     scene = read_scene(loaded_scene("fence"))
     mesh = volume_mesh(cast_shadow_map(scene.geometry, scene.lights[0], SCENES["fence"][1]), scene.lights[0])
