@@ -16,6 +16,7 @@ from realtime.plane_boxes import TILE, Box, block_boxes, tile_boxes, touches
 from realtime.plane_index import BINS, FIRST, FULL, NUMBER, TURN, PlaneIndex
 
 ROOM = 32  #: entries for each tile and, fourfold, for each block, on average
+LEAST = 1 << 18  #: entries for all tiles, and for all blocks: tiles of small images see more
 
 
 @dataclass
@@ -57,13 +58,14 @@ def tile_lists(index: PlaneIndex, rays, distance, *, order: str, square: bool) -
     dr.eval(tiles)
     blocks = block_boxes(tiles)
     dr.eval(blocks)
-    room = 4 * ROOM * dr.width(blocks.x)
+    room = max(LEAST, 4 * ROOM * dr.width(blocks.x))
     # Blocks are few and their bins long: as many lanes as a tile has share each, or most processors would idle.
     of_block = listed(index, blocks, index.entries, bin_source(index, blocks), room=room, lanes=TILE)
     dr.eval(of_block)
     block = dr.arange(mi.UInt32, dr.width(tiles.x)) // TILE
     source = dr.gather(Source, of_block.source, block)
-    of_tile = listed(index, tiles, of_block.entries, source, room=ROOM * dr.width(tiles.x), order=order)
+    room = max(LEAST, ROOM * dr.width(tiles.x))
+    of_tile = listed(index, tiles, of_block.entries, source, room=room, order=order)
     dr.eval(of_tile)
     return of_tile
 

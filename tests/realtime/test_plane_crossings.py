@@ -144,6 +144,7 @@ def test_tiles_without_room_add_up_in_the_same_order(variant, monkeypatch, order
     wanted, lit = added_up(index, ways, end, order=order)
     stepped, _ = added_up(index, ways, end, order=order, buffer=Buffer(0.9))
     monkeypatch.setattr(module, "ROOM", room)
+    monkeypatch.setattr(module, "LEAST", 0)
     assert np.array(drawn_lists(index, ways, end, order=order)[0].sorted).mean() < 0.9
     found, found_lit = added_up(index, ways, end, order=order)
     found_stepped, _ = added_up(index, ways, end, order=order, buffer=Buffer(0.9))

@@ -92,6 +92,7 @@ def test_tiles_without_room_read_the_list_they_drew_on(variant, monkeypatch, roo
     import realtime.plane_tiles as module
 
     monkeypatch.setattr(module, "ROOM", room)
+    monkeypatch.setattr(module, "LEAST", 0)
     x, lists = endless("torus", "open cylinder", spread=0.05)
     assert 0 < np.array(lists.sorted).mean() < 0.9
     for tile, (numbers, _) in enumerate(listed_planes(lists)):
@@ -111,3 +112,10 @@ def test_full_turns_are_seen(variant):
     ((numbers, _),) = listed_planes(lists)
     assert np.array(box.azimuth_half).item() == 4
     assert set(np.flatnonzero(np.isfinite(x).any(axis=0)).tolist()) <= set(numbers.tolist())
+
+
+def test_a_small_image_of_many_planes_has_room(variant):
+    """Its few tiles see more planes each than those of a large one; all get lists of their own, in order."""
+    _, lists = endless("torus", "open cylinder", "sphere", spread=0.5)
+    assert np.max(np.array(lists.source.count)) > 32
+    assert np.all(np.array(lists.sorted))
