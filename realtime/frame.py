@@ -17,10 +17,12 @@ from realtime.errors import InputError
 from realtime.frame_view import frame_view
 from realtime.frozen import Frozen
 from realtime.kernels.table import resident_tables
+from realtime.media_sides import media_sides
 from realtime.methods import Method
 from realtime.scene import Scene
 from realtime.surface import Cast
 from realtime.surface_stages import no_surface, surface_stages
+from realtime.tile_corners import between_corners, tile_corners
 
 
 @dataclass(frozen=True)
@@ -35,6 +37,7 @@ class FrameRenderer:
     shade: Callable[..., Any]  #: -> surface radiance: by light where `airlight` finds shadows, or a sum
     tiles: Callable[..., Any] | None  #: -> what the method sorts by tiles; None where it does not
     airlight: Callable[..., Any]  #: -> airlight radiance, and that of the surface where this finds its shadows, or None
+    corners: Any  #: how the tiles of the image lie; None where every pixel is computed
     shade_casts_rays: bool  #: whether shading asks Mitsuba for shapes or shadows
     casts_rays: bool  #: whether the method casts rays of its own
 
@@ -90,9 +93,12 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
     if method.uses_kernel and kernel is None:
         raise InputError(f"method {method.name}: got no kernel, wanted one of realtime.kernels.KERNELS")
     settings = dict(method.parameters) | parameters
+    tolerance = settings.pop("tolerance") if method.tiled else 0.0
+    by_rays = method.tiled is not None and method.tiled(settings)
     plan, camera = scene.plan, scene.camera
     lights_surfaces = method.lights_surfaces(settings)
     pixel = mi.UInt32(tiled_pixels(camera.width, camera.height))
+    corners = tile_corners(pixel, camera, tolerance, by_rays=by_rays, lights=len(scene.lights))
     surface, shade, shade_casts_rays = surface_stages(scene, lights_surfaces=lights_surfaces)
 
     def sort_tiles(pixel, camera, medium, lights, prepared, distance):
@@ -100,13 +106,23 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
         shown = {"geometry": None, "medium": medium, "lights": lights, "prepared": prepared}
         return method.tiles(frame_view(camera, pixel, distance, plan=plan, **shown), **settings)
 
-    def run_method(geometry, pixel, camera, medium, lights, prepared, tiles, distance, by_light):
+    def run_method(geometry, pixel, camera, medium, lights, prepared, tiles, distance, by_light, corners=None):
         shown = {"geometry": geometry, "medium": medium, "lights": lights, "prepared": prepared, "tiles": tiles}
-        view = frame_view(camera, pixel, distance, plan=plan, **shown)
-        found = method.function(view, kernel=kernel, **settings)
+
+        def sample(pixel, distance, tile=None):
+            view = frame_view(camera, pixel, distance, plan=plan, tile=tile, **shown)
+            found = method.function(view, kernel=kernel, **settings)
+            return found if lights_surfaces else (found, ())
+
+        if corners is None:
+            airlight, lit = sample(pixel, distance)
+        else:
+            if plan.bounded:
+                shown["sides"] = media_sides(medium, lights, camera.origin)
+            how = {"width": camera.width, "tolerance": tolerance}
+            airlight, lit = between_corners(corners, pixel, distance, sample, **how)
         if not lights_surfaces:
-            return found, None
-        airlight, lit = found
+            return airlight, None
         return airlight, sum(dr.select(reached, color, 0) for reached, color in zip(lit, by_light))
 
     # Asked of every scene: it checks the parameters also where nothing casts a shadow.
@@ -136,6 +152,7 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
         shade=shade,
         tiles=tiles,
         airlight=airlight,
+        corners=corners,
         shade_casts_rays=shade_casts_rays,
         casts_rays=casts_rays,
     )
@@ -222,7 +239,11 @@ def run_airlight(renderer: FrameRenderer, prepared, distance, by_light, tiles=No
         From `run_tiles`; None if the method is to build its own on the way.
     """
     scene = renderer.scene
-    arguments = (renderer.pixel, scene.camera, scene.medium, scene.lights, prepared, tiles, distance, by_light)
+    arguments = [renderer.pixel, scene.camera, scene.medium, scene.lights, prepared, tiles, distance, by_light]
+    if renderer.corners is not None:
+        if tiles is None:
+            arguments[5] = run_tiles(renderer, prepared, distance)
+        arguments.append(renderer.corners)
     return renderer.airlight(renderer.geometry, *arguments)
 
 

@@ -20,6 +20,8 @@ def frame_view(
     lights: tuple[Light, ...],
     prepared,
     tiles=None,
+    tile=None,
+    sides=None,
 ) -> View:
     """Return what a method is given for some pixels; `geometry` may be None where the method casts no rays."""
     direction, low = ray_directions(camera, pixel)
@@ -39,6 +41,8 @@ def frame_view(
         visible_triangle=lambda: visible_triangle(geometry, camera.origin, direction),
         prepared=prepared,
         tiles=tiles,
+        tile=tile,
+        sides=sides,
     )
 
 

@@ -140,7 +140,7 @@ def _walk(heights: LightHeights, leaves: Leaves, airlight: RayAirlight):
     view = airlight.view
     zero = dr.zeros(integral_type(view), dr.width(view.distance))
     away = view.origin - airlight.light.position
-    place = {"away": away, "direction": view.direction, "segment": airlight.segment}
+    place = {"away": away, "direction": view.direction, "segment": airlight.segment, "tile": view.tile}
     value, reached = sum_lit_pieces(heights, leaves, **place, integral=airlight.integral, zero=zero)
     return airlight.radiance(value), reached
 

@@ -7,11 +7,12 @@ Lines are followed over the facets of bodies (`realtime.entry_planes`), in packe
 from dataclasses import dataclass
 from typing import Any
 
-from realtime.clipping import Seen, inverse_crossings, near_line, seen_from, share_inside
-from realtime.entry_planes import EntryPlanes, clear_of, entry_planes, exit_planes, line_crossings
+from realtime.clipping import Seen, inverse_crossings, near_line, share_inside
+from realtime.entry_planes import EntryPlanes, clear_of, line_crossings
 from realtime.geometry import RayGeometry, distance_to_light
 from realtime.lights import Light
-from realtime.medium import Body, Medium
+from realtime.media_sides import BodySides, body_sides, light_sides
+from realtime.medium import Medium
 from realtime.parallel_light import parallel_legs, seen_along
 
 
@@ -72,7 +73,7 @@ def sum_over_pieces(pieces: tuple[Piece, ...], segments, integral, zero):
     return total
 
 
-def camera_pieces(medium: Medium, origin, direction) -> tuple[Piece, ...]:
+def camera_pieces(medium: Medium, origin, direction, sides: tuple[BodySides, ...] | None = None) -> tuple[Piece, ...]:
     """Return the pieces of the camera rays in which something scatters.
 
     Parameters
@@ -81,11 +82,14 @@ def camera_pieces(medium: Medium, origin, direction) -> tuple[Piece, ...]:
         The medium with its bodies.
     origin, direction
         The camera, one for all lanes [m], and unit directions.
+    sides
+        The bodies as the camera sees them, if they are known.
     """
     import drjit as dr
 
     Float = type(direction.x)
-    passages = [_passage(body, origin, direction) for body in medium.bodies]
+    sides = sides or tuple(body_sides(body, origin) for body in medium.bodies)
+    passages = [_passage(one, direction) for one in sides]
 
     def piece(own: Medium, number, begin, end):
         before = []
@@ -122,22 +126,24 @@ def media_ray(
     direction,
     pieces,
     form: str = "exact",
+    sides: tuple[BodySides, ...] | None = None,
 ) -> MediaRay:
-    """Return what the integrals of one light need; `pieces` is from `camera_pieces`, the paper's form needs no legs."""
-    bodies = medium.bodies if form == "exact" else ()
-    seen = tuple(seen_from(body, light.position) for body in bodies)
-    start = origin - light.position
-    entries = tuple(entry_planes(one) for one in seen)
-    exits = tuple(exit_planes(one) for one in seen) if len(seen) > 1 else ()
-    return MediaRay(medium, light, geometry, start, direction, pieces, seen, entries, exits, form)
+    """Return what the integrals of one light need.
+
+    `pieces` is from `camera_pieces`, `sides` are the bodies as the light sees them, if they are known; the paper's form
+    needs no legs.
+    """
+    known = () if form != "exact" else sides or light_sides(medium, light)
+    seen, entries = tuple(one.seen for one in known), tuple(one.entering for one in known)
+    exits = tuple(one.leaving for one in known) if len(known) > 1 else ()
+    return MediaRay(medium, light, geometry, origin - light.position, direction, pieces, seen, entries, exits, form)
 
 
-def _passage(body: Body, origin, direction):
+def _passage(sides: BodySides, direction):
     """Return where camera rays enter and leave a body [m], both infinite where they miss it."""
     import drjit as dr
 
-    seen = seen_from(body, origin)
-    planes = entry_planes(seen), exit_planes(seen)
+    seen, planes = sides.seen, (sides.entering, sides.leaving)
     nothing = type(direction.x)(dr.inf)
 
     def ends(direction):
@@ -160,7 +166,7 @@ def camera_insides(medium: Medium, origin, direction, distance) -> tuple[Any, ..
 
     insides = []
     for body in medium.bodies:
-        ends = _passage(body, origin, direction)
+        ends = _passage(body_sides(body, origin), direction)
         enter, leave = (dr.minimum(end, distance) for end in ends)
         insides.append(dr.select(leave > enter, leave - enter, 0))
     return tuple(insides)
@@ -203,9 +209,9 @@ def path_transmittance(medium: Medium, light: Light, *, depths, point, active):
     length = dr.norm(vector)
     depths = [dr.fma(sigma, length, depth) for depth, sigma in zip(depths, medium.sigma_t)]
     for body in medium.bodies:
-        seen = seen_from(body, light.position)
+        sides = body_sides(body, light.position)
+        seen, planes = sides.seen, (sides.entering, sides.leaving)
         near = active & near_line(seen, vector / length, length)
-        planes = entry_planes(seen), exit_planes(seen)
         inside = dr.if_stmt(
             args=(vector,),
             cond=near,

@@ -31,8 +31,9 @@ from realtime.exponential import exp_bounded
 from realtime.gauss import unit_nodes
 from realtime.lights import Light
 from realtime.media_rays import Piece, sum_over_pieces
+from realtime.media_sides import sunny_sides
 from realtime.medium import Medium, least_extinction
-from realtime.parallel_light import ParallelSeen, cylinder_bend, parallel_legs, seen_along, slope_from
+from realtime.parallel_light import ParallelSeen, cylinder_bend, parallel_legs, slope_from
 from realtime.phase import evaluate_half
 
 _FEW_PLANES = 12  # whose bends are worth the search for them
@@ -54,12 +55,13 @@ class ParallelRay:
     seen: tuple[ParallelSeen, ...]
 
 
-def parallel_ray(medium: Medium, light: Light, *, origin, direction, pieces, form: str = "exact") -> ParallelRay:
-    """Return what the integrals of a directional light need; `pieces` is from `realtime.media_rays.camera_pieces`."""
+def parallel_ray(
+    medium: Medium, light: Light, *, origin, direction, pieces, form: str = "exact", sides=None
+) -> ParallelRay:
+    """Return what the integrals of a directional light need; `pieces` and `sides` as in `realtime.media_rays`."""
     if form != "exact":
         raise InputError(f"media={form}: the published approximation is of lights with a place; use media=exact")
-    seen = tuple(seen_along(body, light.axis) for body in medium.bodies)
-    return ParallelRay(medium, light, origin, direction, pieces, seen)
+    return ParallelRay(medium, light, origin, direction, pieces, sides or sunny_sides(medium, light))
 
 
 def parallel_airlight(ray: ParallelRay, x0, x1):

@@ -46,12 +46,12 @@ class RayPlanes:
     sorted: Any  #: whether they are in order
 
 
-def ray_planes(lists: Lists, x, y, z) -> RayPlanes:
-    """Return camera rays, directions in the frame of a light, with the planes of their tiles."""
+def ray_planes(lists: Lists, x, y, z, tile=None) -> RayPlanes:
+    """Return camera rays, directions in the frame of a light, with the planes of their tiles; see `View.tile`."""
     import drjit as dr
     import mitsuba as mi
 
-    tile = dr.arange(mi.UInt32, dr.width(x)) // TILE
+    tile = dr.arange(mi.UInt32, dr.width(x)) // TILE if tile is None else tile
     source = dr.gather(Source, lists.source, tile)
     return RayPlanes(x, y, z, diamond_angle(x, y), source, dr.gather(mi.Bool, lists.sorted, tile))
 

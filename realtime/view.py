@@ -9,6 +9,7 @@ from realtime.camera import Camera
 from realtime.geometry import ray_geometry
 from realtime.lights import Light
 from realtime.media_rays import MediaRay, camera_pieces, media_ray
+from realtime.media_sides import MediaSides
 from realtime.medium import Medium
 from realtime.parallel_airlight import ParallelRay, parallel_ray
 from realtime.plan import Plan
@@ -39,6 +40,8 @@ class View:
     tiles: tuple[Any, ...] | None = (
         None  #: by light what the method's `tiles` made; None where the method makes its own
     )
+    tile: Any = None  #: the tile of every ray; None where sixteen that follow one another are one
+    sides: MediaSides | None = None  #: bodies of media, where they are known before the rays
 
 
 def radiance(medium: Medium, light: Light, integral):
@@ -51,16 +54,16 @@ def radiance(medium: Medium, light: Light, integral):
 
 def rays_in_media(view: View, form: str = "exact") -> tuple[MediaRay | ParallelRay, ...]:
     """Return the rays of a view in bounded media, by light; `form` is one of `realtime.bounded_media.FORMS`."""
-    pieces = camera_pieces(view.medium, view.origin, view.direction)
+    pieces = camera_pieces(view.medium, view.origin, view.direction, view.sides.camera if view.sides else None)
     rays: list[MediaRay | ParallelRay] = []
-    for light in view.lights:
+    for number, light in enumerate(view.lights):
+        place = {"origin": view.origin, "direction": view.direction, "pieces": pieces, "form": form}
+        place["sides"] = view.sides.lights[number] if view.sides else None
         if light.kind == "directional":
-            place = {"origin": view.origin, "direction": view.direction, "pieces": pieces, "form": form}
             rays.append(parallel_ray(view.medium, light, **place))
             continue
         geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
-        ends = {"origin": view.origin, "direction": view.direction, "form": form}
-        rays.append(media_ray(view.medium, light, geometry, **ends, pieces=pieces))
+        rays.append(media_ray(view.medium, light, geometry, **place))
     return tuple(rays)
 
 

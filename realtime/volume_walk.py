@@ -23,7 +23,15 @@ from realtime.volume_tiles import LARGER, LIT, TILE, Leaves
 
 
 def sum_lit_pieces(
-    heights: LightHeights, leaves: Leaves, *, away, direction, segment, integral: Callable[[Any, Any], Any], zero
+    heights: LightHeights,
+    leaves: Leaves,
+    *,
+    away,
+    direction,
+    segment,
+    integral: Callable[[Any, Any], Any],
+    zero,
+    tile=None,
 ):
     """Add up an integral over the lit pieces of every ray.
 
@@ -41,6 +49,8 @@ def sum_lit_pieces(
         Function (x0, x1) -> value of one piece.
     zero
         The value of no piece, one for each ray.
+    tile
+        The tile of every ray, see `realtime.view.View`.
 
     Returns
     -------
@@ -54,7 +64,7 @@ def sum_lit_pieces(
     import mitsuba as mi
 
     width = dr.width(direction, zero)
-    tile = dr.arange(mi.UInt32, width) // TILE
+    tile = dr.arange(mi.UInt32, width) // TILE if tile is None else tile
 
     def of_face(to_come, run, total, reached):
         face = to_come & NO_FACE

@@ -105,5 +105,6 @@ def _print_costs(costs: Sequence, show) -> None:
 
 def _name(row) -> str:
     width, height = row.size
-    cone = f", cone={row.cone}" if row.cone else ""
-    return f"{row.published.scene}, {width} x {height} ({row.kernel}{cone})"
+    changed = {"cone": row.cone, "tolerance": row.tolerance}
+    values = [row.kernel, *(f"{name}={value}" for name, value in changed.items() if value)]
+    return f"{row.published.scene}, {width} x {height} ({', '.join(values)})"

@@ -4,6 +4,7 @@
 from collections.abc import Callable
 from typing import Any
 
+from reports.page_published import biri_variant
 from reports.progress import part_of
 
 HEADER = (
@@ -61,7 +62,7 @@ def biri_entries(data: dict[str, Any]) -> list[tuple]:
     for row in data.get("rows", ()):
         one = row["published"]
         name = f"{one['scene']}, {one['where']}" + (", " + _size(one["size"]) if one["size"] != [800, 600] else "")
-        variant = row["kernel"] + (f", cone={row['cone']}" if row["cone"] else "")
+        variant = biri_variant(row)
         what = ("biri", "Biri 2006, Table 2", name, variant, "shadow-planes")
         found.append((*what, *_figures(row, one["size"], one["fps"], row["error"])))
     return found

@@ -13,6 +13,7 @@ from reference.files import ensure_folder
 from reports.figure_files import draw_figure, new_figure, pixels, read_data, value, values, write_data, write_table
 from reports.figure_report import reported_papers
 from reports.latex import escape, number, table
+from reports.page_published import biri_variant
 from reports.style import COLOURS, WIDTHS
 
 NAME = "stages"
@@ -59,9 +60,8 @@ def compute(
             shown.add(one["scene"])
             named = (one["scene"], one["where"], _PAPER, *one["size"])
             rows += [(*named, stage, share, *[None] * 4) for stage, share in zip(found["stages"], one["shares"])]
-        cone = f", cone={row['cone']}" if row["cone"] else ""
         frame = tuple(row["rebuilt"][name] for name in ("median_ms", "low_ms", "high_ms"))
-        named = (one["scene"], one["where"], f"{row['kernel']}{cone}", *row["size"])
+        named = (one["scene"], one["where"], biri_variant(row), *row["size"])
         parts = zip(found["stages"], row["shares"], row["stages_ms"])
         rows += [(*named, stage, share, ms, *frame) for stage, share, ms in parts]
     write_data(target, NAME, _HEADER, rows, **origin)

@@ -14,8 +14,12 @@ BILLETER_PASSES = ["surface", "shadow map", "laplacian", "edge map", "tessellate
 def biri_name(row: Row) -> str:
     """Return the name of a row of `reports.biri_tables.rows_data`."""
     width, height = row["size"]
-    cone = f", cone={row['cone']}" if row["cone"] else ""
-    return f"{row['published']['scene']}, {width} \N{MULTIPLICATION SIGN} {height} ({row['kernel']}{cone})"
+    return f"{row['published']['scene']}, {width} \N{MULTIPLICATION SIGN} {height} ({biri_variant(row)})"
+
+
+def biri_variant(row: Row) -> str:
+    """Return the kernel of such a row, and the parameters that differ from their defaults."""
+    return ", ".join([row["kernel"], *(f"{name}={row[name]}" for name in ("cone", "tolerance") if row.get(name))])
 
 
 def billeter_image(row: Row) -> str:

@@ -46,7 +46,7 @@ class FigureEntry:
     scene: str
     map: int  #: [texels]
     method: str
-    parameters: tuple[tuple[str, int | str], ...] = ()  #: without the map
+    parameters: tuple[tuple[str, float | str], ...] = ()  #: without the map
     fps: float | None = None  #: published; None for a peer that the paper does not have
 
     def configuration(self, kernel: str) -> Configuration:
@@ -60,12 +60,14 @@ class FigureEntry:
         return dict(self.parameters).get("walls") == "upright"
 
 
-_MESH: tuple[tuple[str, int | str], ...] = (("evaluation", "mesh"),)
+TILES = "tiles"  #: where rows stand whose airlight is interpolated between the corners of tiles
+_TOLERANCE = ("tolerance", 0.005)
+_MESH: tuple[tuple[str, float | str], ...] = (("evaluation", "mesh"),)
 #: The height field of the mesh without triangles, and with upright walls where the map jumps.
 _WALK, _UPRIGHT = ((("evaluation", "walk"), ("walls", walls)) for walls in ("slanted", "upright"))
 
 
-def _march(steps: int) -> tuple[tuple[str, int | str], ...]:
+def _march(steps: int) -> tuple[tuple[str, float | str], ...]:
     return (("steps", steps), ("spacing", "uniform"), ("shadow", "map"))
 
 
@@ -79,6 +81,10 @@ FIGURES: tuple[FigureEntry, ...] = (
     FigureEntry("Fig. 7b", "colonnade", 512, "ray-march", _march(400), 10),
     *(FigureEntry("Fig. 7c", "colonnade", 512, "light-volumes", how, 96) for how in (_MESH, _WALK, _UPRIGHT)),
     FigureEntry("peer", "colonnade", 512, "min-max"),
+    # Between the corners of tiles, which the paper has not.
+    FigureEntry(TILES, "colonnade", 512, "light-volumes", (*_WALK, _TOLERANCE)),
+    FigureEntry(TILES, "colonnade", 512, "light-volumes", (*_UPRIGHT, _TOLERANCE)),
+    FigureEntry(TILES, "colonnade", 512, "ray-march", (*_march(400), _TOLERANCE)),
 )
 
 

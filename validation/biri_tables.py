@@ -51,6 +51,7 @@ from validation.timing import (
 from validation.truth import truth_image
 
 STAGES = ("silhouettes", "scene", "airlight of the scene", "sorting", "shadow planes")
+TOLERANCE = 0.005  #: of airlight between the corners of tiles: 99 % of the pixels within 1e-3
 KERNELS = ("exact", "taylor")
 
 
@@ -91,6 +92,7 @@ class TableRow:
     published: Published
     kernel: str
     cone: int  #: edges of the planes that bound the spot; 0: the cone itself
+    tolerance: float  #: of what is interpolated between the corners of tiles; 0: nothing
     size: tuple[int, int]  #: of the frame that was timed [pixels]
     triangles: int
     stages_ms: tuple[float, ...]  #: of Table 1, in the order of `STAGES`
@@ -114,6 +116,7 @@ def biri_row(
     kernel: str,
     *,
     cone: int = 0,
+    tolerance: float = 0.0,
     size: tuple[int, int],
     error_size: tuple[int, int],
     seconds: float = 0.6,
@@ -126,8 +129,9 @@ def biri_row(
         The entry of `PUBLISHED`.
     kernel
         Name of the airlight kernel.
-    cone
-        Edges of the planes that bound a spot, see `realtime.shadow_planes`.
+    cone, tolerance
+        Edges of the planes that bound a spot, see `realtime.shadow_planes`, and what may be interpolated, see
+        `realtime.tile_corners`.
     size
         Of the frame that is timed [pixels].
     error_size
@@ -135,7 +139,8 @@ def biri_row(
     seconds
         Time to spend on a timing, about.
     """
-    chosen = Configuration("shadow-planes", kernel, (("cone", cone),) if cone else ())
+    changed = {"cone": cone, "tolerance": tolerance}
+    chosen = Configuration("shadow-planes", kernel, tuple((name, value) for name, value in changed.items() if value))
     small = load_scene(published.scene, error_size).scene
     airlight = render_frame(prepared(read_scene(small), chosen)).airlight
     error = error_metrics(truth_image(small).airlight, airlight)
@@ -156,6 +161,7 @@ def biri_row(
         published,
         kernel,
         cone,
+        tolerance,
         size,
         sum(shape.face_count() for shape in loaded.shapes()),
         _shared([stage.median_ms for stage in stages]),
@@ -182,7 +188,8 @@ def biri_rows(
     Parameters
     ----------
     published, kernels
-        What to measure; every entry with every kernel, a spot by its cone itself and by the planes of the paper.
+        What to measure; every entry with every kernel, a spot by its cone itself and by the planes of the paper; with
+        `exact` also interpolated between the corners of tiles, to `TOLERANCE`.
     scale
         Of the width and height of all images, for a quick look; 1 for the published sizes.
     seconds
@@ -190,14 +197,20 @@ def biri_rows(
     progress
         Told the share done and what comes next.
     """
-    wanted = [(one, kernel, cone) for one in published for kernel in kernels for cone in dict.fromkeys((0, one.cone))]
+    wanted: list[tuple[Published, str, dict[str, Any]]] = []
+    for one in published:
+        for kernel in kernels:
+            wanted += [(one, kernel, {"cone": cone}) for cone in dict.fromkeys((0, one.cone))]
+            wanted += [(one, kernel, {"tolerance": TOLERANCE})] if kernel == "exact" else []
     rows: list[TableRow] = []
-    for one, kernel, cone in wanted:
-        size = (max(1, round(scale * one.size[0])), max(1, round(scale * one.size[1])))
+    for one, kernel, changed in wanted:
+        size = (max(12, round(scale * one.size[0] / 4) * 4), max(12, round(scale * one.size[1] / 4) * 4))
         half = (max(1, size[0] // 2), max(1, size[1] // 2))
         if progress is not None:
             progress(len(rows) / len(wanted), f"{one.scene}, {size[0]} x {size[1]}, {kernel}")
-        rows.append(biri_row(one, kernel, cone=cone, size=size, error_size=half, seconds=seconds))
+        # What is interpolated depends on the size of a pixel.
+        error_size = size if "tolerance" in changed else half
+        rows.append(biri_row(one, kernel, **changed, size=size, error_size=error_size, seconds=seconds))
     return rows
 
 

@@ -34,7 +34,10 @@ METHODS: dict[str, Method] = {
         prepare=prepare_maps,
         prepared_from=frozenset({"geometry", "light"}),
         casts_rays=lambda settings: settings["shadow"] == "ray",
-        parameters=MappingProxyType({"steps": 100, "spacing": "equiangular", "shadow": "ray", "map": 512}),
+        tiled=lambda settings: True,
+        parameters=MappingProxyType(
+            {"steps": 100, "spacing": "equiangular", "shadow": "ray", "map": 512, "tolerance": 0.0}
+        ),
     ),
     "shadow-planes": Method(
         "shadow-planes",
@@ -46,6 +49,7 @@ METHODS: dict[str, Method] = {
         tiles=shadow_plane_tiles,
         casts_rays=lambda settings: settings["evaluation"] == "vertex",  # to know the triangle of a surface
         lights_surfaces=lambda settings: True,
+        tiled=lambda settings: settings["evaluation"] == "pixel",
         parameters=MappingProxyType(
             {
                 "order": "exact",
@@ -57,6 +61,7 @@ METHODS: dict[str, Method] = {
                 "ambient": 0.0,
                 "media": "exact",
                 "cone": 0,
+                "tolerance": 0.0,
             }
         ),
     ),
@@ -69,6 +74,7 @@ METHODS: dict[str, Method] = {
         prepared_from=frozenset({"geometry", "light"}),
         tiles=light_volume_tiles,
         lights_surfaces=finds_lit_surfaces,
+        tiled=lambda settings: settings["evaluation"] == "walk",
         frozen=lambda settings: settings["evaluation"] == "walk",  # the crossings of a mesh are counted on the way
         parameters=MappingProxyType(
             {
@@ -78,6 +84,7 @@ METHODS: dict[str, Method] = {
                 "threshold": 1e-3,
                 "surface": "map",
                 "walls": "upright",
+                "tolerance": 0.0,
             }
         ),
     ),

@@ -29,6 +29,9 @@ class Method:
     )  #: parameters -> whether it returns, after the radiance, by light whether it reaches the surface
     casts_rays: Callable[[Mapping[str, Any]], bool] = lambda settings: False  #: parameters -> whether it casts rays
     frozen: Callable[[Mapping[str, Any]], bool] = lambda settings: True  #: parameters -> whether it can be frozen
+    tiled: Callable[[Mapping[str, Any]], bool] | None = (
+        None  #: parameters -> whether it computes each ray by itself, as its parameter `tolerance` wants
+    )
     shadows: bool = True  #: whether it knows shadows; one that does not is wrong where there are occluders
     parameters: Mapping[str, int | float | str] = field(
         default_factory=lambda: MappingProxyType({})

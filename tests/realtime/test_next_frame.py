@@ -82,6 +82,7 @@ def host(renderer, stages):
 CASES = [
     pytest.param(lambda: built_in("two-pens"), "shadow-planes", {}, STEPS, id="planes"),
     pytest.param(lambda: built_in("two-pens"), "light-volumes", {"map": 64}, STEPS, id="volumes"),
+    pytest.param(lambda: built_in("two-pens"), "shadow-planes", {"tolerance": 0.1}, STEPS, id="planes by tiles"),
     pytest.param(
         lambda: built_in("three-media"),
         "shadow-planes",
@@ -164,9 +165,10 @@ def test_what_a_method_of_ones_own_prepares_is_made_anew_unless_it_says_otherwis
     np.testing.assert_allclose(host(renderer, stages)["airlight"], 2 * 0.31, rtol=1e-6)
 
 
-def test_frames_replay_whatever_moves(variant):
+@pytest.mark.parametrize("tolerance", [0.0, 0.1])
+def test_frames_replay_whatever_moves(variant, tolerance):
     """No stage is recorded again, but for the camera rays, once, where part of Mitsuba's scene is another."""
-    renderer = made(built_in("two-pens"), "shadow-planes")
+    renderer = made(built_in("two-pens"), "shadow-planes", tolerance=tolerance)
     _, kept = next_frame(renderer, renderer.scene, None, **STILL)
     for now, moved in frames(renderer.scene, STEPS):
         _, kept = next_frame(renderer, now, kept, **moved)

@@ -45,8 +45,11 @@ def test_map_sizes_have_the_fitted_slope(variant, tmp_path):
     figure_map_size.compute(tmp_path, quick=True, sizes=(32, 64, 128))
     rows = rows_of(tmp_path / "map-size.csv")
     assert len(rows) == 3 * len(figure_map_size.METHODS)
-    for row in rows:  # order 1 but for what grazes a shadow, see validation.map_study; three sizes scatter by 0.2
-        assert 0.6 < float(row["order"]) < 1.3
+    # Order 1 but for what grazes a shadow, 3/2 where walls stand between samples, see validation.map_study; three sizes
+    # scatter by 0.3.
+    for row in rows:
+        wanted = 1.5 if row["method"] == "light-volumes" else 1.0
+        assert wanted - 0.4 < float(row["order"]) < wanted + 0.3
     assert drawn(figure_map_size, tmp_path) == drawn(figure_map_size, tmp_path)
 
 

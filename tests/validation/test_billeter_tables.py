@@ -9,7 +9,7 @@ import pytest
 from reports import cli
 from reports.billeter_tables import billeter_data, print_billeter
 from validation.billeter_conclusions import conclusions, pays_from
-from validation.billeter_figures import FIGURES, FigureEntry, FigureRow, figure_rows, sampled, sampled_truth
+from validation.billeter_figures import FIGURES, TILES, FigureEntry, FigureRow, figure_rows, sampled, sampled_truth
 from validation.billeter_tables import EVALUATIONS, TABLE, TableRow, table_rows, table_scene
 from validation.metrics import error_metrics
 from validation.timing import Timing
@@ -239,7 +239,8 @@ def test_command_prints_the_figures(variant, quick, monkeypatch, capfd):
 
 
 def test_what_is_not_measured_is_printed_with_its_reason(capfd):
-    figures = [FigureRow(FIGURES[-1], (8, 8), missing="no room")]
+    peer = next(one for one in FIGURES if one.where == "peer")
+    figures = [FigureRow(peer, (8, 8), missing="no room")]
     table = [TableRow(TABLE[1], 4096, "static", (8, 8), missing="too slow")]
     print_billeter(figures, table)
     out = capfd.readouterr().out
@@ -262,3 +263,14 @@ def test_what_is_not_measured_is_printed_with_its_reason(capfd):
 def test_wrong_options_are_refused(arguments, words, capfd):
     assert cli.run(["published", *arguments]) == cli.WRONG_INPUT
     assert words in capfd.readouterr().err
+
+
+def test_rows_by_tiles_are_compared_with_their_own_and_are_not_those_of_the_paper():
+    """A marcher, whose frames are shorter by tiles, is not the one that the paper's conclusion is about."""
+    entries = [one for one in FIGURES if one.scene == "colonnade" and one.method == "ray-march"]
+    assert [one.where for one in entries] == ["Fig. 7a", "Fig. 7b", TILES]
+    volume = next(one for one in FIGURES if one.where == "Fig. 7c" and one.upright)
+    rows = [figure_row(one, ms, 0.1, 0.1) for one, ms in ((volume, 100.0), (entries[1], 900.0), (entries[2], 300.0))]
+    found = conclusions(rows, [])
+    assert any("marching with 400 samples takes 9 times as long" in one for one in found)
+    assert [one for one in found if "corners of tiles" in one and "takes 0.33 of the time" in one]

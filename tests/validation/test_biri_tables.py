@@ -31,17 +31,12 @@ def test_every_entry_is_measured_with_every_kernel(variant):
     rows = biri_rows(
         PUBLISHED[:2], ("exact", "taylor"), scale=0.02, seconds=0.0, progress=lambda *what: told.append(what)
     )
-    assert [(row.size, row.kernel, row.cone) for row in rows] == [
-        ((16, 12), "exact", 0),
-        ((16, 12), "exact", 32),
-        ((16, 12), "taylor", 0),
-        ((16, 12), "taylor", 32),
-        ((20, 15), "exact", 0),
-        ((20, 15), "exact", 32),
-        ((20, 15), "taylor", 0),
-        ((20, 15), "taylor", 32),
+    assert [(row.size, row.kernel, row.cone, row.tolerance) for row in rows] == [
+        (size, *what)
+        for size in ((16, 12), (20, 16))
+        for what in (("exact", 0, 0), ("exact", 32, 0), ("exact", 0, 0.005), ("taylor", 0, 0), ("taylor", 32, 0))
     ]
-    assert [share for share, _ in told] == [number / 8 for number in range(8)]
+    assert [share for share, _ in told] == [number / 10 for number in range(10)]
 
 
 def test_command_prints_both_tables_beside_the_published_figures(variant, capfd):
@@ -49,7 +44,7 @@ def test_command_prints_both_tables_beside_the_published_figures(variant, capfd)
     assert cli.run([*arguments, "--markdown"]) == 0
     out = capfd.readouterr().out
     assert "| two-pens: Table 1, Fig. 7a | 1 % | 8.7 % | 21.7 % | 9.6 % | 59 % | - |" in out
-    assert "two-pens, 24 x 18 (exact) | 34549 | 23 |" in out
+    assert "two-pens, 24 x 16 (exact) | 34549 | 23 |" in out
     assert "more than 35" in out
     assert cli.run([*arguments, "--json"]) == 0
     found = json.loads(capfd.readouterr().out)
