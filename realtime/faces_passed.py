@@ -4,9 +4,10 @@
 A face of the cube about a light is seen through a pyramid that four of the six planes |p| = |q|, p and q two of the
 coordinates x, y, z from the light, cut out of space: the face along +x is where x + y, x - y, x + z and x - z are
 positive. Rays start at the camera, go at most a distance L along directions that are combinations, with positive
-weights, of the corners of their tile. So along all of them a coordinate n . P is at most
+weights, of the corners d of their tile. Those weights add up to at most 1/c, with c the least cosine between a corner
+and the middle m of the tile, since a unit vector has d . m <= 1. So along all rays a coordinate n . P is at most
 
-    n . (camera - light) + L max(0, n . d),     d the corner where that is largest,
+    n . (camera - light) + (L/c) max(0, n . d),     d the corner where that is largest,
 
 and where this is negative for one of the four planes no ray comes into the pyramid.
 """
@@ -37,8 +38,10 @@ def faces_passed(directions, end, away) -> Any:
     import drjit as dr
     import mitsuba as mi
 
-    # A sum of unit directions is a little longer than the unit direction along it.
-    length = dr.minimum(end, _FAR) * (1 + 1e-3)
+    # A combination is as long as its part along the middle, at least: a unit vector takes larger weights by that much.
+    middle = dr.normalize(sum(directions[1:], directions[0]))
+    shortest = reduce(dr.minimum, [dr.dot(d, middle) for d in directions])
+    length = dr.minimum(end / dr.maximum(shortest, 1e-6), _FAR) * (1 + 1e-5)
     rounding = _SLACK * dr.norm(away)
     missed: dict[tuple[int, int, int, int], Any] = {}
     for first, second in combinations(range(3), 2):
