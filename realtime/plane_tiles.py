@@ -12,6 +12,7 @@ paper.
 from dataclasses import dataclass
 from typing import Any
 
+from realtime.arrays import four_numbers
 from realtime.plane_boxes import TILE, Box, block_boxes, tile_boxes, touches
 from realtime.plane_index import BINS, FIRST, FULL, NUMBER, TURN, PlaneIndex
 
@@ -122,7 +123,9 @@ def listed(
     import mitsuba as mi
 
     count = _visit(index, box, entries, source, None, lanes=lanes)
-    offset = dr.prefix_sum(count) + 0
+    dr.eval(count)
+    # Keys are compared four at a time: lists that are put in order begin at every fourth place.
+    offset = dr.prefix_sum(count if order is None else (count + 3) & 0xFFFFFFFC) + 0
     # Lists stand behind what they were drawn from, so that a box without one reads on from there in the same array.
     behind = dr.width(entries)
     pool = dr.empty(mi.UInt32, behind + room)
@@ -145,7 +148,8 @@ def listed(
         dr.eval(pool)
         return Lists(pool, found, fits)
 
-    unsorted = _Unsorted(dr.empty(mi.UInt32, room), dr.empty(type(box.x), room), dr.empty(mi.UInt32, room))
+    fours = (room + 3) // 4
+    unsorted = _Unsorted(dr.empty(mi.UInt32, room), dr.empty(type(box.x), 4 * fours), dr.empty(mi.UInt32, fours))
     dr.eval(unsorted)
 
     def write_unsorted(place, entry, key, active):
@@ -154,11 +158,11 @@ def listed(
             key = -dr.gather(type(box.x), index.spans, (entry & NUMBER) * 4 + 3, active)
         dr.scatter(unsorted.entry, entry, offset + place, active)
         dr.scatter(unsorted.key, key, offset + place, active)
-        dr.scatter(unsorted.owner, dr.arange(mi.UInt32, dr.width(box.x)), offset + place, active)
+        dr.scatter(unsorted.owner, dr.arange(mi.UInt32, dr.width(box.x)), (offset + place) >> 2, active)
 
     _visit(index, box, entries, source, write_unsorted)
     dr.eval(unsorted)
-    _write_sorted(pool, unsorted, found, behind, dr.sum(dr.select(fits, count, 0)))
+    _write_sorted(pool, unsorted, found, behind, dr.max(dr.select(fits, offset + count, 0)))
     return Lists(pool, found, fits)
 
 
@@ -168,7 +172,7 @@ class _Unsorted:
 
     entry: Any
     key: Any  #: larger first
-    owner: Any  #: the box whose list it belongs to
+    owner: Any  #: of every fourth place, the box whose list it belongs to
 
 
 def _of_box(values, lanes: int, number: int):
@@ -217,16 +221,20 @@ def _write_sorted(pool, unsorted: _Unsorted, source: Source, behind: int, total)
     import drjit as dr
     import mitsuba as mi
 
+    Four = four_numbers(type(unsorted.key))
+
     def placed(place):
-        box = dr.gather(mi.UInt32, unsorted.owner, place)
+        box = dr.gather(mi.UInt32, unsorted.owner, place >> 2)
         first = dr.gather(mi.UInt32, source.first, box) - behind
         count = dr.gather(mi.UInt32, source.count, box)
         own = dr.gather(type(unsorted.key), unsorted.key, place)
 
         def body(k, rank):
-            other = dr.gather(type(own), unsorted.key, first + k)
-            before = (other > own) | ((other == own) & (first + k < place))
-            return k + 1, rank + dr.select(before, mi.UInt32(1), mi.UInt32(0))
+            four = dr.gather(Four, unsorted.key, (first + k) >> 2)
+            for step, other in enumerate(four):
+                before = (other > own) | ((other == own) & (first + (k + step) < place))
+                rank += dr.select(before & (k + step < count), mi.UInt32(1), mi.UInt32(0))
+            return k + 4, rank
 
         _, rank = dr.while_loop(
             state=(dr.zeros(mi.UInt32, dr.width(place)), dr.zeros(mi.UInt32, dr.width(place))),
@@ -234,7 +242,7 @@ def _write_sorted(pool, unsorted: _Unsorted, source: Source, behind: int, total)
             body=body,
             labels=("k", "rank"),
         )
-        dr.scatter(pool, dr.gather(mi.UInt32, unsorted.entry, place), first + rank + behind)
+        dr.scatter(pool, dr.gather(mi.UInt32, unsorted.entry, place), first + rank + behind, place < first + count)
         return place
 
     place = dr.arange(mi.UInt32, dr.width(unsorted.entry))
