@@ -150,25 +150,15 @@ def between_corners(corners: Corners, pixel, distance, sample: Callable[..., Any
     bend = _second_difference(corners, color)
     dr.eval(bend)
     four = tile, corners.right, corners.below, corners.diagonal
-    smooth = corners.inner & _depths_alike(distance, four)
     values = [dr.gather(type(color), color, one) for one in four]
+    smooth = corners.inner & _depths_alike(distance, four)
     for one, value in zip(four, values):
         bends = dr.gather(type(color), bend, one)
         for channel in range(3):
             smooth &= bends[channel] <= tolerance * value[channel]
         smooth &= dr.gather(mi.UInt32, lit, one) == lit
-    # f = base + x across + y down + x y twist, x and y in tiles, as four numbers by channel.
-    base, across, down, diagonal = values
-    forms = [
-        four_numbers(Float)(
-            *(one[channel] for one in (base, across - base, down - base, base - across - down + diagonal))
-        )
-        for channel in range(3)
-    ]
-    tables = [dr.empty(Float, 4 * tiles) for _ in range(3)]
-    for table, form in zip(tables, forms):
-        dr.scatter(table, form, tile)
-    dr.eval(tables, smooth, lit)
+    tables = _bilinear(values)
+    dr.eval(tables, smooth)
 
     lane = dr.arange(mi.UInt32, dr.width(distance))
     own = lane // TILE
@@ -185,6 +175,23 @@ def between_corners(corners: Corners, pixel, distance, sample: Callable[..., Any
     smooth = dr.gather(mi.Bool, smooth, own)
     color, bits = dr.if_stmt(args=(pixel, distance, own), cond=smooth, true_fn=between, false_fn=with_bits)
     return color, tuple((bits >> number & 1) != 0 for number in range(lights))
+
+
+def _bilinear(values) -> list[Any]:
+    """Return f = base + x across + y down + x y twist of every tile as four numbers, an array for each channel.
+
+    `values` are f at the corners of the tile, and x and y go from 0 to 1 over it.
+    """
+    import drjit as dr
+
+    tables = []
+    for base, across, down, diagonal in zip(*values):
+        Float = type(base)
+        table = dr.empty(Float, 4 * dr.width(base))
+        form = four_numbers(Float)(base, across - base, down - base, base - across - down + diagonal)
+        dr.scatter(table, form, dr.arange(dr.uint32_array_t(Float), dr.width(base)))
+        tables.append(table)
+    return tables
 
 
 def _second_difference(corners: Corners, color):
