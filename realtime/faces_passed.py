@@ -14,6 +14,7 @@ and where this is negative for one of the four planes no ray comes into the pyra
 
 from functools import reduce
 from itertools import combinations
+from operator import or_
 from typing import Any
 
 FACE_BITS = 3  #: of the number of a face in an order of faces
@@ -23,13 +24,15 @@ _SLACK = 1e-6  # of a coordinate or a slope: float32 rounding, with room
 _FAR = 1e30  # stands for the end of endless rays [m]
 
 
-def faces_passed(directions, end, away) -> Any:
+def faces_passed(directions, middle, end, away) -> Any:
     """Return bit k for each face k of a cube that rays may pass, by tile.
 
     Parameters
     ----------
     directions
         Unit directions of rays, by tile, of which all others are combinations with positive weights.
+    middle
+        The unit direction of their sum.
     end
         Largest length of a ray, by tile [m].
     away
@@ -39,7 +42,6 @@ def faces_passed(directions, end, away) -> Any:
     import mitsuba as mi
 
     # A combination is as long as its part along the middle, at least: a unit vector takes larger weights by that much.
-    middle = dr.normalize(sum(directions[1:], directions[0]))
     shortest = reduce(dr.minimum, [dr.dot(d, middle) for d in directions])
     length = dr.minimum(end / dr.maximum(shortest, 1e-6), _FAR) * (1 + 1e-5)
     rounding = _SLACK * dr.norm(away)
@@ -59,7 +61,7 @@ def faces_passed(directions, end, away) -> Any:
     for face in range(6):
         axis, side = face // 2, 1 - 2 * (face % 2)
         planes = [missed[axis, side, other, sign] for other in range(3) if other != axis for sign in (1, -1)]
-        passed |= dr.select(reduce(lambda a, b: a | b, planes), 0, mi.UInt32(1 << face))
+        passed |= dr.select(reduce(or_, planes), 0, mi.UInt32(1 << face))
     return passed
 
 

@@ -239,12 +239,10 @@ def run_airlight(renderer: FrameRenderer, prepared, distance, by_light, tiles=No
         From `run_tiles`; None if the method is to build its own on the way.
     """
     scene = renderer.scene
-    arguments = [renderer.pixel, scene.camera, scene.medium, scene.lights, prepared, tiles, distance, by_light]
-    if renderer.corners is not None:
-        if tiles is None:
-            arguments[5] = run_tiles(renderer, prepared, distance)
-        arguments.append(renderer.corners)
-    return renderer.airlight(renderer.geometry, *arguments)
+    if renderer.corners is not None and tiles is None:
+        tiles = run_tiles(renderer, prepared, distance)
+    arguments = (renderer.pixel, scene.camera, scene.medium, scene.lights, prepared, tiles, distance, by_light)
+    return renderer.airlight(renderer.geometry, *arguments, renderer.corners)
 
 
 def _nothing(scene: Scene) -> tuple[()]:

@@ -5,6 +5,7 @@ from realtime.camera import Camera, ray_directions
 from realtime.lights import Light
 from realtime.medium import Medium
 from realtime.plan import Plan
+from realtime.plane_boxes import TILE
 from realtime.surface import visible_triangle
 from realtime.view import View
 
@@ -23,7 +24,14 @@ def frame_view(
     tile=None,
     sides=None,
 ) -> View:
-    """Return what a method is given for some pixels; `geometry` may be None where the method casts no rays."""
+    """Return what a method is given for some pixels.
+
+    `geometry` may be None where the method casts no rays, and `tile` where sixteen pixels that follow one another are a
+    tile.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
     direction, low = ray_directions(camera, pixel)
     return View(
         origin=camera.origin,
@@ -41,7 +49,7 @@ def frame_view(
         visible_triangle=lambda: visible_triangle(geometry, camera.origin, direction),
         prepared=prepared,
         tiles=tiles,
-        tile=tile,
+        tile=dr.arange(mi.UInt32, dr.width(pixel)) // TILE if tile is None else tile,
         sides=sides,
     )
 

@@ -26,7 +26,6 @@ from typing import Any
 from realtime.arrays import four_numbers, two_numbers
 from realtime.crossing_queue import filled, inserted, popped, pushed
 from realtime.diamond import diamond_angle
-from realtime.plane_boxes import TILE
 from realtime.plane_index import FULL, GAIN_SHIFT, GAIN_ZERO, NUMBER, PlaneIndex
 from realtime.plane_tiles import Lists, Source, entry_at
 
@@ -46,12 +45,11 @@ class RayPlanes:
     sorted: Any  #: whether they are in order
 
 
-def ray_planes(lists: Lists, x, y, z, tile=None) -> RayPlanes:
+def ray_planes(lists: Lists, x, y, z, *, tile) -> RayPlanes:
     """Return camera rays, directions in the frame of a light, with the planes of their tiles; see `View.tile`."""
     import drjit as dr
     import mitsuba as mi
 
-    tile = dr.arange(mi.UInt32, dr.width(x)) // TILE if tile is None else tile
     source = dr.gather(Source, lists.source, tile)
     return RayPlanes(x, y, z, diamond_angle(x, y), source, dr.gather(mi.Bool, lists.sorted, tile))
 

@@ -193,7 +193,7 @@ def shadow_planes(
         index = view.prepared[number]
         lists = view.tiles[number] if view.tiles else tile_planes(view, index, order=order)
         seen = seen_rays(index.aim, view.camera, view.pixel, index.distance, light)
-        rays = ray_planes(lists, seen.x, seen.y, seen.z, view.tile)
+        rays = ray_planes(lists, seen.x, seen.y, seen.z, tile=view.tile)
         airlight = ray_airlight(view, light, kernel, in_media[number] if in_media else None, geometry=seen.geometry)
         if order == "exact" and evaluation == "pixel" and buffer == "float":
             value, reached = _segments(index, lists, rays, airlight, differences=sum == "gamma")

@@ -130,22 +130,11 @@ def between_corners(corners: Corners, pixel, distance, sample: Callable[..., Any
     import mitsuba as mi
 
     Float = type(distance)
-    lights = 0
-
-    def with_bits(pixel, distance, tile):
-        nonlocal lights
-        color, reached = sample(pixel, distance, tile)
-        lights = len(reached)
-        bits = mi.UInt32(0)
-        for number, one in enumerate(reached):
-            bits |= dr.select(one, mi.UInt32(1 << number), 0)
-        return color, bits
-
     tiles = dr.width(distance) // TILE
     tile = dr.arange(mi.UInt32, tiles)
     first = tile * TILE
-    color, lit = with_bits(dr.gather(mi.UInt32, pixel, first), dr.gather(Float, distance, first), tile)
-    color, lit = color + dr.zeros(Float, tiles), lit + dr.zeros(mi.UInt32, tiles)
+    color, reached = sample(dr.gather(mi.UInt32, pixel, first), dr.gather(Float, distance, first), tile)
+    color, lit = color + dr.zeros(Float, tiles), _bits(reached) + dr.zeros(mi.UInt32, tiles)
     dr.eval(color, lit)
     bend = _second_difference(corners, color)
     dr.eval(bend)
@@ -172,9 +161,24 @@ def between_corners(corners: Corners, pixel, distance, sample: Callable[..., Any
             channels.append(dr.fma(y, dr.fma(x, twist, down), dr.fma(x, across, base)))
         return type(color)(*channels), dr.gather(mi.UInt32, lit, own)
 
+    def computed(pixel, distance, own):
+        color, reached = sample(pixel, distance, own)
+        return color, _bits(reached)
+
     smooth = dr.gather(mi.Bool, smooth, own)
-    color, bits = dr.if_stmt(args=(pixel, distance, own), cond=smooth, true_fn=between, false_fn=with_bits)
-    return color, tuple((bits >> number & 1) != 0 for number in range(lights))
+    color, bits = dr.if_stmt(args=(pixel, distance, own), cond=smooth, true_fn=between, false_fn=computed)
+    return color, tuple((bits >> number & 1) != 0 for number in range(len(reached)))
+
+
+def _bits(reached):
+    """Return by light, as one bit each, whether it reaches the surface."""
+    import drjit as dr
+    import mitsuba as mi
+
+    bits = mi.UInt32(0)
+    for number, one in enumerate(reached):
+        bits |= dr.select(one, mi.UInt32(1 << number), 0)
+    return bits
 
 
 def _bilinear(values) -> list[Any]:

@@ -40,7 +40,7 @@ class View:
     tiles: tuple[Any, ...] | None = (
         None  #: by light what the method's `tiles` made; None where the method makes its own
     )
-    tile: Any = None  #: the tile of every ray; None where sixteen that follow one another are one
+    tile: Any = None  #: the number of every ray's tile: of sixteen that follow one another, where all are there
     sides: MediaSides | None = None  #: bodies of media, where they are known before the rays
 
 

@@ -79,7 +79,7 @@ def tile_leaves(heights: LightHeights, rays, distance, *, light, square: bool) -
     end = reduce(dr.maximum, (dr.gather(Float, ends, member) for member in members))
     lists = _block_lists(heights, make_beam(about, end, light, heights.axis), face)
     beam = make_beam(directions, ends, light, heights.axis)
-    faces = mi.UInt32(1) if heights.faces == 1 else faces_passed(directions, ends, -light)
+    faces = mi.UInt32(1) if heights.faces == 1 else faces_passed(directions, beam.middle, ends, -light)
     return _tile_lists(heights, beam, faces, *lists)
 
 

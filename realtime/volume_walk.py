@@ -19,7 +19,7 @@ from realtime.light_heights import LightHeights
 from realtime.volume_crossings import Crossings, nearest_crossings
 from realtime.volume_rays import FaceRay, face_ray, in_face
 from realtime.volume_texels import line_of
-from realtime.volume_tiles import LARGER, LIT, TILE, Leaves
+from realtime.volume_tiles import LARGER, LIT, Leaves
 
 
 def sum_lit_pieces(
@@ -31,7 +31,7 @@ def sum_lit_pieces(
     segment,
     integral: Callable[[Any, Any], Any],
     zero,
-    tile=None,
+    tile,
 ):
     """Add up an integral over the lit pieces of every ray.
 
@@ -64,7 +64,6 @@ def sum_lit_pieces(
     import mitsuba as mi
 
     width = dr.width(direction, zero)
-    tile = dr.arange(mi.UInt32, width) // TILE if tile is None else tile
 
     def of_face(to_come, run, total, reached):
         face = to_come & NO_FACE

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from reports.bench_tables import RATES, print_heading, print_markdown, rate, rate_cells
+from reports.page_published import biri_variant
 from reports.tables import number, print_table
 
 
@@ -105,6 +106,4 @@ def _print_costs(costs: Sequence, show) -> None:
 
 def _name(row) -> str:
     width, height = row.size
-    changed = {"cone": row.cone, "tolerance": row.tolerance}
-    values = [row.kernel, *(f"{name}={value}" for name, value in changed.items() if value)]
-    return f"{row.published.scene}, {width} x {height} ({', '.join(values)})"
+    return f"{row.published.scene}, {width} x {height} ({biri_variant(vars(row))})"

@@ -130,7 +130,12 @@ def listed_planes(lists):
 
 def rays_of(index, lists, ways):
     """Return the rays of a walk over lists."""
+    import drjit as dr
+    import mitsuba as mi
+
+    from realtime.plane_boxes import TILE
     from realtime.plane_sweep import ray_planes
 
     Float = type(index.distance)
-    return ray_planes(lists, *(Float(np.ascontiguousarray(part)) for part in ways.T))
+    tile = dr.arange(mi.UInt32, len(ways)) // TILE
+    return ray_planes(lists, *(Float(np.ascontiguousarray(part)) for part in ways.T), tile=tile)

@@ -26,7 +26,7 @@ from realtime.scene import Scene, read_scene
 from realtime.shadow_map import cast_shadow_map
 from reference.quadrature import quadrature_image
 from reference.scene import TruthScene, read_truth
-from validation.configurations import Configuration, configuration, prepared
+from validation.configurations import TOLERANCE, Configuration, configuration, prepared
 from validation.load import load_scene
 from validation.metrics import Metrics, error_metrics
 from validation.timing import Timing, changed_look, first_frame, moved_light, moved_light_alone, time_in_turns
@@ -61,7 +61,7 @@ class FigureEntry:
 
 
 TILES = "tiles"  #: where rows stand whose airlight is interpolated between the corners of tiles
-_TOLERANCE = ("tolerance", 0.005)
+_TOLERANCE = ("tolerance", TOLERANCE)
 _MESH: tuple[tuple[str, float | str], ...] = (("evaluation", "mesh"),)
 #: The height field of the mesh without triangles, and with upright walls where the map jumps.
 _WALK, _UPRIGHT = ((("evaluation", "walk"), ("walls", walls)) for walls in ("slanted", "upright"))

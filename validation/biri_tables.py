@@ -32,11 +32,12 @@ from realtime.frame import (
     run_tiles,
 )
 from realtime.next_frame import Kept
+from realtime.plane_boxes import SIDE
 from realtime.plane_view import bodies_in_view
 from realtime.scene import Scene, read_scene
 from realtime.shadow_planes import PlanePreparation
 from realtime.silhouettes import silhouette
-from validation.configurations import Configuration, prepared
+from validation.configurations import TOLERANCE, Configuration, prepared
 from validation.load import load_scene
 from validation.metrics import Metrics, error_metrics
 from validation.timing import (
@@ -51,7 +52,6 @@ from validation.timing import (
 from validation.truth import truth_image
 
 STAGES = ("silhouettes", "scene", "airlight of the scene", "sorting", "shadow planes")
-TOLERANCE = 0.005  #: of airlight between the corners of tiles: 99 % of the pixels within 1e-3
 KERNELS = ("exact", "taylor")
 
 
@@ -189,7 +189,7 @@ def biri_rows(
     ----------
     published, kernels
         What to measure; every entry with every kernel, a spot by its cone itself and by the planes of the paper; with
-        `exact` also interpolated between the corners of tiles, to `TOLERANCE`.
+        `exact` also interpolated between the corners of tiles, to `validation.configurations.TOLERANCE`.
     scale
         Of the width and height of all images, for a quick look; 1 for the published sizes.
     seconds
@@ -204,7 +204,7 @@ def biri_rows(
             wanted += [(one, kernel, {"tolerance": TOLERANCE})] if kernel == "exact" else []
     rows: list[TableRow] = []
     for one, kernel, changed in wanted:
-        size = (max(12, round(scale * one.size[0] / 4) * 4), max(12, round(scale * one.size[1] / 4) * 4))
+        size = _whole_tiles(scale * one.size[0]), _whole_tiles(scale * one.size[1])
         half = (max(1, size[0] // 2), max(1, size[1] // 2))
         if progress is not None:
             progress(len(rows) / len(wanted), f"{one.scene}, {size[0]} x {size[1]}, {kernel}")
@@ -212,6 +212,11 @@ def biri_rows(
         error_size = size if "tolerance" in changed else half
         rows.append(biri_row(one, kernel, **changed, size=size, error_size=error_size, seconds=seconds))
     return rows
+
+
+def _whole_tiles(length: float) -> int:
+    """Return the side of an image in which tiles can be interpolated: three of them and more [pixels]."""
+    return SIDE * max(3, round(length / SIDE))
 
 
 def _shared(measured: Sequence[float]) -> tuple[float, ...]:

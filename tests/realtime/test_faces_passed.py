@@ -13,10 +13,12 @@ SEEDS = st.integers(0, 2**32 - 1)
 
 def found_for(directions, end, away):
     """Return the numbers of the faces found for one tile."""
+    import drjit as dr
     import mitsuba as mi
 
     corners = [mi.Vector3f(*(float(c) for c in corner)) for corner in directions]
-    bits = int(faces_passed(corners, mi.Float(float(end)), mi.Vector3f(*(float(c) for c in away)))[0])
+    middle = dr.normalize(sum(corners[1:], corners[0]))
+    bits = int(faces_passed(corners, middle, mi.Float(float(end)), mi.Vector3f(*(float(c) for c in away)))[0])
     return {face for face in range(6) if bits >> face & 1}
 
 

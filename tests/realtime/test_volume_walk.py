@@ -34,7 +34,7 @@ def test_what_is_lit_across_faces_is_one_piece(variant):
     from realtime.faces_passed import NO_FACE
     from realtime.light_heights import light_heights
     from realtime.shadow_map import cast_shadow_map
-    from realtime.volume_tiles import tile_leaves
+    from realtime.volume_tiles import TILE, tile_leaves
     from realtime.volume_walk import sum_lit_pieces
 
     speck = {"type": "sphere", "center": [0.3, 0.2, -90.0], "radius": 1e-3}  # falls between the rays of the map
@@ -49,6 +49,7 @@ def test_what_is_lit_across_faces_is_one_piece(variant):
 
     leaves = tile_leaves(heights, rays, distance, light=-away, square=True)
     way = {"away": away, "direction": rays(dr.arange(mi.UInt32, 64 * 48)), "segment": (mi.Float(0), distance)}
+    way["tile"] = dr.arange(mi.UInt32, 64 * 48) // TILE
     pieces, lit = sum_lit_pieces(
         heights,
         leaves,
