@@ -22,74 +22,74 @@ from reports import __version__
 
 if TYPE_CHECKING:  # for editors, which complete names from here; `_API` says the same at run time
     from analytic.errors import InputError as InputError
-    from realtime.frame import frame_renderer as frame_renderer
-    from realtime.frame import render_frame as render_frame
-    from realtime.kernels import KERNELS as KERNELS
-    from realtime.methods import METHODS as METHODS
-    from realtime.methods import Method as Method
-    from realtime.methods import find_method as find_method
-    from realtime.scene import read_scene as read_scene
-    from reference.exr import read_exr as read_exr
-    from reference.exr import write_exr as write_exr
-    from reports.api import compare as compare
-    from reports.api import load_scene as load_scene
-    from reports.api import render as render
-    from reports.api_report import report as report
-    from reports.api_studies import bench as bench
-    from reports.api_studies import integrate as integrate
-    from reports.api_truth import reference as reference
-    from reports.environment import MissingError as MissingError
-    from reports.environment import activate as activate
-    from reports.environment import versions as versions
-    from validation.budget import Budget as Budget
-    from validation.certified_fog import certified_data as certified_data
-    from validation.compare import compare_files as compare_files
-    from validation.configurations import configuration as configuration
-    from validation.known_answers import known_answers as known_answers
-    from validation.merge import merged_references as merged_references
-    from validation.metrics import error_metrics as error_metrics
-    from validation.multiple import multiple_scattering_share as multiple_scattering_share
-    from validation.references import monte_carlo_reference as monte_carlo_reference
-    from validation.references import quadrature_reference as quadrature_reference
-    from validation.references import volpath_reference as volpath_reference
-    from validation.scenes import SCENES as SCENES
-    from validation.timing import time_frame as time_frame
+    from realtime.frame.renderer import frame_renderer as frame_renderer
+    from realtime.frame.renderer import render_frame as render_frame
+    from realtime.kernels.registry import KERNELS as KERNELS
+    from realtime.methods.method import Method as Method
+    from realtime.methods.registry import METHODS as METHODS
+    from realtime.methods.registry import find_method as find_method
+    from realtime.scene.read_scene import read_scene as read_scene
+    from reference.storage.exr import read_exr as read_exr
+    from reference.storage.exr import write_exr as write_exr
+    from reports.api.images import compare as compare
+    from reports.api.images import load_scene as load_scene
+    from reports.api.images import render as render
+    from reports.api.reference import reference as reference
+    from reports.api.report import report as report
+    from reports.api.studies import bench as bench
+    from reports.api.studies import integrate as integrate
+    from reports.machine.environment import MissingError as MissingError
+    from reports.machine.environment import activate as activate
+    from reports.machine.environment import versions as versions
+    from validation.certified.generate import certified_data as certified_data
+    from validation.comparison.images import compare_files as compare_files
+    from validation.configurations.methods import configuration as configuration
+    from validation.configurations.timing import time_frame as time_frame
+    from validation.estimates.budget import Budget as Budget
+    from validation.estimates.images import monte_carlo_reference as monte_carlo_reference
+    from validation.estimates.images import quadrature_reference as quadrature_reference
+    from validation.estimates.images import volpath_reference as volpath_reference
+    from validation.estimates.merge import merged_references as merged_references
+    from validation.estimates.multiple_scattering import multiple_scattering_share as multiple_scattering_share
+    from validation.known_answers.point_lights import known_answers as known_answers
+    from validation.metrics.errors import error_metrics as error_metrics
+    from validation.scenes.registry import SCENES as SCENES
 
 # name -> module; what is not named here is no part of the API.
 _API = {
-    "load_scene": "reports.api",
-    "render": "reports.api",
-    "reference": "reports.api_truth",
-    "compare": "reports.api",
-    "integrate": "reports.api_studies",
-    "bench": "reports.api_studies",
-    "report": "reports.api_report",
+    "load_scene": "reports.api.images",
+    "render": "reports.api.images",
+    "reference": "reports.api.reference",
+    "compare": "reports.api.images",
+    "integrate": "reports.api.studies",
+    "bench": "reports.api.studies",
+    "report": "reports.api.report",
     "InputError": "analytic.errors",
-    "MissingError": "reports.environment",
-    "activate": "reports.environment",
-    "versions": "reports.environment",
-    "SCENES": "validation.scenes",
-    "METHODS": "realtime.methods",
-    "Method": "realtime.methods",
-    "find_method": "realtime.methods",
-    "KERNELS": "realtime.kernels",
-    "configuration": "validation.configurations",
-    "read_scene": "realtime.scene",
-    "frame_renderer": "realtime.frame",
-    "render_frame": "realtime.frame",
-    "time_frame": "validation.timing",
-    "error_metrics": "validation.metrics",
-    "quadrature_reference": "validation.references",
-    "volpath_reference": "validation.references",
-    "monte_carlo_reference": "validation.references",
-    "Budget": "validation.budget",
-    "merged_references": "validation.merge",
-    "multiple_scattering_share": "validation.multiple",
-    "known_answers": "validation.known_answers",
-    "certified_data": "validation.certified_fog",
-    "compare_files": "validation.compare",
-    "read_exr": "reference.exr",
-    "write_exr": "reference.exr",
+    "MissingError": "reports.machine.environment",
+    "activate": "reports.machine.environment",
+    "versions": "reports.machine.environment",
+    "SCENES": "validation.scenes.registry",
+    "METHODS": "realtime.methods.registry",
+    "Method": "realtime.methods.method",
+    "find_method": "realtime.methods.registry",
+    "KERNELS": "realtime.kernels.registry",
+    "configuration": "validation.configurations.methods",
+    "read_scene": "realtime.scene.read_scene",
+    "frame_renderer": "realtime.frame.renderer",
+    "render_frame": "realtime.frame.renderer",
+    "time_frame": "validation.configurations.timing",
+    "error_metrics": "validation.metrics.errors",
+    "quadrature_reference": "validation.estimates.images",
+    "volpath_reference": "validation.estimates.images",
+    "monte_carlo_reference": "validation.estimates.images",
+    "Budget": "validation.estimates.budget",
+    "merged_references": "validation.estimates.merge",
+    "multiple_scattering_share": "validation.estimates.multiple_scattering",
+    "known_answers": "validation.known_answers.point_lights",
+    "certified_data": "validation.certified.generate",
+    "compare_files": "validation.comparison.images",
+    "read_exr": "reference.storage.exr",
+    "write_exr": "reference.storage.exr",
 }
 
 __all__ = ["__version__", "main", *_API]
@@ -107,7 +107,7 @@ def __dir__() -> list[str]:
 
 def main() -> None:
     """Run the `airlight` command."""
-    from reports.cli import run
+    from reports.commands.main import run
 
     sys.exit(run(sys.argv[1:]))
 

@@ -16,7 +16,7 @@ def data_folder() -> Path:
 @pytest.fixture(scope="session")
 def variant() -> str:
     """The best Mitsuba variant that works on this machine, made current."""
-    from reports.environment import activate
+    from reports.machine.environment import activate
 
     return activate()
 

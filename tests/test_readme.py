@@ -74,8 +74,8 @@ def test_commands_of_the_table_exist():
 
 def test_the_table_of_costs_was_printed_by_bench():
     """Dated, and no number written by hand: a table for each of its scenes, and every check of the truth agrees."""
-    from reports.bench_tables import _HEADERS
-    from validation.scenes import SCENES
+    from reports.tables.bench import _HEADERS
+    from validation.scenes.registry import SCENES
 
     table = README.split("<!-- bench: begin -->")[1].split("<!-- bench: end -->")[0]
     assert re.match(r"\n\d{4}-\d\d-\d\d, .*threads, (llvm|cuda)_ad_rgb\.\n", table)
@@ -91,7 +91,7 @@ def commands() -> dict:
     """Return by name the options of every command."""
     import typer
 
-    from reports.cli import app
+    from reports.commands.main import app
 
     found = typer.main.get_group(app).commands
     return {
@@ -141,9 +141,9 @@ def test_links_lead_somewhere(name):
 
 
 def test_the_parameters_of_shadow_planes_are_explained():
-    from realtime import shadow_planes
-    from realtime.bounded_media import FORMS
-    from realtime.methods import METHODS
+    from realtime.bounded_media.airlight import FORMS
+    from realtime.methods.registry import METHODS
+    from realtime.methods.shadow_planes import method as shadow_planes
 
     section = DOCUMENTS["docs/shadow-planes.md"].split("## The parameters")[1].split("**The three orders.**")[0]
     rows = re.findall(r"^\| `(\w+)` \| ([^|]*) \|", section, flags=re.MULTILINE)
@@ -159,7 +159,7 @@ def test_the_parameters_of_shadow_planes_are_explained():
 
 def test_scenes_and_names_of_the_api_are_those_of_the_program():
     import airlight
-    from validation.scenes import SCENES
+    from validation.scenes.registry import SCENES
 
     for name in SCENES:
         assert f"`{name}`" in DOCUMENTS["CHANGELOG.md"], name

@@ -6,9 +6,9 @@
 
 import pytest
 
-from validation.baseline_runs import measure_baseline
-from validation.baselines import compare_baseline, read_baseline
-from validation.scenes import SCENES
+from validation.frames.baseline_files import compare_baseline, read_baseline
+from validation.frames.baseline_runs import measure_baseline
+from validation.scenes.registry import SCENES
 
 QUICK = ("open-fog", "sphere-spot")  # every method and every kernel; the other scenes take longer
 
@@ -23,13 +23,15 @@ def test_errors_are_those_of_the_baseline(name, variant):
 
 
 def test_a_fault_of_a_thousandth_is_found(monkeypatch, variant):
-    import validation.configurations
-    from validation import baseline_runs
-    from validation.baseline_runs import YARDSTICK
+    import validation.configurations.methods
+    from validation.frames import baseline_runs
+    from validation.frames.baseline_runs import YARDSTICK
 
-    find = validation.configurations.find_kernel
+    find = validation.configurations.methods.find_kernel
     monkeypatch.setattr(
-        validation.configurations, "find_kernel", lambda name: lambda *args, **known: 1.001 * find(name)(*args, **known)
+        validation.configurations.methods,
+        "find_kernel",
+        lambda name: lambda *args, **known: 1.001 * find(name)(*args, **known),
     )
     monkeypatch.setattr(baseline_runs, "baseline_configurations", lambda name, plan: (YARDSTICK,))
     moves = compare_baseline(read_baseline("open-fog"), measure_baseline("open-fog", times=False))

@@ -61,7 +61,7 @@ def _cell(words: str) -> str:
 
 def methods() -> str:
     """Return the methods with links to their pages."""
-    from realtime.methods import METHODS
+    from realtime.methods.registry import METHODS
 
     rows = [
         (
@@ -78,7 +78,7 @@ def methods() -> str:
 
 def parameters(method: str) -> str:
     """Return the defaults of a method's parameters in a sentence."""
-    from realtime.methods import METHODS
+    from realtime.methods.registry import METHODS
 
     values = METHODS[method].parameters
     if not values:
@@ -88,7 +88,7 @@ def parameters(method: str) -> str:
 
 def kernels() -> str:
     """Return the kernels."""
-    from realtime.kernels import KERNELS
+    from realtime.kernels.registry import KERNELS
 
     rows = [
         (
@@ -104,7 +104,7 @@ def kernels() -> str:
 
 def keys() -> str:
     """Return the keys of a report's page."""
-    from reports.page_words import KEYS
+    from reports.page.filters import KEYS
 
     rows = [(" ".join(f"`{one}`" for one in names), words) for names, words in KEYS]
     return table(("key", "what it does"), rows, 2)
@@ -118,7 +118,7 @@ def commands() -> str:
     """
     import typer
 
-    from reports.cli import app
+    from reports.commands.main import app
 
     found = typer.main.get_group(app).commands
     return "\n".join(_command(name, command) for name, command in found.items())

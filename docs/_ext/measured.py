@@ -8,7 +8,7 @@ from typing import Any
 
 from listed import table
 
-from reports.tables import number
+from reports.tables.terminal import number
 
 DATA = Path(__file__).resolve().parents[1] / "data"
 _COLUMNS = ("scene", "configuration", "frame ms", "quartiles", "rebuilt ms", "rel. RMSE", "rel. bias", "p99", "max")
@@ -93,7 +93,7 @@ def _pictures(name: str) -> str:
 
 def kernel_costs(phase: str) -> str:
     """Return what kernels cost and how wrong they are for one phase function, the default sizes."""
-    from realtime.kernels import KERNELS
+    from realtime.kernels.registry import KERNELS
 
     found = data()["kernels"]
     if found is None:
@@ -149,7 +149,7 @@ def _share(share: dict[str, Any] | None) -> str:
 
 def scenes() -> str:
     """Return the gallery: every built-in scene with its picture, what it is for and what it holds."""
-    from validation.scenes import SCENES
+    from validation.scenes.registry import SCENES
 
     kept = {scene["name"]: scene for scene in data()["scenes"]}
     return "\n".join(_scene(record, kept.get(name)) for name, record in SCENES.items())

@@ -33,11 +33,11 @@ the error that they leave there; a test on the change from one level to the next
 fraction all terms that make Im w agree in sign, so Im S keeps its relative accuracy where it is tiny.
 """
 
-from realtime.arrays import is_single, smallest
 from realtime.errors import InputError
-from realtime.geometry import RayGeometry
-from realtime.lights import Light
-from realtime.medium import Medium, per_extinction
+from realtime.numerics.array_types import is_single, smallest
+from realtime.rays.ray_light import RayGeometry
+from realtime.scene.lights import Light
+from realtime.scene.medium import Medium, per_extinction
 
 # The coefficients of u^0, u^1, ... of the phase functions.
 _POLYNOMIALS = {

@@ -18,8 +18,8 @@ foot point. For the lobes cos^16 and cos^64 of half the angle ("hazy", "murky"),
 their width.
 
 In float32 every segment takes as many panels of eight nodes as its width in v and its optical depth ask for, see
-`realtime.kernels.panels`, or four or eight nodes in x if it is short, see `realtime.kernels.short`; they leave less
-than 1e-6. In float64 the numbers of nodes are the same for all, the smallest with which the certified cases
+`realtime.kernels.panels`, or four or eight nodes in x if it is short, see `realtime.kernels.short_segments`; they
+leave less than 1e-6. In float64 the numbers of nodes are the same for all, the smallest with which the certified cases
 (tests/data) and random rays of optical depth 1e-6 to 50, heights down to 1e-7 of the distance and |g| up to 0.95 stay
 below 1e-10; the isotropic case has no lobe, and pairs of nodes about the centre share their exponentials: it is
 `quadrature` with 40 nodes.
@@ -27,15 +27,15 @@ below 1e-10; the isotropic case has no lobe, and pairs of nodes about the centre
 
 from functools import reduce
 
-from realtime.arrays import is_single
-from realtime.gauss import unit_nodes
-from realtime.geometry import RayGeometry, falloff, stretches
 from realtime.kernels.panels import panels_mean
 from realtime.kernels.quadrature import path_interval, quadrature
-from realtime.kernels.short import FEW, MORE, extent, serves, short_segment
-from realtime.lights import Light
-from realtime.medium import Medium, per_extinction
-from realtime.phase import Phase, evaluate_half
+from realtime.kernels.short_segments import FEW, MORE, extent, serves, short_segment
+from realtime.numerics.array_types import is_single
+from realtime.numerics.gauss_legendre import unit_nodes
+from realtime.rays.ray_light import RayGeometry, falloff, stretches
+from realtime.scene.lights import Light
+from realtime.scene.medium import Medium, per_extinction
+from realtime.scene.phase import Phase, evaluate_half
 
 #: The scale d of the substitution (Henyey-Greenstein: by g).
 _SCALE = {"hazy": 0.7, "murky": 0.5}

@@ -8,12 +8,12 @@
 Both are of order 2 in the number of steps once the steps resolve the integrand.
 """
 
-from realtime.arrays import smallest
 from realtime.errors import InputError
-from realtime.geometry import RayGeometry, distance_to_light, falloff
-from realtime.lights import Light
-from realtime.medium import Medium, least_extinction, per_extinction
-from realtime.phase import evaluate
+from realtime.numerics.array_types import smallest
+from realtime.rays.ray_light import RayGeometry, distance_to_light, falloff
+from realtime.scene.lights import Light
+from realtime.scene.medium import Medium, least_extinction, per_extinction
+from realtime.scene.phase import evaluate
 
 _REACH = 20.0  # optical depths after which uniform steps end an endless ray: e^-20 = 2e-9
 

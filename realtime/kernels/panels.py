@@ -37,9 +37,9 @@ from collections.abc import Callable
 from functools import reduce
 from typing import Any
 
-from realtime.exponential import LOG2_E, exp2_bounded, sinh_bounded
-from realtime.gauss import unit_nodes
-from realtime.phase import Phase, evaluate_half
+from realtime.numerics.fast_exp import LOG2_E, exp2_bounded, sinh_bounded
+from realtime.numerics.gauss_legendre import unit_nodes
+from realtime.scene.phase import Phase, evaluate_half
 
 _NODES = 8
 _MOST = 160  # panels; more than any segment needs: what is not a number must end too

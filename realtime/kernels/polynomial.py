@@ -43,10 +43,10 @@ from functools import lru_cache
 from typing import Any
 
 from realtime.errors import InputError
-from realtime.geometry import RayGeometry, stretches
 from realtime.kernels.polynomial_piece import Piece, integrand, offset, piece_of, place, with_limits
-from realtime.lights import Light
-from realtime.medium import Medium, per_extinction
+from realtime.rays.ray_light import RayGeometry, stretches
+from realtime.scene.lights import Light
+from realtime.scene.medium import Medium, per_extinction
 
 
 @dataclass(frozen=True)

@@ -13,12 +13,12 @@ sums of positive terms. The far end is brought to where extinction or 1/(1 + E^2
 from dataclasses import dataclass, replace
 from typing import Any
 
-from realtime.arrays import is_single, smallest
-from realtime.exponential import exp_bounded
-from realtime.geometry import RayGeometry, falloff
-from realtime.lights import Light
-from realtime.medium import Medium
-from realtime.phase import Phase, evaluate_half
+from realtime.numerics.array_types import is_single, smallest
+from realtime.numerics.fast_exp import exp_bounded
+from realtime.rays.ray_light import RayGeometry, falloff
+from realtime.scene.lights import Light
+from realtime.scene.medium import Medium
+from realtime.scene.phase import Phase, evaluate_half
 
 _LOBE_WIDTH = {"hazy": 0.6, "murky": 0.35}  # m, found by trial: a factor of two either way costs a factor of two to ten
 

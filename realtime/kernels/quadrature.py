@@ -27,13 +27,13 @@ a spot falls off between beam and cut-off, it is split at the cone of the beam, 
 
 from functools import lru_cache
 
-from realtime.arrays import is_single, smallest
 from realtime.errors import InputError
-from realtime.exponential import exp_bounded
-from realtime.geometry import RayGeometry, falloff, stretches
-from realtime.lights import Light
-from realtime.medium import Medium, per_extinction
-from realtime.phase import evaluate
+from realtime.numerics.array_types import is_single, smallest
+from realtime.numerics.fast_exp import exp_bounded
+from realtime.rays.ray_light import RayGeometry, falloff, stretches
+from realtime.scene.lights import Light
+from realtime.scene.medium import Medium, per_extinction
+from realtime.scene.phase import evaluate
 
 
 def quadrature(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, nodes: int = 16):

@@ -9,11 +9,11 @@ has an essential singularity. `realtime.kernels.quadrature` avoids it.
 """
 
 from realtime.errors import InputError
-from realtime.gauss import unit_nodes
-from realtime.geometry import RayGeometry, distance_to_light, falloff
-from realtime.lights import Light
-from realtime.medium import Medium, per_extinction
-from realtime.phase import evaluate
+from realtime.numerics.gauss_legendre import unit_nodes
+from realtime.rays.ray_light import RayGeometry, distance_to_light, falloff
+from realtime.scene.lights import Light
+from realtime.scene.medium import Medium, per_extinction
+from realtime.scene.phase import evaluate
 
 
 def quadrature_theta(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, nodes: int = 16):

@@ -34,11 +34,11 @@ the four corners of each cell side by side, one fetch a read.
 
 from functools import lru_cache
 
-from realtime.arrays import four_numbers
 from realtime.errors import InputError
-from realtime.geometry import RayGeometry
-from realtime.lights import Light
-from realtime.medium import Medium, per_extinction
+from realtime.numerics.array_types import four_numbers
+from realtime.rays.ray_light import RayGeometry
+from realtime.scene.lights import Light
+from realtime.scene.medium import Medium, per_extinction
 
 FORMS = ("sun", "tail")
 _LARGEST_U = 10.0  # of Sun's table

@@ -23,12 +23,12 @@ The difference of powers is written (theta1 - theta0) sum_k theta1^k theta0^(n-k
 tangent, so that short segments and rays that pass the light do not cancel.
 """
 
-from realtime.arrays import largest
 from realtime.errors import InputError
-from realtime.geometry import RayGeometry, falloff
-from realtime.lights import Light
-from realtime.medium import Medium, per_extinction
-from realtime.phase import Phase
+from realtime.numerics.array_types import largest
+from realtime.rays.ray_light import RayGeometry, falloff
+from realtime.scene.lights import Light
+from realtime.scene.medium import Medium, per_extinction
+from realtime.scene.phase import Phase
 
 
 def taylor(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, degree: int = 4):

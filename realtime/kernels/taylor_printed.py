@@ -23,12 +23,12 @@ Three choices let the kernel be compared with others:
 * The rest, the difference of powers without cancellation among it, is code of `taylor`.
 """
 
-from realtime.arrays import largest
 from realtime.errors import InputError
-from realtime.geometry import RayGeometry
 from realtime.kernels.taylor import _extinction_series, _integrated, _phase_series, _product, _weighted
-from realtime.lights import Light
-from realtime.medium import Medium, per_extinction
+from realtime.numerics.array_types import largest
+from realtime.rays.ray_light import RayGeometry
+from realtime.scene.lights import Light
+from realtime.scene.medium import Medium, per_extinction
 
 PRINTED_PHASES = ("isotropic", "rayleigh", "hazy", "murky")
 HIGHEST_DEGREE = 4

@@ -14,18 +14,18 @@ steps.
 
 from collections.abc import Callable
 
-from realtime.bounded_media import bounded_source
+from realtime.bounded_media.airlight import bounded_source
+from realtime.bounded_media.directional_airlight import ParallelRay
+from realtime.bounded_media.ray_segments import MediaRay
 from realtime.errors import InputError
-from realtime.geometry import RayGeometry, clip_to_cone, distance_to_light, falloff, ray_geometry
-from realtime.lights import Light
-from realtime.media_rays import MediaRay
-from realtime.medium import least_extinction, per_extinction
 from realtime.memory import check_memory
-from realtime.parallel_airlight import ParallelRay
-from realtime.phase import evaluate
-from realtime.scene import Scene
-from realtime.shadow_map import ShadowMap, cast_shadow_map, check_size, lit_in_map, map_memory
-from realtime.view import View, bounded_radiance, radiance, rays_in_media
+from realtime.methods.view import View, bounded_radiance, radiance, rays_in_media
+from realtime.rays.ray_light import RayGeometry, clip_to_cone, distance_to_light, falloff, ray_geometry
+from realtime.scene.lights import Light
+from realtime.scene.medium import least_extinction, per_extinction
+from realtime.scene.phase import evaluate
+from realtime.scene.read_scene import Scene
+from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, check_size, lit_in_map, map_memory
 
 SPACINGS = ("equiangular", "uniform")
 SHADOWS = ("ray", "map", "none")

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Airlight without volumetric shadows: one integral from the camera to the visible surface, for each light."""
 
-from realtime.bounded_media import bounded_airlight
-from realtime.geometry import ray_geometry
-from realtime.kernels import airlight_integral
-from realtime.view import View, bounded_radiance, radiance, rays_in_media
+from realtime.bounded_media.airlight import bounded_airlight
+from realtime.kernels.registry import airlight_integral
+from realtime.methods.view import View, bounded_radiance, radiance, rays_in_media
+from realtime.rays.ray_light import ray_geometry
 
 
 def unshadowed(view: View, *, kernel):

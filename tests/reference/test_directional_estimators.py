@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from tests.scenes_for_tests import tiny_scene
-from tests.suns_for_tests import ball_over_floor, brick, pearl, sun, sunny
-from tests.volpath_for_tests import assert_volpath_agrees
+from tests.helpers.scenes import tiny_scene
+from tests.helpers.suns import ball_over_floor, brick, pearl, sun, sunny
+from tests.helpers.volpath import assert_volpath_agrees
 
 HG = {"phase": {"type": "hg", "g": 0.6}}
 
@@ -16,10 +16,10 @@ def traced(scene, batches, samples=64):
     """Return quadrature image and batches of single-scatter."""
     import mitsuba as mi
 
-    from reference.batches import merged
-    from reference.quadrature import quadrature_image
-    from reference.scene import read_truth
-    from reference.single_scatter import single_scatter_batch
+    from reference.monte_carlo.batches import merged
+    from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
+    from reference.quadrature.image import quadrature_image
+    from reference.scene.read import read_truth
 
     truth = read_truth(mi.load_dict(scene))
     done = single_scatter_batch(truth, 0, samples)
@@ -82,7 +82,7 @@ def test_sampled_distances_have_their_density(variant):
     """The mean of 1/density over the samples is the length; the density is below 1/(2 length) nowhere."""
     import mitsuba as mi
 
-    from reference.plain_sampling import sample_stretch
+    from reference.monte_carlo.single_scatter.directional_sampling import sample_stretch
 
     count = 4096
     u = mi.Float((np.arange(count) + 0.5) / count)
@@ -112,7 +112,7 @@ def test_volpath_agrees(variant, name):
     """
     import mitsuba as mi
 
-    from reference.scene import read_truth
+    from reference.scene.read import read_truth
 
     assert_volpath_agrees(read_truth(mi.load_dict(CASES[name]())), batches=16, least_precision=0.03)
 
@@ -122,8 +122,8 @@ def test_volpath_agrees(variant, name):
 def test_medium_without_bounds_is_refused(variant, estimator, bounded):
     import mitsuba as mi
 
-    from reference.scatter_task import read_task
-    from reference.scene import read_truth
+    from reference.monte_carlo.single_scatter.scene_data import read_task
+    from reference.scene.read import read_truth
 
     body = {"brick": brick() | {"exterior": {"type": "ref", "id": "fog"}}} if bounded else {}
     scene = mi.load_dict(tiny_scene(lamp=None, sun=sun(), **body))

@@ -10,7 +10,7 @@ MOVES = ("light", "objects", "medium", "colour")
 
 @dataclass(frozen=True)
 class Animation:
-    """What moves in the frames of a scene; see `validation.animation`."""
+    """What moves in the frames of a scene; see `validation.scenes.animation`."""
 
     moves: tuple[str, ...] = ("light",)  #: of `MOVES`
     about: tuple[float, float, float] | None = None  #: where the axis of the lights' circle is [m]; None: in the middle

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from realtime.errors import InputError
-from tests.realtime.test_kernels import evaluate
+from tests.realtime.kernels.test_registry import evaluate
 
 PHASES = ("isotropic", "rayleigh", "hazy", "murky")
 ROUNDING = {"single": 2.0**-24, "double": 2.0**-53}
@@ -40,8 +40,8 @@ def test_scaled_exponential_integral(variant, precision, bound):
     """Both regions and their border, against mpmath at the values that the kernel sees."""
     import mpmath
 
-    from realtime.arrays import array_types
     from realtime.kernels.closed_form import scaled_e1
+    from realtime.numerics.array_types import array_types
 
     types = array_types(precision)
     magnitude = np.concatenate([np.logspace(-6, 3, 40), np.linspace(0.7, 2.4, 60)])
@@ -56,8 +56,8 @@ def test_scaled_exponential_integral(variant, precision, bound):
 
 
 def test_exponential_integral_in_vacuum(variant):
-    from realtime.arrays import array_types
     from realtime.kernels.closed_form import scaled_e1
+    from realtime.numerics.array_types import array_types
 
     types = array_types("double")
     e = np.array([0.0, 0.3, 1.0, 7.0, 1e12])
@@ -130,7 +130,7 @@ def test_limits(variant, precision):
 
 def test_refuses_what_has_no_closed_form(variant):
     from realtime.kernels.closed_form import closed_form
-    from realtime.lights import Light
+    from realtime.scene.lights import Light
 
     with pytest.raises(InputError, match="kernel closed-form: phase function 'hg' is no polynomial"):
         evaluate(closed_form, [ONE | {"phase": "hg", "g": 0.3}], "single")
@@ -145,12 +145,12 @@ def test_refuses_what_has_no_closed_form(variant):
 def test_renders_in_colour_like_the_quadrature(variant):
     import mitsuba as mi
 
-    from realtime.frame import frame_renderer, render_frame
+    from realtime.frame.renderer import frame_renderer, render_frame
     from realtime.kernels.closed_form import closed_form
     from realtime.kernels.quadrature import quadrature
-    from realtime.methods import METHODS
-    from realtime.scene import read_scene
-    from tests.scenes_for_tests import tiny_scene
+    from realtime.methods.registry import METHODS
+    from realtime.scene.read_scene import read_scene
+    from tests.helpers.scenes import tiny_scene
 
     fog = {
         "type": "homogeneous",

@@ -13,7 +13,7 @@ def cases(request, data_folder):
 
 
 def errors(cases, kernel, precision):
-    from validation.integrate import integrate_cases
+    from validation.kernels.cases import integrate_cases
 
     values = integrate_cases(cases, kernel, precision)
     assert np.all(np.isfinite(values))
@@ -41,12 +41,12 @@ def test_limits(variant, name):
     """Zero length, vacuum, endless rays, the light beside the segment at height 0, against the truth."""
     from analytic.panels import airlight_segments
     from analytic.phase import PhaseFunction
-    from realtime.arrays import array_types
-    from realtime.geometry import RayGeometry
     from realtime.kernels.exact import exact
-    from realtime.lights import Light
-    from realtime.medium import Medium
-    from realtime.phase import Phase
+    from realtime.numerics.array_types import array_types
+    from realtime.rays.ray_light import RayGeometry
+    from realtime.scene.lights import Light
+    from realtime.scene.medium import Medium
+    from realtime.scene.phase import Phase
 
     foot = np.array([1.0, 1.0, 1.5, -0.7, 2.5, 0.3])
     height = np.array([0.5, 0.5, 0.25, 0.0, 0.0, 2.0])
@@ -83,12 +83,12 @@ def test_wide_rays(variant, name, g):
     """Float32: the nodes leave 5e-6, and rounding of the exponent 6e-8 times an optical depth of up to 300."""
     from analytic.panels import airlight_segments
     from analytic.phase import PhaseFunction
-    from realtime.arrays import array_types
-    from realtime.geometry import RayGeometry
     from realtime.kernels.exact import exact
-    from realtime.lights import Light
-    from realtime.medium import Medium
-    from realtime.phase import Phase
+    from realtime.numerics.array_types import array_types
+    from realtime.rays.ray_light import RayGeometry
+    from realtime.scene.lights import Light
+    from realtime.scene.medium import Medium
+    from realtime.scene.phase import Phase
 
     foot, height, x1, sigma_t = wide_rays(5000)
     expected, _ = airlight_segments(foot, height, 0.0, x1, sigma_t, PhaseFunction(name, g=g))
@@ -108,12 +108,12 @@ def test_endless_rays_through_a_vacuum_with_sharp_lobes(variant, g):
     """A backward lobe holds its light at large E: the far end must not be cut before it."""
     from analytic.panels import airlight_segments
     from analytic.phase import PhaseFunction
-    from realtime.arrays import array_types
-    from realtime.geometry import RayGeometry
     from realtime.kernels.exact import exact
-    from realtime.lights import Light
-    from realtime.medium import Medium
-    from realtime.phase import Phase
+    from realtime.numerics.array_types import array_types
+    from realtime.rays.ray_light import RayGeometry
+    from realtime.scene.lights import Light
+    from realtime.scene.medium import Medium
+    from realtime.scene.phase import Phase
 
     foot, height = np.array([1.5, -2.0, 0.01, 3.0]), np.array([0.7, 0.3, 1e-3, 2.0])
     for precision, bound in (("single", 5e-6), ("double", 1e-10)):
@@ -127,12 +127,12 @@ def test_endless_rays_through_a_vacuum_with_sharp_lobes(variant, g):
 
 
 def test_rays_that_meet_the_light_are_infinite(variant):
-    from realtime.arrays import array_types
-    from realtime.geometry import RayGeometry
     from realtime.kernels.exact import exact
-    from realtime.lights import Light
-    from realtime.medium import Medium
-    from realtime.phase import Phase
+    from realtime.numerics.array_types import array_types
+    from realtime.rays.ray_light import RayGeometry
+    from realtime.scene.lights import Light
+    from realtime.scene.medium import Medium
+    from realtime.scene.phase import Phase
 
     types = array_types()
     for name in ("isotropic", "rayleigh"):
@@ -145,13 +145,13 @@ def test_rays_that_meet_the_light_are_infinite(variant):
 
 
 def test_gamma_is_the_integral_from_the_camera(variant):
-    from realtime.arrays import array_types
-    from realtime.geometry import RayGeometry
-    from realtime.kernels import airlight_integral, gamma
     from realtime.kernels.exact import exact
-    from realtime.lights import Light
-    from realtime.medium import Medium
-    from realtime.phase import Phase
+    from realtime.kernels.registry import airlight_integral, gamma
+    from realtime.numerics.array_types import array_types
+    from realtime.rays.ray_light import RayGeometry
+    from realtime.scene.lights import Light
+    from realtime.scene.medium import Medium
+    from realtime.scene.phase import Phase
 
     types = array_types("double")
     medium = Medium((types.scalar(0.5),), types.color(1), Phase("rayleigh"))

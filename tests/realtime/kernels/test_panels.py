@@ -24,18 +24,18 @@ PHASES = [
 
 
 def phase_of(name, g, types):
-    from realtime.phase import Phase
+    from realtime.scene.phase import Phase
 
     return Phase(name, g=types.scalar(g) if name == "hg" else None)
 
 
 def kernel_values(rays, name, g, *, precision="single"):
     """Return J of the default kernel in a precision; `rays` are foot, height, x0, x1, extinction."""
-    from realtime.arrays import array_types
-    from realtime.geometry import RayGeometry
     from realtime.kernels.exact import exact
-    from realtime.lights import Light
-    from realtime.medium import Medium
+    from realtime.numerics.array_types import array_types
+    from realtime.rays.ray_light import RayGeometry
+    from realtime.scene.lights import Light
+    from realtime.scene.medium import Medium
 
     types = array_types(precision)
     foot, height, x0, x1, sigma_t = (types.scalar(np.atleast_1d(column)) for column in rays)
@@ -62,11 +62,11 @@ def rule_and_truth(rays, name, g):
     """Return J/[what all nodes share] by the rule for float32, but in float64, and by 25 times as many nodes."""
     import drjit as dr
 
-    from realtime.arrays import array_types
-    from realtime.geometry import RayGeometry
     from realtime.kernels.exact import _double_mean, _lobe_scales
     from realtime.kernels.panels import panels_mean
     from realtime.kernels.quadrature import path_interval
+    from realtime.numerics.array_types import array_types
+    from realtime.rays.ray_light import RayGeometry
 
     types = array_types("double")
     foot, height, x0, x1, sigma_t = (types.scalar(column) for column in rays)
@@ -94,9 +94,9 @@ def test_what_the_rule_leaves_without_rounding(variant, name, g):
 def test_segments_as_wide_and_as_deep_as_their_panels_may_be(variant, name, g, panels):
     import drjit as dr
 
-    from realtime.arrays import array_types
     from realtime.kernels.exact import _double_mean, _lobe_scales
     from realtime.kernels.panels import panel_count, panels_mean
+    from realtime.numerics.array_types import array_types
 
     rng = np.random.default_rng(panels)
     types = array_types("double")
@@ -155,8 +155,8 @@ def test_no_seam_where_a_segment_takes_another_panel(variant, name, g):
 
 
 def counts(name, g, widths, depths, **options):
-    from realtime.arrays import array_types
     from realtime.kernels.panels import panel_count
+    from realtime.numerics.array_types import array_types
 
     types = array_types("single")
     return np.array(panel_count(phase_of(name, g, types), types.scalar(widths), types.scalar(depths), **options))
@@ -175,7 +175,7 @@ def test_the_number_of_panels_grows_with_width_and_depth(variant, name, g):
 
 def test_every_panel_is_narrow_enough_for_its_sine(variant):
     """`sinh_bounded` holds half a panel, of every phase function."""
-    from realtime.exponential import WIDEST
+    from realtime.numerics.fast_exp import WIDEST
 
     widths = np.linspace(1e-3, 25, 5000)
     for name, g in [*PHASES, ("tabulated", 0.0)]:
@@ -207,11 +207,11 @@ def test_float32_is_float64_up_to_rounding(height, cos, start, length, thickness
 @pytest.mark.parametrize("extinctions", [(0.2, 0.3, 0.5), (0.0, 0.01, 8.0), (1e-3, 30.0, 1.0)])
 def test_the_colours_of_a_medium_are_those_of_grey_ones(variant, name, g, extinctions):
     """They share nodes; what the most transparent needs must not spoil the others."""
-    from realtime.arrays import array_types
-    from realtime.geometry import RayGeometry
     from realtime.kernels.exact import exact
-    from realtime.lights import Light
-    from realtime.medium import Medium
+    from realtime.numerics.array_types import array_types
+    from realtime.rays.ray_light import RayGeometry
+    from realtime.scene.lights import Light
+    from realtime.scene.medium import Medium
 
     types = array_types("single")
     foot, height, x0, x1, _ = many_rays(2000, 9)
@@ -228,7 +228,7 @@ def test_the_colours_of_a_medium_are_those_of_grey_ones(variant, name, g, extinc
 
 
 def soft_spot(types, cutoff, beam):
-    from realtime.lights import Light, spot_fields
+    from realtime.scene.lights import Light, spot_fields
 
     fields = spot_fields([0, 0, -1.0], np.radians(cutoff), np.radians(beam), types)
     return Light("spot", True, types.vector(0), types.color(1), **fields)
@@ -239,11 +239,11 @@ def test_soft_spots_against_the_truth(variant, cutoff, beam):
     """A ray that passes close to the axis of a narrow beam sees almost a kink: without a cut there 6e-3 was left."""
     from analytic.panels import airlight_segments
     from analytic.phase import PhaseFunction
-    from realtime.arrays import array_types
-    from realtime.geometry import ray_geometry
-    from realtime.kernels import airlight_integral
     from realtime.kernels.exact import exact
-    from realtime.medium import Medium
+    from realtime.kernels.registry import airlight_integral
+    from realtime.numerics.array_types import array_types
+    from realtime.rays.ray_light import ray_geometry
+    from realtime.scene.medium import Medium
 
     rng = np.random.default_rng(3)
     count = 400

@@ -9,11 +9,11 @@ from realtime.errors import InputError
 
 def values(kernel, precision="double", *, phase="isotropic", **parameters):
     """Evaluate a kernel on moderate rays: the light in front, well away from the ray."""
-    from realtime.arrays import array_types
-    from realtime.geometry import RayGeometry
-    from realtime.lights import Light
-    from realtime.medium import Medium
-    from realtime.phase import Phase
+    from realtime.numerics.array_types import array_types
+    from realtime.rays.ray_light import RayGeometry
+    from realtime.scene.lights import Light
+    from realtime.scene.medium import Medium
+    from realtime.scene.phase import Phase
 
     rng = np.random.default_rng(17)
     foot, height, sigma_t = rng.uniform(0.5, 2, 300), rng.uniform(0.5, 2, 300), rng.uniform(0.1, 1, 300)
@@ -27,7 +27,7 @@ def values(kernel, precision="double", *, phase="isotropic", **parameters):
 @pytest.mark.parametrize("phase", ["isotropic", "hg"])
 @pytest.mark.parametrize("name", ["uniform", "equiangular"])
 def test_midpoint_steps_are_of_second_order(variant, name, phase):
-    from realtime.kernels import KERNELS
+    from realtime.kernels.registry import KERNELS
 
     exact = values(KERNELS["exact"].function, phase=phase)
     steps = np.array([32, 64, 128, 256])
@@ -37,7 +37,7 @@ def test_midpoint_steps_are_of_second_order(variant, name, phase):
 
 
 def test_nodes_in_theta_converge_geometrically(variant):
-    from realtime.kernels import KERNELS
+    from realtime.kernels.registry import KERNELS
 
     exact = values(KERNELS["exact"].function)
     nodes = np.array([2, 4, 6, 8])
@@ -50,7 +50,7 @@ def test_nodes_in_theta_converge_geometrically(variant):
     ("name", "parameter"), [("uniform", "steps"), ("equiangular", "steps"), ("quadrature-theta", "nodes")]
 )
 def test_no_steps_are_refused(variant, name, parameter):
-    from realtime.kernels import KERNELS
+    from realtime.kernels.registry import KERNELS
 
     with pytest.raises(InputError, match=f"{parameter}: got 0"):
         values(KERNELS[name].function, **{parameter: 0})
@@ -58,12 +58,12 @@ def test_no_steps_are_refused(variant, name, parameter):
 
 def test_endless_rays(variant):
     """20 optical depths end uniform steps, pi/2 ends the angle."""
-    from realtime.arrays import array_types
-    from realtime.geometry import RayGeometry
-    from realtime.kernels import KERNELS
-    from realtime.lights import Light
-    from realtime.medium import Medium
-    from realtime.phase import Phase
+    from realtime.kernels.registry import KERNELS
+    from realtime.numerics.array_types import array_types
+    from realtime.rays.ray_light import RayGeometry
+    from realtime.scene.lights import Light
+    from realtime.scene.medium import Medium
+    from realtime.scene.phase import Phase
 
     types = array_types("double")
     medium = Medium((types.scalar(0.4),), types.color(1), Phase("isotropic"))

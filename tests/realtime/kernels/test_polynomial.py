@@ -27,11 +27,11 @@ def rows(data_folder):
 
 def arguments(columns, phase="isotropic", precision="double", *, g=None, values=None, light=None):
     """Return the arguments of a kernel; `columns` holds foot, height, x0, x1, sigma_t (numbers or arrays)."""
-    from realtime.arrays import array_types
-    from realtime.geometry import RayGeometry
-    from realtime.lights import Light
-    from realtime.medium import Medium
-    from realtime.phase import Phase
+    from realtime.numerics.array_types import array_types
+    from realtime.rays.ray_light import RayGeometry
+    from realtime.scene.lights import Light
+    from realtime.scene.medium import Medium
+    from realtime.scene.phase import Phase
 
     types = array_types(precision)
     c = {key: types.scalar(np.atleast_1d(columns[key]).astype(np.float64)) for key in RAY}
@@ -199,9 +199,9 @@ def test_limits(variant):
 
 def soft_spot(precision):
     """Return rays across a spot whose intensity falls off from 20 to 50 degrees, and the spot."""
-    from realtime.arrays import array_types
-    from realtime.geometry import ray_geometry
-    from realtime.lights import Light, spot_fields
+    from realtime.numerics.array_types import array_types
+    from realtime.rays.ray_light import ray_geometry
+    from realtime.scene.lights import Light, spot_fields
 
     types = array_types(precision)
     cutoff, beam = np.deg2rad(50.0), np.deg2rad(20.0)
@@ -220,9 +220,9 @@ def soft_spot(precision):
 def test_soft_spot(variant, phase):
     from scipy.integrate import quad
 
-    from realtime.geometry import clip_to_cone
-    from realtime.medium import Medium
-    from realtime.phase import Phase
+    from realtime.rays.ray_light import clip_to_cone
+    from realtime.scene.medium import Medium
+    from realtime.scene.phase import Phase
 
     types, geometry, light = soft_spot("double")
     medium = Medium((types.scalar(0.4),), types.color(1), Phase(phase))
@@ -261,8 +261,8 @@ def test_tabulated_phase_function(variant):
 
 
 def test_a_colour_is_three_grey_media(variant):
-    from realtime.medium import Medium
-    from realtime.phase import Phase
+    from realtime.scene.medium import Medium
+    from realtime.scene.phase import Phase
 
     geometry, x0, x1, grey, light = arguments(RAY)
     extinctions = [type(x0)(v) for v in (0.0, 0.5, 3.0)]

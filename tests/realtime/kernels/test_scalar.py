@@ -11,11 +11,11 @@ import mitsuba as mi
 mi.set_variant("scalar_rgb")
 from analytic.cases import read_cases
 from realtime.errors import InputError
-from realtime.geometry import RayGeometry
-from realtime.kernels import KERNELS
-from realtime.lights import Light
-from realtime.medium import Medium
-from realtime.phase import Phase
+from realtime.rays.ray_light import RayGeometry
+from realtime.kernels.registry import KERNELS
+from realtime.scene.lights import Light
+from realtime.scene.medium import Medium
+from realtime.scene.phase import Phase
 
 cases, light, found = read_cases(sys.argv[1]), Light("point", False, None, None), {}
 for name, kernel in KERNELS.items():

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from realtime.errors import InputError
-from tests.realtime.test_kernels import evaluate
+from tests.realtime.kernels.test_registry import evaluate
 
 ONE = {"phase": "isotropic", "g": 0, "t": 1.3, "h": 0.7, "x0": 0.2, "x1": 3.1, "sigma_t": 0.43}
 
@@ -159,7 +159,7 @@ def test_refuses_bad_parameters(variant, parameters, message):
 
 def test_refuses_what_it_cannot_do(variant):
     from realtime.kernels.table import table
-    from realtime.lights import Light
+    from realtime.scene.lights import Light
 
     with pytest.raises(InputError, match="kernel table: phase function 'rayleigh' is not tabulated"):
         evaluate(table, [ONE | {"phase": "rayleigh"}], "single")
@@ -177,12 +177,12 @@ def test_frozen_and_in_colour(variant, form, precision):
     """Recorded once, right after another medium and another number of rays; three extinctions give three values."""
     import drjit as dr
 
-    from realtime.arrays import array_types
-    from realtime.geometry import RayGeometry
     from realtime.kernels.table import resident_tables, table
-    from realtime.lights import Light
-    from realtime.medium import Medium
-    from realtime.phase import Phase
+    from realtime.numerics.array_types import array_types
+    from realtime.rays.ray_light import RayGeometry
+    from realtime.scene.lights import Light
+    from realtime.scene.medium import Medium
+    from realtime.scene.phase import Phase
 
     types = array_types(precision)
     light = Light("point", False, None, None)
@@ -215,7 +215,7 @@ def test_names_a_table_that_is_not_on_the_device():
     """In a process of its own: what a frozen function raises while it records spoils later recordings."""
     code = """
 import drjit as dr
-from reports.environment import activate
+from reports.machine.environment import activate
 activate()
 import mitsuba as mi
 from realtime.kernels.table import upload_table

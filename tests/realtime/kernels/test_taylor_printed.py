@@ -24,8 +24,8 @@ A = np.array([0.0, 1e-3, 0.13, 0.7, 2.9])
 
 def rays(precision):
     """Return 200 rays near the foot and their medium, phase function left out, and NumPy's copy of the columns."""
-    from realtime.arrays import array_types
-    from realtime.geometry import RayGeometry
+    from realtime.numerics.array_types import array_types
+    from realtime.rays.ray_light import RayGeometry
 
     types = array_types(precision)
     rng = np.random.default_rng(2)
@@ -37,9 +37,9 @@ def rays(precision):
 
 
 def run(kernel, name, precision, **parameters):
-    from realtime.lights import Light
-    from realtime.medium import Medium
-    from realtime.phase import Phase
+    from realtime.scene.lights import Light
+    from realtime.scene.medium import Medium
+    from realtime.scene.phase import Phase
 
     types, geometry, (x0, x1, sigma_t), _ = rays(precision)
     medium = Medium((sigma_t,), types.color(1), Phase(name, g=0.3 if name == "hg" else None))
@@ -78,9 +78,9 @@ def test_differs_from_taylor_by_the_integral_of_the_misprints(variant, name):
 
 
 def test_a_colour_is_three_grey_media(variant):
-    from realtime.lights import Light
-    from realtime.medium import Medium
-    from realtime.phase import Phase
+    from realtime.scene.lights import Light
+    from realtime.scene.medium import Medium
+    from realtime.scene.phase import Phase
 
     types, geometry, (x0, x1, _), _ = rays("single")
     extinctions = [types.scalar(v) for v in (0.1, 0.5, 0.9)]

@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How far the light of a directional source runs through convex bodies on its way to a point.
+
+With a the unit direction in which the light travels, the leg from a point P back to the light is P - f a, f >= 0. It
+crosses the plane n . x = c of a half space at
+
+    f = phi(P) = (n . P - c) / (n . a).
+
+Where n . a < 0 the light comes in through the plane, and the leg is in the half space up to phi; where n . a > 0 it is
+so from phi on. The leg therefore has in the body the part
+
+    l = max(0, min phi over the planes with n . a < 0  -  max(0, max phi over the others)).
+
+phi is linear in P. Along a ray P = o + x d every phi is a line in x, l is linear between *bends*, and so is the optical
+depth of the leg. The bends are where another plane becomes the least or the largest, and where one of the two maxima
+changes sides. A plane along the light has lines of next to no width: tilted a little it is like the others, infinitely
+far on one side and on the other.
+
+In a ball of radius R about C, with w = P - C, the leg leaves at w . a + q and enters at w . a - q, q^2 = R^2 - |w x
+a|^2. That has no bends but where the ray enters and leaves the cylinder |w x a| = R.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+from realtime.numerics.array_types import four_numbers
+from realtime.scene.medium import Body
+
+
+@dataclass(frozen=True)
+class Slope:
+    """What of the legs lies in a body along a ray, linear from a distance on."""
+
+    length: Any  #: l there [m]
+    rate: Any  #: dl/dx [1]
+    until: Any  #: the next bend [m]
+
+
+@dataclass(frozen=True)
+class ParallelSeen:
+    """A body as a directional light sees it."""
+
+    body: Body
+    axis: Any  #: unit direction in which the light travels
+    planes: Any  #: four numbers a plane, phi = g . (P - centre) + k; None for a ball
+    comes_in: Any  #: by plane 1 where the light comes in, else 0
+
+
+def seen_along(body: Body, axis) -> ParallelSeen:
+    """Return what the legs to a directional light need of a body; `axis` is one direction for all lanes."""
+    import drjit as dr
+    import mitsuba as mi
+
+    if body.planes is None:
+        return ParallelSeen(body, axis, None, None)
+    *normal, offset = body.planes
+    along = normal[0] * axis.x + normal[1] * axis.y + normal[2] * axis.z
+    tilt = 16 * dr.epsilon(type(along))
+    along = dr.select(dr.abs(along) < tilt, dr.select(along < 0, -tilt, tilt), along)
+    room = offset - (normal[0] * body.centre.x + normal[1] * body.centre.y + normal[2] * body.centre.z)
+    planes = dr.zeros(type(along), 4 * body.count)
+    columns = (*(component / along for component in normal), -room / along)
+    for place, column in enumerate(columns):
+        dr.scatter(planes, column, 4 * dr.arange(mi.UInt32, body.count) + place)
+    comes_in = dr.select(along < 0, type(along)(1), 0)
+    dr.eval(planes, comes_in)
+    return ParallelSeen(body, axis, planes, comes_in)
+
+
+def parallel_legs(seen: ParallelSeen, origin, direction, distances, active=True) -> list[Any]:
+    """Return how much of the legs to the points origin + distance direction lies in the body [m].
+
+    Parameters
+    ----------
+    seen
+        The body and the light.
+    origin, direction
+        Of the rays.
+    distances
+        A list of distances: the planes are read once for all of them.
+    active
+        Lanes to compute; others have 0.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    start = origin - seen.body.centre
+    if seen.planes is None:
+        return [dr.select(active, _ball_leg(seen, start + direction * x), 0) for x in distances]
+    Float = type(start.x)
+    width = dr.width(start, direction, *distances)
+    first = [dr.full(Float, -dr.inf, width) for _ in distances]
+    last = [dr.full(Float, dr.inf, width) for _ in distances]
+
+    def plane(number, first, last):
+        constant, slope, comes_in = _line(seen, number, start, direction)
+        low, high = dr.select(comes_in, -dr.inf, constant), dr.select(comes_in, constant, dr.inf)
+        first = [dr.maximum(value, dr.fma(slope, x, low)) for value, x in zip(first, distances)]
+        last = [dr.minimum(value, dr.fma(slope, x, high)) for value, x in zip(last, distances)]
+        return number + 1, first, last
+
+    _, first, last = dr.while_loop(
+        state=(mi.UInt32(0), first, last),
+        cond=lambda number, first, last: active & (number < seen.body.count),
+        body=plane,
+        labels=("number", "first", "last"),
+    )
+    lengths = [dr.maximum(end - dr.maximum(begin, 0), 0) for begin, end in zip(first, last)]
+    return [dr.select(active, length, 0) for length in lengths]
+
+
+def slope_from(seen: ParallelSeen, origin, direction, x) -> Slope:
+    """Return what of the legs lies in a body that has planes, from a distance on.
+
+    Parameters
+    ----------
+    seen
+        The body and the light.
+    origin, direction
+        Of the rays.
+    x
+        From where; at least a rounding error beyond the last bend, so that each is met once [m].
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    start = origin - seen.body.centre
+    Float = type(x)
+    width = dr.width(start, direction, x)
+
+    def extremes(number, first, last, first_rate, last_rate):
+        constant, slope, comes_in = _line(seen, number, start, direction)
+        value = dr.fma(slope, x, constant)
+        later, sooner = ~comes_in & (value > first), comes_in & (value < last)
+        first, first_rate = dr.select(later, value, first), dr.select(later, slope, first_rate)
+        last, last_rate = dr.select(sooner, value, last), dr.select(sooner, slope, last_rate)
+        return number + 1, first, last, first_rate, last_rate
+
+    zero = dr.zeros(Float, width)
+    _, first, last, first_rate, last_rate = dr.while_loop(
+        state=(mi.UInt32(0), dr.full(Float, -dr.inf, width), dr.full(Float, dr.inf, width), zero, zero + 0),
+        cond=lambda number, *_: number < seen.body.count,
+        body=extremes,
+        labels=("number", "first", "last", "first_rate", "last_rate"),
+    )
+
+    def bends(number, until):
+        constant, slope, comes_in = _line(seen, number, start, direction)
+        value = dr.fma(slope, x, constant)
+        nearing = dr.select(comes_in, last_rate - slope, slope - first_rate)
+        gap = dr.select(comes_in, value - last, first - value)
+        return number + 1, dr.minimum(until, dr.select(nearing > 0, dr.maximum(gap, 0) / nearing, dr.inf))
+
+    until = dr.full(Float, dr.inf, width)
+    for gap, closing in ((last - first, first_rate - last_rate), (-first, first_rate), (-last, last_rate)):
+        at = gap / closing
+        until = dr.minimum(until, dr.select(at > 0, at, dr.inf))
+    _, until = dr.while_loop(
+        state=(mi.UInt32(0), until),
+        cond=lambda number, until: number < seen.body.count,
+        body=bends,
+        labels=("number", "until"),
+    )
+    ahead = first > 0
+    length = last - dr.select(ahead, first, 0)
+    rate = last_rate - dr.select(ahead, first_rate, 0)
+    there = length > 0
+    return Slope(dr.select(there, length, 0), dr.select(there, rate, 0), x + until)
+
+
+def cylinder_bend(seen: ParallelSeen, origin, direction, x):
+    """Return the next distance beyond `x` at which rays enter or leave the cylinder about a ball, or infinity [m]."""
+    import drjit as dr
+
+    w = dr.cross(origin - seen.body.centre, seen.axis)
+    v = dr.cross(direction, seen.axis)
+    a, b = dr.squared_norm(v), dr.dot(w, v)
+    # b^2 - a c without its cancellation: a R^2 - |w x v|^2.
+    inner = a * dr.square(seen.body.radius) - dr.squared_norm(dr.cross(w, v))
+    root = dr.sqrt(dr.maximum(inner, 0))
+    bend = type(x)(dr.inf)
+    for at in ((root - b) / a, (-root - b) / a):
+        bend = dr.select((inner > 0) & (at > x), dr.minimum(at, bend), bend)
+    return bend
+
+
+def _ball_leg(seen: ParallelSeen, w):
+    import drjit as dr
+
+    along = dr.dot(w, seen.axis)
+    inner = dr.square(seen.body.radius) - dr.squared_norm(dr.cross(w, seen.axis))
+    root = dr.sqrt(dr.maximum(inner, 0))
+    return dr.select(inner > 0, dr.maximum(along + root - dr.maximum(along - root, 0), 0), 0)
+
+
+def _line(seen: ParallelSeen, number, start, direction):
+    """Return phi of a plane at a ray's start, its slope along the ray, and whether the light comes in through it."""
+    import drjit as dr
+
+    values = dr.gather(four_numbers(type(seen.planes)), seen.planes, number)
+    comes_in = dr.gather(type(seen.planes), seen.comes_in, number) > 0
+    g = values.xyz
+    return dr.dot(g, start) + values.w, dr.dot(g, direction), comes_in

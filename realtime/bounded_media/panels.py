@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Panels of few nodes along a ray in a body: as many as the bends of the legs and the depth of the medium ask for.
+
+The integral is that of `realtime.bounded_media.airlight` over a segment in a body that the leg from the light enters
+on its way, and enters no other. With r the distance from the light, u(x) from `realtime.bounded_media.facet_walk` and
+rho = r/u what of the leg lies before the body,
+
+    tau = tau_before + sigma_t (x - x_begin + r - rho) + sigma_0 rho,      sigma_0 of what surrounds the bodies.
+
+Between two bends all of this is smooth. A panel ends at a bend, and sooner where it would
+
+* turn by more than some angle about the light,
+* be optically thicker than some depth, both legs together,
+* change u by more than some share of it: rho rises steeply where a leg grazes its facet.
+
+In a panel of n nodes the rule of Gauss and Legendre is used in t from 0 to 1 with the tangent of the angle at the light
+from the panel's beginning linear in t: with the ends s_0 and s_1 from the foot, h the height and D = h^2 + s_0 s_1,
+
+    s = ((1 - t) D s_0 + t r_0^2 s_1)/((1 - t) D + t r_0^2),      dx/r^2 = (s_1 - s_0)/D dt/(1 + t^2 T^2),
+
+T = h (s_1 - s_0)/D. All terms are of one sign, and nothing divides by h: a segment far from the light or a ray close to
+it loses nothing. The largest angle, of tangent T, ends at s_0 + T r_0^2/(h - T s_0), nowhere where that is behind.
+"""
+
+from dataclasses import dataclass
+from functools import reduce
+from typing import Any
+
+from realtime.bounded_media.convex_clip import Seen, inverse_crossings
+from realtime.bounded_media.facet_walk import Entry, EntryPlanes, first_entry, next_bend
+from realtime.numerics.array_types import is_single
+from realtime.numerics.fast_exp import exp_bounded
+from realtime.numerics.gauss_legendre import unit_nodes
+from realtime.rays.ray_light import RayGeometry, falloff
+from realtime.scene.lights import Light
+from realtime.scene.medium import Medium
+from realtime.scene.phase import evaluate
+
+_NODES, _NODES_DOUBLE = 3, 6
+_MOST = 1000  # panels; more than any segment needs: what is not a number must end too
+_TANGENT = 0.45
+_DEPTH = 1.6
+_SHARE = 0.5
+_NEARER, _FARTHER = 0.5, 0.8
+_STEEP, _LEAST = 0.2, 0.002  # share for a ball, and of its radius in any case
+#: Shares of the largest angle for phase functions with lobes; a table has kinks, and no accuracy between them.
+_TURN = {"isotropic": 1.0, "rayleigh": 0.8, "hazy": 0.6, "murky": 0.35, "tabulated": 0.25}
+
+
+@dataclass(frozen=True)
+class BodySegment:
+    """What the integrals over parts of rays in one body need."""
+
+    medium: Medium  #: of the body
+    around: tuple[Any, ...] | None  #: extinction of what surrounds the bodies [1/m]; None for clear air
+    light: Light
+    geometry: RayGeometry
+    start: Any  #: from the light to the camera [m]
+    direction: Any
+    begin: Any  #: where the rays enter the body [m]
+    before: tuple[Any, ...]  #: optical depth from the camera to there, by channel
+    seen: Seen  #: the body as the light sees it
+    planes: EntryPlanes | None  #: None for a ball
+
+
+def body_integral(one: BodySegment, x0, x1):
+    """Return albedo sigma_t times the integral from x0 to x1 within the body, RGB [1/m^2]."""
+    import drjit as dr
+    import mitsuba as mi
+
+    Float, Color = type(x0), type(one.medium.albedo)
+    foot = one.geometry.foot
+    # A ray through the light itself: its integral is infinite, and so nearly is this.
+    h = dr.maximum(one.geometry.height, 1e-15)
+    last = x1 - foot
+    walk = _walk_from(one, x0)
+
+    def panel(turn, s, square, walk, totals):
+        until, beyond = _bend(one, walk)
+        until = dr.clip(until - foot, s, last)
+        end = s + _panel_length(one, walk, s=s, square=square, h=h, length=until - s)
+        bends = end >= until
+        end = dr.minimum(end, until)
+        end_square = dr.fma(end, end, h * h)
+        parts = _panel(one, walk, ends=(s, end), squares=(square, end_square), h=h)
+        walk = dr.select(bends, beyond, walk)
+        return turn + 1, end, end_square, walk, [total + part for total, part in zip(totals, parts)]
+
+    s = x0 - foot
+    width = dr.width(s, x1, h)
+    *_, totals = dr.while_loop(
+        state=(
+            dr.zeros(mi.UInt32, width),
+            s,
+            dr.fma(s, s, h * h),
+            walk,
+            [dr.zeros(Float, width) for _ in one.before],
+        ),
+        cond=lambda turn, s, square, walk, totals: (s < last) & (turn < _MOST),
+        body=panel,
+        labels=("turn", "s", "square", "walk", "totals"),
+    )
+    channels = [sigma * total for sigma, total in zip(one.medium.sigma_t, totals)]
+    return one.medium.albedo * Color(*channels)
+
+
+def _walk_from(one: BodySegment, x):
+    """Return the plane where legs enter; of a ball nothing needs to be known."""
+    import drjit as dr
+    import mitsuba as mi
+
+    if one.planes is None:
+        return Entry(dr.zeros(mi.UInt32, dr.width(x)), x * 0, x * 0)
+    return first_entry(one.planes, one.start, one.direction, x)
+
+
+def _bend(one: BodySegment, walk: Entry):
+    import drjit as dr
+
+    if one.planes is None:
+        return type(walk.constant)(dr.inf), walk
+    return next_bend(one.planes, one.start, one.direction, walk)
+
+
+def _panel_length(one: BodySegment, walk: Entry, *, s, square, h, length):
+    """Return the length of a panel: the whole `length`, or an equal part of it [m]."""
+    import drjit as dr
+
+    x = s + one.geometry.foot
+    u = dr.fma(walk.slope, x, walk.constant)
+    slope = dr.abs(walk.slope)
+    largest = reduce(dr.maximum, one.medium.sigma_t)
+    tangent = _largest_tangent(one)
+    turning = h - tangent * s
+    most = dr.select(turning > 0, tangent * square / turning, dr.inf)
+    r = dr.sqrt(square)
+    most = dr.minimum(most, dr.select(s < 0, _NEARER, _FARTHER) * r)
+    if one.planes is None:
+        most = dr.minimum(most, dr.minimum(_ball_length(one, x), _DEPTH / (2 * largest)))
+    else:
+        rising = dr.select(u > 0, slope / u, 0)
+        most = dr.minimum(most, _SHARE / rising)
+        most = dr.minimum(most, _DEPTH / (largest * dr.fma(r, rising, 2)))
+    return length / dr.maximum(dr.ceil(length / most), 1)
+
+
+def _ball_length(one: BodySegment, x):
+    """Return the length in which the square of half the chord that legs have in a ball changes by a share of it [m].
+
+    The part of the leg in the ball is like the root of it: steep where legs graze the ball. With w from the light to
+    the middle of the ball it is radius^2 - |v x w|^2/|v|^2.
+    """
+    import drjit as dr
+
+    radius, w = one.seen.body.radius, one.seen.toward
+    v = dr.fma(one.direction, x, one.start)
+    cross, square = dr.cross(v, w), dr.squared_norm(v)
+    distance = dr.squared_norm(cross) / square
+    rate = 2 * (dr.dot(cross, dr.cross(one.direction, w)) - distance * dr.dot(v, one.direction)) / square
+    chord = dr.maximum(radius * radius - distance, 0)
+    return dr.clip(_STEEP * chord / dr.abs(rate), _LEAST * radius, 0.25 * radius)
+
+
+def _largest_tangent(one: BodySegment):
+    import drjit as dr
+
+    phase = one.medium.phase
+    turn = dr.maximum(1 - dr.abs(phase.g), 0.03) if phase.name == "hg" else _TURN[phase.name]
+    if one.light.soft:
+        turn = dr.minimum(turn, 0.4)
+    return _TANGENT * turn
+
+
+def _panel(one: BodySegment, walk: Entry, *, ends, squares, h) -> list[Any]:
+    """Return the integrals of p exp(-tau) / r^2 over a panel, by channel."""
+    import drjit as dr
+
+    s0, s1 = ends
+    Float = type(s0)
+    length = s1 - s0
+    # A panel turns by less than 31 degrees: a smaller product is what rounding left of it.
+    product = dr.maximum(dr.fma(s0, s1, h * h), 0.5 * dr.sqrt(squares[0] * squares[1]))
+    scale = length / product
+    tangent = dr.square(h * scale)
+    totals = [Float(0) for _ in one.before]
+    for t, share in unit_nodes(_NODES if is_single(Float) else _NODES_DOUBLE):
+        far = t * squares[0]
+        s = dr.fma(length, far / dr.fma(1 - t, product, far), s0)
+        x = s + one.geometry.foot
+        r = dr.sqrt(dr.fma(s, s, h * h))
+        before = _before_body(one, walk, x, r)
+        inside = (x - one.begin) + (r - before)
+        weight = share * evaluate(one.medium.phase, -s / r) / dr.fma(t * t, tangent, 1)
+        if one.light.soft:
+            weight *= falloff(one.geometry, one.light, x)
+        for channel, (depth, own) in enumerate(zip(one.before, one.medium.sigma_t)):
+            depth = dr.fma(own, inside, depth)
+            if one.around is not None:
+                depth = dr.fma(one.around[channel], before, depth)
+            totals[channel] += weight * exp_bounded(-depth)
+    return [scale * total for total in totals]
+
+
+def _before_body(one: BodySegment, walk: Entry, x, r):
+    """Return what of the leg to a point within the body lies before it [m]."""
+    import drjit as dr
+
+    if one.planes is None:
+        (u,), _ = inverse_crossings(one.seen, one.start, one.direction, [x], True)
+        return r / dr.maximum(u, 1)
+    return dr.select(one.planes.within, 0, r / dr.maximum(dr.fma(walk.slope, x, walk.constant), 1))

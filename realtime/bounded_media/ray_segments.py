@@ -1,0 +1,308 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Rays through bounded media: the pieces of the camera rays, what of the legs from the light lies in each body.
+
+Lines are followed over the facets of bodies (`realtime.bounded_media.facet_walk`), in packets in which any comes near.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+from realtime.bounded_media.body_views import BodySides, body_sides, light_sides
+from realtime.bounded_media.convex_clip import Seen, inverse_crossings, near_line, share_inside
+from realtime.bounded_media.directional_legs import parallel_legs, seen_along
+from realtime.bounded_media.facet_walk import EntryPlanes, clear_of, line_crossings
+from realtime.rays.ray_light import RayGeometry, distance_to_light
+from realtime.scene.lights import Light
+from realtime.scene.medium import Medium
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A part of every ray that lies in one medium."""
+
+    medium: Medium
+    number: int | None  #: of the body; None between bodies
+    begin: Any  #: distances from the camera [m], equal or infinite where the ray misses it
+    end: Any
+    before: tuple[Any, ...]  #: optical depth from the camera to `begin`, by channel
+
+
+@dataclass(frozen=True)
+class MediaRay:
+    """Camera rays in bounded media, and one light."""
+
+    medium: Medium
+    light: Light
+    geometry: RayGeometry
+    start: Any  #: from the light to the camera [m]
+    direction: Any
+    pieces: tuple[Piece, ...]
+    seen: tuple[Seen, ...]  #: the bodies as the light sees them
+    entries: tuple[EntryPlanes | None, ...]  #: by body, the planes where legs to points within it enter
+    exits: tuple[EntryPlanes | None, ...]  #: by body, the planes where legs leave it; only where there are several
+    form: str  #: of `FORMS`
+
+
+def sum_over_pieces(pieces: tuple[Piece, ...], segments, integral, zero):
+    """Add up an integral over the parts of segments that lie in the pieces.
+
+    Parameters
+    ----------
+    pieces
+        Of the rays.
+    segments
+        Pairs of distances (x0, x1), `x1` may be infinite [m].
+    integral
+        Function (piece, x0, x1) -> colour; only lanes with x0 < x1 count.
+    zero
+        The colour of no segment, of the rays' width.
+    """
+    import drjit as dr
+
+    Color = type(zero)
+    total = zero
+    for piece in pieces:
+        for x0, x1 in segments:
+            begin, end = dr.maximum(x0, piece.begin), dr.minimum(x1, piece.end)
+            total += dr.if_stmt(
+                args=(begin, end),
+                cond=end > begin,
+                true_fn=lambda begin, end, piece=piece: integral(piece, begin, end),
+                false_fn=lambda begin, end: Color(0),
+            )
+    return total
+
+
+def camera_pieces(medium: Medium, origin, direction, sides: tuple[BodySides, ...] | None = None) -> tuple[Piece, ...]:
+    """Return the pieces of the camera rays in which something scatters.
+
+    Parameters
+    ----------
+    medium
+        The medium with its bodies.
+    origin, direction
+        The camera, one for all lanes [m], and unit directions.
+    sides
+        The bodies as the camera sees them, if they are known.
+    """
+    import drjit as dr
+
+    Float = type(direction.x)
+    sides = sides or tuple(body_sides(body, origin) for body in medium.bodies)
+    passages = [_passage(one, direction) for one in sides]
+
+    def piece(own: Medium, number, begin, end):
+        before = []
+        for channel, around in enumerate(medium.sigma_t):
+            depth = Float(0) if medium.clear else around * begin
+            for body, (enter, leave) in zip(medium.bodies, passages):
+                excess = body.medium.sigma_t[channel] - around
+                depth += dr.select(leave <= begin, excess * (leave - enter), 0)
+            before.append(depth)
+        return Piece(own, number, begin, end, tuple(before))
+
+    pieces = [
+        piece(body.medium, number, *ends)
+        for number, (body, ends) in enumerate(zip(medium.bodies, passages, strict=True))
+    ]
+    if not medium.clear:
+        starts = [dr.zeros(Float, dr.width(direction)), *(leave for _, leave in passages)]
+        for begin in starts:
+            end = Float(dr.inf)
+            for enter, _ in passages:
+                end = dr.minimum(end, dr.select(enter >= begin, enter, dr.inf))
+            # A camera within a body has no gap before it.
+            inside = [(enter <= begin) & (begin < leave) for enter, leave in passages]
+            pieces.append(piece(medium, None, begin, dr.select(_any(inside), begin, end)))
+    return tuple(pieces)
+
+
+def media_ray(
+    medium: Medium,
+    light: Light,
+    geometry: RayGeometry,
+    *,
+    origin,
+    direction,
+    pieces,
+    form: str = "exact",
+    sides: tuple[BodySides, ...] | None = None,
+) -> MediaRay:
+    """Return what the integrals of one light need.
+
+    `pieces` is from `camera_pieces`, `sides` are the bodies as the light sees them, if they are known; the paper's form
+    needs no legs.
+    """
+    known = () if form != "exact" else sides or light_sides(medium, light)
+    seen, entries = tuple(one.seen for one in known), tuple(one.entering for one in known)
+    exits = tuple(one.leaving for one in known) if len(known) > 1 else ()
+    return MediaRay(medium, light, geometry, origin - light.position, direction, pieces, seen, entries, exits, form)
+
+
+def _passage(sides: BodySides, direction):
+    """Return where camera rays enter and leave a body [m], both infinite where they miss it."""
+    import drjit as dr
+
+    seen, planes = sides.seen, (sides.entering, sides.leaving)
+    nothing = type(direction.x)(dr.inf)
+
+    def ends(direction):
+        enter, leave = line_ends(seen, planes, direction)
+        begin, end = dr.rcp(enter), dr.select(leave > 0, dr.rcp(leave), dr.inf)
+        hit = (enter > 0) & (begin < end)
+        return dr.select(hit, begin, dr.inf), dr.select(hit, end, dr.inf)
+
+    return dr.if_stmt(
+        args=(direction,),
+        cond=near_line(seen, direction, dr.inf),
+        true_fn=ends,
+        false_fn=lambda direction: (nothing, nothing),
+    )
+
+
+def camera_insides(medium: Medium, origin, direction, distance) -> tuple[Any, ...]:
+    """Return what of camera rays up to a distance lies in each body [m]; arguments as in `camera_pieces`."""
+    import drjit as dr
+
+    insides = []
+    for body in medium.bodies:
+        ends = _passage(body_sides(body, origin), direction)
+        enter, leave = (dr.minimum(end, distance) for end in ends)
+        insides.append(dr.select(leave > enter, leave - enter, 0))
+    return tuple(insides)
+
+
+def optical_depths(medium: Medium, distance, insides) -> tuple[Any, ...]:
+    """Return the optical depth up to a distance, by channel; `insides` is what of it lies in each body [m]."""
+    import drjit as dr
+
+    depths = [type(distance)(0) if medium.clear else sigma * distance for sigma in medium.sigma_t]
+    for body, inside in zip(medium.bodies, insides, strict=True):
+        excess = [own - sigma for own, sigma in zip(body.medium.sigma_t, medium.sigma_t)]
+        depths = [dr.fma(more, inside, depth) for more, depth in zip(excess, depths)]
+    return tuple(depths)
+
+
+def path_transmittance(medium: Medium, light: Light, *, depths, point, active):
+    """Return the transmittance from the light to points and on to the camera, a colour [1].
+
+    Parameters
+    ----------
+    medium, light
+        What the light crosses and where it comes from.
+    depths
+        Of the camera rays, from `optical_depths`.
+    point
+        The points.
+    active
+        Lanes to compute.
+    """
+    import drjit as dr
+
+    if light.kind == "directional":
+        still = dr.zeros(type(point))
+        for body in medium.bodies:
+            (inside,) = parallel_legs(seen_along(body, light.axis), point, still, [type(point.x)(0)], active)
+            depths = [dr.fma(own, inside, depth) for own, depth in zip(body.medium.sigma_t, depths)]
+        return type(medium.albedo)(*(dr.exp(-depth) for depth in depths))
+    vector = point - light.position
+    length = dr.norm(vector)
+    depths = [dr.fma(sigma, length, depth) for depth, sigma in zip(depths, medium.sigma_t)]
+    for body in medium.bodies:
+        sides = body_sides(body, light.position)
+        seen, planes = sides.seen, (sides.entering, sides.leaving)
+        near = active & near_line(seen, vector / length, length)
+        inside = dr.if_stmt(
+            args=(vector,),
+            cond=near,
+            true_fn=lambda vector, seen=seen, planes=planes: (
+                share_inside(*line_ends(seen, planes, vector)) * dr.norm(vector)
+            ),
+            false_fn=lambda vector: type(vector.x)(0),
+        )
+        excess = [own - sigma for own, sigma in zip(body.medium.sigma_t, medium.sigma_t)]
+        depths = [dr.fma(more, inside, depth) for more, depth in zip(excess, depths)]
+    return type(medium.albedo)(*(dr.exp(-depth) for depth in depths))
+
+
+def line_ends(seen: Seen, planes, v):
+    """Return 1/f_in and 1/f_out of lines along v, as of `realtime.bounded_media.convex_clip.inverse_crossings`."""
+    import drjit as dr
+
+    if seen.body.planes is None:
+        (enter,), (leave,) = inverse_crossings(seen, v, dr.zeros(type(v)), [type(v.x)(0)], True)
+        return enter, leave
+    return line_crossings(planes, v)
+
+
+def light_leg(ray: MediaRay, piece: Piece, xs, rs) -> list[list[Any]]:
+    """Return by body and node what of the leg from the light lies in it [m]."""
+    import drjit as dr
+
+    insides = []
+    for number, seen in enumerate(ray.seen):
+        own = number == piece.number
+        near = dr.full(dr.mask_t(xs[0]), True, dr.width(xs[0])) if own else _near_legs(ray, seen, xs, rs)
+        enter, leave = inverse_crossings(seen, ray.start, ray.direction, xs, near, leaves=not own)
+        ends = [None] * len(xs) if own else leave
+        shares = [share_inside(one, other) for one, other in zip(enter, ends)]
+        insides.append([dr.select(near, share * r, 0) for share, r in zip(shares, rs)])
+    return insides
+
+
+def other_bodies_near(ray: MediaRay, number: int, x0, x1):
+    """Return whether legs from the light to points of a segment in a body may meet another body."""
+    import drjit as dr
+
+    xs = [x0, x1]
+    rs = [distance_to_light(ray.geometry, x) for x in xs]
+    meets: Any = False
+    for other, seen in enumerate(ray.seen):
+        if other == number:
+            continue
+        near = _near_legs(ray, seen, xs, rs)
+        if seen.planes is not None:
+            near = dr.if_stmt(
+                args=(x0, x1),
+                cond=near,
+                true_fn=lambda x0, x1, other=other: ~_clear_of(ray, other, x0, x1),
+                false_fn=lambda x0, x1: dr.mask_t(x0)(False),
+            )
+        meets = near | meets
+    return meets
+
+
+def _clear_of(ray: MediaRay, other: int, x0, x1):
+    entering, leaving = ray.entries[other], ray.exits[other]
+    assert entering is not None
+    assert leaving is not None
+    return clear_of((entering, leaving), ray.start, ray.direction, x0, x1)
+
+
+def _near_legs(ray: MediaRay, seen: Seen, xs, rs):
+    """Return whether legs from the light to points of a segment may come near a body.
+
+    In the plane of ray and light, with u along the ray and v to it, the legs fill a triangle with the corner at the
+    light and the others at (s_0, h) and (s_1, h); q is the distance of the body's centre from the plane. First and last
+    node stand for the ends.
+    """
+    import drjit as dr
+
+    geometry, radius = ray.geometry, seen.body.radius * 1.001
+    foot = dr.fma(ray.direction, geometry.foot, ray.start)
+    size = dr.norm(foot)
+    # A ray through the light has no such plane: all legs lie in the ray.
+    away = dr.select(size > 0, foot / size, 0)
+    u, v = dr.dot(seen.toward, ray.direction), dr.dot(seen.toward, away)
+    beside = dr.squared_norm(seen.toward - ray.direction * u - away * v) > dr.square(radius)
+    h, s0, s1 = geometry.height, xs[0] - geometry.foot, xs[-1] - geometry.foot
+    before = s0 * v - h * u > radius * rs[0]
+    behind = h * u - s1 * v > radius * rs[-1]
+    return ~(beside | before | behind | (v > h + radius))
+
+
+def _any(conditions: list[Any]):
+    result: Any = False
+    for condition in conditions:
+        result = condition | result
+    return result

@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The view of a frame, from its camera and what was found before the method's turn."""
+
+from realtime.frame.surface import visible_triangle
+from realtime.methods.shadow_planes.tile_boxes import TILE
+from realtime.methods.view import View
+from realtime.scene.camera import Camera, ray_directions
+from realtime.scene.features import Plan
+from realtime.scene.lights import Light
+from realtime.scene.medium import Medium
+
+
+def frame_view(
+    camera: Camera,
+    pixel,
+    distance,
+    *,
+    plan: Plan,
+    geometry,
+    medium: Medium,
+    lights: tuple[Light, ...],
+    prepared,
+    tiles=None,
+    tile=None,
+    sides=None,
+) -> View:
+    """Return what a method is given for some pixels.
+
+    `geometry` may be None where the method casts no rays, and `tile` where sixteen pixels that follow one another are a
+    tile.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    direction, low = ray_directions(camera, pixel)
+    return View(
+        origin=camera.origin,
+        direction=direction,
+        direction_low=low,
+        distance=distance,
+        lights=lights,
+        medium=medium,
+        plan=plan,
+        visible=lambda point, light: _visible(geometry, point, light),
+        camera=camera,
+        pixel=pixel,
+        rays=_rays(camera, pixel),
+        square_tiles=_in_square_tiles(camera, pixel),
+        visible_triangle=lambda: visible_triangle(geometry, camera.origin, direction),
+        prepared=prepared,
+        tiles=tiles,
+        tile=dr.arange(mi.UInt32, dr.width(pixel)) // TILE if tile is None else tile,
+        sides=sides,
+    )
+
+
+def _rays(camera: Camera, pixel):
+    """Return the function from lanes to the directions of their rays."""
+    import drjit as dr
+    import mitsuba as mi
+
+    return lambda lane: ray_directions(camera, dr.gather(mi.UInt32, pixel, lane))
+
+
+def _in_square_tiles(camera: Camera, pixel) -> bool:
+    import drjit as dr
+
+    return camera.width % 4 == 0 and camera.height % 4 == 0 and dr.width(pixel) > 1
+
+
+def _visible(geometry, point, light):
+    """Cast a shadow ray from the light, where nothing can block it at once, to just before the point."""
+    import drjit as dr
+    import mitsuba as mi
+
+    if light.kind == "directional":
+        # From the point on, where a ray is exact, though not from the surface that it may lie on.
+        away = 2e-6 * light.face.depth
+        return ~geometry.ray_test(mi.Ray3f(mi.Point3f(point - light.axis * away), mi.Vector3f(-light.axis)))
+    start = mi.Point3f(light.position)
+    direction = mi.Vector3f(point) - mi.Vector3f(start)
+    length = dr.norm(direction)
+    # Twenty units in the last place before the point: on a surface the point itself must not block the light.
+    return ~geometry.ray_test(mi.Ray3f(start, direction / length, length * (1 - 2e-6), 0.0, []))

@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The next frame of an animation: what did not change since the last one is kept.
+
+| moved | made anew |
+| --- | --- |
+| camera | camera rays, tiles, and what was prepared if it depends on the camera |
+| geometry | everything |
+| light | what was prepared, tiles |
+| medium, colours | nothing of these |
+
+Surface and airlight are computed for every frame. Who calls says what moved: nothing is compared, so what moved without
+being named stays where it was.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from realtime.frame.renderer import FrameRenderer, evaluated, run_airlight, run_cast_and_shade, run_shade, run_tiles
+from realtime.scene.read_scene import Scene
+
+
+@dataclass(frozen=True)
+class Kept:
+    """What a frame leaves to the next one, by what it depends on."""
+
+    cast: Any  #: camera and geometry
+    prepared: Any  #: lights and geometry, shadow planes also the camera: `Method.prepared_from`
+    tiles: Any  #: camera, geometry and lights
+
+
+def next_frame(
+    renderer: FrameRenderer,
+    scene: Scene,
+    kept: Kept | None,
+    *,
+    camera_moved: bool,
+    geometry_moved: bool,
+    light_moved: bool,
+) -> tuple[tuple[Any, Any, Any], Kept]:
+    """Render a scene after the one that left something.
+
+    Parameters
+    ----------
+    renderer
+        The stages of the frame.
+    scene
+        The scene as it is now: that of the renderer but for camera, positions, lights, colours and medium.
+    kept
+        What the last frame left; None for the first, for which everything is made. If nothing is said to move in it,
+        it is shaded by the function that the next ones will use: then these record nothing.
+    camera_moved, geometry_moved, light_moved
+        What is elsewhere than in the last frame, or turned: the camera, shapes or the bounds of media, a light. The
+        medium and the colours of lights may have changed in any case.
+
+    Returns
+    -------
+    stages
+        As from `realtime.frame.renderer.run_stages`: bit by bit what it returns for this scene.
+    kept
+        For the next frame.
+    """
+    renderer = replace(renderer, scene=scene)
+    cast_again = camera_moved or geometry_moved
+    tile_again = cast_again or light_moved or kept is None
+    moved = {"camera": camera_moved, "geometry": geometry_moved, "light": light_moved, "look": True}
+    prepare_again = kept is None or any(moved[what] for what in renderer.method.prepared_from)
+    kept = kept or Kept(None, None, None)
+    finish = _started(renderer.prepare, scene) if prepare_again else None
+    if cast_again:
+        cast, by_light = run_cast_and_shade(renderer)
+    else:
+        cast = kept.cast or run_cast_and_shade(renderer)[0]
+        by_light = run_shade(renderer, cast)
+    prepared = finish() if finish else kept.prepared
+    tiles = run_tiles(renderer, prepared, cast.distance) if tile_again else kept.tiles
+    stages = evaluated(cast, by_light, run_airlight(renderer, prepared, cast.distance, by_light, tiles))
+    return stages, Kept(cast, prepared, tiles)
+
+
+def _started(prepare: Callable[[Scene], Any], scene: Scene) -> Callable[[], Any]:
+    """Return what finishes the preparation.
+
+    One that works on the host has a method `start`: it reads what it needs of the scene, for which the device must have
+    come to rest, and returns the rest of the work, which is done while the device is busy with the surface.
+    """
+    if hasattr(prepare, "start"):
+        return prepare.start(scene)
+    prepared = prepare(scene)
+    return lambda: prepared

@@ -1,0 +1,278 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""One-dimensional min/max mipmaps in epipolar slices: the lit pieces of rays by steps of 2^k texels of a shadow map.
+
+All rays of an epipolar slice see the same line of the shadow map. So a binary tree of the bounds along it, one for each
+slice, tells a ray at once of long pieces that are lit or dark as a whole (Chen, Baran, Durand, Jarosz 2011). Airlight
+is computed at samples of the slices, at intervals and at breaks of the depth, and interpolated to the pixels
+(Engelhardt and Dachsbacher 2010; Yusov 2013).
+
+Three things differ from what is published, all to the good of the method: each lit piece is integrated by a kernel and
+not marched; a leaf of the tree is linear and not constant, see `realtime.methods.epipolar.min_max_tree`; and what is
+interpolated is not the airlight but its quotient by a simple estimate, see `_yardstick`: the published scenes are lit
+by the sun, and near a point light the airlight itself goes as 1 / distance.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from realtime.errors import InputError
+from realtime.memory import check_memory
+from realtime.methods.epipolar.min_max_tree import SliceHeights, slice_heights
+from realtime.methods.epipolar.samples import (
+    STEPS,
+    WORD,
+    Samples,
+    between_samples,
+    mark_samples,
+    marked_samples,
+    no_value,
+    sample_ray,
+    spread,
+)
+from realtime.methods.epipolar.slices import (
+    Slices,
+    image_point,
+    image_slices,
+    neighbour,
+    pixel_number,
+    slice_coordinate,
+)
+from realtime.methods.epipolar.walk import sum_lit_pieces
+from realtime.methods.light_airlight import RayAirlight, integral_type, ray_airlight
+from realtime.methods.light_volumes.height_field import inverse_depth
+from realtime.methods.view import View, rays_in_media
+from realtime.numerics.array_types import bytes_of
+from realtime.rays.ray_light import distance_to_light
+from realtime.scene.camera import Camera
+from realtime.scene.features import check_places
+from realtime.scene.lights import Light
+from realtime.scene.medium import transmittance
+from realtime.scene.phase import evaluate
+from realtime.scene.read_scene import Scene
+from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, check_size, map_memory
+
+SAMPLINGS = ("slices", "pixels")
+
+
+@dataclass(frozen=True)
+class EpipolarMap:
+    """What the method needs beyond the view, for one light."""
+
+    shadow_map: ShadowMap
+    heights: Any  #: inverse planar depths at the corners of its texels [1/m]
+
+
+def min_max(
+    view: View, *, kernel, map: int = 512, slices: int = 0, samples: int = 0, step: int = 16, sampling: str = "slices"
+):
+    """Return the airlight of every ray by one-dimensional min/max mipmaps [W/(m^2 sr)].
+
+    Parameters
+    ----------
+    view
+        The frame.
+    kernel
+        An airlight kernel, see `realtime.kernels`.
+    map
+        Resolution of the shadow map, and of a slice's map for an edge of the cube or the cone of a spot [texels].
+    slices
+        Epipolar slices; 0 for (width + height) / 2, the published high quality.
+    samples
+        Samples of a slice, rounded up to a multiple of 32; 0 for max(width, height) / 2.
+    step
+        One sample in `step` is computed, besides those at breaks of the depth.
+    sampling
+        'slices', or 'pixels': every pixel is computed, in the slice that is nearest to it. Nothing is interpolated over
+        the image then, and `samples` and `step` have no effect.
+
+    Raises
+    ------
+    InputError
+        For parameters out of range.
+
+    Notes
+    -----
+    Valid for point and spot lights anywhere; the epipole may lie in the image, where the pixels next to the light are
+    the least accurate. Shadows are those of the map, sampled once more along the slices.
+
+    References
+    ----------
+    Chen, Baran, Durand, Jarosz 2011, *Real-time volumetric shadows using 1D min-max mipmaps*, I3D. Yusov 2013,
+    *Practical implementation of light scattering effects using epipolar sampling and 1D min/max binary trees*, GDC.
+    """
+    total = type(view.medium.albedo)(0)
+    for number, light in enumerate(view.lights):
+        airlight = _ray_airlight(view, number, kernel)
+        if not view.plan.shadows:
+            total += airlight.radiance(airlight.integral(*airlight.segment))
+            continue
+        found: EpipolarMap = view.prepared[number]
+        camera = view.camera
+        cut = image_slices(camera, light, slices or _usual_slices(camera))
+        heights = slice_heights(found.shadow_map, found.heights, cut, light)
+        point = image_point(camera, view.direction)
+        if sampling == "pixels":
+            total += airlight.radiance(_lit_integral(airlight, heights, _nearest(cut, point)))
+            continue
+        depth = _depth_image(cut, point, view.distance)
+        drawn = mark_samples(cut, depth, count=_whole_words(samples, camera), step=step)
+        shares = _sampled_shares(view, number, kernel, drawn, heights)
+        total += airlight.radiance(_interpolated(airlight, drawn, shares, heights, point))
+    return total
+
+
+def prepare_min_max(
+    scene: Scene, *, map: int, slices: int, samples: int, step: int, sampling: str
+) -> Callable[[Scene], tuple[EpipolarMap, ...]]:
+    """Return the function that casts the shadow map of every light of a frame.
+
+    Raises
+    ------
+    InputError
+        For parameters out of range, directional lights, and more memory than the machine has.
+    """
+    check_size(map)
+    check_places(scene.plan, "min-max")
+    if sampling not in SAMPLINGS:
+        raise InputError(f"sampling: got {sampling!r}, wanted one of {', '.join(SAMPLINGS)}")
+    for name, value in (("slices", slices), ("samples", samples)):
+        if not 0 <= value <= 65536:
+            raise InputError(f"{name}: got {value!r}, wanted up to 65536, or 0 for as many as the image needs")
+    if step not in STEPS:
+        raise InputError(f"step: got {step!r}, wanted one of {', '.join(str(one) for one in STEPS)}")
+
+    if scene.plan.shadows:
+        held = sum(2 * map_memory(light, map) for light in scene.lights)
+        drawn = max((_memory_of_slices(scene, light, map, slices, samples) for light in scene.lights), default=0)
+        what = f"map: {map} texels, slices: {slices or _usual_slices(scene.camera)}"
+        check_memory(f"{what} for {len(scene.lights)} light(s)", held + drawn, "use a smaller map, or fewer slices")
+    return lambda scene: tuple(_epipolar_map(scene, light, map) for light in scene.lights)
+
+
+def _usual_slices(camera: Camera) -> int:
+    return max(4, (camera.width + camera.height) // 2)
+
+
+def _whole_words(samples: int, camera: Camera) -> int:
+    """Return how many samples a slice has."""
+    count = samples or max(2, camera.width, camera.height) // 2
+    return (count + WORD - 1) // WORD * WORD
+
+
+def _memory_of_slices(scene: Scene, light: Light, size: int, slices: int, samples: int) -> int:
+    """Return about how much the slices of a light take [bytes]: per leaf its value, two bounds, four of the tree."""
+    number = bytes_of(type(light.position.x))
+    leaves = size if light.kind == "spot" else 2 * size
+    lanes = _whole_words(samples, scene.camera)
+    return (slices or _usual_slices(scene.camera)) * (number * 7 * leaves + lanes * (4 + 3 * number))
+
+
+def _epipolar_map(scene: Scene, light: Light, size: int) -> EpipolarMap:
+    import drjit as dr
+
+    shadow_map = cast_shadow_map(scene.geometry, light, size)
+    heights = inverse_depth(shadow_map)
+    dr.eval(heights)
+    return EpipolarMap(shadow_map, heights)
+
+
+def _ray_airlight(view: View, number: int, kernel) -> RayAirlight:
+    """Return the airlight of one light along the rays of a view."""
+    light = view.lights[number]
+    media = rays_in_media(replace(view, lights=(light,)))[0] if view.plan.bounded else None
+    return ray_airlight(view, light, kernel, media)
+
+
+def _lit_integral(airlight: RayAirlight, heights: SliceHeights, number, active=True):
+    """Return the integral over the lit pieces of rays, each in a slice; 0 where not `active`."""
+    import drjit as dr
+
+    x0, x1 = airlight.segment
+    zero = dr.zeros(integral_type(airlight.view), dr.width(airlight.view.distance))
+    ends = x0, dr.select(active, x1, x0)
+    return sum_lit_pieces(heights, number, airlight.geometry, ends, airlight.integral, zero)
+
+
+def _nearest(slices: Slices, point):
+    """Return the slice that is nearest to each image point."""
+    import drjit as dr
+    import mitsuba as mi
+
+    return neighbour(slices, mi.Int32(dr.floor(slice_coordinate(slices, *point) + 0.5)))
+
+
+def _depth_image(slices: Slices, point, distance):
+    """Return the distances row by row, in whatever order the pixels come."""
+    import drjit as dr
+
+    image = dr.empty(type(distance), slices.width * slices.height)
+    dr.scatter(image, distance, pixel_number(slices, *point))
+    dr.eval(image)
+    return image
+
+
+def _sampled_shares(view: View, number: int, kernel, samples: Samples, heights: SliceHeights):
+    """Return by sample, of those that are marked, the share of its airlight that is lit."""
+    import drjit as dr
+    import mitsuba as mi
+
+    marked, count = marked_samples(samples)
+    camera = view.camera
+    shares = dr.empty(integral_type(view), dr.width(marked))
+
+    def computed(lane):
+        sample = dr.gather(mi.UInt32, marked, lane)
+        (i, j), slice_number, depth = sample_ray(samples, sample)
+        direction = dr.normalize(camera.forward + camera.left * i + camera.up * j)
+        seen = replace(view, direction=direction, direction_low=None, distance=depth, square_tiles=False)
+        airlight = _ray_airlight(seen, number, kernel)
+        share = _lit_integral(airlight, heights, slice_number) / _yardstick(airlight)
+        dr.scatter(shares, dr.select(dr.isfinite(share), share, no_value(share)), sample)
+        return lane
+
+    lane = spread(dr.width(marked))
+    if view.plan.bounded:
+        # The planes of bodies are written to a table first, which no branch may do: empty room repeats the last sample.
+        computed(dr.minimum(lane, dr.maximum(count, 1) - 1))
+    else:
+        # Most of the room is empty: a branch steps over it.
+        dr.if_stmt(args=(lane,), cond=lane < count, true_fn=computed, false_fn=lambda lane: lane)
+    dr.eval(shares)
+    return shares
+
+
+def _yardstick(airlight: RayAirlight):
+    """Return what airlight is interpolated in units of: it has its peaks and its ends, and what remains is smooth.
+
+    That is the airlight without shadows, by one node at the middle of the angle at the light: angle / h times the
+    integrand there. The bisector of the angle meets the ray at x = (x0 r1 + x1 r0) / (r0 + r1). What one node is wrong
+    by is in the samples and in the pixels alike.
+    """
+    import drjit as dr
+
+    x0, x1 = airlight.segment
+    if airlight.media:
+        return airlight.integral(x0, x1)
+    geometry, medium = airlight.geometry, airlight.view.medium
+    foot = geometry.foot
+    # As in the kernels, so that a ray through the light has a finite share.
+    height = dr.maximum(geometry.height, 1e-9 * dr.abs(x0 - foot))
+    endless = ~dr.isfinite(x1)
+    end = dr.select(endless, x0, x1)
+    across = dr.select(endless, height, height * (x1 - x0))
+    along = dr.select(endless, x0 - foot, dr.fma(x0 - foot, end - foot, dr.square(height)))
+    r0, r1 = distance_to_light(geometry, x0), distance_to_light(geometry, end)
+    x = dr.select(endless, x0 + r0, (x0 * r1 + end * r0) / (r0 + r1))
+    r = distance_to_light(geometry, x)
+    weight = dr.atan2(across, along) / height * evaluate(medium.phase, (foot - x) / r)
+    return dr.select(x1 > x0, transmittance(medium, x + r) * weight, 0)
+
+
+def _interpolated(airlight: RayAirlight, samples: Samples, shares, heights: SliceHeights, point):
+    """Return the integral of every pixel: the share of the samples around it, or its own where they do not fit."""
+    import drjit as dr
+
+    share, found = between_samples(samples, shares, point, airlight.view.distance)
+    own = _lit_integral(airlight, heights, _nearest(samples.slices, point), ~found)
+    return dr.select(found, share * _yardstick(airlight), own)

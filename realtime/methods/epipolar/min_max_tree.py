@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a light sees of epipolar slices: one-dimensional height maps, and binary trees of their bounds.
+
+In the plane of a slice (`realtime.methods.epipolar.slices`) the light is at the origin, the camera at (D, 0). The
+directions from the light are taken along a polygonal line k(q): of a point light the corners (1, 0), (0, 1), (-1, 0),
+so that it is seen all round; of a spot the chord between the two ends of its cone in the slice. A point is P = k / s;
+with k linear along an edge of the line, (q, s) are projective coordinates and a camera ray is straight in them
+(`realtime.methods.light_volumes.height_field` has the same with one dimension more).
+
+The map of a slice holds S = D s of the surfaces at equal steps in q, read from the height field of the shadow map. A
+leaf lies between two of them, and a node of 2^l leaves holds the least and the greatest S over it. Published is one
+depth for a leaf (Chen et al. 2011, Yusov 2013); here it is linear between its ends, like the height field of the light
+volume, and a shadow ends where that says and not at the end of a texel.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from realtime.methods.epipolar.slices import Slices
+from realtime.numerics.array_types import two_numbers
+from realtime.scene.lights import Light
+from realtime.shadow_maps.shadow_map import ShadowMap, cube_coordinates, face_coordinates
+
+
+@dataclass(frozen=True)
+class SliceHeights:
+    """The height maps of slices with their trees."""
+
+    size: int  #: leaves of an edge of k(q), a power of two
+    edges: int  #: 2 of a point light, 1 of a spot
+    slices: Slices
+    chord: tuple[Any, Any, Any, Any] | None  #: of a spot: k at both ends, by slice
+    tree: (
+        Any  #: by slice a heap of pairs: 2 nodes of 2^(m-1) leaves from the second place on, ..., the leaves at the end
+    )
+
+    @property
+    def leaves(self) -> int:
+        """Leaves of a slice."""
+        return self.size * self.edges
+
+    @property
+    def top(self) -> int:
+        """The level of the nodes of a whole edge; a node over two edges would have a kink."""
+        return self.size.bit_length() - 1
+
+
+def slice_heights(shadow_map: ShadowMap, heights, slices: Slices, light: Light) -> SliceHeights:
+    """Return the height maps of slices.
+
+    Parameters
+    ----------
+    shadow_map
+        Of the light.
+    heights
+        Its inverse planar depths at the corners of the texels
+        (`realtime.methods.light_volumes.height_field.inverse_depth`) [1/m].
+    slices
+        The slices of the image.
+    light
+        The light.
+
+    References
+    ----------
+    Chen, Baran, Durand, Jarosz 2011, *Real-time volumetric shadows using 1D min-max mipmaps*.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    edges = 1 if light.kind == "spot" else 2
+    chord = _chord(slices, light, shadow_map.size) if light.kind == "spot" else None
+    Float = type(heights)
+    empty = SliceHeights(shadow_map.size, edges, slices, chord, None)
+    samples = empty.leaves + 1
+    index = dr.arange(mi.UInt32, slices.count * samples)
+    number = index // samples
+    kx, ky = line_point(empty, number, Float(index - number * samples))
+    across = dr.gather(type(slices.across), slices.across, number)
+    value = slices.distance * _height(shadow_map, heights, slices.towards * kx + across * ky)
+    dr.eval(value, chord)
+    index = dr.arange(mi.UInt32, slices.count * empty.leaves)
+    at = index + index // empty.leaves  # a map has one sample more than leaves
+    ends = dr.gather(Float, value, at), dr.gather(Float, value, at + 1)
+    return replace(empty, tree=_tree(empty, *ends))
+
+
+def line_point(heights: SliceHeights, number, q):
+    """Return (k_x, k_y) at `q`, counted in leaves, of slices."""
+    import drjit as dr
+
+    q = q * (1.0 / heights.size)
+    if heights.chord is None:
+        kx = 1 - q
+        return kx, 1 - dr.abs(kx)
+    x0, y0, x1, y1 = (dr.gather(type(q), one, number) for one in heights.chord)
+    return dr.fma(q, x1 - x0, x0), dr.fma(q, y1 - y0, y0)
+
+
+def _tree(heights: SliceHeights, one, other):
+    """Return the trees over leaves that have `one` and `other` at their ends."""
+    import drjit as dr
+    import mitsuba as mi
+
+    count, leaves = heights.slices.count, heights.leaves
+    Pair = two_numbers(type(one))
+    # Written only: reading from what is being written would copy it at every level.
+    tree = dr.empty(type(one), 2 * count * 2 * leaves)
+    index = dr.arange(mi.UInt32, count * leaves)
+    dr.scatter(tree, Pair(one, other), index + (index // leaves + 1) * leaves)
+    low, high = dr.minimum(one, other), dr.maximum(one, other)
+    dr.eval(low, high, tree)
+    for level in range(1, heights.top + 1):
+        nodes = leaves >> level
+        index = dr.arange(mi.UInt32, count * nodes)
+        low = dr.minimum(*(dr.gather(type(one), low, 2 * index + k) for k in (0, 1)))
+        high = dr.maximum(*(dr.gather(type(one), high, 2 * index + k) for k in (0, 1)))
+        number = index // nodes
+        dr.scatter(tree, Pair(low, high), number * (2 * leaves) + (index - number * nodes + nodes))
+        dr.eval(low, high, tree)
+    return tree
+
+
+def _height(shadow_map: ShadowMap, heights, direction):
+    """Return s of the surface in a direction k: it is hit at k / s [1/m times |k|]."""
+    import drjit as dr
+    import mitsuba as mi
+
+    size = shadow_map.size
+    if shadow_map.frame:
+        a, b, depth = face_coordinates(shadow_map.frame, mi.UInt32(0), direction)
+        face, u, v = mi.UInt32(0), a / depth, b / depth
+    else:
+        face, u, v = cube_coordinates(direction)
+        depth = dr.maximum(dr.maximum(dr.abs(direction.x), dr.abs(direction.y)), dr.abs(direction.z))
+    u, v = (dr.clip(dr.fma(0.5 * size, one, 0.5 * size), 0, size) for one in (u, v))
+    column, row = (dr.minimum(mi.UInt32(one), size - 1) for one in (u, v))
+    x, y = u - type(u)(column), v - type(v)(row)
+    # The two triangles of a texel share its diagonal and differ in the third corner.
+    corner = (face * (size + 1) + row) * (size + 1) + column
+    third = corner + dr.select(x >= y, mi.UInt32(1), mi.UInt32(size + 1))
+    h0, h1, h2 = (dr.gather(type(u), heights, at) for at in (corner, third, corner + (size + 2)))
+    return depth * (h0 + dr.maximum(x, y) * (h1 - h0) + dr.minimum(x, y) * (h2 - h1))
+
+
+def _chord(slices: Slices, light: Light, size: int):
+    """Return k at the ends of the cone of a spot in the slices.
+
+    A direction at the angle phi has the cosine p cos phi + q sin phi = R cos(phi - middle) with the axis, (p, q) the
+    axis in the slice. The chord is a texel wider on both sides, for the rays of pixels beside the slice.
+    """
+    import drjit as dr
+
+    p, q = dr.dot(light.axis, slices.towards), dr.dot(light.axis, slices.across)
+    middle = dr.atan2(q, p)
+    middle += dr.select(middle < -0.5 * dr.pi, 2 * dr.pi, 0)
+    reach = dr.sqrt(p * p + q * q)
+    margin = 2 * light.cutoff / size
+    half = dr.minimum(dr.safe_acos(dr.minimum(light.cos_cutoff / reach, 1)) + margin, 1.56)
+    begin = dr.clip(middle - half, 0, dr.pi - margin)
+    end = dr.clip(middle + half, begin + margin, dr.pi)
+    return dr.cos(begin), dr.sin(begin), dr.cos(end), dr.sin(end)
+
+
+def node_pair(heights: SliceHeights, number, place, level):
+    """Return the pair of the node of a level that begins at a leaf."""
+    import drjit as dr
+    import mitsuba as mi
+
+    heap = (mi.UInt32(heights.leaves) + place) >> level
+    pair = dr.gather(two_numbers(type(heights.tree)), heights.tree, number * (2 * heights.leaves) + heap)
+    return pair.x, pair.y

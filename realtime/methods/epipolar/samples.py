@@ -1,0 +1,254 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Samples along epipolar slices: which of them to compute, and what lies between them.
+
+A slice has a fixed number of samples at equal steps from where it enters the image to where it leaves. One in `step` is
+computed, and both sides of every break of the depth between two of them; the others are interpolated along the slice
+(Yusov 2013). Which are computed is a bit each, 32 to a word, so the nearest on either side is found by counting bits.
+
+A pixel lies between two slices and on each between two samples. It takes the mean of the four, weighted by their
+nearness and by how well their depths agree with its own. Where none agrees it has to be computed by itself.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+from realtime.methods.epipolar.slices import Slices, neighbour, pixel_number, slice_coordinate
+from realtime.numerics.array_types import four_numbers
+
+WORD = 32  #: samples to a word of bits
+STEPS = (1, 2, 4, 8, 16, 32)
+AGREES = 0.1  #: relative difference of depths up to which there is no break
+LEAST = 0.01  #: the least sum of weights that a pixel is content with
+
+_PACKET, _HANDS = 16, 64
+_BESIDE = -1.0  # the value of a sample that has none: its ray meets no light
+
+
+@dataclass(frozen=True)
+class Samples:
+    """The samples of slices."""
+
+    slices: Slices
+    count: int  #: of a slice, a multiple of 32
+    depth: Any  #: of the pixels, row by row [m]
+    bits: Any  #: by word and slice, which samples are computed
+
+
+def mark_samples(slices: Slices, depth, *, count: int, step: int) -> Samples:
+    """Return samples, with those to be computed marked.
+
+    Parameters
+    ----------
+    slices
+        The slices.
+    depth
+        Distances of the visible surface, pixel by pixel, row by row; may be infinite [m].
+    count
+        Samples of a slice, a multiple of 32.
+    step
+        One in so many is computed: a power of two up to 32.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    words = count // WORD
+    index = dr.arange(mi.UInt32, slices.count * words)
+    word = index // slices.count
+    number, first = index - word * slices.count, word * WORD
+    samples = Samples(slices, count, depth, None)
+    ends = _ends(slices, number)
+
+    def depth_at(k):
+        return _sample_depth(samples, ends, dr.clip(mi.Int32(k), 0, count - 1))
+
+    def body(b, bits, here, before):
+        after = depth_at(first + b + 1)
+        breaks = _apart(before, here) | _apart(here, after)
+        return b + 1, bits | (dr.select(breaks, mi.UInt32(1), 0) << b), after, here
+
+    # The last sample of all is marked: every other has one behind it.
+    initial = sum(1 << b for b in range(0, WORD, step))
+    bits = dr.select(first + WORD == count, mi.UInt32(initial | 1 << (WORD - 1)), initial)
+    _, bits, _, _ = dr.while_loop(
+        state=(dr.zeros(mi.UInt32, dr.width(index)), bits, depth_at(first), depth_at(mi.Int32(first) - 1)),
+        cond=lambda b, bits, here, before: b < WORD,
+        body=body,
+        labels=("b", "bits", "here", "before"),
+    )
+    dr.eval(bits)
+    return Samples(slices, count, depth, bits)
+
+
+def marked_samples(samples: Samples):
+    """Return the marked samples, slice times count plus sample, and how many there are.
+
+    They come word by word, and slice by slice within a word: what is next to each other in the list then is so in the
+    image too.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    slices = samples.slices.count
+    number = dr.popcnt(samples.bits)
+    place = dr.prefix_sum(number)
+    found = dr.empty(mi.UInt32, slices * samples.count)
+    index = dr.arange(mi.UInt32, dr.width(samples.bits))
+    word = index // slices
+    first = (index - word * slices) * samples.count + word * WORD
+
+    def body(bits, place):
+        dr.scatter(found, first + dr.tzcnt(bits), place)
+        return bits & (bits - 1), place + 1
+
+    dr.while_loop(state=(+samples.bits, place), cond=lambda bits, place: bits != 0, body=body, labels=("bits", "place"))
+    total = dr.sum(number)
+    dr.eval(found, total)
+    return found, total
+
+
+def spread(width: int):
+    """Return the numbers below `width`, and a few more, in an order that deals packets of 16 out evenly.
+
+    A list fills only the first part of its room. Threads take contiguous parts of it, and one would get all the work.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    row = width // (_PACKET * _HANDS) + 1
+    lane = dr.arange(mi.UInt32, row * _PACKET * _HANDS)
+    packet = lane // _PACKET
+    return ((packet % row) * _HANDS + packet // row) * _PACKET + lane % _PACKET
+
+
+def sample_ray(samples: Samples, sample):
+    """Return image point, slice and depth of samples by their numbers among all."""
+    import mitsuba as mi
+
+    number = sample // samples.count
+    ends = _ends(samples.slices, number)
+    k = mi.Int32(sample - number * samples.count)
+    return _sample_point(samples, ends, k), number, _sample_depth(samples, ends, k)
+
+
+def no_value(like):
+    """Return what stands for the value of a sample whose ray meets no light."""
+    return type(like)(_BESIDE)
+
+
+def between_samples(samples: Samples, values, point, depth):
+    """Return the values of pixels from those of samples.
+
+    Parameters
+    ----------
+    samples, values
+        The samples; by sample the values of those that are marked.
+    point
+        Image points (i, j) of the pixels.
+    depth
+        Their distances [m].
+
+    Returns
+    -------
+    value
+        The weighted mean.
+    found
+        Whether enough of the samples agree in their depth.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    place = slice_coordinate(samples.slices, *point)
+    low = dr.floor(place)
+    total, weights = type(values)(0), type(depth)(0)
+    for step, share in ((0, 1 - (place - low)), (1, place - low)):
+        number = neighbour(samples.slices, mi.Int32(low) + step)
+        for value, weight in _on_slice(samples, values, number, point, depth):
+            total += value * (share * weight)
+            weights += share * weight
+    return total / dr.maximum(weights, 1e-20), weights > LEAST
+
+
+def _on_slice(samples: Samples, values, number, point, depth):
+    """Return values and weights of the two samples of a slice on either side of a point."""
+    import drjit as dr
+    import mitsuba as mi
+
+    ends = _ends(samples.slices, number)
+    i, j = ends.z - ends.x, ends.w - ends.y
+    length = dr.maximum(i * i + j * j, 1e-10)
+    along = ((point[0] - ends.x) * i + (point[1] - ends.y) * j) * ((samples.count - 1) / length)
+    along = dr.clip(along, 0, samples.count - 1)
+    k = dr.minimum(mi.UInt32(along), samples.count - 2)
+    share = along - type(along)(k)
+    left, right = _marked_about(samples, number, k)
+    one, other = (dr.gather(type(values), values, number * samples.count + at) for at in (left, right))
+    has_one, has_other = (_first(value) >= 0 for value in (one, other))
+    one, other = dr.select(has_one, one, other), dr.select(has_other, other, one)
+    pace = dr.rcp(type(along)(right - left))
+    found = []
+    for step, near in ((0, 1 - share), (1, share)):
+        value = one + (other - one) * (type(along)(k + step - left) * pace)
+        agreement = _agreement(depth, _sample_depth(samples, ends, mi.Int32(k) + step))
+        found.append((value, dr.select(has_one | has_other, near * agreement, 0)))
+    return found
+
+
+def _marked_about(samples: Samples, number, k):
+    """Return the last marked sample up to k and the first after it."""
+    import drjit as dr
+    import mitsuba as mi
+
+    word, behind = k // WORD, (k + 1) // WORD
+    slices = samples.slices.count
+    bits = dr.gather(mi.UInt32, samples.bits, word * slices + number)
+    left = word * WORD + (WORD - 1) - dr.lzcnt(bits & (mi.UInt32(0xFFFFFFFF) >> (WORD - 1 - k % WORD)))
+    rest = dr.gather(mi.UInt32, samples.bits, behind * slices + number) >> ((k + 1) % WORD)
+    # The first sample of a word is always marked.
+    return left, dr.select(rest != 0, k + 1 + dr.tzcnt(rest), (behind + 1) * WORD)
+
+
+def _ends(slices: Slices, number):
+    import drjit as dr
+
+    return dr.gather(four_numbers(type(slices.ends)), slices.ends, number)
+
+
+def _sample_point(samples: Samples, ends, k):
+    import drjit as dr
+
+    t = type(ends.x)(k) * (1.0 / (samples.count - 1))
+    return dr.fma(t, ends.z - ends.x, ends.x), dr.fma(t, ends.w - ends.y, ends.y)
+
+
+def _sample_depth(samples: Samples, ends, k):
+    """Return the depth of the pixel that a sample lies in."""
+    import drjit as dr
+
+    pixel = pixel_number(samples.slices, *_sample_point(samples, ends, k))
+    return dr.gather(type(samples.depth), samples.depth, pixel)
+
+
+def _difference(one, other):
+    """Return the relative difference of two depths, by their inverses: they may be infinite."""
+    import drjit as dr
+
+    a, b = dr.rcp(one), dr.rcp(other)
+    return dr.abs(a - b) / dr.maximum(dr.maximum(a, b), 1e-20)
+
+
+def _apart(one, other):
+    return _difference(one, other) > AGREES
+
+
+def _agreement(one, other):
+    import drjit as dr
+
+    close = dr.minimum(AGREES / dr.maximum(_difference(one, other), 1e-6), 1)
+    return dr.square(dr.square(close))
+
+
+def _first(value):
+    """Return a value, or the first channel of a colour."""
+    import drjit as dr
+
+    return value if dr.depth_v(type(value)) == 1 else value.x

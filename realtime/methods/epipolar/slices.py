@@ -1,0 +1,219 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Epipolar slices: half planes bounded by the line through camera and light, which cut the image in straight lines.
+
+With (i, j) counted in pixels to the left and up from the centre of the image, the ray through (i, j) has the direction
+forward + i left + j up. The light, at v from the camera, has the homogeneous image point
+
+    (a, b, c) = (v . left / |left|^2,  v . up / |up|^2,  v . forward),
+
+and every slice goes through the epipole E = (a/c, b/c), the light's image, or for c < 0 that of the point opposite.
+From X, sign(c) (a - i c, b - j c) points to E; no quotient is needed, so that E may lie at infinity. A side of the
+image "faces away" from E if E lies on the inner side of it. The sides that do are a connected part of the border: all
+four where E is in the image, one to three otherwise. Slices leave the image at equal steps of length along them (Yusov
+2013), and so each pixel lies on one half line from E, which leaves the image at a place along the border.
+
+In a slice the light is at the origin, e1 = the unit vector to the camera and e2 is at right angles to it, on the side
+of the rays. The rays of a slice start at (D, 0), D = distance of camera and light, and the angle of their points about
+the light grows from 0 to less than pi.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from realtime.numerics.array_types import four_numbers
+from realtime.scene.camera import Camera
+from realtime.scene.lights import Light
+
+
+@dataclass(frozen=True)
+class Slices:
+    """The slices of an image and a light; arrays of `count` entries unless one entry is noted."""
+
+    count: int
+    width: int  #: of the image [pixels]
+    height: int
+    epipole: tuple[Any, Any, Any]  #: a, b, c, and all times -1 where c < 0; one entry each
+    sides: tuple[tuple[Any, Any], ...]  #: of the border: where it begins along those that face away, and if it does
+    length: Any  #: of those sides [pixels], one entry
+    closed: Any  #: whether they are all four: after the last slice comes the first; one entry
+    towards: Any  #: e1, one entry
+    distance: Any  #: D [m], one entry
+    across: Any  #: e2
+    ends: Any  #: i and j where a slice enters, or of E, and where it leaves: four numbers a slice [pixels]
+
+
+def image_slices(camera: Camera, light: Light, count: int) -> Slices:
+    """Return the slices of an image.
+
+    Parameters
+    ----------
+    camera
+        The camera.
+    light
+        A point or spot light, anywhere. Where it is in the pinhole, all half planes hold it; E is then the centre of
+        the image.
+    count
+        How many slices.
+
+    References
+    ----------
+    Engelhardt, Dachsbacher 2010, *Epipolar sampling for shadows and crepuscular rays in participating media with
+    single scattering*. Yusov 2013, *Practical implementation of light scattering effects using epipolar sampling and
+    1D min/max binary trees*.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    Float = type(camera.origin.x)
+    v = light.position - camera.origin
+    distance = dr.norm(v)
+    away = distance == 0
+    v = dr.select(away, camera.forward, v)
+    towards = -dr.normalize(v)
+    a = dr.dot(v, camera.left) / dr.squared_norm(camera.left)
+    b = dr.dot(v, camera.up) / dr.squared_norm(camera.up)
+    c = dr.dot(v, camera.forward)
+    epipole = tuple(dr.select(c < 0, -one, one) for one in (a, b, c))
+    sides, length, closed = _border(camera.width, camera.height, epipole)
+    found = Slices(count, camera.width, camera.height, epipole, sides, length, closed, towards, distance, None, None)
+    place = (Float(dr.arange(mi.UInt32, count)) + 0.5) * (length / count)
+    leave = _at_border(found, place)
+    enter = _entry(found, *leave)
+    out = camera.forward + camera.left * leave[0] + camera.up * leave[1]
+    across = _at_right_angles(out, towards, camera)
+    ends = dr.empty(Float, 4 * count)
+    dr.scatter(ends, four_numbers(Float)(*enter, *leave), dr.arange(mi.UInt32, count))
+    found = replace(found, across=across, ends=ends)
+    dr.eval(found)
+    return found
+
+
+def image_point(camera: Camera, direction):
+    """Return (i, j) of rays [pixels]."""
+    import drjit as dr
+
+    depth = dr.rcp(dr.dot(direction, camera.forward))
+    i = dr.dot(direction, camera.left) / dr.squared_norm(camera.left)
+    j = dr.dot(direction, camera.up) / dr.squared_norm(camera.up)
+    return i * depth, j * depth
+
+
+def pixel_number(slices: Slices, i, j):
+    """Return the number, row times width plus column, of the pixel that holds an image point, or of the nearest."""
+    import drjit as dr
+    import mitsuba as mi
+
+    column = dr.clip(0.5 * slices.width - i, 0, slices.width - 1)
+    row = dr.clip(0.5 * slices.height - j, 0, slices.height - 1)
+    return mi.UInt32(row) * slices.width + mi.UInt32(column)
+
+
+def slice_coordinate(slices: Slices, i, j):
+    """Return the place of image points among the slices: 0 on the first, 1 on the second, and so on.
+
+    Beyond the first and the last it goes on to -1/2 and count - 1/2, where all four sides face away round the circle.
+    """
+    import drjit as dr
+
+    x, y = 0.5 * slices.width, 0.5 * slices.height
+    di, dj = _towards_epipole(slices.epipole, i, j)
+    # Away from E, to whichever side comes first.
+    to_i = dr.select(di < 0, x - i, x + i) / dr.abs(di)
+    to_j = dr.select(dj < 0, y - j, y + j) / dr.abs(dj)
+    t = dr.minimum(to_i, to_j)
+    at_i, at_j = dr.clip(dr.fma(-t, di, i), -x, x), dr.clip(dr.fma(-t, dj, j), -y, y)
+    first, second, third, fourth = (begin for begin, _ in slices.sides)
+    along_i = dr.select(di < 0, first + (at_j + y), third + (y - at_j))
+    along_j = dr.select(dj < 0, second + (x - at_i), fourth + (at_i + x))
+    # On E itself any slice will do.
+    here = (di == 0) & (dj == 0)
+    place = dr.select(here, 0, dr.select(to_i <= to_j, along_i, along_j))
+    return dr.clip(place, 0, slices.length) * (slices.count / slices.length) - 0.5
+
+
+def neighbour(slices: Slices, number):
+    """Return the slice of a whole number that may lie beyond the first or the last."""
+    import drjit as dr
+    import mitsuba as mi
+
+    last = slices.count - 1
+    round_ = dr.select(number < 0, number + slices.count, dr.select(number > last, number - slices.count, number))
+    return mi.UInt32(dr.clip(dr.select(slices.closed, round_, number), 0, last))
+
+
+def _towards_epipole(epipole, i, j):
+    a, b, c = epipole
+    return a - i * c, b - j * c
+
+
+def _border(width: int, height: int, epipole):
+    """Return where the sides left, top, right, bottom begin along those that face away, their length, and if all do.
+
+    The border is gone round from the lower left corner, (i, j) = (W/2, -H/2).
+    """
+    import drjit as dr
+
+    x, y = 0.5 * width, 0.5 * height
+    left, top = _towards_epipole(epipole, x, y)
+    right, bottom = _towards_epipole(epipole, -x, -y)
+    faces = (left < 0, top < 0, right > 0, bottom > 0)
+    lengths = [type(left)(dr.select(side, float(n), 0)) for side, n in zip(faces, 2 * (height, width))]
+    closed = faces[0] & faces[1] & faces[2] & faces[3]
+    # The first of the connected sides, where they do not close.
+    first = [faces[k] & ~faces[k - 1] for k in range(4)]
+    first[0] = first[0] | closed
+    sides = []
+    for side in range(4):
+        before = type(lengths[0])(0)
+        for start in range(4):
+            between = sum(lengths[(start + k) % 4] for k in range((side - start) % 4))
+            before += dr.select(first[start], between, 0)
+        sides.append((before, faces[side]))
+    return tuple(sides), sum(lengths), closed
+
+
+def _at_border(slices: Slices, place):
+    """Return (i, j) at a place along the sides that face away."""
+    import drjit as dr
+
+    x, y = 0.5 * slices.width, 0.5 * slices.height
+    points = (
+        lambda r: (x, r - y),
+        lambda r: (x - r, y),
+        lambda r: (-x, y - r),
+        lambda r: (r - x, -y),
+    )
+    i = j = type(place)(0)
+    for (begin, faces), point, length in zip(slices.sides, points, 2 * (slices.height, slices.width)):
+        inside = faces & (place >= begin) & (place < begin + length)
+        at_i, at_j = point(place - begin)
+        i, j = dr.select(inside, at_i, i), dr.select(inside, at_j, j)
+    return i, j
+
+
+def _entry(slices: Slices, i, j):
+    """Return where the half line from E to a point of the border enters the image: E itself if that is inside."""
+    import drjit as dr
+
+    x, y = 0.5 * slices.width, 0.5 * slices.height
+    di, dj = _towards_epipole(slices.epipole, i, j)
+    to_i = dr.select(di > 0, x - i, x + i) / dr.abs(di)
+    to_j = dr.select(dj > 0, y - j, y + j) / dr.abs(dj)
+    to_i, to_j = dr.select(di == 0, dr.inf, to_i), dr.select(dj == 0, dr.inf, to_j)
+    t = dr.minimum(dr.minimum(to_i, to_j), dr.rcp(slices.epipole[2]))
+    t = dr.select(dr.isfinite(t), t, 0)
+    return dr.clip(dr.fma(t, di, i), -x, x), dr.clip(dr.fma(t, dj, j), -y, y)
+
+
+def _at_right_angles(vector, axis, camera: Camera):
+    """Return the unit vector across `axis` on the side of `vector`; any across it where the two are parallel."""
+    import drjit as dr
+
+    def across(one):
+        normal = dr.cross(axis, one)
+        return dr.cross(normal, axis)
+
+    found = across(vector)
+    flat = dr.squared_norm(found) <= 1e-12 * dr.squared_norm(vector)
+    other = dr.select(dr.squared_norm(across(camera.left)) > 0.1 * dr.squared_norm(camera.left), camera.left, camera.up)
+    return dr.normalize(dr.select(flat, across(other), found))

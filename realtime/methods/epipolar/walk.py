@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The lit pieces of rays in the height maps of epipolar slices.
+
+In a slice (`realtime.methods.epipolar.min_max_tree`) let t and h be foot and height of a ray. From cross(k, direction)
+= s cross(P, direction) = s h and D direction = (-t, h),
+
+    D h s(q) = G(q) := h k_x + t k_y,      x = D^2 k_y / G.
+
+With S = D times the height of the map the point is lit where
+
+    G(q) >= h S(q),
+
+without a quotient. At a crossing G = h S, thus x = D^2 k_y / (h S); between the ends of a leaf, with the differences d0
+= G - h S at one and d1 at the other, k and S are those at the ends in the ratio |d1| : |d0|. Nothing cancels, wherever
+the ray goes.
+
+A ray that at both ends of a node is above its greatest S is lit all over it, one that is below the least is dark (Chen
+et al. 2011): a long step.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from realtime.methods.epipolar.min_max_tree import SliceHeights, line_point, node_pair
+from realtime.rays.ray_light import RayGeometry
+
+
+@dataclass
+class _Walk:
+    """Where a ray is on its way along the leaves."""
+
+    place: Any  #: the first leaf of the node to look at
+    level: Any  #: the node has 2^level leaves
+    lit: Any  #: whether the light reaches the ray there
+    opened: Any  #: where it came back [m]
+    closed: Any  #: where it ended [m]
+    ready: Any  #: a lit piece has ended
+    done: Any  #: there are no more
+
+
+def sum_lit_pieces(
+    heights: SliceHeights, number, geometry: RayGeometry, segment, integral: Callable[[Any, Any], Any], zero
+):
+    """Add up an integral over the lit pieces of rays.
+
+    Parameters
+    ----------
+    heights
+        The maps.
+    number
+        The slice that stands for each ray: the ray is turned into it about the line of camera and light.
+    geometry
+        The rays and the light.
+    segment
+        Distances (x0, x1) between which to look; `x1` may be infinite, and x1 <= x0 for rays to leave out.
+    integral
+        Function (x0, x1) -> value of one piece.
+    zero
+        The value of no piece, one for each ray.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    x0, x1 = segment
+    width = dr.width(zero)
+    x0 = x0 + dr.zeros(type(x1), width)
+    distance = heights.slices.distance
+    # A ray through the light: next to it, it sees the same.
+    height = dr.maximum(geometry.height, 1e-12 * distance)
+    ray = (geometry.foot, height, dr.square(distance))
+    begin, end = (_position(heights, number, ray, x) for x in segment)
+    last = dr.minimum(mi.UInt32(end), heights.leaves - 1)
+    leaf = dr.minimum(mi.UInt32(begin), last)
+    s0, s1 = node_pair(heights, number, leaf, mi.UInt32(0))
+    s = dr.fma(begin - type(begin)(leaf), s1 - s0, s0)
+    start = _Walk(
+        place=leaf,
+        # From a leaf that begins no larger node the way up is by steps.
+        level=dr.select(leaf % heights.size == 0, mi.UInt32(heights.top), mi.UInt32(0)),
+        lit=_line_value(heights, number, ray, begin) >= height * s,
+        opened=+x0,
+        closed=+x0,
+        ready=dr.full(mi.Bool, False, width),
+        done=~(x1 > x0),
+    )
+
+    def body(total, walk):
+        (walk,) = dr.while_loop(
+            state=(walk,),
+            cond=lambda walk: ~walk.ready & ~walk.done,
+            body=lambda walk: (_step(heights, number, ray, (x0, x1), (end, last), walk),),
+            labels=("walk",),
+        )
+        begin = dr.clip(walk.opened, x0, x1)
+        value = integral(begin, dr.clip(walk.closed, begin, x1))
+        total = total + dr.select(walk.ready, value, 0)
+        walk.ready = mi.Bool(False)
+        return total, walk
+
+    total, _ = dr.while_loop(
+        state=(zero, start), cond=lambda total, walk: ~walk.done, body=body, labels=("total", "walk")
+    )
+    return total
+
+
+def _step(heights: SliceHeights, number, ray, segment, stop, walk: _Walk) -> _Walk:
+    """Look at one node: go over it, or down into it."""
+    import drjit as dr
+    import mitsuba as mi
+
+    _, height, square = ray
+    end, last = stop
+    Float = type(height)
+    after = walk.place + (mi.UInt32(1) << walk.level)
+    one, other = node_pair(heights, number, walk.place, walk.level)
+    kx0, ky0 = line_point(heights, number, Float(walk.place))
+    kx1, ky1 = line_point(heights, number, Float(after))
+    g0, g1 = _line(ray, kx0, ky0), _line(ray, kx1, ky1)
+    # The ray may end within the node.
+    g_end = dr.select(Float(after) > end, _line_value(heights, number, ray, end), g1)
+    all_lit = dr.minimum(g0, g_end) >= height * dr.maximum(one, other)
+    all_dark = dr.maximum(g0, g_end) < height * dr.minimum(one, other)
+    whole, leaf = all_lit | all_dark, walk.level == 0
+    # Within a leaf, from end to end.
+    d0, d1 = dr.abs(g0 - height * one), g1 - height * other
+    lit = dr.select(whole, all_lit, d1 >= 0)
+    passed = whole | leaf
+    changed = passed & (lit != walk.lit)
+    # Where a whole node differs from what was before it, by rounding, the change is at its beginning.
+    ky = dr.select(whole, ky0, ky0 * dr.abs(d1) + ky1 * d0)
+    divisor = dr.select(whole, g0, height * (one * dr.abs(d1) + other * d0))
+    x = dr.select(divisor > 0, square * ky / divisor, dr.inf)
+    x = dr.clip(x, segment[0], segment[1])
+    over = passed & (after > last)
+    closes = changed & walk.lit
+    remains = over & lit
+    step_up = passed & ((after & ((mi.UInt32(2) << walk.level) - 1)) == 0) & (walk.level < heights.top)
+    level = dr.select(passed, dr.select(step_up, walk.level + 1, walk.level), walk.level - 1)
+    return _Walk(
+        place=dr.select(passed, after, walk.place),
+        level=level,
+        lit=dr.select(passed, lit, walk.lit),
+        opened=dr.select(changed & lit, x, walk.opened),
+        closed=dr.select(remains, segment[1], dr.select(closes, x, walk.closed)),
+        ready=closes | remains,
+        done=over,
+    )
+
+
+def _line(ray, kx, ky):
+    """Return G."""
+    import drjit as dr
+
+    foot, height, _ = ray
+    return dr.fma(height, kx, foot * ky)
+
+
+def _line_value(heights: SliceHeights, number, ray, q):
+    """Return G at a place along k(q), counted in leaves."""
+    return _line(ray, *line_point(heights, number, q))
+
+
+def _position(heights: SliceHeights, number, ray, x):
+    """Return where the point at x lies along k(q), in leaves."""
+    import drjit as dr
+
+    foot, height, square = ray
+    finite = dr.isfinite(x)
+    at = dr.select(finite, x, 1)
+    px = dr.fma(-at, foot, dr.select(finite, square, 0))
+    py = at * height
+    if heights.chord is None:
+        q = dr.select(px >= 0, py / (px + py), 2 - py / (py - px))
+        q = dr.select(px + py == 0, 0, q)
+    else:
+        x0, y0, x1, y1 = (dr.gather(type(x), one, number) for one in heights.chord)
+        before, beyond = x0 * py - y0 * px, px * y1 - py * x1
+        # Outside the wedge of the chord one of them is negative.
+        before, beyond = dr.maximum(before, 0), dr.maximum(beyond, 0)
+        q = dr.select(before + beyond > 0, before / (before + beyond), 0)
+    return dr.clip(q, 0, heights.edges) * heights.size

@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The airlight of one light along camera rays, whatever fills the scene: what methods sum over lit pieces."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from realtime.bounded_media.airlight import bounded_airlight
+from realtime.bounded_media.directional_airlight import ParallelRay
+from realtime.bounded_media.ray_segments import MediaRay
+from realtime.kernels.registry import airlight_integral, gamma
+from realtime.methods.view import View, bounded_radiance, radiance
+from realtime.rays.ray_light import clip_to_cone, ray_geometry
+from realtime.scene.lights import Light
+
+
+def integral_type(view: View) -> Any:
+    """Return the type of an integral: a number for a grey medium, a colour otherwise."""
+    grey = len(view.medium.sigma_t) == 1 and not view.plan.bounded
+    return type(view.distance) if grey else type(view.medium.albedo)
+
+
+def ray_airlight(
+    view: View, light: Light, kernel, media: MediaRay | ParallelRay | None = None, *, geometry: Any = None
+) -> "RayAirlight":
+    """Return the airlight of a light along the rays of a view; `media` where they are bounded, `geometry` if known."""
+    if light.kind == "directional":
+        return RayAirlight(view, light, None, kernel, media)
+    if geometry is None:
+        geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
+    return RayAirlight(view, light, geometry, kernel, media)
+
+
+@dataclass(frozen=True)
+class RayAirlight:
+    """The airlight of one light along the rays of a view."""
+
+    view: View
+    light: Light
+    geometry: Any  #: a `RayGeometry`; None for a light at infinity
+    kernel: Any
+    media: MediaRay | ParallelRay | None  #: where media are bounded
+
+    @property
+    def segment(self) -> tuple[Any, Any]:
+        """The part of the rays that the light could reach: up to the visible surface, in the cone of a spot [m]."""
+        x0, x1 = type(self.view.distance)(0), self.view.distance
+        return clip_to_cone(self.geometry, x0, x1) if self.light.kind == "spot" else (x0, x1)
+
+    def integral(self, x0, x1):
+        """Return the integral over a segment; `radiance` knows its units."""
+        if self.media:
+            return bounded_airlight(self.media, x0, x1)
+        return airlight_integral(self.kernel, self.geometry, x0, x1, medium=self.view.medium, light=self.light)
+
+    def radiance(self, integral):
+        """Return the radiance of an integral [W/(m^2 sr)]."""
+        return (
+            bounded_radiance(self.light, integral) if self.media else radiance(self.view.medium, self.light, integral)
+        )
+
+    def gamma(self, x):
+        """Return the integral from the camera on."""
+        if self.media:
+            return self.integral(type(x)(0), x)
+        return gamma(self.kernel, self.geometry, x, medium=self.view.medium, light=self.light)

@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Upright walls of a light volume: where between two samples of a shadow map its depth jumps.
+
+As published (Billeter, Sintorn, Assarsson 2010), a silhouette of what the light sees is joined to what lies behind it
+by triangles across one texel: next to its caster the shadow begins at the caster's last sample, far behind it at the
+first sample of the background. What joins them in truth is upright, in a plane through the light, and stands somewhere
+between the two samples. The same error stands along the whole ray, so it does not average out.
+
+Here the place is found. On every side of a texel whose two heights differ by more than `_JUMP` of the larger one, rays
+from the light halve the interval between the samples `_HALVINGS` times, each time keeping the half with the larger
+change of height. What is left of a slope is a small part of its change, and the side stays as it is; of a jump there is
+all of it: a wall stands in the middle of the last interval. That is the idea of silhouette maps (Sen, Cammarano,
+Hanrahan 2003), for volumes; the map itself stays as it was.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+from realtime.methods.light_volumes.height_field import LEAF, LightHeights, height_at
+from realtime.methods.light_volumes.texel_walls import BOTTOM, LEFT, PLACES, RIGHT, TOP, walled_heights
+from realtime.scene.lights import Light
+from realtime.shadow_maps.shadow_map import cast_map_rays
+
+_HALVINGS = PLACES.bit_length() - 1
+_JUMP = 0.05  # of the larger height: walls lower than that are left slanted
+_KEPT = 0.5  # of the change between the samples that a jump keeps in the last interval
+_SIDES = 2 * LEAF * (LEAF + 1)  # of the texels of a leaf
+
+
+def with_walls(heights: LightHeights, scene, light: Light) -> LightHeights:
+    """Return a height field with upright walls where the map of a light jumps.
+
+    Parameters
+    ----------
+    heights
+        The height field of the light's map.
+    scene
+        The Mitsuba scene that the map was cast in.
+    light
+        The light.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    walls = dr.zeros(mi.UInt32, heights.faces * heights.size**2)
+    leaf, side = _jumping_sides(heights)
+    texels = _trace(heights, scene, light, (leaf, side), walls) if dr.width(leaf) else leaf
+    return walled_heights(heights, walls, texels)
+
+
+@dataclass
+class _Edge:
+    """A side of a texel in a face, from corner (i, j) on along u or along v."""
+
+    face: Any
+    i: Any
+    j: Any
+    upright: Any  #: whether it goes along v
+
+
+def _edge_of(heights: LightHeights, leaf, side) -> _Edge:
+    """Return a side by the number of its leaf and its own in there."""
+    import drjit as dr
+
+    nodes = 1 << heights.finest
+    row = leaf // nodes
+    face = row // nodes
+    upright = side >= _SIDES // 2
+    within = side % (_SIDES // 2)
+    across, along = within // LEAF, within % LEAF
+    i, j = dr.select(upright, across, along), dr.select(upright, along, across)
+    return _Edge(face, (leaf - row * nodes) * LEAF + i, (row - face * nodes) * LEAF + j, upright)
+
+
+def _jumping_sides(heights: LightHeights):
+    """Return the sides over which heights differ enough, by their leaves' numbers and their own."""
+    import drjit as dr
+    import mitsuba as mi
+
+    per_face = 4**heights.finest
+    leaf = dr.arange(mi.UInt32, heights.faces * per_face)
+    node = leaf + (leaf // per_face + 1) * (heights.nodes - per_face)
+    low, high = (dr.gather(type(heights.bounds), heights.bounds, 2 * node + which) for which in (0, 1))
+    leaf = dr.compress(high - low > _JUMP * high)
+    if not dr.width(leaf):
+        return leaf, leaf
+    lane = dr.arange(mi.UInt32, dr.width(leaf) * _SIDES)
+    of_leaf, side = dr.gather(mi.UInt32, leaf, lane // _SIDES), lane % _SIDES
+    edge = _edge_of(heights, of_leaf, side)
+    one, other = _ends(heights, edge)
+    # The far border of a leaf belongs to the next one, but for the last.
+    outer = dr.select(edge.upright, edge.i, edge.j)
+    own = (side % (_SIDES // 2) < LEAF * LEAF) | (outer == heights.size)
+    some = dr.compress(own & (dr.abs(one - other) > _JUMP * dr.maximum(one, other)))
+    return dr.gather(mi.UInt32, of_leaf, some), dr.gather(mi.UInt32, side, some)
+
+
+def _ends(heights: LightHeights, edge: _Edge):
+    """Return the heights at both ends of sides."""
+    import drjit as dr
+    import mitsuba as mi
+
+    size = heights.size
+    i, j = dr.minimum(edge.i, size - 1), dr.minimum(edge.j, size - 1)
+    texel = (edge.face * size + j) * size + i
+    # The corners of a texel: 0, 1, 2 and 3 at (0, 0), (1, 0), (0, 1) and (1, 1).
+    first = 4 * texel + (edge.i - i) + 2 * (edge.j - j)
+    step = dr.select(edge.upright, mi.UInt32(2), mi.UInt32(1))
+    return tuple(dr.gather(type(heights.texels), heights.texels, place) for place in (first, first + step))
+
+
+def _trace(heights: LightHeights, scene, light: Light, sides, walls):
+    """Find the walls on sides and write them to both texels of each; return the numbers of these texels."""
+    import drjit as dr
+    import mitsuba as mi
+
+    edge = _edge_of(heights, *sides)
+    one, other = _ends(heights, edge)
+    Double, size = mi.Float64, heights.size
+
+    def halve(step, number, one, other):
+        middle = (2 * Double(number) + 1) / Double(2 << step)
+        column, row = Double(edge.i), Double(edge.j)
+        u = dr.fma(dr.select(edge.upright, column, column + middle), 2.0 / size, -1.0)
+        v = dr.fma(dr.select(edge.upright, row + middle, row), 2.0 / size, -1.0)
+        distance = cast_map_rays(scene, light, (edge.face, u, v))
+        height = height_at(heights.frame, heights.depth, (type(one)(u), type(one)(v)), distance)
+        far = dr.abs(height - one) < dr.abs(height - other)
+        number = (number << 1) + dr.select(far, mi.UInt32(1), mi.UInt32(0))
+        return step + 1, number, dr.select(far, height, one), dr.select(far, other, height)
+
+    step = dr.zeros(mi.UInt32, dr.width(one))
+    _, number, low, high = dr.while_loop(
+        state=(step, step + 0, one + 0, other + 0),
+        cond=lambda step, *_: step < _HALVINGS,
+        body=halve,
+        labels=("step", "number", "one", "other"),
+    )
+    jumps = dr.abs(low - high) > _KEPT * dr.abs(one - other)
+    behind = (edge.face * size + edge.j) * size + edge.i
+    before = behind - dr.select(edge.upright, mi.UInt32(1), mi.UInt32(size))
+    place = dr.select(edge.upright, edge.i, edge.j)
+    for shifts, texel, active in (((BOTTOM, LEFT), behind, place < size), ((TOP, RIGHT), before, place > 0)):
+        level, upright = (mi.UInt32(8 * side) for side in shifts)
+        number_there = (number + 1) << dr.select(edge.upright, upright, level)
+        dr.scatter_reduce(dr.ReduceOp.Or, walls, number_there, texel, jumps & active)
+    dr.eval(walls)
+    return dr.concat((dr.select(place < size, behind, before), dr.select(place > 0, before, behind)))

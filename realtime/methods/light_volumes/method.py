@@ -1,0 +1,216 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Light volumes: volumetric shadows from a shadow map, without marching (Billeter, Sintorn, Assarsson 2010).
+
+What a light reaches directly is the volume between it and the surface that its shadow map samples. A camera ray enters
+and leaves that volume at crossings with its boundary; with Gamma(x) the airlight from the camera to x (the paper's eq.
+1), the airlight of the ray is the signed sum of eq. 3,
+
+    L = sum_n s_n Gamma(min(x_n, x_visible)),   s_n = +1 where it leaves the light, -1 where it enters it,
+
+in any order. The boundary is the height field of `realtime.methods.light_volumes.height_field`, and `evaluation` says
+how it is crossed:
+
+* `walk`: each ray looks at the texels on its line (`realtime.methods.light_volumes.walk`) that a beam of rays about it
+may meet
+  (`realtime.methods.light_volumes.tile_lists`); terms are put in order and integrated pair by pair, which keeps the
+  digits that a difference of two Gammas loses. Where the map jumps the boundary stands upright, at a place that rays
+  from the light find (`realtime.methods.light_volumes.jump_search`).
+* `mesh`, as published: the boundary becomes triangles (`realtime.methods.light_volumes.published.mesh`), each is drawn
+over the pixels that it
+  covers (`realtime.methods.light_volumes.published.raster`), and terms are added up as they come
+  (`realtime.methods.light_volumes.published.signed_sum`). The `static` mesh is the height field itself, an `adaptive`
+  one has fewer triangles where the map is flat (`realtime.methods.light_volumes.published.tessellation`).
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from realtime.errors import InputError
+from realtime.memory import check_memory
+from realtime.methods.light_airlight import RayAirlight, integral_type, ray_airlight
+from realtime.methods.light_volumes.height_field import LightHeights, level_start, light_heights
+from realtime.methods.light_volumes.jump_search import with_walls
+from realtime.methods.light_volumes.published.mesh import THRESHOLD, memory_needed, volume_mesh
+from realtime.methods.light_volumes.published.signed_sum import mesh_airlight
+from realtime.methods.light_volumes.tile_lists import Leaves, tile_leaves
+from realtime.methods.light_volumes.walk import sum_lit_pieces
+from realtime.methods.view import View, rays_in_media
+from realtime.numerics.array_types import bytes_of
+from realtime.scene.lights import Light
+from realtime.scene.read_scene import Scene
+from realtime.shadow_maps.shadow_map import cast_shadow_map, check_size, map_memory
+
+EVALUATIONS = ("walk", "mesh")
+TESSELLATIONS = ("static", "adaptive")
+SURFACES = ("map", "ray")
+WALLS = ("upright", "slanted")
+
+
+def light_volumes(
+    view: View,
+    *,
+    kernel,
+    map: int = 512,
+    evaluation: str = "walk",
+    tessellation: str = "static",
+    threshold: float = THRESHOLD,
+    surface: str = "map",
+    walls: str = "upright",
+):
+    """Return the airlight of every ray in the light volumes [W/(m^2 sr)].
+
+    Parameters
+    ----------
+    view
+        The frame.
+    kernel
+        An airlight kernel, see `realtime.kernels`.
+    map
+        Resolution of the shadow maps, a power of two [texels].
+    evaluation
+        'walk' or 'mesh', see above.
+    tessellation
+        'static' or 'adaptive', of the mesh.
+    threshold
+        Departure of an adaptive mesh from the shadow map that is allowed, relative to the depth.
+    surface
+        Where the shadows on surfaces come from: 'map', which costs nothing with evaluation=walk, or 'ray'. A mesh needs
+        rays for them.
+    walls
+        What joins both sides of a jump of the map for evaluation=walk: 'upright', where rays from the light find it
+        between two samples (`realtime.methods.light_volumes.jump_search`), or 'slanted', as published. A mesh has
+        slanted ones.
+
+    Returns
+    -------
+    radiance
+        In-scattered radiance [W/(m^2 sr)].
+    lit
+        By light, whether it reaches the visible surface; only where `finds_lit_surfaces`.
+
+    Notes
+    -----
+    Valid for all lights and any shapes that rays can be cast against; the map of a directional light covers the media,
+    and its shadows on surfaces always come from rays. Exact with respect to the shadow map:
+    what it misses of the scene falls as the size of a texel (`validation.frames.map_size`). A map that sees nothing
+    lights everything; a light inside a closed occluder lights nothing outside it. Bounded media are for
+    evaluation=walk; they have nodes of their own, the kernel is not asked.
+
+    References
+    ----------
+    Billeter, Sintorn, Assarsson 2010, *Real time volumetric shadows using polygonal light volumes*, High Performance
+    Graphics.
+    """
+    total = type(view.medium.albedo)(0)
+    lit = []
+    in_media = rays_in_media(view) if view.plan.bounded else ()
+    for number, light in enumerate(view.lights):
+        if evaluation == "mesh" and view.plan.shadows:
+            total += mesh_airlight(view, light, view.prepared[number], kernel=kernel)
+            continue
+        airlight = ray_airlight(view, light, kernel, in_media[number] if in_media else None)
+        if view.plan.shadows:
+            leaves = view.tiles[number] if view.tiles else _leaves(view, number)
+            value, reached = _walk(view.prepared[number], leaves, airlight)
+        else:
+            value, reached = airlight.radiance(airlight.integral(*airlight.segment)), True
+        total += value
+        # A surface may be beside the map of a directional light, whose shadows on surfaces come from rays.
+        lit.append(True if light.kind == "directional" else reached)
+    return (total, tuple(lit)) if finds_lit_surfaces({"evaluation": evaluation, "surface": surface}) else total
+
+
+def finds_lit_surfaces(settings: Mapping[str, Any]) -> bool:
+    """Return whether the method, with these parameters, says which surfaces are lit."""
+    return settings["evaluation"] == "walk" and settings["surface"] == "map"
+
+
+def light_volume_tiles(view: View, *, evaluation: str, **_) -> tuple[Leaves, ...] | None:
+    """Return by light the leaves of its height field that concern each tile; a mesh has none."""
+    if evaluation == "mesh":
+        return None
+    return tuple(_leaves(view, number) for number in range(len(view.lights)))
+
+
+def _leaves(view: View, number: int) -> Leaves:
+    toward = view.lights[number].position - view.origin
+    place = {"light": toward, "square": view.square_tiles}
+    return tile_leaves(view.prepared[number], lambda lane: view.rays(lane)[0], view.distance, **place)
+
+
+def _walk(heights: LightHeights, leaves: Leaves, airlight: RayAirlight):
+    """Return the airlight of one light along the rays [W/(m^2 sr)], and whether it reaches their ends."""
+    import drjit as dr
+
+    view = airlight.view
+    zero = dr.zeros(integral_type(view), dr.width(view.distance))
+    away = view.origin - airlight.light.position
+    place = {"away": away, "direction": view.direction, "segment": airlight.segment, "tile": view.tile}
+    value, reached = sum_lit_pieces(heights, leaves, **place, integral=airlight.integral, zero=zero)
+    return airlight.radiance(value), reached
+
+
+def prepare_light_volumes(
+    scene: Scene, *, map: int, evaluation: str, tessellation: str, threshold: float, surface: str, walls: str
+) -> Callable[[Scene], tuple[Any, ...]]:
+    """Return the function that makes the height field, or the mesh, of every light of a frame.
+
+    Raises
+    ------
+    InputError
+        For parameters out of range or that contradict each other, a mesh in bounded media, and more memory than the
+        machine has.
+    """
+    _check(map, evaluation, tessellation, threshold, surface, walls)
+    if evaluation == "mesh" and scene.plan.bounded:
+        raise InputError(
+            "evaluation=mesh: the scene has a medium with bounds, wanted one medium that fills all space; use "
+            "evaluation=walk"
+        )
+    if scene.plan.shadows:
+        needed = sum(_memory_of(light, map, evaluation) for light in scene.lights)
+        check_memory(f"map: {map} texels for {len(scene.lights)} light(s)", needed, "use a smaller map")
+
+    def volume(scene: Scene, light: Light):
+        shadow_map = cast_shadow_map(scene.geometry, light, map)
+        if evaluation == "walk":
+            heights = light_heights(shadow_map)
+            return with_walls(heights, scene.geometry, light) if walls == "upright" else heights
+        return volume_mesh(shadow_map, light, tessellation=tessellation, threshold=threshold)
+
+    return lambda scene: tuple(volume(scene, light) for light in scene.lights)
+
+
+def _check(map: int, evaluation: str, tessellation: str, threshold: float, surface: str, walls: str) -> None:
+    check_size(map)
+    words = (
+        ("evaluation", evaluation, EVALUATIONS),
+        ("tessellation", tessellation, TESSELLATIONS),
+        ("surface", surface, SURFACES),
+        ("walls", walls, WALLS),
+    )
+    for name, value, allowed in words:
+        if value not in allowed:
+            raise InputError(f"{name}: got {value!r}, wanted one of {', '.join(allowed)}")
+    if tessellation == "adaptive" and evaluation != "mesh":
+        raise InputError(
+            f"tessellation=adaptive: got evaluation={evaluation}, which has no triangles to save; wanted "
+            "evaluation=mesh with it"
+        )
+    if not 0 < threshold < float("inf"):
+        raise InputError(f"threshold: got {threshold!r}, wanted a positive number, for instance {THRESHOLD:g}")
+
+
+def _memory_of(light: Light, size: int, evaluation: str) -> int:
+    """Return about how much the volume of a light takes, an upper bound where it is adaptive [bytes]."""
+    number = bytes_of(type(light.position.x))
+    faces = 6 if light.kind == "point" else 1
+    corners = map_memory(light, size)
+    if evaluation == "mesh":
+        # Drawing it takes four doubles for each vertex as it is, and four for it in the image.
+        return corners + memory_needed(faces, size) + faces * (size + 1) ** 2 * 8 * 8
+    # Distances and heights at the corners, four heights and walls a texel, two bounds a node, a gap and sides a leaf.
+    heights = LightHeights(size, None, None, None)
+    leaves = 4**heights.finest
+    numbers = 4 * size**2 + 2 * level_start(heights.finest + 1) + 2 * leaves
+    return 2 * corners + faces * (number * numbers + 4 * leaves + 4 * size**2)

@@ -1,0 +1,230 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The light volume as a closed mesh: the displaced grid of a shadow map, joined to the light.
+
+Billeter, Sintorn, Assarsson 2010, section 4, after McCool 2000. Each corner (u, v) of a texel, or of a larger quad of
+an adaptive tessellation, is a vertex at light + k / s, k = axis + u across + v up, with s the inverse planar depth
+(`realtime.methods.light_volumes.height_field`). In homogeneous coordinates that is
+
+    (light s + k, s),
+
+which needs no division and holds vertices at infinity, s = 0. The grid of a spot ends at the border of its face; there
+it is joined to the light itself, (light, 1). The six grids of a cube are welded along their common edges, where their
+heights are the same numbers, and close by themselves.
+
+Triangles are counter-clockwise in (u, v), so as the light sees them: their normals point away from it and out of the
+volume. Faces of a cube that look along a negative axis are mirrored: there the triangles are turned over.
+"""
+
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Any
+
+from realtime.errors import InputError
+from realtime.methods.light_volumes.height_field import inverse_depth
+from realtime.methods.light_volumes.published.tessellation import divide, edges, triangles
+from realtime.scene.lights import Light
+from realtime.shadow_maps.shadow_map import ShadowMap
+
+#: Departure of an adaptive mesh from the shadow map that is allowed by default, relative to the depth.
+THRESHOLD = 1e-3
+
+
+@dataclass(frozen=True)
+class VolumeMesh:
+    """A closed mesh around the space that a light reaches."""
+
+    vertices: Any  #: (n, 4), homogeneous: the point is [:3] / [3] in world space [m]; [3] >= 0, 0 at infinity
+    triangles: Any  #: (m, 3) numbers of vertices; (v1 - v0) x (v2 - v0) points out of the lit volume
+
+
+def volume_mesh(
+    shadow_map: ShadowMap, light: Light, *, tessellation: str = "static", threshold: float = THRESHOLD
+) -> VolumeMesh:
+    """Return the mesh around what a light reaches.
+
+    Parameters
+    ----------
+    shadow_map
+        Shadow map of the light.
+    light
+        A point or spot light.
+    tessellation
+        ``static``: two triangles a texel; ``adaptive``: larger ones where the map is flat (see
+        `realtime.methods.light_volumes.published.tessellation`).
+    threshold
+        For ``adaptive``: departure from the map that is allowed, relative to the depth.
+
+    Raises
+    ------
+    InputError
+        If `tessellation` or `threshold` is none, or a surface touches the light.
+    """
+    if tessellation not in ("static", "adaptive"):
+        raise InputError(f"tessellation: got {tessellation!r}, wanted static or adaptive")
+    height = _heights(shadow_map)
+    if tessellation == "static":
+        return _static_mesh(shadow_map, light, height)
+    return _adaptive_mesh(shadow_map, light, height, triangles(divide(edges(height, threshold))))
+
+
+def memory_needed(faces: int, size: int) -> int:
+    """Return about how much a static mesh takes at its making, an upper bound of an adaptive one [bytes].
+
+    Each texel has one vertex (four doubles), two triangles (six 32 bit integers), a height with the copy of its
+    distance, and its numbers (one of 32, one of 64 bits).
+    """
+    return faces * (size + 1) ** 2 * (4 * 8 + 6 * 4 + 2 * 4 + 4 + 8)
+
+
+def tessellation_stages(
+    shadow_map: ShadowMap, light: Light, threshold: float = THRESHOLD
+) -> tuple[dict[str, float], VolumeMesh]:
+    """Return the time of each pass of an adaptive tessellation [ms], and its mesh.
+
+    The passes are those of the paper's Table 1, ``laplacian``, ``edge map`` and ``tessellate``, and ``vertices``, which
+    a graphics card does while it draws.
+    """
+    passed: list[Any] = [_heights(shadow_map)]
+    times = {}
+    stages = {
+        "laplacian": lambda height: edges(height, threshold),
+        "edge map": divide,
+        "tessellate": triangles,
+        "vertices": lambda corners: _adaptive_mesh(shadow_map, light, passed[0], corners),
+    }
+    for name, stage in stages.items():
+        start = perf_counter()
+        passed.append(stage(passed[-1]))
+        times[name] = 1e3 * (perf_counter() - start)
+    return times, passed[-1]
+
+
+def _heights(shadow_map: ShadowMap):
+    import numpy as np
+
+    side = shadow_map.size + 1
+    height = np.array(inverse_depth(shadow_map)).reshape(shadow_map.faces, side, side)
+    if not np.all(np.isfinite(height)):
+        raise InputError("light: a surface touches it, so that it has no light volume; move it off the surface")
+    return height
+
+
+def _static_mesh(shadow_map: ShadowMap, light: Light, height) -> VolumeMesh:
+    """Return the mesh of two triangles for each texel."""
+    import numpy as np
+
+    faces, size = shadow_map.faces, shadow_map.size
+    number, kept = _numbering(faces, size, np.ones(height.size, bool))
+    cells = 2 * faces * size * size
+    found = np.empty((cells + (4 * size if faces == 1 else 0), 3), np.int32)
+    if faces == 1:
+        found[cells:] = _sides(size, number, apex=len(kept))
+    grid, number = found[:cells].reshape(faces, size, size, 2, 3), number.reshape(height.shape)
+    steps = ((0, 0), (0, 1), (1, 1)), ((0, 0), (1, 1), (1, 0))  # (row, column)
+    for face in range(faces):
+        for which, three in enumerate(steps):
+            for k, (row, column) in enumerate(three[::-1] if face % 2 else three):
+                grid[face, ..., which, k] = number[face, row : row + size, column : column + size]
+    return VolumeMesh(_vertices(shadow_map, light, height, kept), found)
+
+
+def _adaptive_mesh(shadow_map: ShadowMap, light: Light, height, corners) -> VolumeMesh:
+    """Return the mesh of triangles between corners of texels: those that are used become its vertices."""
+    import numpy as np
+
+    faces, size = shadow_map.faces, shadow_map.size
+    used = np.zeros(height.size, bool)
+    used[corners] = True
+    number, kept = _numbering(faces, size, used)
+    found = number[corners]
+    if faces == 1:
+        found = np.concatenate([found, _sides(size, number, apex=len(kept))])
+    else:
+        mirrored = corners[:, 0] // (size + 1) ** 2 % 2 == 1
+        found[mirrored] = found[mirrored, ::-1]
+    return VolumeMesh(_vertices(shadow_map, light, height, kept), found)
+
+
+def _numbering(faces: int, size: int, used):
+    """Return the numbers of the vertices at all corners, and the corners that they are taken from."""
+    import numpy as np
+
+    if faces == 6:
+        twin, original = _welds(size)
+        used[original[used[twin]]] = True
+        used[twin] = False
+    number = np.cumsum(used, dtype=np.int32) - 1
+    number[~used] = -1
+    if faces == 6:
+        number[twin] = number[original]
+    return number, np.flatnonzero(used)
+
+
+def _sides(size: int, number, *, apex: int):
+    """Return the triangles between the vertices on the border of a spot's face and the light."""
+    import numpy as np
+
+    ring = number[_border(size)]
+    ring = ring[ring >= 0]
+    return np.stack([np.roll(ring, -1), ring, np.full(len(ring), apex, np.int32)], axis=1)
+
+
+def _vertices(shadow_map: ShadowMap, light: Light, height, kept):
+    """Return the homogeneous coordinates of corners of texels, in ascending order, and of a spot's light."""
+    import numpy as np
+
+    side = shadow_map.size + 1
+    place = np.array(light.position, dtype=float).ravel()
+    result = np.empty((len(kept) + (1 if shadow_map.frame else 0), 4))
+    result[len(kept) :] = (*place, 1)
+    starts = np.searchsorted(kept, np.arange(shadow_map.faces + 1) * side**2)
+    batch = 2**16  # what is in between stays in the cache
+    for face in range(shadow_map.faces):
+        for start in range(starts[face], starts[face + 1], batch):
+            some = slice(start, min(start + batch, starts[face + 1]))
+            numbers = (kept[some] - face * side**2).astype(np.int32)
+            row, column = np.divmod(numbers, side)
+            u, v = column * (2 / shadow_map.size) - 1, row * (2 / shadow_map.size) - 1
+            s = height[face].ravel()[numbers].astype(float)
+            for one, k in enumerate(_directions(shadow_map.frame, face, u, v)):
+                result[some, one] = place[one] * s + k
+            result[some, 3] = s
+    return result
+
+
+def _directions(frame, face: int, u, v) -> list[Any]:
+    """Return the coordinates of axis + u across + v up of a face."""
+    import numpy as np
+
+    if frame:
+        across, up, axis = (np.array(one, dtype=float).ravel() for one in frame)
+        return [axis[one] + u * across[one] + v * up[one] for one in range(3)]
+    cyclic = [1.0 - 2 * (face & 1), u, v]  # from the coordinate of the axis onwards
+    return [cyclic[(one - (face >> 1)) % 3] for one in range(3)]
+
+
+def _border(size: int):
+    """Return the corners on the border of a face, counter-clockwise in (u, v)."""
+    import numpy as np
+
+    along = np.arange(size)
+    side = size + 1
+    return np.concatenate([along, along * side + size, size * side + size - along, (size - along) * side])
+
+
+def _welds(size: int):
+    """Return the corners of a cube's faces that are the same as an earlier one, and that one."""
+    import numpy as np
+
+    face = np.repeat(np.arange(6), 4 * size)
+    border = np.tile(_border(size), 6)
+    row, column = np.divmod(border, size + 1)
+    lattice = np.empty((3, len(face)), np.int64)
+    for step, value in enumerate((size * (1 - (face & 1)), column, row)):
+        lattice[((face >> 1) + step) % 3, np.arange(len(face))] = value
+    numbers = face * (size + 1) ** 2 + border
+    key = np.ravel_multi_index(tuple(lattice), (size + 1,) * 3)
+    _, first, group = np.unique(key, return_index=True, return_inverse=True)
+    original = numbers[first[group]]
+    twin = original != numbers
+    return numbers[twin], original[twin]

@@ -1,0 +1,298 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Every triangle of a light volume against every pixel that it covers.
+
+A light volume is drawn (Billeter, Sintorn, Assarsson 2010, section 3) by its crossings with the ray of every pixel, in
+any order: `realtime.methods.light_volumes.published.signed_sum` adds them up.
+
+Scan conversion in homogeneous coordinates. A vertex (P w, w) becomes (a, b, z, w): with the depth z along the view and
+the point in the image at column a/z, row b/z. Nothing is divided before it must be, so a vertex at infinity (w = 0) is
+like any other and no near plane cuts triangles behind the camera (Olano, Greer 1997). The row j is a plane through the
+pinhole, b - j z = 0. With f = b - j z at the ends of an edge, f <= 0 at B and f > 0 at A, the edge crosses that plane
+at
+
+    C = f_A B - f_B A,       a combination with weights of 0 or more,
+
+in the image (z_C > 0) at the column a_C/z_C, or behind the camera. The two crossed edges of a triangle so bound its
+pixels in that row: those with left <= column < right. Where one of the ends is behind the camera, the segment leaves
+the image to the side on which it passes z = 0, and the span is a half line.
+
+Why it is watertight: fma(-j, z, b) has the sign of b - j z itself, and B and A are ordered by that sign, not by
+triangle. So the two triangles of an edge find the same bits for its column. In one row the segments of a closed mesh
+join into closed polygons, directed from the edge that goes up the image to the one that goes down. Every pixel that
+such a polygon passes to the right it passes to the left as well: the signs of the crossings before a camera outside the
+volume add up to exactly 0, before one inside it to exactly 1.
+
+Over a triangle w/z, the inverse depth, is linear in the image, and so it is along a span: it is found at the span's
+first and last pixel, as a combination of both ends with weights of 0 or more, and interpolated between the two. No
+determinant is divided by, and slivers do no harm.
+
+References
+----------
+Billeter, Sintorn, Assarsson 2010, *Real time volumetric shadows using polygonal light volumes*, HPG 2010. Olano, Greer
+1997, *Triangle scan conversion using 2D homogeneous coordinates*, Graphics Hardware.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from realtime.methods.light_volumes.published.mesh import VolumeMesh
+from realtime.scene.camera import Camera
+
+BATCH = 1 << 22  #: lanes of one batch: some 0.3 GB
+
+
+@dataclass(frozen=True)
+class Crossings:
+    """Crossings of camera rays with a mesh, one an entry."""
+
+    pixel: Any  #: row times width plus column
+    distance: Any  #: along the ray, 0 or more, may be infinite; float64 [m]
+    sign: Any  #: +1 along the triangle's normal, -1 against it; float64
+
+
+@dataclass(frozen=True)
+class _Spans:
+    """Pixels of one row that one triangle covers."""
+
+    count: Any  #: pixels; 0 where the triangle covers none
+    pixel: Any  #: the first
+    sign: Any  #: as in `Crossings`
+    inverse: Any  #: inverse depth at the first pixel [1/m]
+    step: Any  #: change of the inverse depth from pixel to pixel [1/m]
+
+
+def signed_crossings(mesh: VolumeMesh, camera: Camera, *, batch: int = BATCH) -> Iterator[Crossings]:
+    """Yield the crossings of the rays through all pixels with the triangles of a mesh.
+
+    Parameters
+    ----------
+    mesh
+        The mesh; vertices at infinity are as good as any.
+    camera
+        The camera; pixels are points at the centres of squares.
+    batch
+        Triangles, rows of triangles, and crossings that are held at a time.
+
+    Notes
+    -----
+    Valid for any mesh. For a closed one the signs of the crossings of each pixel add up to 0, or to 1 where the camera
+    is inside and normals point out; all that can go wrong is which, with a camera on the mesh. The yielded arrays are
+    not evaluated: what the caller does with them becomes one kernel with the expansion of the spans.
+    """
+    import mitsuba as mi
+    import numpy as np
+
+    screen = _project(mesh.vertices, camera)
+    for begin in range(0, len(mesh.triangles), batch):
+        corners = mi.UInt32(np.ascontiguousarray(mesh.triangles[begin : begin + batch], dtype=np.uint32).ravel())
+        triangle, first, rows = _rows(screen, corners, camera)
+        for owner, rank in _expand(rows, batch):
+            spans = _spans(screen, corners, camera, (triangle, first), owner, rank)
+            for span, column in _expand(spans.count, batch):
+                yield _crossings(spans, camera, span, column)
+
+
+def _camera_basis(camera: Camera):
+    """Return origin and (forward, left, up) as columns, in float64."""
+    import numpy as np
+
+    def read(vector):
+        return np.array(vector, dtype=np.float64).ravel()
+
+    low = (camera.forward_low, camera.left_low, camera.up_low)
+    basis = [read(high) + read(rest) for high, rest in zip((camera.forward, camera.left, camera.up), low)]
+    return read(camera.origin), np.stack(basis, axis=1)
+
+
+def _opaque(values):
+    """Return a vector of which no kernel knows the value, so that none is compiled anew when it changes."""
+    import drjit as dr
+    import mitsuba as mi
+
+    return mi.Vector3d(*(dr.opaque(mi.Float64, float(one)) for one in values))
+
+
+def _project(vertices, camera: Camera):
+    """Return (a, b, z, w) of all vertices, one after the other, in float64."""
+    import drjit as dr
+    import mitsuba as mi
+    import numpy as np
+
+    origin, basis = _camera_basis(camera)
+    depth, left, up = np.linalg.inv(basis)
+    to_column, to_row = 0.5 * (camera.width - 1) * depth - left, 0.5 * (camera.height - 1) * depth - up
+    vertices = np.ascontiguousarray(vertices, dtype=np.float64)
+    number = dr.arange(mi.UInt32, len(vertices))
+    vertex = dr.gather(mi.Vector4d, mi.Float64(vertices.ravel()), number)
+    offset = dr.fma(_opaque(-origin), vertex.w, mi.Vector3d(vertex.x, vertex.y, vertex.z))
+    seen = [dr.dot(_opaque(line), offset) for line in (to_column, to_row, depth)]
+    screen = dr.empty(mi.Float64, 4 * len(vertices))
+    dr.scatter(screen, mi.Vector4d(*seen, vertex.w), number)
+    dr.eval(screen)
+    return screen
+
+
+def _corners(screen, corners, triangle):
+    """Return the corners (a, b, z, w) of triangles."""
+    import drjit as dr
+    import mitsuba as mi
+
+    number = [dr.gather(mi.UInt32, corners, 3 * triangle + k) for k in range(3)]
+    return [dr.gather(mi.Vector4d, screen, one) for one in number]
+
+
+def _rows(screen, corners, camera: Camera):
+    """Return the triangles that may cover pixels, the first row of each, and how many rows it may cover."""
+    import drjit as dr
+    import mitsuba as mi
+
+    vertices = _corners(screen, corners, dr.arange(mi.UInt32, dr.width(corners) // 3))
+    depth = [v.z for v in vertices]
+    column0, column1 = _pixel_range([v.x for v in vertices], depth, camera.width)
+    row0, row1 = _pixel_range([v.y for v in vertices], depth, camera.height)
+    count = dr.select(column0 < column1, row1 - row0, 0)
+    dr.eval(row0, count)
+    triangle = dr.compress(count > 0)
+    return triangle, dr.gather(mi.UInt32, row0, triangle), dr.gather(mi.UInt32, count, triangle)
+
+
+def _pixel_range(values, depth, size: int):
+    """Return first and end of the whole numbers that the part of triangles before the camera covers, or a few more.
+
+    `values` over `depth` are coordinates in the image. A slack of 1e-6 pixel is far above rounding: what is left out
+    here covers no pixel by the exact rule either.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    low, high = mi.Float64(dr.inf), mi.Float64(-dr.inf)
+    for value, z in zip(values, depth):
+        at = value / z
+        low, high = dr.select(z > 0, dr.minimum(low, at), low), dr.select(z > 0, dr.maximum(high, at), high)
+    for k, m in ((0, 1), (1, 2), (2, 0)):
+        # Where an edge passes z = 0 it leaves the image on the side of its value there; in doubt, on both.
+        cut = (depth[k] > 0) ^ (depth[m] > 0)
+        one, other = values[k] * dr.abs(depth[m]), values[m] * dr.abs(depth[k])
+        doubt = 1e-12 * (dr.abs(one) + dr.abs(other))
+        low = dr.select(cut & (one + other <= doubt), -dr.inf, low)
+        high = dr.select(cut & (one + other >= -doubt), dr.inf, high)
+    begin, end = (dr.clip(dr.ceil(edge), 0, size) for edge in (low - 1e-6, high + 1e-6))
+    return mi.UInt32(begin), dr.maximum(mi.UInt32(end), mi.UInt32(begin))
+
+
+def _expand(count, limit: int):
+    """Yield (number, rank) for all ranks below count[number], number by number, at most about `limit` at a time."""
+    import drjit as dr
+    import mitsuba as mi
+    import numpy as np
+
+    if dr.width(count) == 0:
+        return
+    used = dr.compress(count > 0)
+    ends = np.cumsum(np.array(dr.gather(mi.UInt32, count, used)), dtype=np.int64)
+    begin = before = 0
+    while begin < len(ends):
+        # One that is larger than the limit comes alone; it is the width or the height of an image at most.
+        end = max(begin + 1, int(np.searchsorted(ends, before + limit, side="right")))
+        starts = np.concatenate(([before], ends[begin : end - 1])) - before
+        start = mi.UInt32(starts.astype(np.uint32))
+        mark = dr.zeros(mi.UInt32, int(ends[end - 1] - before))
+        dr.scatter(mark, mi.UInt32(1), start)
+        here = dr.cumsum(mark) - 1
+        number = dr.gather(mi.UInt32, used, here + begin)
+        yield number, dr.arange(mi.UInt32, dr.width(mark)) - dr.gather(mi.UInt32, start, here)
+        begin, before = end, int(ends[end - 1])
+
+
+def _spans(screen, corners, camera: Camera, found, owner, rank) -> _Spans:
+    """Return the pixels that triangles cover in rows, by the rule of the module."""
+    import drjit as dr
+    import mitsuba as mi
+    import numpy as np
+
+    triangle, first = (dr.gather(mi.UInt32, values, owner) for values in found)
+    row = first + rank
+    down, up = _row_segment(_corners(screen, corners, triangle), mi.Float64(row))
+    columns = [_first_right_of(one, other, camera.width) for one, other in ((down, up), (up, down))]
+    begin, end = dr.minimum(*columns), dr.maximum(*columns)
+    count = dr.select((down.z > 0) | (up.z > 0), end - begin, 0)
+    up_is_left = columns[1] < columns[0]
+    left, right = dr.select(up_is_left, up, down), dr.select(up_is_left, down, up)
+    inverse = _inverse_depth(left, right, mi.Float64(begin))
+    last = _inverse_depth(left, right, mi.Float64(end - 1))
+    step = (last - inverse) / dr.maximum(mi.Float64(count) - 1, 1)
+    # Seen from behind the normal, a triangle goes down on its right.
+    handedness = float(np.sign(np.linalg.det(_camera_basis(camera)[1])))
+    sign = dr.select(up_is_left, mi.Float64(handedness), -handedness)
+    spans = _Spans(mi.UInt32(count), row * camera.width + mi.UInt32(begin), sign, inverse, step)
+    dr.eval(spans.count, spans.pixel, spans.sign, spans.inverse, spans.step)
+    return spans
+
+
+def _row_segment(vertices, row):
+    """Return where triangles cross the plane of a row: on the edges that go down and up the image; z = 0 if nowhere."""
+    import drjit as dr
+    import mitsuba as mi
+
+    side = [dr.fma(-row, v.z, v.y) for v in vertices]
+    below = [f > 0 for f in side]
+    # The vertex that is alone on its side of the row is at the end of both edges.
+    alone = [below[1] == below[2], below[2] == below[0]]
+
+    def pick(values):
+        return dr.select(alone[0], values[0], dr.select(alone[1], values[1], values[2]))
+
+    vertex, after, before = ([*vertices[k:], *vertices[:k]] for k in range(3))
+    f, f_after, f_before = ([*side[k:], *side[:k]] for k in range(3))
+    one = pick(vertex), pick(f)
+    other = pick(after), pick(f_after)
+    third = pick(before), pick(f_before)
+    is_below = one[1] > 0
+    crossed = (below[0] != below[1]) | (below[1] != below[2])
+
+    def cross(end):
+        above, under = (dr.select(is_below, x, y) for x, y in ((end[0], one[0]), (one[0], end[0])))
+        weight, other_weight = dr.select(is_below, one[1], end[1]), -dr.select(is_below, end[1], one[1])
+        return dr.select(crossed, dr.fma(above, weight, under * other_weight), mi.Vector4d(0))
+
+    leaving, arriving = cross(other), cross(third)
+    return dr.select(is_below, arriving, leaving), dr.select(is_below, leaving, arriving)
+
+
+def _first_right_of(point, other, width: int):
+    """Return the first column right of or at one end of a segment in the plane of a row, from 0 to `width`."""
+    import drjit as dr
+    import mitsuba as mi
+
+    # An end behind the camera is as far to the side as the segment passes z = 0.
+    edge = dr.select(other.x * -point.z + point.x * other.z >= 0, mi.Float64(dr.inf), -dr.inf)
+    return mi.Int32(dr.clip(dr.ceil(dr.select(point.z > 0, point.x / point.z, edge)), 0, width))
+
+
+def _inverse_depth(left, right, column):
+    """Return w/z where the segment between two points of a row passes a column."""
+    import drjit as dr
+
+    # Between left and right both are 0 or more; rounding must not take them below.
+    of_left = dr.maximum(dr.fma(-column, right.z, right.x), 0)
+    of_right = dr.maximum(dr.fma(column, left.z, -left.x), 0)
+    nowhere = (of_left + of_right) == 0
+    of_left, of_right = dr.select(nowhere, 1, of_left), dr.select(nowhere, 1, of_right)
+    depth = dr.fma(of_left, left.z, of_right * right.z)
+    return dr.fma(of_left, left.w, of_right * right.w) / dr.maximum(depth, 1e-300)
+
+
+def _crossings(spans: _Spans, camera: Camera, span, step) -> Crossings:
+    """Return the crossings of pixels: the span of each, and how many pixels come before it there."""
+    import drjit as dr
+    import mitsuba as mi
+
+    pixel = dr.gather(mi.UInt32, spans.pixel, span) + step
+    first, change, sign = (dr.gather(mi.Float64, one, span) for one in (spans.inverse, spans.step, spans.sign))
+    inverse = dr.maximum(dr.fma(mi.Float64(step), change, first), 0)
+    row = pixel // camera.width
+    across = 0.5 * (camera.width - 1) - mi.Float64(pixel - row * camera.width)
+    upward = 0.5 * (camera.height - 1) - mi.Float64(row)
+    forward, left, up = (_opaque(column) for column in _camera_basis(camera)[1].T)
+    return Crossings(pixel, dr.norm(forward + left * across + up * upward) / inverse, sign)

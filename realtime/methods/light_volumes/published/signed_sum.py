@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The airlight of a light volume: a signed sum over the crossings of camera rays with its boundary.
+
+With J(x) the airlight of a lit ray up to x, a ray has the airlight sum_k s_k J(x_k), s = +1 where it leaves the light
+and -1 where it enters it (Billeter, Sintorn, Assarsson 2010, eq. 3). The order does not matter. The visible surface is
+at D, and crossings behind it count as crossings at D.
+"""
+
+from collections.abc import Iterable
+from dataclasses import fields
+from typing import Any
+
+from realtime.kernels.registry import airlight_integral
+from realtime.methods.light_volumes.published.mesh import VolumeMesh
+from realtime.methods.light_volumes.published.raster import BATCH, Crossings, signed_crossings
+from realtime.methods.view import View, radiance
+from realtime.rays.ray_light import RayGeometry, ray_geometry
+from realtime.scene.lights import Light
+from realtime.scene.medium import Medium
+
+
+def crossing_sum(
+    batches: Iterable[Crossings],
+    *,
+    kernel,
+    geometry: RayGeometry,
+    distance,
+    medium: Medium,
+    light: Light,
+    lane: Any = None,
+) -> Any:
+    """Return J along the lit parts of rays, the signed sum over their crossings [1/m].
+
+    Parameters
+    ----------
+    batches
+        From `realtime.methods.light_volumes.published.raster.signed_crossings`.
+    kernel
+        An airlight kernel function, see `realtime.kernels`.
+    geometry, distance
+        The rays and the distances to the visible surface, one entry per pixel [m].
+    medium, light
+        What fills the scene and what lights it; the cone of a spot clips every crossing.
+    lane
+        By pixel number its entry in `geometry` and `distance`; None where entries are in the order of the image.
+
+    Notes
+    -----
+    Valid for a closed mesh. With eq. 3 as it stands, every crossing beyond the light has the large airlight about the
+    light, and what rounding leaves of it where they cancel is visible. As J(0, x) = J(0, D) - J(x, D), the sum is also
+
+        n J(0, D) + sum_{x_k < foot} s_k J(0, x_k) - sum_{foot <= x_k < D} s_k J(x_k, D),
+
+    with n the sum of the signs of the crossings at or beyond the foot, or at the surface: a whole number, 1 where the
+    point next to the light is lit and 0 where it is not. No other term contains the airlight about the light, and
+    crossings at the surface cost nothing. Terms have the precision of the rays and are added up in float64.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    Float = type(distance)
+    grey = len(medium.sigma_t) == 1
+    total = dr.zeros(mi.Float64 if grey else mi.Color3d, dr.width(distance))
+    beyond = dr.zeros(mi.Float64, dr.width(distance))
+
+    def add(index, x0, x1, sign):
+        dr.eval(index, x0, x1, sign)  # so that all calls are one kernel: compiling it is what takes time
+        columns = (getattr(geometry, field.name) for field in fields(RayGeometry))
+        rays = RayGeometry(*(None if one is None else dr.gather(Float, one, index) for one in columns))
+        term = airlight_integral(kernel, rays, x0, x1, medium=medium, light=light)
+        dr.scatter_add(total, type(total)(term) * sign, index)
+        dr.eval(total)
+
+    for found in batches:
+        index = found.pixel if lane is None else dr.gather(mi.UInt32, lane, found.pixel)
+        x, sign = Float(found.distance), found.sign
+        in_front = x < dr.gather(Float, distance, index)
+        is_beyond = ~in_front | (x >= dr.gather(Float, geometry.foot, index))
+        dr.scatter_add(beyond, sign, index, is_beyond)
+        dr.eval(beyond, index, x, sign, in_front)
+        some = dr.compress(in_front)
+        if dr.width(some) == 0:
+            continue
+        index, x, sign = (dr.gather(type(one), one, some) for one in (index, x, sign))
+        near = x < dr.gather(Float, geometry.foot, index)
+        end = dr.select(near, x, dr.gather(Float, distance, index))
+        add(index, dr.select(near, 0, x), end, dr.select(near, sign, -sign))
+    whole = dr.compress(beyond != 0)
+    if dr.width(whole):
+        zero = dr.opaque(Float, 0, dr.width(whole))
+        add(whole, zero, dr.gather(Float, distance, whole), dr.gather(mi.Float64, beyond, whole))
+    return Float(total) if grey else type(medium.albedo)(total)
+
+
+def mesh_airlight(view: View, light: Light, mesh: VolumeMesh, *, kernel, batch: int = BATCH):
+    """Return the airlight of one light by the triangles of its light volume [W/(m^2 sr)].
+
+    Parameters
+    ----------
+    view
+        The frame; its rays are those of all pixels of its camera.
+    light
+        The light.
+    mesh
+        Its light volume, closed.
+    kernel
+        An airlight kernel function.
+    batch
+        See `realtime.methods.light_volumes.published.raster.signed_crossings`.
+
+    Notes
+    -----
+    Valid for homogeneous media that fill all space. The number of crossings is counted on the way: not for a frozen
+    function.
+
+    References
+    ----------
+    Billeter, Sintorn, Assarsson 2010, eq. 3.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
+    lane = dr.zeros(mi.UInt32, view.camera.width * view.camera.height)
+    dr.scatter(lane, dr.arange(mi.UInt32, dr.width(view.pixel)), view.pixel)
+    distance = view.distance
+    dr.eval(geometry, lane, distance)  # every crossing reads them
+    rays = {"geometry": geometry, "distance": distance, "medium": view.medium, "light": light, "lane": lane}
+    return radiance(
+        view.medium, light, crossing_sum(signed_crossings(mesh, view.camera, batch=batch), kernel=kernel, **rays)
+    )

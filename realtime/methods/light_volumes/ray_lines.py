@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Camera rays in the projective coordinates of a face of a shadow map.
+
+With the camera at a0 across + b0 up + c0 axis from the light and the direction (da, db, dc) likewise, the point at x
+has
+
+    u = (a0 + x da) / c,   v = (b0 + x db) / c,   s = 1 / c,   c = c0 + x dc,
+
+and y = x / c. All four are linear along the projective line: with t from 0 to 1 between two points of the ray, each is
+(1 - t) its value at one and t its value at the other, and x = y / s. At the end of an endless ray s = 0 and y = 1 / dc.
+
+Of a directional light's face u, v and s = -c are linear in x itself, so y = x with weight 1 in place of s; the
+ray is cut where s = 0, and all before the largest height is lit.
+
+The part of the ray in the face is cut out by c + a >= 0, c - a >= 0, c + b >= 0, c - b >= 0. A ray that stays on the
+border of two faces is in one of them, that of the first axis: neighbours compute the same numbers there, with opposite
+signs. The line t goes over the part of it beyond the nearest height of the face: all before that is lit.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+from realtime.methods.light_volumes.height_field import LightHeights, node_bounds
+from realtime.shadow_maps.shadow_map import face_coordinates, parallel_coordinates
+
+_NEARER = 1 - 1e-4  # of the nearest height, with room for rounding
+_STEEP = 1e30  # stands for 1/0: lines that are never crossed lie far beyond [0, 1]
+
+
+@dataclass
+class FaceRay:
+    """A ray in a face; the coordinates are those of its line at t = 0 and t = 1."""
+
+    begin: Any  #: the part of the ray in the face [m]
+    end: Any
+    walks: Any  #: whether any of it lies beyond the nearest height
+    u: tuple[Any, Any]  #: columns [texels]
+    v: tuple[Any, Any]  #: rows [texels]
+    s: tuple[Any, Any]  #: [1/m]
+    y: tuple[Any, Any]  #: x s, or x itself where rays of light are parallel
+    per_u: Any  #: dt/du, positive where u stays the same
+    per_v: Any
+    per_diagonal: Any  #: dt/d(v - u)
+    parallel: bool = False  #: whether the rays of the light are parallel
+    stops: Any = False  #: whether the ray ends in the face, and does not go on in another one
+
+
+def in_face(heights: LightHeights, face, away, direction, segment):
+    """Return the part of a segment of rays that lies in a face, x0 >= x1 where none does; see `face_ray`."""
+    import drjit as dr
+
+    a0, b0, c0 = face_coordinates(heights.frame, face, away)
+    da, db, dc = face_coordinates(heights.frame, face, direction)
+    begin, end = segment
+    if heights.depth is not None:
+        (a0, b0, c0), (da, db, dc) = (parallel_coordinates(heights.frame, one) for one in (away, direction))
+        begin, end = _cut(begin, end, -c0, -dc)
+        c0, dc = type(c0)(1), type(dc)(0)
+    # The neighbours across come later in the order of axes, but for the last axis; those above only for the first one.
+    for start, slope, is_first in (
+        (c0 + a0, dc + da, face < 4),
+        (c0 - a0, dc - da, face < 4),
+        (c0 + b0, dc + db, face < 2),
+        (c0 - b0, dc - db, face < 2),
+    ):
+        begin, end = _cut(begin, end, start, slope)
+        end = dr.select((slope == 0) & (start == 0) & ~is_first, begin, end)
+    return begin, end
+
+
+def face_ray(heights: LightHeights, face, away, direction, segment) -> FaceRay:
+    """Return rays in a face.
+
+    Parameters
+    ----------
+    heights
+        The height field.
+    face
+        Number of the face.
+    away
+        The camera less the light [m].
+    direction
+        Unit directions.
+    segment
+        The distances (x0, x1) of the part in the face; `x1` may be infinite.
+    """
+    import mitsuba as mi
+
+    a0, b0, c0 = face_coordinates(heights.frame, face, away)
+    da, db, dc = face_coordinates(heights.frame, face, direction)
+    begin, end = segment
+    zero = mi.UInt32(0)
+    _, highest = node_bounds(heights, face, zero, zero, zero)
+    if heights.depth is not None:
+        (a0, b0, c0), (da, db, dc) = (parallel_coordinates(heights.frame, one) for one in (away, direction))
+        t0, t1 = _cut(begin, end, highest / _NEARER + c0, dc)
+        walks = (t0 < t1) & (highest > 0)
+        ends = [_parallel_coordinates(heights.size, x, (a0, b0, -c0), (da, db, -dc), walks) for x in (t0, t1)]
+        return _face_ray(begin, end, walks, ends, parallel=True)
+    nearest = _NEARER / highest  # infinite where nothing is hit: all is lit
+    t0, t1 = _cut(begin, end, c0 - nearest, dc)
+    walks = (t0 < t1) & (highest > 0)
+    ends = [_coordinates(heights.size, x, (a0, b0, c0), (da, db, dc), nearest) for x in (t0, t1)]
+    return _face_ray(begin, end, walks, ends)
+
+
+def _face_ray(begin, end, walks, ends, *, parallel: bool = False) -> FaceRay:
+    u, v, s, y = zip(*ends)
+    across, upward = u[1] - u[0], v[1] - v[0]
+    per_u, per_v, per_diagonal = (_inverse(length) for length in (across, upward, upward - across))
+    return FaceRay(begin, end, walks, u, v, s, y, per_u, per_v, per_diagonal, parallel)
+
+
+def _cut(begin, end, start, slope):
+    """Cut a segment down to where start + x slope >= 0."""
+    import drjit as dr
+
+    at = -start / slope
+    begin = dr.select(slope > 0, dr.maximum(begin, at), begin)
+    end = dr.select(slope < 0, dr.minimum(end, at), end)
+    return begin, dr.select((slope == 0) & (start < 0), begin, end)
+
+
+def _coordinates(size: int, x, origin, direction, nearest):
+    """Return u, v [texels], s and y of the point at x."""
+    import drjit as dr
+
+    finite = dr.isfinite(x)
+    at = dr.select(finite, x, 0)
+    a, b, c = (dr.select(finite, dr.fma(at, d, o), d) for o, d in zip(origin, direction))
+    inverse = dr.rcp(dr.select(finite, dr.maximum(c, nearest), c))
+    half = 0.5 * size
+    # Just within the last column and row: a line along the far border would lie in none.
+    last = size * (1 - dr.epsilon(type(x)))
+    u, v = (dr.clip(dr.fma(half * p, inverse, half), 0, last) for p in (a, b))
+    return u, v, dr.select(finite, inverse, 0), dr.select(finite, at * inverse, inverse)
+
+
+def _parallel_coordinates(size: int, x, origin, direction, walks):
+    """Return u, v [texels], s and x of the point at x, or of any point where the line does not walk."""
+    import drjit as dr
+
+    at = dr.select(walks, x, 0)
+    a, b, s = (dr.fma(at, d, o) for o, d in zip(origin, direction))
+    half = 0.5 * size
+    last = size * (1 - dr.epsilon(type(x)))
+    u, v = (dr.clip(dr.fma(half, p, half), 0, last) for p in (a, b))
+    return u, v, s, at
+
+
+def _inverse(length):
+    import drjit as dr
+
+    return dr.select(dr.abs(length) < 1 / _STEEP, _STEEP, 1 / length)
+
+
+def at_line(pair, t):
+    """Return a coordinate of the line at t."""
+    import drjit as dr
+
+    return dr.fma(t, pair[1], dr.fma(-t, pair[0], pair[0]))
+
+
+def distance_at(ray: FaceRay, t):
+    """Return the distance x along the ray at t [m]."""
+    return at_line(ray.y, t) if ray.parallel else at_line(ray.y, t) / at_line(ray.s, t)

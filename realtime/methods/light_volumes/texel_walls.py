@@ -1,0 +1,191 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The height field over a texel on whose sides upright walls stand: see `realtime.methods.light_volumes.jump_search`.
+
+A texel's walls are one whole number: a byte for each side, 0 or 1 + the number of the place where the wall stands. Both
+texels of a side hold the same byte. On a side with a wall the height is that of the one corner up to the wall and that
+of the other beyond it; on a side without, it is linear. A side looks the same from both of its texels, so all that
+holds of crossings in `realtime.methods.light_volumes.crossings` holds still: between two ends of a ray the number of
+changes of sign says whether both are lit.
+
+One straight line divides the texel into two parts, each under a plane; where these differ a wall stands on the line:
+
+* where walls on two sides that meet cut a corner off, the line joins them. The corner's part has its height, the other
+  the plane through the other three corners;
+* where walls stand on two sides across from each other, the line joins them. Each part has the heights of the side that
+  lies in it;
+* else the line is the diagonal from (0, 0) to (1, 1), between two triangles, as without walls.
+
+A plane through three corners may leave their range towards the fourth: `walled_heights` widens the bounds that tiles go
+by. Beside a corner that is cut off the border and the plane differ by the slope over a part of a texel, and of walls on
+three or four sides one or two end at the border: there a step stands on the border itself, and which side of it is lit
+says the border.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from realtime.methods.light_volumes.height_field import LightHeights, level_start, texel_heights
+
+PLACES = 64  #: on a side, where a wall may stand: what is smaller costs rays, and outlines between two sides are bent
+BOTTOM, TOP, LEFT, RIGHT = range(4)  #: sides of a texel, v = 0, v = 1, u = 0 and u = 1, by their bytes
+
+
+Numbers = tuple[Any, Any, Any]
+
+
+@dataclass
+class Side:
+    """The wall on a side of a texel, which goes from its corner of lower u or v to the other."""
+
+    stands: Any  #: whether there is one
+    place: Any  #: where, from 0 to 1
+
+
+def side_of(walls, side, Float) -> Side:
+    """Return the wall on one side of a texel with the numbers `walls`; `side` may depend on the lane."""
+    import drjit as dr
+
+    number = (walls >> (8 * side)) & 0xFF
+    return Side(number != 0, dr.fma(Float(number), 1 / PLACES, -0.5 / PLACES))
+
+
+@dataclass
+class Parts:
+    """The two parts of a texel; each triple c0, cx, cy stands for c0 + cx x + cy y."""
+
+    line: Numbers  #: above 0 in the second part
+    first: Numbers  #: height over the first part
+    second: Numbers  #: height over the second part
+
+
+def parts_of(four, walls, Float) -> Parts:
+    """Return the parts of a texel with four heights and the walls of a number, see
+    `realtime.methods.light_volumes.jump_search`.
+    """
+    import drjit as dr
+
+    s00, s10, s01, s11 = four
+    bottom, top, left, right = sides = _sides_of(walls, Float)
+    cut = _cuts_corner(sides)
+    upright = bottom.stands & top.stands
+    level = left.stands & right.stands & ~upright
+    zero, one = Float(0), Float(1)
+    line = _select(upright, (-bottom.place, one, bottom.place - top.place), (zero, one, -one))
+    line = _select(level, (-left.place, left.place - right.place, one), line)
+    line = _select(cut, _cut_line(bottom, top, left, right), line)
+    below, above, before, behind = s10 - s00, s11 - s01, s01 - s00, s11 - s10
+    corner = dr.select(right.stands, dr.select(top.stands, s11, s10), dr.select(top.stands, s01, s00))
+    first = (
+        dr.select(cut, corner, s00),
+        dr.select(cut | upright, zero, dr.select(level, below, above)),
+        dr.select(cut | level, zero, before),
+    )
+    at_zero = dr.select(bottom.stands & left.stands, s10 - above, s00)
+    second = (
+        dr.select(cut, at_zero, dr.select(upright, s10, dr.select(level, s01, s00))),
+        dr.select(upright, zero, dr.select(level | (cut & bottom.stands), above, below)),
+        dr.select(level, zero, dr.select(cut & ~left.stands, before, behind)),
+    )
+    return Parts(line, first, second)
+
+
+def _sides_of(walls, Float) -> list[Side]:
+    """Return the walls on the bottom, top, left and right of a texel."""
+    return [side_of(walls, side, Float) for side in (BOTTOM, TOP, LEFT, RIGHT)]
+
+
+def _cuts_corner(sides: list[Side]):
+    """Return whether there are two walls, on sides that meet."""
+    bottom, top, left, right = (side.stands for side in sides)
+    return (bottom ^ top) & (left ^ right)
+
+
+def _cut_line(bottom: Side, top: Side, left: Side, right: Side) -> Numbers:
+    """Return the line through the walls of two sides that meet, below 0 at the corner between them."""
+    import drjit as dr
+
+    Float = type(bottom.place)
+    x, y = dr.select(bottom.stands, bottom.place, top.place), dr.select(left.stands, left.place, right.place)
+    corner_x, corner_y = dr.select(right.stands, Float(1), 0), dr.select(top.stands, Float(1), 0)
+    # Distances from the corner over those of the walls from it: their sum is 1 on the line.
+    per_x, per_y = dr.rcp(x - corner_x), dr.rcp(y - corner_y)
+    return -1 - corner_x * per_x - corner_y * per_y, per_x, per_y
+
+
+def _select(condition, one: Numbers, other: Numbers) -> Numbers:
+    import drjit as dr
+
+    a, b, c = (dr.select(condition, *pair) for pair in zip(one, other))
+    return a, b, c
+
+
+def value_at(numbers: Numbers, x, y):
+    """Return c0 + cx x + cy y."""
+    import drjit as dr
+
+    return dr.fma(numbers[1], x, dr.fma(numbers[2], y, numbers[0]))
+
+
+def height_at(parts: Parts, second, x, y):
+    """Return the height at a point by the plane of the second part, or of the first."""
+    import drjit as dr
+
+    return dr.select(second, value_at(parts.second, x, y), value_at(parts.first, x, y))
+
+
+def height_in(parts: Parts, x, y):
+    """Return the height at a point of a texel."""
+    return height_at(parts, value_at(parts.line, x, y) > 0, x, y)
+
+
+def walled_heights(heights: LightHeights, walls, texels) -> LightHeights:
+    """Return a height field with walls in its texels, and the bounds of its nodes as these need them.
+
+    Parameters
+    ----------
+    heights
+        The height field.
+    walls
+        The number of each texel.
+    texels
+        Those that may have walls; some may be there more than once.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    bounds, gaps = heights.bounds + 0, heights.gaps + 0
+    if dr.width(texels):
+        size = heights.size
+        row = texels // size
+        face, i = row // size, texels - row * size
+        _widen(heights, (bounds, gaps), (face, i, row - face * size), dr.gather(mi.UInt32, walls, texels))
+    dr.eval(bounds, gaps)
+    return replace(heights, bounds=bounds, gaps=gaps, walls=walls)
+
+
+def _widen(heights: LightHeights, arrays, texel, walls) -> None:
+    """Widen bounds and gaps to hold the planes over texels with a corner cut off."""
+    import drjit as dr
+    import mitsuba as mi
+
+    (bounds, gaps), mode = arrays, dr.ReduceMode.Direct  # few: no copies of the arrays for each thread
+    face, i, j = texel
+    four = texel_heights(heights, face, i, j)
+    sides = _sides_of(walls, type(bounds))
+    cut, (_, top, _, right) = _cuts_corner(sides), (side.stands for side in sides)
+    # The plane at the corner that is cut off, the farthest that it can come to.
+    ends = dr.select(right == top, four[1] + four[2], four[0] + four[3])
+    value = ends - dr.select(right, dr.select(top, four[0], four[2]), dr.select(top, four[1], four[3]))
+    value = dr.maximum(value, 0)  # no ray comes below
+    low, high = cut & (value < dr.min(four)), cut & (value > dr.max(four))
+    for level in range(heights.finest + 1):
+        shift = heights.finest + 2 - level
+        node = face * heights.nodes + level_start(level) + ((j >> shift) << level) + (i >> shift)
+        dr.scatter_reduce(dr.ReduceOp.Min, bounds, value, 2 * node, low, mode)
+        dr.scatter_reduce(dr.ReduceOp.Max, bounds, value, 2 * node + 1, high, mode)
+    leaf = (((face << heights.finest) + (j >> 2)) << heights.finest) + (i >> 2)
+    bit = mi.UInt32(1) << ((i & 3) + 4 * (j & 3))
+    sorted_as = dr.gather(mi.UInt32, heights.sides, leaf)
+    below, both = (sorted_as & bit) != 0, (sorted_as & (bit << 16)) != 0
+    dr.scatter_reduce(dr.ReduceOp.Max, gaps, value, 2 * leaf, high & below, mode)
+    dr.scatter_reduce(dr.ReduceOp.Min, gaps, value, 2 * leaf + 1, low & ~below & ~both, mode)

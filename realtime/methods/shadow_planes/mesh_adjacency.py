@@ -1,0 +1,273 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Shadow casters: the triangles of a scene and how they hang together.
+
+Adjacency is computed once; when a light moves only signs change (`realtime.methods.shadow_planes.silhouettes`), when
+an object moves only its vertices (`moved`).
+
+Vertices that coincide exactly are one vertex: meshes come with seams where texture coordinates differ. An edge is met
+by *half-edges*, one for each triangle at it, each with a direction. Half-edges of an edge are paired, opposite ones
+first, and each pair is one entry of `Casters.edges`; one that finds no partner is an entry whose second triangle is
+`Casters.none`. So a manifold edge is one entry, a border edge one with a single triangle, and an edge at which four
+triangles meet two entries: their sum is the same whichever way they are paired.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realtime.errors import InputError
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int32]
+
+
+@dataclass(frozen=True)
+class Casters:
+    """Triangles that cast shadows, with their adjacency."""
+
+    vertices: Array  #: positions [m], (vertices, 3)
+    triangles: Index  #: vertex numbers, (triangles, 3)
+    normals: Array  #: (v1 - v0) x (v2 - v0) [m^2], (triangles, 3)
+    offsets: Array  #: normal . v0 [m^3], (triangles,)
+    edges: Index  #: vertex numbers of the entries, (entries, 2)
+    left: Index  #: triangle that runs along the entry from its first vertex to its second
+    right: Index  #: the other triangle, or `none`
+    same_way: NDArray[np.bool_]  #: whether `right` runs along the entry in the same direction as `left`
+    body: Index  #: connected part that each triangle belongs to
+    closed: NDArray[np.bool_]  #: by body: whether every edge is met as often one way as the other
+    boxes: Array  #: by body: lower and upper corner of its bounding box [m], (bodies, 2, 3)
+    shapes: tuple[tuple[str, int, Index], ...]  #: name, its first vertex, and which of the shape's own each one is
+    warnings: tuple[str, ...] = ()  #: what is odd about the meshes, by name
+
+    @property
+    def none(self) -> int:
+        """The number that stands for no triangle."""
+        return len(self.triangles)
+
+
+def read_casters(scene) -> Casters:
+    """Read the triangles of a Mitsuba scene.
+
+    Parameters
+    ----------
+    scene
+        An `mi.Scene`; shapes whose surface lets light pass (`null`) cast no shadow.
+
+    Raises
+    ------
+    InputError
+        For a shape that has no triangles, with its name.
+    """
+    import mitsuba as mi
+
+    meshes = []
+    for shape in scene.shapes():
+        if shape.bsdf() is not None and mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.Null):
+            continue
+        meshes.append((shape.id(), *_triangles(shape)))
+    return make_casters(meshes)
+
+
+def make_casters(meshes) -> Casters:
+    """Return the casters of meshes.
+
+    Parameters
+    ----------
+    meshes
+        (name, vertices (n, 3) [m], triangles (m, 3)) each. Triangles with a vertex twice and repeated ones are left
+        out, the latter with a warning.
+    """
+    parts, warnings, shapes, first_vertex, first_body = [], [], [], 0, 0
+    for name, vertices, triangles in meshes:
+        part, remarks, own = _mesh_part(name, vertices, triangles)
+        shapes.append((name, first_vertex, own))
+        parts.append(_shifted(part, first_vertex, first_body))
+        first_vertex += len(part["vertices"])
+        first_body += len(part["closed"])
+        warnings += remarks
+    if not parts:
+        parts = [_mesh_part("none", np.zeros((0, 3)), np.zeros((0, 3), dtype=int))[0]]
+    first_triangle = np.cumsum([0] + [len(part["triangles"]) for part in parts])
+    for part, first in zip(parts, first_triangle):
+        count = len(part["triangles"])
+        for side in ("left", "right"):
+            part[side] = np.where(part[side] == count, first_triangle[-1], part[side] + first)
+    joined = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
+    for key in ("triangles", "edges", "left", "right", "body"):
+        joined[key] = np.ascontiguousarray(joined[key], dtype=np.int32)
+    return Casters(**joined, shapes=tuple(shapes), warnings=tuple(warnings))
+
+
+def moved(casters: Casters, vertices: Array) -> Casters:
+    """Return the casters with their vertices elsewhere; adjacency stays."""
+    normals, offsets = _planes(vertices, casters.triangles)
+    boxes = _boxes(vertices, casters.triangles, casters.body, len(casters.closed))
+    return replace(casters, vertices=vertices, normals=normals, offsets=offsets, boxes=boxes)
+
+
+def with_positions(casters: Casters, positions: Mapping[str, Array]) -> Casters:
+    """Return the casters with the vertices of some shapes elsewhere; `positions` are those of the shapes [m]."""
+    if not positions:
+        return casters
+    vertices = casters.vertices.copy()
+    for name, first, own in casters.shapes:
+        if name in positions:
+            vertices[first : first + len(own)] = positions[name][own]
+    return moved(casters, vertices)
+
+
+def mesh_triangles(mesh) -> tuple[Array, NDArray[np.int64]]:
+    """Return the vertices [m] and the triangles of a Mitsuba mesh, (vertices, 3) and (triangles, 3)."""
+    import drjit as dr
+    import mitsuba as mi
+
+    # Asked for one by one: `mi.traverse` shows the transform of a rectangle or a cube, not its vertices.
+    position = mesh.vertex_position(dr.arange(mi.UInt32, mesh.vertex_count()))
+    face = mesh.face_indices(dr.arange(mi.UInt32, mesh.face_count()))
+    return np.array(position, dtype=np.float64).T.copy(), np.array(face, dtype=np.int64).T.copy()
+
+
+def _triangles(shape) -> tuple[Array, NDArray[np.int64]]:
+    """Return vertices and triangles of a Mitsuba shape."""
+    if shape.is_mesh():
+        return mesh_triangles(shape)
+    raise InputError(
+        f"shape '{shape.id()}' is a {shape.class_name()}, which has no triangles and so no silhouette edges; wanted "
+        "meshes (obj, ply, cube, rectangle); replace it by a mesh, or use --method ray-march"
+    )
+
+
+def _mesh_part(name: str, vertices: Array, triangles: NDArray[Any]) -> tuple[dict[str, Any], list[str], Index]:
+    warnings = []
+    vertices = np.asarray(vertices, dtype=np.float64).reshape(-1, 3)
+    vertices, own, inverse = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
+    triangles = inverse.reshape(-1)[np.asarray(triangles, dtype=np.int64).reshape(-1, 3)]
+    # One that is a line stays: it closes the gap between a long edge and the two halves on its other side.
+    triangles = triangles[np.all(triangles != np.roll(triangles, 1, axis=1), axis=1)]
+    _, kept = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)
+    if len(kept) < len(triangles):
+        warnings.append(f"shape '{name}' has {len(triangles) - len(kept)} repeated triangles: each is used once")
+        triangles = triangles[np.sort(kept)]
+    normals, offsets = _planes(vertices, triangles)
+    edges, left, right, same_way, met = _paired_edges(triangles)
+    body, closed = _bodies(triangles, edges, (left, right, same_way))
+    if np.any(met > 2):
+        warnings.append(
+            f"shape '{name}' has {int(np.sum(met > 2))} edges at which more than two triangles meet: right with "
+            "order=exact; order=none and order=paper may count planes twice"
+        )
+    if np.any(right == len(triangles)):
+        warnings.append(
+            f"shape '{name}' is open: its border casts shadow planes too; right with order=exact; order=none and "
+            "order=paper count its folds twice"
+        )
+    elif not np.all(closed):
+        warnings.append(
+            f"shape '{name}' has triangles that run both ways round: each is turned to the light; right with "
+            "order=exact; order=none and order=paper count its folds twice"
+        )
+    part = {
+        "vertices": vertices,
+        "triangles": triangles,
+        "normals": normals,
+        "offsets": offsets,
+        "edges": edges,
+        "left": left,
+        "right": right,
+        "same_way": same_way,
+        "body": body,
+        "closed": closed,
+        "boxes": _boxes(vertices, triangles, body, len(closed)),
+    }
+    return part, warnings, own.astype(np.int32)
+
+
+def _shifted(part: dict[str, Any], vertex: int, body: int) -> dict[str, Any]:
+    return part | {
+        "triangles": part["triangles"] + vertex,
+        "edges": part["edges"] + vertex,
+        "body": part["body"] + body,
+    }
+
+
+def _planes(vertices: Array, triangles) -> tuple[Array, Array]:
+    corner = vertices[triangles]
+    normals = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    return normals, np.einsum("ij,ij->i", normals, corner[:, 0])
+
+
+def _boxes(vertices: Array, triangles, body, bodies: int) -> Array:
+    order = np.argsort(body, kind="stable")
+    starts = np.searchsorted(body[order], np.arange(bodies))
+    corners = vertices[triangles[order]]
+    if not bodies:
+        return np.zeros((0, 2, 3))
+    low, high = np.minimum.reduceat(corners.min(axis=1), starts), np.maximum.reduceat(corners.max(axis=1), starts)
+    return np.stack([low, high], axis=1)
+
+
+def _paired_edges(triangles: NDArray[Any]):
+    """Pair the half-edges of every edge, opposite directions first.
+
+    Sorted by edge, then by direction, the half-edges of an edge are a run of `forward` ones followed by `backward`
+    ones. The first min(forward, backward) of both are partners; the rest are of one direction and pair up among
+    themselves.
+    """
+    count = len(triangles)
+    tail = triangles.reshape(-1)
+    head = np.roll(triangles, -1, axis=1).reshape(-1)
+    triangle = np.repeat(np.arange(count), 3)
+    backward = tail > head
+    low, high = np.minimum(tail, head), np.maximum(tail, head)
+    order = np.lexsort((backward, high, low))
+    low, high, backward, triangle = low[order], high[order], backward[order], triangle[order]
+    starts = np.flatnonzero(np.r_[True, (low[1:] != low[:-1]) | (high[1:] != high[:-1])][: len(low)])
+    met = np.diff(np.r_[starts, len(low)])
+    forward_count = np.add.reduceat((~backward).astype(int), starts) if len(starts) else np.zeros(0, dtype=int)
+    matched = np.minimum(forward_count, met - forward_count)
+    rank = np.arange(len(low)) - np.repeat(starts, met)
+    in_direction = np.where(backward, rank - np.repeat(forward_count, met), rank)
+    rest = in_direction - np.repeat(matched, met)
+    is_left = np.where(rest < 0, ~backward, rest % 2 == 0)
+    # Keys that partners share: the edge, whether they are matched, and the rank among their likes.
+    first = np.flatnonzero(is_left)
+    partner = np.where(
+        rest[first] < 0,
+        np.repeat(starts + forward_count, met)[first] + in_direction[first],
+        first + 1,
+    )
+    run_end = np.repeat(starts + met, met)[first]
+    same_direction = (partner < run_end) & (backward[np.minimum(partner, len(low) - 1)] == backward[first])
+    alone = (rest[first] >= 0) & ~same_direction
+    right = np.where(alone, count, triangle[np.minimum(partner, len(low) - 1)]) if len(first) else first
+    tail_vertex = np.where(backward[first], high[first], low[first])
+    head_vertex = np.where(backward[first], low[first], high[first])
+    edges = np.stack([tail_vertex, head_vertex], axis=1)
+    return edges, triangle[first], right, (rest[first] >= 0) & ~alone, met
+
+
+def _bodies(triangles, edges, entries):
+    """Return the connected part of every triangle, and by part whether it is closed."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    left, right, same_way = entries
+    count = len(triangles)
+    if not count:
+        return np.zeros(0, dtype=int), np.zeros(0, dtype=bool)
+    # Triangles that share an edge, however many meet there.
+    both = right < count
+    links = [(left[both], right[both])]
+    order = np.lexsort((edges.max(axis=1), edges.min(axis=1)))
+    key = np.sort(edges[order], axis=1)
+    again = np.flatnonzero(np.all(key[1:] == key[:-1], axis=1))
+    links.append((left[order[again]], left[order[again + 1]]))
+    one, other = (np.concatenate([link[side] for link in links]) for side in (0, 1))
+    graph = coo_array((np.ones(len(one), dtype=np.int8), (one, other)), shape=(count, count))
+    bodies, body = connected_components(graph, directed=False)
+    closed = np.ones(bodies, dtype=bool)
+    closed[body[left[~both | same_way]]] = False
+    return body, closed

@@ -1,0 +1,309 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Shadow planes: volumetric shadows from silhouettes, without shadow rays.
+
+The silhouette of every caster, as the light sees it (`realtime.methods.shadow_planes.silhouettes`), extruded away from
+the light, bounds what is in shadow. A camera ray crosses these planes, and between crossings it is lit or not as a
+whole. With Gamma(x) the airlight of a lit ray from the camera to x (eq. 2), a ray with lit segments [a_i, b_i] has the
+airlight
+
+    L = sum_i Gamma(b_i) - Gamma(a_i)                                                      (section 4.2).
+
+The paper evaluates Gamma on every plane and adds or subtracts it, with a stencil buffer to leave out planes that are
+themselves in shadow. `order` chooses how that is decided:
+
+* `exact` counts layers along each ray, from the camera on.
+* `paper` draws all planes in one order, towards the camera by the cosine between the axis from light to camera and the
+  middle of the edge (5.1.4), with the stencil rule of 5.1.5. (Section 5 has the front facing planes increment the
+  stencil, section 5.1.5 has the back facing ones add: the latter is right.)
+* `none` counts every plane: the artefact of Fig. 4.
+
+`exact` with ``evaluation=pixel`` sums the segments, J(a_i, b_i), all positive: nothing cancels. ``sum=gamma`` takes the
+difference of the two Gammas instead, as the paper does.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+
+from realtime.bounded_media.airlight import FORMS, ambient_radiance, check_form
+from realtime.bounded_media.directional_airlight import ParallelRay
+from realtime.bounded_media.ray_segments import MediaRay
+from realtime.errors import InputError
+from realtime.methods.light_airlight import RayAirlight, integral_type, ray_airlight
+from realtime.methods.shadow_planes.mesh_adjacency import Casters, read_casters, with_positions
+from realtime.methods.shadow_planes.pixel_rays import aim_at, read_spot, seen_rays, seen_ways
+from realtime.methods.shadow_planes.plane_table import PlaneIndex, index_planes
+from realtime.methods.shadow_planes.published_crossings import Buffer, sum_crossings
+from realtime.methods.shadow_planes.published_mesh import mesh_gamma, surface_gamma
+from realtime.methods.shadow_planes.spot_pyramid import cone_ring
+from realtime.methods.shadow_planes.sweep import RayPlanes, ray_planes, sum_lit_segments
+from realtime.methods.shadow_planes.tile_lists import Lists, tile_lists
+from realtime.methods.shadow_planes.view_culling import bodies_in_view
+from realtime.methods.view import View, rays_in_media
+from realtime.numerics.array_types import ArrayTypes, types_of
+from realtime.scene.camera import HostCamera, read_camera
+from realtime.scene.features import check_places
+from realtime.scene.lights import Light
+from realtime.scene.read_scene import Scene
+
+ORDERS = ("exact", "paper", "none")
+EVALUATIONS = ("pixel", "vertex")
+SUMS = ("segments", "gamma")
+BUFFERS = ("float", "8bit")
+
+
+@dataclass(frozen=True)
+class PlanePreparation:
+    """The casters of a scene; called with the scene as it is now, returns the shadow planes of its lights."""
+
+    casters: Casters
+    cone: int = 0  #: edges of the cone of a spot; 0: no planes for it
+
+    def __call__(self, scene: Scene) -> tuple[PlaneIndex, ...]:
+        """Return the planes of every light of a scene."""
+        return self.start(scene)()
+
+    def start(self, scene: Scene) -> Callable[[], tuple[PlaneIndex, ...]]:
+        """Read what the host needs of a scene, which waits for the device; return what then finds the planes."""
+        here = self.standing(scene)
+        camera = read_camera(scene.camera)
+        types = types_of(type(scene.camera.origin.x))
+        each = [plane_finder(here, camera, light, cone=self.cone, types=types) for light in scene.lights]
+        return lambda: tuple(find() for find in each)
+
+    def standing(self, scene: Scene) -> Casters:
+        """Return the casters where they are in a scene."""
+        return with_positions(self.casters, scene.positions)
+
+
+def prepare_shadow_planes(scene: Scene, **settings) -> PlanePreparation:
+    """Read the casters of a scene and return the function that finds the shadow planes of a frame.
+
+    Raises
+    ------
+    InputError
+        For a parameter out of range, casters without triangles and directional lights.
+    """
+    _check(**settings)
+    check_places(scene.plan, "shadow-planes")
+    return PlanePreparation(read_casters(scene.geometry), settings["cone"])
+
+
+def plane_finder(
+    casters: Casters, camera: HostCamera, light: Light, *, cone: int = 0, types: ArrayTypes
+) -> Callable[[], PlaneIndex]:
+    """Return what finds the shadow planes of one light, as a camera needs them; `cone` edges bound a spot.
+
+    All that is on the device is read here, and nothing else done: until then the device stands still.
+    """
+    import numpy as np
+
+    position = np.array(light.position, dtype=np.float64).ravel()
+    ring = None
+    if cone and light.kind == "spot":
+        ring = cone_ring(np.array(light.axis, dtype=np.float64).ravel(), float(light.cos_cutoff[0]), cone)
+    seen = None if ring is not None else read_spot(light)
+
+    def find() -> PlaneIndex:
+        used = bodies_in_view(casters, camera, position)
+        aim = partial(aim_at, camera, spot=seen, types=types)
+        return index_planes(casters, position, camera.origin, used=used, types=types, ring=ring, aim=aim)
+
+    return find
+
+
+def shadow_planes(
+    view: View,
+    *,
+    kernel,
+    order: str = "exact",
+    evaluation: str = "pixel",
+    sum: str = "segments",
+    buffer: str = "float",
+    white: float = 1.0,
+    rows: int = 16,
+    ambient: float = 0.0,
+    media: str = "exact",
+    cone: int = 0,
+):
+    """Return the airlight of every ray between shadow planes.
+
+    Parameters
+    ----------
+    view
+        The frame.
+    kernel
+        An airlight kernel, see `realtime.kernels`.
+    order
+        'exact', 'paper' or 'none', see above.
+    evaluation
+        'pixel': Gamma at every crossing; 'vertex': Gamma at the vertices of a mesh of each plane and of the surfaces,
+        interpolated, as published.
+    sum
+        'segments' or 'gamma'; only with order=exact and evaluation=pixel.
+    buffer
+        'float', or '8bit': the paper's frame buffer, which holds 255 steps up to `white` and clamps after every plane.
+    white
+        Radiance at which the 8-bit buffer is full [W/(m^2 sr)].
+    rows
+        Rows of vertices of the mesh of a plane, each 1.5 times as far from the light as the last.
+    ambient
+        Radiance of a constant light field in the medium, the paper's stand-in for multiple scattering [W/(m^2 sr)];
+        adds albedo ambient (1 - exp(-sigma_t x)). The truth has none.
+    media
+        In bounded media 'exact' or 'paper', the constant R of section 4.2, see `realtime.bounded_media.airlight`.
+    cone
+        Edges of the cone of a spot, whose planes then bound its light, 32 in the paper: a pyramid inside the cone. 0
+        for the cone itself, as a scene without casters has it always.
+
+    Returns
+    -------
+    radiance
+        In-scattered radiance [W/(m^2 sr)].
+    lit
+        By light, whether it reaches the visible surface.
+
+    Notes
+    -----
+    Valid for casters that are triangle meshes, closed or not. Shadows are those of the
+    triangles, exact to rounding, with order=exact. Bounded media have nodes of their own, the kernel is not asked;
+    they are for evaluation=pixel.
+
+    References
+    ----------
+    Biri, Arques, Michelin 2006, *Real time rendering of atmospheric scattering and volumetric shadows*, Journal of
+    WSCG 14.
+    """
+    import drjit as dr
+
+    total = type(view.medium.albedo)(0)
+    lit = []
+    in_media: tuple[MediaRay | ParallelRay, ...] = ()
+    if view.plan.bounded:
+        check_form(view.medium, media)
+        _check_bounded(evaluation)
+        in_media = rays_in_media(view, media)
+    for number, light in enumerate(view.lights):
+        if cone and light.kind == "spot" and not light.soft and view.plan.shadows:
+            light = replace(light, kind="point")  # planes bound it
+        if not view.plan.shadows:
+            airlight = ray_airlight(view, light, kernel, in_media[number] if in_media else None)
+            total += airlight.radiance(airlight.integral(type(view.distance)(0), view.distance))
+            lit.append(True)
+            continue
+        index = view.prepared[number]
+        lists = view.tiles[number] if view.tiles else tile_planes(view, index, order=order)
+        seen = seen_rays(index.aim, view.camera, view.pixel, index.distance, light)
+        rays = ray_planes(lists, seen.x, seen.y, seen.z, tile=view.tile)
+        airlight = ray_airlight(view, light, kernel, in_media[number] if in_media else None, geometry=seen.geometry)
+        if order == "exact" and evaluation == "pixel" and buffer == "float":
+            value, reached = _segments(index, lists, rays, airlight, differences=sum == "gamma")
+        else:
+            at_plane, at_surface = _gammas(index, airlight, evaluation=evaluation, rows=rows)
+            levels = Buffer(white) if buffer == "8bit" else None
+            value, reached = sum_crossings(
+                index, lists, rays, view.distance, (at_plane, at_surface), order=order, buffer=levels
+            )
+        total += value
+        lit.append(reached)
+    if ambient and in_media:
+        total += ambient_radiance(in_media[0].pieces, view.distance, ambient)
+    elif ambient:
+        distance = dr.minimum(view.distance, 1e30)
+        for_channel = [1 - dr.exp(-sigma_t * distance) for sigma_t in view.medium.sigma_t]
+        total += view.medium.albedo * ambient * type(total)(*for_channel)
+    return total, tuple(lit)
+
+
+def shadow_plane_tiles(view: View, *, order: str, **_) -> tuple[Lists, ...]:
+    """Return by light the planes that concern each tile of the image."""
+    return tuple(tile_planes(view, index, order=order) for index in view.prepared)
+
+
+def tile_planes(view: View, index: PlaneIndex, *, order: str) -> Lists:
+    """Return the planes that concern each tile of the image."""
+    import drjit as dr
+    import mitsuba as mi
+
+    def rays(lane):
+        pixel = dr.gather(mi.UInt32, view.pixel, lane)
+        return seen_ways(index.aim, view.camera, pixel)
+
+    return tile_lists(index, rays, view.distance, order=order, square=view.square_tiles)
+
+
+def _segments(index: PlaneIndex, lists: Lists, rays: RayPlanes, airlight: RayAirlight, *, differences: bool):
+    """Sum the lit segments of one light."""
+    import drjit as dr
+
+    view = airlight.view
+
+    def integral(a, b):
+        return airlight.gamma(b) - airlight.gamma(a) if differences else airlight.integral(a, b)
+
+    zero = dr.zeros(integral_type(view), dr.width(view.distance))
+    value, reached = sum_lit_segments(index, lists, rays, airlight.segment, integral, zero)
+    return airlight.radiance(value), reached
+
+
+def _gammas(index: PlaneIndex, airlight: RayAirlight, *, evaluation: str, rows: int):
+    """Return the functions that give the radiance of Gamma at a crossing, and at the surface."""
+    view, light, kernel = airlight.view, airlight.light, airlight.kernel
+
+    def at(x):
+        return airlight.radiance(airlight.gamma(x))
+
+    if evaluation == "pixel":
+        return lambda number, rays, x: at(x), at
+    return (
+        mesh_gamma(view, index, light, kernel=kernel, rows=rows),
+        lambda x: surface_gamma(view, light, kernel=kernel, otherwise=at(x)),
+    )
+
+
+def _check_bounded(evaluation: str) -> None:
+    if evaluation == "vertex":
+        raise InputError(
+            "evaluation=vertex: Gamma has kinks where planes cross the bounds of a medium, between any vertices; use "
+            "evaluation=pixel in scenes with bounded media"
+        )
+
+
+def _check(
+    *,
+    order: str,
+    evaluation: str,
+    sum: str,
+    buffer: str,
+    white: float,
+    rows: int,
+    ambient: float,
+    media: str,
+    cone: int,
+) -> None:
+    words = (
+        ("order", order, ORDERS),
+        ("evaluation", evaluation, EVALUATIONS),
+        ("sum", sum, SUMS),
+        ("buffer", buffer, BUFFERS),
+        ("media", media, FORMS),
+    )
+    for name, value, allowed in words:
+        if value not in allowed:
+            raise InputError(f"{name}: got {value!r}, wanted one of {', '.join(allowed)}")
+    if not white > 0:
+        raise InputError(f"white: got {white!r}, wanted a radiance above 0 [W/(m^2 sr)]")
+    if not 0 <= ambient < float("inf"):
+        raise InputError(f"ambient: got {ambient!r}, wanted a finite radiance of 0 or more [W/(m^2 sr)]")
+    if rows < 2:
+        raise InputError(f"rows: got {rows!r}, wanted at least 2 rows of vertices")
+    if cone and not 3 <= cone <= 4096:
+        raise InputError(f"cone: got {cone!r}, wanted 0 for the cone itself, or 3 to 4096 edges")
+    if cone and evaluation == "vertex":
+        raise InputError(
+            "cone: wanted evaluation=pixel; the planes of a cone begin too close to the light to be meshed"
+        )
+    if sum == "gamma" and (order != "exact" or evaluation != "pixel" or buffer != "float"):
+        raise InputError(
+            "sum=gamma: wanted order=exact, evaluation=pixel and buffer=float; the others add Gammas anyway"
+        )

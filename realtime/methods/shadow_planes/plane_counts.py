@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the casters of a scene ask of shadow planes, and what is left out for this camera."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from realtime.methods.shadow_planes.mesh_adjacency import Casters, read_casters, with_positions
+from realtime.methods.shadow_planes.plane_table import light_frame, shadow_planes
+from realtime.methods.shadow_planes.silhouettes import silhouette
+from realtime.methods.shadow_planes.view_culling import bodies_in_view
+from realtime.scene.camera import HostCamera, read_camera
+from realtime.scene.features import check_places
+from realtime.scene.read_scene import Scene
+
+
+@dataclass(frozen=True)
+class LightPlan:
+    """The shadow planes of one light."""
+
+    edges: int  #: silhouette edges of all casters
+    bodies: int  #: connected parts whose shadow can be seen
+    planes: int  #: planes of those parts: what a frame works with
+
+
+@dataclass(frozen=True)
+class CasterPlan:
+    """The casters of a scene and, by light, their planes."""
+
+    shapes: int
+    bodies: int  #: connected parts
+    closed: int  #: of which without border
+    triangles: int
+    lights: tuple[LightPlan, ...]
+    warnings: tuple[str, ...]  #: what is odd about the meshes, by name
+
+
+def caster_plan(scene: Scene) -> CasterPlan:
+    """Count the casters of a scene and what its camera needs of them.
+
+    Raises
+    ------
+    InputError
+        For a caster without triangles, and a directional light.
+    """
+    check_places(scene.plan, "shadow-planes")
+    casters = with_positions(read_casters(scene.geometry), scene.positions)
+    camera = read_camera(scene.camera)
+    lights = tuple(_light_plan(casters, camera, light) for light in scene.lights)
+    return CasterPlan(
+        shapes=len(casters.shapes),
+        bodies=len(casters.closed),
+        closed=int(casters.closed.sum()),
+        triangles=len(casters.triangles),
+        lights=lights,
+        warnings=casters.warnings,
+    )
+
+
+def describe_casters(plan: CasterPlan) -> dict[str, str]:
+    """Return the plan in words, one entry for each decision."""
+    if not plan.triangles:
+        return {"casters": "none: no silhouettes, no planes; one integral a ray and light"}
+    words = {
+        "shadows": "silhouettes and planes: no shadow rays",
+        "casters": f"{plan.shapes} shapes, {plan.triangles} triangles in {plan.bodies} parts, {plan.closed} closed",
+    }
+    for number, light in enumerate(plan.lights):
+        out = plan.bodies - light.bodies
+        left = f"{out} parts left out, their shadows miss the view" if out else "every part's shadow can be seen"
+        name = "planes" if len(plan.lights) == 1 else f"planes of light {number + 1}"
+        words[name] = f"{light.planes} of {light.edges} silhouette edges; {left}"
+    return words
+
+
+def _light_plan(casters: Casters, camera: HostCamera, light) -> LightPlan:
+    position = np.array(light.position, dtype=np.float64).ravel()
+    used = bodies_in_view(casters, camera, position)
+    axes, _ = light_frame(position, camera.origin)
+    seen = silhouette(casters, position, used=used)
+    every = len(silhouette(casters, position).edges)
+    return LightPlan(every, int(used.sum()), len(shadow_planes(casters, seen, position, axes).first))

@@ -1,0 +1,289 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""Which shadow planes a camera ray crosses, found by its azimuth about the axis from the light to the camera.
+
+Put the light S at the origin and the camera O on the z axis, at the distance D. A camera ray lies in a half plane that
+the z axis bounds, at the azimuth phi; there it has the direction (sin g, cos g) of (radius, height), g being its angle
+with the axis. A shadow plane contains S, so in that half plane it is a half line from S; the angle between it and the
+axis is psi, the same angle by whose cosine Biri orders the planes (section 5.1.4). Along the ray psi grows from 0.
+
+A silhouette edge, a straight line, meets the half plane phi at radius c and height z with
+
+    1/c = P cos(phi) + Q sin(phi),        z/c = cot(psi) = A cos(phi) + B sin(phi),
+
+because its projection along z is the line P x + Q y = 1, and the plane through S and the edge z = A x + B y. The ray
+point O + x w lies on the half line (c, z) where (x sin g, D + x cos g) is parallel to it:
+
+    x = D / (sin g cot(psi) - cos g),     and it is beyond the edge, so in its shadow plane, if x sin g / c > 1.
+
+Four numbers an edge, no division but one, and no test of depth against a triangle. Only edges whose azimuths hold phi
+count, so they are kept in `BINS` bins of azimuth, from which the tiles of the image draw their lists
+(`realtime.methods.shadow_planes.tile_lists`).
+
+Azimuths are diamond angles (`realtime.numerics.diamond_angle`), 0 to 4 for a full turn. Two edges that share a vertex
+share its azimuth bit by bit, and an edge holds phi if first <= phi < last: no ray slips between two edges of a loop,
+and none is counted twice.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realtime.methods.shadow_planes.mesh_adjacency import Casters
+from realtime.methods.shadow_planes.silhouettes import Silhouette, silhouette
+from realtime.methods.shadow_planes.spot_pyramid import NEARNESS, is_outside, ring_edges
+from realtime.numerics.array_types import is_single
+from realtime.numerics.diamond_angle import TURN, host_diamond_angle
+
+Array = NDArray[np.float64]
+
+BINS = 64  #: of azimuth
+
+# An entry of a list: the number of a plane, the layers gained beyond it, and two marks.
+NUMBER = (1 << 24) - 1
+GAIN_SHIFT, GAIN_ZERO = 24, 32  #: gains from -32 to 31; a plane that gains more is there more than once
+FULL = 1 << 30  #: whatever ray of the tile: it lies in the span of the plane, and beyond the edge where it crosses it
+FIRST = 1 << 31  #: the first bin that holds the plane
+
+
+@dataclass(frozen=True)
+class PlaneIndex:
+    """The shadow planes of one light as a frame needs them; Dr.Jit arrays, padded so that their sizes seldom change."""
+
+    x_axis: Any  #: axes of the frame in which the light is the origin and the camera lies on the z axis
+    y_axis: Any
+    z_axis: Any
+    distance: Any  #: D, from the light to the camera [m]
+    start: Any  #: first place in `entries` of every bin of two turns, (2 bins + 1,)
+    entries: Any  #: the planes bin by bin, two turns of them
+    lines: Any  #: A, B, P [1/m], Q [1/m] of every plane, flat
+    spans: Any  #: first and last azimuth, layers gained when psi grows past it, Biri's cosine of every plane; flat
+    ends: Any  #: ends of the edge of every plane in the frame [m], six numbers each, flat
+    layers: Any  #: layers between the light and the camera
+    aim: Any = None  #: where the pixels of the camera aim in the frame, see `realtime.methods.shadow_planes.pixel_rays`
+
+
+@dataclass(frozen=True)
+class Planes:
+    """Shadow planes in NumPy, before they are put in order."""
+
+    lines: Array  #: (planes, 4)
+    first: NDArray[np.float32]
+    last: NDArray[np.float32]
+    gain: NDArray[np.int8]
+    ends: Array  #: of the edge [m], (planes, 6)
+    centre: Array  #: cosine between the axis and the middle of the edge, Biri section 5.1.4
+
+
+def light_frame(light: Array, camera: Array) -> tuple[Array, float]:
+    """Return the axes of the frame of a light and a camera (rows) and the distance between the two [m]."""
+    axis = camera - light
+    distance = float(np.linalg.norm(axis))
+    z = axis / distance if distance > 0 else np.array([0.0, 0.0, 1.0])
+    helper = np.eye(3)[np.argmin(np.abs(z))]
+    x = np.cross(helper, z)
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(z, x), z]), distance
+
+
+def shadow_planes(casters: Casters, found: Silhouette, light: Array, axes: Array) -> Planes:
+    """Return the shadow planes of silhouette edges in the frame of a light and a camera."""
+    return edge_planes((casters.vertices[found.edges] - light) @ axes.T, found.coefficient)
+
+
+def edge_planes(vertices: Array, coefficient: NDArray[np.int8]) -> Planes:
+    """Return the shadow planes of edges in the frame, ends (edges, 2, 3), with their coefficients."""
+    a, b = vertices[:, 0], vertices[:, 1]
+    azimuth = host_diamond_angle(vertices[..., 0].astype(np.float32), vertices[..., 1].astype(np.float32))
+    turn = azimuth[:, 1] - azimuth[:, 0]
+    # The short way about the axis; `ahead` if azimuth grows from a to b along it.
+    ahead = np.where(np.abs(turn) <= TURN / 2, turn > 0, turn < 0)
+    first = np.where(ahead, azimuth[:, 0], azimuth[:, 1])
+    last = np.where(ahead, azimuth[:, 1], azimuth[:, 0])
+    # As the light sees it, with the camera's end of the axis up, azimuth grows to the left and psi downwards: the
+    # layers left of an edge that leads to the left lie below it, at larger psi.
+    gain = np.where(ahead, coefficient, -coefficient).astype(np.int8)
+    cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    # An edge that meets the axis itself: any tiny number keeps the loop closed.
+    cross = np.where(cross == 0, 1e-12 * np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1), cross)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        lines = np.stack(
+            [
+                (a[:, 2] * b[:, 1] - a[:, 1] * b[:, 2]) / cross,
+                (a[:, 0] * b[:, 2] - a[:, 2] * b[:, 0]) / cross,
+                (b[:, 1] - a[:, 1]) / cross,
+                (a[:, 0] - b[:, 0]) / cross,
+            ],
+            axis=1,
+        )
+    middle = 0.5 * (a + b)
+    centre = middle[:, 2] / np.maximum(np.linalg.norm(middle, axis=1), np.finfo(float).tiny)
+    kept = (first != last) & np.all(np.isfinite(lines), axis=1)
+    return _chosen(Planes(lines, first, last, gain, vertices.reshape(-1, 6), centre), kept)
+
+
+def binned(planes: Planes) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
+    """Put planes into bins of azimuth.
+
+    Returns
+    -------
+    start, entries
+        First place of every bin of two turns, and the planes bin by bin, twice: a range of azimuths that passes 0 is
+        then one run of places.
+    """
+    low = np.maximum((planes.first * np.float32(BINS / TURN)).astype(np.int64), 0)
+    high = np.minimum((planes.last * np.float32(BINS / TURN)).astype(np.int64), BINS - 1)
+    width = high - low + 1
+    plane = np.repeat(np.arange(len(width), dtype=np.uint32), width)
+    step = np.arange(len(plane)) - np.repeat(np.cumsum(width) - width, width)
+    bins = (step + low[plane]).astype(np.uint16)
+    place = np.argsort(bins, kind="stable")
+    gain = (planes.gain.astype(np.int64) + GAIN_ZERO).astype(np.uint32) << np.uint32(GAIN_SHIFT)
+    entries = (plane + gain[plane] + np.where(step == 0, np.uint32(FIRST), np.uint32(0)))[place]
+    start = np.concatenate([[0], np.cumsum(np.tile(np.bincount(bins, minlength=BINS), 2))])
+    return start.astype(np.uint32), np.tile(entries, 2)
+
+
+def _parted(planes: Planes) -> Planes:
+    """Part the planes that hold azimuth 0 in two, one that ends beyond 4 and one that begins below 0."""
+    around = planes.first > planes.last
+    if not around.any():
+        return planes
+    above = _chosen(planes, around)
+    return _joined(
+        replace(planes, first=np.where(around, np.float32(-1), planes.first)),
+        replace(above, last=np.full_like(above.last, 5)),
+    )
+
+
+def _chosen(planes: Planes, which: NDArray[np.bool_]) -> Planes:
+    return Planes(*(getattr(planes, field.name)[which] for field in fields(Planes)))
+
+
+def _joined(one: Planes, other: Planes) -> Planes:
+    return Planes(*(np.concatenate([getattr(part, field.name) for part in (one, other)]) for field in fields(Planes)))
+
+
+def layers_between(casters: Casters, light: Array, axes: Array, distance: float, *, used: NDArray[np.bool_]) -> int:
+    """Return how many layers lie between a light and a camera at a distance along the last of some axes.
+
+    A closed body counts the larger number of its triangles that face the light and that are averted: the two differ
+    where the light or the camera is inside, and then all beyond is dark.
+    """
+    camera = light + distance * axes[2]
+    low, high = casters.boxes[:, 0], casters.boxes[:, 1]
+    near = used & np.all((low <= np.maximum(light, camera)) & (high >= np.minimum(light, camera)), axis=1)
+    if not near.any():
+        return 0
+    # The axis runs through x = y = 0: most triangles lie aside, all three corners beyond it on one of four sides.
+    x, y = axes[:2] @ casters.vertices.T - (axes[:2] @ light)[:, None]
+    sides = (x > 0) | (x < 0).view(np.uint8) << 1 | (y > 0).view(np.uint8) << 2 | (y < 0).view(np.uint8) << 3
+    number = np.flatnonzero(near[casters.body])
+    one, other, third = casters.triangles[number].T
+    number = number[sides[one] & sides[other] & sides[third] == 0]
+    if not len(number):
+        return 0
+    crossed = number[_crosses(casters, number, light, camera)]
+    sign = np.sign(casters.normals[crossed] @ light - casters.offsets[crossed])
+    body = casters.body[crossed]
+    bodies = len(casters.closed)
+    front, back = np.bincount(body[sign > 0], minlength=bodies), np.bincount(body[sign < 0], minlength=bodies)
+    return int(np.where(casters.closed, np.maximum(front, back), front + back).sum())
+
+
+def _crosses(casters: Casters, number, light: Array, camera: Array) -> NDArray[np.bool_]:
+    """Return whether triangles are crossed by the segment from the light to the camera, watertight.
+
+    The line crosses a triangle if it passes all three edges on the same side. d . (a x b) of an edge is computed from
+    its lower vertex number to its higher one, so that both triangles at an edge see the same rounding.
+    """
+    direction = camera - light
+    triangle = casters.triangles[number]
+    sides = []
+    for k in range(3):
+        tail, head = triangle[:, k], triangle[:, (k + 1) % 3]
+        low, high = casters.vertices[np.minimum(tail, head)] - light, casters.vertices[np.maximum(tail, head)] - light
+        left = np.cross(low, high) @ direction >= 0
+        sides.append(np.where(tail < head, left, ~left))
+    inside = (sides[0] == sides[1]) & (sides[1] == sides[2])
+    # The plane normal . p = offset is met at light + u direction.
+    normal = casters.normals[number]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        u = (casters.offsets[number] - normal @ light) / (normal @ direction)
+    return inside & (u > 0) & (u < 1)
+
+
+def index_planes(
+    casters: Casters,
+    light: Array,
+    camera: Array,
+    *,
+    used: NDArray[np.bool_],
+    types,
+    ring: Array | None = None,
+    aim: Callable[[Array], Any] | None = None,
+) -> PlaneIndex:
+    """Find the shadow planes of a light and put them into bins for a camera.
+
+    Parameters
+    ----------
+    casters
+        Triangles with their adjacency.
+    light, camera
+        Positions [m].
+    used
+        By body, whether its shadow can be seen.
+    types
+        The array types to use, see `realtime.numerics.array_types`.
+    ring
+        Of a spot whose cone is a caster, see `realtime.methods.shadow_planes.spot_pyramid`.
+    aim
+        Axes of the frame -> where the pixels of the camera aim in it.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    axes, distance = light_frame(light, camera)
+    layers = layers_between(casters, light, axes, distance, used=used)
+    planes = shadow_planes(casters, silhouette(casters, light, used=used), light, axes)
+    if ring is not None:
+        edges = NEARNESS * distance * ring_edges(ring) @ axes.T
+        planes = _joined(planes, edge_planes(edges, np.full(len(ring), -1, dtype=np.int8)))
+        layers += is_outside(ring, axes[2])
+    planes = _parted(planes)
+    start, entries = binned(planes)
+    spans = np.stack([planes.first, planes.last, planes.gain, planes.centre], axis=1)
+    Float = types.scalar
+    real = np.float32 if is_single(Float) else np.float64
+    x_axis, y_axis, z_axis = (types.vector(*(float(c) for c in axis)) for axis in axes)
+    index = PlaneIndex(
+        x_axis,
+        y_axis,
+        z_axis,
+        Float(distance),
+        mi.UInt32(_padded(start)),
+        mi.UInt32(_padded(entries, 7)),
+        Float(_padded(planes.lines.astype(real).ravel(), 5)),
+        Float(_padded(spans.astype(real).ravel(), 5)),
+        Float(_padded(planes.ends.astype(real).ravel(), 6)),
+        Float(layers),
+        aim(axes) if aim else None,
+    )
+    dr.make_opaque(index)
+    return index
+
+
+def _padded(values, multiple: int = 1):
+    """Return an array with zeros up to a power of two times `multiple`, aligned to 64 bytes.
+
+    A frozen function is recorded anew where arrays that had one size have two or the other way round, so that each kind
+    has a multiple of its own, and where the alignment of an array is another.
+    """
+    size = multiple << max(6, int(-(-len(values) // multiple) - 1).bit_length())
+    room = np.zeros(size * values.itemsize + 64, dtype=np.uint8)
+    begin = -room.ctypes.data % 64
+    padded = room[begin : begin + size * values.itemsize].view(values.dtype)
+    padded[: len(values)] = values
+    return padded

@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Gamma added up over the crossings of shadow planes one by one, as the paper does it.
+
+The stencil starts with the layers over the visible surface. Planes come towards the camera (order=paper): one that
+faces the camera, beyond which there is shadow, adds its Gamma if the stencil is one and takes its layers off; one that
+faces away subtracts its Gamma if the stencil is zero and puts its layers on (Biri 2006, section 5.1.5). From the camera
+on (order=exact) the same rule reads: a plane that brings the count from zero up adds, one that brings it back to zero
+subtracts. Without an order every plane counts.
+
+The list of a tile is in order, but for a tile that found no room for a list of its own and reads the longer one that it
+would have drawn on. Its rays look for each next crossing in the whole of that list.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+from realtime.methods.shadow_planes.plane_table import PlaneIndex
+from realtime.methods.shadow_planes.sweep import RayPlanes, read_plane
+from realtime.methods.shadow_planes.tile_lists import Lists
+
+
+@dataclass(frozen=True)
+class Buffer:
+    """A frame buffer of 8 bits a channel."""
+
+    white: float  #: radiance that fills it [W/(m^2 sr)]
+
+    def stored(self, value):
+        """Return what the buffer keeps of a radiance."""
+        import drjit as dr
+
+        return dr.round(dr.clip(value, 0, self.white) * (255 / self.white)) * (self.white / 255)
+
+
+@dataclass
+class _Draw:
+    """What has been drawn of a ray's planes."""
+
+    place: Any  #: next entry to read; in a list without order the one that was drawn last, or its end
+    key: Any  #: of the crossing drawn last, in a list without order: larger come first
+    stencil: Any
+    quotient: Any  #: of the plane to draw
+    number: Any  #: of the plane to draw
+    factor: Any  #: how often it counts; 0 if none is ready
+    total: Any
+
+
+def sum_crossings(
+    index: PlaneIndex, lists: Lists, ray: RayPlanes, distance, gammas, *, order: str, buffer: Buffer | None
+):
+    """Add up Gamma over the crossings of every ray.
+
+    Parameters
+    ----------
+    index, lists, ray
+        The planes and the rays.
+    distance
+        To the visible surface [m].
+    gammas
+        Functions (plane, ray, x) and (x) that give the radiance of Gamma at a crossing and at the surface.
+    order
+        'exact', 'paper' or 'none'.
+    buffer
+        What keeps the sum; None for float.
+
+    Returns
+    -------
+    total
+        The radiance.
+    lit
+        Whether the light reaches the visible surface.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    at_plane, at_surface = gammas
+    ray_end = index.distance / distance
+    width = dr.width(ray.x)
+    Float = type(ray.x)
+    over_surface = _layers_at_end(index, lists, ray, ray_end)
+    lit = over_surface <= 0
+    keep = buffer.stored if buffer else lambda value: value
+    total = keep(dr.select(lit, at_surface(distance), 0))
+    begin = Float(index.layers) + dr.zeros(Float, width) if order == "exact" else over_surface
+    draw = _Draw(
+        dr.zeros(mi.UInt32, width),
+        dr.full(Float, dr.inf, width),
+        begin,
+        dr.zeros(Float, width),
+        dr.zeros(mi.UInt32, width),
+        dr.zeros(Float, width),
+        total,
+    )
+
+    def body(draw):
+        (draw,) = dr.while_loop(
+            state=(draw,),
+            cond=lambda draw: (draw.factor == 0) & (draw.place < ray.source.count),
+            body=lambda draw: (_next(index, lists, ray, ray_end, draw, order),),
+            labels=("draw",),
+        )
+        x = dr.minimum(index.distance / dr.select(draw.factor == 0, index.distance, draw.quotient), distance)
+        value = at_plane(draw.number, ray, x)
+        draw.total = dr.select(draw.factor == 0, draw.total, keep(draw.total + draw.factor * value))
+        draw.factor = Float(0)
+        return (draw,)
+
+    (draw,) = dr.while_loop(state=(draw,), cond=lambda draw: draw.place < ray.source.count, body=body, labels=("draw",))
+    return draw.total, lit
+
+
+def _next(index: PlaneIndex, lists: Lists, ray: RayPlanes, ray_end, draw: _Draw, order: str) -> _Draw:
+    """Read one plane: the next of the list, or the next crossing of a list without order."""
+    import drjit as dr
+
+    found, key = _sought(index, lists, ray, ray_end, draw, order)
+    place = dr.select(ray.sorted, draw.place, found)
+    quotient, crossed, gain, number = read_plane(index, lists, ray, place, place < ray.source.count)
+    crossed &= quotient > ray_end
+    if order == "none":
+        factor, stencil = gain, draw.stencil
+    elif order == "paper":
+        passes = dr.select(gain > 0, draw.stencil == 1, draw.stencil == 0)
+        factor = dr.select(passes, dr.sign(gain), 0)
+        stencil = draw.stencil - gain
+    else:
+        stencil = draw.stencil + gain
+        begins, ends = (draw.stencil <= 0) & (stencil > 0), (draw.stencil > 0) & (stencil <= 0)
+        factor = dr.select(begins, 1, dr.select(ends, -1, 0))
+    return _Draw(
+        dr.select(ray.sorted, draw.place + 1, place),
+        key,
+        dr.select(crossed, stencil, draw.stencil),
+        quotient,
+        number,
+        dr.select(crossed, type(gain)(factor), 0),
+        draw.total,
+    )
+
+
+def _sought(index: PlaneIndex, lists: Lists, ray: RayPlanes, ray_end, draw: _Draw, order: str):
+    """Return the place in a list without order of the crossing that comes after the last one, and its key.
+
+    That is the largest key below the last, of crossings of one key the first in the list that was not drawn: the order
+    in which `realtime.methods.shadow_planes.tile_lists` puts lists, but that the ray's own crossings tell it, not
+    those of the middle ray. Behind the last crossing the place is the end of the list. Lists in order are not read.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    Float, width = type(ray.x), dr.width(ray.x)
+    count = dr.select(ray.sorted, 0, ray.source.count)
+
+    def body(k, place, key):
+        quotient, crossed, _, number = read_plane(index, lists, ray, k, k < count)
+        crossed &= quotient > ray_end
+        own = -dr.gather(Float, index.spans, number * 4 + 3, crossed) if order == "paper" else quotient
+        waits = (own < draw.key) | ((own == draw.key) & (k > draw.place))
+        nearer = crossed & waits & (own > key)
+        return k + 1, dr.select(nearer, k, place), dr.select(nearer, own, key)
+
+    _, place, key = dr.while_loop(
+        state=(dr.zeros(mi.UInt32, width), count + dr.zeros(mi.UInt32, width), dr.full(Float, -dr.inf, width)),
+        cond=lambda k, place, key: k < count,
+        body=body,
+        labels=("k", "place", "key"),
+    )
+    return place, key
+
+
+def _layers_at_end(index: PlaneIndex, lists: Lists, ray: RayPlanes, ray_end):
+    """Return the layers over the visible surface."""
+    import drjit as dr
+    import mitsuba as mi
+
+    Float, width = type(ray.x), dr.width(ray.x)
+
+    def body(place, layers):
+        quotient, crossed, gain, _ = read_plane(index, lists, ray, place, place < ray.source.count)
+        return place + 1, layers + dr.select(crossed & (quotient > ray_end), gain, 0)
+
+    _, layers = dr.while_loop(
+        state=(dr.zeros(mi.UInt32, width), dr.zeros(Float, width) + Float(index.layers)),
+        cond=lambda place, layers: place < ray.source.count,
+        body=body,
+        labels=("place", "layers"),
+    )
+    return layers

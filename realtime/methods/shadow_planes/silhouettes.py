@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""Silhouette edges as seen from a point light.
+
+Give every triangle t the number of layers w_t that it stands for, positive if its front faces the light. Its shadow is
+the set of directions of its projection on the sphere about the light, and the number of layers over a direction changes
+by w_t where one crosses the border of that projection. Summed over all triangles, the edge e from vertex a to vertex b
+is crossed with the coefficient
+
+    c_e = sum_t s_te w_t,    s_te = +1 if t runs along e from a to b, -1 if it runs from b to a.
+
+The edges with c_e != 0 are the silhouette. As a sum of borders it is a cycle: at each vertex as many layers begin as
+end, *whatever signs w_t have*. So a triangle whose plane holds the light, and whose sign is a matter of rounding,
+changes the count only inside its own projection, which has no area; and the count over a direction is a whole number.
+
+Layers:
+
+* a closed body counts its triangles that face the light, w = 1, or just as well those that are averted: both have the
+  same cycle. Edges between a facing and an averted triangle get c = +-1: the silhouette of the paper.
+* an open body (border edges, or faces that are not consistently oriented) counts all of its triangles, each turned to
+  the light: w = +1 or -1. Its folds get c = +-2, its border edges c = +-1.
+* a triangle whose plane holds the light counts nothing, w = 0.
+
+Biri, Arques, Michelin 2006, section 5.1.1, for closed meshes.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realtime.methods.shadow_planes.mesh_adjacency import Casters
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Silhouette:
+    """Directed edges about which shadow volumes turn."""
+
+    edges: NDArray[np.int32]  #: vertex numbers, (edges, 2)
+    coefficient: NDArray[np.int8]  #: layers to the left of the edge, as the light sees it, less those to its right
+
+
+def facing(casters: Casters, light: Array) -> NDArray[np.int8]:
+    """Return by triangle whether its front faces a light: 1 yes, -1 no, 0 edge-on; and a last 0 for no triangle."""
+    height = casters.normals @ np.asarray(light, dtype=np.float64) - casters.offsets
+    return np.append(np.sign(height).astype(np.int8), np.int8(0))
+
+
+def layers(casters: Casters, light: Array) -> NDArray[np.int8]:
+    """Return the number of layers that each triangle stands for, and a last 0 for no triangle."""
+    sign = facing(casters, light)
+    if casters.closed.all():
+        return np.maximum(sign, 0)
+    is_open = np.append(~casters.closed[casters.body], False)
+    return np.where(is_open, sign, np.maximum(sign, 0))
+
+
+def silhouette(casters: Casters, light: Array, *, used: NDArray[np.bool_] | None = None) -> Silhouette:
+    """Find the silhouette edges.
+
+    Parameters
+    ----------
+    casters
+        Triangles with their adjacency.
+    light
+        Position of the light [m].
+    used
+        By body, which ones to look at; all by default.
+
+    Notes
+    -----
+    Valid for closed, open and non-manifold meshes, either winding, and a light inside a caster (which has then no
+    silhouette: all outside is dark, see `realtime.methods.shadow_planes.plane_table.layers_between`).
+    """
+    weight = layers(casters, light)
+    if used is not None and not used.all():
+        weight[:-1][~used[casters.body]] = 0
+    right = weight[casters.right]
+    if casters.same_way.any():
+        right = np.where(casters.same_way, -right, right)
+    coefficient = weight[casters.left] - right
+    found = np.flatnonzero(coefficient)
+    return Silhouette(casters.edges[found], coefficient[found])

@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Boxes about the directions of tiles and blocks of rays, and which shadow planes can touch them.
+
+A tile is sixteen rays that follow one another (4 x 4 pixels), a block sixteen tiles. Each has a box about the
+directions of its rays in the frame of the light, and the least quotient 1/x at which one of them ends. What decides
+whether a ray crosses a plane, D/x = A wx + B wy - wz and its like (`realtime.methods.shadow_planes.plane_table`), is
+linear in the direction, so its largest value over the box is the value at the centre plus |A| ex + |B| ey + ez.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import reduce
+from typing import Any
+
+from realtime.methods.shadow_planes.plane_table import NUMBER, TURN, PlaneIndex
+from realtime.numerics.array_types import four_numbers, two_numbers
+from realtime.numerics.diamond_angle import diamond_angle
+
+TILE = 16  #: rays in a tile, and tiles in a block
+SIDE = 4  #: of a tile [pixels], where it is a square
+
+_SLACK = 1e-5  # of the terms of a sum: float32 rounding, with room to spare
+
+
+@dataclass
+class Box:
+    """Boxes about directions, in the frame of the light."""
+
+    x: Any  #: centre
+    y: Any
+    z: Any
+    x_half: Any  #: half the width
+    y_half: Any
+    z_half: Any
+    ray_end: Any  #: least D/x at which a ray ends
+    azimuth: Any  #: of the centre, diamond angle
+    azimuth_half: Any
+
+
+def tile_boxes(index: PlaneIndex, rays: Callable[[Any], tuple[Any, Any, Any]], distance, *, square: bool) -> Box:
+    """Return the boxes of the tiles.
+
+    Parameters
+    ----------
+    index
+        The planes, for the frame of the light.
+    rays
+        (lane) -> direction in that frame, three arrays.
+    distance
+        At which every ray ends [m].
+    square
+        Whether every tile is a square of 4 x 4 pixels: then its corners bound it, but for the curvature of the sphere
+        of directions.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    count = dr.width(distance)
+    tiles = -(-count // TILE)
+    tile = dr.arange(mi.UInt32, tiles)
+
+    def lane(k):
+        # Beyond the last ray: the first of the tile again.
+        lane = tile * TILE + k
+        return dr.select(lane < count, lane, tile * TILE)
+
+    corners = (0, SIDE - 1, TILE - SIDE, TILE - 1) if square else range(TILE)
+    directions = [rays(lane(k)) for k in corners]
+    ends = [dr.gather(type(distance), distance, lane(k)) for k in range(TILE)]
+    low = [reduce(dr.minimum, [w[axis] for w in directions]) for axis in range(3)]
+    high = [reduce(dr.maximum, [w[axis] for w in directions]) for axis in range(3)]
+    if square:
+        # Between two directions at the angle a the sphere stands out by 1 - cos(a/2) < a^2/8.
+        bulge = 0.125 * sum(dr.square(b - a) for a, b in zip(low, high))
+        low, high = [a - bulge for a in low], [b + bulge for b in high]
+    return _box(low, high, index.distance / reduce(dr.maximum, ends))
+
+
+def block_boxes(tile: Box) -> Box:
+    """Return the boxes of the blocks of tiles."""
+    import drjit as dr
+    import mitsuba as mi
+
+    count = dr.width(tile.x)
+    block = dr.arange(mi.UInt32, -(-count // TILE))
+
+    def bounds(k):
+        number = block * TILE + k
+        number = dr.select(number < count, number, block * TILE)
+        box = dr.gather(Box, tile, number)
+        centre, half = (box.x, box.y, box.z), (box.x_half, box.y_half, box.z_half)
+        low, high = [c - h for c, h in zip(centre, half)], [c + h for c, h in zip(centre, half)]
+        return low, high, box.ray_end
+
+    members = [bounds(k) for k in range(TILE)]
+    low = [reduce(dr.minimum, [member[0][axis] for member in members]) for axis in range(3)]
+    high = [reduce(dr.maximum, [member[1][axis] for member in members]) for axis in range(3)]
+    return _box(low, high, reduce(dr.minimum, [member[2] for member in members]))
+
+
+def _box(low, high, ray_end) -> Box:
+    """Return the box between two corners."""
+    x, y, z = (0.5 * (a + b) for a, b in zip(low, high))
+    x_half, y_half, z_half = (0.5 * (b - a) for a, b in zip(low, high))
+    azimuth, azimuth_half = _azimuths((x, y), (x_half, y_half))
+    return Box(x, y, z, x_half, y_half, z_half, ray_end, azimuth, azimuth_half)
+
+
+def _azimuths(centre, half):
+    """Return the azimuth of the centres and how far the corners are from it; a full turn where that is unclear."""
+    import drjit as dr
+
+    (x, y), (x_half, y_half) = centre, half
+    azimuth = diamond_angle(x, y)
+    widest = type(x)(0)
+    for side_x in (-1, 1):
+        for side_y in (-1, 1):
+            turn = diamond_angle(x + side_x * x_half, y + side_y * y_half) - azimuth
+            turn = dr.abs(turn)
+            widest = dr.maximum(widest, dr.minimum(turn, TURN - turn))
+    holds_axis = (dr.abs(x) <= x_half) & (dr.abs(y) <= y_half)
+    return azimuth, dr.select(holds_axis | (widest > 1), TURN, widest + 1e-6)
+
+
+def touches(index: PlaneIndex, box: Box, entry, active):
+    """Return whether a ray of the box could cross a plane, whether all that reach it do, and D/x at the centre."""
+    import drjit as dr
+
+    Float = type(box.x)
+    number = entry & NUMBER
+    a, b, p, q = dr.gather(four_numbers(Float), index.lines, number, active)
+    first, last = dr.gather(two_numbers(Float), index.spans, 2 * number, active)
+    quotient = dr.fma(a, box.x, dr.fma(b, box.y, -box.z))
+    reach = dr.fma(dr.abs(a), box.x_half, dr.fma(dr.abs(b), box.y_half, box.z_half))
+    reach += _SLACK * (dr.abs(a * box.x) + dr.abs(b * box.y) + 1)
+    pd, qd = p * index.distance, q * index.distance
+    margin = dr.fma(pd, box.x, qd * box.y) - quotient
+    margin_reach = dr.fma(dr.abs(pd - a), box.x_half, dr.fma(dr.abs(qd - b), box.y_half, box.z_half))
+    margin_reach += _SLACK * (dr.abs(a * box.x) + dr.abs(b * box.y) + dr.abs(pd * box.x) + dr.abs(qd * box.y) + 1)
+    low, high = box.azimuth - box.azimuth_half, box.azimuth + box.azimuth_half
+    overlaps = (first <= high) & (last >= low)
+    overlaps |= (first <= high - TURN) & (last >= low - TURN)
+    overlaps |= (first <= high + TURN) & (last >= low + TURN)
+    largest = quotient + reach
+    could = (largest > 0) & (largest >= box.ray_end) & (margin + margin_reach > 0)
+    full = (quotient > reach) & (margin > margin_reach) & (first <= low) & (high < last) & (low >= 0) & (high < TURN)
+    return active & overlaps & could, full, quotient

@@ -1,0 +1,249 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A user's own method, named 'module:function' or 'path/to/file.py:function'.
+
+What the function takes decides: a keyword `kernel` means that it calls one, other keywords are parameters and their
+defaults give them their types. What it returns is checked, because nobody else has. See docs/own-method.md.
+
+It is not frozen unless its author says that it can be: a frozen function that copies NumPy's arrays in or reads values
+out ends the process (Dr.Jit 1.5). Tracing `unshadowed` anew for every frame costs 0.3 ms (2 threads).
+"""
+
+import importlib
+import importlib.util
+import inspect
+import os
+import sys
+import traceback
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from types import MappingProxyType, ModuleType
+from typing import Any
+
+from realtime.errors import InputError
+from realtime.methods.method import Method
+from realtime.methods.user_result import check_finite, checked_radiance
+
+_WANTED = "wanted 'module:function' or 'path/to/file.py:function'"
+_TYPES = (bool, int, float, str)
+
+
+def own_method(name: str) -> Method:
+    """Return the record of a user's own method.
+
+    Parameters
+    ----------
+    name
+        'module:function', the current folder first on the path, or 'path/to/file.py:function'. The object may also be a
+        `Method`, for all that an attribute cannot say; it is taken as it is, and what it returns is checked.
+
+    Raises
+    ------
+    InputError
+        For what cannot be imported, is not there or is no function, and a function that no frame can call.
+    """
+    found = _find(name)
+    if isinstance(found, Method):
+        return replace(
+            found,
+            function=_guarded(found.function, name, lights_surfaces=found.lights_surfaces),
+            check=found.check or partial(check_finite, name=name),
+        )
+    if isinstance(found, type) or not callable(found):
+        kind = "class" if isinstance(found, type) else type(found).__name__
+        raise InputError(f"method {name}: this is a {kind}; wanted a function of the view")
+    takes_kernel, parameters = _signature(found, name)
+    return Method(
+        name,
+        _guarded(found, name, takes_kernel=takes_kernel),
+        _summary(found),
+        _file(found) or "one's own",
+        uses_kernel=takes_kernel,
+        prepare=_guarded_prepare(getattr(found, "prepare", None), name),
+        casts_rays=lambda settings: True,
+        frozen=lambda settings: bool(getattr(found, "frozen", False)),
+        shadows=bool(getattr(found, "shadows", True)),
+        parameters=MappingProxyType(parameters),
+        check=partial(check_finite, name=name),
+    )
+
+
+def _find(name: str) -> Any:
+    """Import the module or the file, and return the object in it."""
+    module_name, _, path = name.rpartition(":")
+    if not module_name or not all(part.isidentifier() for part in path.split(".")):
+        raise InputError(f"method: got {name!r}, {_WANTED}")
+    is_file = module_name.endswith(".py") or os.sep in module_name
+    with _own_errors(f"method {name}"):
+        module = _from_file(Path(module_name), name) if is_file else _from_path(module_name, name)
+    found: Any = module
+    for part in path.split("."):
+        if not hasattr(found, part):
+            there = [key for key, value in vars(module).items() if _is_candidate(value, module)]
+            known = f"it has {', '.join(there)}" if there else "it has no functions of its own"
+            raise InputError(f"method {name}: {module_name} has no {path!r}; {known}")
+        found = getattr(found, part)
+    return found
+
+
+def _is_candidate(value: Any, module: ModuleType) -> bool:
+    if isinstance(value, Method):
+        return True
+    return inspect.isfunction(value) and value.__module__ == module.__name__ and not value.__name__.startswith("_")
+
+
+def _from_path(module_name: str, name: str) -> ModuleType:
+    """Import a module, the current folder first on the path: the console script's own folder stands there otherwise."""
+    if not all(part.isidentifier() for part in module_name.split(".")):
+        raise InputError(f"method {name}: no module can have the name {module_name!r}; {_WANTED}")
+    folder = os.getcwd()
+    sys.path.insert(0, folder)
+    try:
+        importlib.invalidate_caches()
+        return importlib.import_module(module_name)
+    except ModuleNotFoundError as error:
+        missing = error.name or ""
+        if missing and f"{module_name}.".startswith(f"{missing}."):
+            raise InputError(
+                f"method {name}: there is no module {missing!r} in {folder} or installed; {_WANTED}"
+            ) from None
+        raise
+    finally:
+        sys.path.remove(folder)
+
+
+def _from_file(path: Path, name: str) -> ModuleType:
+    """Import a file under a name of its own, again where it was changed since: in a notebook it will be."""
+    if not path.is_file():
+        raise InputError(f"method {name}: there is no file {path}; {_WANTED}")
+    place = path.resolve()
+    status = place.stat()
+    stamp = (status.st_mtime_ns, status.st_size)
+    key = f"airlight_own_{place.stem}_{abs(hash(str(place))):x}"
+    known = sys.modules.get(key)
+    if known is not None and known.__dict__.get("__airlight_stamp__") == stamp:
+        return known
+    spec = importlib.util.spec_from_file_location(key, place)
+    if spec is None or spec.loader is None:
+        raise InputError(f"method {name}: {path} is no Python file; {_WANTED}")
+    module = importlib.util.module_from_spec(spec)
+    module.__dict__["__airlight_stamp__"] = stamp
+    sys.modules[key] = module
+    sys.path.insert(0, str(place.parent))  # its neighbours are there for it, as if it were run
+    try:
+        spec.loader.exec_module(module)
+    except BaseException:
+        del sys.modules[key]
+        raise
+    finally:
+        sys.path.remove(str(place.parent))
+    return module
+
+
+def _signature(function: Callable[..., Any], name: str) -> tuple[bool, dict[str, Any]]:
+    """Return whether a function takes a kernel, and its other keywords with their defaults."""
+    try:
+        arguments = list(inspect.signature(function).parameters.values())
+    except (TypeError, ValueError) as error:
+        raise InputError(f"method {name}: its arguments cannot be read ({error}); wanted a Python function") from error
+    if not arguments or arguments[0].kind not in (
+        inspect.Parameter.POSITIONAL_ONLY,
+        inspect.Parameter.POSITIONAL_OR_KEYWORD,
+    ):
+        raise InputError(f"method {name}: it takes no view; wanted function(view, *, kernel=None, **parameters)")
+    parameters = {}
+    takes_kernel = False
+    for one in arguments[1:]:
+        if one.kind in (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD):
+            continue
+        if one.name == "kernel":
+            takes_kernel = True
+        elif one.default is inspect.Parameter.empty or one.kind == inspect.Parameter.POSITIONAL_ONLY:
+            raise InputError(f"method {name}: nothing gives {one.name!r} a value; wanted a keyword with a default")
+        elif type(one.default) in _TYPES:  # what has another type cannot be set, and keeps its default
+            parameters[one.name] = one.default
+    return takes_kernel, parameters
+
+
+def _guarded(
+    function: Callable[..., Any],
+    name: str,
+    *,
+    takes_kernel: bool = True,
+    lights_surfaces: Callable[[Mapping[str, Any]], bool] = lambda settings: False,
+) -> Callable[..., Any]:
+    """Return the function with its errors named and its result checked."""
+
+    def method(view, *, kernel=None, **parameters):
+        given = {"kernel": kernel} if takes_kernel else {}
+        with _own_errors(f"method {name}", _file(function)):
+            found = function(view, **given, **parameters)
+        if not lights_surfaces(parameters):
+            return checked_radiance(found, view, name)
+        if not isinstance(found, tuple) or len(found) != 2:
+            raise InputError(f"method {name}: returned a {type(found).__name__}; wanted (radiance, lit by light)")
+        return checked_radiance(found[0], view, name), found[1]
+
+    return method
+
+
+def _guarded_prepare(prepare: Any, name: str) -> Callable[..., Any] | None:
+    """Return the preparation with its errors named."""
+    if prepare is None:
+        return None
+    if not callable(prepare):
+        raise InputError(f"method {name}: its `prepare` is a {type(prepare).__name__}; wanted a function of the scene")
+
+    def ready(scene, **parameters):
+        with _own_errors(f"method {name}", _file(prepare)):
+            made = prepare(scene, **parameters)
+        if not callable(made):
+            raise InputError(
+                f"method {name}: `prepare` returned a {type(made).__name__}; wanted a function of the scene"
+            )
+
+        def run(moved):
+            with _own_errors(f"method {name}", _file(prepare)):
+                return made(moved)
+
+        return run
+
+    return ready
+
+
+@contextmanager
+def _own_errors(what: str, file: str | None = None) -> Iterator[None]:
+    """Turn any exception of the user's code into an `InputError` that says where it came from."""
+    try:
+        yield
+    except InputError:  # what it refuses by name
+        raise
+    except Exception as error:  # the user's code may raise anything, and that is his to mend: never a failure of ours
+        root: BaseException = error
+        while root.__cause__ is not None:  # Dr.Jit wraps what is raised in the body of a loop
+            root = root.__cause__
+        words = " ".join(str(root).split())
+        raise InputError(f"{what}: {_place(root, error, file)}{type(root).__name__}: {words}") from error
+
+
+def _place(root: BaseException, error: BaseException, file: str | None) -> str:
+    """Return 'file, line N: ' of the innermost step in the user's file, or of the innermost of all."""
+    if isinstance(root, SyntaxError):
+        return f"{root.filename}, line {root.lineno}: "
+    steps = [step for one in (error, root) for step in traceback.extract_tb(one.__traceback__)]
+    outside = [step for step in steps if step.filename != __file__ and "importlib" not in step.filename]
+    inside = [step for step in outside if step.filename == file]
+    chosen = inside or outside
+    return f"{chosen[-1].filename}, line {chosen[-1].lineno}: " if chosen else ""
+
+
+def _file(function: Any) -> str | None:
+    code = getattr(inspect.unwrap(function), "__code__", None)
+    return None if code is None else code.co_filename
+
+
+def _summary(function: Any) -> str:
+    text = inspect.getdoc(function) if inspect.isfunction(function) else None
+    return text.splitlines()[0] if text else "a method of one's own"

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a user's own method returned, made a colour for every pixel or refused."""
+
+from typing import Any
+
+from realtime.errors import InputError
+from realtime.methods.view import View
+
+_WANTED = "wanted the radiance of every pixel, an RGB colour or one number: a Dr.Jit array, or NumPy's (pixels, 3)"
+
+
+def checked_radiance(found: Any, view: View, name: str):
+    """Return the radiance of every pixel as a colour in the precision of the view.
+
+    Parameters
+    ----------
+    found
+        What the method `name` returned: a Dr.Jit colour, three-vector or number, or an array (pixels, 3) or (pixels,)
+        of another kind, which goes through NumPy; one entry per pixel of `view`, or one for all.
+    view
+        What the method was given.
+    name
+        The method's name, for messages.
+
+    Raises
+    ------
+    InputError
+        For a result of another type or shape.
+    """
+    import drjit as dr
+
+    Color, Float = type(view.medium.albedo), type(view.distance)
+    width = dr.width(view.pixel)
+    channels = _dr_channels(found, name) if dr.is_array_v(found) else _channels(found, width, name)
+    for one in channels:
+        if dr.width(one) not in (1, width):
+            raise InputError(f"method {name}: returned {dr.width(one)} values for {width} pixels; {_WANTED}")
+    # A constant has one entry: every pixel gets it.
+    return Color(*(Float(one) + dr.zeros(Float, width) for one in channels))
+
+
+def check_finite(airlight, *, name: str) -> None:
+    """Refuse an image of radiance, (height, width, 3), with values that are not finite."""
+    import numpy as np
+
+    wrong = ~np.isfinite(airlight).all(axis=2)
+    if wrong.any():
+        row, column = np.argwhere(wrong)[0]
+        raise InputError(
+            f"method {name}: the radiance of {int(wrong.sum())} of {wrong.size} pixels is not finite, first in column "
+            f"{column} of row {row}: {', '.join(f'{value:g}' for value in airlight[row, column])}"
+        )
+
+
+def _dr_channels(found: Any, name: str) -> tuple[Any, ...]:
+    """Return the three channels of a Dr.Jit array."""
+    import drjit as dr
+
+    kind = type(found)
+    if dr.is_float_v(kind) and not dr.is_special_v(kind) and not dr.is_tensor_v(kind):
+        if dr.depth_v(kind) == 1:
+            return (found,) * 3
+        if dr.depth_v(kind) == 2 and len(found) == 3:
+            return tuple(found)
+    raise InputError(f"method {name}: returned a {kind.__module__}.{kind.__name__}; {_WANTED}")
+
+
+def _channels(found: Any, width: int, name: str) -> tuple[Any, ...]:
+    """Return the three channels of an array of another kind, or of a number."""
+    import mitsuba as mi
+    import numpy as np
+
+    try:
+        values = np.asarray(found)
+        right = values.dtype.kind in "fiu"
+    except (TypeError, ValueError):
+        right = False
+    if not right:
+        raise InputError(f"method {name}: returned a {type(found).__name__}; {_WANTED}")
+    if values.ndim == 0:
+        return (float(values),) * 3
+    if values.shape not in ((width,), (width, 3)):
+        raise InputError(f"method {name}: returned an array of shape {values.shape} for {width} pixels; {_WANTED}")
+    double = np.ascontiguousarray(values, dtype=np.float64)
+    return (mi.Float64(double),) * 3 if double.ndim == 1 else tuple(mi.Float64(column) for column in double.T.copy())

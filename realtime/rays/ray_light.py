@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The geometry of a ray and a light: the foot of the perpendicular, the height, and the cone of a spot.
+
+With v = light - origin and a unit direction d, ``foot = v . d`` and ``height = |v x d|``. The textbook form
+sqrt(|v|^2 - foot^2) cancels where the ray passes close to the light: at height 1e-3 |v| it has no correct digit left in
+float32. Each component of the cross product is a difference of two products, a b - c d, and Kahan's form with fused
+multiply-add gives it to 1.5 units in the last place:
+
+    w = c d;   e = fma(-c, d, w)   (the exact rounding error of w);   a b - c d = fma(a, b, -w) + e
+
+That is as good as v and d are. The rounding errors of both are known, v's from the subtraction and d's from
+`realtime.scene.camera`, and enter to first order: (v + v') x (d + d') = v x d + v' x d + v x d'. A spot's cone needs
+the cross product to twice the digits (`realtime.rays.spot_cone`); a point light does not pay for them.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from realtime.numerics.error_free import difference_of_products, two_sum
+from realtime.rays.spot_cone import axis_distance, axis_geometry, cone_interval
+from realtime.scene.lights import Light
+
+_PARALLEL = 1e-6  #: sine between a ray and the axis of a spot below which their distance is the same everywhere
+
+
+@dataclass(frozen=True)
+class RayGeometry:
+    """Where a light lies as seen from a camera ray; every field has one entry per ray."""
+
+    foot: Any  #: signed distance along the ray of the foot of the perpendicular from the light [m]
+    height: Any  #: distance from the light to the ray [m]
+    axial: Any = None  #: spot only: cosine between the ray and the axis of the spot
+    offset: Any = None  #: spot only: component along the axis of the vector from the light to the foot [m]
+    enter: Any = None  #: spot only: distance at which the ray enters the cone, -inf if it misses it [m]
+    leave: Any = None  #: spot only: distance at which it leaves the cone, -inf if it misses it [m]
+    beam_enter: Any = None  #: soft spot only: the same for the cone of full intensity [m]
+    beam_leave: Any = None
+    slant: Any = None  #: soft spot only: sine between the ray and the axis
+    slide: Any = None  #: soft spot only: slant times the distance from the foot to the point closest to the axis [m]
+    gap: Any = None  #: soft spot only: distance between the ray and the axis, as endless lines [m]
+
+
+def ray_geometry(origin, direction, light: Light, *, low=None) -> RayGeometry:
+    """Return foot and height of rays with respect to one light, and where they are in the cone of a spot.
+
+    Parameters
+    ----------
+    origin, direction
+        Camera rays, three-vectors of Dr.Jit arrays [m]; `direction` has unit length.
+    light
+        A point or spot light.
+    low
+        What rounding took from `direction`, if that is known (see `realtime.scene.camera.ray_directions`).
+
+    Notes
+    -----
+    Valid for any ray and a light that has a place. A ray through the light has height 0.
+    """
+    import drjit as dr
+
+    v, v_low = two_sum(light.position, -origin)
+    d = direction
+    if light.kind == "spot":
+        return _spot_geometry((v, v_low), d, low, light)
+    cross = type(v)(
+        difference_of_products(v.y, d.z, v.z, d.y),
+        difference_of_products(v.z, d.x, v.x, d.z),
+        difference_of_products(v.x, d.y, v.y, d.x),
+    )
+    cross += dr.cross(v_low, d)
+    if low is not None:
+        cross += dr.cross(v, low)
+    return RayGeometry(dr.dot(v, d), dr.norm(cross))
+
+
+def _spot_geometry(away, direction, direction_low, light: Light) -> RayGeometry:
+    """Return the geometry of rays and a spot; `away` is the vector to the light with its low part."""
+    import drjit as dr
+
+    ray = axis_geometry(away, direction, direction_low, light)
+    foot = dr.dot(away[0], direction)
+    enter, leave = (foot + s for s in cone_interval(ray, light.cone))
+    geometry = RayGeometry(foot, ray.height, ray.axial, ray.offset, enter, leave)
+    if not light.soft:
+        return geometry
+    begin, end = (foot + s for s in cone_interval(ray, light.beam))
+    return replace(geometry, beam_enter=begin, beam_leave=end, **axis_distance(ray))
+
+
+def distance_to_light(geometry: RayGeometry, x):
+    """Return r(x) = sqrt(height^2 + (x - foot)^2), the distance from the light to the point at `x` [m]."""
+    import drjit as dr
+
+    s = x - geometry.foot
+    return dr.sqrt(dr.fma(s, s, geometry.height * geometry.height))
+
+
+def clip_to_cone(geometry: RayGeometry, x0, x1):
+    """Clip [x0, x1] to the part of the ray inside the cone of a spot.
+
+    Parameters
+    ----------
+    geometry
+        Rays and a spot.
+    x0, x1
+        The segment [m]; `x1` may be infinite.
+
+    Returns
+    -------
+    x0, x1
+        The clipped segment [m]; x1 = x0 where the segment misses the cone.
+    """
+    return _clip(geometry.enter, geometry.leave, x0, x1)
+
+
+def stretches(geometry: RayGeometry, light: Light, x0, x1):
+    """Cut [x0, x1] where a soft spot's `falloff` has kinks, at the cone of the beam; one stretch for other lights.
+
+    A ray that misses the beam is cut where it is closest to the axis: the closer it passes, the more like a kink.
+    """
+    import drjit as dr
+
+    if not light.soft:
+        return [(x0, x1)]
+    inner0, inner1 = _clip(geometry.beam_enter, geometry.beam_leave, x0, x1)
+    crosses = geometry.slant > _PARALLEL
+    closest = dr.clip(geometry.foot + dr.select(crosses, geometry.slide / geometry.slant, 0), x0, x1)
+    misses = crosses & (inner0 >= inner1)
+    inner0, inner1 = dr.select(misses, closest, inner0), dr.select(misses, closest, inner1)
+    return [(x0, inner0), (inner0, inner1), (inner1, x1)]
+
+
+def _clip(enter, leave, x0, x1):
+    import drjit as dr
+
+    begin = dr.clip(enter, x0, x1)
+    return begin, dr.maximum(dr.clip(leave, x0, x1), begin)
+
+
+def falloff(geometry: RayGeometry, light: Light, x):
+    """Return the relative intensity of a spot at the point at `x`: Mitsuba's profile, linear in the angle [1].
+
+    One inside the beam, zero outside the cut-off; between the two, (cutoff - angle) / (cutoff - beam). The angle is
+    that of the distances from the axis and along it: near the axis a cosine alone has lost it.
+    """
+    import drjit as dr
+
+    s = x - geometry.foot
+    t = dr.fma(geometry.slant, s, -geometry.slide)
+    away = dr.sqrt(dr.fma(t, t, dr.square(geometry.gap)))
+    along = dr.fma(geometry.axial, s, geometry.offset)
+    # As one angle: at the dim edge the difference of two has lost what is left of it.
+    cos, sin = light.cone.cos, dr.sqrt(light.cone.square_sin)
+    within = dr.atan2(sin * along - cos * away, dr.fma(cos, along, sin * away))
+    return dr.clip(within * light.inverse_transition, 0, 1)

@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What moves from frame to frame: lights, the medium, objects.
+
+A scene with something moved is a new `Scene` that shares all the rest. Its arrays have the types and sizes of the old
+ones and are opaque, so a frame that was recorded once serves for all. Only objects move in Mitsuba's own scene, which
+is told so that rays meet them; what was prepared for a method follows from `Scene.positions`.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realtime.errors import InputError
+from realtime.methods.shadow_planes.mesh_adjacency import Casters
+from realtime.numerics.array_types import types_of
+from realtime.scene.directional_extent import directional_fields, face_balls
+from realtime.scene.lights import Light
+from realtime.scene.medium import Medium
+from realtime.scene.read_scene import Scene
+from realtime.scene.triangle_table import read_facets
+
+Array = NDArray[np.float64]
+
+
+def turned_light(light: Light, about: Array, turn: Array) -> Light:
+    """Return a light turned about a point, with its axis if it has one; a light at infinity only turns its axis.
+
+    Parameters
+    ----------
+    light
+        The light.
+    about
+        A point that stays [m].
+    turn
+        Rotation matrix, (3, 3).
+    """
+    if light.kind == "directional":
+        return replace(light, **_turned_sun(light, turn))
+    position = np.array(light.position, dtype=np.float64).ravel()
+    arrays = {"position": _like(light.position, about + turn @ (position - about))}
+    if light.axis is not None:
+        high, low = (np.array(part, dtype=np.float64).ravel() for part in (light.axis, light.axis_low))
+        axis = turn @ (high + low)
+        arrays["axis"] = _like(light.axis, axis)
+        arrays["axis_low"] = _like(light.axis_low, axis - np.array(arrays["axis"], dtype=np.float64).ravel())
+    return replace(light, **arrays)
+
+
+def _turned_sun(light: Light, turn: Array) -> dict[str, Any]:
+    high, low = (np.array(part, dtype=np.float64).ravel() for part in (light.axis, light.axis_low))
+    types = types_of(type(light.face.back))
+    return directional_fields(turn @ (high + low), face_balls(light.face), float(light.face.back[0]), types)
+
+
+def coloured_light(light: Light, share: float) -> Light:
+    """Return a light whose red, green and blue went round by a share of a turn; their sum stays."""
+    intensity = np.array(light.intensity, dtype=np.float64).ravel()
+    whole, part = divmod(3 * share, 1)
+    here, there = (np.roll(intensity, int(whole) + step) for step in (0, 1))
+    return replace(light, intensity=_like(light.intensity, (1 - part) * here + part * there))
+
+
+def thicker_medium(medium: Medium, factor: float) -> Medium:
+    """Return a medium, with the bodies of others in it, with its extinction times a factor; the albedo stays."""
+    import drjit as dr
+
+    if not 0 <= factor < np.inf:
+        raise InputError(f"factor of the extinction: got {factor!r}, wanted a finite value of 0 or more")
+    sigma = tuple(dr.opaque(type(value), factor * float(value[0])) for value in medium.sigma_t)
+    bodies = tuple(replace(body, medium=thicker_medium(body.medium, factor)) for body in medium.bodies)
+    return replace(medium, sigma_t=sigma, bodies=bodies)
+
+
+@dataclass(frozen=True)
+class Objects:
+    """Shapes that can move, as they stood when they were read."""
+
+    parameters: Any  #: `mi.traverse` of the scene
+    vertices: Mapping[str, Array]  #: by shape, its vertices [m]
+
+
+def read_objects(scene: Scene, names: Sequence[str]) -> Objects:
+    """Read the shapes that are to move.
+
+    Raises
+    ------
+    InputError
+        For a shape that is not there, or whose vertices Mitsuba does not let move.
+    """
+    import mitsuba as mi
+
+    parameters = mi.traverse(scene.geometry)
+    vertices = {}
+    for name in names:
+        key = f"{name}.vertex_positions"
+        if key not in parameters:
+            raise InputError(f"shape {name!r} cannot move: wanted the name of a mesh (obj, ply) in the scene")
+        vertices[name] = np.array(parameters[key], dtype=np.float64).reshape(-1, 3)
+    moving = replace_positions(parameters, vertices)
+    return Objects(parameters, moving)
+
+
+def replace_positions(parameters, positions: Mapping[str, Array]) -> Mapping[str, Array]:
+    """Move the vertices of shapes in Mitsuba's scene; return them as it holds them, rounded to float32.
+
+    Dr.Jit reads NumPy's memory where it lies, and a frozen function is recorded anew where the alignment of an array
+    is another: what it is given are arrays of Dr.Jit's own.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    rounded = {}
+    for name, vertices in positions.items():
+        key = f"{name}.vertex_positions"
+        narrow = vertices.astype(np.float32)
+        borrowed = mi.Float(narrow.ravel())
+        own = dr.gather(mi.Float, borrowed, dr.arange(mi.UInt32, dr.width(borrowed)))
+        dr.eval(own)
+        parameters[key] = own
+        rounded[name] = narrow.astype(np.float64)
+    parameters.update()
+    return rounded
+
+
+def turned_objects(scene: Scene, objects: Objects, turn: Array) -> Scene:
+    """Return the scene with each of the objects turned about the middle of its bounding box, from where it stood.
+
+    Parameters
+    ----------
+    scene
+        The scene; its Mitsuba scene is changed.
+    objects
+        From `read_objects`.
+    turn
+        Rotation matrix, (3, 3).
+    """
+    positions = {}
+    for name, vertices in objects.vertices.items():
+        middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
+        positions[name] = (vertices - middle) @ turn.T + middle
+    moved = replace_positions(objects.parameters, positions)
+    facets = scene.facets and read_facets(scene.geometry, types_of(type(scene.camera.origin.x)))
+    return replace(scene, positions=moved, facets=facets)
+
+
+def closed_shapes(casters: Casters) -> tuple[str, ...]:
+    """Return the names of the shapes all of whose parts are closed: things, not floors and walls."""
+    names = []
+    firsts = [first for _, first, _ in casters.shapes]
+    owner = np.searchsorted(firsts, casters.triangles[:, 0], side="right") - 1
+    for number, (name, _, _) in enumerate(casters.shapes):
+        bodies = np.unique(casters.body[owner == number])
+        if len(bodies) and casters.closed[bodies].all():
+            names.append(name)
+    return tuple(names)
+
+
+def _like(old, values):
+    """Return an opaque array of the type of an old one."""
+    import drjit as dr
+
+    new = type(old)(*(float(value) for value in values))
+    dr.make_opaque(new)
+    return new

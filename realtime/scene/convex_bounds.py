@@ -1,0 +1,225 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Convex bounds of media: the half spaces of a closed convex mesh, or a ball, read from Mitsuba's shapes.
+
+Facets that lie in one plane are one half space: a cube has 6, not 12. Vertices are float32 numbers, so "in one plane"
+and "convex" hold to 1e-5 of the size of the body; triangles thinner than that have no plane worth the name, and their
+neighbours bound the body without them.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realtime.errors import InputError
+from realtime.methods.shadow_planes.mesh_adjacency import mesh_triangles
+
+Array = NDArray[np.float64]
+
+_FLAT = 1e-5  # relative to the size of the body
+_SAMPLES = 1 << 16  # pairs of points for the mean distance: its standard error is 0.2 %
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """A convex body: what lies in all half spaces normal . x <= offset, or in the ball where there are none."""
+
+    name: str
+    normals: Array  #: unit vectors that point outwards, (planes, 3)
+    offsets: Array  #: (planes,) [m]
+    corners: Array  #: of the triangles, (triangles, 3, 3) [m]
+    centre: Array  #: of a ball that holds the body [m]
+    radius: float  #: of that ball [m]
+
+    @property
+    def is_ball(self) -> bool:
+        """Whether the body is its ball."""
+        return not len(self.offsets)
+
+
+def read_bounds(shape) -> Bounds:
+    """Read the bounds of a medium from a shape.
+
+    Parameters
+    ----------
+    shape
+        A Mitsuba shape.
+
+    Raises
+    ------
+    InputError
+        For a shape that is neither a sphere nor a closed convex mesh with its normals outwards, with its name.
+    """
+    name = shape.id()
+    if shape.class_name() == "Sphere":
+        return _read_ball(shape)
+    if not shape.is_mesh():
+        raise _refusal(name, f"is a {shape.class_name()}", "a sphere, a cube or a closed convex mesh")
+    vertices, faces = mesh_triangles(shape)
+    return mesh_bounds(name, vertices, faces[:, ::-1] if shape.has_flipped_normals() else faces)
+
+
+def _read_ball(shape) -> Bounds:
+    box = shape.bbox()
+    low, high = np.array(box.min, dtype=np.float64).ravel(), np.array(box.max, dtype=np.float64).ravel()
+    size = high - low
+    if np.ptp(size) > _FLAT * size.max():
+        raise _refusal(shape.id(), "is a sphere with different scales along its axes", "one scale, or a mesh")
+    if shape.has_flipped_normals():
+        raise _refusal(shape.id(), "is inside out", "normals that point outwards: remove flip_normals")
+    return Bounds(
+        shape.id(), np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3, 3)), 0.5 * (low + high), float(size.mean() / 2)
+    )
+
+
+def mesh_bounds(name: str, vertices: Array, faces: NDArray[Any]) -> Bounds:
+    """Return the bounds that a mesh describes, counter-clockwise seen from outside.
+
+    Raises
+    ------
+    InputError
+        For a mesh that is not closed, not convex, inside out or flat.
+    """
+    corners = vertices[faces]
+    size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    _check_closed(name, corners)
+    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    twice = np.linalg.norm(area, axis=1)
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    volume = np.sum((corners[:, 0] - vertices.mean(axis=0)) * area) / 6
+    if not abs(volume) > _FLAT * size**3 * 1e-3:
+        raise _refusal(name, "has no volume", "a closed convex mesh")
+    if volume < 0:
+        raise _refusal(name, "is inside out", "faces that run counter-clockwise seen from outside")
+    sound = twice > _FLAT * size * longest
+    normals = area[sound] / twice[sound, None]
+    offsets = np.mean(np.sum(corners[sound] * normals[:, None], axis=2), axis=1)
+    normals, offsets = _merged(normals, offsets, size)
+    if np.any(vertices @ normals.T > offsets + 2 * _FLAT * size):
+        raise _refusal(name, "is not convex", "convex bounds: cut the body into convex parts")
+    centre = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
+    radius = float(np.linalg.norm(vertices - centre, axis=1).max())
+    return Bounds(name, normals, offsets, corners, centre, radius)
+
+
+def _check_closed(name: str, corners: Array) -> None:
+    """Refuse a surface in which not every edge is met once each way; doubled vertices are one."""
+    _, number = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
+    face = number.reshape(-1, 3)
+    tail, head = face.ravel(), np.roll(face, -1, axis=1).ravel()
+    count = face.max() + 1
+    one, other = np.sort(tail * count + head), np.sort(head * count + tail)
+    if np.any(tail == head) or np.any(one[1:] == one[:-1]) or not np.array_equal(one, other):
+        raise _refusal(name, "is not a closed surface", "a closed convex mesh without doubled or degenerate faces")
+
+
+def _merged(normals: Array, offsets: Array, size: float) -> tuple[Array, Array]:
+    """Keep one plane of all that coincide."""
+    key = np.column_stack([normals, offsets / size])
+    kept: list[int] = []
+    for number, row in enumerate(key):
+        if not kept or np.abs(key[kept] - row).max(axis=1).min() > _FLAT:
+            kept.append(number)
+    return normals[kept], offsets[kept]
+
+
+def _refusal(name: str, found: str, wanted: str) -> InputError:
+    return InputError(f"shape '{name}' bounds a medium and {found}; wanted {wanted}")
+
+
+def plane_neighbours(bounds: Bounds) -> NDArray[np.uint32]:
+    """Return by plane the planes that share an edge with it, filled up with its own number, (planes, most of any).
+
+    Planes through the same two corners, to the precision of the corners: where facets are tiny that may be more.
+    """
+    corners = np.unique(bounds.corners.reshape(-1, 3), axis=0)
+    on = np.abs(corners @ bounds.normals.T - bounds.offsets) < 4 * _FLAT * bounds.radius
+    shared = on.T.astype(np.float32) @ on.astype(np.float32)
+    np.fill_diagonal(shared, 0)
+    rows = [np.flatnonzero(row >= 2) for row in shared]
+    table = np.repeat(np.arange(len(rows), dtype=np.uint32)[:, None], max(len(row) for row in rows), axis=1)
+    for number, row in enumerate(rows):
+        table[number, : len(row)] = row
+    return table
+
+
+def holds(bounds: Bounds, point: Array) -> bool:
+    """Return whether a point lies inside."""
+    if bounds.is_ball:
+        return bool(np.linalg.norm(point - bounds.centre) < bounds.radius)
+    return bool(np.all(bounds.normals @ point < bounds.offsets))
+
+
+def overlap(one: Bounds, other: Bounds) -> bool:
+    """Return whether two bodies share more than 1e-5 of their size; bodies that touch do not."""
+    gap = float(np.linalg.norm(one.centre - other.centre))
+    margin = _FLAT * min(one.radius, other.radius)
+    if gap >= one.radius + other.radius - margin:
+        return False
+    if one.is_ball and other.is_ball:
+        return True
+    if one.is_ball or other.is_ball:
+        ball, mesh = (one, other) if one.is_ball else (other, one)
+        return _distance_to_hull(mesh, ball.centre) < ball.radius - margin
+    from scipy.optimize import linprog
+
+    # The largest ball in both: maximise t under n . x + t <= offset.
+    planes = np.concatenate([one.normals, other.normals])
+    found = linprog(
+        [0, 0, 0, -1],
+        A_ub=np.column_stack([planes, np.ones(len(planes))]),
+        b_ub=np.concatenate([one.offsets, other.offsets]),
+        bounds=[(None, None)] * 4,
+    )
+    return bool(found.status == 0 and -found.fun > margin)
+
+
+def _distance_to_hull(bounds: Bounds, point: Array) -> float:
+    """Return the distance from a point to the convex hull of the corners.
+
+    min |sum_i l_i v_i - point| with l_i >= 0 and sum l_i = 1 is a problem of non-negative least squares; a heavy last
+    row holds the sum.
+    """
+    from scipy.optimize import nnls
+
+    if holds(bounds, point):
+        return 0.0
+    weight = 1e4 * bounds.radius
+    corners = np.unique(bounds.corners.reshape(-1, 3), axis=0) - point
+    matrix = np.vstack([corners.T, np.full(len(corners), weight)])
+    shares, _ = nnls(matrix, np.array([0.0, 0.0, 0.0, weight]))
+    return float(np.linalg.norm(shares @ corners / shares.sum()))
+
+
+def mean_distance(bounds: Bounds) -> float:
+    """Return R, the average distance between a point of the boundary and a point of the body [m].
+
+    Both are uniform, by area and by volume, and independent: one reading of "the average distance between a point
+    located in the boundary and a point in the medium". In a ball the mean over the boundary is a + d^2/(3 a) for a
+    point at the distance d from the centre, so R = 6 a/5. In a mesh it is the mean over 65 536 pairs drawn once for all
+    from a fixed seed, with a standard error of about 0.2 %.
+
+    References
+    ----------
+    Biri, Arques, Michelin 2006, section 4.2.
+    """
+    if bounds.is_ball:
+        return 1.2 * bounds.radius
+    random = np.random.default_rng(20_061)
+    corner = bounds.corners
+    area = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    middle = np.unique(corner.reshape(-1, 3), axis=0).mean(axis=0)
+    volume = np.sum((corner[:, 0] - middle) * area, axis=1)
+    boundary = _on_triangles(corner, np.linalg.norm(area, axis=1), random)
+    # The body is the tetrahedra from its middle to its triangles.
+    inside = middle + np.cbrt(random.random((_SAMPLES, 1))) * (_on_triangles(corner, volume, random) - middle)
+    return float(np.mean(np.linalg.norm(boundary - inside, axis=1)))
+
+
+def _on_triangles(corner: Array, share: Array, random) -> Array:
+    """Draw points that are uniform on each triangle, which is chosen by its share."""
+    share = np.maximum(share, 0)
+    chosen = corner[random.choice(len(corner), _SAMPLES, p=share / share.sum())]
+    u, v = np.sqrt(random.random((_SAMPLES, 1))), random.random((_SAMPLES, 1))
+    return (1 - u) * chosen[:, 0] + u * (1 - v) * chosen[:, 1] + u * v * chosen[:, 2]

@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The face of a directional light: the smallest rectangle across it through which all light of the media comes.
+
+Light enters there before all shapes, and leaves through the same rectangle behind the media. Heights above that end are
+small numbers where depths may be large ones, so its middle stands for the place of the light.
+
+The media lie in the hull of some balls: the corners of bodies of few planes, which are balls of radius 0, and the balls
+about the others. Seen along the light their rectangle is wanted at the angle at which it has the least area.
+"""
+
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realtime.numerics.array_types import ArrayTypes
+from realtime.scene.lights import Face, with_low
+from realtime.scene.medium import Body
+
+Array = NDArray[np.float64]
+
+_FEW_PLANES = 12  # of which every three are met
+_ANGLES = 90  # that are tried, in a quarter of a turn
+_BITS = 14  # of the numbers of a ball
+_MARGIN = 1.001  # so that rounding leaves nothing outside
+
+
+def media_balls(bodies: tuple[Body, ...]) -> Array:
+    """Return balls whose hull holds bodies: middles and radii [m], (balls, 4).
+
+    Numbers are rounded, and the balls grown by as much: what the precision of the bodies puts in their last digits must
+    not move the rays of a map.
+    """
+    balls = np.concatenate([_balls(body) for body in bodies])
+    grain = 2.0 ** np.ceil(np.log2(np.ptp(balls[:, :3], axis=0).max() + balls[:, 3].max()) - _BITS)
+    return grain * (np.round(balls / grain) + np.array([0, 0, 0, 2]))
+
+
+def distance_before(balls: Array, shapes) -> float:
+    """Return how far from the middle of the media nothing is any more [m].
+
+    An object that turns about the middle of its box stays within the ball about the box.
+    """
+    middle = _middle(balls)
+    reach = np.linalg.norm(balls[:, :3] - middle, axis=1) + balls[:, 3]
+    for shape in shapes:
+        low, high = (np.array(corner, dtype=np.float64).ravel() for corner in (shape.bbox().min, shape.bbox().max))
+        ball = np.linalg.norm(0.5 * (low + high) - middle) + 0.5 * np.linalg.norm(high - low)
+        reach = np.append(reach, ball)
+    return float(np.float32(_MARGIN * reach.max()))
+
+
+def directional_fields(axis: Array, balls: Array, back: float, types: ArrayTypes) -> dict[str, Any]:
+    """Return the fields of a directional `Light` that follow from where it comes from and what it lights.
+
+    Parameters
+    ----------
+    axis
+        Unit vector in which the light travels.
+    balls, back
+        From `media_balls` and `distance_before`.
+    types
+        Of the arrays.
+
+    Notes
+    -----
+    Valid for any axis. All but the axis is rounded to float32 in any precision, so that its map is the same in all.
+    """
+    import drjit as dr
+
+    high, low = with_low(axis, types)
+    middle = _middle(balls)
+    across, up, corner = _least_rectangle(axis, balls[:, :3] - middle, balls[:, 3])
+    behind = _MARGIN * float(((balls[:, :3] - middle) @ axis + balls[:, 3]).max())
+    vectors = {"position": middle + corner + behind * axis, "across": across, "up": up}
+    made = {name: _vector(vector.astype(np.float32), types) for name, vector in vectors.items()}
+    position = made.pop("position")
+    media = types.vector(*(types.scalar(column) for column in balls[:, :3].T))
+    numbers = {"depth": types.scalar(float(np.float32(back + behind))), "back": types.scalar(back)}
+    face = Face(**made, **numbers, media=media, radii=types.scalar(balls[:, 3]))
+    fields = {"position": position, "axis": _vector(high, types), "axis_low": _vector(low, types), "face": face}
+    dr.make_opaque(*fields.values())
+    return fields
+
+
+def face_balls(face: Face) -> Array:
+    """Return the balls of the media that a face was made for."""
+    return np.column_stack([np.array(face.media, dtype=np.float64).T, np.array(face.radii, dtype=np.float64)])
+
+
+def _middle(balls: Array) -> Array:
+    centres, radii = balls[:, :3], balls[:, 3:]
+    return 0.5 * ((centres - radii).min(axis=0) + (centres + radii).max(axis=0))
+
+
+def _least_rectangle(axis: Array, points: Array, radii: Array):
+    """Return half the sides of the rectangle of least area, two vectors, and its middle."""
+    helper = np.eye(3)[np.argmin(np.abs(axis))]
+    first = np.cross(helper, axis)
+    first /= np.linalg.norm(first)
+    second = np.cross(axis, first)
+    best: Any = None
+    for angle in np.linspace(0, 0.5 * np.pi, _ANGLES, endpoint=False):
+        sides = np.cos(angle) * first + np.sin(angle) * second, np.cos(angle) * second - np.sin(angle) * first
+        ends = [((points @ side - radii).min(), (points @ side + radii).max()) for side in sides]
+        area = (ends[0][1] - ends[0][0]) * (ends[1][1] - ends[1][0])
+        if best is None or area < best[0] * (1 - 1e-9):
+            best = area, sides, ends
+    _, sides, ends = best
+    across, up = (side * (0.5 * _MARGIN * (high - low)) for side, (low, high) in zip(sides, ends))
+    return across, up, sum(side * (0.5 * (low + high)) for side, (low, high) in zip(sides, ends))
+
+
+def _balls(body: Body) -> Array:
+    """Return the corners of a body of few planes, or its ball."""
+    centre, radius = np.array(body.centre, dtype=np.float64).ravel(), float(body.radius[0])
+    whole = np.array([[*centre, radius]])
+    if body.planes is None or body.count > _FEW_PLANES:
+        return whole
+    *normal, offsets = (np.array(column, dtype=np.float64).ravel() for column in body.planes)
+    normals = np.column_stack(normal)
+    corners = []
+    for three in combinations(range(body.count), 3):
+        matrix = normals[list(three)]
+        # Planes that are nearly parallel meet far away, if anywhere.
+        if abs(np.linalg.det(matrix)) > 1e-6:
+            point = np.linalg.solve(matrix, offsets[list(three)])
+            if np.all(normals @ point < offsets + 1e-4 * radius):
+                corners.append([*point, 0.0])
+    return np.array(corners) if len(corners) >= 4 else whole
+
+
+def _vector(values, types: ArrayTypes):
+    return types.vector(*(float(one) for one in values))

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Homogeneous media as Dr.Jit values: what fills space, and bodies of other media in it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from realtime.scene.phase import Phase
+
+
+@dataclass(frozen=True)
+class Medium:
+    """A homogeneous medium. One extinction for a grey medium, three for a coloured one: code runs once for each."""
+
+    sigma_t: tuple[Any, ...]  #: extinction [1/m], one or three values
+    albedo: Any  #: single-scattering albedo, RGB [1]
+    phase: Phase
+    bodies: tuple["Body", ...] = ()  #: convex, disjoint bodies of other media, with as many extinctions
+    clear: bool = False  #: around the bodies nothing scatters or absorbs
+
+
+@dataclass(frozen=True)
+class Body:
+    """A homogeneous medium within convex bounds (`realtime.scene.convex_bounds`)."""
+
+    medium: Medium
+    planes: tuple[Any, ...] | None  #: components of the outward normals and offsets of the half spaces; None for a ball
+    count: int  #: half spaces
+    centre: Any  #: of the ball, or of one that holds the body [m]
+    radius: Any  #: of that ball [m]
+    mean_distance: Any  #: R, see `realtime.scene.convex_bounds.mean_distance` [m]
+    neighbours: Any = None  #: `sides` numbers a half space: planes that share an edge with it, or itself; None: a ball
+    sides: int = 0
+
+
+def per_extinction(medium: Medium, function: Callable[[Any], Any]):
+    """Return `function(sigma_t)` for a grey medium, and its three values as a colour for a coloured one."""
+    values = [function(sigma_t) for sigma_t in medium.sigma_t]
+    return values[0] if len(values) == 1 else type(medium.albedo)(*values)
+
+
+def least_extinction(medium: Medium):
+    """Return the smallest extinction of the channels [1/m]."""
+    import drjit as dr
+
+    least = medium.sigma_t[0]
+    for sigma_t in medium.sigma_t[1:]:
+        least = dr.minimum(least, sigma_t)
+    return least
+
+
+def transmittance(medium: Medium, distance):
+    """Return exp(-sigma_t distance) [1], one value or a colour as in `per_extinction`."""
+    import drjit as dr
+
+    return per_extinction(medium, lambda sigma_t: dr.exp(-sigma_t * distance))

@@ -1,0 +1,208 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reading the media of a Mitsuba scene: what surrounds the camera, and what shapes bound.
+
+A shape with the material `null` and an interior medium is the boundary of a body: light passes, nothing is seen of it.
+All bodies lie in one medium, the camera's own or, for a camera inside a body, that body's exterior; none is a vacuum.
+"""
+
+from dataclasses import replace
+
+from realtime.errors import InputError
+from realtime.numerics.array_types import ArrayTypes
+from realtime.scene.convex_bounds import Bounds, holds, mean_distance, overlap, plane_neighbours, read_bounds
+from realtime.scene.medium import Body, Medium
+from realtime.scene.phase import Phase
+
+_PHASES = {
+    "IsotropicPhaseFunction": "isotropic",
+    "HGPhaseFunction": "hg",
+    "RayleighPhaseFunction": "rayleigh",
+    "TabulatedPhaseFunction": "tabulated",
+}
+
+
+def sort_shapes(scene):
+    """Return the opaque shapes of a scene and those that bound a medium.
+
+    Raises
+    ------
+    InputError
+        For a shape that is transparent or bounds a medium in a way that no method can render, with its name.
+    """
+    import mitsuba as mi
+
+    opaque, boundaries = [], []
+    for shape in scene.shapes():
+        bsdf, name = shape.bsdf(), shape.id()
+        bounds = shape.interior_medium() is not None or shape.exterior_medium() is not None
+        if bsdf.class_name() != "Null":
+            if bounds:
+                raise InputError(
+                    f"shape '{name}' bounds a medium and is opaque; wanted the material 'null' on it, and no medium on "
+                    "opaque shapes"
+                )
+            if mi.has_flag(bsdf.flags(), mi.BSDFFlags.Null):
+                raise InputError(f"shape '{name}' is partly transparent; wanted opaque surfaces or material 'null'")
+            opaque.append(shape)
+        elif shape.interior_medium() is not None:
+            boundaries.append(shape)
+        elif bounds:
+            raise InputError(f"shape '{name}' is a hole in a medium; wanted media inside of convex bounds")
+        else:
+            raise InputError(f"shape '{name}' is transparent and bounds no medium; wanted opaque surfaces: remove it")
+    return opaque, boundaries
+
+
+def opaque_scene(scene, opaque):
+    """Return the scene itself where all shapes are opaque, else a scene of those that are, under their names."""
+    import mitsuba as mi
+
+    if len(opaque) == len(scene.shapes()):
+        return scene
+    # A key of Mitsuba's dictionaries becomes the shape's name, and holds no dots.
+    return mi.load_dict({"type": "scene"} | {shape.id().replace(".", "-"): shape for shape in opaque})
+
+
+def read_medium(sensor, boundaries, types: ArrayTypes) -> Medium:
+    """Return the medium of a scene with the bodies in it.
+
+    Parameters
+    ----------
+    sensor
+        Mitsuba's sensor.
+    boundaries
+        The shapes that bound media.
+    types
+        Array types to compute with.
+
+    Raises
+    ------
+    InputError
+        For media that no method can render, with the name of what is in the way.
+    """
+    if not boundaries:
+        if sensor.get_medium() is None:
+            raise InputError(
+                "the camera references no medium: it would be in a vacuum; declare the medium with an id and put "
+                '<ref name="medium" id="..."/> inside the sensor'
+            )
+        return _homogeneous(sensor.get_medium(), types)
+    bounds = [read_bounds(shape) for shape in boundaries]
+    _check_disjoint(bounds)
+    around = _surrounding(sensor, boundaries, bounds)
+    media = [_homogeneous(shape.interior_medium(), types) for shape in boundaries]
+    ambient = _clear(types) if around is None else _homogeneous(around, types)
+    channels = max(len(medium.sigma_t) for medium in [ambient, *media])
+    bodies = tuple(convex_body(_in_channels(medium, channels), one, types) for medium, one in zip(media, bounds))
+    return replace(_in_channels(ambient, channels), bodies=bodies)
+
+
+def _surrounding(sensor, boundaries, bounds: list[Bounds]):
+    """Return the Mitsuba medium around all bodies, or None; refuse a camera or a boundary that says otherwise."""
+    import numpy as np
+
+    camera = np.array(sensor.world_transform().matrix, dtype=np.float64).reshape(4, 4)[:3, 3]
+    around = sensor.get_medium()
+    for shape, one in zip(boundaries, bounds):
+        if holds(one, camera):
+            if sensor.get_medium() != shape.interior_medium():
+                raise InputError(
+                    f"the camera is inside of shape '{one.name}', but references another medium or none; reference "
+                    "that shape's interior medium in the sensor"
+                )
+            around = shape.exterior_medium()
+    for shape, one in zip(boundaries, bounds):
+        if shape.exterior_medium() != around:
+            raise InputError(
+                f"the exterior medium of shape '{one.name}' is not what surrounds the camera or the others; wanted one "
+                "medium around all bounded media, or none at all"
+            )
+    return around
+
+
+def _check_disjoint(bounds: list[Bounds]) -> None:
+    for number, one in enumerate(bounds):
+        for other in bounds[:number]:
+            if overlap(one, other):
+                raise InputError(f"the media of shapes '{other.name}' and '{one.name}' overlap; wanted disjoint bounds")
+
+
+def convex_body(medium: Medium, bounds: Bounds, types: ArrayTypes) -> Body:
+    """Return a medium within bounds."""
+    import drjit as dr
+    import mitsuba as mi
+
+    centre = types.vector(*(float(c) for c in bounds.centre))
+    radius, distance = (dr.opaque(types.scalar, value) for value in (bounds.radius, mean_distance(bounds)))
+    dr.make_opaque(centre)
+    body = Body(medium, None, len(bounds.offsets), centre, radius, distance)
+    if bounds.is_ball:
+        return body
+    planes = tuple(types.scalar(column) for column in (*bounds.normals.T, bounds.offsets))
+    table = plane_neighbours(bounds)
+    neighbours = mi.UInt32(table.ravel())
+    dr.eval(neighbours, *planes)
+    return replace(body, planes=planes, neighbours=neighbours, sides=table.shape[1])
+
+
+def _clear(types: ArrayTypes) -> Medium:
+    import drjit as dr
+
+    albedo = types.color(0.0)
+    dr.make_opaque(albedo)
+    return Medium((dr.opaque(types.scalar, 0.0),), albedo, Phase("isotropic"), clear=True)
+
+
+def _in_channels(medium: Medium, channels: int) -> Medium:
+    """Return a grey medium with its extinction repeated: media of one scene have equally many."""
+    import drjit as dr
+
+    if len(medium.sigma_t) == channels:
+        return medium
+    (grey,) = medium.sigma_t
+    # Each channel has an array of its own: a recorded frame tells arrays that are one from arrays that are equal.
+    return replace(medium, sigma_t=tuple(dr.opaque(type(grey), float(grey[0])) for _ in range(channels)))
+
+
+def _homogeneous(medium, types: ArrayTypes) -> Medium:
+    import drjit as dr
+    import mitsuba as mi
+    import numpy as np
+
+    if not medium.is_homogeneous():
+        raise InputError(f"the medium is a {medium.class_name()}; wanted a medium of type 'homogeneous'")
+    sigma_s, _, sigma_t = medium.get_scattering_coefficients(dr.zeros(mi.MediumInteraction3f))
+    scattering = np.array(sigma_s, dtype=np.float64).reshape(-1)
+    extinction = np.array(sigma_t, dtype=np.float64).reshape(-1)
+    for name, values in (("sigma_t", extinction), ("sigma_s = albedo sigma_t", scattering)):
+        if not np.all(np.isfinite(values)) or np.any(values < 0):
+            raise InputError(f"the medium's {name} is {values.tolist()}; wanted finite values of 0 or more [1/m]")
+    albedo = np.divide(scattering, extinction, out=np.zeros(3), where=extinction > 0)
+    if np.any(albedo > 1 + 1e-6):
+        raise InputError(f"the medium's albedo is {albedo.tolist()}; wanted values from 0 to 1")
+    grey = extinction[0] == extinction[1] == extinction[2]
+    sigma = tuple(dr.opaque(types.scalar, float(value)) for value in (extinction[:1] if grey else extinction))
+    color = types.color(*(float(value) for value in albedo))
+    dr.make_opaque(color)
+    return Medium(sigma, color, _read_phase(medium.phase_function(), types))
+
+
+def _read_phase(phase, types: ArrayTypes) -> Phase:
+    import drjit as dr
+    import mitsuba as mi
+    import numpy as np
+
+    name = _PHASES.get(phase.class_name())
+    if name is None:
+        raise InputError(
+            f"the phase function is a {phase.class_name()}; wanted one of isotropic, hg, rayleigh, tabphase"
+        )
+    parameters = mi.traverse(phase)
+    if name == "hg":
+        return Phase(name, g=dr.opaque(types.scalar, float(parameters["g"][0])))
+    if name == "tabulated":
+        values = np.array(parameters["values"], dtype=np.float64)
+        # The mean over the sphere is half the integral over the cosine: the trapezoidal rule is exact on linear pieces.
+        mean = (values.sum() - 0.5 * (values[0] + values[-1])) / (len(values) - 1)
+        return Phase(name, values=types.scalar(values / mean))
+    return Phase(name)

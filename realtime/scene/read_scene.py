@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reading a Mitsuba scene: the camera, the medium, the lights, and the plan of what they need.
+
+Mitsuba's own scene is the scene; nothing of ours is needed in it. What no method can do yet is refused by name.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from realtime.errors import InputError
+from realtime.numerics.array_types import ArrayTypes, array_types, is_single
+from realtime.scene.camera import Camera
+from realtime.scene.directional_extent import directional_fields, distance_before, media_balls
+from realtime.scene.features import Plan
+from realtime.scene.lights import Light, spot_fields
+from realtime.scene.medium import Medium
+from realtime.scene.read_media import opaque_scene, read_medium, sort_shapes
+from realtime.scene.triangle_table import Facets, read_facets
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A Mitsuba scene with what a real-time method reads from it."""
+
+    geometry: Any  #: an `mi.Scene` of all opaque shapes, for casting rays
+    camera: Camera
+    medium: Medium
+    lights: tuple[Light, ...]
+    plan: Plan
+    facets: Facets | None = None  #: the triangles, where a table says all that shading needs
+    positions: Mapping[str, Any] = field(default_factory=dict)  #: vertices of the shapes that moved, by name [m]
+
+
+def read_scene(scene, precision: str = "single") -> Scene:
+    """Read a Mitsuba scene.
+
+    Parameters
+    ----------
+    scene
+        An `mi.Scene` of the current RGB variant.
+    precision
+        'single' or 'double': the precision of every array that the methods compute with.
+
+    Raises
+    ------
+    InputError
+        For a scene that no method can render, with the name of what it cannot do.
+    """
+    types = array_types(precision)
+    camera, sensor = _read_camera(scene, types)
+    opaque, boundaries = sort_shapes(scene)
+    medium = read_medium(sensor, boundaries, types)
+    if not scene.emitters():
+        raise InputError("the scene has no light; wanted at least one emitter of type 'point', 'spot' or 'directional'")
+    lights = tuple(
+        _read_directional(emitter, medium, opaque, types)
+        if emitter.class_name() == "DirectionalEmitter"
+        else _read_light(emitter, types)
+        for emitter in scene.emitters()
+    )
+    geometry = opaque_scene(scene, opaque)
+    return Scene(geometry, camera, medium, lights, _make_plan(opaque, medium, lights), read_facets(geometry, types))
+
+
+def _read_camera(scene, types: ArrayTypes):
+    import drjit as dr
+    import mitsuba as mi
+    import numpy as np
+
+    sensors = scene.sensors()
+    if not sensors:
+        raise InputError("the scene has no camera; wanted a sensor of type 'perspective'")
+    sensor = sensors[0]
+    if sensor.class_name() != "PerspectiveCamera":
+        raise InputError(f"the scene's sensor is a {sensor.class_name()}; wanted a sensor of type 'perspective'")
+    parameters = mi.traverse(sensor)
+    width, height = (int(n) for n in parameters["film.size"])
+    if list(parameters["film.crop_size"]) != [width, height]:
+        raise InputError("the camera's film is cropped; remove crop_width, crop_height and crop_offset from the film")
+    if any(float(parameters[f"principal_point_offset_{axis}"][0]) for axis in "xy"):
+        raise InputError("the camera has a principal point offset; remove principal_point_offset_x and _y")
+    matrix = np.array(sensor.world_transform().matrix, dtype=np.float64).reshape(4, 4)
+    tangent = math.tan(0.5 * math.radians(float(parameters["x_fov"][0])))
+    pixel = 2 * tangent / width
+    basis = matrix[:3, 2], matrix[:3, 0] * pixel, matrix[:3, 1] * pixel
+    real = np.float32 if is_single(types.scalar) else np.float64
+    low = [column - column.astype(real) for column in basis]
+    vectors = [types.vector(*(float(c) for c in column)) for column in (matrix[:3, 3], *basis, *low)]
+    dr.make_opaque(*vectors)
+    return Camera(width, height, *vectors), sensor
+
+
+def _read_light(emitter, types: ArrayTypes) -> Light:
+    import drjit as dr
+    import mitsuba as mi
+    import numpy as np
+
+    kind = {"PointLight": "point", "SpotLight": "spot"}.get(emitter.class_name())
+    if kind is None:
+        raise InputError(
+            f"the scene has an emitter of class {emitter.class_name()}; wanted emitters of type 'point', 'spot' or "
+            "'directional' only: replace it or remove it"
+        )
+    parameters = mi.traverse(emitter)
+    if "intensity.value" not in parameters or (kind == "spot" and "texture.value" not in parameters):
+        raise InputError(f"the {kind} light has a textured or spectral intensity; wanted a constant 'rgb' intensity")
+    intensity = _read_colour(parameters["intensity.value"], f"the {kind} light's intensity", "W/sr")
+    matrix = np.array(emitter.world_transform().matrix, dtype=np.float64).reshape(4, 4)
+    position = np.array(parameters["position"], dtype=np.float64).reshape(-1) if kind == "point" else matrix[:3, 3]
+    arrays: dict[str, Any] = {
+        "position": types.vector(*(float(c) for c in position)),
+        "intensity": types.color(*(float(c) for c in intensity)),
+    }
+    soft = False
+    if kind == "spot":
+        cutoff, beam = _read_angles(parameters)
+        soft = beam < cutoff
+        arrays |= spot_fields(matrix[:3, 2] / np.linalg.norm(matrix[:3, 2]), cutoff, beam, types)
+    dr.make_opaque(*arrays.values())
+    return Light(kind, soft, **arrays)
+
+
+def _read_directional(emitter, medium: Medium, opaque, types: ArrayTypes) -> Light:
+    import drjit as dr
+    import mitsuba as mi
+    import numpy as np
+
+    if not (medium.bodies and medium.clear):
+        raise InputError(
+            "the scene has a directional light and a medium without bounds, which lets nothing of it through from "
+            "infinity: wanted media with bounds in clear air; give the medium bounds, or use a 'point' or 'spot' light"
+        )
+    parameters = mi.traverse(emitter)
+    if "irradiance.value" not in parameters:
+        raise InputError("the directional light has a textured or spectral irradiance; wanted a constant 'rgb' one")
+    irradiance = _read_colour(parameters["irradiance.value"], "the directional light's irradiance", "W/m^2")
+    matrix = np.array(emitter.world_transform().matrix, dtype=np.float64).reshape(4, 4)
+    axis = matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])
+    arrays: dict[str, Any] = {"intensity": types.color(*(float(c) for c in irradiance))}
+    balls = media_balls(medium.bodies)
+    arrays |= directional_fields(axis, balls, distance_before(balls, opaque), types)
+    dr.make_opaque(*arrays.values())
+    return Light("directional", False, **arrays)
+
+
+def _read_colour(value, name: str, unit: str):
+    """Return three values of 0 or more."""
+    import numpy as np
+
+    colour = np.array(value, dtype=np.float64).reshape(-1)
+    colour = np.broadcast_to(colour, 3) if colour.size == 1 else colour
+    if not np.all(np.isfinite(colour)) or np.any(colour < 0):
+        raise InputError(f"{name} is {colour.tolist()}; wanted finite values of 0 or more [{unit}]")
+    return colour
+
+
+def _read_angles(parameters) -> tuple[float, float]:
+    """Return the half angles of a spot's cut-off and of its beam [rad]."""
+    cutoff = math.radians(float(parameters["cutoff_angle"][0]))
+    beam = min(math.radians(float(parameters["beam_width"][0])), cutoff)
+    if not 0 < cutoff < 0.5 * math.pi:
+        raise InputError(
+            f"the spot light's cutoff_angle is {math.degrees(cutoff):g} degrees; wanted more than 0, less than 90"
+        )
+    return cutoff, beam
+
+
+def _make_plan(opaque, medium: Medium, lights: tuple[Light, ...]) -> Plan:
+    import mitsuba as mi
+
+    notes = []
+    for shape in opaque:
+        flags = shape.bsdf().flags()
+        if flags & ~int(mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide) & 0x3FF:
+            notes.append(
+                f"shape '{shape.id()}' is not purely diffuse: shaded by its diffuse reflectance, airlight unaffected"
+            )
+    media = [body.medium for body in medium.bodies] + [medium] * (not medium.clear)
+    return Plan(
+        shadows=bool(opaque),
+        surfaces=bool(opaque),
+        extinctions=len(medium.sigma_t),
+        isotropic=all(one.phase.name == "isotropic" for one in media),
+        bounded=bool(medium.bodies),
+        clear=medium.clear,
+        vacuum=any(float(sigma_t[0]) == 0 for sigma_t in medium.sigma_t),
+        point_lights=sum(light.kind == "point" for light in lights),
+        spot_lights=sum(light.kind == "spot" for light in lights),
+        directional_lights=sum(light.kind == "directional" for light in lights),
+        soft_spots=any(light.soft for light in lights),
+        notes=tuple(dict.fromkeys(notes)),
+    )

@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What shading needs of every triangle of a scene, in two tables.
+
+Mitsuba computes a surface interaction by calls over all kinds and instances of shapes and materials; where all of them
+are uniformly diffuse meshes, the number of the triangle says all, and reading it from a table costs a quarter of that.
+A scene with anything else is shaded by Mitsuba's interaction.
+"""
+
+from dataclasses import dataclass
+from itertools import accumulate
+from typing import Any
+
+from realtime.numerics.array_types import ArrayTypes, four_numbers
+
+_CORNERS = (0, 0), (1, 0), (0, 1)  # barycentric coordinates u, v
+_FLAT = 1e-5  # length of the difference between the normals of a corner and of the triangle: float32, with room
+
+
+@dataclass(frozen=True)
+class Facets:
+    """The triangles of all shapes, shape after shape."""
+
+    first: Any  #: by number of the shape in Mitsuba's registry, its first triangle
+    normals: Any  #: four numbers each, or each of its corners: the unit normal, and 1 if it is lit from both sides
+    albedos: Any  #: four numbers each: the diffuse reflectance, and 0
+    smooth: bool  #: whether normals are those of corners, to be interpolated
+
+
+def read_facets(scene, types: ArrayTypes) -> Facets | None:
+    """Return the triangles of a Mitsuba scene; None where a shape is no mesh of one diffuse colour."""
+    import drjit as dr
+    import mitsuba as mi
+
+    shapes = scene.shapes()
+    if not shapes or not all(_is_plain(shape) for shape in shapes):
+        return None
+    numbers = [int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))[0]) for shape in shapes]
+    counts = [shape.face_count() for shape in shapes]
+    first = [0] * (max(numbers) + 1)
+    for number, before in zip(numbers, accumulate(counts, initial=0)):
+        first[number] = before
+    smooth = any(_is_smooth(shape) for shape in shapes)
+    rows = [_of_shape(shape, types, smooth) for shape in shapes]
+    normals, albedos = ([row[k] for row in rows] for k in range(2))
+    corners = [3 * count if smooth else count for count in counts]
+    table = Facets(mi.UInt32(first), _joined(types, normals, corners), _joined(types, albedos, counts), smooth)
+    dr.make_opaque(table)
+    return table
+
+
+def facet_number(facets: Facets, hit, active):
+    """Return the number of the triangle of a preliminary intersection."""
+    import drjit as dr
+    import mitsuba as mi
+
+    shape = dr.reinterpret_array(mi.UInt32, hit.shape)
+    return dr.gather(mi.UInt32, facets.first, shape, active) + hit.prim_index
+
+
+def facet_at(facets: Facets, number, uv, active):
+    """Return the unit normal, whether it is lit from both sides, and the albedo of triangles by their numbers.
+
+    `uv`, barycentric coordinates, is only read where normals are interpolated.
+    """
+    import drjit as dr
+
+    Four = four_numbers(type(facets.normals))
+    red, green, blue, _ = dr.gather(Four, facets.albedos, number, active)
+    if not facets.smooth:
+        x, y, z, two_sided = dr.gather(Four, facets.normals, number, active)
+        return (x, y, z), two_sided > 0, (red, green, blue)
+    Float = type(red)
+    u, v = Float(uv.x), Float(uv.y)
+    corners = [dr.gather(Four, facets.normals, 3 * number + k, active) for k in range(3)]
+    x, y, z = (dr.fma(u, b, dr.fma(v, c, (1 - u - v) * a)) for a, b, c in list(zip(*corners))[:3])
+    scale = dr.rsqrt(x * x + y * y + z * z)
+    return (x * scale, y * scale, z * scale), corners[0].w > 0, (red, green, blue)
+
+
+def _is_plain(shape) -> bool:
+    import mitsuba as mi
+
+    if not shape.is_mesh() or shape.face_count() == 0:
+        return False
+    # A texture, a normal map or another kind of surface has parameters of other names.
+    names = [name.rsplit(".", 2)[-2:] for name in mi.traverse(shape.bsdf()).keys()]  # noqa: SIM118 (no mapping)
+    return names == [["reflectance", "value"]]
+
+
+def _is_smooth(shape) -> bool:
+    """Return whether normals differ over a triangle of a shape."""
+    import drjit as dr
+    import mitsuba as mi
+
+    if not shape.has_vertex_normals():
+        return False
+    flat = mi.Bool(True)
+    for u, v in _CORNERS:
+        there = _interaction(shape, u, v)
+        # A triangle that is a line has no normal, and no ray meets it.
+        flat &= ~dr.all(dr.isfinite(there.n)) | (dr.norm(there.sh_frame.n - there.n) < _FLAT)
+    return not dr.all(flat)
+
+
+def _of_shape(shape, types: ArrayTypes, smooth: bool):
+    """Return normals and albedos of the triangles of a shape, as Mitsuba has them."""
+    import drjit as dr
+    import mitsuba as mi
+
+    Float, Four = types.scalar, four_numbers(types.scalar)
+    two_sided = float(mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.BackSide))
+    middle = _interaction(shape, 1 / 3, 1 / 3)
+    middle.wi = mi.Vector3f(0, 0, 1)
+    albedo = shape.bsdf().eval_diffuse_reflectance(middle)
+    albedos = Four(*(Float(channel) for channel in albedo), 0)
+    if not smooth:
+        return Four(*(Float(part) for part in middle.sh_frame.n), two_sided), albedos
+    count = shape.face_count()
+    normals = dr.empty(Float, 12 * count)
+    for corner, (u, v) in enumerate(_CORNERS):
+        normal = _interaction(shape, u, v).sh_frame.n
+        row = Four(*(Float(part) for part in normal), two_sided)
+        dr.scatter(normals, row, 3 * dr.arange(mi.UInt32, count) + corner)
+    return dr.gather(Four, normals, dr.arange(mi.UInt32, 3 * count)), albedos
+
+
+def _interaction(shape, u: float, v: float):
+    """Return Mitsuba's interactions with all triangles of a shape, at their barycentric coordinates u, v."""
+    import drjit as dr
+    import mitsuba as mi
+
+    count = shape.face_count()
+    hit = dr.zeros(mi.PreliminaryIntersection3f, count)
+    hit.t = dr.full(mi.Float, 1, count)
+    hit.prim_uv = mi.Point2f(u, v)
+    hit.prim_index = dr.arange(mi.UInt32, count)
+    return shape.compute_surface_interaction(mi.Ray3f(mi.Point3f(0), mi.Vector3f(0, 0, 1)), hit, mi.RayFlags.All)
+
+
+def _joined(types: ArrayTypes, parts, counts):
+    """Return rows of shapes one after the other; a row that all triangles of a shape share counts for each."""
+    import drjit as dr
+    import mitsuba as mi
+
+    table = dr.empty(types.scalar, 4 * sum(counts))
+    place = 0
+    for part, count in zip(parts, counts):
+        dr.scatter(table, part, dr.arange(mi.UInt32, count) + place)
+        place += count
+    return table

@@ -1,0 +1,222 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""Airlight between the corners of tiles, where it is nearly linear.
+
+Most pixels of a frame lie in beams and shadows, few on their edges. So a ray is computed in the first pixel of every
+tile of 4 x 4, and all pixels of a tile only where the airlight between these corners cannot be told from them.
+
+Let Delta be the second difference f_(i-1) - 2 f_i + f_(i+1) of the airlight along a row or a column of corners, h
+apart. Where f is smooth, linear interpolation misses it by up to |f''| h^2/8, which is Delta/8. Where it has a kink
+between two corners, at the share w of the way and with a change of slope s, it misses it by s h w (1 - w), while the
+Deltas at the two corners are s h (1 - w) and s h w: the larger is at least twice the error. So a tile is interpolated
+where
+
+    |Delta| <= tolerance f
+
+at all four corners, in both directions and all channels, and errs by about the tolerance at most. A jump of f, at an
+edge of surfaces, has a Delta of its own size.
+
+What no corner sees is missed: beams and shadows thinner than a tile. Surfaces are not, since the pixels of an
+interpolated tile and its corners have to be about equally far away, and the light reaches the surface at all four
+corners or at none.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from realtime.errors import InputError
+from realtime.methods.shadow_planes.tile_boxes import SIDE, TILE
+from realtime.numerics.array_types import four_numbers
+from realtime.scene.camera import Camera
+
+_DEPTHS = 1.1  # largest to least distance in a tile
+_LIGHTS = 32  # one bit each
+
+
+@dataclass(frozen=True)
+class Corners:
+    """How the tiles of an image lie: numbers of tiles, by tile."""
+
+    right: Any  #: the next tile to the right; itself in the last column
+    below: Any
+    diagonal: Any
+    row: tuple[Any, Any, Any]  #: three that follow one another in a row: it and its neighbours, or those next to an end
+    column: tuple[Any, Any, Any]
+    inner: Any  #: whether there are tiles on the right and below
+
+
+def tile_corners(pixel, camera: Camera, tolerance: float, *, by_rays: bool, lights: int) -> Corners | None:
+    """Return how the tiles of an image lie; None for a tolerance of 0, with which every pixel is computed.
+
+    Parameters
+    ----------
+    pixel
+        The pixel numbers of the image in square tiles.
+    camera
+        Its camera.
+    tolerance
+        Share of the airlight, see the module.
+    by_rays
+        Whether the method computes each ray by itself.
+    lights
+        How many there are.
+
+    Raises
+    ------
+    InputError
+        For a tolerance that is no share, a method that draws all pixels together, more lights than a number has bits,
+        and an image whose sides are no multiples of four or less than three tiles.
+    """
+    import drjit as dr
+    import mitsuba as mi
+    import numpy as np
+
+    if not 0 <= tolerance < 1:
+        raise InputError(f"tolerance: got {tolerance!r}, wanted a share of the airlight from 0 up to 1")
+    if not tolerance:
+        return None
+    if not by_rays:
+        raise InputError(
+            "tolerance: wanted each ray by itself, which evaluation=mesh and vertex do not; use tolerance=0"
+        )
+    if lights > _LIGHTS:
+        raise InputError(f"tolerance: got a scene of {lights} lights, wanted up to {_LIGHTS}; use tolerance=0")
+    width, height = camera.width, camera.height
+    across, down = width // SIDE, height // SIDE
+    if width % SIDE or height % SIDE or across < 3 or down < 3:
+        raise InputError(
+            f"tolerance: got an image of {width} x {height}, wanted sides that are multiples of {SIDE}, from "
+            f"{3 * SIDE} on"
+        )
+    rows, columns = np.divmod(np.array(pixel)[::TILE], width)
+    i, j = (columns // SIDE).astype(np.int64), (rows // SIDE).astype(np.int64)
+    number = np.empty((down, across), dtype=np.uint32)
+    number[j, i] = np.arange(len(i), dtype=np.uint32)
+    right, below = np.minimum(i + 1, across - 1), np.minimum(j + 1, down - 1)
+    middle_i, middle_j = np.clip(i, 1, across - 2), np.clip(j, 1, down - 2)
+    found = Corners(
+        mi.UInt32(number[j, right]),
+        mi.UInt32(number[below, i]),
+        mi.UInt32(number[below, right]),
+        tuple(mi.UInt32(number[j, middle_i + step]) for step in (-1, 0, 1)),
+        tuple(mi.UInt32(number[middle_j + step, i]) for step in (-1, 0, 1)),
+        mi.Bool((i < across - 1) & (j < down - 1)),
+    )
+    dr.eval(found)
+    return found
+
+
+def between_corners(corners: Corners, pixel, distance, sample: Callable[..., Any], *, width: int, tolerance: float):
+    """Return the airlight of every pixel, and by light whether it reaches the visible surface.
+
+    Parameters
+    ----------
+    corners
+        Of the image.
+    pixel, distance
+        Pixel numbers in square tiles, and the distances to the visible surfaces [m].
+    sample
+        Function (pixel, distance, tile) -> radiance [W/(m^2 sr)], and by light whether it reaches the surface.
+    width
+        Of the image [pixels].
+    tolerance
+        Largest second difference between corners, of the airlight.
+
+    Notes
+    -----
+    Valid in a function that may evaluate arrays; `sample` may not.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    Float = type(distance)
+    tiles = dr.width(distance) // TILE
+    tile = dr.arange(mi.UInt32, tiles)
+    first = tile * TILE
+    color, reached = sample(dr.gather(mi.UInt32, pixel, first), dr.gather(Float, distance, first), tile)
+    color, lit = color + dr.zeros(Float, tiles), _bits(reached) + dr.zeros(mi.UInt32, tiles)
+    dr.eval(color, lit)
+    bend = _second_difference(corners, color)
+    dr.eval(bend)
+    four = tile, corners.right, corners.below, corners.diagonal
+    values = [dr.gather(type(color), color, one) for one in four]
+    smooth = corners.inner & _depths_alike(distance, four)
+    for one, value in zip(four, values):
+        bends = dr.gather(type(color), bend, one)
+        for channel in range(3):
+            smooth &= bends[channel] <= tolerance * value[channel]
+        smooth &= dr.gather(mi.UInt32, lit, one) == lit
+    tables = _bilinear(values)
+    dr.eval(tables, smooth)
+
+    lane = dr.arange(mi.UInt32, dr.width(distance))
+    own = lane // TILE
+    row = pixel // width
+    x, y = (Float(value & (SIDE - 1)) * (1 / SIDE) for value in (pixel - row * width, row))
+
+    def between(pixel, distance, own):
+        channels = []
+        for table in tables:
+            base, across, down, twist = dr.gather(four_numbers(Float), table, own)
+            channels.append(dr.fma(y, dr.fma(x, twist, down), dr.fma(x, across, base)))
+        return type(color)(*channels), dr.gather(mi.UInt32, lit, own)
+
+    def computed(pixel, distance, own):
+        color, reached = sample(pixel, distance, own)
+        return color, _bits(reached)
+
+    smooth = dr.gather(mi.Bool, smooth, own)
+    color, bits = dr.if_stmt(args=(pixel, distance, own), cond=smooth, true_fn=between, false_fn=computed)
+    return color, tuple((bits >> number & 1) != 0 for number in range(len(reached)))
+
+
+def _bits(reached):
+    """Return by light, as one bit each, whether it reaches the surface."""
+    import drjit as dr
+    import mitsuba as mi
+
+    bits = mi.UInt32(0)
+    for number, one in enumerate(reached):
+        bits |= dr.select(one, mi.UInt32(1 << number), 0)
+    return bits
+
+
+def _bilinear(values) -> list[Any]:
+    """Return f = base + x across + y down + x y twist of every tile as four numbers, an array for each channel.
+
+    `values` are f at the corners of the tile, and x and y go from 0 to 1 over it.
+    """
+    import drjit as dr
+
+    tables = []
+    for base, across, down, diagonal in zip(*values):
+        Float = type(base)
+        table = dr.empty(Float, 4 * dr.width(base))
+        form = four_numbers(Float)(base, across - base, down - base, base - across - down + diagonal)
+        dr.scatter(table, form, dr.arange(dr.uint32_array_t(Float), dr.width(base)))
+        tables.append(table)
+    return tables
+
+
+def _second_difference(corners: Corners, color):
+    """Return the larger of the second differences along rows and columns, by channel."""
+    import drjit as dr
+
+    found = type(color)(0)
+    for three in (corners.row, corners.column):
+        before, here, behind = (dr.gather(type(color), color, one) for one in three)
+        found = dr.maximum(found, dr.abs(before + behind - 2 * here))
+    return found
+
+
+def _depths_alike(distance, four):
+    """Return whether the pixels of a tile and its four corners are about equally far away."""
+    import drjit as dr
+
+    tile, *others = four
+    places = [tile * TILE + k for k in range(TILE)] + [other * TILE for other in others]
+    least = largest = dr.gather(type(distance), distance, places[0])
+    for place in places[1:]:
+        depth = dr.gather(type(distance), distance, place)
+        least, largest = dr.minimum(least, depth), dr.maximum(largest, depth)
+    return largest <= _DEPTHS * least

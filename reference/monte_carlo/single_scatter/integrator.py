@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`single-scatter`: a Mitsuba integrator that estimates exactly one scattering, in the medium or on a surface.
+
+The plugin and its batches; what is estimated along a ray, and how, is in
+`reference.monte_carlo.single_scatter.estimator`. It is the check of `reference.quadrature.image`: the two share the
+reading of the camera and Mitsuba's ray casting, and no derivation beyond the integral itself.
+
+The n samples of a ray lie in n cells of the unit interval, each at a random place of its cell; the grid of cells is
+itself at a random place, drawn anew for each light and medium. The estimate is unbiased, its error falls as n^-1.5
+where the integrand is smooth and as 1/n at the edge of a shadow, and batches of different seeds are independent.
+
+Rounding: a ray's foot and height are computed in double precision; everything after that is relative to the light, in
+the variant's precision. Sums over at most 256 samples are single, over batches double.
+"""
+
+import functools
+
+import numpy as np
+
+from analytic.errors import InputError
+from reference.monte_carlo.batches import LARGEST_BATCH, Batches, check_samples, single_batch
+from reference.monte_carlo.single_scatter.estimator import double_ray, ray_light
+from reference.monte_carlo.single_scatter.scene_data import read_task
+from reference.scene.read import TruthScene
+
+PLUGIN = "single-scatter"
+_RAYS = 1 << 20  # camera rays in one kernel
+
+
+def register() -> str:
+    """Register the integrator with the current variant, and return the name of the plugin.
+
+    Afterwards ``mi.load_dict({"type": "single-scatter", "samples": 16})`` loads it. `samples` is the number of
+    stratified distances for each light and medium of one camera ray, 1 by default; the film's own samples multiply it.
+    A film's rays begin at the near clip plane, so what lies before it is missing from an image by `mi.render`
+    (DESIGN section 6.3); `single_scatter_batch` has no such plane.
+    """
+    import mitsuba as mi
+
+    mi.register_integrator(PLUGIN, _integrator_class(mi.variant()))
+    return PLUGIN
+
+
+@functools.cache
+def _integrator_class(variant: str):
+    """Return the integrator's class of a variant, the current one; each variant has its own base class."""
+    import drjit as dr
+    import mitsuba as mi
+
+    class SingleScatterIntegrator(mi.SamplingIntegrator):
+        """Exactly one scattering of point, spot and directional lights (see
+        `reference.monte_carlo.single_scatter.integrator`).
+        """
+
+        def __init__(self, properties):
+            super().__init__(properties)
+            self.samples = properties.get("samples", 1)
+            if not isinstance(self.samples, int) or not 1 <= self.samples <= LARGEST_BATCH:
+                raise InputError(f"{PLUGIN}: samples is {self.samples}; wanted an integer from 1 to {LARGEST_BATCH}")
+
+        def sample(self, scene, sampler, ray, medium=None, active=True):
+            lanes = double_ray(mi.Point3d(ray.o), mi.Vector3d(ray.d))
+            airlight, surface = ray_light(
+                read_task(scene, medium, self.samples), sampler, lanes, medium, mi.Bool(active)
+            )
+            return airlight + surface, dr.full(mi.Bool, True, dr.width(ray)), []
+
+        def to_string(self):
+            return f"SingleScatterIntegrator[samples = {self.samples}]"
+
+    return SingleScatterIntegrator
+
+
+def single_scatter_batch(truth: TruthScene, seed: int, samples: int) -> Batches:
+    """Trace one batch along the pixel-centre rays, from the pinhole.
+
+    Parameters
+    ----------
+    truth
+        The scene.
+    seed
+        Seed of the batch; different seeds are independent.
+    samples
+        Distances sampled for each ray, light and medium, at most 256.
+
+    Returns
+    -------
+    Batches
+        Airlight and surface of every pixel [W/(m^2 sr)]. The surface needs no sampling, so all batches agree on it.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    check_samples(samples)
+    medium = truth.scene.sensors()[0].get_medium()
+    task = read_task(truth.scene, medium, samples)
+    sampler = mi.load_dict({"type": "independent"})
+    pixels = truth.width * truth.height
+    chunks = -(-pixels // _RAYS)
+    mean = np.empty((2, pixels, 3))
+    for number in range(chunks):
+        chunk = slice(number * _RAYS, min((number + 1) * _RAYS, pixels))
+        count = chunk.stop - chunk.start
+        # Seeds count up from batch to batch and from chunk to chunk: no two streams share one.
+        sampler.seed((seed * chunks + number) % 2**32, count)
+        ray = double_ray(mi.Point3d(*(float(c) for c in truth.origin)), mi.Vector3d(truth.direction[chunk].T))
+        layers = ray_light(task, sampler, ray, medium, dr.full(mi.Bool, True, count))
+        dr.eval(layers)
+        for layer, radiance in enumerate(layers):
+            mean[layer, chunk] = np.stack([np.array(c, dtype=np.float64) for c in radiance], axis=1)
+    return single_batch(seed, samples, mean)

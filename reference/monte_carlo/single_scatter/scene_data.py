@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the integrator `single-scatter` must know of a scene: where lights are, what bounds media, what it refuses.
+
+`reference.scene.read` reads the same scene for the quadrature; the two share no code. Here the emitters, phase
+functions and media stay Mitsuba's own and are asked for their answers while rays are traced.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from analytic.errors import InputError
+from reference.monte_carlo.single_scatter.boundary_walk import (
+    Surroundings,
+    coefficients,
+    read_surroundings,
+    require_homogeneous,
+)
+from reference.scene.directional_light import endless_medium, is_directional
+
+
+@dataclass(frozen=True)
+class Light:
+    """A light as far as sampling must know it; what it sends where is the emitter's answer."""
+
+    emitter: Any  #: Mitsuba's emitter
+    position: Any  #: of double precision [m]
+    axis: Any = None  #: spot: unit vector of double precision
+    cutoff: float = math.pi  #: spot: half angle of the cone [rad]
+
+
+@dataclass(frozen=True)
+class Task:
+    """What is fixed while a scene is traced."""
+
+    around: Surroundings
+    lights: tuple[Light, ...]  #: point and spot lights
+    directional: tuple[Any, ...]  #: Mitsuba's directional emitters
+    samples: int  #: distances for each ray, light and medium
+    grey: bool  #: no medium's extinction depends on the channel
+
+
+def read_task(scene, medium, samples: int) -> Task:
+    """Read what the estimator needs from a Mitsuba scene.
+
+    Parameters
+    ----------
+    scene
+        The `mi.Scene`.
+    medium
+        What camera rays start in: a Mitsuba medium, a pointer to one, or None for a vacuum.
+    samples
+        Distances for each ray, light and medium.
+
+    Raises
+    ------
+    InputError
+        For an emitter, a medium or a material that it has no answer for.
+    """
+    import mitsuba as mi
+
+    directional = tuple(one for one in scene.emitters() if is_directional(one))
+    lights = tuple(_read_light(emitter) for emitter in scene.emitters() if not is_directional(emitter))
+    around, media = read_surroundings(scene)
+    if directional:
+        _refuse_endless(scene, medium, directional[0])
+    if isinstance(medium, mi.Medium):
+        require_homogeneous(medium)
+        media = [*media, medium]
+    known = medium is None or isinstance(medium, mi.Medium)
+    return Task(around, lights, directional, samples, grey=known and all(_is_grey(one) for one in media))
+
+
+def _refuse_endless(scene, medium, emitter) -> None:
+    """Refuse a medium without bounds: what camera rays start in where nothing bounds it, or the exterior of a bound."""
+    import mitsuba as mi
+
+    inside = [shape.interior_medium() for shape in scene.shapes()]
+    around = [shape.exterior_medium() for shape in scene.shapes()]
+    if isinstance(medium, mi.Medium) and medium not in inside:
+        around.append(medium)
+    for one in around:
+        if one is not None and max(float(np.ravel(c)[0]) for c in coefficients(mi.MediumPtr(one), mi.Bool(True))[1]):
+            raise InputError(f"single-scatter: {endless_medium(emitter)}")
+
+
+def _is_grey(medium) -> bool:
+    import mitsuba as mi
+
+    _, sigma_t = coefficients(mi.MediumPtr(medium), mi.Bool(True))
+    return len({float(np.ravel(channel)[0]) for channel in sigma_t}) == 1
+
+
+def _read_light(emitter) -> Light:
+    import drjit as dr
+    import mitsuba as mi
+
+    name = emitter.class_name()
+    if name not in ("PointLight", "SpotLight"):
+        raise InputError(
+            f"single-scatter: the scene has an emitter of class {name}; wanted 'point', 'spot' or 'directional' only"
+        )
+    sample, _ = emitter.sample_direction(dr.zeros(mi.Interaction3f), mi.Point2f(0.5))
+    position = mi.Point3d(sample.p)
+    if name == "PointLight":
+        return Light(emitter, position)
+    axis = dr.normalize(mi.Vector3d(emitter.world_transform() @ mi.Vector3f(0, 0, 1)))
+    cutoff = float(np.ravel(mi.traverse(emitter)["cutoff_angle"])[0])
+    return Light(emitter, position, axis, math.radians(cutoff))

@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Mitsuba's volumetric path tracer as the check by code that nobody here wrote.
+
+`volpath` with ``max_depth = 2`` is exactly one scattering, on a surface or in the medium (DESIGN section 6.4). It is
+run along the pixel-centre rays from the pinhole itself, so neither the reconstruction filter, nor the film's float32
+sums, nor the near clip plane come into play; what remains of Mitsuba's biases is the shadow-ray epsilon
+(`reference.scene.shadow_epsilon`).
+
+Airlight and surface come apart by two runs: with black surfaces only the medium scatters, with albedo 0 only surfaces
+do. Where the extinction depends on the channel, each channel has a run of its own in grey media, since a path that
+picks its channel at random may have infinite variance (DESIGN section 6.7). Boundaries of media are of type 'null':
+paths go through them without counting an edge, and they stay as they are when surfaces turn black.
+
+Each batch has its own seed and at most 256 samples a pixel on the average; what a pixel gets may differ, see
+`reference.monte_carlo.allocation`. Sums, means and standard errors are taken in float64.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.monte_carlo.batches import Batches, check_samples, single_batch
+from reference.scene.read import TruthMedium, TruthScene
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.integer]
+
+_PATHS = 1 << 22  # paths traced at once
+_VALUES = ("sigma_t.value.value", "albedo.value.value")  # what decides the numbers among a medium's parameters
+
+
+def volpath_batch(
+    truth: TruthScene, seed: int, samples: int, *, max_depth: int = 2, counts: Counts | None = None
+) -> Batches:
+    """Trace one batch.
+
+    Parameters
+    ----------
+    truth
+        The scene.
+    seed
+        Seed of the batch; different seeds are independent.
+    samples
+        Samples a pixel, at most 256.
+    max_depth
+        Most edges of a path: 2 is one scattering. With more, `airlight` is the light that was scattered by the medium
+        alone, any number of times up to max_depth - 1, and `surface` all other light: what met a surface at least once.
+    counts
+        Samples of each pixel, (layers, pixels), for `max_depth` 2; all have `samples` by default.
+
+    Notes
+    -----
+    Batches of one seed but another `max_depth` are not independent: their airlight paths begin alike, so that the
+    difference of the two has less spread than either.
+    """
+    import mitsuba as mi
+
+    check_samples(samples)
+    if max_depth < 2:
+        raise ValueError(f"max_depth: got {max_depth}, wanted at least 2, one scattering")
+    if counts is not None and max_depth != 2:
+        raise ValueError("counts: got some with multiple scattering, whose layers are traced along the same paths")
+    in_air, on_surface = np.full((2, truth.width * truth.height), samples) if counts is None else counts
+    integrator = mi.load_dict({"type": "volpath", "max_depth": max_depth, "rr_depth": 1000})
+    with _black_surfaces(truth.occluders):
+        airlight = _trace(truth, integrator, 2 * seed, in_air)
+    surface = np.zeros_like(airlight)
+    if truth.occluders.shapes() and max_depth == 2:
+        surface = _trace(truth, integrator, 2 * seed + 1, on_surface, scattering=False)
+    elif truth.occluders.shapes():
+        # The same paths once more, now with light from surfaces; the difference is what these add.
+        surface = _trace(truth, integrator, 2 * seed, in_air) - airlight
+    return single_batch(seed, samples, np.stack([airlight, surface]))
+
+
+@contextmanager
+def _black_surfaces(scene) -> Iterator[None]:
+    """Make every surface black for a while."""
+    import mitsuba as mi
+
+    black = mi.load_dict({"type": "diffuse", "reflectance": 0.0})
+    own = [(shape, shape.bsdf()) for shape in scene.shapes()]
+    try:
+        for shape, _ in own:
+            shape.set_bsdf(black)
+        yield
+    finally:
+        for shape, bsdf in own:
+            shape.set_bsdf(bsdf)
+
+
+def _trace(truth: TruthScene, integrator, seed: int, counts: Counts, *, scattering: bool = True) -> Array:
+    """Return the mean radiance of every pixel, (pixels, 3), over so many paths each."""
+    image = np.zeros((len(counts), 3))
+    parts = _parts(counts)
+    extinctions = np.stack([medium.sigma_t for medium in (truth.medium, *truth.media)], axis=1)
+    for number, sigma_t in enumerate(dict.fromkeys(map(tuple, extinctions))):
+        channels = np.all(extinctions == sigma_t, axis=1)
+        with _grey_media(truth, int(np.argmax(channels)), scattering) as medium:
+            for place, part in enumerate(parts):
+                # Streams differ by seed; the part and the channel get seeds of their own.
+                stream = (seed * 3 + number) * len(parts) + place
+                image[part, channels] = _trace_pixels(truth, integrator, medium, part, stream, counts[part])[
+                    :, channels
+                ]
+    return image
+
+
+def _parts(counts: Counts) -> list[slice]:
+    """Cut the pixels into parts that have about `_PATHS` paths together, or are one pixel."""
+    part = (np.cumsum(counts) - 1) // _PATHS
+    edges = [0, *(np.flatnonzero(np.diff(part)) + 1), len(counts)]
+    return [slice(int(start), int(end)) for start, end in pairwise(edges)]
+
+
+def _trace_pixels(truth: TruthScene, integrator, medium, pixels: slice, seed: int, counts: Counts) -> Array:
+    import drjit as dr
+    import mitsuba as mi
+
+    direction = mi.Vector3f(truth.direction[pixels].T)
+    pixel = mi.UInt32(np.repeat(np.arange(len(counts), dtype=np.uint32), counts))
+    sampler = mi.load_dict({"type": "independent"})
+    sampler.seed(seed, dr.width(pixel))
+    start = mi.Point3f(*(float(c) for c in truth.origin))
+    ray = mi.Ray3f(start, dr.normalize(dr.gather(mi.Vector3f, direction, pixel)))
+    radiance, _, _ = integrator.sample(truth.scene, sampler, mi.RayDifferential3f(ray), medium)
+    first = np.cumsum(counts, dtype=np.int64) - counts
+    sums = [np.add.reduceat(np.array(channel, dtype=np.float64), first) for channel in radiance]
+    return np.stack(sums, axis=1) / counts[:, None]
+
+
+@contextmanager
+def _grey_media(truth: TruthScene, channel: int, scattering: bool) -> Iterator[Any]:
+    """Give all media the extinction of one channel for a while; yield the medium in which camera rays begin."""
+    import mitsuba as mi
+
+    if not truth.media:
+        yield _grey_medium(truth.medium, float(truth.medium.sigma_t[channel]), scattering)
+        return
+    own: list[tuple[Any, dict[str, Any]]] = []
+    try:
+        for medium in (truth.medium, *truth.media):
+            # Shapes may share a medium.
+            if medium.plugin is not None and all(medium.plugin != plugin for plugin, _ in own):
+                parameters = mi.traverse(medium.plugin)
+                own.append((medium.plugin, {key: type(parameters[key])(parameters[key]) for key in _VALUES}))
+                sigma_t = float(medium.sigma_t[channel]) / float(parameters["scale"] or 1.0)
+                _set_values(medium.plugin, sigma_t, medium.albedo if scattering else np.zeros(3))
+        yield truth.scene.sensors()[0].get_medium()
+    finally:
+        for plugin, values in own:
+            parameters = mi.traverse(plugin)
+            for key, value in values.items():
+                parameters[key] = value
+            parameters.update()
+
+
+def _set_values(plugin: Any, sigma_t: float, albedo: Array) -> None:
+    """Set the extinction, before the medium's scale, and the albedo."""
+    import mitsuba as mi
+
+    parameters = mi.traverse(plugin)
+    for key, value in zip(_VALUES, (np.full(3, sigma_t), albedo), strict=True):
+        kind = type(parameters[key])
+        # A grey number of Mitsuba is one value, a colour three.
+        parameters[key] = kind(*(float(v) for v in value)) if "Color" in kind.__name__ else kind(float(value[0]))
+    parameters.update()
+
+
+def _grey_medium(medium: TruthMedium, sigma_t: float, scattering: bool):
+    import mitsuba as mi
+
+    return mi.load_dict(
+        {
+            "type": "homogeneous",
+            "sigma_t": sigma_t,
+            "albedo": {"type": "rgb", "value": [float(a) if scattering else 0.0 for a in medium.albedo]},
+            "has_spectral_extinction": False,
+            "phase": medium.plugin.phase_function(),
+        }
+    )

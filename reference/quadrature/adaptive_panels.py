@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Panels of the smooth pieces of rays, halved until the sum of each ray meets a tolerance (see `analytic.panels`)."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.quadrature.unbounded import sums_of
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+RTOL = 1e-9  #: relative tolerance of the sum of a ray and a light
+_HALVINGS = 40
+
+
+@dataclass(frozen=True)
+class Panels:
+    """Panels and what the two rules gave for them, arrays of shape (m,) and (m, 3)."""
+
+    piece: Index
+    start: Array  #: in the variable of the integral
+    width: Array
+    value: Array
+    error: Array
+    noise: Array  #: rounding error of the value
+
+    def __getitem__(self, rows) -> "Panels":
+        return Panels(*(getattr(self, f.name)[rows] for f in fields(self)))
+
+
+def first_panels(start: Array, width: Array, widest: float) -> tuple[Index, Array, Array]:
+    """Cut pieces into equal panels no wider than `widest`: numbers of the pieces, starts and widths."""
+    count = np.maximum(np.ceil(width / widest), 1).astype(np.int64)
+    piece = np.repeat(np.arange(len(count)), count)
+    number = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+    part = (width / count)[piece]
+    return piece, start[piece] + number * part, part
+
+
+def sum_panels(
+    first: tuple[Index, Array, Array],
+    evaluate: Callable[[Index, Array, Array], Panels],
+    owner: Index,
+    count: int,
+) -> tuple[Array, Array]:
+    """Halve panels until all rays meet the tolerance, or only rounding is left, and add up those of each ray.
+
+    Parameters
+    ----------
+    first
+        From `first_panels`.
+    evaluate
+        (pieces, starts, widths) -> panels.
+    owner
+        The ray of each piece, from 0 on.
+    count
+        Number of rays.
+
+    Returns
+    -------
+    value, error
+        (count, 3) each.
+    """
+    panels = evaluate(*first)
+    for _ in range(_HALVINGS):
+        ray = owner[panels.piece]
+        allowed = RTOL * sums_of(ray, panels.value, count)
+        missed = sums_of(ray, panels.error, count) > allowed
+        share = allowed / np.maximum(np.bincount(ray, minlength=count), 1)[:, None]
+        halve = np.any(missed[ray] & (panels.error > share[ray]) & (panels.error > panels.noise), axis=1)
+        if not halve.any():
+            break
+        half = 0.5 * panels.width[halve]
+        start = np.concatenate([panels.start[halve], panels.start[halve] + half])
+        halves = evaluate(np.tile(panels.piece[halve], 2), start, np.tile(half, 2))
+        kept = panels[~halve]
+        panels = Panels(*(np.concatenate([getattr(p, f.name) for p in (kept, halves)]) for f in fields(Panels)))
+    ray = owner[panels.piece]
+    return sums_of(ray, panels.value, count), sums_of(ray, panels.error + panels.noise, count)

@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Smooth pieces of lit intervals in scenes with bounded media.
+
+A piece lies inside of one medium, and the leg from the light passes no corner of a body while the point moves along it
+(`reference.quadrature.segments`); nor does the scattering angle pass a kink of a tabulated phase function.
+"""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.quadrature.segments import AMBIENT, Segments, optical_depth
+from reference.quadrature.unbounded import Rays
+from reference.scene.read import TruthLight, TruthMedium, TruthScene
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+_UNDERFLOW = 745.0  # optical depth after which nothing is left
+
+
+@dataclass(frozen=True)
+class Crossed:
+    """Rays of a scene and the media that they cross."""
+
+    truth: TruthScene
+    direction: Array  # of the rays, unit, (rays, 3)
+    segments: Segments
+
+    def medium(self, number: int) -> TruthMedium:
+        """Return the medium of this number."""
+        return self.truth.medium if number == AMBIENT else self.truth.media[number]
+
+    def by_medium(self, name: str, numbers: Index) -> Array:
+        """Return a property of the media of these numbers, (n, 3)."""
+        media = (*self.truth.media, self.truth.medium)  # AMBIENT is the last
+        return np.stack([getattr(medium, name) for medium in media])[numbers]
+
+
+@dataclass(frozen=True)
+class Setup(Crossed):
+    """What all pieces of rays share that a point light shines on."""
+
+    light: TruthLight
+    rays: Rays
+    shadow_scale: float
+    edge: float  # relative uncertainty of the distance of an edge between light and shadow
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Smooth pieces of rays, each in one medium; arrays of shape (n,) and one of (n, 3)."""
+
+    ray: Index
+    medium: Index
+    x0: Array
+    x1: Array
+    first: NDArray[np.bool_]  # begins where a lit interval does
+    last: NDArray[np.bool_]  # ends where a lit interval does
+    depth: Array  # optical depth between camera and x0
+
+    def __getitem__(self, rows) -> "Pieces":
+        return Pieces(*(getattr(self, f.name)[rows] for f in fields(self)))
+
+
+def cut_pieces(
+    setup: Crossed, lit: tuple[Index, Array, Array], kinks: tuple[Index, Array], foot: Array | None = None
+) -> Pieces:
+    """Cut lit intervals at the bounds of media and at every kink of the integrand.
+
+    Parameters
+    ----------
+    setup
+        The rays.
+    lit
+        Rays and distances of both ends of the lit intervals [m].
+    kinks
+        Rays and distances of the kinks [m], in any order.
+    foot
+        Distance at which each ray is closest to the light, where rays may be endless [m].
+    """
+    return _cut(setup, _parts(setup, *lit, foot), *kinks)
+
+
+def _parts(setup: Crossed, ray: Index, x0: Array, x1: Array, foot: Array | None) -> Pieces:
+    """Return what parts of lit intervals lie in each medium, by ray and distance."""
+    parts = []
+    for start, end, medium in zip(setup.segments.start, setup.segments.end, setup.segments.medium):
+        low, high = np.maximum(x0, start[ray]), np.minimum(x1, end[ray])
+        keep = high > low
+        rows, low, high = ray[keep], low[keep], high[keep]
+        parts.append((rows, medium[rows], low, high, low == x0[keep], (high == x1[keep]) & np.isfinite(high)))
+    ray, number, low, high, first, last = (np.concatenate(column) for column in zip(*parts))
+    if foot is not None and np.any(np.isinf(high)):
+        # Only what surrounds the bodies is endless, and only if its extinction is not zero does it scatter.
+        sigma_t = setup.truth.medium.sigma_t
+        reach = np.maximum(low, foot[ray]) + _UNDERFLOW / sigma_t[sigma_t > 0].min()
+        high = np.where(np.isinf(high), reach, high)
+    order = np.lexsort((low, ray))
+    return Pieces(ray, number, low, high, first, last, np.zeros((len(ray), 3)))[order]
+
+
+def _cut(setup: Crossed, parts: Pieces, ray: Index, x: Array) -> Pieces:
+    """Cut parts of rays, given by ray and distance, at kinks."""
+    # The part in which each kink lies is the last one that begins before it.
+    everything = np.lexsort((np.concatenate([parts.x0, x]), np.concatenate([parts.ray, ray])))
+    begins = everything < len(parts.ray)
+    part = np.cumsum(begins)[~begins] - 1
+    kink = everything[~begins] - len(parts.ray)
+    inside = (part >= 0) & (parts.ray[part] == ray[kink]) & (parts.x0[part] < x[kink]) & (x[kink] < parts.x1[part])
+    part, x = part[inside], x[kink[inside]]
+    owner = np.concatenate([np.arange(len(parts.ray)), part])
+    start = np.concatenate([parts.x0, x])
+    order = np.lexsort((start, owner))
+    owner, start = owner[order], start[order]
+    ends = np.append(owner[1:] != owner[:-1], True)[: len(owner)]
+    end = np.where(ends, parts.x1[owner], np.append(start[1:], 0.0)[: len(owner)])
+    begin = np.append(True, ends[:-1])[: len(owner)]
+    before = optical_depth(
+        setup.truth, setup.truth.origin, setup.direction[parts.ray], np.zeros(len(parts.ray)), parts.x0
+    )
+    sigma_t = setup.by_medium("sigma_t", parts.medium[owner])
+    depth = before[owner] + (start - parts.x0[owner])[:, None] * sigma_t
+    pieces = Pieces(
+        parts.ray[owner],
+        parts.medium[owner],
+        start,
+        end,
+        parts.first[owner] & begin,
+        parts.last[owner] & ends,
+        depth,
+    )
+    return pieces[end > start]

@@ -1,0 +1,254 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reading a Mitsuba scene for the ground truth, in float64 NumPy.
+
+`realtime.scene.read_scene` reads the same scene for the methods under test. The two share no code on purpose: this one
+asks Mitsuba's emitters for their intensity and reads the parameters of the medium, where the other does it the other
+way round.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analytic.errors import InputError
+from analytic.phase import PhaseFunction
+from reference.scene.camera import camera_matrix, film_directions, pixel_centres
+from reference.scene.convex_bodies import Bounds, holds, overlap, read_bounds
+from reference.scene.directional_light import DirectionalLight, endless_medium, is_directional, read_directional
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class TruthLight:
+    """A point or spot light."""
+
+    position: Array  #: [m]
+    intensity: Array  #: radiant intensity on the axis [W/sr], RGB
+    axis: Array | None = None  #: spot: unit vector
+    cutoff: float = np.pi  #: spot: half angle of the cone [rad]
+    beam: float = np.pi  #: spot: half angle of full intensity [rad]
+
+    @property
+    def is_soft(self) -> bool:
+        """Whether the intensity falls off between beam and cut-off."""
+        return self.axis is not None and self.beam < self.cutoff
+
+
+@dataclass(frozen=True)
+class TruthMedium:
+    """A homogeneous medium."""
+
+    sigma_t: Array  #: extinction [1/m], RGB
+    albedo: Array  #: RGB
+    phase: PhaseFunction
+    plugin: Any  #: Mitsuba's medium, None for a vacuum
+
+
+@dataclass(frozen=True)
+class BoundedMedium(TruthMedium):
+    """A homogeneous medium within convex bounds."""
+
+    bounds: Bounds  #: what it fills
+    name: str  #: the id of the shape that bounds it
+
+
+@dataclass(frozen=True)
+class TruthScene:
+    """A scene as the truth sees it."""
+
+    scene: Any  #: the `mi.Scene`, whole
+    occluders: Any  #: an `mi.Scene` of the opaque shapes alone: cast rays here
+    width: int
+    height: int
+    origin: Array  #: the pinhole [m], (3,)
+    direction: Array  #: unit directions through the pixel centres, (pixels, 3), row by row
+    medium: TruthMedium  #: the medium without bounds, a vacuum of extinction 0 where there is none
+    lights: tuple[TruthLight, ...]  #: point and spot lights
+    media: tuple[BoundedMedium, ...] = ()  #: the media with bounds, disjoint
+    directional: tuple[DirectionalLight, ...] = ()  #: lights at infinity; all media then have bounds
+
+
+def read_truth(scene) -> TruthScene:
+    """Read a Mitsuba scene of the current RGB variant.
+
+    Raises
+    ------
+    InputError
+        For a scene whose truth cannot be computed, with the name of what is in the way.
+    """
+    if not scene.sensors():
+        raise InputError("the scene has no camera; wanted a sensor of type 'perspective'")
+    sensor = scene.sensors()[0]
+    width, height = (int(n) for n in sensor.film().size())
+    far, near = (tuple(one for one in scene.emitters() if is_directional(one) == kind) for kind in (True, False))
+    if not far + near:
+        raise InputError("the scene has no light; wanted at least one emitter of type 'point', 'spot' or 'directional'")
+    lights = tuple(_read_light(emitter) for emitter in near)
+    opaque, boundaries = _sorted_shapes(scene)
+    media = tuple(_read_bounded(shape) for shape in boundaries)
+    origin = camera_matrix(sensor)[:3, 3]
+    _check_disjoint(media)
+    medium = _read_ambient(sensor, origin, media, boundaries)
+    if far and np.any(medium.sigma_t > 0):
+        raise InputError(endless_medium(far[0]))
+    return TruthScene(
+        scene=scene,
+        occluders=scene_of(opaque, scene),
+        width=width,
+        height=height,
+        origin=origin,
+        direction=film_directions(sensor, pixel_centres((width, height)), (width, height)),
+        medium=medium,
+        lights=lights,
+        media=media,
+        directional=tuple(read_directional(emitter) for emitter in far),
+    )
+
+
+def _sorted_shapes(scene) -> tuple[list[Any], list[Any]]:
+    """Return the opaque shapes and those that bound a medium; what is neither takes no part."""
+    import mitsuba as mi
+
+    opaque, boundaries = [], []
+    for shape in scene.shapes():
+        inside, outside = shape.interior_medium(), shape.exterior_medium()
+        null = shape.bsdf().class_name() == "Null"
+        if not null and mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.Null):
+            raise InputError(f"shape '{shape.id()}' is partly transparent; wanted opaque surfaces, or material 'null'")
+        if not null and (inside is not None or outside is not None):
+            raise InputError(
+                f"shape '{shape.id()}' bounds a medium and has a {shape.bsdf().class_name()} material; wanted the "
+                "material 'null' on it, and no media on opaque shapes"
+            )
+        if not null:
+            opaque.append(shape)
+        elif inside is not None:
+            boundaries.append(shape)
+        elif outside is not None:
+            raise InputError(f"shape '{shape.id()}' is a hole in a medium; wanted media inside of convex bounds")
+    return opaque, boundaries
+
+
+def scene_of(shapes: list[Any], whole):
+    """Return a scene of some of the shapes of another one, `whole`: that itself where they are all of its shapes."""
+    import mitsuba as mi
+
+    if len(shapes) == len(whole.shapes()):
+        return whole
+    # The keys become the names of the shapes, in the whole scene too: they keep those they have, if these are keys.
+    names = {shape.id() for shape in shapes}
+    sound = len(names) == len(shapes) and not any("." in name or not name for name in names)
+    return mi.load_dict(
+        {"type": "scene"} | {shape.id() if sound else f"shape{number}": shape for number, shape in enumerate(shapes)}
+    )
+
+
+def _check_disjoint(media: tuple[BoundedMedium, ...]) -> None:
+    for number, one in enumerate(media):
+        for other in media[:number]:
+            if overlap(one.bounds, other.bounds):
+                raise InputError(
+                    f"the media of shapes '{other.name}' and '{one.name}' overlap or one holds the other; wanted "
+                    "disjoint bounds"
+                )
+
+
+def _read_ambient(sensor, origin: Array, media: tuple[BoundedMedium, ...], boundaries: list[Any]) -> TruthMedium:
+    """Return the medium without bounds; refuse a camera or a boundary that says otherwise."""
+    own = sensor.get_medium()
+    ambient = own
+    for medium, shape in zip(media, boundaries, strict=True):
+        if holds(medium.bounds, origin):
+            if own != medium.plugin:
+                raise InputError(
+                    f"the camera is inside of shape '{medium.name}', but references another medium or none; "
+                    "reference that shape's interior medium in the sensor"
+                )
+            ambient = shape.exterior_medium()
+    for medium, shape in zip(media, boundaries, strict=True):
+        if shape.exterior_medium() != ambient:
+            raise InputError(
+                f"the exterior medium of shape '{medium.name}' is not what surrounds the others or the camera; wanted "
+                "the medium that the camera references as exterior of all shapes, or none at all"
+            )
+    if ambient is not None:
+        return _read_medium(ambient, "the medium")
+    if not media:
+        raise InputError("the camera references no medium: it would be in a vacuum; reference the medium in the sensor")
+    return TruthMedium(np.zeros(3), np.zeros(3), PhaseFunction("isotropic"), None)
+
+
+def _read_bounded(shape) -> BoundedMedium:
+    inside = _read_medium(shape.interior_medium(), f"the medium of shape '{shape.id()}'")
+    return BoundedMedium(
+        inside.sigma_t, inside.albedo, inside.phase, inside.plugin, bounds=read_bounds(shape), name=shape.id()
+    )
+
+
+def _read_medium(medium, name: str) -> TruthMedium:
+    import mitsuba as mi
+
+    if not medium.is_homogeneous():
+        raise InputError(f"{name} is a {medium.class_name()}; wanted a medium of type 'homogeneous'")
+    parameters = mi.traverse(medium)
+    sigma_t = _rgb(parameters["sigma_t.value.value"]) * float(parameters["scale"])
+    return TruthMedium(sigma_t, _rgb(parameters["albedo.value.value"]), _read_phase(medium.phase_function()), medium)
+
+
+def _read_phase(phase) -> PhaseFunction:
+    import mitsuba as mi
+
+    parameters = mi.traverse(phase)
+    name = phase.class_name()
+    if name == "IsotropicPhaseFunction":
+        return PhaseFunction("isotropic")
+    if name == "RayleighPhaseFunction":
+        return PhaseFunction("rayleigh")
+    if name == "HGPhaseFunction":
+        return PhaseFunction("hg", g=float(parameters["g"][0]))
+    if name == "TabulatedPhaseFunction":
+        return PhaseFunction("tabulated", table=tuple(float(v) for v in np.array(parameters["values"])))
+    raise InputError(f"the phase function is a {name}; wanted one of isotropic, hg, rayleigh, tabphase")
+
+
+def _read_light(emitter) -> TruthLight:
+    import drjit as dr
+    import mitsuba as mi
+
+    name = emitter.class_name()
+    if name not in ("PointLight", "SpotLight"):
+        raise InputError(
+            f"the scene has an emitter of class {name}; wanted emitters of type 'point', 'spot' or 'directional' only"
+        )
+    parameters = mi.traverse(emitter)
+    matrix = np.array(emitter.world_transform().matrix, dtype=np.float64).reshape(4, 4)
+    spot = name == "SpotLight"
+    position = matrix[:3, 3] if spot else np.array(parameters["position"], dtype=np.float64).reshape(3)
+    axis = matrix[:3, 2] / np.linalg.norm(matrix[:3, 2]) if spot else np.array([0.0, 0.0, 1.0])
+    # Mitsuba's own answer at a far point on the axis, where positions lose no digits that matter.
+    distance = 1024.0 * max(1.0, float(np.abs(position).max()))
+    interaction = dr.zeros(mi.Interaction3f)
+    interaction.p = mi.Point3f(*(float(c) for c in position + distance * axis))
+    _, arriving = emitter.sample_direction(interaction, mi.Point2f(0.5))
+    intensity = _as_given(parameters, _rgb(arriving) * distance**2)
+    if not spot:
+        return TruthLight(position, intensity)
+    cutoff = np.deg2rad(float(parameters["cutoff_angle"][0]))
+    return TruthLight(position, intensity, axis, cutoff, min(np.deg2rad(float(parameters["beam_width"][0])), cutoff))
+
+
+def _as_given(parameters, measured: Array) -> Array:
+    """Return the intensity as the scene gives it, where that is what was measured: measuring rounds it to float32."""
+    if "intensity.value" not in parameters:
+        return measured
+    texture = _rgb(parameters["texture.value"]) if "texture.value" in parameters else np.ones(3)
+    given = _rgb(parameters["intensity.value"]) * texture
+    return given if given.shape == measured.shape and np.allclose(given, measured, rtol=1e-5, atol=0) else measured
+
+
+def _rgb(value) -> Array:
+    flat = np.array(value, dtype=np.float64).reshape(-1)
+    return np.repeat(flat, 3) if flat.size == 1 else flat

@@ -1,0 +1,266 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Layered OpenEXR images: radiance by layer, depth, standard errors, and in the header what made them.
+
+A file is one part of scan lines in float32 with ZIP compression, which every viewer reads. A layer is three channels
+`name.R`, `name.G`, `name.B`; the total, `airlight + surface`, is in plain `R`, `G`, `B`, so that viewers show it.
+
+The binding of OpenEXR 3.5 writes an array with strides as if it were contiguous, drops the upper half of an integer
+attribute, changes the header dictionary that it is given and refuses NumPy's scalars: hence the conversions below.
+"""
+
+import contextlib
+import difflib
+import os
+import struct
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analytic.errors import InputError
+from reference.storage.files import NO_SPACE, atomic_path
+
+TOTAL = "total"  #: the layer in the plain channels R, G, B
+NOTE = "airlight:read"  #: the attribute in which the reader says what it changed or left out
+
+Attribute = str | int | float
+
+# What the format itself keeps in a header.
+# fmt: off
+_STANDARD = frozenset((
+    "channels", "chunkCount", "compression", "dataWindow",
+    "deepImageState", "displayWindow", "lineOrder", "maxSamplesPerPixel",
+    "name", "pixelAspectRatio", "screenWindowCenter", "screenWindowWidth",
+    "tiles", "type", "version", "view",
+))
+# fmt: on
+_COLOURS = {"r": "R", "g": "G", "b": "B", "red": "R", "green": "G", "blue": "B"}  # as other programs name channels
+_MAGIC = 20000630
+_KINDS = {0x200: "tiled", 0x800: "deep", 0x1000: "multi-part"}  # bits of the second word of a file
+
+
+@dataclass(frozen=True)
+class Image:
+    """A layered image.
+
+    Attributes
+    ----------
+    layers
+        Arrays (height, width, 3) by name: `airlight`, `surface`, their standard errors `airlight_se`, `surface_se`
+        [W/(m^2 sr)], and `total`.
+    depth
+        Distance along the ray to the visible surface [m], (height, width); infinite where the ray hits nothing.
+    attributes
+        Header attributes such as `airlight:method`.
+    """
+
+    layers: Mapping[str, NDArray[np.floating]]
+    depth: NDArray[np.floating] | None = None
+    attributes: Mapping[str, Attribute] = field(default_factory=dict)
+
+
+def layer(image: Image, name: str, path: str | os.PathLike[str] = "the image") -> NDArray[np.floating]:
+    """Return a layer, (height, width, 3); the empty name is the total.
+
+    Raises
+    ------
+    InputError
+        If it is not there, with the layers that are and the nearest name.
+    """
+    name = name or TOTAL
+    if name in image.layers:
+        return image.layers[name]
+    there = sorted(image.layers)
+    near = difflib.get_close_matches(name, there, n=1, cutoff=0.4)
+    hint = f"did you mean '{near[0]}'?" if near else "ask for one of them"
+    listed = ", ".join(there) if there else "no layer of colours at all"
+    raise InputError(f"{path} has no layer '{name}'; it has {listed}; {hint}")
+
+
+def write_exr(path: str | os.PathLike[str], image: Image) -> None:
+    """Write an image as a single-part float32 EXR, whole or not at all.
+
+    Where there is an airlight, the total in `R`, `G`, `B` is it plus the surface, or it alone. An attribute is kept in
+    32 bits: of a float about 7 digits remain, and a number beyond their range is written as text.
+
+    Raises
+    ------
+    InputError
+        If the layers are none, of two sizes, of another shape than (height, width, 3), or too large for float32; if a
+        `total` is given that is not the sum; if the name of an attribute is one of the format's own.
+    OSError
+        If the disk is full; the file is as it was.
+    """
+    import OpenEXR
+
+    channels = _channels(image)
+    header: dict[str, Any] = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    for key, value in image.attributes.items():
+        header[key] = _attribute(key, value)
+    with atomic_path(path) as temporary, _system_errors():
+        OpenEXR.File(header, channels).write(str(temporary))
+
+
+def read_exr(path: str | os.PathLike[str]) -> Image:
+    """Read an image written by `write_exr` or by another program.
+
+    Plain `R`, `G`, `B` (or `r`, `Red` and so on) become the layer `total`, half floats float32, a lone `Y` three equal
+    channels; the attribute `airlight:read` says so, and names the channels left out (alpha, integers, incomplete
+    layers).
+
+    Raises
+    ------
+    InputError
+        If the file is missing, broken, no EXR, multi-part, tiled, deep or subsampled, or shows a part of its frame.
+    """
+    _check_kind(path)
+    import OpenEXR
+
+    try:
+        with _quiet(), OpenEXR.File(str(path), separate_channels=True) as file:
+            header = dict(file.header())  # the binding empties its own when the file is closed
+            channels = {key: (c.pixels, c.xSampling * c.ySampling) for key, c in file.channels().items()}
+    except (RuntimeError, ValueError, MemoryError, TypeError) as error:
+        raise InputError(f"{path} is a broken EXR file: its pixels cannot be read; write or copy it again") from error
+    if not all(np.array_equal(a, b) for a, b in zip(header["dataWindow"], header["displayWindow"])):
+        raise InputError(
+            f"{path} holds another window of pixels than its frame (dataWindow is not displayWindow); "
+            "crop or pad it to the frame first"
+        )
+    subsampled = sorted(key for key, (_, sampling) in channels.items() if sampling != 1)
+    if subsampled or any(key.rpartition(".")[2] in ("RY", "BY") for key in channels):
+        raise InputError(f"{path} is stored as luminance and subsampled chroma; convert it to R, G, B channels")
+    return _image({key: pixels for key, (pixels, _) in channels.items()}, header)
+
+
+def _channels(image: Image) -> dict[str, NDArray[np.float32]]:
+    """Name the channels of an image, each contiguous in float32."""
+    if not image.layers:
+        raise InputError("an image without layers cannot be written; give at least one, such as 'airlight'")
+    layers = {name or TOTAL: _float32(np.asarray(values), name) for name, values in image.layers.items()}
+    first = next(iter(layers))
+    for name, values in layers.items():
+        if values.ndim != 3 or values.shape[2] != 3 or values.size == 0:
+            raise InputError(f"layer '{name}' has shape {values.shape}; wanted (height, width, 3), none of them zero")
+        if values.shape != layers[first].shape:
+            raise InputError(f"layers of two sizes: '{first}' {layers[first].shape}, '{name}' {values.shape}")
+    if "airlight" in layers:
+        total = layers["airlight"] + layers["surface"] if "surface" in layers else layers["airlight"]
+        # A total read from a file is the same sum; one that is not is a stale or foreign one.
+        given = layers.get(TOTAL, total)
+        if not np.allclose(given, total, rtol=1e-5, atol=0, equal_nan=True):
+            raise InputError("layer 'total' is not airlight + surface; leave it out and it is written for you")
+        layers[TOTAL] = total
+    channels = {}
+    for name, values in layers.items():
+        prefix = "" if name == TOTAL else f"{name}."
+        for index, suffix in enumerate("RGB"):
+            channels[prefix + suffix] = np.ascontiguousarray(values[:, :, index])
+    if image.depth is not None:
+        depth = _float32(np.asarray(image.depth), "depth")
+        if depth.shape != layers[first].shape[:2]:
+            raise InputError(f"depth has shape {depth.shape}; wanted that of the layers, {layers[first].shape[:2]}")
+        channels["depth.Z"] = np.ascontiguousarray(depth)
+    return channels
+
+
+def _float32(values: NDArray[Any], name: str) -> NDArray[np.float32]:
+    """Round to float32; refuse finite numbers that would become infinite."""
+    with np.errstate(over="ignore", under="ignore"):
+        rounded = values.astype(np.float32)
+    lost = int(np.count_nonzero(np.isinf(rounded) & np.isfinite(values)))
+    if lost:
+        raise InputError(f"{lost} values of '{name}' exceed what float32 holds (3.4e38); scale the radiance down")
+    return rounded
+
+
+def _attribute(key: str, value: Any) -> Attribute:
+    """Turn an attribute into one of the three types that the format keeps."""
+    if key in _STANDARD or not 0 < len(key.encode()) <= 255:
+        raise InputError(f"'{key}' cannot name a header attribute of ours; choose one such as 'airlight:{key[:40]}'")
+    if isinstance(value, str):
+        return value
+    if isinstance(value, int | np.integer):
+        return int(value) if -(2**31) <= value < 2**31 else str(int(value))
+    if isinstance(value, float | np.floating):
+        number = float(value)
+        return str(number) if np.isfinite(number) and abs(number) > float(np.finfo(np.float32).max) else number
+    raise InputError(f"attribute '{key}' is a {type(value).__name__}; wanted text, an integer or a float")
+
+
+def _check_kind(path: str | os.PathLike[str]) -> None:
+    """Read the first two words: the library prints to the terminal, and names no reason, where these are wrong."""
+    try:
+        with open(path, "rb") as stream:
+            start = stream.read(8)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"cannot read {path}: {reason}; give an EXR file that exists") from error
+    if len(start) < 8 or struct.unpack("<I", start[:4])[0] != _MAGIC:
+        raise InputError(f"{Path(path)} is not an EXR file; give an image with the layers of an EXR")
+    flags = struct.unpack("<I", start[4:])[0]
+    for bit, kind in reversed(_KINDS.items()):
+        if flags & bit:
+            raise InputError(f"{path} is a {kind} EXR file; save it as a single part of flat scan lines")
+
+
+@contextlib.contextmanager
+def _system_errors() -> Iterator[None]:
+    """Turn OpenEXR's words for a full disk back into the system's error."""
+    try:
+        yield
+    except RuntimeError as error:
+        for code in NO_SPACE:
+            if os.strerror(code) in str(error):
+                raise OSError(code, os.strerror(code)) from error
+        raise
+
+
+@contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep what OpenEXR's C code prints about a broken file off the terminal; the exception says it once."""
+    with open(os.devnull, "w") as sink, contextlib.redirect_stdout(sink), contextlib.redirect_stderr(sink):
+        saved = os.dup(2)
+        try:
+            os.dup2(sink.fileno(), 2)
+            yield
+        finally:
+            os.dup2(saved, 2)
+            os.close(saved)
+
+
+def _image(channels: dict[str, NDArray[Any]], header: dict[str, Any]) -> Image:
+    """Group channels into layers; note what is changed or left out."""
+    floats = {k: v.astype(np.float32, copy=False) for k, v in channels.items() if v.dtype.kind == "f"}
+    groups: dict[str, dict[str, str]] = {}
+    for key in floats:
+        name, _, suffix = key.rpartition(".")
+        groups.setdefault(name, {})[suffix] = key
+    layers, used, grey = {}, set(), []
+    for name, group in groups.items():
+        # Some programs write r, g, b or Red, Green, Blue.
+        colours = {_COLOURS[suffix.lower()]: key for suffix, key in group.items() if suffix.lower() in _COLOURS} | group
+        if {"R", "G", "B"} <= colours.keys():
+            keys = [colours[suffix] for suffix in "RGB"]
+        elif "Y" in group and group.keys() <= {"Y", "A", "Z"}:
+            keys = [group["Y"]] * 3
+            grey.append(name or TOTAL)
+        else:
+            continue
+        layers[name or TOTAL] = np.stack([floats[key] for key in keys], axis=-1)
+        used |= set(keys)
+    # Beside an X it is a component of a vector.
+    depth_key = next((key for key in ("depth.Z", "Z") if key in floats and key[:-1] + "X" not in floats), None)
+    used |= {depth_key} if depth_key else set()
+    notes = []
+    if grey:
+        notes.append(f"grey, Y repeated as R, G, B: {', '.join(sorted(grey))}")
+    if any(channels[key].dtype == np.float16 for key in used):
+        notes.append("half floats (relative rounding 5e-4)")
+    if left := sorted(channels.keys() - used):
+        notes.append(f"channels left out: {', '.join(left)}")
+    kept = {k: v for k, v in header.items() if isinstance(v, str | int | float) and k not in _STANDARD and k != NOTE}
+    return Image(layers, floats.get(depth_key or ""), {**kept, NOTE: "; ".join(notes)} if notes else kept)

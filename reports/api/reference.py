@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The Python API for the truth of a scene, by the certified integral or by samples."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Literal
+
+from analytic.errors import InputError
+from reports.api.inputs import OpenScene, Progress, SceneLike, Size, one_error, opened, telling
+
+if TYPE_CHECKING:
+    from reports.api.results import Reference
+    from validation.estimates.budget import Budget
+
+USUAL_SAMPLES = 2048  #: a pixel, of an estimator that samples and is given no budget
+
+
+@one_error
+def reference(
+    scene: SceneLike,
+    estimator: Literal["quadrature", "single-scatter", "volpath"] = "quadrature",
+    *,
+    size: Size | None = None,
+    pixel: Literal["centre", "area"] = "centre",
+    samples: int | None = None,
+    error: float | None = None,
+    seconds: float | None = None,
+    target: Literal["pooled", "worst"] = "pooled",
+    seed: int = 0,
+    progress: Progress = None,
+) -> "Reference":
+    """Compute the truth of a scene, with its error; what was computed before comes from the cache.
+
+    Parameters
+    ----------
+    scene
+        See `load_scene`.
+    estimator
+        'quadrature', with a bound of the error in every pixel; or by random samples, with standard errors,
+        'single-scatter' and 'volpath'.
+    size
+        Width and height [pixels], or 'WxH'; the scene's own by default.
+    pixel
+        Of the quadrature: the radiance at a pixel's 'centre', or the mean over its 'area'.
+    samples, error, seconds
+        When an estimator that samples stops: at so many samples a pixel (2048 where none of the three is given), at a
+        relative standard error, or after a time [s].
+    target
+        Whether `error` is that of the image, 'pooled', or of its 'worst' pixel.
+    seed
+        Of the first batch of samples; the others count up.
+    progress
+        Called with (share done, what); True shows a bar.
+
+    Raises
+    ------
+    InputError
+        For what the estimator has no use for, and more than one of `samples`, `error` and `seconds`.
+
+    Examples
+    --------
+    >>> import airlight
+    >>> truth = airlight.reference("open-fog", size=(32, 24))
+    >>> truth.relative_error < 1e-6
+    True
+    >>> traced = airlight.reference("open-fog", "single-scatter", size=(32, 24), samples=64)
+    >>> traced.standard_error.shape
+    (24, 32, 3)
+    """
+    from validation.scenes.loading import nearest
+
+    known = ("quadrature", "single-scatter", "volpath")
+    if estimator not in known:
+        raise InputError(f"estimator: got {estimator!r}, wanted one of {', '.join(known)}" + nearest(estimator, known))
+    given = {"samples": samples, "error": error, "seconds": seconds}
+    if estimator == "quadrature":
+        named = [name for name, value in given.items() if value is not None]
+        if named:
+            raise InputError(f"{named[0]}: is for 'single-scatter' and 'volpath'; leave it out, or take one of these")
+        with telling(progress, "quadrature") as tell:
+            return _quadrature(opened(scene, size), pixel, tell)
+    if pixel != "centre":
+        raise InputError(
+            f"pixel: got {pixel!r}, but {estimator} traces pixel centres; leave it out or take 'quadrature'"
+        )
+    budget = _budget(given, target)
+    with telling(progress, estimator) as tell:
+        return _sampled(opened(scene, size), estimator, budget, seed=seed, tell=tell)
+
+
+def _quadrature(loaded: OpenScene, pixel: str, tell: Callable[[float, str], None]) -> "Reference":
+    import numpy as np
+
+    from reports.api.results import Reference, sealed
+    from validation.estimates.images import whole_truth
+    from validation.estimates.quadrature import truth_image
+
+    truth = truth_image(loaded.scene, pixel=pixel, progress=lambda done, total, what: tell(done / total, what))
+    finite = np.isfinite(truth.airlight)
+    mean = float(truth.airlight[finite].mean()) if finite.any() else 0.0
+    counts = ("transitions", "checked", "disagreements", "refined", "left")
+    return Reference(
+        scene=loaded.name,
+        image=sealed(whole_truth(loaded, truth, pixel=pixel)),
+        estimator="quadrature",
+        relative_error=float(truth.airlight_bound[finite].mean()) / mean if mean > 0 else float("nan"),
+        details={"pixel": pixel} | {name: getattr(truth, name) for name in counts},
+    )
+
+
+def _sampled(
+    loaded: OpenScene, estimator: str, budget: "Budget", *, seed: int, tell: Callable[[float, str], None]
+) -> "Reference":
+    from reports.api.results import Reference, sealed
+    from validation.estimates.images import monte_carlo_reference
+
+    found = monte_carlo_reference(loaded, estimator, budget=budget, seed=seed, progress=tell)
+    attributes = {name.removeprefix("airlight:"): value for name, value in found.image.attributes.items()}
+    details: dict[str, Any] = {name: attributes[name] for name in ("spp", "batches", "seeds")}
+    details |= {"cached": found.cached, "masked": found.masked, "reached": found.reached}
+    return Reference(
+        scene=loaded.name,
+        image=sealed(found.image),
+        estimator=estimator,
+        relative_error=getattr(found.errors, budget.target),
+        details=details,
+    )
+
+
+def _budget(given: dict[str, Any], target: Any) -> "Budget":
+    from validation.estimates.budget import Budget
+
+    named = [name for name, value in given.items() if value is not None]
+    if len(named) > 1:
+        raise InputError(f"{' and '.join(named)} exclude each other; give one of them")
+    for name in named:
+        kind, words = (int, "a whole number") if name == "samples" else (int | float, "a number")
+        if not isinstance(given[name], kind) or not given[name] > 0:
+            raise InputError(f"{name}: got {given[name]!r}, wanted {words} above 0")
+    if target not in ("pooled", "worst"):
+        raise InputError(f"target: got {target!r}, wanted 'pooled' or 'worst'")
+    usual = given["samples"] if named else USUAL_SAMPLES
+    return Budget(samples=usual, error=given["error"], seconds=given["seconds"], target=target)

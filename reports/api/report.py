@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The Python API for the error report."""
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from analytic.errors import InputError
+from reports.api.inputs import Progress, one_error, opened, telling
+from reports.api.studies import MethodLike, chosen_methods, several
+
+if TYPE_CHECKING:
+    from reports.api.tables import Report
+
+
+@one_error
+def report(
+    folder: str | os.PathLike[str] = "airlight-report",
+    *,
+    scenes: Sequence[str] | None = None,
+    methods: "Sequence[MethodLike] | None" = None,
+    effort: Literal["quick", "default", "full"] = "quick",
+    images: str | os.PathLike[str] | None = None,
+    fresh: bool = False,
+    progress: Progress = None,
+) -> "Report":
+    """Measure methods in scenes and write the error report: one page, its data, EXR files and pictures.
+
+    Parameters
+    ----------
+    folder
+        Where it is written.
+    scenes
+        Built-in names and paths of Mitsuba XML files; those of `airlight report` by default.
+    methods
+        As for `bench`; those of `airlight report` by default.
+    effort
+        'quick', 'default' or 'full': minutes or an hour. What was measured before, with the same sources on the same
+        machine, is not measured again.
+    images
+        A folder with EXR files that another renderer wrote, SCENE.exr or SCENE.NAME.exr, to be judged too.
+    fresh
+        Measure again what was kept.
+    progress
+        Called with (share done, what); True shows a bar.
+
+    Raises
+    ------
+    InputError
+        For what cannot be used, before the work begins.
+    KeyboardInterrupt
+        At Ctrl-C; the next report goes on from there.
+
+    Examples
+    --------
+    >>> import airlight
+    >>> found = airlight.report("my-report", scenes=["open-fog"], methods=["unshadowed"])  # doctest: +SKIP
+    >>> found.claims[0]  # doctest: +SKIP
+    'The truth is confirmed by our own Mitsuba integrator in 1 of 1 comparisons: ...'
+    """
+    from reference.storage.files import ensure_folder
+    from reports.api.tables import Report
+    from reports.machine.environment import activate
+    from reports.machine.progress import Interrupted
+    from reports.report.measure import write_report
+    from validation.configurations.methods import QUICK, STANDARD
+    from validation.frames.scene_study import EFFORTS
+    from validation.scenes.loading import nearest
+
+    if effort not in EFFORTS:
+        raise InputError(f"effort: got {effort!r}, wanted one of {', '.join(EFFORTS)}" + nearest(effort, EFFORTS))
+    target = ensure_folder(folder)
+    activate()
+    usual = QUICK if effort == "quick" else STANDARD
+    chosen = usual if methods is None else chosen_methods(methods)
+    names, shown = _scenes_and_images(scenes, images, effort)
+    try:
+        with telling(progress, "report") as tell:
+            data = write_report(
+                target,
+                scenes=names,
+                effort=EFFORTS[effort],
+                configurations=chosen,
+                images=shown,
+                command=f"airlight.report({os.fspath(folder)!r}, ..)",
+                fresh=fresh,
+                progress=tell,
+            )
+    except Interrupted as stop:
+        raise KeyboardInterrupt(str(stop)) from None
+    return Report(folder=target, data=data)
+
+
+def _scenes_and_images(scenes: Any, images: Any, effort: str) -> tuple[list[str], dict[str, Any]]:
+    """Return the scenes to study, those of the images where only these are given; refuse what cannot be used."""
+    from realtime.scene.read_scene import read_scene
+    from validation.comparison.engine_images import find_images
+    from validation.frames.scene_study import EFFORTS
+    from validation.scenes.registry import SCENES
+
+    asked = [os.fspath(one) for one in several(scenes)] if scenes else []
+    names = asked or list(EFFORTS[effort].scenes)
+    shown: dict[str, Any] = {}
+    if images is not None:
+        shown = find_images(images, {Path(name).stem: name for name in [*SCENES, *asked]})
+        names = asked or list(shown)
+        stems = {Path(name).stem for name in names}
+        shown = {name: found for name, found in shown.items() if name in stems}
+    for name in names:
+        read_scene(opened(name, (8, 6)).scene)
+    return names, shown

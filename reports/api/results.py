@@ -1,0 +1,252 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Images as results of the Python API: frozen, NumPy arrays where one is wanted, pictures in a notebook.
+
+Arrays are (height, width, 3) of linear RGB radiance [W/(m^2 sr)], the first row at the top, and read-only. They keep
+the precision of what made them: float32 from a method in single precision, float64 from one in double and from the
+truth, whose error is far below what float32 can hold; `.numpy(numpy.float32)` converts.
+"""
+
+import math
+import os
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from analytic.errors import InputError
+from reference.storage.exr import TOTAL, Image
+from reference.storage.exr import layer as image_layer
+from reports.tables.terminal import number
+from validation.configurations.timing import FrameTimes
+
+Array = NDArray[np.floating]
+
+
+def sealed(image: Image) -> Image:
+    """Return a layered image whose arrays cannot be written to."""
+    layers = {name: read_only(values) for name, values in image.layers.items()}
+    depth = None if image.depth is None else read_only(image.depth)
+    return Image(layers, depth, dict(image.attributes))
+
+
+def read_only(values: Any) -> Array:
+    """Return an array that cannot be written to."""
+    view = np.asarray(values).view()
+    view.flags.writeable = False
+    return view
+
+
+class Pictured(ABC):
+    """What a notebook shows as the PNG file of its picture."""
+
+    @abstractmethod
+    def picture(self) -> NDArray[np.uint8]:
+        """Return the picture, (height, width, 3)."""
+
+    @cached_property
+    def _png(self) -> bytes:
+        from reports.plotting.pictures import png_bytes
+
+        return png_bytes(self.picture())
+
+    def _repr_png_(self) -> bytes:
+        return self._png
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class LayeredImage(Pictured):
+    """What renderings and references share: layers of radiance and the depth, see the module."""
+
+    scene: str  #: name of the scene
+    image: Image  #: the layers as they are written to a file, with what made them
+
+    @property
+    def airlight(self) -> Array:
+        """The in-scattered radiance alone [W/(m^2 sr)], (height, width, 3)."""
+        return image_layer(self.image, "airlight")
+
+    @property
+    def surface(self) -> Array:
+        """The radiance of the lit surface through the medium [W/(m^2 sr)], (height, width, 3)."""
+        return image_layer(self.image, "surface")
+
+    @cached_property
+    def total(self) -> Array:
+        """All light, airlight and surface [W/(m^2 sr)], (height, width, 3)."""
+        return read_only(self.airlight + self.surface)
+
+    @property
+    def depth(self) -> Array:
+        """The distance along the ray to the visible surface, infinite where there is none [m], (height, width)."""
+        assert self.image.depth is not None
+        return self.image.depth
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height [pixels]."""
+        height, width = self.airlight.shape[:2]
+        return width, height
+
+    def numpy(self, dtype: DTypeLike | None = None) -> Array:
+        """Return the total as an array of one's own, which can be written to."""
+        return np.array(self.total, dtype=dtype)
+
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> Array:
+        return as_array(self.total, dtype, copy)
+
+    def with_total(self) -> Image:
+        """Return the layers and the total among them."""
+        return replace(self.image, layers=dict(self.image.layers) | {TOTAL: self.total})
+
+    def picture(self, layer: str = TOTAL, exposure: float | None = None) -> NDArray[np.uint8]:
+        """Return a layer as a picture for a screen, (height, width, 3).
+
+        Parameters
+        ----------
+        layer
+            'total', 'airlight', 'surface' or another layer that is there.
+        exposure
+            Stops: the radiance is multiplied by 2 to this power. By default one that suits the total.
+        """
+        from reports.plotting.pictures import tone_mapped
+        from validation.metrics.colour import auto_exposure
+
+        stops = auto_exposure(self.total) if exposure is None else exposure
+        radiance = np.asarray(image_layer(self.with_total(), layer), dtype=np.float64)
+        return tone_mapped(radiance, 2.0**stops)
+
+    def save(self, path: str | os.PathLike[str], exposure: float | None = None) -> Path:
+        """Write the layers as EXR or the picture of the total as PNG, by the suffix of the path, which is returned."""
+        from reference.storage.exr import write_exr
+        from reports.machine.environment import stamped
+        from reports.plotting.pictures import write_png
+
+        target = Path(path)
+        if target.suffix.lower() == ".exr":
+            write_exr(target, stamped(self.image))
+        elif target.suffix.lower() == ".png":
+            write_png(target, self.picture(exposure=exposure))
+        else:
+            raise InputError(
+                f"save: got {str(path)!r}, wanted a path that ends with .exr (all layers) or .png (picture)"
+            )
+        return target
+
+    def facts(self) -> dict[str, str]:
+        """Return what there is to say of the image, in words, by name."""
+        width, height = self.size
+        return {"scene": self.scene, "size": f"{width} x {height}"} | _levels(self)
+
+    @property
+    def title(self) -> str:
+        """What to call the image."""
+        return self.scene
+
+    def _repr_html_(self) -> str:
+        from reports.api.html import block, picture, table
+        from reports.plotting.pictures import png_bytes
+
+        title = self.title
+        shown = [picture(self._png, self.size[0], alt=f"{title}, all light", caption="all light")]
+        if np.any(self.surface):
+            png = png_bytes(self.picture("airlight"))
+            shown.append(picture(png, self.size[0], alt=f"{title}, the airlight", caption="airlight"))
+        return block(title, *shown, table(list(self.facts().items())))
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.title}, {self.size[0]} x {self.size[1]})"
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Rendering(LayeredImage):
+    """A frame by a real-time method."""
+
+    method: str
+    kernel: str | None  #: None for a method that calls none
+    parameters: Mapping[str, Any]  #: those that differ from the method's defaults
+    label: str  #: method, kernel and parameters in one
+    precision: str  #: 'single' or 'double'
+    plan: Mapping[str, str]  #: what the scene needs of a method, in words
+    notes: tuple[str, ...] = ()  #: what there is to know of the scene
+    times: FrameTimes | None = None  #: what a frame costs, where it was asked for
+
+    def facts(self) -> dict[str, str]:
+        """Return what there is to say of the frame, in words, by name."""
+        found = super().facts() | {"method": self.label, "precision": self.precision}
+        if self.times is not None:
+            frame = self.times.frame
+            found["a frame"] = (
+                f"{number(frame.median_ms)} ms, quartiles {number(frame.low_ms)}..{number(frame.high_ms)}"
+            )
+            found["of it airlight"] = f"{number(self.times.airlight.median_ms)} ms"
+            found["after the light moved"] = f"{number(self.times.rebuild.median_ms)} ms"
+        return found | ({"notes": " ".join(self.notes)} if self.notes else {})
+
+    @property
+    def title(self) -> str:
+        """What to call the frame."""
+        return f"{self.scene} by {self.label}"
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Reference(LayeredImage):
+    """The truth of a scene, with its error."""
+
+    estimator: str  #: 'quadrature', 'single-scatter' or 'volpath'
+    relative_error: float  #: of the airlight: mean bound over mean, or the relative standard error of the image
+    details: Mapping[str, Any] = field(
+        default_factory=dict
+    )  #: how it was made: samples, seeds, shadow rays that checked
+
+    @property
+    def bound(self) -> Array | None:
+        """The bound of the airlight's error [W/(m^2 sr)], (height, width, 3); None for an estimator that samples."""
+        return self.image.layers.get("airlight_bound")
+
+    @property
+    def standard_error(self) -> Array | None:
+        """The standard error of the airlight [W/(m^2 sr)], (height, width, 3); None for the quadrature."""
+        return self.image.layers.get("airlight_se")
+
+    @property
+    def surface_standard_error(self) -> Array | None:
+        """The standard error of the surface [W/(m^2 sr)], (height, width, 3); None for the quadrature."""
+        return self.image.layers.get("surface_se")
+
+    def facts(self) -> dict[str, str]:
+        """Return what there is to say of the truth, in words, by name."""
+        kind = "mean bound of the airlight's error" if self.bound is not None else "standard error of the image"
+        error = {kind: f"{number(100 * self.relative_error)} %"} if math.isfinite(self.relative_error) else {}
+        words = {name.replace("_", " "): str(value) for name, value in self.details.items() if value is not None}
+        return super().facts() | {"estimator": self.estimator} | error | words
+
+    @property
+    def title(self) -> str:
+        """What to call the truth."""
+        return f"{self.scene}, the truth by {self.estimator}"
+
+
+def as_array(values: Array, dtype: DTypeLike | None, copy: bool | None) -> Array:
+    """Answer NumPy's protocol: a view unless another type or a copy is wanted."""
+    if dtype is not None and np.dtype(dtype) != values.dtype:
+        if copy is False:
+            raise ValueError(f"a copy is needed to turn {values.dtype} into {np.dtype(dtype)}")
+        return values.astype(dtype)
+    return values.copy() if copy else values
+
+
+def _levels(image: LayeredImage) -> dict[str, str]:
+    """Say how bright the layers are, and what is odd in them."""
+    found = {}
+    for name, values in (("airlight", image.airlight), ("surface", image.surface)):
+        finite = np.isfinite(values)
+        mean = float(values[finite].mean(dtype=np.float64)) if finite.any() else math.nan
+        odd = [f"{int((~finite).any(axis=-1).sum())} pixels not finite"] if not finite.all() else []
+        odd += [f"{int((values < 0).any(axis=-1).sum())} pixels negative"] if (values < 0).any() else []
+        found[f"mean {name}"] = ", ".join([f"{number(mean, 4)} W/(m^2 sr)", *odd])
+    return found

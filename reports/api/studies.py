@@ -1,0 +1,212 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The Python API for studies: integrals by kernels, speed against error."""
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+
+from analytic.errors import InputError
+from reports.api.inputs import Progress, SceneLike, Size, kernel_name, one_error, opened, telling
+
+if TYPE_CHECKING:
+    from analytic.cases import Cases
+    from reports.api.tables import BenchTable, Integrals
+    from validation.configurations.methods import Configuration
+    from validation.frames.benchmark import Measurement
+
+#: A name, 'module:function', a function, or a method with its kernel and parameters.
+MethodLike: TypeAlias = "str | Callable[..., Any] | Configuration"
+
+
+@one_error
+def integrate(
+    cases: "Mapping[str, Any] | Cases | str | os.PathLike[str]",
+    kernel: str | Callable[..., Any] = "exact",
+    *,
+    precision: Literal["single", "double"] = "single",
+    certify: bool = False,
+) -> "Integrals":
+    """Evaluate the airlight integral J of some cases by a kernel.
+
+    Parameters
+    ----------
+    cases
+        Columns by name, of any shapes that broadcast together: `phase` ('isotropic', 'rayleigh', 'hg' ..), `g` for
+        'hg', `x0`, `x1` [m] (may be infinite), `sigma_t` [1/m], and either `foot` and `height` [m] or `origin`,
+        `direction` and `light`, (..., 3); a data frame with such columns; or the path of a CSV file, see
+        `analytic.cases`.
+    kernel
+        A name (`airlight.KERNELS`), such a name with '-N', 'module:function', or such a function itself.
+    precision
+        Of all that the kernel computes.
+    certify
+        Also integrate by adaptive quadrature in float64, to 1e-10, and compare with that where no `value` is given.
+
+    Returns
+    -------
+    Integrals
+        `J` [1/m], float64, of the shape of the columns.
+
+    Raises
+    ------
+    InputError
+        For a column that is missing, a number out of its range, an unknown kernel or phase function.
+
+    Examples
+    --------
+    >>> import airlight, numpy as np
+    >>> rays = {"phase": "isotropic", "foot": np.linspace(-2, 2, 5), "height": 0.3, "x0": 0, "x1": np.inf}
+    >>> found = airlight.integrate(rays | {"sigma_t": 0.2}, "exact", certify=True)
+    >>> found.J.shape
+    (5,)
+    >>> bool(abs(found.error).max() < 1e-5)
+    True
+    """
+    from analytic.cases import integrate_cases as certified
+    from reports.api.tables import Integrals
+    from reports.machine.environment import activate
+    from validation.kernels.cases import integrate_cases, summary
+
+    activate()
+    read, shape = _cases(cases)
+    named = kernel_name(kernel) or "exact"
+    J = integrate_cases(read, named, precision)
+    if certify and read.value is None:
+        read = replace(read, value=certified(read)[0])
+    return Integrals(
+        J=_sealed(J, shape),
+        value=None if read.value is None else _sealed(read.value, shape),
+        kernel=named,
+        precision=precision,
+        cases=read,
+        summary=summary(read, J),
+    )
+
+
+def _cases(cases: Any) -> tuple["Cases", tuple[int, ...]]:
+    from analytic.case_columns import cases_from_columns
+    from analytic.cases import Cases, read_cases
+
+    if isinstance(cases, str | os.PathLike):
+        cases = read_cases(Path(cases))
+    if isinstance(cases, Cases):
+        return cases, (len(cases.x0),)
+    if not isinstance(cases, Mapping) and not hasattr(cases, "keys"):
+        raise InputError(f"cases: got {type(cases).__name__}, wanted columns by name or the path of a CSV file")
+    return cases_from_columns({str(name): cases[name] for name in cases})
+
+
+def _sealed(values: Any, shape: tuple[int, ...]) -> Any:
+    shaped = values.reshape(shape)
+    shaped.flags.writeable = False
+    return shaped
+
+
+@one_error
+def bench(
+    scenes: "SceneLike | Sequence[SceneLike]",
+    methods: "MethodLike | Sequence[MethodLike] | None" = None,
+    *,
+    size: Size | None = None,
+    seconds: float = 0.6,
+    flip: bool = False,
+    progress: Progress = None,
+) -> "BenchTable":
+    """Measure what methods cost in scenes and how wrong they are, against the quadrature truth.
+
+    Parameters
+    ----------
+    scenes
+        One or several, see `load_scene`.
+    methods
+        One or several: names, each of which stands for its standard configurations, one's own methods as for `render`,
+        and `airlight.configuration(method, kernel, parameters)`. All standard configurations by default.
+    size
+        Width and height [pixels], or 'WxH'; the scenes' own by default.
+    seconds
+        Time to spend on each timing, of which every configuration has five.
+    flip
+        Also compute HDR-FLIP of all light.
+    progress
+        Called with (share done, what); True shows a bar.
+
+    Raises
+    ------
+    InputError
+        For what is not known; what a method refuses in a scene stands in its row.
+
+    Examples
+    --------
+    >>> import airlight
+    >>> table = airlight.bench("open-fog", ["unshadowed"], size=(32, 24), seconds=0.01)
+    >>> [row["label"] for row in table]
+    ['unshadowed (taylor)', 'unshadowed (quadrature)', 'unshadowed (exact)']
+    >>> table.fastest(1e-3)["relative_rmse"] < 1e-3
+    True
+    """
+    from realtime.scene.read_scene import read_scene
+    from reports.api.tables import BenchTable
+    from reports.machine.environment import activate, describe_environment
+    from validation.estimates.quadrature import truth_image
+    from validation.frames.benchmark import configurations_for, measure
+
+    activate()
+    chosen = chosen_methods(methods)
+    loaded = [opened(one, size) for one in several(scenes)]
+    read = [read_scene(one.scene) for one in loaded]  # refuse what cannot be used before the work begins
+    rows = []
+    with telling(progress, "bench") as tell:
+        for number, (one, scene) in enumerate(zip(loaded, read)):
+            tell(number / len(loaded), f"{one.name}: the truth")
+            truth = truth_image(one.scene)
+            useful = configurations_for(scene.plan, chosen)
+            for place, each in enumerate(useful):
+                tell((number + place / len(useful)) / len(loaded), f"{one.name}: {each.label}")
+                measured = measure(scene, each, truth=truth, seconds=seconds, with_flip=flip)
+                rows.append({"scene": one.name, **_size(scene), **_numbers(measured)})
+        tell(1.0, "done")
+    return BenchTable(rows=tuple(rows), environment=describe_environment())
+
+
+def several(things: Any) -> list[Any]:
+    """Return one or several as a list."""
+    return list(things) if isinstance(things, list | tuple) else [things]
+
+
+def chosen_methods(methods: Any) -> "tuple[Configuration, ...]":
+    """Return what to measure, all standard configurations for None; see `bench`."""
+    from validation.configurations.methods import STANDARD, Configuration, chosen_configurations, configuration
+
+    if methods is None:
+        return STANDARD
+    found: list[Configuration] = []
+    for one in several(methods):
+        if isinstance(one, Configuration):
+            found.append(one)
+        else:
+            found += chosen_configurations([one]) if isinstance(one, str) else [configuration(one)]
+    return tuple(found)
+
+
+def _size(scene: Any) -> dict[str, int]:
+    return {"width": scene.camera.width, "height": scene.camera.height}
+
+
+def _numbers(measured: "Measurement") -> dict[str, Any]:
+    """Return a measurement as one row, see `BenchTable`."""
+    from validation.metrics.errors import plain
+
+    chosen, times, error = measured.configuration, measured.times, measured.error
+    row: dict[str, Any] = {"label": chosen.label, "method": chosen.method, "kernel": chosen.kernel}
+    row |= {"parameters": dict(chosen.parameters)}
+    row["frame_ms"] = times and times.frame.median_ms
+    row["frame_low_ms"] = times and times.frame.low_ms
+    row["frame_high_ms"] = times and times.frame.high_ms
+    for stage in ("airlight", "surface", "rebuild", "moved", "relit", "recoloured"):
+        row[f"{stage}_ms"] = times and getattr(times, stage).median_ms
+    for name in ("relative_rmse", "relative_bias", "p50", "p99", "max", "nonfinite", "negative"):
+        row[name] = error and plain(getattr(error, name))
+    row["flip"] = measured.flip and measured.flip.value
+    return row | {"refused": measured.refused, "note": measured.note}

@@ -1,0 +1,201 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Tables and reports as results of the Python API: frozen, plain numbers by name, tables in a notebook."""
+
+import math
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from analytic.cases import Cases
+from reports.api.results import as_array
+from reports.tables.terminal import number
+
+Array = NDArray[np.float64]
+
+_SHOWN = 12  #: rows of integrals that a notebook shows
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Integrals:
+    """The airlight integral of some cases by a kernel."""
+
+    J: Array  #: by the kernel [1/m], of the shape of the columns that were given
+    value: Array | None  #: certified, or as given by the file [1/m], of the same shape
+    kernel: str
+    precision: str  #: 'single' or 'double'
+    cases: Cases  #: the cases, one after the other
+    summary: Mapping[str, Any]  #: rows, and where there are values to compare with the quantiles of the relative error
+
+    @property
+    def error(self) -> Array | None:
+        """The signed relative error (J - value) / value; None where there is nothing to compare with."""
+        if self.value is None:
+            return None
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(self.value == self.J, 0.0, (self.J - self.value) / np.abs(self.value))
+
+    def numpy(self, dtype: DTypeLike | None = None) -> NDArray[Any]:
+        """Return J as an array of one's own, which can be written to."""
+        return np.array(self.J, dtype=dtype)
+
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
+        return as_array(self.J, dtype, copy)
+
+    def __len__(self) -> int:
+        return self.J.size
+
+    def to_dict(self) -> dict[str, list[Any]]:
+        """Return columns by name, a value for each case, as `pandas.DataFrame` takes them."""
+        cases = self.cases
+        names = {"phase": cases.phase, "g": cases.g, "foot": cases.foot, "height": cases.height}
+        names |= {"x0": cases.x0, "x1": cases.x1, "sigma_t": cases.sigma_t, "J": self.J.reshape(-1)}
+        names |= {} if self.value is None else {"value": self.value.reshape(-1)}
+        return {name: np.asarray(values).tolist() for name, values in names.items()}
+
+    def _repr_html_(self) -> str:
+        from reports.api.html import block, paragraph, table
+
+        columns = self.to_dict()
+        rows = [
+            [str(row), *(_cell(values[row]) for values in columns.values())] for row in range(min(_SHOWN, len(self)))
+        ]
+        left = len(self) - len(rows)
+        more = paragraph(f"and {left} more") if left else ""
+        return block(self._title(), table(rows, ["", *columns]), more)
+
+    def _title(self) -> str:
+        compared = self.summary.get("p50") is not None
+        errors = [f"{name} {self.summary[name]:.3g}" for name in ("p50", "p99", "max")] if compared else []
+        words = f"; relative error {', '.join(errors)}" if errors else ""
+        return f"{len(self)} integrals by {self.kernel} in {self.precision} precision{words}"
+
+    def __repr__(self) -> str:
+        return f"Integrals({self._title()})"
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class BenchTable:
+    """Speed against error: a row for each configuration in each scene.
+
+    A row has `scene`, `width`, `height`, `label`, `method`, `kernel`; medians `frame_ms` with its quartiles
+    `frame_low_ms` and `frame_high_ms`, `airlight_ms`, `surface_ms`, `rebuild_ms` (after the light moved), `moved_ms`
+    (after objects moved), `relit_ms` (after the light moved, camera rays kept), `recoloured_ms` (after only medium or
+    colours changed) [ms]; of the airlight `relative_rmse`, `relative_bias`, `p50`, `p99`, `max`, `nonfinite` and
+    `negative`; `refused`, why the method cannot render the scene, and `note`. What there is none of is None.
+    """
+
+    rows: tuple[Mapping[str, Any], ...]
+    environment: Mapping[str, Any]  #: the machine and the versions
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __iter__(self) -> Iterator[Mapping[str, Any]]:
+        return iter(self.rows)
+
+    def __getitem__(self, index: int) -> Mapping[str, Any]:
+        return self.rows[index]
+
+    def to_dict(self) -> dict[str, list[Any]]:
+        """Return columns by name, as `pandas.DataFrame` takes them."""
+        names = list(dict.fromkeys(name for row in self.rows for name in row))
+        return {name: [row.get(name) for row in self.rows] for name in names}
+
+    def fastest(self, error: float, scene: str | None = None) -> Mapping[str, Any] | None:
+        """Return the row of the fastest frame whose relative RMSE is at most `error`; None where there is none.
+
+        Parameters
+        ----------
+        error
+            Relative RMSE of the airlight, such as 0.01.
+        scene
+            Its name; all scenes by default.
+        """
+        # Pixels that are not finite are left out of the RMSE: a method that has any must not win by it.
+        good = [
+            row
+            for row in self.rows
+            if scene in (None, row["scene"])
+            and row["relative_rmse"] is not None
+            and row["relative_rmse"] <= error
+            and not row["nonfinite"]
+        ]
+        return min(good, key=lambda row: row["frame_ms"], default=None)
+
+    def _repr_html_(self) -> str:
+        from reports.api.html import block, paragraph, table
+
+        headers = ("method", "frame ms", "frames/s", "airlight ms", "rebuilt ms", "rel. RMSE", "rel. bias", "p99")
+        parts = []
+        for scene in dict.fromkeys((row["scene"], row["width"], row["height"]) for row in self.rows):
+            found = [row for row in self.rows if (row["scene"], row["width"], row["height"]) == scene]
+            parts += [paragraph("{}, {} x {}".format(*scene)), table([_bench_row(row) for row in found], headers)]
+        return block(self._title(), *parts)
+
+    def _title(self) -> str:
+        machine = self.environment
+        return f"{machine['processor']}, {machine['threads']} threads, {machine['variant']}"
+
+    def __repr__(self) -> str:
+        scenes = ", ".join(dict.fromkeys(row["scene"] for row in self.rows))
+        return f"BenchTable({len(self.rows)} rows: {scenes})"
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Report:
+    """An error report that was written."""
+
+    folder: Path
+    data: Mapping[str, Any]  #: the content of report.json
+
+    @property
+    def page(self) -> Path:
+        """The HTML page."""
+        return self.folder / "report.html"
+
+    @property
+    def claims(self) -> tuple[str, ...]:
+        """The sentences at the top of the page."""
+        return tuple(claim["text"] for claim in self.data["claims"])
+
+    @property
+    def confirmed(self) -> bool:
+        """Whether no check speaks against the truth, and at least one confirms each layer."""
+        from reports.data.claims import confirmed
+
+        return confirmed(self.data["scenes"])
+
+    def _repr_html_(self) -> str:
+        from reports.api.html import block, bullets, link
+
+        scenes = ", ".join(scene["name"] for scene in self.data["scenes"])
+        title = f"Report on {scenes}, {self.data['created']}"
+        return block(title, bullets(self.claims), f"<p>{link(_address(self.page), str(self.page))}</p>")
+
+    def __repr__(self) -> str:
+        return f"Report({str(self.folder)!r}, {len(self.data['scenes'])} scenes)"
+
+
+def _address(page: Path) -> str:
+    """Return the address of a page for a notebook in the current folder, which shows no files outside of it."""
+    try:
+        return page.resolve().relative_to(Path(os.getcwd()).resolve()).as_posix()
+    except ValueError:
+        return page.resolve().as_uri()
+
+
+def _cell(value: Any) -> str:
+    return f"{value:.9g}" if isinstance(value, float) else str(value)
+
+
+def _bench_row(row: Mapping[str, Any]) -> list[str]:
+    if row["refused"]:
+        return [row["label"], f"refused: {row['refused']}", *[""] * 6]
+    rate = 1000 / row["frame_ms"] if row["frame_ms"] else math.inf
+    times = [number(row["frame_ms"]), number(rate), number(row["airlight_ms"]), number(row["rebuild_ms"])]
+    return [row["label"], *times, *(number(row[name], 2) for name in ("relative_rmse", "relative_bias", "p99"))]

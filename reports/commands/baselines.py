@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`airlight baselines [SCENE...]`: is every method as accurate as it was?"""
+
+from typing import Annotated
+
+import typer
+
+
+def baselines(
+    scenes: Annotated[
+        list[str] | None, typer.Argument(help="Built-in scenes; all by default.", show_default=False)
+    ] = None,
+    update: Annotated[bool, typer.Option("--update", help="Write what moved into the baselines.")] = False,
+    because: Annotated[
+        str | None, typer.Option(help="Why numbers moved; CHANGELOG.md must say the same.", show_default=False)
+    ] = None,
+    times: Annotated[bool, typer.Option("--times/--no-times", help="Also time frames beside unshadowed.")] = True,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Compare the errors of every configuration with the baselines in the repository; small images of every scene.
+
+    Errors may move by rounding, both ways; a frame may take three times as many frames of `unshadowed` as before. What
+    has no baseline, and a baseline without its configuration, fails too. Exit status 1 if anything moved. With --update
+    what moved is written, with a new revision, which CHANGELOG.md must name.
+    """
+    from analytic.errors import InputError
+    from reports.machine.environment import activate
+    from reports.machine.progress import part_of, progress_bar
+    from reports.tables.baselines import print_moves, print_updates
+    from reports.tables.terminal import print_json
+    from validation.frames.baseline_files import (
+        FOLDER,
+        compare_baseline,
+        read_baseline,
+        stray_baselines,
+        updated,
+        write_baseline,
+    )
+    from validation.frames.baseline_runs import measure_baseline
+    from validation.scenes.loading import nearest
+    from validation.scenes.registry import SCENES
+
+    names = list(dict.fromkeys(scenes or SCENES))
+    for name in names:
+        if name not in SCENES:
+            raise InputError(
+                f"baselines: got {name!r}, wanted built-in scenes: {', '.join(SCENES)}{nearest(name, SCENES)}"
+            )
+    if because is not None and not update:
+        raise InputError("baselines: --because is for --update; give both, or neither")
+    kept = {name: read_baseline(name) for name in names}
+    activate()
+    found = {}
+    with progress_bar("baselines") as tell:
+        for number, name in enumerate(names):
+            told = part_of(tell, number / len(names), (number + 1) / len(names))
+            found[name] = measure_baseline(name, kept=kept[name], times=times, progress=told)
+    moves = {name: compare_baseline(kept[name], found[name]) for name in names}
+    stray = [] if scenes else stray_baselines(SCENES)
+    if update:
+        # All reasons are asked for before the first file is written.
+        written = [one for one in (updated(kept[name], found[name], because) for name in names) if one is not None]
+        for one in written:
+            write_baseline(one)
+    if json:
+        from reports.data.serialize import plain
+
+        print_json({"scenes": found, "moves": plain(moves), "stray": stray, "updated": update})
+    else:
+        print_moves(found, moves, stray)
+        if update:
+            print_updates(written, FOLDER)
+    if stray or (not update and any(moves.values())):
+        raise typer.Exit(1)

@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`airlight describe SCENE`: everything to set in another renderer."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def describe(
+    scene: Annotated[str, typer.Argument(help="A built-in scene or a Mitsuba XML file.", show_default=False)],
+    size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels; the scene's own by default.")] = None,
+    gltf: Annotated[
+        Path | None, typer.Option(help="Write the scene as binary glTF 2.0, a .glb file.", show_default=False)
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Say all that another renderer must be told to render a scene, so that its image can be judged.
+
+    Camera, media, lights, surfaces, what the pixels hold and what file to write. The glTF file has the same camera,
+    lights and meshes; media are in its extras.
+    """
+    from analytic.errors import InputError
+    from reference.storage.files import ensure_writable
+    from reports.interchange.gltf import write_gltf
+    from reports.interchange.scene import describe_scene
+    from reports.machine.environment import activate
+    from reports.tables.scene import description_text
+    from reports.tables.terminal import print_json
+    from validation.scenes.loading import load_scene, parse_size
+
+    if gltf is not None:
+        if gltf.suffix.lower() != ".glb":
+            raise InputError(f"--gltf: got {gltf}, wanted a name that ends in .glb, for example {gltf.stem}.glb")
+        ensure_writable(gltf)
+    pixels = parse_size(size) if size else None
+    activate()
+    loaded = load_scene(scene, pixels)
+    found = describe_scene(loaded)
+    written = None if gltf is None else write_gltf(gltf, loaded)
+    if json:
+        print_json(found | ({} if written is None else {"gltf": written}))
+        return
+    print(description_text(found))
+    if written is not None:
+        cut = ", ".join(written["tessellated"])
+        print(f"{written['path']}: {written['triangles']} triangles" + (f"; cut into triangles: {cut}" if cut else ""))

@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`airlight diff OLD NEW`: what got slower or less accurate between two reports."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def diff(
+    old: Annotated[Path, typer.Argument(help="report.json, or its folder, to compare with.", show_default=False)],
+    new: Annotated[Path, typer.Argument(help="report.json, or its folder, to judge.", show_default=False)],
+    error_tolerance: Annotated[
+        float, typer.Option(help="Relative change of an error that is noise; that of a maximum is twice as wide.")
+    ] = 0.02,
+    time_tolerance: Annotated[
+        float, typer.Option(help="Relative change of a time that is noise, on a quiet machine.")
+    ] = 0.25,
+    times: Annotated[bool, typer.Option("--times/--no-times", help="Compare times too.")] = True,
+    common: Annotated[
+        bool, typer.Option("--common", help="What only the old report holds is no loss: compare what both hold.")
+    ] = False,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Compare two reports: what got slower or less accurate beyond the noise, what got better, what is new or gone.
+
+    Errors hardly have noise: a relative band and a floor at float32 rounding. Times have: the quartiles of both reports
+    say how busy the machine was, and what the stages of a frame share must agree; between two machines only times
+    beside the median of all are compared. Exit status 1 if anything is worse, or gone, or newly refused or not finite,
+    or the truth is no longer confirmed; so a run after each change guards a project.
+    """
+    from reports.diff.compare import compare_reports, read_report
+    from reports.diff.table import print_difference
+    from reports.tables.terminal import print_json
+
+    found = compare_reports(
+        read_report(old),
+        read_report(new),
+        error_tolerance=error_tolerance,
+        time_tolerance=time_tolerance if times else None,
+        common=common,
+    )
+    if json:
+        print_json(found.to_json())
+    else:
+        print_difference(found)
+    if found.worse:
+        raise typer.Exit(1)

@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`airlight figures`: figures and tables for papers."""
+
+import importlib
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from types import ModuleType
+
+#: Figure -> module and what its `compute` takes: 'quick', 'report' (without which it cannot be), 'published' (a report
+#: if there is one). A figure's name is its module's `NAME`; its summary is there too.
+FIGURES: dict[str, tuple[str, tuple[str, ...]]] = {
+    "polynomials": ("polynomials", ("rays",)),
+    "kernel-errors": ("kernel_errors", ("quick", "progress")),
+    "kernel-speed": ("kernel_speed", ("quick", "progress")),
+    "convergence": ("convergence", ("quick", "progress")),
+    "z-distribution": ("z_distribution", ("quick", "progress")),
+    "map-size": ("map_size", ("quick", "progress")),
+    "stages": ("stages", ("quick", "progress", "published")),
+    "published": ("published", ("quick", "progress", "published")),
+    "frame-speed": ("frame_speed", ("report",)),
+    "strip": ("strip", ("report", "scene", "methods")),
+    "methods-table": ("methods_table", ("report",)),
+}
+
+
+def figures(
+    names: Annotated[
+        list[str] | None, typer.Argument(help=f"Figures: {', '.join(FIGURES)}; all by default.", show_default=False)
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="Folder of the figures; airlight-figures by default.", show_default=False),
+    ] = None,
+    report: Annotated[
+        Path | None,
+        typer.Option(help="Folder of a report; airlight-report by default, if it is there.", show_default=False),
+    ] = None,
+    source: Annotated[
+        Path | None,
+        typer.Option("--from", help="Draw again from the data in this folder; nothing is measured."),
+    ] = None,
+    column: Annotated[str, typer.Option(help="Width: single (3.5 inches) or double (7.16 inches).")] = "double",
+    style: Annotated[
+        list[str] | None, typer.Option(help="A style sheet of matplotlib on top of ours, by name or path; repeatable.")
+    ] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer rays, smaller images, shorter timings.")] = False,
+    rays: Annotated[int, typer.Option(min=64, max=1_000_000, help="polynomials: rays to count.")] = 100_000,
+    scene: Annotated[
+        str | None, typer.Option(help="strip: the scene of the report; the first with shadows by default.")
+    ] = None,
+    methods: Annotated[
+        str | None, typer.Option(help="strip: labels of the report, separated by ';'; the best of each by default.")
+    ] = None,
+) -> None:
+    """Write figures as PDF and PNG and tables as LaTeX, with the data of each as CSV beside it.
+
+    Computing writes the data, drawing only reads them: the same data give the same bytes. Figures of whole frames and
+    images are made from a report (`airlight report`); the others are measured here.
+    """
+    from analytic.errors import InputError
+    from reference.storage.files import ensure_folder
+    from reports.machine.progress import part_of, progress_bar
+    from reports.plotting.style import WIDTHS
+    from validation.scenes.loading import nearest
+
+    for name in names or ():
+        if name not in FIGURES:
+            raise InputError(f"figure: got {name!r}, wanted one of {', '.join(FIGURES)}" + nearest(name, FIGURES))
+    if column not in WIDTHS:
+        raise InputError(f"--column: got {column!r}, wanted one of {', '.join(WIDTHS)}" + nearest(column, WIDTHS))
+    drawing: dict[str, Any] = {"column": column, "extra": tuple(style or ())}
+    if source is not None:
+        _redraw(names, source, ensure_folder(output or source), drawing)
+        return
+    found = _report_folder(report)
+    given = {"quick": quick, "rays": rays, "report": found, "scene": scene, "methods": methods}
+    chosen = _chosen(names, found)
+    if (scene or methods) and "strip" not in chosen:
+        raise InputError(
+            "--scene and --methods choose images of the figure strip, which is not asked for: leave them out"
+        )
+    folder = ensure_folder(output or "airlight-figures")
+    with progress_bar("figures") as tell:
+        for number, name in enumerate(chosen):
+            tell(number / len(chosen), name)
+            told = part_of(tell, number / len(chosen), (number + 1) / len(chosen), before=f"{name}: ")
+            _compute(name, folder, given | {"progress": told})
+            _module(name).plot(folder, **drawing)
+            _print_files(name, folder)
+
+
+def _module(name: str) -> "ModuleType":
+    return importlib.import_module(f"reports.figures.{FIGURES[name][0]}")
+
+
+def _report_folder(report: Path | None) -> Path | None:
+    """Return the folder of the report that was asked for, or of the usual one if it is there."""
+    from reports.figures.report import FOLDER, read_report
+
+    if report is not None:
+        read_report(report)
+        return report
+    return FOLDER if (FOLDER / "report.json").is_file() else None
+
+
+def _chosen(names: list[str] | None, report: Path | None) -> list[str]:
+    """Return the figures to make: those named, else all but those that need a report that is not there."""
+    from analytic.errors import InputError
+    from reports.figures.report import FOLDER, read_report
+
+    need = [] if report else [name for name in names or FIGURES if "report" in FIGURES[name][1]]
+    reason = f"made from a report: write one with `airlight report -o {FOLDER}`, or name its folder by --report"
+    if names:
+        if need:
+            raise InputError(f"{', '.join(need)}: {reason}")
+        return names
+    if need:
+        print(f"Left out: {', '.join(need)}: {reason}.")
+    if report is None or not read_report(report).get("published"):
+        need.append("published")
+        print(
+            "Left out: published: no report holds the tables of the papers; named, they are measured in some minutes."
+        )
+    return [name for name in FIGURES if name not in need]
+
+
+def _compute(name: str, folder: Path, given: dict[str, Any]) -> None:
+    """Write the data of a figure; only what measures starts Mitsuba."""
+    takes = FIGURES[name][1]
+    settings = {key: given[key] for key in takes if key != "published"}
+    if "published" in takes:
+        settings["report"] = given["report"]
+    if "report" not in takes:
+        from reports.machine.environment import activate
+
+        activate()
+    _module(name).compute(folder, **settings)
+
+
+def _redraw(names: list[str] | None, source: Path, target: Path, drawing: dict[str, Any]) -> None:
+    """Draw figures from their data: those named, or all that have data there."""
+    from analytic.errors import InputError
+
+    chosen = names or [name for name in FIGURES if (source / f"{name}.csv").is_file()]
+    if not chosen:
+        raise InputError(f"--from: {source} holds no data of a figure; write some with `airlight figures -o {source}`")
+    for name in chosen:
+        _module(name).plot(source, output=target, **drawing)
+        _print_files(name, target)
+
+
+def _print_files(name: str, folder: Path) -> None:
+    made = [suffix for suffix in (".pdf", ".png", ".tex", ".csv") if (folder / f"{name}{suffix}").is_file()]
+    print(f"{folder / name}{', '.join(made)}: {_module(name).SUMMARY}", flush=True)

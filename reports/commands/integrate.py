@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`airlight integrate CASES.csv`: the airlight integral of each row of a file by a kernel."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def integrate(
+    cases: Annotated[
+        Path, typer.Argument(help="CSV with the columns of tests/data; x1 may be inf.", show_default=False)
+    ],
+    kernel: Annotated[str, typer.Option(help="Airlight kernel, see `airlight kernels`.")] = "exact",
+    precision: Annotated[str, typer.Option(help="single or double.")] = "single",
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Write the rows with a column `result`.")
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print a summary as JSON.")] = False,
+) -> None:
+    """Evaluate J for each row of a CSV file; rows that have a value are compared with it."""
+    from analytic.cases import read_cases
+    from reference.storage.files import ensure_writable
+    from reports.machine.environment import activate
+    from reports.tables.terminal import print_json
+    from validation.kernels.cases import integrate_cases, summary, write_results
+
+    read = read_cases(cases)
+    if output is not None:
+        ensure_writable(output)
+    activate()
+    results = integrate_cases(read, kernel, precision)
+    if output is not None:
+        write_results(read, results, output)
+    found = summary(read, results)
+    if json:
+        print_json(found)
+        return
+    print(f"{found['rows']} rows with {kernel} in {precision} precision")
+    if found["compared"]:
+        errors = ", ".join(f"{name} {found[name]:.3g}" for name in ("p50", "p99", "max"))
+        print(f"relative error against `value`, {found['compared']} rows: {errors}; worst in row {found['worst_row']}")
+    if output is None and not found["compared"]:
+        print("\n".join(f"{value:.9g}" for value in results))

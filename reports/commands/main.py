@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The command line.
+
+Each sub-command is a function in a module `reports/commands/*.py` that imports nothing heavy at the top: Mitsuba,
+Dr.Jit, NumPy, SciPy and matplotlib are imported inside the function, after the arguments were read. So `--help`
+answers at once, and a mistake in the arguments costs no start-up. To add a command, write such a module and add the
+function to `_COMMANDS`.
+"""
+
+import errno
+import os
+import sys
+from collections.abc import Sequence
+from typing import Annotated
+
+import typer
+
+from reports import __version__
+from reports.commands.baselines import baselines
+from reports.commands.bench import bench
+from reports.commands.certify import certify
+from reports.commands.compare import compare
+from reports.commands.describe import describe
+from reports.commands.diff import diff
+from reports.commands.docs import docs
+from reports.commands.doctor import doctor
+from reports.commands.figures import figures
+from reports.commands.integrate import integrate
+from reports.commands.lists import kernels, methods, scenes
+from reports.commands.maps import maps
+from reports.commands.merge import merge
+from reports.commands.mutations import mutations
+from reports.commands.published import published
+from reports.commands.reference import reference
+from reports.commands.render import render
+from reports.commands.report import report
+from reports.commands.stability import stability
+from reports.commands.test import run_tests
+from reports.machine.environment import VARIANT_VARIABLE, MissingError, check_variant, install_line, missing_packages
+from reports.machine.progress import Interrupted
+
+DONE, FAILED, WRONG_INPUT, MISSING, INTERRUPTED = 0, 1, 2, 3, 130
+
+# In the order of --help.
+_COMMANDS = (
+    report,
+    doctor,
+    scenes,
+    methods,
+    kernels,
+    describe,
+    render,
+    reference,
+    merge,
+    compare,
+    diff,
+    baselines,
+    integrate,
+    bench,
+    maps,
+    published,
+    stability,
+    mutations,
+    certify,
+    figures,
+    docs,
+)
+
+app = typer.Typer(
+    name="airlight",
+    help="How fast, how accurate and how stable is a real-time method for volumetric light, against a ground truth "
+    "that can be trusted?",
+    epilog="Exit status: 0 done, 1 a check failed, 2 wrong usage or input, 3 something is missing on this machine.",
+    add_completion=False,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 120},
+)
+for _command in _COMMANDS:
+    app.command()(_command)
+# What it does not know goes on to pytest.
+app.command("test", context_settings={"allow_extra_args": True, "ignore_unknown_options": True})(run_tests)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        print(f"airlight {__version__}")
+        raise typer.Exit()
+
+
+@app.callback()
+def _global_options(
+    variant: Annotated[
+        str | None,
+        typer.Option(help="Mitsuba variant: cuda_ad_rgb or llvm_ad_rgb; the first that works by default."),
+    ] = None,
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    if variant is not None:
+        check_variant(variant)
+        os.environ[VARIANT_VARIABLE] = (
+            variant  # for `reports.machine.environment.activate`, here and in child processes
+        )
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Run the command line and return the exit status.
+
+    The user's mistakes, missing libraries and unusable files give one line on the error stream; any other exception
+    is a fault of the program and keeps its traceback.
+    """
+    command = typer.main.get_command(app)
+    try:
+        status = command.main(list(arguments), prog_name="airlight", standalone_mode=False)
+        sys.stdout.flush()
+    except BrokenPipeError:  # the reader of the pipe has left
+        return _drop_output(FAILED)
+    except KeyboardInterrupt:
+        status = INTERRUPTED
+    except Interrupted as stop:
+        print(f"interrupted: {stop}", file=sys.stderr)
+        return INTERRUPTED
+    except MissingError as error:
+        return _fail(str(error), MISSING)
+    except OSError as error:
+        if error.filename is None and error.errno not in (errno.ENOSPC, errno.EDQUOT):
+            raise
+        _drop_output(WRONG_INPUT)
+        return _fail(f"{error.filename or 'output'}: {error.strerror}", WRONG_INPUT)
+    except (ImportError, NameError):  # a NameError is what `import drjit` raises where libatomic is missing
+        packages = missing_packages()
+        if not packages:
+            raise
+        return _fail(f"system libraries are missing, install them with `{install_line(packages)}`", MISSING)
+    except _input_errors() as error:
+        return _fail(str(error), WRONG_INPUT)
+    except Exception as error:  # what Typer raises for wrong usage has its class in one of Typer's private modules
+        if not hasattr(error, "format_message"):
+            raise
+        return _usage(error)
+    if status == INTERRUPTED:
+        print("interrupted", file=sys.stderr)
+    return status if isinstance(status, int) else DONE
+
+
+def _input_errors() -> tuple[type[Exception], ...]:
+    """Return both classes for the user's mistakes, as far as they were imported: `analytic` imports NumPy."""
+    modules = (sys.modules.get(name) for name in ("analytic.errors", "realtime.errors"))
+    return tuple(module.InputError for module in modules if module is not None)
+
+
+def _fail(message: str, status: int) -> int:
+    print(f"airlight: error: {' '.join(message.split())}", file=sys.stderr)
+    return status
+
+
+def _usage(error) -> int:
+    """Report wrong usage: Typer's message, which names the nearest command, and where help is."""
+    message = error.format_message().rstrip(".")
+    if not message:  # no sub-command: its help was printed
+        return WRONG_INPUT
+    context = getattr(error, "ctx", None)
+    path = context.command_path if context is not None else "airlight"
+    return _fail(f"{message} (see `{path} --help`)", WRONG_INPUT)
+
+
+def _drop_output(status: int) -> int:
+    """Let nothing more be written on the output, so that what cannot be written is not tried again at exit."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return status

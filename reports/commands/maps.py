@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`airlight maps [SCENE...]`: error and flicker against the size of the shadow map."""
+
+from functools import partial
+from typing import Annotated, Any
+
+import typer
+
+
+def maps(
+    scenes: Annotated[list[str] | None, typer.Argument(help="Scenes; all built-in ones by default.")] = None,
+    method: Annotated[str, typer.Option(help="A method with a shadow map.")] = "light-volumes",
+    kernel: Annotated[str | None, typer.Option(help="Airlight kernel; exact by default.")] = None,
+    settings: Annotated[list[str] | None, typer.Option("--set", help="Parameter of the method, NAME=VALUE.")] = None,
+    sizes: Annotated[
+        str, typer.Option(help="Comma-separated sizes of the shadow map [texels].")
+    ] = "32,64,128,256,512,1024,2048,4096",
+    size: Annotated[str, typer.Option(help="WIDTHxHEIGHT of the image in pixels.")] = "160x120",
+    flicker: Annotated[
+        bool, typer.Option("--flicker", help="Also move the light and measure how it flickers.")
+    ] = False,
+    frames: Annotated[int, typer.Option(min=2, help="Frames of the moving light.")] = 9,
+    step: Annotated[float, typer.Option(help="By how much the light turns from frame to frame [rad].")] = 1e-3,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    markdown: Annotated[bool, typer.Option("--markdown", help="Print tables for a README, dated.")] = False,
+) -> None:
+    """Measure how the error of a method falls with the size of its shadow map, against the ray-traced truth.
+
+    With the slope of the relative RMSE, fitted to the logarithms. --flicker: a light that circles slowly, and the
+    change of the image from frame to frame less that of the truth.
+    """
+    from analytic.errors import InputError
+    from realtime.scene.read_scene import read_scene
+    from reports.machine.environment import activate, describe_environment
+    from reports.machine.progress import counted, part_of, progress_bar
+    from reports.tables.bench import print_heading
+    from reports.tables.map_size import map_data, parse_map_sizes, print_maps
+    from reports.tables.terminal import print_json
+    from validation.configurations.methods import configuration, parse_settings, prepared
+    from validation.frames.map_size import map_errors, map_flicker
+    from validation.scenes.loading import load_scene, parse_size
+    from validation.scenes.registry import SCENES
+
+    pixels = parse_size(size)
+    texels = parse_map_sizes("--sizes", sizes)
+    parameters = parse_settings(settings or [])
+    if "map" in parameters:
+        raise InputError(f"--set: got map={parameters['map']}, wanted it in --sizes: the map's size is what varies")
+    largest = configuration(method, kernel, parameters | {"map": texels[-1]})
+    activate()
+    loaded = [load_scene(name, pixels) for name in scenes or SCENES]
+    for one in loaded:  # refuse what cannot be used, or does not fit into the memory, before any work, not after
+        prepared(read_scene(one.scene), largest)
+    found = []
+    with progress_bar("maps") as tell:
+        for number, one in enumerate(loaded):
+            studies: list[Any] = [partial(map_errors, one.scene, method)]
+            if flicker:
+                moves: dict[str, Any] = {"frames": frames, "step": step, "about": one.animation.about}
+                studies.append(partial(map_flicker, one.scene, method, **moves))
+            results = []
+            for study in studies:
+                told = part_of(tell, number / len(loaded), (number + 1) / len(loaded), before=f"{one.name}, ")
+                results.append(study(kernel=kernel, parameters=parameters, sizes=texels, progress=counted(told)))
+            found.append((one.name, results[0], results[1] if flicker else None))
+    if json:
+        scenes_data = [{"name": name} | map_data(errors, moving) for name, errors, moving in found]
+        print_json({"environment": describe_environment(), "size": list(pixels), "scenes": scenes_data})
+        return
+    if markdown:
+        print_heading()
+    for name, errors, moving in found:
+        print_maps(name, pixels, errors, moving, markdown=markdown)

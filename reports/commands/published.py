@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`airlight published`: the tables and figures of papers, measured again beside what was printed."""
+
+from collections.abc import Callable, Sequence
+from typing import Annotated, Any
+
+import typer
+
+PAPERS = ("biri", "billeter")
+
+
+def published(
+    paper: Annotated[str | None, typer.Option(help="biri or billeter; both by default.")] = None,
+    scenes: Annotated[
+        str | None, typer.Option(help="Comma-separated scenes of the papers; all that are built in by default.")
+    ] = None,
+    kernels: Annotated[
+        str, typer.Option(help="Comma-separated airlight kernels; for billeter the first counts.")
+    ] = "exact,taylor",
+    scale: Annotated[float, typer.Option(help="Of width and height; 1 for the published sizes.")] = 1.0,
+    maps: Annotated[
+        str, typer.Option(help="billeter: comma-separated sizes of the shadow map in Table 1, ascending.")
+    ] = "1024,2048,4096",
+    limit: Annotated[
+        float, typer.Option(help="billeter: frames that take longer are left out, with the reason [s].")
+    ] = 30.0,
+    needless: Annotated[
+        bool, typer.Option(help="biri: also measure that casters which are not there or not seen cost nothing.")
+    ] = True,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    markdown: Annotated[bool, typer.Option("--markdown", help="Print tables for a README, dated.")] = False,
+) -> None:
+    """Measure the results of Biri, Arques, Michelin 2006 and of Billeter, Sintorn, Assarsson 2010 again.
+
+    biri: Tables 1 and 2 with `shadow-planes`: share of time by stage, frames a second. billeter: Figures 6 and 7 and
+    Table 1 with `light-volumes` and its peers: frames a second, static against adaptive tessellation, the passes, and
+    which of the paper's conclusions hold here. Each at the published sizes, after the light moved, everything rebuilt
+    or camera rays kept, beside the published figures, with the error of the airlight.
+    """
+    from analytic.errors import InputError
+    from reports.machine.environment import activate, describe_environment
+    from reports.machine.progress import progress_bar
+    from reports.tables.map_size import parse_map_sizes
+    from reports.tables.terminal import print_json
+    from validation.configurations.kernel_names import find_kernel
+
+    if paper is not None and paper not in PAPERS:
+        raise InputError(f"--paper: got {paper!r}, wanted one of {', '.join(PAPERS)}")
+    if not 0 < scale <= 4:
+        raise InputError(f"--scale: got {scale:g}, wanted more than 0, at most 4")
+    if not limit > 0:
+        raise InputError(f"--limit: got {limit:g}, wanted more than 0 [s]")
+    papers = PAPERS if paper is None else (paper,)
+    wanted = _wanted_scenes(scenes, papers)
+    names = [name.strip() for name in kernels.split(",")]
+    for name in names:
+        find_kernel(name)
+    sizes = parse_map_sizes("--maps", maps)
+    activate()
+    data: dict[str, Any] = {"environment": describe_environment()} if json else {}
+    with progress_bar("published") as tell:
+        measured = []
+        for one in papers:
+            if one == "biri":
+                found = _biri(wanted, names, scale=scale, needless=needless, tell=tell)
+            else:
+                found = _billeter(wanted, names[0], scale=scale, maps=sizes, limit=limit, tell=tell)
+            if found is not None:
+                measured.append(found)
+    for as_data, show in measured:
+        if json:
+            data |= as_data()
+        else:
+            show(markdown)
+    if json:
+        print_json(data)
+
+
+def _wanted_scenes(scenes: str | None, papers: Sequence[str]) -> list[str]:
+    from analytic.errors import InputError
+    from validation.papers.billeter_images import FIGURES
+    from validation.papers.billeter_tessellation import TABLE
+    from validation.papers.biri import PUBLISHED
+    from validation.scenes.registry import SCENES
+
+    of_paper = {
+        "biri": [one.scene for one in PUBLISHED if one.scene in SCENES],
+        "billeter": [one.scene for one in FIGURES] + [one.scene for one in TABLE],
+    }
+    known = list(dict.fromkeys(name for paper in papers for name in of_paper[paper]))
+    wanted = [name.strip() for name in scenes.split(",")] if scenes else known
+    for name in wanted:
+        if name not in known:
+            raise InputError(f"--scenes: got {name!r}, wanted some of {', '.join(known)}")
+    return wanted
+
+
+def _biri(wanted: Sequence[str], kernels: Sequence[str], *, scale: float, needless: bool, tell) -> tuple | None:
+    """Measure the tables of Biri 2006; return the functions that make data of them and print."""
+    from reports.papers.biri import print_biri, rows_data
+    from validation.frames.zero_cost import needless_costs
+    from validation.papers.biri import PUBLISHED, biri_rows
+
+    chosen = [one for one in PUBLISHED if one.scene in wanted]
+    if not chosen:
+        return None
+    rows = biri_rows(chosen, kernels, scale=scale, progress=tell)
+    if needless:
+        tell(0.99, "what is not needed")
+    costs = needless_costs(size=(round(800 * scale), round(600 * scale))) if needless else []
+    return lambda: rows_data(rows, costs), lambda markdown: print_biri(rows, costs, markdown=markdown)
+
+
+def _billeter(
+    wanted: Sequence[str], kernel: str, *, scale: float, maps: Sequence[int], limit: float, tell: Callable
+) -> tuple | None:
+    """Measure the figures and the table of Billeter 2010; return the functions that make data of both and print."""
+    from reports.papers.billeter import billeter_data, print_billeter
+    from validation.papers.billeter_images import FIGURES, SIZE, figure_rows
+    from validation.papers.billeter_tessellation import TABLE, table_rows
+
+    images = [one for one in FIGURES if one.scene in wanted]
+    views = [one for one in TABLE if one.scene in wanted]
+    if not images and not views:
+        return None
+    share = len(images) / (len(images) + 3 * len(maps) * len(views))
+    size = (max(1, round(scale * SIZE[0])), max(1, round(scale * SIZE[1])))
+
+    def first(done: float, what: str) -> None:
+        tell(share * done, what)
+
+    def second(done: float, what: str) -> None:
+        tell(share + (1 - share) * done, what)
+
+    figures = figure_rows(images, kernel=kernel, size=size, limit=limit, progress=first)
+    table = table_rows(views, maps=maps, kernel=kernel, size=size, limit=limit, progress=second)
+    return lambda: {"billeter": billeter_data(figures, table)}, lambda markdown: print_billeter(
+        figures, table, markdown=markdown
+    )

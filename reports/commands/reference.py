@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`airlight reference SCENE`: the ground truth of a scene, with its error."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from reports.machine.progress import Progress
+    from validation.estimates.budget import Budget
+    from validation.estimates.images import MonteCarloReference
+    from validation.scenes.loading import LoadedScene
+
+_USUAL_SPP = 2048
+
+
+class Estimator(StrEnum):
+    """The estimators of the truth."""
+
+    quadrature = "quadrature"
+    single_scatter = "single-scatter"
+    volpath = "volpath"
+
+
+class Pixel(StrEnum):
+    """What a pixel holds: the radiance at its centre, or the mean over its area."""
+
+    centre = "centre"
+    area = "area"
+
+
+class Target(StrEnum):
+    """The standard error that `--target-error` is about."""
+
+    pooled = "pooled"
+    worst = "worst"
+
+
+def reference(
+    scene: Annotated[str, typer.Argument(help="A built-in scene or a Mitsuba XML file.", show_default=False)],
+    output: Annotated[Path, typer.Option("--output", "-o", help="The EXR file to write.")] = Path("reference.exr"),
+    estimator: Annotated[Estimator, typer.Option(help="How to compute it.")] = Estimator.quadrature,
+    spp: Annotated[
+        int | None,
+        typer.Option(min=64, help=f"Monte Carlo: samples a pixel, {_USUAL_SPP} by default.", show_default=False),
+    ] = None,
+    target_error: Annotated[
+        float | None,
+        typer.Option(help="Monte Carlo: go on to this relative standard error, such as 0.001.", show_default=False),
+    ] = None,
+    time_budget: Annotated[
+        float | None, typer.Option(help="Monte Carlo: go on for so many seconds.", show_default=False)
+    ] = None,
+    target: Annotated[
+        Target, typer.Option(help="The error that --target-error is about: the image's, or its worst pixel's.")
+    ] = Target.pooled,
+    pixel: Annotated[Pixel, typer.Option(help="quadrature: the radiance at the centre, or the mean.")] = Pixel.centre,
+    seed: Annotated[int, typer.Option(min=0, help="Monte Carlo: seed of the first batch; the others count up.")] = 0,
+    size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels; the scene's own by default.")] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print a summary as JSON.")] = False,
+) -> None:
+    """Compute the ground truth of a scene and write it as layered EXR, with its error.
+
+    Finished batches are kept: a Monte Carlo run that was interrupted, or that asks for more, goes on from them.
+
+    Exit status 1 if the target error was not reached.
+    """
+    from reference.storage.exr import write_exr
+    from reference.storage.files import ensure_writable
+    from reports.interchange.frames import check_ending
+    from reports.machine.environment import activate, stamped
+    from reports.machine.progress import progress_bar
+    from validation.estimates.budget import Budget
+    from validation.estimates.images import quadrature_reference
+    from validation.scenes.loading import load_scene, parse_size
+
+    sampled = estimator is not Estimator.quadrature
+    _check_options(estimator, {"--spp": spp, "--target-error": target_error, "--time-budget": time_budget}, pixel)
+    usual = _USUAL_SPP if spp is None and target_error is None and time_budget is None else spp
+    budget = Budget(samples=usual, error=target_error, seconds=time_budget, target=target.value) if sampled else None
+    check_ending("--output", output, ".exr")
+    ensure_writable(output)
+    activate()
+    loaded = load_scene(scene, parse_size(size) if size else None)
+    found = None
+    with progress_bar(f"{loaded.name}: {estimator}") as tell:
+        if budget is None:
+            image = quadrature_reference(loaded, pixel=pixel.value, progress=tell)
+        else:
+            found = _sample(loaded, estimator, budget, seed=seed, tell=tell)
+            image = found.image
+    write_exr(output, stamped(image))
+    summary: dict[str, Any] = {"scene": loaded.name, "output": str(output), "estimator": str(estimator)}
+    summary |= {"means": {name: layer.mean(axis=(0, 1)).tolist() for name, layer in image.layers.items()}}
+    _print_summary(summary | (_sampling(found) if found else {"pixel": str(pixel)}), json=json)
+    if found is not None and found.reached is False:
+        raise typer.Exit(1)
+
+
+def _check_options(estimator: Estimator, budgets: dict[str, Any], pixel: Pixel) -> None:
+    """Refuse what the estimator has no use for."""
+    from analytic.errors import InputError
+
+    given = [name for name, value in budgets.items() if value is not None]
+    if estimator is Estimator.quadrature and given:
+        others = " or ".join(other for other in Estimator if other is not Estimator.quadrature)
+        raise InputError(f"{given[0]} is for an estimator that samples; add --estimator {others}, or leave it out")
+    if len(given) > 1:
+        raise InputError(f"{' and '.join(given)} exclude each other; give one of them")
+    if estimator is not Estimator.quadrature and pixel is Pixel.area:
+        raise InputError(f"{estimator} traces pixel centres; leave out --pixel area, or take --estimator quadrature")
+
+
+def _sample(
+    loaded: "LoadedScene", estimator: Estimator, budget: "Budget", *, seed: int, tell: "Progress"
+) -> "MonteCarloReference":
+    from reports.machine.progress import Interrupted
+    from validation.estimates.images import monte_carlo_reference
+
+    try:
+        return monte_carlo_reference(loaded, estimator.value, budget=budget, seed=seed, progress=tell)
+    except KeyboardInterrupt as stop:
+        if not stop.args:
+            raise
+        raise Interrupted(str(stop)) from None
+
+
+def _sampling(found: "MonteCarloReference") -> dict[str, Any]:
+    """Return what a run says of itself, by name."""
+    attributes = {name.removeprefix("airlight:"): value for name, value in found.image.attributes.items()}
+    return {
+        **{name: attributes[name] for name in ("spp", "batch_spp", "batches", "seeds")},
+        "cached": found.cached,
+        "damaged": found.damaged,
+        "masked": found.masked,
+        "pooled_error": found.errors.pooled,
+        "worst_error": found.errors.worst,
+        "reached": found.reached,
+    }
+
+
+def _print_summary(summary: dict[str, Any], *, json: bool) -> None:
+    from reports.data.serialize import plain
+    from reports.tables.terminal import print_json
+
+    if json:
+        print_json(plain(summary))
+        return
+    print(f"{summary['output']}: {summary['scene']} by {summary['estimator']}")
+    for name, mean in summary["means"].items():
+        print(f"  {name}: mean {', '.join(f'{value:.6g}' for value in mean)} W/(m^2 sr)")
+    if "batches" not in summary:
+        return
+    batches = summary["batches"]
+    print(f"  {summary['spp']} samples a pixel in {batches} batches, seeds {summary['seeds']}")
+    if summary["cached"]:
+        print(f"  {summary['cached']} of {batches} batches from the cache")
+    if summary["damaged"]:
+        files = "file" if summary["damaged"] == 1 else "files"
+        print(f"  {summary['damaged']} damaged {files} of the cache traced again")
+    left_out = f"; {summary['masked']} pixels beside a light left out" if summary["masked"] else ""
+    worst = f"{100 * summary['worst_error']:.3g} % of the worst pixel"
+    print(f"  standard error {100 * summary['pooled_error']:.3g} % of the image, {worst}{left_out}")
+    if batches < 32:
+        print(f"  a standard error from {batches} batches is known to {100 / (2 * (batches - 1)) ** 0.5:.0f} % only")
+    if summary["reached"] is False:
+        print("  the target error was not reached")

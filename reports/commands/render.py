@@ -1,0 +1,195 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`airlight render SCENE`: a frame or an animation by a real-time method, with what it costs."""
+
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+Scene = Annotated[str, typer.Argument(help="A built-in scene or a Mitsuba XML file.", show_default=False)]
+Size = Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels; the scene's own by default.")]
+
+
+def render(
+    scene: Scene,
+    method: Annotated[
+        str, typer.Option(help="Real-time method, see `airlight methods`, or MODULE:FUNCTION.")
+    ] = "ray-march",
+    kernel: Annotated[str | None, typer.Option(help="Airlight kernel, see `airlight kernels`.")] = None,
+    set_: Annotated[list[str] | None, typer.Option("--set", help="NAME=VALUE, a parameter of the method.")] = None,
+    size: Size = None,
+    precision: Annotated[str, typer.Option(help="single or double.")] = "single",
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Write layered EXR here.")] = None,
+    preview: Annotated[Path | None, typer.Option(help="Write a PNG picture here.")] = None,
+    frames: Annotated[
+        int | None, typer.Option(min=1, help="Render an animation of so many frames, as name-0001.exr and so on.")
+    ] = None,
+    animate: Annotated[
+        str | None,
+        typer.Option(
+            help="What moves: light, objects, medium, colour, or several with commas; the scene's by default."
+        ),
+    ] = None,
+    plan: Annotated[bool, typer.Option("--plan", help="Print what the scene needs of a method, and stop.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="Print times as JSON.")] = False,
+) -> None:
+    """Render a frame, or an animation, with a real-time method and print what it costs.
+
+    An animation is one turn: lights circle, objects turn, the medium's density swings, colours go round. Only what
+    moves is made anew. Ctrl-C keeps the frames that are finished.
+    """
+    from realtime.scene.read_scene import read_scene
+    from reports.machine.environment import activate
+    from validation.configurations.methods import configuration, parse_settings
+    from validation.scenes.loading import load_scene, parse_size
+
+    if ":" in method:
+        activate()  # one's own module may want arrays when it is imported
+    chosen = configuration(method, kernel, parse_settings(set_ or []))
+    outputs = {"exr": output, "png": preview}
+    _check_outputs(outputs, frames, animate)
+    variant = activate()
+    loaded = load_scene(scene, parse_size(size) if size else None)
+    read = read_scene(loaded.scene, precision)
+    if plan:
+        _print_plan(read, chosen, json=json)
+    elif frames is None:
+        _print_times(_render(loaded.name, read, chosen, outputs=outputs), variant, json=json)
+    else:
+        found = _render_frames(loaded, read, chosen, frames=frames, animate=animate, outputs=outputs)
+        _print_frames(found, variant, json=json)
+
+
+def _check_outputs(outputs: dict[str, Path | None], frames: int | None, animate: str | None) -> None:
+    """Refuse what could not be written, before any work."""
+    from analytic.errors import InputError
+    from reference.storage.files import ensure_writable
+    from reports.interchange.frames import check_ending, numbered
+
+    if outputs["exr"] is not None:
+        check_ending("--output", outputs["exr"], ".exr", instead="; --preview NAME.png writes a picture")
+    if outputs["png"] is not None:
+        check_ending("--preview", outputs["png"], ".png", instead="; --output NAME.exr writes the layers")
+    if animate is not None and frames is None:
+        raise InputError("--animate: got no number of frames; add --frames N")
+    if frames is not None and not any(outputs.values()):
+        raise InputError("--frames: got no place for the files; add --output NAME.exr or --preview NAME.png")
+    for path in outputs.values():
+        if path is not None:
+            ensure_writable(path if frames is None else numbered(path, 1, frames))
+
+
+def _print_plan(scene, chosen, *, json: bool) -> None:
+    from realtime.methods.registry import find_method
+    from realtime.methods.shadow_planes.method import prepare_shadow_planes
+    from realtime.methods.shadow_planes.plane_counts import caster_plan, describe_casters
+    from realtime.scene.features import describe
+    from reports.tables.terminal import print_json
+
+    words, notes = describe(scene.plan), list(scene.plan.notes)
+    if find_method(chosen.method).prepare is prepare_shadow_planes:
+        casters = caster_plan(scene)
+        words |= describe_casters(casters)
+        _warn(casters.warnings)
+    if json:
+        print_json({"plan": words, "notes": notes})
+    else:
+        print("\n".join([f"{name}: {value}" for name, value in words.items()] + notes))
+
+
+def _warn(warnings) -> None:
+    """Print what is odd about the casters on the error stream, once a command."""
+    for warning in warnings:
+        print(f"airlight: warning: {warning}", file=sys.stderr)
+
+
+def _prepared(scene, chosen):
+    """Return the frame renderer, the warnings of its casters printed."""
+    from realtime.methods.shadow_planes.method import PlanePreparation
+    from validation.configurations.methods import prepared
+
+    renderer = prepared(scene, chosen)
+    if isinstance(renderer.prepare, PlanePreparation):
+        _warn(renderer.prepare.casters.warnings)
+    return renderer
+
+
+def _render(name: str, scene, chosen, *, outputs: dict[str, Path | None]) -> dict[str, Any]:
+    import drjit as dr
+
+    from realtime.frame.renderer import render_frame
+    from reports.interchange.frames import write_frame
+    from validation.configurations.timing import time_frame
+
+    renderer = _prepared(scene, chosen)
+    write_frame(name, chosen, render_frame(renderer), outputs=outputs)
+    times = time_frame(renderer)
+    return {
+        "scene": name,
+        "method": chosen.label,
+        "size": [scene.camera.width, scene.camera.height],
+        "frame_ms": times.frame.median_ms,
+        "fps": 1000 / times.frame.median_ms,
+        "stages": [
+            {"name": "surface", "ms": times.surface.median_ms},
+            {"name": "airlight", "ms": times.airlight.median_ms},
+        ],
+        "rebuild_ms": times.rebuild.median_ms,
+        "moved_ms": times.moved.median_ms,
+        "relit_ms": times.relit.median_ms,
+        "recoloured_ms": times.recoloured.median_ms,
+        "threads": dr.thread_count(),
+    }
+
+
+def _render_frames(loaded, scene, chosen, *, frames: int, animate: str | None, outputs) -> dict[str, Any]:
+    from dataclasses import replace
+
+    from reports.interchange.frames import write_frames
+    from reports.machine.progress import progress_bar
+    from validation.scenes.animation import parse_moves
+
+    animation = loaded.animation
+    if animate is not None:
+        animation = replace(animation, moves=parse_moves(animate))
+    renderer = _prepared(scene, chosen)
+    with progress_bar(f"{loaded.name}: {frames} frames") as tell:
+        found = write_frames(loaded.name, renderer, chosen, animation, frames=frames, outputs=outputs, tell=tell)
+    size = [scene.camera.width, scene.camera.height]
+    return {"scene": loaded.name, "method": chosen.label, "size": size} | found
+
+
+def _print_times(times: dict[str, Any], variant: str, *, json: bool) -> None:
+    from reports.tables.bench import rate
+    from reports.tables.terminal import print_json
+
+    if json:
+        print_json(times | {"device": variant})
+        return
+    stages = ", ".join(f"{stage['name']} {stage['ms']:.3g} ms" for stage in times["stages"])
+    rebuild, moved, relit, look = (times[f"{name}_ms"] for name in ("rebuild", "moved", "relit", "recoloured"))
+    print(
+        f"{times['scene']}, {times['method']}: {times['frame_ms']:.3g} ms a frame ({rate(times['frame_ms'])} frames/s)"
+    )
+    print(f"  {stages}; {rebuild:.3g} ms after the light moved, {moved:.3g} ms after objects moved")
+    print(
+        f"  camera rays kept: {relit:.3g} ms after the light moved, {look:.3g} ms after only medium or colours changed"
+    )
+    print(f"  {variant}, {times['threads']} threads")
+
+
+def _print_frames(found: dict[str, Any], variant: str, *, json: bool) -> None:
+    from reports.tables.bench import rate
+    from reports.tables.terminal import print_json
+
+    if json:
+        print_json(found | {"device": variant})
+        return
+    move, rendered = found["move_ms"], found["render_ms"]
+    print(f"{found['scene']}, {found['method']}: {found['frames']} frames, {' and '.join(found['moves'])} moving")
+    print(f"  {found['files'][0]} to {found['files'][-1]}")
+    print(
+        f"  {found['frame_ms']:.3g} ms a frame ({rate(found['frame_ms'])} frames/s): {move:.3g} ms to move, "
+        f"{rendered:.3g} ms to render, keeping what stood still; {variant}"
+    )

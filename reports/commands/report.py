@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`airlight report`: the error report."""
+
+import shlex
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+
+def report(
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Three scenes, small images: less than three minutes.")
+    ] = False,
+    full: Annotated[bool, typer.Option("--full", help="Large images, many samples, all tables: an hour.")] = False,
+    scenes: Annotated[
+        str | None,
+        typer.Option(
+            help="Comma-separated built-in scenes and Mitsuba XML files; three with --quick, all with --full."
+        ),
+    ] = None,
+    methods: Annotated[str | None, typer.Option(help="Comma-separated methods; all by default.")] = None,
+    method: Annotated[
+        list[str] | None,
+        typer.Option(help="Your own method as module:function or file.py:function; may be given several times."),
+    ] = None,
+    images: Annotated[
+        Path | None,
+        typer.Option(help="Folder with your engine's images, SCENE.exr or SCENE.NAME.exr, judged against the truth."),
+    ] = None,
+    fresh: Annotated[bool, typer.Option("--fresh", help="Measure again what is kept from earlier runs.")] = False,
+    redraw: Annotated[
+        Path | None, typer.Option("--from", help="Draw the page of this report.json again, without measuring.")
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Folder of the report; airlight-report by default.")
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print report.json.")] = False,
+) -> None:
+    """Measure every method in every scene and write the report: one HTML page, report.json, EXR and PNG files.
+
+    What was measured before on this machine, with the same code and scenes, is taken from the cache. Exit status 1 if
+    single-scatter or volpath does not confirm the truth within the margin.
+    """
+    from analytic.errors import InputError
+    from reports.data.claims import confirmed
+    from reports.tables.terminal import print_json
+
+    if redraw is not None:
+        given = {
+            "--quick": quick,
+            "--full": full,
+            "--scenes": scenes,
+            "--methods": methods,
+            "--method": method,
+            "--images": images,
+            "--fresh": fresh,
+        }
+        for option, value in given.items():
+            if value:
+                raise InputError(f"report: got --from together with {option}; --from measures nothing, leave that out")
+        data, target = _redrawn(redraw, output)
+        done = "drawn again"
+    else:
+        if quick and full:
+            raise InputError("report: got both --quick and --full; give one of them, or neither for the default")
+        target = output or Path("airlight-report")
+        effort = "quick" if quick else "full" if full else "default"
+        data = _measured(target, effort, scenes=scenes, methods=methods, own=method or [], images=images, fresh=fresh)
+        done = _kept_words(data)
+    if json:
+        print_json(data)
+    else:
+        print("\n".join(f"- {claim['text']}" for claim in data["claims"]))
+        count = len(data["scenes"])
+        print(f"{target / 'report.html'}: {count} scene{'' if count == 1 else 's'}, {done}")
+    if not confirmed(data["scenes"]):
+        raise typer.Exit(1)
+
+
+def _redrawn(path: Path, output: Path | None) -> tuple[dict[str, Any], Path]:
+    """Draw the page of a report again."""
+    from reports.data.reader import load_report, redraw_report
+
+    data, folder = load_report(path)
+    target = output or folder
+    redraw_report(data, folder, target)
+    return data, target
+
+
+def _measured(
+    target: Path,
+    effort_name: str,
+    *,
+    scenes: str | None,
+    methods: str | None,
+    own: list[str],
+    images: Path | None,
+    fresh: bool,
+) -> dict[str, Any]:
+    """Measure and write a report; what cannot be used is refused before the work begins."""
+    from analytic.errors import InputError
+    from realtime.scene.read_scene import read_scene
+    from reference.storage.files import ensure_folder
+    from reports.machine.environment import activate
+    from reports.machine.progress import progress_bar
+    from reports.report.measure import write_report
+    from validation.comparison.engine_images import find_images
+    from validation.frames.scene_study import EFFORTS
+    from validation.scenes.loading import load_scene
+    from validation.scenes.registry import SCENES
+
+    asked = [name.strip() for name in scenes.split(",")] if scenes else []
+    names = asked or list(EFFORTS[effort_name].scenes)
+    shown = {}
+    if images is not None:
+        shown = find_images(images, {Path(name).stem: name for name in [*SCENES, *asked]})
+        if not asked:
+            names = list(shown)
+        wanted = {Path(one).stem for one in names}
+        if not wanted & set(shown):
+            raise InputError(
+                f"--images: {images} has no image of {', '.join(sorted(wanted))}, only of {', '.join(shown)}"
+            )
+        shown = {name: several for name, several in shown.items() if name in wanted}
+    chosen = _configurations(effort_name, methods, own)
+    ensure_folder(target)
+    activate()
+    for name in names:
+        read_scene(load_scene(name, (8, 6)).scene)
+    with progress_bar("report") as tell:
+        return write_report(
+            target,
+            scenes=names,
+            effort=EFFORTS[effort_name],
+            configurations=chosen,
+            images=shown,
+            command=shlex.join(["airlight", *sys.argv[1:]]),
+            fresh=fresh,
+            progress=tell,
+        )
+
+
+def _configurations(effort_name: str, methods: str | None, own: list[str]) -> list[Any]:
+    """Return what to measure: the methods that were named, or the usual ones, and the user's own."""
+    from realtime.methods.registry import METHODS
+    from validation.configurations.methods import QUICK, chosen_configurations, configuration
+
+    if effort_name == "quick" and not methods:
+        chosen = list(QUICK)
+    else:
+        chosen = list(chosen_configurations([name.strip() for name in (methods.split(",") if methods else METHODS)]))
+    return chosen + [configuration(name) for name in own]
+
+
+def _kept_words(data: dict[str, Any]) -> str:
+    """Say how long it took, and how much of it had been measured before."""
+    seconds, kept, computed = data["seconds"], data["kept"], data["computed"]
+    if not kept:
+        return f"{computed} results in {seconds:.0f} s"
+    when = data["measured"]
+    rest = f"{kept} of {kept + computed}" if computed else f"all {kept}"
+    return (
+        f"{seconds:.0f} s: {rest} results kept from earlier runs, measured from {when['first']} to {when['last']}; "
+        "--fresh measures again"
+    )

@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`airlight stability`: where kernels break."""
+
+from typing import Annotated
+
+import typer
+
+
+def stability(
+    kernels: Annotated[
+        str | None, typer.Option(help="Comma-separated: a kernel, 'name-N' or 'module:function'; all by default.")
+    ] = None,
+    rays: Annotated[int, typer.Option(min=64, max=1_000_000, help="Number of generated rays.")] = 100_000,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Try every kernel on certified values, on rays of every magnitude and against exact laws, and sums of many planes.
+
+    Errors come with the ray where they are largest, ready for `airlight integrate`. Exit status 1 if a kernel that
+    claims to be exact breaks its bar, or shadow planes theirs; the latter are left out where --kernels leaves out
+    'exact'.
+    """
+    from reports.machine.environment import activate, describe_environment
+    from reports.machine.progress import progress_bar
+    from reports.tables.stability import print_plane_stability, print_stability
+    from reports.tables.terminal import print_json
+    from validation.frames.plane_stability import broken, plane_stability
+    from validation.kernels.stability import Bar, certified_files
+    from validation.kernels.stability import stability as run
+
+    names = None if kernels is None else [name.strip() for name in kernels.split(",") if name.strip()]
+    activate()
+    with progress_bar("stability") as tell:
+        found = run(names, count=rays, progress=lambda done, total, what: tell(0.9 * done / total, what))
+        wanted = names is None or "exact" in names
+        planes = plane_stability(progress=lambda n, m, what: tell(0.9 + 0.1 * n / m, what)) if wanted else []
+    broken_planes = broken(planes)
+    certified = [path.name for path in certified_files()]
+    if json:
+        from reports.data.serialize import plain
+
+        data = {"environment": describe_environment(), "certified": certified, "bar": Bar(), "kernels": found}
+        data |= {"shadow_planes": planes, "broken_planes": broken_planes}
+        print_json(plain(data))
+    else:
+        print_stability(found, certified=bool(certified))
+        if planes:
+            print_plane_stability(planes, broken_planes)
+    if broken_planes or any(kernel.broken for kernel in found):
+        raise typer.Exit(1)

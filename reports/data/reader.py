@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""report.json read back, checked, and its page drawn again: without Mitsuba, and without measuring anything."""
+
+import json
+import shutil
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from analytic.errors import InputError
+from reports.data.json_files import read_json
+from reports.data.schema_check import first_fault
+
+SCHEMA_FILE = Path(__file__).parent / "schema" / "report-2.json"
+
+
+def load_report(path: Path | str) -> tuple[dict[str, Any], Path]:
+    """Read a report.
+
+    Parameters
+    ----------
+    path
+        Of report.json, or of the folder that holds it.
+
+    Returns
+    -------
+    tuple
+        Its content and the folder in which the files that it names lie.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it is no JSON, has another schema or does not keep to its own, or a file that it names
+        is missing.
+    """
+    file = Path(path)
+    file = file / "report.json" if file.is_dir() else file
+    data = read_json(file, "report.json of an airlight report")
+    schema = json.loads(SCHEMA_FILE.read_text(encoding="utf-8"))
+    wanted = schema["properties"]["schema"]["const"]
+    given = data.get("schema") if isinstance(data, dict) else None
+    if given != wanted:
+        got = f"the schema {given!r}" if given is not None else "no schema"
+        raise InputError(f"{file} has {got}, wanted {wanted!r}; make the report again with this version of airlight")
+    fault = first_fault(data, schema)
+    if fault:
+        raise InputError(f"{file} does not keep to {wanted}: {fault}; make the report again")
+    for name in named_files(data):
+        if Path(name).is_absolute() or ".." in Path(name).parts:
+            raise InputError(f"{file} names {name}, which is not in its folder; make the report again")
+        if not (file.parent / name).is_file():
+            raise InputError(f"{file} names {name}, which is not beside it; move a report with its whole folder")
+    return data, file.parent
+
+
+def redraw_report(data: Mapping[str, Any], folder: Path, target: Path) -> None:
+    """Draw the page of a report again, into its own folder or as a whole report into another.
+
+    Parameters
+    ----------
+    data, folder
+        From `load_report`.
+    target
+        Where to write.
+    """
+    from reference.storage.files import ensure_folder, write_text
+    from reports.page.render import render_page
+
+    ensure_folder(target)
+    page = render_page(dict(data), folder)
+    if not target.samefile(folder):
+        for name in named_files(data):
+            (target / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(folder / name, target / name)
+        shutil.copyfile(folder / "report.json", target / "report.json")
+    write_text(target / "report.html", page)
+
+
+def named_files(data: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the names of all files that a report consists of besides its page and its data."""
+    for scene in data["scenes"]:
+        yield from scene["files"].values()
+        for method in scene["methods"]:
+            yield from method["files"].values()

@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The data of a report: plain numbers and words, ready for JSON.
+
+docs/report-schema.md explains every key of the schema "airlight-report/2". Not-a-number is null.
+"""
+
+from dataclasses import asdict, is_dataclass
+from typing import Any
+
+from realtime.scene.features import describe
+from reference.quadrature.image import TruthImage
+from validation.comparison.engine_images import ImageMeasurement
+from validation.frames.benchmark import Measurement, knows_shadows
+from validation.frames.scene_study import SceneStudy
+from validation.metrics.errors import plain as plain_value
+
+SCHEMA = "airlight-report/2"
+
+
+def plain(value: Any) -> Any:
+    """Return dataclasses, NumPy numbers and containers as what JSON can hold."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return plain(asdict(value))
+    if isinstance(value, dict):
+        return {str(key): plain(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(one) for one in value]
+    return plain_value(value)
+
+
+def scene_facts(study: SceneStudy) -> dict[str, Any]:
+    """Return what a scene is, before anything is measured in it."""
+    loaded, effort, plan = study.loaded, study.effort, study.scene.plan
+    return {
+        "name": loaded.name,
+        "purpose": loaded.purpose,
+        "published": loaded.published,
+        "path": str(loaded.path) if loaded.path else None,
+        "size": list(effort.image),
+        "timed": list(effort.timed),
+        "plan": describe(plan),
+        "notes": list(plan.notes),
+    }
+
+
+def truth_data(truth: TruthImage) -> dict[str, Any]:
+    """Return how exact the quadrature truth is, without its images."""
+    import numpy as np
+
+    finite = np.isfinite(truth.airlight)
+    mean = float(truth.airlight[finite].mean()) if finite.any() else float("nan")
+    return plain(
+        {
+            "mean": mean,
+            "relative_bound": float(truth.airlight_bound[finite].mean()) / mean if mean > 0 else None,
+            "transitions": truth.transitions,
+            "missed": truth.missed,
+            "checked": truth.checked,
+            "disagreements": truth.disagreements,
+            "refined": truth.refined,
+            "left": truth.left,
+        }
+    )
+
+
+def measurement_data(measured: Measurement) -> dict[str, Any]:
+    """Return what one configuration costs and how wrong it is."""
+    return {
+        "label": measured.configuration.label,
+        "kind": "function" if measured.configuration.own else "built-in",
+        "layer": "airlight",
+        "method": measured.configuration.method,
+        "kernel": measured.configuration.kernel,
+        "parameters": dict(measured.configuration.parameters),
+        "knows_shadows": knows_shadows(measured.configuration),
+        "refused": measured.refused,
+        "left_out": measured.left_out,
+        "note": measured.note,
+        "times": plain(measured.times),
+        "error": plain(measured.error),
+        "surface_error": plain(measured.surface_error),
+        "flip": measured.flip.to_json() if measured.flip else None,
+        "files": {},
+    }
+
+
+def image_data(measured: ImageMeasurement) -> dict[str, Any]:
+    """Return how wrong an image from elsewhere is, with the keys of `measurement_data`."""
+    return {
+        "label": measured.shown.label,
+        "kind": "image",
+        "layer": measured.layer,
+        "method": "image",
+        "kernel": None,
+        "parameters": {},
+        "knows_shadows": True,
+        "refused": None,
+        "left_out": False,
+        "note": measured.note,
+        "times": None,
+        "error": plain(measured.error),
+        "surface_error": plain(measured.surface_error),
+        "flip": measured.flip.to_json() if measured.flip else None,
+        "files": {},
+    }
+
+
+def mutations_data(study: Any) -> dict[str, Any]:
+    """Return what `validation.mutations.study.study_mutations` found, in full."""
+    return {
+        "caught": study.caught,
+        "count": len(study.results),
+        "passed": study.passed,
+        "results": plain(study.results),
+    }

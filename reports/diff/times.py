@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The times of two reports compared, by the rules of `validation.statistics.noise`."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from reports.diff.finding import Finding, Report
+from validation.statistics.noise import SHORTEST, Times, drift, least_ratio, slower_stages, spread
+
+_MACHINE = ("processor", "threads", "variant", "device")
+
+
+@dataclass(frozen=True)
+class TimeComparison:
+    """What two reports say of the speed."""
+
+    compared: int  #: configurations
+    same_machine: bool
+    machine: tuple[str, ...]  #: how the machines and versions differ, in words
+    spread: float  #: quartiles of the noisier report, upper over lower
+    least: float  #: least ratio of two times that means something
+    drift: float  #: median ratio of all frames
+    findings: tuple[Finding, ...] = field(default=())
+
+
+def compare_times(old: Report, new: Report, *, tolerance: float | None) -> TimeComparison:
+    """Compare the times of two reports; parameters as in `reports.diff.compare.compare_reports`."""
+    machine, changes = _machines(old, new)
+    notes = [Finding("note", "", "", one) for one in changes]
+    if tolerance is None:
+        return TimeComparison(0, machine, changes, 1.0, 1.0, 1.0, tuple(notes))
+    kept = new.get("kept")
+    if kept:
+        notes.append(Finding("note", "", "", f"{kept} results of the new report were measured earlier and kept"))
+    pairs, otherwise = _pairs(old, new)
+    notes += otherwise
+    both = max(spread(_all_times(old)), spread(_all_times(new)))
+    least = least_ratio(both, same_machine=machine, tolerance=tolerance)
+    common = drift(pairs.values()) if pairs else 1.0
+    findings = [*notes, *_drift(common, least, machine, len(pairs))]
+    for (scene, label), (one, two) in pairs.items():
+        findings += _configuration(scene, label, one, two, least=least, common=common, machine=machine)
+    return TimeComparison(len(pairs), machine, changes, both, least, common, tuple(findings))
+
+
+def _machines(old: Report, new: Report) -> tuple[bool, tuple[str, ...]]:
+    """Return whether both reports come from one machine, and what differs, in words."""
+    before, after = old["environment"], new["environment"]
+    changes = [f"{key}: {before.get(key)} -> {after.get(key)}" for key in _MACHINE if before.get(key) != after.get(key)]
+    same = not changes
+    versions = before.get("versions", {}), after.get("versions", {})
+    for name in sorted({*versions[0], *versions[1]}):
+        one, two = (found.get(name) for found in versions)
+        changes += [f"{name}: {one} -> {two}"] if one != two else []
+    if before.get("llvm") != after.get("llvm"):
+        changes.append(f"llvm: {before.get('llvm')} -> {after.get('llvm')}")
+    return same, tuple(changes)
+
+
+Key = tuple[str, str]  # scene and label
+
+
+def _pairs(old: Report, new: Report) -> tuple[dict[Key, tuple[Times, Times]], list[Finding]]:
+    """Return the times of what both reports timed alike, and what they timed otherwise."""
+    before, after = _timed(old), _timed(new)
+    pairs: dict[Key, tuple[Times, Times]] = {}
+    notes: dict[Finding, None] = {}
+    for key in [key for key in before if key in after]:
+        (size, note, one), (new_size, new_note, two) = before[key], after[key]
+        if size != new_size:
+            sizes = " and ".join("x".join(map(str, found or ["?"])) for found in (size, new_size))
+            notes[Finding("note", key[0], "", f"times not compared: the frames timed are {sizes} pixels")] = None
+        elif note != new_note:
+            notes[
+                Finding("note", *key, f"times not compared: {note or 'as usual'} before, {new_note or 'as usual'} now")
+            ] = None
+        else:
+            pairs[key] = one, two
+    return pairs, list(notes)
+
+
+def _timed(report: Report) -> dict[Key, tuple[Any, str | None, Times]]:
+    """Return the size of the frames that were timed, the note on how, and the times, by scene and label."""
+    usual = report["settings"].get("timed")
+    return {
+        (scene["name"], one["label"]): (scene.get("timed", usual), one.get("note"), one["times"])
+        for scene in report["scenes"]
+        for one in scene["methods"]
+        if one.get("times") and "frame" in one["times"]
+    }
+
+
+def _all_times(report: Report) -> list[Times]:
+    return [one["times"] for scene in report["scenes"] for one in scene["methods"] if one.get("times")]
+
+
+def _drift(common: float, least: float, machine: bool, count: int) -> list[Finding]:
+    """Judge what all frames share."""
+    if not machine or count == 0 or 1 / least < common < least:
+        return []
+    words = "every frame, in the median: the machine, or what all methods share (time ratio)"
+    return [Finding("worse" if common > 1 else "better", "", "", words, 1.0, common)]
+
+
+def _configuration(
+    scene: str, label: str, old: Times, new: Times, *, least: float, common: float, machine: bool
+) -> list[Finding]:
+    """Return the stages of one configuration that got slower or faster."""
+    floor = 1.0 if machine else 0.0
+    slower = slower_stages(old, new, least=least, scale=max(floor, common))
+    faster = slower_stages(new, old, least=least, scale=max(floor, 1 / common))
+    moved = [("worse", stage) for stage in slower] + [("better", stage) for stage in faster]
+    beside = "" if machine else f", beside the median of all ({common:.2f} times)"
+    return [
+        Finding(verdict, scene, label, f"{stage} [ms]{beside}", old[stage]["median_ms"], new[stage]["median_ms"])
+        for verdict, stage in moved
+        if max(old[stage]["median_ms"], new[stage]["median_ms"]) >= SHORTEST
+    ]

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What two reports claim, compared: truth, verdicts, kernels that break, faults that nothing catches, the fastest."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from reports.data.claims import TARGETS, confirmed, verdict
+from reports.diff.finding import Finding, Report
+
+
+def compare_truth(old: Report, new: Report, gone: str) -> Iterator[Finding]:
+    """Compare what is known of the truth of a scene."""
+    name = old["name"]
+    if not confirmed([new]) and confirmed([old]):
+        yield Finding("worse", name, "", "the truth is no longer confirmed")
+    elif confirmed([new]) and not confirmed([old]):
+        yield Finding("better", name, "", "the truth is confirmed now")
+    for key, agreement in old["agreement"].items():
+        if key not in new["agreement"]:
+            yield Finding(gone, name, "", f"the comparison with {key} is gone")
+        elif verdict(agreement) is True and verdict(new["agreement"][key]) is None:
+            yield Finding("note", name, "", f"{key} ran out of time before it could confirm the truth")
+    if old["size"] == new["size"]:
+        for key in ("disagreements", "left"):
+            before, after = old["truth"].get(key), new["truth"].get(key)
+            if before is not None and after is not None and after > before:
+                yield Finding("worse", name, "", f"lit intervals of the truth: {key}", before, after)
+
+
+def compare_claims(old: Report, new: Report) -> Iterator[Finding]:
+    """Compare what concerns the whole report."""
+    yield from _claims(old, new)
+    yield from _stability(old, new)
+    yield from _mutations(old, new)
+
+
+def _claims(old: Report, new: Report) -> Iterator[Finding]:
+    """Compare the verdicts at the top: of each kind, how many are bad."""
+    before, after = (report.get("claims", []) for report in (old, new))
+    if any(isinstance(one, str) for one in (*before, *after)):
+        yield Finding("note", "", "", "claims not compared: those of schema airlight-report/1 are plain sentences")
+        return
+    for kind in dict.fromkeys(one["kind"] for one in (*before, *after)):
+        bad = [
+            [one["text"] for one in claims if one["kind"] == kind and one["good"] is False]
+            for claims in (before, after)
+        ]
+        if len(bad[1]) > len(bad[0]):
+            yield from (Finding("worse", "", "", f"claim: {text}") for text in bad[1] if text not in bad[0])
+        elif len(bad[1]) < len(bad[0]):
+            yield from (Finding("better", "", "", f"no longer: {text}") for text in bad[0] if text not in bad[1])
+
+
+def _stability(old: Report, new: Report) -> Iterator[Finding]:
+    """Compare which kernels break their bars."""
+    before, after = ({one["kernel"]: one["broken"] for one in _kernels(report)} for report in (old, new))
+    for kernel in before:
+        if kernel in after and after[kernel] and not before[kernel]:
+            yield Finding("worse", "", kernel, f"breaks its bar: {after[kernel][0]}")
+        elif kernel in after and before[kernel] and not after[kernel]:
+            yield Finding("better", "", kernel, "keeps its bars again")
+
+
+def _kernels(report: Report) -> list[Mapping[str, Any]]:
+    found = report.get("stability") or report.get("kernels") or []
+    return [one for one in found if isinstance(one, Mapping) and {"kernel", "broken"} <= set(one)]
+
+
+def _mutations(old: Report, new: Report) -> Iterator[Finding]:
+    """Compare how many faults of the physics the checks of the truth miss."""
+    if not (old.get("mutations") and new.get("mutations")):
+        return
+    before, after = ((one["count"] - one["caught"]) for one in (old["mutations"], new["mutations"]))
+    if before != after:
+        yield Finding("worse" if after > before else "better", "", "", "faults that nothing catches", before, after)
+
+
+def compare_winners(before: Mapping[str, Report], after: Mapping[str, Report]) -> Iterator[Finding]:
+    """Say where another method is the fastest; which one it is may change within the noise."""
+    for name in [name for name in before if name in after]:
+        for target in TARGETS:
+            one, two = (_fastest(scene, target) for scene in (before[name], after[name]))
+            if one != two:
+                words = f"fastest within {100 * target:g} %: {one or 'none'} before, {two or 'none'} now"
+                yield Finding("note", name, "", words)
+
+
+def _fastest(scene: Report, target: float) -> str | None:
+    def reaches(one: Report) -> bool:
+        error = one.get("error") or {}
+        rmse = error.get("relative_rmse")
+        return bool(one.get("times")) and rmse is not None and rmse <= target and not error.get("nonfinite")
+
+    good = [one for one in scene["methods"] if reaches(one)]
+    return min(good, key=lambda one: one["times"]["frame"]["median_ms"])["label"] if good else None

@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the documentation takes from a report: its numbers without the long tables, and small pictures.
+
+The documentation is built from `docs/data/report.json` and the PNG files beside it, schema "airlight-docs/1":
+`report` (when, by which command, on which machine), `claims`, `scenes` (each with `counts`, `truth`, `multiple` and
+`methods`), `pictures` (by method: whose frame it is), `kernels` (costs and errors of `airlight bench --kernels`, or
+null).
+"""
+
+import io
+import json
+from pathlib import Path
+from typing import Any
+
+from analytic.errors import InputError
+from reference.storage.files import ensure_folder, write_bytes, write_text
+from reports.data.json_files import read_json
+
+SCHEMA = "airlight-docs/1"
+REPORTS = ("airlight-report/1", "airlight-report/2")
+#: The scene whose frames show a method: the first of these that the report holds, else its first scene.
+SHOWN = ("colonnade", "two-pens", "sphere-spot")
+WIDTH, LARGEST = 480, 60_000  # pixels, bytes: of a picture
+
+_ERRORS = ("relative_rmse", "relative_bias", "p50", "p99", "max", "nonfinite", "negative")
+_METHOD = ("label", "method", "kernel", "parameters", "knows_shadows", "refused", "note")
+_COST = ("kernel", "family", "size", "phase", "g", "device", "wall", "median", "p99", "max", "nonfinite", "refused")
+
+
+def refresh(data: Path, *, report: Path | None = None, kernels: Path | None = None) -> list[Path]:
+    """Write the data of the documentation anew from a report, from the costs of kernels, or both; return the files.
+
+    Parameters
+    ----------
+    data
+        The folder `docs/data`.
+    report
+        A folder that `airlight report` wrote.
+    kernels
+        What `airlight bench --kernels --json` printed. What is not given stays as it was.
+
+    Raises
+    ------
+    InputError
+        If a file is not what it should be; nothing is written then.
+    """
+    path = data / "report.json"
+    found: dict[str, Any] = {"schema": SCHEMA, "kernels": None}
+    if path.exists():
+        found = _read_object(path, "the data of the documentation")
+    pictures: dict[str, bytes] = {}
+    if report is not None:
+        content = _read_object(report / "report.json", "the folder of a report")
+        if content.get("schema") not in REPORTS:
+            wanted = " or ".join(REPORTS)
+            raise InputError(f"{report / 'report.json'}: schema {content.get('schema')!r}, wanted {wanted}")
+        found |= kept_of_report(content)
+        pictures = pictures_of(report, content, found)
+    if kernels is not None:
+        costs = _read_object(kernels, "what `airlight bench --kernels --json` prints")
+        found["kernels"] = kept_of_kernels(costs, kernels)
+    ensure_folder(data)
+    for name, content_of in pictures.items():
+        write_bytes(data / name, content_of)
+    write_text(path, json.dumps(found, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+    return [path, *(data / name for name in pictures)]
+
+
+def _read_object(path: Path, what: str) -> dict[str, Any]:
+    """Return the object in a JSON file; raises InputError if the file is not there or holds something else."""
+    data = read_json(path, what)
+    if not isinstance(data, dict):
+        raise InputError(f"{path}: wanted {what}")
+    return data
+
+
+def kept_of_report(report: dict[str, Any]) -> dict[str, Any]:
+    """Return what the documentation keeps of a report."""
+    environment = report["environment"]
+    return {
+        "report": {
+            "created": report["created"],
+            "command": report["command"],
+            "effort": report["settings"]["name"],
+            "timed": report["settings"]["timed"],
+            "processor": environment["processor"],
+            "threads": environment["threads"],
+            "variant": environment["variant"],
+            "versions": environment["versions"],
+        },
+        "claims": [claim if isinstance(claim, str) else claim["text"] for claim in report["claims"]],
+        "scenes": [_kept_scene(scene) for scene in report["scenes"] if scene["path"] is None],
+    }
+
+
+def _kept_scene(scene: dict[str, Any]) -> dict[str, Any]:
+    built_in = [one for one in scene["methods"] if one.get("kind", "built-in") == "built-in"]
+    return {
+        "name": scene["name"],
+        "size": scene["size"],
+        "plan": scene["plan"],
+        "counts": counts(scene["name"]),
+        "truth": scene["truth"],
+        "multiple": scene["multiple"],
+        "methods": [_kept_method(one) for one in built_in],
+    }
+
+
+def _kept_method(one: dict[str, Any]) -> dict[str, Any]:
+    times = {name: one["times"][name] for name in ("frame", "airlight", "rebuild")} if one["times"] else None
+    error = {name: one["error"][name] for name in _ERRORS} if one["error"] else None
+    return {name: one[name] for name in _METHOD} | {"times": times, "error": error}
+
+
+def counts(name: str) -> dict[str, int]:
+    """Return how many shapes, triangles and lights a built-in scene has."""
+    from validation.scenes.loading import load_scene
+
+    scene = load_scene(name, (8, 6)).scene
+    shapes = scene.shapes()
+    triangles = sum(shape.face_count() for shape in shapes if shape.is_mesh())
+    return {"shapes": len(shapes), "triangles": int(triangles), "lights": len(scene.emitters())}
+
+
+def kept_of_kernels(costs: dict[str, Any], path: Path) -> dict[str, Any]:
+    """Return what the documentation keeps of the costs of kernels."""
+    try:
+        rows = costs["kernels"]["costs"]
+        environment = costs["environment"]
+        return {
+            "processor": environment["processor"],
+            "threads": environment["threads"],
+            "variant": environment["variant"],
+            "costs": [{name: row[name] for name in _COST} for row in rows],
+            "convergence": costs["convergence"],
+        }
+    except (KeyError, TypeError) as error:
+        raise InputError(f"{path}: wanted what `airlight bench --kernels --json` prints, {error} is missing") from error
+
+
+def pictures_of(folder: Path, report: dict[str, Any], found: dict[str, Any]) -> dict[str, bytes]:
+    """Return the pictures by file name, and put into `found` which frame shows which method."""
+    scenes = {scene["name"]: scene for scene in report["scenes"] if scene["path"] is None}
+    pictures = {f"scene-{name}.png": small(folder / scene["files"]["picture"]) for name, scene in scenes.items()}
+    found["pictures"] = {}
+    if not scenes:
+        return pictures
+    shown = next((scenes[name] for name in SHOWN if name in scenes), next(iter(scenes.values())))
+    for method in dict.fromkeys(one["method"] for one in shown["methods"]):
+        one = _typical([one for one in shown["methods"] if one["method"] == method and one["files"] and one["error"]])
+        if one is None:
+            continue
+        error = one["error"]["relative_rmse"]
+        found["pictures"][method] = {"scene": shown["name"], "label": one["label"], "relative_rmse": error}
+        for kind, suffix in (("picture", ""), ("error", "-error")):
+            pictures[f"method-{method}{suffix}.png"] = small(folder / one["files"][kind])
+    return pictures
+
+
+def _typical(candidates: list[dict[str, Any]]) -> dict[str, Any] | None:
+    """Return the configuration that shows a method: few parameters set, little error."""
+    return min(candidates, key=lambda one: (len(one["parameters"]), one["error"]["relative_rmse"] or 0), default=None)
+
+
+def small(path: Path) -> bytes:
+    """Return a picture as a PNG file of at most `LARGEST` bytes."""
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        picture = Image.open(path).convert("RGB")
+    except (OSError, UnidentifiedImageError) as error:
+        raise InputError(f"{path}: no picture ({error}); wanted the folder of a whole report") from error
+    width = min(WIDTH, picture.width)
+    while True:
+        size = (width, max(1, round(picture.height * width / picture.width)))
+        scaled = picture if size == picture.size else picture.resize(size, Image.Resampling.LANCZOS)
+        buffer = io.BytesIO()
+        # No dithering: error maps are read by colour, and noise would not compress.
+        colours = scaled.quantize(128, dither=Image.Dither.NONE)
+        colours.save(buffer, format="PNG", optimize=True)
+        if buffer.tell() <= LARGEST or width < 80:
+            return buffer.getvalue()
+        width = round(0.85 * width)

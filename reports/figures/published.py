@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The figure of the published results: frames a second of each table and figure of the papers, beside our own.
+
+Biri, Arques, Michelin 2006, Table 2, and Billeter, Sintorn, Assarsson 2010, Figures 6 and 7 and Table 1. Everything is
+rebuilt after the light moved, as published. The machines are not the same: what can be compared are ratios within a
+paper, and what the error of each is.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from reference.storage.files import ensure_folder
+from reports.figures.files import draw_figure, new_figure, pixels, read_data, value, write_data, write_table
+from reports.figures.published_rows import HEADER, billeter_entries, biri_entries, measured_papers
+from reports.figures.report import reported_papers
+from reports.plotting.style import WIDTHS, method_style
+from reports.tables.latex import escape, number, table, with_quartiles
+
+NAME = "published"
+SUMMARY = "frames a second of each table of the papers, published and measured"
+
+
+def compute(
+    folder: Path | str,
+    *,
+    report: Path | str | None = None,
+    quick: bool = False,
+    progress: Callable[[float, str], None] | None = None,
+) -> None:
+    """Write `published.csv` into a folder: a row for each published figure and everything that was measured for it.
+
+    Parameters
+    ----------
+    folder
+        Where the data go.
+    report
+        The folder of a report: the papers that it holds are taken from it; if it holds none, all are measured, which
+        takes minutes.
+    quick
+        Measure at a quarter of the published size, Billeter's Table 1 for its smallest map.
+    progress
+        Told the share done and what comes next.
+    """
+    target = ensure_folder(folder)
+    papers, origin = reported_papers(report)
+    if not any(papers.values()):
+        papers, origin = measured_papers(quick, progress), {}
+    rows = biri_entries(papers.get("biri") or {}) + billeter_entries(papers.get("billeter") or {})
+    write_data(target, NAME, HEADER, rows, **origin)
+
+
+def plot(folder: Path | str, *, output: Path | str | None = None, **options: Any) -> None:
+    """Draw `published.pdf` and `.png` and write `published.tex`; options: see `reports.figures.files.draw_figure`."""
+    draw_figure(NAME, folder, _draw, output=output, **options)
+    write_table(NAME, folder, _tabular, output)
+
+
+def _draw(folder: Path, column: str):
+    rows = read_data(folder, NAME)
+    names = dict.fromkeys(row["table"] for row in rows)
+    tables = {name: [row for row in rows if row["table"] == name] for name in names}
+    lines = [len({row["row"] for row in chosen}) for chosen in tables.values()]
+    width, double = WIDTHS[column], column == "double"
+    figure = new_figure(width, 0.24 * sum(lines) + (0.4 if double else 0.8) * len(tables) + 0.3)
+    panels = figure.subplots(len(tables), 1, sharex=True, squeeze=False, height_ratios=lines)[:, 0]
+    for panel, (name, chosen) in zip(panels, tables.items()):
+        _panel(panel, chosen)
+        title = name + _scale(chosen[0])
+        if double:
+            panel.set_title(title)
+            panel.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+        else:
+            panel.legend(loc="lower right", bbox_to_anchor=(1.02, 0.98), ncols=2, title=title, title_fontsize=7)
+    figure.supxlabel("frames a second after the light moved [1/s]", fontsize="medium")
+    return figure
+
+
+def _scale(row: dict[str, str]) -> str:
+    """Say of what size the images are, where it is not the published one."""
+    scale = int(row["width"]) / int(row["published_width"])
+    return "" if scale == 1 else f", here at {100 * scale:.3g} % of its size"
+
+
+def _panel(panel, rows: list[dict[str, str]]) -> None:
+    """Draw a table: a line for each row, on it the published figure and what was measured, a little apart."""
+    names = list(dict.fromkeys(row["row"] for row in rows))
+    printed = {(value(row, "published_fps"), names.index(row["row"])) for row in rows if row["published_fps"]}
+    if printed:
+        style = {"color": "black", "linestyle": "none", "marker": "|", "markersize": 9, "markeredgewidth": 1.4}
+        panel.plot(*zip(*sorted(printed)), label="published", zorder=1, **style)
+    styles: dict[tuple[str, str], dict[str, Any]] = {}
+    for row in rows:
+        key = (row["method"], row["variant"])
+        if key not in styles:
+            variant = sum(method == row["method"] for method, _ in styles)
+            styles[key] = method_style(row["method"], variant) | {"linestyle": "none"}
+            panel.plot([], [], label=row["variant"], **styles[key])
+    for place, name in enumerate(names):
+        on_line = [row for row in rows if row["row"] == name]
+        for number_, row in enumerate(on_line):
+            shift = 0.6 * ((number_ + 0.5) / len(on_line) - 0.5)
+            _measured(panel, row, place + shift, styles[row["method"], row["variant"]])
+    panel.set_yticks(range(len(names)), names)
+    panel.set(xscale="log", ylim=(len(names) - 0.5, -0.5))
+    panel.grid(False, axis="y")
+
+
+def _measured(panel, row: dict[str, str], height: float, style: dict[str, Any]) -> None:
+    middle, low, high = (value(row, name) for name in ("fps", "fps_low", "fps_high"))
+    if middle is not None and low is not None and high is not None:  # what was not measured has its name alone
+        panel.errorbar([middle], [height], xerr=[[middle - low], [high - middle]], **style)
+
+
+def _tabular(rows: list[dict[str, str]]) -> str:
+    headers = (
+        ("", "", "published", "measured", "ratio", "rel. RMSE"),
+        ("", "", "[1/s]", "[1/s]", "[1]", "[1]"),
+    )
+    body: list[tuple[str, ...] | str] = []
+    for name in dict.fromkeys(row["table"] for row in rows):
+        body.append(rf"\textit{{{escape(name)}}}")
+        for row in (row for row in rows if row["table"] == name):
+            fps, published = value(row, "fps"), value(row, "published_fps")
+            as_published = (row["width"], row["height"]) == (row["published_width"], row["published_height"])
+            variant = "" if row["row"].endswith(row["variant"]) else row["variant"]
+            size = "" if as_published else f"{', ' if variant else ''}{pixels(row)}"
+            shown = with_quartiles(fps, value(row, "fps_low"), value(row, "fps_high"))
+            ratio = fps / published if fps and published and as_published else None
+            printed = f"${published:g}$" if published else "--"
+            cells = (printed, shown, number(ratio, 2), number(value(row, "relative_rmse"), 2))
+            body.append((escape(row["row"]), escape(variant + size), *cells))
+    comment = (
+        "Needs \\usepackage{booktabs}. Frames a second after the light moved, everything rebuilt, medians with the",
+        "distances to the quartiles; the error of the airlight is against the quadrature truth.",
+    )
+    return table("llrrrr", headers, body, comment=comment)

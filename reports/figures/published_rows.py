@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Rows of the figure of the published results, from what `airlight published` measures or a report holds."""
+
+from collections.abc import Callable
+from typing import Any
+
+from reports.machine.progress import part_of
+from reports.papers.labels import biri_variant
+
+HEADER = (
+    "paper",
+    "table",
+    "row",
+    "variant",
+    "method",
+    "width",
+    "height",
+    "published_width",
+    "published_height",
+    "published_fps",
+    "fps",
+    "fps_low",
+    "fps_high",
+    "relative_rmse",
+    "missing",
+)
+_BILLETER_SIZE = [1024, 1024]
+_LIMIT = 10.0  # a frame that takes longer is left out [s]
+
+
+def measured_papers(quick: bool, progress: Callable[[float, str], None] | None) -> dict[str, Any]:
+    """Measure the tables of both papers, as `published` in report.json.
+
+    Parameters
+    ----------
+    quick
+        A quarter of the published width and height, and one size of the map in Billeter's Table 1.
+    progress
+        Told the share done and what comes next.
+    """
+    from reports.papers.billeter import billeter_data
+    from reports.papers.biri import rows_data
+    from validation.papers.billeter_images import SIZE, figure_rows
+    from validation.papers.billeter_tessellation import MAPS, table_rows
+    from validation.papers.biri import biri_rows
+
+    scale = 0.25 if quick else 1.0
+    size = (round(scale * SIZE[0]), round(scale * SIZE[1]))
+    seconds = 0.1 if quick else 0.6
+
+    biri = rows_data(biri_rows(scale=scale, seconds=seconds, progress=part_of(progress, 0.0, 0.3)), [])
+    figures = figure_rows(size=size, seconds=seconds, limit=_LIMIT, progress=part_of(progress, 0.3, 0.6))
+    maps = MAPS[:1] if quick else MAPS
+    told = part_of(progress, 0.6, 1.0)
+    views = table_rows(maps=maps, size=size, seconds=seconds, limit=_LIMIT, progress=told)
+    return {"biri": biri, "billeter": billeter_data(figures, views)}
+
+
+def biri_entries(data: dict[str, Any]) -> list[tuple]:
+    """Return the rows of Table 2 of Biri 2006 and of the scene that its section 6 adds."""
+    found = []
+    for row in data.get("rows", ()):
+        one = row["published"]
+        name = f"{one['scene']}, {one['where']}" + (", " + _size(one["size"]) if one["size"] != [800, 600] else "")
+        variant = biri_variant(row)
+        what = ("biri", "Biri 2006, Table 2", name, variant, "shadow-planes")
+        found.append((*what, *_figures(row, one["size"], one["fps"], row["error"])))
+    return found
+
+
+def billeter_entries(data: dict[str, Any]) -> list[tuple]:
+    """Return the rows of Figures 6 and 7 and Table 1 of Billeter 2010."""
+    found = []
+    for row in data.get("figures", ()):
+        one = row["entry"]
+        figure = one["where"] if one["where"].startswith("Fig") else "Fig. 7"  # peers share the scene of Fig. 7
+        table = f"Billeter 2010, {figure.rstrip('abc')}"
+        values = dict(one["parameters"])
+        variant = values.get("evaluation") or (f"{values['steps']} steps" if "steps" in values else "default")
+        what = ("billeter", table, f"{one['where']}, map {one['map']}", f"{one['method']}, {variant}", one["method"])
+        found.append((*what, *_figures(row, _BILLETER_SIZE, one["fps"], row["error"])))
+    for row in data.get("table", ()):
+        name = f"{row['scene']}, map {row['map']}"
+        for_table = "Billeter 2010, Table 1"
+        # The published figure differs by evaluation here, so each evaluation has a line of its own.
+        line = f"{name}, {row['evaluation']}"
+        what = ("billeter", for_table, line, row["evaluation"], "light-volumes")
+        found.append((*what, *_figures(row, _BILLETER_SIZE, row["published"]["fps"], None)))
+    return found
+
+
+def _figures(row: dict[str, Any], size: list[int], fps: float | None, error: dict[str, Any] | None) -> tuple:
+    """Return size, published and measured frames a second, error, and why nothing was measured."""
+    rebuilt = row["rebuilt"]
+    # The third quartile of the time is the first of the rate.
+    rates = [1000 / rebuilt[name] for name in ("median_ms", "high_ms", "low_ms")] if rebuilt else [None] * 3
+    relative = error["relative_rmse"] if error else None
+    return (*row["size"], *size, fps, *rates, relative, row.get("missing"))
+
+
+def _size(size: list[int]) -> str:
+    return f"{size[0]} \N{MULTIPLICATION SIGN} {size[1]}"

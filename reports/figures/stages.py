@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The figure of the stages: Table 1 of Biri, Arques, Michelin 2006, the share of each in a frame, published and here.
+
+The shares are of the sum of the stages of a frame after the light moved. How the stages are told apart:
+`validation.papers.biri`.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from reference.storage.files import ensure_folder
+from reports.figures.files import draw_figure, new_figure, pixels, read_data, value, values, write_data, write_table
+from reports.figures.report import reported_papers
+from reports.papers.labels import biri_variant
+from reports.plotting.style import COLOURS, WIDTHS
+from reports.tables.latex import escape, number, table
+
+NAME = "stages"
+SUMMARY = "share of each stage of shadow planes in a frame: Table 1 of Biri 2006, published and measured"
+
+_PAPER = "published"
+_HEADER = ("scene", "where", "row", "width", "height", "stage", "share_percent", "ms", "frame_ms", "low_ms", "high_ms")
+_COLOURS = ("purple", "sky", "blue", "orange", "vermillion")
+_HATCHES = ("", "....", "", "////", "")  # beside the colour: for prints in grey
+
+
+def compute(
+    folder: Path | str,
+    *,
+    report: Path | str | None = None,
+    quick: bool = False,
+    progress: Callable[[float, str], None] | None = None,
+) -> None:
+    """Write `stages.csv` into a folder: the share of every stage in every row of the table.
+
+    Parameters
+    ----------
+    folder
+        Where the data go.
+    report
+        The folder of a report: if it holds Biri's tables they are taken from it, else they are measured.
+    quick
+        Measure at a quarter of the published size.
+    progress
+        Told the share done and what comes next.
+    """
+    target = ensure_folder(folder)
+    papers, origin = reported_papers(report)
+    found = papers.get("biri")
+    if not found or not any(row["published"]["shares"] for row in found["rows"]):
+        found, origin = _measured(0.25 if quick else 1.0, progress), {}
+    rows: list[tuple] = []
+    shown = set()
+    for row in found["rows"]:
+        one = row["published"]
+        if one["shares"] is None:
+            continue
+        if one["scene"] not in shown:
+            shown.add(one["scene"])
+            named = (one["scene"], one["where"], _PAPER, *one["size"])
+            rows += [(*named, stage, share, *[None] * 4) for stage, share in zip(found["stages"], one["shares"])]
+        frame = tuple(row["rebuilt"][name] for name in ("median_ms", "low_ms", "high_ms"))
+        named = (one["scene"], one["where"], biri_variant(row), *row["size"])
+        parts = zip(found["stages"], row["shares"], row["stages_ms"])
+        rows += [(*named, stage, share, ms, *frame) for stage, share, ms in parts]
+    write_data(target, NAME, _HEADER, rows, **origin)
+
+
+def _measured(scale: float, progress: Callable[[float, str], None] | None) -> dict[str, Any]:
+    from reports.papers.biri import rows_data
+    from validation.papers.biri import PUBLISHED, biri_rows
+
+    return rows_data(biri_rows([one for one in PUBLISHED if one.shares], scale=scale, progress=progress), [])
+
+
+def plot(folder: Path | str, *, output: Path | str | None = None, **options: Any) -> None:
+    """Draw `stages.pdf` and `.png` and write `stages.tex`; options: see `reports.figures.files.draw_figure`."""
+    draw_figure(NAME, folder, _draw, output=output, **options)
+    write_table(NAME, folder, _tabular, output)
+
+
+def _groups(rows: list[dict[str, str]]) -> dict[tuple[str, str], list[dict[str, str]]]:
+    """Return the rows by scene and by what was measured, in their order."""
+    found: dict[tuple[str, str], list[dict[str, str]]] = {}
+    for row in rows:
+        found.setdefault((row["scene"], row["row"]), []).append(row)
+    return found
+
+
+def _draw(folder: Path, column: str):
+    import numpy as np
+
+    rows = read_data(folder, NAME)
+    groups = _groups(rows)
+    stages = list(dict.fromkeys(row["stage"] for row in rows))
+    shares = np.array([values(group, "share_percent") for group in groups.values()])
+    width = WIDTHS[column]
+    double = column == "double"
+    figure = new_figure(width, 0.24 * len(groups) + (0.9 if double else 1.25))
+    panel = figure.subplots()
+    rows_at = np.arange(len(groups)) + 0.4 * np.cumsum([name == _PAPER for _, name in groups])  # a gap before a scene
+    start = np.zeros(len(groups))
+    for place, stage in enumerate(stages):
+        bars = panel.barh(rows_at, shares[:, place], left=start, height=0.8, label=stage, edgecolor="white")
+        for bar in bars:
+            bar.set(facecolor=COLOURS[_COLOURS[place % 5]], hatch=_HATCHES[place % 5])
+        start += shares[:, place]
+    panel.set_yticks(rows_at, [_words(*name, group) for name, group in groups.items()])
+    panel.invert_yaxis()
+    panel.set(xlabel="share of all stages after the light moved [%]", xlim=(0, 100))
+    panel.grid(False, axis="y")
+    figure.legend(loc="outside lower center", ncols=len(stages) if double else 2)
+    return figure
+
+
+def _words(scene: str, row: str, group: list[dict[str, str]]) -> str:
+    where = group[0]["where"]
+    if row == _PAPER:
+        return f"{scene}: published, {where}"
+    return f"{row}, {pixels(group[0])}, {value(group[0], 'frame_ms'):.3g} ms"
+
+
+def _tabular(rows: list[dict[str, str]]) -> str:
+    stages = list(dict.fromkeys(row["stage"] for row in rows))
+    headers = (("share of a frame [\\%]", *map(escape, stages), "frame [ms]"),)
+    body: list[tuple[str, ...] | str] = []
+    for (scene, name), group in _groups(rows).items():
+        if name == _PAPER:
+            body.append(rf"\textit{{{escape(scene)}}} ({escape(group[0]['where'])})")
+        size = "" if name == _PAPER else escape(f", {pixels(group[0])}")
+        # A published share has the digits that were printed.
+        shares = (f"${share:g}$" if name == _PAPER else number(share) for share in values(group, "share_percent"))
+        body.append((escape(name) + size, *shares, number(value(group[0], "frame_ms"))))
+    comment = ("Needs \\usepackage{booktabs}. Table 1 of Biri, Arques, Michelin 2006, published and measured.",)
+    return table("l" + "r" * (len(stages) + 1), headers, body, comment=comment)

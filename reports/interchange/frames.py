@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The frames of an animation as numbered files, each whole or not at all."""
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from reports.machine.progress import Interrupted, Progress
+
+STAGES = ("surface", "shade", "tiles", "airlight")  #: the functions of a frame that are frozen, of a `FrameRenderer`
+
+
+def check_ending(option: str, path: Path, ending: str, *, instead: str = "") -> None:
+    """Refuse a file whose name says that it is something else than what will be written.
+
+    Raises
+    ------
+    InputError
+        If the name does not end in `ending`, such as '.exr'; `instead` is said after that.
+    """
+    from analytic.errors import InputError
+
+    if path.suffix.lower() != ending:
+        raise InputError(f"{option}: got {str(path)!r}, wanted a name that ends in {ending}{instead}")
+
+
+def numbered(path: Path, number: int, frames: int) -> Path:
+    """Return name-0001.exr for name.exr; the first frame has the number 1."""
+    digits = max(4, len(str(frames)))
+    return path.with_name(f"{path.stem}-{number:0{digits}d}{path.suffix}")
+
+
+def write_frames(
+    name: str, renderer, chosen, animation, *, frames: int, outputs: dict[str, Path | None], tell: Progress
+) -> dict[str, Any]:
+    """Render the frames of an animation, write them and return what they cost.
+
+    Parameters
+    ----------
+    name, renderer, chosen
+        The name of the scene, its frame renderer, and the configuration.
+    animation
+        What moves, a `validation.scenes.record.Animation`.
+    frames
+        How many.
+    outputs
+        The paths that were asked for, as 'exr' and 'png'; frames get their number before the suffix.
+    tell
+        Told the share done and what was written last.
+
+    Raises
+    ------
+    Interrupted
+        At Ctrl-C, with the frames that are finished.
+    """
+    import numpy as np
+
+    from realtime.frame.renderer import image_frame
+    from validation.configurations.timing import timed_frame
+    from validation.scenes.animation import animate, moved_parts
+
+    cost: list[tuple[float, float]] = []
+    kept = None
+    factor: float | None = None  # the exposure of the first frame serves for all: a lamp that fades must look so
+    done = 0
+    try:
+        start = time.perf_counter()
+        for number, scene in enumerate(animate(renderer.scene, animation, frames), 1):
+            moved = 1e3 * (time.perf_counter() - start)
+            stages, kept, render_ms = timed_frame(renderer, scene, kept, **moved_parts(animation))
+            cost.append((moved, render_ms))
+            frame = image_frame(renderer, stages)
+            numbers = {kind: path and numbered(path, number, frames) for kind, path in outputs.items()}
+            factor = write_frame(name, chosen, frame, outputs=numbers, factor=factor)
+            done = number
+            tell(number / frames, f"frame {number} of {frames}")
+            start = time.perf_counter()
+    except KeyboardInterrupt:
+        raise Interrupted(_kept(outputs, done, frames)) from None
+    later = np.array(cost[1:] or cost)
+    moved, rendered = (float(value) for value in np.median(later, axis=0))
+    return {
+        "frames": frames,
+        "moves": list(animation.moves),
+        "frame_ms": moved + rendered,
+        "move_ms": moved,
+        "render_ms": rendered,
+        "recordings": {name: getattr(getattr(renderer, name), "n_recordings", 0) for name in STAGES},
+        "files": [str(path) for path in _files(outputs, frames)],
+    }
+
+
+def write_frame(
+    name: str, chosen, frame, *, outputs: dict[str, Path | None], factor: float | None = None
+) -> float | None:
+    """Write a frame where it is wanted, as EXR and as PNG; return the exposure of the picture, if there is one.
+
+    Parameters
+    ----------
+    name, chosen, frame
+        The name of the scene, the configuration, and the frame.
+    outputs
+        Paths or None, by 'exr' and 'png'.
+    factor
+        Exposure of the picture; by default one that suits it.
+    """
+    if outputs["exr"] is not None:
+        from reference.storage.exr import write_exr
+        from reports.machine.environment import stamped
+        from validation.estimates.images import layered_frame
+
+        write_exr(outputs["exr"], stamped(layered_frame(name, chosen, frame)))
+    if outputs["png"] is not None:
+        from reports.plotting.pictures import exposure, tone_mapped, write_png
+
+        total = frame.airlight + frame.surface
+        factor = exposure(total) if factor is None else factor
+        write_png(outputs["png"], tone_mapped(total, factor))
+    return factor
+
+
+def _files(outputs: dict[str, Path | None], frames: int) -> Sequence[Path]:
+    paths = [path for path in outputs.values() if path is not None]
+    return [numbered(path, number, frames) for path in paths for number in range(1, frames + 1)]
+
+
+def _kept(outputs: dict[str, Path | None], done: int, frames: int) -> str:
+    if not done:
+        return f"none of {frames} frames is finished"
+    last = ", ".join(str(numbered(path, done, frames)) for path in outputs.values() if path is not None)
+    return f"{done} of {frames} frames are finished and kept, the last is {last}"

@@ -1,0 +1,274 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A scene as binary glTF 2.0, with the same camera and lights, for engines and modelling programs.
+
+glTF has y up and cameras that look along -z with x to the right; lengths are metres, as here. The scene is turned by a
+quarter about an axis, which is exact, so that its own up axis becomes y: with z up, (x, y, z) becomes (x, z, -y).
+
+Lights are those of KHR_lights_punctual. Its unit is the candela, 1 lm/sr, and its colours are RGB factors: here the
+largest channel of the intensity in W/sr stands as the intensity, the channels over it as the colour, with no factor of
+683 lm/W. Its spots fall off otherwise than Mitsuba's and their inner angle must be smaller than the outer one. What the
+scene really has is in the `extras` of each light, camera, material and medium.
+
+The file is written here, not by trimesh, which writes the ratio of the angles of view as the aspect ratio of a camera,
+3 % off at 52 degrees, and no lights.
+
+References
+----------
+Khronos 2021, *glTF 2.0 specification*, sections 3 and 4; KHR_lights_punctual; KHR_materials_specular.
+"""
+
+import json
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.scene.read import read_truth
+from reference.storage.files import write_bytes
+from reports import __version__
+from reports.interchange.meshes import ShapeMesh, shape_mesh
+from reports.interchange.scene import describe_scene
+from validation.scenes.loading import LoadedScene
+
+Array = NDArray[np.float64]
+
+_FLOAT, _UINT = 5126, 5125
+_VERTICES, _INDICES = 34962, 34963
+_NEAR = 1e-3  # glTF wants a near plane; the medium begins at the pinhole all the same [m]
+
+# Rows: where the axes of glTF's world lie in the scene's, by the axis that points up in the scene.
+_TURNS: dict[str, list[list[int]]] = {
+    "z": [[1, 0, 0], [0, 0, 1], [0, -1, 0]],
+    "-z": [[1, 0, 0], [0, 0, -1], [0, 1, 0]],
+    "y": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+    "-y": [[1, 0, 0], [0, -1, 0], [0, 0, -1]],
+    "x": [[0, -1, 0], [1, 0, 0], [0, 0, 1]],
+    "-x": [[0, 1, 0], [-1, 0, 0], [0, 0, 1]],
+}
+
+
+def write_gltf(path: Path, loaded: LoadedScene) -> dict[str, Any]:
+    """Write a scene as a .glb file, whole or not at all.
+
+    Parameters
+    ----------
+    path
+        The file.
+    loaded
+        The scene, at the size of the image: the camera's aspect ratio is that of the image.
+
+    Returns
+    -------
+    dict
+        `path`, `triangles`, `bytes` and `tessellated`, the names of the shapes that are not triangles by nature.
+
+    Raises
+    ------
+    InputError
+        For a scene without a truth, a shape that cannot be made a mesh, and a file that cannot be written.
+    """
+    described = describe_scene(loaded)
+    truth = read_truth(loaded.scene)
+    turn = np.array(_TURNS[described["up"]], dtype=np.float64)
+    opaque = [shape_mesh(shape) for shape in truth.occluders.shapes()]
+    names = {medium.name for medium in truth.media}
+    bounds = [shape_mesh(shape) for shape in loaded.scene.shapes() if shape.id() in names]
+    document, binary = _document(described, turn, opaque, bounds)
+    data = _container(document, binary)
+    write_bytes(path, data)
+    meshes = [*opaque, *bounds]
+    return {
+        "path": str(path),
+        "triangles": sum(len(mesh.faces) for mesh in meshes),
+        "bytes": len(data),
+        "tessellated": [mesh.name for mesh in meshes if not mesh.exact],
+    }
+
+
+def _document(
+    described: dict[str, Any], turn: Array, opaque: list[ShapeMesh], bounds: list[ShapeMesh]
+) -> tuple[dict[str, Any], bytes]:
+    """Return the JSON and the binary part."""
+    buffer = _Buffer()
+    materials = [_material(one) for one in described["surfaces"]]
+    materials += [_boundary(one) for one in described["bounded_media"]]
+    meshes = [buffer.mesh(mesh, turn, number) for number, mesh in enumerate([*opaque, *bounds])]
+    nodes: list[dict[str, Any]] = [{"name": mesh["name"], "mesh": number} for number, mesh in enumerate(meshes)]
+    camera = described["camera"]
+    nodes.append({"name": "camera", "camera": 0, "matrix": _camera_matrix(camera, turn)})
+    nodes += [
+        {
+            "name": f"light-{number}",
+            "matrix": _light_matrix(light, turn),
+            "extensions": {"KHR_lights_punctual": {"light": number}},
+        }
+        for number, light in enumerate(described["lights"])
+    ]
+    document = {
+        "asset": {"version": "2.0", "generator": f"airlight {__version__}"},
+        "extensionsUsed": ["KHR_lights_punctual", "KHR_materials_specular"] if materials else ["KHR_lights_punctual"],
+        "scene": 0,
+        "scenes": [
+            {"name": described["scene"], "nodes": list(range(len(nodes))), "extras": _scene_extras(described, turn)}
+        ],
+        "nodes": nodes,
+        "cameras": [_camera(camera)],
+        "extensions": {"KHR_lights_punctual": {"lights": [_light(light) for light in described["lights"]]}},
+    }
+    if meshes:  # glTF has no empty lists
+        document |= {
+            "meshes": meshes,
+            "materials": materials,
+            "accessors": buffer.accessors,
+            "bufferViews": buffer.views,
+            "buffers": [{"byteLength": len(buffer.data)}],
+        }
+    return document, bytes(buffer.data)
+
+
+def _scene_extras(described: dict[str, Any], turn: Array) -> dict[str, Any]:
+    return {
+        "medium": described["medium"],
+        "radiance": described["radiance"],
+        "scene_to_gltf": turn.astype(int).tolist(),
+        "units": "m, 1/m, W/sr, W/(m^2 sr)",
+    }
+
+
+def _camera(camera: dict[str, Any]) -> dict[str, Any]:
+    width, height = camera["size"]
+    tangent = np.tan(0.5 * np.deg2rad(camera["fov_horizontal"]))
+    return {
+        "name": "camera",
+        "type": "perspective",
+        "perspective": {
+            "yfov": float(2 * np.arctan(tangent * height / width)),
+            "aspectRatio": width / height,
+            "znear": _NEAR,
+        },
+        "extras": {"size": camera["size"], "fov_horizontal_degrees": camera["fov_horizontal"]},
+    }
+
+
+def _camera_matrix(camera: dict[str, Any], turn: Array) -> list[float]:
+    backward = -np.array(camera["forward"])
+    return _matrix(np.array([camera["right"], camera["up"], backward]).T, camera["position"], turn)
+
+
+_KEYS = {"W/sr": "w_per_sr", "W/m^2": "w_per_m2"}
+
+
+def _light(light: dict[str, Any]) -> dict[str, Any]:
+    # Of a directional light the format wants lux in the place of candela.
+    quantity, unit = ("irradiance", "W/m^2") if light["kind"] == "directional" else ("intensity", "W/sr")
+    intensity = np.array(light[quantity])
+    largest = float(intensity.max())
+    found: dict[str, Any] = {
+        "type": light["kind"],
+        "intensity": largest,
+        "color": (intensity / largest if largest > 0 else np.ones(3)).tolist(),
+        "extras": {
+            f"{quantity}_{_KEYS[unit]}": light[quantity],
+            "unit": f"the intensity of this light is in {unit}: no factor of 683 lm/W is in it",
+            "falloff": light["falloff"],
+        },
+    }
+    if light["kind"] == "spot":
+        outer = float(np.deg2rad(light["cutoff_angle"]))
+        # The format wants the inner angle below the outer one, also for a cone with a hard edge.
+        inner = min(float(np.deg2rad(light["beam_angle"])), outer * (1 - 1e-4))
+        found["spot"] = {"innerConeAngle": inner, "outerConeAngle": outer}
+        found["extras"] |= {key: light[key] for key in ("beam_angle", "cutoff_angle")}
+    return found
+
+
+def _light_matrix(light: dict[str, Any], turn: Array) -> list[float]:
+    """Return the transform of a light, which shines along its own -z."""
+    position = light.get("position", [0.0, 0.0, 0.0])  # one at infinity has none
+    if "axis" not in light:
+        return _matrix(np.eye(3), position, turn)
+    backward = -np.array(light["axis"])
+    side = np.cross(np.eye(3)[np.argmin(np.abs(backward))], backward)
+    side /= np.linalg.norm(side)
+    return _matrix(np.array([side, np.cross(backward, side), backward]).T, position, turn)
+
+
+def _matrix(axes: Array, position: list[float], turn: Array) -> list[float]:
+    """Return a transform as glTF lists it, column by column; `axes` has the node's axes as columns."""
+    matrix = np.eye(4)
+    # The axes are float32 numbers; the format wants a rotation.
+    unit, _, other = np.linalg.svd(turn @ axes)
+    matrix[:3, :3] = unit @ other
+    matrix[:3, 3] = turn @ np.array(position)
+    return [float(value) + 0.0 for value in matrix.T.reshape(-1)]
+
+
+def _material(surface: dict[str, Any]) -> dict[str, Any]:
+    """Return a material that reflects diffusely and nothing else."""
+    return {
+        "name": surface["name"],
+        "pbrMetallicRoughness": {
+            "baseColorFactor": [min(1.0, value) for value in surface["reflectance"]] + [1.0],
+            "metallicFactor": 0.0,
+            "roughnessFactor": 1.0,
+        },
+        "doubleSided": surface["two_sided"],
+        "extensions": {"KHR_materials_specular": {"specularFactor": 0.0}},
+        "extras": {key: surface[key] for key in ("reflectance", "textured", "diffuse")},
+    }
+
+
+def _boundary(medium: dict[str, Any]) -> dict[str, Any]:
+    """Return a material for the bounds of a medium: nothing is seen of them, what is in them stands in the extras."""
+    return {
+        "name": f"medium {medium['name']}",
+        "pbrMetallicRoughness": {"baseColorFactor": [1.0, 1.0, 1.0, 0.0], "metallicFactor": 0.0},
+        "alphaMode": "BLEND",
+        "extensions": {"KHR_materials_specular": {"specularFactor": 0.0}},
+        "extras": {"medium": medium},
+    }
+
+
+class _Buffer:
+    """The binary part, with the list of what lies where."""
+
+    def __init__(self) -> None:
+        self.data = bytearray()
+        self.views: list[dict[str, Any]] = []
+        self.accessors: list[dict[str, Any]] = []
+
+    def mesh(self, mesh: ShapeMesh, turn: Array, material: int) -> dict[str, Any]:
+        """Add a mesh and return its entry."""
+        vertices = (mesh.vertices @ turn.T).astype("<f4")
+        ends = {"min": vertices.min(axis=0).tolist(), "max": vertices.max(axis=0).tolist()}
+        attributes = {"POSITION": self._add(vertices, "VEC3", _FLOAT, _VERTICES) if len(vertices) else None}
+        self.accessors[-1] |= ends
+        if mesh.normals is not None:
+            normals = (mesh.normals @ turn.T).astype("<f4")
+            attributes["NORMAL"] = self._add(normals, "VEC3", _FLOAT, _VERTICES)
+        indices = self._add(mesh.faces.astype("<u4").reshape(-1), "SCALAR", _UINT, _INDICES)
+        return {
+            "name": mesh.name,
+            "primitives": [{"attributes": attributes, "indices": indices, "material": material}],
+        }
+
+    def _add(self, values: NDArray[Any], kind: str, component: int, target: int) -> int:
+        """Add an array, every number of which has four bytes, and return the number of its accessor."""
+        data = values.tobytes()
+        self.views.append({"buffer": 0, "byteOffset": len(self.data), "byteLength": len(data), "target": target})
+        self.data += data
+        self.accessors.append(
+            {"bufferView": len(self.views) - 1, "componentType": component, "count": len(values), "type": kind}
+        )
+        return len(self.accessors) - 1
+
+
+def _container(document: dict[str, Any], binary: bytes) -> bytes:
+    """Return the bytes of a .glb file: a header, the JSON, the binary part, each padded to four bytes."""
+    text = json.dumps(document, separators=(",", ":"), ensure_ascii=True, allow_nan=False).encode()
+    chunks = [(b"JSON", text + b" " * (-len(text) % 4))]
+    chunks += [(b"BIN\0", binary + b"\0" * (-len(binary) % 4))] if binary else []
+    body = b"".join(struct.pack("<I", len(data)) + kind + data for kind, data in chunks)
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body

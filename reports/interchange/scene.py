@@ -1,0 +1,214 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a scene is, in the numbers that another renderer wants to be told."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analytic.errors import InputError
+from reference.scene.camera import camera_matrix
+from reference.scene.directional_light import DirectionalLight
+from reference.scene.read import TruthLight, TruthMedium, TruthScene, read_truth
+from validation.scenes.loading import LoadedScene
+
+Array = NDArray[np.float64]
+
+_POINTS = 64  # at which a reflectance is asked for, to tell a texture from a colour
+
+_FALLOFF = {
+    "point": "the same intensity in every direction; irradiance falls as 1/r^2, times exp(-sigma_t r)",
+    "hard": "full intensity within the cut-off angle of the axis, none beyond; then 1/r^2 exp(-sigma_t r)",
+    "soft": "full intensity within the beam angle of the axis, none beyond the cut-off angle, between them "
+    "intensity (cutoff - angle)/(cutoff - beam), linear in the angle; then 1/r^2 exp(-sigma_t r)",
+    "directional": "from infinity, parallel: the same irradiance everywhere, times exp(-sigma_t length) of its way in "
+    "the media",
+}
+CONVENTION = (
+    "Linear RGB radiance in W/(m^2 sr), as the light's intensity in W/sr gives it: no exposure, no tone mapping, no "
+    "gamma, no bloom. Single scattering: light - one scattering in the medium or one diffuse reflection - eye, "
+    "attenuated by exp(-sigma_t length) on both legs; no ambient light, no sky. The airlight alone is the layer "
+    "`airlight`; the plain channels are airlight + surface. One ray through the centre of every pixel, or the mean "
+    "over the pixel's area (a box filter; then compare with --pixel area)."
+)
+
+
+def describe_scene(loaded: LoadedScene) -> dict[str, Any]:
+    """Return all that a renderer must be told to render a scene, as plain data.
+
+    Parameters
+    ----------
+    loaded
+        The scene, at the size of the image.
+
+    Returns
+    -------
+    dict
+        `scene`, `source`, `purpose`, `up`, `handedness`, `camera`, `medium`, `bounded_media`, `lights`, `surfaces`,
+        `radiance`, `file`. Lengths in metres, angles in degrees, extinction in 1/m, intensity in W/sr.
+
+    Raises
+    ------
+    InputError
+        For a scene without a truth, with the name of what is in the way.
+    """
+    truth = read_truth(loaded.scene)
+    camera = _camera(loaded.scene.sensors()[0], truth)
+    return {
+        "scene": loaded.name,
+        "source": str(loaded.path or loaded.name),
+        "purpose": loaded.purpose,
+        "up": up_axis(camera_matrix(loaded.scene.sensors()[0])[:3, 1]),
+        "handedness": "right",
+        "camera": camera,
+        "medium": _medium(truth.medium),
+        "bounded_media": [
+            {"name": medium.name, **(_medium(medium) or {}), "bounds": _bounds(medium.bounds)} for medium in truth.media
+        ],
+        "lights": [*map(_light, truth.lights), *map(_directional, truth.directional)],
+        "surfaces": [surface(shape) for shape in truth.occluders.shapes()],
+        "radiance": CONVENTION,
+        "file": {
+            "name": f"{loaded.name}.exr",
+            "format": "OpenEXR, one part of scan lines, half or float",
+            "layers": {
+                "airlight": "airlight.R, airlight.G, airlight.B: the in-scattered light alone, if the engine has it",
+                "total": "R, G, B: airlight + surface",
+            },
+        },
+    }
+
+
+def up_axis(up: Array) -> str:
+    """Return the axis of the world that points up in the image most: 'x', '-x', 'y', '-y', 'z' or '-z'."""
+    number = int(np.argmax(np.abs(up)))
+    return ("-" if up[number] < 0 else "") + "xyz"[number]
+
+
+def surface(shape: Any) -> dict[str, Any]:
+    """Return what an opaque shape is and how much light it reflects."""
+    import mitsuba as mi
+
+    from reports.interchange.meshes import triangle_count
+
+    colour, textured = _reflectance(shape)
+    flags = shape.bsdf().flags()
+    kind = shape.class_name()
+    return {
+        "name": shape.id(),
+        "kind": "Mesh" if shape.is_mesh() and kind != "Rectangle" else kind,
+        "triangles": triangle_count(shape),
+        "reflectance": colour,
+        "textured": textured,
+        "two_sided": bool(mi.has_flag(flags, mi.BSDFFlags.BackSide)),
+        "diffuse": not flags
+        & ~int(mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide)
+        & 0x3FF,
+    }
+
+
+def _camera(sensor: Any, truth: TruthScene) -> dict[str, Any]:
+    import mitsuba as mi
+
+    matrix = camera_matrix(sensor)
+    if not np.allclose(matrix[:3, :3].T @ matrix[:3, :3], np.eye(3), atol=1e-5) or np.linalg.det(matrix[:3, :3]) < 0:
+        raise InputError("the camera's to_world scales, shears or mirrors; wanted a rotation and a translation")
+    x_fov = _number(float(mi.traverse(sensor)["x_fov"][0]))
+    tangent = np.tan(0.5 * np.deg2rad(x_fov))
+    return {
+        "position": _numbers(matrix[:3, 3]),
+        "forward": _numbers(matrix[:3, 2]),
+        "right": _numbers(-matrix[:3, 0]),
+        "up": _numbers(matrix[:3, 1]),
+        "size": [truth.width, truth.height],
+        "fov_horizontal": x_fov,
+        "fov_vertical": float(2 * np.rad2deg(np.arctan(tangent * truth.height / truth.width))),
+        "projection": "pinhole; square pixels; the pixel in column i and row j, counted from 0 at the upper left, "
+        "looks through (i + 0.5, j + 0.5); no depth of field, no jitter; the medium begins at the pinhole, so let the "
+        "near plane cut nothing away",
+    }
+
+
+def _medium(medium: TruthMedium) -> dict[str, Any] | None:
+    """Return the numbers of a medium, None for a vacuum."""
+    if medium.plugin is None:
+        return None
+    sigma_t, albedo = (np.array(_numbers(values)) for values in (medium.sigma_t, medium.albedo))
+    phase: dict[str, Any] = {"name": medium.phase.name}
+    phase |= {"g": _number(medium.phase.g)} if medium.phase.name == "hg" else {}
+    phase |= {"table": _numbers(medium.phase.table)} if medium.phase.table is not None else {}
+    return {
+        "sigma_t": _numbers(sigma_t),
+        "albedo": _numbers(albedo),
+        "sigma_s": _numbers(albedo * sigma_t),
+        "sigma_a": _numbers((1 - albedo) * sigma_t),
+        "mean_free_path": [_number(1 / value) if value > 0 else None for value in sigma_t],
+        "phase": phase | {"formula": _PHASES[medium.phase.name]},
+    }
+
+
+_PHASES = {
+    "isotropic": "1/(4 pi) [1/sr]",
+    "rayleigh": "3 (1 + cos^2)/(16 pi) [1/sr]",
+    "hg": "(1 - g^2)/(4 pi (1 + g^2 - 2 g cos)^1.5) [1/sr], cos = 1 forward: g > 0 scatters forward",
+    "tabulated": "linear between values at regular cosines from -1 (backward) to 1, divided by 4 pi times their mean",
+}
+
+
+def _bounds(bounds: Any) -> dict[str, Any]:
+    from reference.scene.convex_bodies import Ball
+
+    if isinstance(bounds, Ball):
+        return {"kind": "ball", "centre": _numbers(bounds.centre), "radius": _number(bounds.radius)}
+    return {"kind": "convex mesh", "facets": len(bounds.offset)}
+
+
+def _light(light: TruthLight) -> dict[str, Any]:
+    found: dict[str, Any] = {
+        "kind": "point",
+        "position": _numbers(light.position),
+        "intensity": _numbers(light.intensity),
+    }
+    if light.axis is None:
+        return found | {"falloff": _FALLOFF["point"]}
+    return found | {
+        "kind": "spot",
+        "axis": _numbers(light.axis),
+        "cutoff_angle": _number(np.rad2deg(light.cutoff)),
+        "beam_angle": _number(np.rad2deg(light.beam)),
+        "falloff": _FALLOFF["soft" if light.is_soft else "hard"],
+    }
+
+
+def _directional(light: DirectionalLight) -> dict[str, Any]:
+    return {
+        "kind": "directional",
+        "axis": _numbers(light.direction),
+        "irradiance": _numbers(light.irradiance),
+        "falloff": _FALLOFF["directional"],
+    }
+
+
+def _reflectance(shape: Any) -> tuple[list[float], bool]:
+    """Return the diffuse reflectance, its mean where it differs from place to place, and whether it does."""
+    import drjit as dr
+    import mitsuba as mi
+
+    number = np.arange(_POINTS)
+    place = mi.Point2f((number + 0.5) / _POINTS, number * 0.6180339887 % 1)  # evenly spread: Kronecker's points
+    found = shape.sample_position(0, place)
+    interaction = mi.SurfaceInteraction3f(found, dr.zeros(mi.Color0f))
+    interaction.wi = mi.Vector3f(0, 0, 1)
+    values = np.array(shape.bsdf().eval_diffuse_reflectance(interaction), dtype=np.float64).reshape(3, -1)
+    return _numbers(values.mean(axis=1)), bool(np.ptp(values, axis=1).max() > 1e-6)
+
+
+def _numbers(values: Any) -> list[float]:
+    return [_number(value) for value in np.asarray(values, dtype=np.float64).reshape(-1)]
+
+
+def _number(value: float) -> float:
+    """Return a number that float32 rounded as the one that was meant: 0.91 instead of 0.9100000262260437."""
+    short = float(str(np.float32(value)))
+    # A number with more digits than float32 has stays what it is; + 0.0 takes the sign from a zero.
+    return (short if abs(short - value) <= 1e-7 * abs(value) else float(value)) + 0.0

@@ -1,0 +1,241 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What this machine has, and the check that every command runs before its first kernel.
+
+Importing this module imports neither Mitsuba nor Dr.Jit. `activate` is the only place that sets a Mitsuba variant.
+"""
+
+import ctypes
+import difflib
+import os
+import shutil
+import sys
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from reports import __version__
+from reports.machine.gpu import cuda_status, optix_status
+from reports.machine.llvm import LLVM_VARIABLE, OLDEST_LLVM, Llvm, find_llvm
+
+if TYPE_CHECKING:
+    from reference.storage.exr import Image
+
+#: Mitsuba variants that airlight runs in: vectorised, in colour.
+VARIANTS = ("cuda_ad_rgb", "llvm_ad_rgb")
+VARIANT_VARIABLE = "AIRLIGHT_VARIANT"
+
+_PACKAGES = ("mitsuba", "drjit", "numpy", "scipy", "mpmath", "OpenEXR", "colour-science", "matplotlib")
+# Debian's package names, and how each family of systems installs the same two libraries. Checked on Debian 12.
+_INSTALLERS = {
+    "apt-get": ("apt-get install -y", {}),
+    "dnf": ("dnf install -y", {"libllvm19": "llvm-libs", "libatomic1": "libatomic"}),
+    "zypper": ("zypper install -y", {"libllvm19": "libLLVM19"}),
+    "pacman": ("pacman -S", {"libllvm19": "llvm-libs", "libatomic1": "gcc-libs"}),
+    "brew": ("brew install", {"libllvm19": "llvm", "libatomic1": "gcc"}),
+}  # fmt: skip
+
+
+class MissingError(RuntimeError):
+    """Something that airlight needs is missing on this machine.
+
+    The message is one line that says what is missing and what to type. The command line prints it without a
+    traceback and exits with status 3.
+    """
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """What the check before the first kernel chose."""
+
+    variant: str
+    llvm: Llvm | None  #: the one that Dr.Jit will load; None where CUDA does without
+
+
+def prepare(variant: str | None = None) -> Prepared:
+    """Check that kernels can be compiled here, and tell Dr.Jit which libLLVM to use.
+
+    Call it before Dr.Jit compiles anything: it sets ``DRJIT_LIBLLVM_PATH``. Takes a few milliseconds.
+
+    Parameters
+    ----------
+    variant
+        One of `VARIANTS`; by default ``AIRLIGHT_VARIANT`` (which ``--variant`` sets), else the best that works.
+
+    Raises
+    ------
+    MissingError
+        If a library is missing, or the variant asked for does not work here.
+    analytic.errors.InputError
+        For an unknown variant.
+    """
+    variant = variant or os.environ.get(VARIANT_VARIABLE) or None
+    if variant is not None:
+        check_variant(variant)
+    if variant == "cuda_ad_rgb" or variant is None:
+        reason = cuda_problem()
+        if variant is not None and reason:
+            raise MissingError(f"the variant cuda_ad_rgb does not work here: {reason}; use --variant llvm_ad_rgb")
+        variant = "llvm_ad_rgb" if reason else "cuda_ad_rgb"
+    on_processor = variant == "llvm_ad_rgb"
+    if on_processor and not _has_fma():
+        raise MissingError("the processor has no fused multiply-add (FMA), which Dr.Jit needs: use another machine")
+    llvm = next(iter(find_llvm()), None)
+    problems = [problem for problem in (llvm_problem(llvm) if on_processor else "", atomic_problem()) if problem]
+    if problems:
+        packages = missing_packages()
+        install = f". Install what is missing with `{install_line(packages)}`" if packages else ""
+        raise MissingError("; ".join(problems) + install)
+    if llvm is None or not llvm.works:
+        return Prepared(variant, None)
+    os.environ[LLVM_VARIABLE] = llvm.path
+    return Prepared(variant, llvm)
+
+
+def activate(variant: str | None = None) -> str:
+    """Check the machine as `prepare` does and make the Mitsuba variant current; return its name.
+
+    A variant of `VARIANTS` that is already current stays, unless another one is asked for.
+    """
+    mitsuba = sys.modules.get("mitsuba")
+    current = mitsuba.variant() if mitsuba else None
+    if current in VARIANTS and (variant or os.environ.get(VARIANT_VARIABLE) or current) == current:
+        return current
+    chosen = prepare(variant)
+    try:
+        import mitsuba as mi
+    except ImportError as error:
+        raise MissingError(f"mitsuba cannot be imported ({error}): run `pip install mitsuba==3.9.1`") from error
+
+    try:
+        mi.set_variant(chosen.variant)
+    except ImportError as error:  # a library that is there and cannot be loaded
+        raise MissingError(f"{chosen.variant} does not start ({error}); see `airlight doctor`") from error
+    return chosen.variant
+
+
+def check_variant(variant: str) -> None:
+    """Refuse a variant that airlight cannot run in."""
+    from analytic.errors import InputError
+
+    if variant not in VARIANTS:
+        nearest = difflib.get_close_matches(variant, VARIANTS, n=1)
+        hint = f"; did you mean {nearest[0]}?" if nearest else ""
+        raise InputError(f"variant: got {variant!r}, wanted one of {', '.join(VARIANTS)}{hint}")
+
+
+def atomic_problem() -> str:
+    """Say what is wrong with libatomic, without which `import drjit` fails; nothing wrong gives an empty string."""
+    if sys.platform != "linux":
+        return ""
+    try:
+        ctypes.CDLL("libatomic.so.1")
+    except OSError:
+        return "libatomic.so.1 is missing, which Dr.Jit needs"
+    return ""
+
+
+def cuda_problem() -> str:
+    """Say why `cuda_ad_rgb` does not work here; an empty string if it does."""
+    cuda = cuda_status()
+    if not cuda.works:
+        return f"CUDA: {cuda.reason}"
+    optix = optix_status()
+    return "" if optix.works else f"OptiX: {optix.reason}"
+
+
+def llvm_problem(llvm: Llvm | None) -> str:
+    """Say what is wrong with the best libLLVM; nothing wrong gives an empty string."""
+    if llvm is None:
+        return f"no libLLVM found, {OLDEST_LLVM} or newer is needed (set {LLVM_VARIABLE} if it lies elsewhere)"
+    if llvm.works:
+        return ""
+    if os.environ.get(LLVM_VARIABLE) == llvm.path:
+        return f"{LLVM_VARIABLE} names {llvm.path}, which does not work ({llvm.reason}); unset it or name another"
+    return f"the newest libLLVM here, {llvm.path}, does not work ({llvm.reason})"
+
+
+def missing_packages() -> list[str]:
+    """Return Debian's names of the packages that are missing here."""
+    missing = [] if any(llvm.works for llvm in find_llvm()) else ["libllvm19"]
+    return [*missing, "libatomic1"] if atomic_problem() else missing
+
+
+def install_line(packages: list[str]) -> str:
+    """Return the line to type on this system to install packages known by Debian's names."""
+    for program, (line, names) in _INSTALLERS.items():
+        if shutil.which(program):
+            sudo = "" if os.geteuid() == 0 or program == "brew" else "sudo "
+            return f"{sudo}{line} {' '.join(names.get(package, package) for package in packages)}"
+    return f"your system's installer for {' and '.join(packages)}"
+
+
+def threads() -> int:
+    """Return how many processors this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def processor() -> str:
+    """Return the processor's name."""
+    import platform
+
+    lines = _cpuinfo("model name")
+    return lines or platform.processor() or platform.machine()
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of airlight, Python and the packages that make the numbers."""
+    from importlib.metadata import PackageNotFoundError, version
+
+    found = {"airlight": __version__, "python": ".".join(map(str, sys.version_info[:3]))}
+    for package in _PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = "missing"
+    return found
+
+
+def stamped(image: "Image") -> "Image":
+    """Return a layered image whose header names the versions that made it."""
+    named = {f"airlight:version:{key}": value for key, value in versions().items()}
+    return replace(image, attributes=dict(image.attributes) | named)
+
+
+def describe_environment() -> dict[str, object]:
+    """Return what made the numbers, as JSON-ready data, for the head of a report."""
+    import platform
+
+    mitsuba = sys.modules.get("mitsuba")
+    variant = mitsuba.variant() if mitsuba else None
+    found: dict[str, object] = {
+        "versions": versions(),
+        "platform": platform.platform(),
+        "processor": processor(),
+        "threads": threads(),
+        "variant": variant or "none yet",
+    }
+    if variant == "cuda_ad_rgb":
+        found["device"] = cuda_status().reason
+    llvm = next(iter(find_llvm()), None)
+    if llvm is not None:
+        found["llvm"] = f"{llvm.label}, {llvm.path}"
+    return found
+
+
+def _has_fma() -> bool:
+    if sys.platform != "linux" or os.uname().machine not in ("x86_64", "i686"):
+        return True
+    flags = _cpuinfo("flags")
+    return not flags or "fma" in flags.split()
+
+
+def _cpuinfo(key: str) -> str:
+    """Return the first value of a key of /proc/cpuinfo, read no further than that."""
+    try:
+        with open("/proc/cpuinfo", encoding="utf-8", errors="replace") as lines:
+            for line in lines:
+                name, _, value = line.partition(":")
+                if name.strip() == key:
+                    return value.strip()
+    except OSError:
+        pass
+    return ""

@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""Images as integers that compress well, for a page that decodes them in the browser.
+
+A page holds hundreds of images. What a reader looks at are the errors, and these must not drown in the rounding of the
+encoding: a half float moves a radiance by up to 5e-4, a good method by 1e-6. So only the reference is stored as
+radiance; of every other image its difference from the reference is, relative as in `validation.metrics.errors`:
+
+    d = (test - reference) / max(|reference|, floor),        floor = 0.001 mean(reference)
+    code = round(k asinh(d / s))                              16 bits
+
+which is linear for |d| < s and logarithmic above, so that the rounding of d is at most
+
+    (1/2k) sqrt(s^2 + d^2)  (+ terms of second order in 1/k)
+
+that is d/2k of a large error, and s/2k, below single precision for the finest of `PRECISIONS`, of a small one. Nothing
+is clamped: where the largest code would not fit, k is made smaller for that plane. The reference keeps the upper 24
+bits of each float32, rounded: 16 binary digits, to 2^-16 = 1.5e-5 relative at most. `d` is taken against the rounded
+reference in the denominator and against the exact one in the difference, so that the errors do not see that rounding.
+
+A plane of codes is then predicted (from nothing, from the left, from the gradient left + up - left-up), the second and
+third channel also from the first; what remains, zigzag coded (0, -1, 1, -2, ...), goes byte by byte, low bytes first,
+into zlib. All arithmetic is modulo 2^bits, so decoding is exact. `templates/codec.js` is the decoder of the page,
+`decode_planes` its twin.
+"""
+
+import zlib
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Codes = NDArray[np.int32]
+Array = NDArray[np.float64]
+
+NONE, LEFT, GRADIENT = range(3)  #: predictors
+REFERENCE_BITS, DIFFERENCE_BITS, FLIP_BITS = 24, 16, 8
+LARGEST = 32766  #: code of the largest finite difference
+NAN, INFINITE = -32768, 32767  #: codes of what is no number; minus infinity is -INFINITE
+
+_BAND = 48  # rows on which a predictor is chosen
+
+
+@dataclass(frozen=True)
+class Precision:
+    """How finely differences are stored."""
+
+    k: float  #: codes for each factor e of a large difference
+    s: float  #: relative difference where linear turns into logarithmic
+
+    @property
+    def of_difference(self) -> float:
+        """Largest rounding of a large difference, relative to it."""
+        return 0.5 / self.k
+
+    @property
+    def of_value(self) -> float:
+        """Largest rounding of a small difference, relative to the value of the reference."""
+        return 0.5 * self.s / self.k
+
+
+#: From fine to coarse.
+PRECISIONS = (Precision(1000, 5e-5), Precision(250, 1e-4), Precision(100, 1e-4))
+
+
+@dataclass(frozen=True)
+class Packed:
+    """Planes of one image, compressed.
+
+    Attributes
+    ----------
+    data
+        A zlib stream.
+    planes
+        For each plane whether it is the difference from the first (0 or 1), and its predictor.
+    """
+
+    data: bytes
+    planes: tuple[tuple[int, int], ...]
+
+
+def reference_codes(radiance: NDArray[np.floating]) -> Codes:
+    """Return the upper 24 bits of float32 values, rounded to nearest; infinities stay, every NaN becomes one."""
+    with np.errstate(over="ignore"):  # beyond float32 is infinite, as in the file
+        single = np.ascontiguousarray(radiance, dtype=np.float32)
+    bits = single.view(np.uint32).astype(np.int64)
+    # Rounding up the largest finite numbers may reach the pattern of infinity, never beyond.
+    rounded = (bits + 0x80) >> 8
+    codes = np.where(np.isfinite(single), rounded, bits >> 8)
+    return np.where(np.isnan(single), 0x7FC000, codes).astype(np.int32)
+
+
+def reference_values(codes: Codes) -> Array:
+    """Return the values of `reference_codes`."""
+    return (codes.astype(np.uint32) << np.uint32(8)).view(np.float32).astype(np.float64)
+
+
+def difference_codes(difference: Array, precision: Precision) -> tuple[Codes, float]:
+    """Return the codes of relative differences and the k that they were made with (see the module)."""
+    finite = np.isfinite(difference)
+    scaled = np.arcsinh(np.where(finite, difference, 0) / precision.s)
+    largest = float(np.abs(scaled).max(initial=0))
+    k = min(precision.k, LARGEST / largest) if largest > 0 else precision.k
+    codes = np.round(k * scaled)
+    codes = np.where(np.isposinf(difference), INFINITE, np.where(np.isneginf(difference), -INFINITE, codes))
+    return np.where(np.isnan(difference), NAN, codes).astype(np.int32), k
+
+
+def difference_values(codes: Codes, k: float, s: float) -> Array:
+    """Return the relative differences of `difference_codes`."""
+    values = s * np.sinh(codes / k)
+    values = np.where(codes == INFINITE, np.inf, np.where(codes == -INFINITE, -np.inf, values))
+    return np.where(codes == NAN, np.nan, values)
+
+
+def pack_planes(codes: Codes, bits: int) -> Packed:
+    """Compress planes of codes.
+
+    Parameters
+    ----------
+    codes
+        (height, width, planes); signed or unsigned, taken modulo 2^bits.
+    bits
+        8, 16 or 24.
+    """
+    parts: list[bytes] = []
+    planes = []
+    for number in range(codes.shape[-1]):
+        own = codes[..., number]
+        choices = [(0, own)] + ([(1, own - codes[..., 0])] if number else [])
+        tried = [
+            (_cost(_residual(band, predictor, bits)), relative, predictor)
+            for relative, plane in choices
+            for band in (_band(plane),)
+            for predictor in (NONE, LEFT, GRADIENT)
+        ]
+        _, relative, predictor = min(tried)
+        planes.append((relative, predictor))
+        residual = _residual(choices[relative][1], predictor, bits)
+        parts += [(residual >> shift).astype(np.uint8).tobytes() for shift in range(0, bits, 8)]
+    return Packed(zlib.compress(b"".join(parts), 6), tuple(planes))
+
+
+def decode_planes(packed: Packed, size: tuple[int, int], bits: int) -> Codes:
+    """Return the codes, (height, width, planes); those of 16 bits with their sign. The twin of the page's decoder.
+
+    Parameters
+    ----------
+    packed
+        From `pack_planes`.
+    size
+        Width and height.
+    bits
+        As given to `pack_planes`.
+    """
+    width, height = size
+    raw = np.frombuffer(zlib.decompress(packed.data), np.uint8).astype(np.int64)
+    found: list[NDArray[np.int64]] = []
+    for part, (relative, predictor) in zip(np.split(raw, len(packed.planes)), packed.planes):
+        zigzag = sum(byte << 8 * place for place, byte in enumerate(np.split(part, bits // 8)))
+        residual = np.where(zigzag & 1, -(zigzag + 1) // 2, zigzag // 2).reshape(height, width)
+        if predictor == LEFT:
+            residual = np.cumsum(residual, axis=1)
+        elif predictor == GRADIENT:
+            residual = np.cumsum(np.cumsum(residual, axis=1), axis=0)
+        codes = residual + found[0] if relative else residual
+        found.append(np.asarray(codes % (1 << bits), dtype=np.int64))
+    planes = np.stack(found, axis=-1)
+    if bits == DIFFERENCE_BITS:
+        planes = np.where(planes >> (bits - 1), planes - (1 << bits), planes)
+    return planes.astype(np.int32)
+
+
+def _residual(plane: Codes, predictor: int, bits: int) -> Codes:
+    """Return what a predictor leaves, zigzag coded. Outside the image everything is 0."""
+    rest = plane.astype(np.int32)
+    if predictor != NONE:
+        rest = np.diff(rest, axis=1, prepend=np.int32(0))
+    if predictor == GRADIENT:
+        rest = np.diff(rest, axis=0, prepend=np.int32(0))
+    spare = 32 - bits
+    signed = (rest << spare) >> spare  # modulo 2^bits, with its sign
+    return ((signed << 1) ^ (signed >> 31)) & ((1 << bits) - 1)
+
+
+def _band(plane: Codes) -> Codes:
+    start = max(0, (len(plane) - _BAND) // 2)
+    return plane[start : start + _BAND]
+
+
+def _cost(residual: Codes) -> float:
+    """Return about how many bits a value of a residual takes."""
+    return float(np.log2(1.0 + residual).mean()) if residual.size else 0.0

@@ -1,0 +1,214 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The images of a report as data for its page: packed, with an index that the page's script reads.
+
+Each scene becomes one string of base64 that holds all of its packed planes, and an entry of the index that says where
+each lies and how it was coded (`reports.page.image_codec`). A page has a limit of bytes; the largest scenes go down
+`LADDER` until all fit (`reports.page.image_cache`): first the differences are coded more coarsely, then every second,
+third ... pixel is kept. What was done is in the index, and the page says so.
+"""
+
+import base64
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analytic.errors import InputError
+from reference.storage.exr import TOTAL, read_exr
+from reports.page.image_codec import (
+    DIFFERENCE_BITS,
+    FLIP_BITS,
+    PRECISIONS,
+    REFERENCE_BITS,
+    Packed,
+    Precision,
+    difference_codes,
+    pack_planes,
+    reference_codes,
+    reference_values,
+)
+
+Array = NDArray[np.float64]
+
+LAYERS = ("airlight", "surface")
+FLIP_LAYER = "flip"
+FLIP_LEVELS = 255  #: code of an HDR-FLIP of 1
+DARK = 1e-3  #: share of the mean of the reference below which a relative error is against that, as in the tables
+#: Precision of the differences, and which pixels are kept: from the finest down.
+LADDER: tuple[tuple[Precision, int], ...] = (
+    *((precision, 1) for precision in PRECISIONS),
+    *((PRECISIONS[1], stride) for stride in (2, 3, 4, 6, 8, 12, 16)),
+)
+
+
+@dataclass(frozen=True)
+class SceneImages:
+    """The images of one scene for the page.
+
+    Attributes
+    ----------
+    index
+        What the page's script reads, JSON-ready; offsets count the bytes before base64.
+    data
+        All packed planes, in base64.
+    """
+
+    index: dict[str, Any]
+    data: str
+
+
+@dataclass(frozen=True)
+class StoredImages:
+    """The layers of one scene as they are in the files: of the reference, and of each method with its FLIP map."""
+
+    reference: Mapping[str, Array]
+    methods: Sequence[Mapping[str, Array]]
+
+
+def read_images(scene: Mapping[str, Any], folder: Path) -> StoredImages:
+    """Return the images of a scene of report.json from the files that it names.
+
+    Raises
+    ------
+    InputError
+        If a file is missing or cannot be read, or its size is not that of the reference.
+    """
+    reference = _layers(folder / scene["files"]["exr"])
+    files = [folder / one["files"]["exr"] for one in scene["methods"] if one["files"]]
+    methods = [_layers(path) for path in files]  # one at a time: reading turns the standard error stream off
+    size = reference["airlight"].shape
+    for path, layers in zip(files, methods):
+        for layer in layers.values():
+            if layer.shape != size:
+                raise InputError(
+                    f"{path}: got {layer.shape[1]} x {layer.shape[0]} pixels, wanted the {size[1]} x {size[0]} of the "
+                    "scene's reference; make the report again"
+                )
+    return StoredImages(reference, methods)
+
+
+def _layers(path: Path) -> dict[str, Array]:
+    """Return the layers of a file that the page shows: airlight and surface, or the total where it has no airlight."""
+    layers = read_exr(path).layers
+    wanted = [*(LAYERS if "airlight" in layers else (TOTAL,)), FLIP_LAYER]
+    return {name: np.asarray(layers[name], dtype=np.float64) for name in wanted if name in layers}
+
+
+def packed_scene(scene: Mapping[str, Any], images: StoredImages, precision: Precision, stride: int) -> SceneImages:
+    """Return the images of a scene for the page.
+
+    Parameters
+    ----------
+    scene
+        A scene of report.json.
+    images
+        From its files.
+    precision
+        Of the differences.
+    stride
+        One pixel in so many is kept, along both axes.
+    """
+
+    def thin(layers: Mapping[str, Array]) -> dict[str, Array]:
+        return {name: layer[::stride, ::stride] for name, layer in layers.items()}
+
+    store = _Store()
+    exact = thin(images.reference)
+    exact.setdefault("surface", np.zeros_like(exact["airlight"]))
+    codes = {name: reference_codes(exact[name]) for name in LAYERS}
+    # The floors are those of the whole image, so that they do not depend on which pixels are kept.
+    whole = dict(images.reference)
+    whole[TOTAL] = whole["airlight"] + whole.get("surface", 0)
+    floors = {name: _floor(whole.get(name)) for name in (*LAYERS, TOTAL)}
+    exact[TOTAL] = exact["airlight"] + exact["surface"]
+    rounded = {name: reference_values(codes[name]) for name in LAYERS}
+    rounded[TOTAL] = rounded["airlight"] + rounded["surface"]
+    shown = [one for one in scene["methods"] if one["files"]]
+
+    def packed(number: int) -> dict[str, tuple[Packed, float]]:
+        """Return the packed layers of a method, each with its k."""
+        found = {}
+        for name, layer in thin(images.methods[number]).items():
+            if name == FLIP_LAYER:
+                levels = np.round(FLIP_LEVELS * np.clip(np.nan_to_num(layer[..., :1]), 0, 1)).astype(np.int32)
+                found[name] = pack_planes(levels, FLIP_BITS), float(FLIP_LEVELS)
+            else:
+                relative = relative_difference(exact[name], rounded[name], layer, floors[name])
+                method_codes, k = difference_codes(relative, precision)
+                found[name] = pack_planes(method_codes, DIFFERENCE_BITS), k
+        return found
+
+    with ThreadPoolExecutor() as pool:
+        references = list(pool.map(lambda name: pack_planes(codes[name], REFERENCE_BITS), LAYERS))
+        methods = list(pool.map(packed, range(len(shown))))
+    height, width = codes["airlight"].shape[:2]
+    full_height, full_width = images.reference["airlight"].shape[:2]
+    index = {
+        "name": scene["name"],
+        "size": [width, height],
+        "full": [full_width, full_height],
+        "stride": stride,
+        "exposure": scene["exposure"],
+        "floors": floors,
+        "s": precision.s,
+        "of_difference": precision.of_difference,
+        "of_value": precision.of_value,
+        "reference": {name: store.add(one) for name, one in zip(LAYERS, references)},
+        "methods": [
+            {
+                "label": one["label"],
+                "layers": {name: store.add(what) | {"k": k} for name, (what, k) in layers.items()},
+            }
+            for one, layers in zip(shown, methods)
+        ],
+    }
+    return SceneImages(index, base64.b64encode(store.bytes()).decode("ascii"))
+
+
+def relative_difference(exact: Array, rounded: Array, test: Array, floor: float) -> Array:
+    """Return the difference of an image from the reference, in units of the larger of that and the floor.
+
+    Parameters
+    ----------
+    exact, test
+        Reference and image as they are.
+    rounded
+        The reference as the page will have it, which it multiplies with.
+    floor
+        Of the reference; positive.
+    """
+    with np.errstate(invalid="ignore"):
+        difference = test - np.where(np.isfinite(exact), exact, 0)
+        unit = np.maximum(np.abs(np.where(np.isfinite(rounded), rounded, 0)), floor)
+        return difference / unit
+
+
+def _floor(reference: Array | None) -> float:
+    """Return the radiance below which errors are relative to it; 1 where the reference is black."""
+    if reference is None:
+        return 1.0
+    finite = np.isfinite(reference)
+    mean = float(reference[finite].mean()) if finite.any() else 0.0
+    return DARK * mean if mean > 0 else 1.0
+
+
+class _Store:
+    """Packed planes one behind the other; equal ones once."""
+
+    def __init__(self) -> None:
+        self._parts: dict[bytes, int] = {}
+        self._length = 0
+
+    def add(self, packed: Packed) -> dict[str, Any]:
+        """Put planes into the store; return where they lie and how they are coded."""
+        if packed.data not in self._parts:
+            self._parts[packed.data] = self._length
+            self._length += len(packed.data)
+        return {"at": self._parts[packed.data], "bytes": len(packed.data), "planes": [list(p) for p in packed.planes]}
+
+    def bytes(self) -> bytes:
+        return b"".join(self._parts)

@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The page of a report: report.json and its images as one self-contained HTML file.
+
+Styles, scripts and images are put into the file: it opens without a network, in any recent browser. The images go in as
+data (`reports.page.image_index`), decoded and drawn by the scripts in `templates/`.
+"""
+
+import base64
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from analytic.errors import InputError
+from reports.data.claims import verdict
+from reports.page.chart import speed_error_chart
+from reports.page.filters import FILTERS, KEYS, KINDS, MARKS, kept_words, precision_words, viewer_words
+from reports.page.image_cache import page_images
+from reports.page.image_index import SceneImages
+from reports.papers.labels import BILLETER_PASSES, BILLETER_SIZE
+from reports.papers.labels import FILTERS as PUBLISHED_FILTERS
+from reports.plotting.colour_maps import signed_colours, unsigned_colours
+from reports.tables.bench import RATES
+
+PAGE_LIMIT = 30_000_000  #: bytes of a page
+WORDS_LIMIT = 2_500_000  #: of these for all that is not an image
+SCRIPTS = ("codec.js", "scene.js", "draw.js", "viewer.js", "page.js")
+TEMPLATES = Path(__file__).parent / "templates"
+
+
+def render_page(data: dict[str, Any], folder: Path, *, limit: int = PAGE_LIMIT) -> str:
+    """Return the HTML page of a report.
+
+    Parameters
+    ----------
+    data
+        The content of report.json, schema "airlight-report/2".
+    folder
+        Where the files that it names lie.
+    limit
+        Of the page [bytes]; images are thinned out to keep it.
+
+    Raises
+    ------
+    InputError
+        If a file is missing or cannot be used, or if the page cannot be made small enough.
+    """
+    import jinja2
+    from markupsafe import Markup
+
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(TEMPLATES),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {**FILTERS, **PUBLISHED_FILTERS, "verdict": verdict}
+    # A scene of which nothing could be shown has no viewer, and no images in the page.
+    with_images = [scene for scene in data["scenes"] if any(one["files"] for one in scene["methods"])]
+    images = page_images(with_images, Path(folder), limit - WORDS_LIMIT)
+    number_of = {id(scene): number for number, scene in enumerate(with_images)}
+    page = environment.get_template("report.html.j2").render(
+        report=data,
+        viewers=[
+            _viewer(scene, number_of[id(scene)], images[number_of[id(scene)]]) if id(scene) in number_of else None
+            for scene in data["scenes"]
+        ],
+        chart=Markup(speed_error_chart(data["scenes"])) if data["scenes"] else "",
+        css=Markup((TEMPLATES / "report.css").read_text(encoding="utf-8")),
+        scripts=[Markup((TEMPLATES / name).read_text(encoding="utf-8")) for name in SCRIPTS],
+        images=Markup(_script_json({"scenes": [one.index for one in images], "maps": _maps()})),
+        pixels=[Markup(one.data) for one in images],
+        rates_headers=list(RATES),
+        billeter_passes=BILLETER_PASSES,
+        billeter_size=BILLETER_SIZE,
+        key_table=KEYS,
+        kinds=KINDS,
+        marks=MARKS,
+        kept=kept_words(data),
+        precision_words=precision_words([one.index for one in images]),
+    )
+    if len(page.encode()) > limit:
+        raise InputError(
+            f"report: the page takes {len(page.encode()) / 1e6:.1f} MB, wanted at most {limit / 1e6:g} MB; "
+            "report fewer scenes or methods at once"
+        )
+    return page
+
+
+def _viewer(scene: Mapping[str, Any], number: int, images: SceneImages) -> dict[str, Any]:
+    shown = [one for one in scene["methods"] if one["files"]]
+    return {
+        "number": number,
+        "shown": shown,
+        "first": _first_shown(shown),
+        "size": images.index["size"],
+        "words": viewer_words(images.index),
+    }
+
+
+def _first_shown(methods: Sequence[Mapping[str, Any]], target: float = 0.01) -> int:
+    """Return the place of the fastest method within the target, as the claims name it, or else of the most accurate."""
+
+    def order(number: int) -> tuple[float, float]:
+        one = methods[number]
+        error = (one["error"] or {}).get("relative_rmse")
+        if error is None or one["error"].get("nonfinite"):
+            return 2, 0
+        if error <= target and one["times"]:
+            return 0, one["times"]["frame"]["median_ms"]
+        return 1, error
+
+    return min(range(len(methods)), key=order)
+
+
+def _maps() -> dict[str, str]:
+    """Return the colour maps by name, their bytes in base64."""
+    maps = {"signed": signed_colours(), "relative": unsigned_colours("viridis"), "flip": unsigned_colours("magma")}
+    return {name: base64.b64encode(colours.tobytes()).decode("ascii") for name, colours in maps.items()}
+
+
+def _script_json(value: Any) -> str:
+    """Return JSON that can stand inside a script element: no tag can begin in it."""
+    return json.dumps(value, ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")

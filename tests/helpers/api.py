@@ -1,0 +1,22 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""For tests of `import airlight`: the functions that it has, a small image, a method and a kernel of one's own."""
+
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+TINY = (16, 12)
+FUNCTIONS = ("load_scene", "render", "reference", "compare", "integrate", "bench", "report")
+
+
+def brighter(view, *, kernel=None, times=2.0):
+    """A method of one's own: all of the airlight, unshadowed, times something."""
+    from realtime.methods.unshadowed import unshadowed
+
+    return times * unshadowed(view, kernel=kernel)
+
+
+def third(geometry, x0, x1, medium, light):
+    """A kernel of one's own."""
+    from realtime.kernels.exact import exact
+
+    return exact(geometry, x0, x1, medium, light) / 3

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What tests see and do in a browser that shows a report's page."""
+
+import numpy as np
+
+from reference.storage.exr import read_exr
+from tests.helpers.page import HEIGHT, WIDTH
+
+
+def watched(browser, **options):
+    """A new tab, and a list of all that it asks for, prints and throws."""
+    opened = browser.new_page(viewport={"width": 1300, "height": 1000}, **options)
+    told = []
+    opened.on("console", lambda message: told.append(f"console {message.text}"))
+    opened.on("pageerror", lambda error: told.append(f"error {error}"))
+    opened.on("request", lambda request: told.append(f"request {request.url}"))
+    return opened, told
+
+
+def viewer(page, number=0):
+    return page.locator(f"#viewer-{number}")
+
+
+def drawn(page, number=0):
+    return viewer(page, number).get_attribute("data-drawn")
+
+
+def pixels(page, selector):
+    """The pixels of a canvas, (height, width, 3)."""
+    size, values = page.evaluate(
+        """(selector) => {
+          const shown = document.querySelector(selector);
+          const {width, height} = shown;
+          const copy = Object.assign(document.createElement("canvas"), {width, height});
+          const context = copy.getContext("2d", {willReadFrequently: true});
+          context.drawImage(shown, 0, 0);
+          return [[height, width], [...context.getImageData(0, 0, width, height).data]];
+        }""",
+        selector,
+    )
+    return np.array(values, dtype=np.uint8).reshape(*size, 4)[..., :3].astype(int)
+
+
+def layer(folder, name, of="airlight"):
+    return read_exr(folder / "s" / f"{name}.exr").layers[of].astype(np.float64)
+
+
+def point_at(page, x, y, which="method", number=0):
+    canvas = viewer(page, number).locator(f".{which} canvas")
+    box = canvas.bounding_box()
+    canvas.hover(position={"x": (x + 0.5) * box["width"] / WIDTH, "y": (y + 0.5) * box["height"] / HEIGHT})
+
+
+def probe_row(page, label, number=0):
+    rows = viewer(page, number).locator(".probe tbody tr")
+    return next(
+        cells[1:] for cells in (row.locator("th, td").all_inner_texts() for row in rows.all()) if cells[0] == label
+    )
+
+
+def as_number(words):
+    mantissa, _, power = words.replace("\N{MINUS SIGN}", "-").removesuffix(" %").partition("·10")
+    return float(mantissa) * 10.0 ** int(power.translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")) or 0)

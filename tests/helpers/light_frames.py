@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Scenes and frames for the tests of light volumes."""
+
+import numpy as np
+
+from tests.helpers.scenes import spot, tiny_scene
+
+SIZE = (48, 36)
+EVALUATIONS = ("walk", "mesh")
+
+
+def lamp(*position):
+    return {"type": "point", "position": list(position), "intensity": {"type": "rgb", "value": [5.0, 4.0, 3.0]}}
+
+
+def camera(origin, target, *, size=SIZE, up=(0, 0, 1)):
+    import mitsuba as mi
+
+    look = mi.ScalarTransform4f().look_at(list(origin), list(target), list(up))
+    return {"sensor": tiny_scene(size=size)["sensor"] | {"to_world": look}}
+
+
+def bars(count=14):
+    """Bars between the light and the rays of a camera that looks along them."""
+    import mitsuba as mi
+
+    def bar(number):
+        place = mi.ScalarTransform4f().translate([-1.6 + 0.25 * number, 0.9, 1.0])
+        return {"type": "cube", "to_world": place.scale([0.05, 0.03, 2.0])}
+
+    return {f"bar{number}": bar(number) for number in range(count)}
+
+
+def fence():
+    return (
+        camera((-3.9, 1.7, 1.4), (2.3, 1.43, 0.9), size=(28, 20))
+        | {"lamp": lamp(0.1, -0.9, 1.2), "ball": None}
+        | bars()
+    )
+
+
+def coloured_fog():
+    colours = {"type": "rgb", "value": [0.1, 0.4, 0.9]}
+    return {"type": "homogeneous", "id": "fog", "sigma_t": colours, "albedo": 0.8, "phase": {"type": "hg", "g": 0.5}}
+
+
+#: Changes of the tiny scene by name, and the size of the map. Cameras on the grid have a column in the middle.
+GRID = (33, 25)
+SCENES = {
+    "light beside the view": (dict, 64),
+    "light in view": (lambda: camera((-2.5, -2.2, 0.3), (0.9, 0.7, 1.9)), 64),
+    "light behind": (lambda: camera((1.7, 1.6, 2.9), (-0.9, -0.7, -0.1)), 64),
+    "looking away": (lambda: camera((0.9, -4.7, 1.9), (0.9, -9.7, 1.9)), 64),
+    "camera close to the light": (lambda: camera((0.9, 0.7001, 1.9), (0, 0, 0.9)), 64),
+    "camera in shadow": (lambda: camera((-0.5, -0.5, 0.1), (2, 1.5, 0.9)), 64),
+    "fence": (fence, 256),
+    "spot": (lambda: {"lamp": spot()}, 64),
+    "spot in view": (lambda: {"lamp": spot()} | camera((-2.5, -2.2, 0.3), (0.5, 0.0, 1.5)), 64),
+    "soft spot": (lambda: {"lamp": spot(cutoff=37.0, beam=19.0)}, 64),
+    "colour, HG": (lambda: {"fog": coloured_fog()}, 64),
+    "three lights": (lambda: {"second": lamp(-1, 1.4, 0.6), "third": spot(beam=11.0)}, 64),
+    "coarse map": (dict, 4),
+    "fine map": (lambda: camera((0.2, -4.1, 1.3), (0.1, 0.0, 0.6), size=(8, 6)), 1024),
+    "along a column of texels": (
+        lambda: camera((0, -4, 2), (0, 0, 2), size=GRID) | {"lamp": lamp(0, 0, 2.5)},
+        16,
+    ),
+    "along the axis of a face": (
+        lambda: camera((0, 0, 0.3), (0, 3, 0.3), size=GRID) | {"lamp": lamp(0, 0, 2.5)},
+        16,
+    ),
+    "along diagonals": (lambda: camera((-3, -3, 2), (0, 0, 2), size=GRID) | {"lamp": lamp(0, 0, 2.5)}, 4),
+    "along the border of two faces": (
+        lambda: camera((1, -4, 1.5), (1, 4, 1.5), size=GRID) | {"lamp": lamp(0, 0, 2.5)},
+        8,
+    ),
+}
+
+
+def loaded_scene(name="light beside the view", **changes):
+    import mitsuba as mi
+
+    return mi.load_dict(tiny_scene(size=changes.pop("size", SIZE), **(SCENES[name][0]() | changes)))
+
+
+def renderer_of(loaded, method="light-volumes", precision="single", **parameters):
+    from realtime.frame.renderer import frame_renderer
+    from realtime.kernels.registry import KERNELS
+    from realtime.methods.registry import METHODS
+    from realtime.scene.read_scene import read_scene
+
+    kernel = KERNELS["exact"].function if METHODS[method].uses_kernel else None
+    return frame_renderer(read_scene(loaded, precision), METHODS[method], kernel=kernel, **parameters)
+
+
+def render(loaded, method="light-volumes", precision="single", **parameters):
+    from realtime.frame.renderer import render_frame
+
+    return render_frame(renderer_of(loaded, method, precision, **parameters))
+
+
+def render_both(loaded, precision="single", **parameters):
+    """Render the same height field, as published, by both evaluations."""
+    shared = {"precision": precision, "walls": "slanted"} | parameters
+    return [render(loaded, evaluation=one, **shared) for one in EVALUATIONS]
+
+
+def differ(found, wanted):
+    """Return the largest difference, relative to the largest value."""
+    return np.max(np.abs(found - wanted)) / np.max(wanted)
+
+
+def twin_of(loaded, frame, size, precision="single", *, walls="slanted"):
+    """Return the airlight of the map that a frame was rendered with, by another route."""
+    from realtime.scene.read_scene import read_scene
+    from realtime.shadow_maps.shadow_map import cast_shadow_map
+    from reference.scene.read import read_truth
+    from validation.oracles.light_volume import traced_walls, twin_airlight
+
+    scene = read_scene(loaded, precision)
+    maps = [cast_shadow_map(scene.geometry, light, size) for light in scene.lights]
+    numbers = traced_walls(scene, maps) if walls == "upright" else None
+    return twin_airlight(read_truth(loaded), maps, distance=frame.distance, walls=numbers)

@@ -1,0 +1,259 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A small report by hand, with its EXR files, and its page as a reader of HTML sees it."""
+
+import copy
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from reference.storage.exr import Image, write_exr
+
+WIDTH, HEIGHT = 32, 24
+VOID = {"meta", "img", "br", "hr", "link", "input"}
+
+
+class Page(HTMLParser):
+    """The page as a reader of HTML sees it; every tag must be closed in order."""
+
+    def __init__(self, text):
+        super().__init__(convert_charrefs=True)
+        self.source = text
+        self.open, self.tags, self.words, self.tables, self.captions, self.scripts = [], [], [], [], [], []
+        self.feed(text)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append((tag, dict(attrs)))
+        if tag == "table":
+            self.tables.append([])
+        elif self.tables and "table" in self.open:
+            self.tables[-1].append((tag, dict(attrs)))
+        if tag == "script":
+            self.scripts.append((dict(attrs), []))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        self.tags.append((tag, dict(attrs)))
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if "script" in self.open:
+            self.scripts[-1][1].append(data)
+        elif not {"style", "svg"} & set(self.open):
+            self.words.append(data)
+            if "caption" in self.open:
+                self.captions.append(data)
+
+    def attributes(self, tag):
+        return [attributes for name, attributes in self.tags if name == tag]
+
+    def script(self, name):
+        """The content of the script element with an id."""
+        (found,) = ("".join(parts) for attributes, parts in self.scripts if attributes.get("id") == name)
+        return found
+
+    @property
+    def text(self):
+        return " ".join(" ".join(self.words).split())
+
+
+def widths(table):
+    """The columns of each row of a table."""
+    found = []
+    for tag, attributes in table:
+        if tag == "tr":
+            found.append(0)
+        if tag in ("td", "th"):
+            found[-1] += int(attributes.get("colspan", 1))
+    return found
+
+
+def table_of(page, caption):
+    """The table whose caption begins so."""
+    return page.tables[next(place for place, words in enumerate(page.captions) if words.startswith(caption))]
+
+
+def timing(median):
+    return {"median_ms": median, "low_ms": 0.9 * median, "high_ms": 1.2 * median, "repetitions": 7}
+
+
+def method(label, **changes):
+    error = {"relative_rmse": 0.0123, "relative_bias": -0.0045, "p50": 0.0011, "p99": 0.0555, "nonfinite": 0}
+    return {
+        "label": label,
+        "kind": "built-in",
+        "layer": "airlight",
+        "method": label.split(" ")[0],
+        "refused": None,
+        "left_out": False,
+        "note": None,
+        "knows_shadows": True,
+        "times": {name: timing(3.21) for name in ("frame", "surface", "airlight", "rebuild")},
+        "error": error,
+        "flip": {"value": 0.0321, "note": ""},
+        "files": {"picture": "s/good.png", "error": "s/good-error.png", "exr": "s/good.exr"},
+    } | changes
+
+
+def refused(label, why, **changes):
+    return method(label, refused=why, times=None, error=None, flip=None, files={}, **changes)
+
+
+STATISTICS = {
+    "relative_bias": 0.00017,
+    "relative_bias_ci": [-0.0011, 0.0014],
+    "margin": 0.005,
+    "equivalent": True,
+    "detectable_bias": 0.0021,
+    "z_mean": 0.013,
+    "z_std": 1.021,
+    "rejected": 3,
+    "expected_rejections": 0.01,
+}
+AGREEMENT = {
+    "estimator": "volpath",
+    "layer": "airlight",
+    "width": 160,
+    "height": 120,
+    "batches": 48,
+    "samples": 64,
+    "epsilon": 8.94e-4,
+    "masked": 11,
+    "uncorrected_bias": 0.0013,
+    "statistics": STATISTICS,
+}
+DATA: dict[str, Any] = {
+    "schema": "airlight-report/2",
+    "created": "2026-11-21 12:34:56 +0000",
+    "command": "airlight report --quick",
+    "seconds": 12.3,
+    "kept": 0,
+    "computed": 9,
+    "settings": {"name": "quick", "image": [WIDTH, HEIGHT], "timed": [64, 48]},
+    "environment": {"versions": {"airlight": "0.1.0", "mitsuba": "3.9.1"}, "variant": "llvm_ad_rgb", "threads": 2},
+    "claims": [
+        {"kind": "truth", "text": "The truth is confirmed.", "good": True},
+        {"kind": "fastest", "text": "hall: the fastest method is good.", "good": None},
+    ],
+    "scenes": [
+        {
+            "name": "hall",
+            "purpose": "A hall.",
+            "published": "Billeter 2010",
+            "path": None,
+            "size": [WIDTH, HEIGHT],
+            "plan": {"shadows": "visibility tests", "medium": "unbounded"},
+            "notes": [],
+            "truth": {
+                "mean": 0.98765,
+                "relative_bound": 1.2e-6,
+                "transitions": 4321,
+                "missed": 0.0007,
+                "checked": 98765,
+                "disagreements": 12,
+                "refined": 11,
+                "left": 1,
+            },
+            "multiple": {
+                "medium": {"value": 0.123, "interval": [0.12, 0.126]},
+                "everything": {"value": 0.21, "interval": [0.2, 0.22]},
+                "max_depth": 64,
+            },
+            "agreement": {"airlight": AGREEMENT, "surface": AGREEMENT | {"layer": "surface"}},
+            "methods": [
+                method("good (k)"),
+                method(
+                    "flat",
+                    knows_shadows=False,
+                    files={"picture": "s/flat.png", "error": "s/flat-error.png", "exr": "s/flat.exr"},
+                ),
+            ],
+            "exposure": 2.5,
+            "files": {"picture": "s/reference.png", "exr": "s/reference.exr"},
+        }
+    ],
+    "stability": [],
+    "mutations": None,
+    "published": None,
+}
+
+
+def images() -> dict[str, dict[str, np.ndarray]]:
+    """The layers of the files: `good` is wrong by 3e-6, `flat` by some per cent with one pixel that is no number."""
+    rng = np.random.default_rng(11)
+    across, down = np.meshgrid(np.linspace(0.1, 2, WIDTH), np.linspace(0.2, 1, HEIGHT))
+    airlight = (across * down)[..., None] * np.array([1.0, 0.8, 0.5])
+    airlight[:2] = 0  # no light there
+    surface = np.where(across < 1, 0.3, 0.0)[..., None] * np.ones(3)
+    good = airlight * (1 + 3e-6 * rng.standard_normal(airlight.shape))
+    flat = airlight * (1 + 0.3 * np.sin(3 * across))[..., None]
+    flat[5, 7, 1] = np.nan
+    flip = np.clip(0.5 * across[..., None] * np.ones(3), 0, 1)
+    return {
+        "reference": {"airlight": airlight, "surface": surface},
+        "good": {"airlight": good, "surface": surface},
+        "flat": {"airlight": flat, "surface": 1.01 * surface, "flip": flip},
+        "engine": {"total": 0.9 * (airlight + surface)},
+    }
+
+
+def write_files(folder: Path) -> Path:
+    """Write the EXR files that `DATA` names, and one of an engine's image."""
+    (folder / "s").mkdir(parents=True, exist_ok=True)
+    for name, layers in images().items():
+        write_exr(folder / "s" / f"{name}.exr", Image(layers))
+    return folder
+
+
+def report_data() -> dict[str, Any]:
+    """Return a copy of `DATA` that a test may change."""
+    return copy.deepcopy(DATA)
+
+
+def engine_image() -> dict[str, Any]:
+    """The entry of an engine's image: judged by its total, without times."""
+    return method(
+        "engine", kind="image", layer="total", method="engine", times=None, flip=None, files={"exr": "s/engine.exr"}
+    )
+
+
+def write_large_report(folder: Path, *, scenes: int, methods: int, size: tuple[int, int]) -> dict[str, Any]:
+    """Write the files of one scene as large as a real one, and return a report that shows them in so many scenes.
+
+    The reference is smooth but for shafts of shadow. A method is wrong by some smooth part, by the places of the edges,
+    and in every pixel by the rounding of single precision.
+    """
+    rng = np.random.default_rng(13)
+    x, y = np.meshgrid(np.linspace(0, 1, size[0]), np.linspace(0, 1, size[1]))
+
+    def light(shift):
+        shafts = 1 - 0.6 * (np.sin(40 * (x - 0.3 + shift) / (0.3 + y)) > 0.4)
+        return np.exp(-3 * np.hypot(x - 0.5, y - 0.2))[..., None] * shafts[..., None] ** np.array([1.0, 1.2, 1.5])
+
+    def write(name, **layers):
+        write_exr(folder / "s" / f"{name}.exr", Image(layers))
+        return {"exr": f"s/{name}.exr", "picture": f"s/{name}.png", "error": f"s/{name}-error.png"}
+
+    airlight = light(0.0)
+    surface = np.where(y > 0.7, 0.2 + 0.1 * np.sin(60 * x) ** 2, 0.0)[..., None] * np.array([1.0, 0.9, 0.8])
+    reference = write("reference", airlight=airlight, surface=surface)
+    entries = []
+    for number in range(methods):
+        wrong = 10 ** (-1 - 0.4 * number) * np.cos(7 * x + number)[..., None]
+        rounding = [1 + 6e-8 * rng.standard_normal(airlight.shape) for _ in range(2)]
+        flip = np.repeat(np.clip(np.abs(wrong) + 0.004 * rng.random(wrong.shape), 0, 1), 3, axis=2)
+        files = write(
+            f"m{number}",
+            airlight=light(0.002 * (number % 3)) * (1 + wrong) * rounding[0],
+            surface=surface * rounding[1],
+            flip=flip,
+        )
+        entries.append(method(f"method {number}", method=f"method-{number}", files=files))
+    scene = report_data()["scenes"][0] | {"size": list(size), "methods": entries, "files": reference}
+    return report_data() | {"scenes": [scene | {"name": f"scene {number}"} for number in range(scenes)]}

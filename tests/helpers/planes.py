@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Shadow planes, and the crossings of rays with them by solving for the point, for tests."""
+
+import numpy as np
+
+from realtime.methods.shadow_planes.mesh_adjacency import make_casters
+from realtime.methods.shadow_planes.plane_table import index_planes, light_frame
+from realtime.numerics.diamond_angle import host_diamond_angle
+from tests.helpers.casters import ALL
+
+LIGHT = np.array([1.23, -0.87, 1.61])
+CAMERA = np.array([-1.57, -1.93, 0.71])
+
+
+def casters_of(*names):
+    """Return the casters of meshes for tests."""
+    return make_casters([(name, *ALL[name]()) for name in names])
+
+
+def index_of(casters, light=LIGHT, camera=CAMERA, precision="single"):
+    """Return the index of the shadow planes of all bodies."""
+    from realtime.numerics.array_types import array_types
+
+    used = np.ones(len(casters.closed), dtype=bool)
+    light, camera = np.asarray(light, dtype=float), np.asarray(camera, dtype=float)
+    return index_planes(casters, light, camera, used=used, types=array_types(precision))
+
+
+def bundles(count, *, spread, light=LIGHT, camera=CAMERA, seed=1):
+    """Return unit directions in the frame of the light, (count, 3): in bundles of sixteen, `spread` wide.
+
+    Three quarters lead to points in and behind the casters, an eighth close by the light and an eighth away from it,
+    where all azimuths meet.
+    """
+    rng = np.random.default_rng(seed)
+    tiles = count // 16
+    place = 0.4 * rng.normal(size=(tiles, 3))
+    aim = light + rng.uniform(1, 3, (tiles, 1)) * (place - light) - camera
+    axis = light - camera
+    aim[::8] = axis + 0.01 * np.linalg.norm(axis) * rng.normal(size=aim[::8].shape)
+    aim[1::8] = -axis + 0.01 * np.linalg.norm(axis) * rng.normal(size=aim[1::8].shape)
+    ways = aim[:, None] / np.linalg.norm(aim, axis=1)[:, None, None]
+    ways = (ways + spread * rng.uniform(-1, 1, (tiles, 16, 3))).reshape(-1, 3)
+    axes, _ = light_frame(np.asarray(light, dtype=float), np.asarray(camera, dtype=float))
+    return ways / np.linalg.norm(ways, axis=1)[:, None] @ axes.T
+
+
+def plane_table(index):
+    """Return ends (planes, 2, 3), first and last azimuth and gain of all planes, float64, without the padding."""
+    ends = np.array(index.ends, dtype=np.float64).reshape(-1, 2, 3)
+    spans = np.array(index.spans, dtype=np.float64).reshape(-1, 4)[: len(ends)]
+    count = int(np.max(np.flatnonzero(np.any(ends != 0, axis=(1, 2))), initial=-1)) + 1
+    return ends[:count], spans[:count, 0], spans[:count, 1], spans[:count, 2]
+
+
+def crossings(index, ways):
+    """Return where rays from the camera cross planes, (rays, planes), infinite where they do not, and the layers
+    gained.
+
+    The point of the ray is p a + q b, with a and b the ends of the edge and p, q >= 0, p + q >= 1 beyond the edge:
+    three linear equations. A plane that is in the table twice, parted at azimuth 0, counts where its azimuths hold the
+    ray's.
+    """
+    ends, first, last, gain = plane_table(index)
+    a, b = ends[:, 0], ends[:, 1]
+    camera = np.array([0.0, 0.0, np.array(index.distance).item()])
+    normal = np.cross(a, b)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        x = -(normal @ camera) / (ways @ normal.T)
+        point = camera + x[..., None] * ways[:, None]
+        scale = np.sum(normal * normal, axis=1)
+        p = np.einsum("rpk,pk->rp", np.cross(point, b), normal) / scale
+        q = np.einsum("rpk,pk->rp", np.cross(a, point), normal) / scale
+        crossed = (x > 0) & (p >= 0) & (q >= 0) & (p + q > 1)
+    azimuth = host_diamond_angle(*ways[:, :2].astype(np.float32).T)[:, None]
+    twice = (first < 0) | (last > 4)
+    again = np.isin(np.arange(len(ends)), np.flatnonzero(twice)) | np.array(
+        [np.any(twice & np.all(ends == end, axis=(1, 2))) for end in ends], dtype=bool
+    )
+    crossed &= ~again | ((azimuth >= first) & (azimuth < last))
+    return np.where(crossed, x, np.inf), gain
+
+
+def lit_lengths(index, ways, end, *, weight=lambda x: x):
+    """Return the sum of weight(x1) - weight(x0) over the lit segments up to `end`, and whether the light reaches it."""
+    x, gain = crossings(index, ways)
+    total, lit = np.zeros(len(ways)), np.zeros(len(ways), dtype=bool)
+    for ray in range(len(ways)):
+        order = np.argsort(x[ray])
+        order = order[x[ray][order] < end[ray]]
+        layers = np.array(index.layers).item() + np.concatenate([[0], np.cumsum(gain[order])])
+        edges = np.concatenate([[0.0], x[ray][order], [end[ray]]])
+        total[ray] = np.sum((weight(edges[1:]) - weight(edges[:-1]))[layers <= 0])
+        lit[ray] = layers[-1] <= 0
+    return total, lit
+
+
+def drawn_lists(index, ways, end, *, order="exact"):
+    """Return the lists of the tiles of sixteen rays each, and their boxes."""
+    import drjit as dr
+    import mitsuba as mi
+
+    from realtime.methods.shadow_planes.tile_boxes import tile_boxes
+    from realtime.methods.shadow_planes.tile_lists import tile_lists
+
+    Float = type(index.distance)
+    parts = [Float(np.ascontiguousarray(part)) for part in ways.T]
+
+    def rays(lane):
+        return tuple(dr.gather(Float, part, mi.UInt32(lane)) for part in parts)
+
+    distance = Float(np.asarray(end, dtype=np.float64))
+    lists = tile_lists(index, rays, distance, order=order, square=False)
+    return lists, tile_boxes(index, rays, distance, square=False)
+
+
+def listed_planes(lists):
+    """Return by tile the numbers of the planes that count, in order, and whether each is marked as full."""
+    from realtime.methods.shadow_planes.plane_table import FIRST, FULL, NUMBER
+
+    entries, source = np.array(lists.entries), lists.source
+    found = []
+    for first, count, before in zip(*(np.array(part) for part in (source.first, source.count, source.all_before))):
+        place = np.arange(first, first + count)
+        entry = entries[place]
+        counts = ((entry & FIRST) != 0) | (place < before)
+        found.append((entry[counts] & NUMBER, (entry[counts] & FULL) != 0))
+    return found
+
+
+def rays_of(index, lists, ways):
+    """Return the rays of a walk over lists."""
+    import drjit as dr
+    import mitsuba as mi
+
+    from realtime.methods.shadow_planes.sweep import ray_planes
+    from realtime.methods.shadow_planes.tile_boxes import TILE
+
+    Float = type(index.distance)
+    tile = dr.arange(mi.UInt32, len(ways)) // TILE
+    return ray_planes(lists, *(Float(np.ascontiguousarray(part)) for part in ways.T), tile=tile)

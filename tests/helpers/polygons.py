@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Scenes of boxes that tests share, and the rays of an image as the search for lit intervals takes them."""
+
+import numpy as np
+
+from tests.helpers.scenes import tiny_scene
+
+
+def rays_of(truth, light=0):
+    """Return the rays of an image, and where they begin and end as angles at a light."""
+    from analytic.geometry import foot_and_height
+    from reference.quadrature.surface import surface_hits
+    from reference.scene.shapes import exact_distance
+    from reference.visibility.spot_cone import cone_interval, perpendicular
+
+    lamp, direction = truth.lights[light], truth.direction
+    foot, height = foot_and_height(np.broadcast_to(truth.origin, direction.shape), direction, lamp.position)
+    normal = perpendicular(truth.origin, direction, lamp)
+    hits = surface_hits(truth)
+    distance = exact_distance(truth, hits.interaction, hits.distance)
+    end = np.where(np.isfinite(distance), np.arctan2(distance - foot, height), np.pi / 2)
+    cone = cone_interval(direction, normal, lamp, lamp.cutoff)
+    return lamp, (direction, normal, height), (np.maximum(np.arctan2(-foot, height), cone[0]), np.minimum(end, cone[1]))
+
+
+def lit_lengths(found, ends):
+    """Return how much of the angle at the light is lit on each ray."""
+    return np.bincount(found.ray, found.high - found.low, len(ends[0]))
+
+
+def box(centre, size, **changes):
+    """Return a box whose sides are parallel to the axes."""
+    import mitsuba as mi
+
+    transform = mi.ScalarTransform4f().translate(list(centre)).scale([0.5 * s for s in size])
+    return {"type": "cube", "to_world": transform} | changes
+
+
+def box_scene(**changes):
+    """A scene of polygons: the ball of the tiny scene replaced by boxes."""
+    boxes = {"tower": box((0.1, 0.1, 0.7), (0.43, 0.37, 1.4)), "beam": box((0.6, 0.3, 1.1), (0.9, 0.11, 0.13))}
+    return tiny_scene(ball=None, **boxes, **changes)

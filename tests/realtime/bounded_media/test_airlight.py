@@ -1,0 +1,313 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Airlight in bounded media: against sums over small steps, limits with a known answer, and marching."""
+
+import numpy as np
+import pytest
+
+from realtime.errors import InputError
+from tests.helpers.scenes import body, clear_scene, spot, tiny_scene
+from validation.scenes.parts import medium_boundary, placed, rotation
+from validation.scenes.solids import box
+
+TURN = rotation((0.4, 1.0, 0.1), 33.0)
+SIDES = np.array([1.1, 0.9, 1.4])
+
+
+def ball(centre=(-0.8, 0.4, 0.7), radius=0.6, sigma_t=(0.9, 0.5, 0.7), **medium):
+    return body({"type": "sphere", "center": list(centre), "radius": radius}, sigma_t, (0.9, 0.4, 0.3), **medium)
+
+
+def cube(centre=(0.9, 0.5, 0.6), *, sigma_t=1.1, phase=None):
+    medium = {
+        "type": "homogeneous",
+        "sigma_t": sigma_t,
+        "albedo": {"type": "rgb", "value": [0.2, 0.5, 0.9]},
+        "phase": phase or {"type": "hg", "g": 0.4},
+    }
+    return medium_boundary("cube", placed(box(tuple(SIDES)), centre, TURN), medium)
+
+
+def render(scene, method="unshadowed", *, precision="double", **parameters):
+    import mitsuba as mi
+
+    from realtime.frame.renderer import frame_renderer, render_frame
+    from realtime.kernels.registry import KERNELS
+    from realtime.methods.registry import METHODS
+    from realtime.scene.read_scene import read_scene
+
+    chosen = METHODS[method]
+    kernel = KERNELS["exact"].function if chosen.uses_kernel else None
+    read = read_scene(mi.load_dict(scene), precision)
+    return render_frame(frame_renderer(read, chosen, kernel=kernel, **parameters))
+
+
+def relative_rmse(one, two):
+    return np.sqrt(np.mean((np.asarray(one, dtype=np.float64) - two) ** 2)) / np.mean(two)
+
+
+def in_ball(start, end, centre, radius):
+    """Return where lines enter and leave a ball, as shares between 0 and 1, by the quadratic formula."""
+    d, w = end - start, start - centre
+    a, b, c = np.sum(d * d, -1), np.sum(d * w, -1), np.sum(w * w, -1) - radius**2
+    root = np.sqrt(np.maximum(b * b - a * c, 0))
+    return np.clip((-b - root) / a, 0, 1), np.clip((-b + root) / a, 0, 1)
+
+
+def in_box(start, end, centre):
+    """Return where lines enter and leave the box, as shares between 0 and 1, slab by slab in its own frame."""
+    p, d = (start - centre) @ TURN, (end - start) @ TURN
+    with np.errstate(divide="ignore"):
+        one, other = (-0.5 * SIDES - p) / d, (0.5 * SIDES - p) / d
+    low = np.clip(np.minimum(one, other).max(axis=-1), 0, 1)
+    return low, np.maximum(np.clip(np.maximum(one, other).min(axis=-1), 0, 1), low)
+
+
+def share(part, start, end):
+    low, high = part(start, end)
+    return high - low
+
+
+def summed(scene, parts, *, steps=500, leg=True):
+    """Sum the airlight over equal steps of every chord; a part is (function, sigma_t, albedo, g)."""
+    import mitsuba as mi
+
+    from reference.scene.read import read_truth
+
+    truth = read_truth(mi.load_dict(scene))
+    light, intensity = truth.lights[0].position, truth.lights[0].intensity
+    image = np.zeros((len(truth.direction), 3))
+    for pixel, direction in enumerate(truth.direction):
+        for part, own_sigma, albedo, g in parts:
+            low, high = 9.0 * np.array(part(truth.origin, truth.origin + 9.0 * direction))
+            x = low + (np.arange(steps) + 0.5) * ((high - low) / steps)
+            point = truth.origin + x[:, None] * direction
+            away = point - light
+            r = np.linalg.norm(away, axis=1)
+            tau = np.zeros((steps, 3))
+            for other, sigma, _, _ in parts:
+                tau += sigma * (share(other, truth.origin, point) * x)[:, None]
+                tau += sigma * (leg * share(other, light, point) * r)[:, None]
+            cosine = -np.sum(away * direction, axis=1) / r
+            p = (1 - g * g) / (1 + g * g - 2 * g * cosine) ** 1.5
+            value = own_sigma * np.exp(-tau) * (p / r**2)[:, None]
+            image[pixel] += albedo * value.sum(axis=0) * ((high - low) / steps) * intensity / (4 * np.pi)
+    return image.reshape(truth.height, truth.width, 3)
+
+
+BALL = (lambda a, b: in_ball(a, b, np.array([-0.8, 0.4, 0.7]), 0.6), np.array([0.9, 0.5, 0.7]), (0.9, 0.4, 0.3), 0.0)
+CUBE = (lambda a, b: in_box(a, b, np.array([0.9, 0.5, 0.6])), np.array([1.1, 1.1, 1.1]), (0.2, 0.5, 0.9), 0.4)
+
+
+@pytest.mark.parametrize(
+    "lamp", [(0.9, 0.7, 1.9), (-2.9, 0.6, 0.5), (0.8, 0.6, 0.7)], ids=["above", "through one to the other", "within"]
+)
+def test_two_bodies_against_sums_over_small_steps(variant, lamp):
+    light = tiny_scene()["lamp"] | {"position": list(lamp)}
+    scene = clear_scene(lamp=light, ball=ball(), cube=cube())
+    expected = summed(scene, [BALL, CUBE])
+    # 24 nodes leave the kinks that the edges of the box put into the leg's length, 10 nodes more of them.
+    assert relative_rmse(render(scene).airlight, expected) < 3e-4
+    assert relative_rmse(render(scene, precision="single").airlight, expected) < 1.5e-3
+
+
+@pytest.mark.parametrize(
+    "changes", [{}, pytest.param({"lamp": "spot"}, marks=pytest.mark.slow), {"sensor": "inside"}, {"fog": "around"}]
+)
+def test_nodes_against_marching_with_many_steps(variant, changes):
+    """Media around the bodies, a soft spot, the camera within a body: the marcher decides each by where a point is."""
+    scene = clear_scene(ball=ball(phase={"type": "rayleigh"}), cube=cube())
+    if "lamp" in changes:
+        scene["lamp"] = spot(cutoff=41.0, beam=23.0)
+    if "fog" in changes:
+        fog = {"type": "homogeneous", "id": "fog", "sigma_t": 0.23, "albedo": 0.7}
+        scene = {"type": "scene", "fog": fog} | {name: entry for name, entry in scene.items() if name != "type"}
+        scene["sensor"] |= {"medium": {"type": "ref", "id": "fog"}}
+        del scene["cube"]
+        scene["ball"] |= {"exterior": {"type": "ref", "id": "fog"}}
+    if "sensor" in changes:
+        del scene["cube"]
+        scene["inside"] = ball()["interior"] | {"id": "inside"}
+        scene["ball"] = ball(centre=(0.1, -3.5, 1.2), radius=1.3) | {"interior": {"type": "ref", "id": "inside"}}
+        scene["sensor"] |= {"medium": {"type": "ref", "id": "inside"}}
+        order = ["type", "inside", "sensor", "lamp", "ball"]
+        scene = {name: scene[name] for name in order}
+    marched = render(scene, "ray-march", steps=1500, shadow="none")
+    # Midpoint steps across the bounds, and nodes across the kinks of the leg's length.
+    assert relative_rmse(render(scene).airlight, marched.airlight) < 1.5e-3
+
+
+def test_a_huge_body_is_a_medium_without_bounds(variant):
+    scene = tiny_scene(ball=None, floor=None)
+    fog = scene["fog"] | {"id": "inside"}
+    huge = {"type": "sphere", "center": [3.0, 2.0, 1.0], "radius": 400.0, "bsdf": {"type": "null"}}
+    bounded = {"type": "scene", "inside": fog, "sensor": scene["sensor"], "lamp": scene["lamp"]}
+    bounded["sensor"] = scene["sensor"] | {"medium": {"type": "ref", "id": "inside"}}
+    bounded["huge"] = huge | {"interior": {"type": "ref", "id": "inside"}}
+    # Twenty-four nodes over a whole ray, cut where exp(-18) is left, against the kernel made for it.
+    assert relative_rmse(render(bounded).airlight, render(scene).airlight) < 1e-4
+
+
+def test_bodies_of_nothing_scatter_nothing(variant):
+    frame = render(clear_scene(ball=ball(sigma_t=0.0)))
+    assert np.all(frame.airlight == 0)
+
+
+def test_bodies_out_of_each_others_light_and_view_add_up(variant):
+    light = tiny_scene()["lamp"] | {"position": [0.0, -0.5, 6.0]}
+    one = render(clear_scene(lamp=light, ball=ball())).airlight
+    other = render(clear_scene(lamp=light, cube=cube())).airlight
+    both = render(clear_scene(lamp=light, ball=ball(), cube=cube())).airlight
+    assert np.all((one > 0).sum(axis=(0, 1)) > 0)
+    assert np.abs(both - one - other).max() < 1e-12 * both.max()
+
+
+def test_the_mean_distance_of_the_paper_is_a_constant_in_the_exponent(variant):
+    """With R for the light's leg the sum over the chord has one factor more, exp(-sigma_t R)."""
+    scene = clear_scene(ball=ball(sigma_t=0.7))
+    found = render(scene, "shadow-planes", media="paper").airlight
+
+    part = (BALL[0], np.array([0.7] * 3), BALL[2], 0.0)
+    expected = summed(scene, [part], leg=False) * np.exp(-0.7 * 1.2 * 0.6)
+    # Six nodes on smooth chords, against 500 steps: 1e-5 each.
+    assert relative_rmse(found, expected) < 1e-4
+
+
+def test_surfaces_are_seen_and_lit_through_the_bodies(variant):
+    """A floor with and without a body between: the ratio is the transmittance of both legs."""
+    floor = tiny_scene()["floor"]
+    seen = render(clear_scene(floor=floor, ball=ball()))
+    clear = render(clear_scene(floor=floor, ball=ball(sigma_t=0.0)))
+    assert np.array_equal(seen.distance, clear.distance)
+    import mitsuba as mi
+
+    from reference.scene.read import read_truth
+
+    truth = read_truth(mi.load_dict(clear_scene(floor=floor, ball=ball())))
+    distance = seen.distance.ravel()
+    hit = np.isfinite(distance) & (clear.surface[..., 0].ravel() > 0)
+    point = truth.origin + distance[hit, None] * truth.direction[hit]
+    light = truth.lights[0].position
+    length = share(BALL[0], truth.origin, point) * distance[hit]
+    length += share(BALL[0], light, point) * np.linalg.norm(point - light, axis=1)
+    ratio = (seen.surface / np.where(clear.surface > 0, clear.surface, 1)).reshape(-1, 3)[hit]
+    assert np.any(length > 0.3)
+    # Mitsuba's rays are float32; distances to the floor are good to 1e-6.
+    assert ratio == pytest.approx(np.exp(-length[:, None] * BALL[1]), rel=1e-4)
+
+
+@pytest.mark.slow
+def test_shadow_planes_in_bounded_media_against_marching(variant):
+    # A smooth sphere has no silhouette edges; the wall throws a shadow through both bodies.
+    import mitsuba as mi
+
+    to_world = mi.ScalarTransform4f().translate([0.3, 0.6, 1.4]).rotate([1, 0.3, 0], 37).scale([0.43, 0.33, 0.05])
+    wall = {"type": "cube", "to_world": to_world}
+    scene = clear_scene(ball=ball(), cube=cube(), wall=wall)
+    planes = render(scene, "shadow-planes").airlight
+    marched = render(scene, "ray-march", steps=3000).airlight
+    assert relative_rmse(render(scene).airlight, planes) > 0.02  # there is a shadow
+    # Steps across the edges of the shadow: 1/3000 of a chord of about a metre.
+    assert relative_rmse(planes, marched) < 3e-3
+    for order in ("paper", "none"):
+        assert np.all(np.isfinite(render(scene, "shadow-planes", order=order).airlight))
+    differences = render(scene, "shadow-planes", sum="gamma").airlight
+    # Gammas have kinks where segments have none.
+    assert relative_rmse(differences, planes) < 3e-3
+
+
+def test_an_ambient_field_fills_the_bodies(variant):
+    scene = clear_scene(ball=ball(sigma_t=0.7))
+    gain = render(scene, "shadow-planes", ambient=0.3).airlight - render(scene, "shadow-planes").airlight
+    import mitsuba as mi
+
+    from reference.scene.read import read_truth
+
+    truth = read_truth(mi.load_dict(scene))
+    chord = 9.0 * share(BALL[0], truth.origin, truth.origin + 9.0 * truth.direction)
+    expected = 0.3 * np.array([0.9, 0.4, 0.3]) * (1 - np.exp(-0.7 * chord))[:, None]
+    assert gain.reshape(-1, 3) == pytest.approx(expected, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        (lambda: {"ball": ball(), "other": ball(centre=(-0.5, 0.4, 0.7))}, "overlap"),
+        (lambda: {"cube": cube(phase={"type": "blendphase", "weight": 0.5})}, "phase|Phase|child"),
+        (lambda: {"ball": ball(centre=(0.2, -4.1, 1.3))}, "inside of shape"),
+        (
+            lambda: {
+                "ball": {
+                    "type": "sphere",
+                    "bsdf": {"type": "null"},
+                    "interior": {"type": "heterogeneous", "albedo": {"type": "constvolume", "value": 0.5}},
+                }
+            },
+            "HeterogeneousMedium",
+        ),
+        (lambda: {"flat": body({"type": "rectangle"}, 0.5, (0.5, 0.5, 0.5))}, "not a closed surface"),
+        (lambda: {"disk": body({"type": "disk"}, 0.5, (0.5, 0.5, 0.5))}, "is a Disk"),
+    ],
+)
+def test_refusals_name_what_is_in_the_way(variant, changes, message):
+    with pytest.raises((InputError, RuntimeError), match=message):
+        render(clear_scene(**changes()))
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"), [({"media": "coarse"}, "media: got"), ({"evaluation": "vertex"}, "evaluation=vertex")]
+)
+def test_parameters_that_do_not_fit_are_refused(variant, parameters, message):
+    with pytest.raises(InputError, match=message):
+        render(clear_scene(ball=ball()), "shadow-planes", **parameters)
+
+
+def test_scenes_without_bodies_plan_none(variant):
+    import mitsuba as mi
+
+    from realtime.scene.read_scene import read_scene
+
+    scene = mi.load_dict(tiny_scene())
+    read = read_scene(scene)
+    assert not read.plan.bounded
+    assert read.geometry is scene
+    bounded = read_scene(mi.load_dict(clear_scene(ball=ball())))
+    assert bounded.plan.bounded
+    assert not bounded.plan.surfaces
+    assert len(bounded.geometry.shapes()) == 0
+
+
+@pytest.mark.slow
+def test_three_media_against_the_truth(variant):
+    """The scene of Fig. 7b, by code that shares nothing with this side."""
+    import mitsuba as mi
+
+    from validation.estimates.quadrature import truth_image
+    from validation.scenes.three_media import SCENE
+
+    scene = SCENE.build()
+    scene["sensor"]["film"] |= {"width": 160, "height": 120}
+    truth = truth_image(mi.load_dict(scene))
+    frame = render(scene, "shadow-planes", precision="single")
+    # Panels end where the leg's length has kinks: measured 6e-6, half of it a pixel at a silhouette.
+    assert relative_rmse(frame.airlight, truth.airlight) < 2e-5
+    error = np.abs(frame.airlight - truth.airlight) / np.maximum(truth.airlight, 1e-3 * truth.airlight.mean())
+    assert np.quantile(error, 0.99) < 5e-5
+    # One pixel at a silhouette sees another surface.
+    assert np.quantile(np.abs(frame.surface - truth.surface), 0.999) < 1e-5 * truth.surface.mean() + 1e-5
+    assert relative_rmse(render(scene, "shadow-planes", precision="single", media="paper").airlight, truth.airlight) > 1
+
+
+def test_a_thicker_medium_has_thicker_bodies(variant):
+    import mitsuba as mi
+
+    from realtime.scene.animate import thicker_medium
+    from realtime.scene.read_scene import read_scene
+
+    medium = read_scene(mi.load_dict(clear_scene(ball=ball(), cube=cube())), "double").medium
+    thicker = thicker_medium(medium, 1.7)
+    assert all(float(value[0]) == 0 for value in thicker.sigma_t)
+    for one, other in zip(thicker.bodies, medium.bodies, strict=True):
+        # Mitsuba holds extinctions in float32.
+        expected = [1.7 * float(value[0]) for value in other.medium.sigma_t]
+        assert [float(value[0]) for value in one.medium.sigma_t] == pytest.approx(expected, rel=1e-12)
+        assert len(one.medium.sigma_t) == 3

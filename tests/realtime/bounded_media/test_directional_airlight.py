@@ -1,0 +1,231 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Airlight of a directional light in bounded media: against a closed form, sums over small steps, and its laws."""
+
+import numpy as np
+import pytest
+
+from realtime.errors import InputError
+from tests.helpers.scenes import clear_scene, tiny_scene
+from tests.helpers.sunlit import (
+    ALONG,
+    BALL_AT,
+    CUBE_AT,
+    ball,
+    ball_part,
+    box_part,
+    cube,
+    plank,
+    plank_part,
+    rays,
+    read,
+    relative_rmse,
+    render,
+    shaded,
+    summed,
+    sun,
+    unit,
+)
+from validation.scenes.parts import rotation
+
+SMALL = (8, 6)
+
+
+def look(origin, target, *, size=SMALL, up=(0, 0, 1)):
+    import mitsuba as mi
+
+    place = mi.ScalarTransform4f().look_at(list(origin), list(target), list(up))
+    sensor = {key: entry for key, entry in tiny_scene(size=size)["sensor"].items() if key != "medium"}
+    return sensor | {"to_world": place}
+
+
+@pytest.mark.parametrize("precision", ["double", "single"])
+def test_a_box_under_light_from_above_has_a_closed_form(variant, precision):
+    """With the light coming straight down the leg is H - z, linear in x, and the integral is an exponential's.
+
+    int_0^c exp(-sigma x - sigma (H - z_0 - x d_z)) dx = exp(-sigma (H - z_0)) (1 - exp(-k c))/k,  k = sigma (1 - d_z).
+    """
+    sides, centre, sigma, g = np.array([1.5, 2.0, 1.25]), np.array([0.25, 0.5, 0.75]), 0.8125, 0.4
+    fog = cube(centre=tuple(centre), sides=sides, turn=np.eye(3), sigma_t=sigma, g=g)
+    scene = read(clear_scene(lamp=sun((0, 0, -1)), cube=fog), precision)
+    found = render(scene).airlight.reshape(-1, 3)
+
+    origin, direction = rays(scene)
+    with np.errstate(divide="ignore"):
+        one, other = (centre - 0.5 * sides - origin) / direction, (centre + 0.5 * sides - origin) / direction
+    enter, leave = np.minimum(one, other).max(axis=1), np.maximum(one, other).min(axis=1)
+    chord, height = np.maximum(leave - enter, 0), (origin + enter[:, None] * direction)[:, 2]
+    k = sigma * (1 - direction[:, 2])
+    integral = np.exp(-sigma * (centre[2] + 0.5 * sides[2] - height)) * -np.expm1(-k * chord) / k
+    phase = (1 - g * g) / (1 + g * g - 2 * g * direction[:, 2]) ** 1.5  # scattering angle: down, then against the ray
+    expected = np.where(chord > 0, integral * phase * sigma, 0)[:, None]
+    expected = expected * np.array([0.2, 0.5, 0.9]) * np.array([3.0, 2.0, 1.0]) / (4 * np.pi)
+    assert np.count_nonzero(chord) > 10
+    # The albedo and g are float32 numbers of Mitsuba's, 6e-8 each; chords of float32 rays near an edge lose more.
+    assert relative_rmse(found, expected) < (1e-6 if precision == "double" else 1e-5)
+
+
+CASES = {
+    "two boxes": ({"cube": cube, "plank": plank}, (box_part, plank_part), ALONG),
+    "box and ball": ({"cube": cube, "ball": ball}, (box_part, ball_part), ALONG),
+    "from behind": ({"cube": cube, "plank": plank}, (box_part, plank_part), (-0.2, -1.0, 0.3)),
+    "along a face": (
+        {"cube": cube, "plank": plank},
+        (box_part, plank_part),
+        tuple(rotation((0.4, 1.0, 0.1), 33.0)[:, 2]),
+    ),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_bodies_against_sums_over_small_steps(variant, case):
+    bodies, parts, along = CASES[case]
+    scene = clear_scene(size=SMALL, lamp=sun(along), **{name: make() for name, make in bodies.items()})
+    expected = summed(read(scene), [make() for make in parts], along=along)
+    # Steps across the edges of the other body's shade: 1e-4 of a chord, on few of the rays. Corners of bodies are
+    # float32 numbers, 1e-7.
+    assert relative_rmse(render(scene).airlight, expected) < 1e-5
+    assert relative_rmse(render(scene, precision="single").airlight, expected) < 3e-5
+
+
+def test_marching_converges_to_the_sum_between_bends(variant):
+    scene = clear_scene(size=SMALL, lamp=sun(), cube=cube(), plank=plank())
+    exact = render(scene).airlight
+    errors = [relative_rmse(render(scene, "ray-march", steps=steps).airlight, exact) for steps in (50, 800)]
+    # Midpoint steps, but for the ends of the bodies, which fall between steps: order 1.
+    assert errors[1] < 0.15 * errors[0]
+    assert errors[1] < 2e-3
+
+
+def test_bodies_of_many_planes_have_nodes(variant):
+    """A faceted ball of 80 planes against steps of its own: the bends within the nodes are small."""
+    from validation.scenes.parts import medium_boundary
+    from validation.scenes.solids import icosphere
+
+    medium = {"type": "homogeneous", "sigma_t": 1.3, "albedo": 0.7}
+    vertices, faces = icosphere(1)
+    scene = clear_scene(
+        size=SMALL, lamp=sun(), many=medium_boundary("many", (vertices + np.array([0.0, 0.0, 0.6]), faces), medium)
+    )
+    marched = render(scene, "ray-march", steps=4000)
+    assert np.any(marched.airlight > 0)
+    assert relative_rmse(render(scene).airlight, marched.airlight) < 1e-3
+    assert relative_rmse(render(scene, precision="single").airlight, marched.airlight) < 3e-3
+
+
+@pytest.mark.parametrize("sense", [1, -1])
+def test_a_ray_along_the_light(variant, sense):
+    """The middle ray runs with the light, or against it."""
+    axis = unit(ALONG)
+    sensor = look(np.asarray(CUBE_AT) - 4 * sense * axis, CUBE_AT, size=(5, 5))
+    scene = clear_scene(sensor=sensor, lamp=sun(), cube=cube(), ball=ball())
+    expected = summed(read(scene), [box_part(), ball_part()])
+    for method in ("unshadowed", "light-volumes"):
+        found = render(scene, method).airlight
+        assert found[2, 2].min() > 0
+        assert found[2, 2] == pytest.approx(expected[2, 2], rel=1e-5)
+        assert relative_rmse(found, expected) < 1e-5
+
+
+def test_a_camera_within_a_body(variant):
+    inside = {"type": "ref", "id": "inside"}
+    sensor = look(np.asarray(BALL_AT) + np.array([0.2, 0.1, -0.15]), (0.4, 0.5, 0.9)) | {"medium": inside}
+    within = ball() | {"interior": inside}
+    parts = {"inside": ball()["interior"] | {"id": "inside"}, "sensor": sensor, "lamp": sun(), "ball": within}
+    scene = {"type": "scene"} | parts | {"cube": cube()}
+    expected = summed(read(scene), [box_part(), ball_part()])
+    assert np.all(expected > 0)
+    assert relative_rmse(render(scene).airlight, expected) < 1e-5
+
+
+def test_irradiance_is_a_factor(variant):
+    bodies = {"size": SMALL, "cube": cube(), "ball": ball(), "floor": tiny_scene()["floor"]}
+    one = render(clear_scene(lamp=sun(), **bodies))
+    four = render(clear_scene(lamp=sun(irradiance=(12.0, 8.0, 4.0)), **bodies))
+    assert np.abs(four.airlight - 4 * one.airlight).max() < 1e-12 * four.airlight.max()
+    assert np.abs(four.surface - 4 * one.surface).max() < 1e-12 * four.surface.max()
+
+
+@pytest.mark.slow
+def test_lights_of_both_kinds_add_up(variant):
+    bodies = {"size": SMALL, "cube": cube(), "ball": ball(), "floor": tiny_scene()["floor"]}
+    lamp = tiny_scene()["lamp"]
+    one, point = render(clear_scene(lamp=sun(), **bodies)), render(clear_scene(lamp=lamp, **bodies))
+    both = render(clear_scene(lamp=lamp, other=sun(), **bodies))
+    assert np.abs(both.airlight - one.airlight - point.airlight).max() < 1e-12 * both.airlight.max()
+    assert np.abs(both.surface - one.surface - point.surface).max() < 1e-12 * both.surface.max()
+    volumes = render(clear_scene(lamp=lamp, other=sun(), **bodies), "light-volumes", map=256)
+    # Nothing stands between the lights and the bodies: a map has nothing to be wrong by.
+    assert relative_rmse(volumes.airlight, both.airlight) < 1e-6
+
+
+@pytest.mark.slow
+def test_a_scene_may_be_turned(variant):
+    """The light's face, its map and the bends know no axes."""
+    turn = rotation((0.3, -0.8, 0.5), 71.0)
+    origin, target = np.array([0.2, -4.1, 1.3]), np.array([0.1, 0.0, 0.6])
+
+    def frames(by):
+        sensor = look(by @ origin, by @ target, up=by @ np.array([0.0, 0.0, 1.0]))
+        fog = cube(centre=tuple(by @ np.asarray(CUBE_AT)), turn=by @ rotation((0.4, 1.0, 0.1), 33.0))
+        block = {"type": "sphere", "center": list(by @ np.array([0.33, 0.27, 1.35])), "radius": 0.29}
+        scene = clear_scene(sensor=sensor, lamp=sun(by @ np.asarray(ALONG)), cube=fog, solid=block)
+        return render(scene).airlight, render(scene, "light-volumes", map=1024).airlight
+
+    plain, turned = frames(np.eye(3)), frames(turn)
+    # Vertices and the camera are float32 numbers; near an edge the chord is a difference of such.
+    assert relative_rmse(turned[0], plain[0]) < 1e-5
+    # The map lies otherwise over the ball: each is wrong by about a texel along its edge.
+    assert relative_rmse(turned[1], plain[1]) < 0.02
+
+
+def test_surfaces_have_lambert_s_law_and_both_legs(variant):
+    scene = shaded(solid=None, cube=None, ball=ball())
+    frame = render(scene)
+    origin, direction = rays(read(scene))
+    distance = frame.distance.ravel()
+    seen = np.isfinite(distance)
+    point = origin + distance[seen, None] * direction[seen]
+    part, axis = ball_part(), unit(ALONG)
+    near, far = part.chord(np.broadcast_to(origin, point.shape), direction[seen])
+    depth = np.clip(distance[seen] - near, 0, far - near)
+    near, far = part.chord(point, -axis)
+    depth = depth + (far - near)
+    expected = np.array([0.4, 0.4, 0.5]) * np.array([3.0, 2.0, 1.0]) * (-axis[2] / np.pi)
+    expected = expected * np.exp(-depth[:, None] * part.sigma_t)
+    assert np.ptp(depth) > 0.3
+    # Mitsuba's rays are float32.
+    assert frame.surface.reshape(-1, 3)[seen] == pytest.approx(expected, rel=1e-5)
+
+
+def test_shadows_on_surfaces_are_those_of_rays_whatever_the_method(variant):
+    rayed, mapped = (render(shaded(), method).surface for method in ("ray-march", "light-volumes"))
+    open_floor = render(shaded(solid=None)).surface
+    assert np.array_equal(rayed, mapped)
+    assert np.count_nonzero((rayed == 0) & (open_floor > 0)) > 3
+
+
+@pytest.mark.parametrize("method", ["unshadowed", "ray-march", "light-volumes"])
+def test_a_medium_without_bounds_is_refused(variant, method):
+    with pytest.raises(InputError, match=r"directional light and a medium without bounds.*give the medium bounds"):
+        render(tiny_scene(lamp=sun()), method)
+
+
+def test_a_medium_around_the_bodies_is_refused(variant):
+    fog = {"type": "homogeneous", "id": "fog", "sigma_t": 0.23, "albedo": 0.7}
+    reference = {"type": "ref", "id": "fog"}
+    scene = clear_scene(size=SMALL, lamp=sun())
+    sensor = scene["sensor"] | {"medium": reference}
+    parts = {"fog": fog, "sensor": sensor, "lamp": sun(), "ball": ball() | {"exterior": reference}}
+    with pytest.raises(InputError, match="medium without bounds"):
+        render({"type": "scene"} | parts)
+
+
+@pytest.mark.parametrize("method", ["shadow-planes", "min-max"])
+def test_methods_that_need_a_place_refuse(variant, method):
+    with pytest.raises(InputError, match=rf"{method}: the scene has a directional light.*light-volumes or ray-march"):
+        render(shaded(), method)
+
+
+def test_a_mesh_is_refused_as_in_all_bounded_media(variant):
+    with pytest.raises(InputError, match=r"evaluation=mesh.*use evaluation=walk"):
+        render(shaded(), "light-volumes", evaluation="mesh")

@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Walks over the facets of a body: against the least over all planes, which asks for no neighbours."""
+
+import numpy as np
+import pytest
+
+from realtime.scene.convex_bounds import mesh_bounds
+from validation.scenes.parts import placed, rotation, scaled
+from validation.scenes.solids import box, gem, icosphere, prism
+
+TURN = rotation((0.3, 1.0, 0.2), 27.3)
+CENTRE = np.array([0.1, 0.2, 0.3])
+#: Triangles, triangles with many at two corners, quads, and two faces of twelve edges.
+SOLIDS = {
+    "icosphere": scaled(icosphere(2), (0.9, 0.7, 1.1)),
+    "gem": gem(13, 5),
+    "box": box((1.3, 1.1, 1.7)),
+    "column": prism(np.array([[np.cos(a), np.sin(a)] for a in np.arange(12) * np.pi / 6]), 1.9),
+}
+
+
+def bounds_of(name):
+    vertices, faces = placed(SOLIDS[name], CENTRE, TURN)
+    return mesh_bounds(name, vertices.astype(np.float32).astype(np.float64), faces)
+
+
+def seen_body(name, light, precision="double"):
+    from realtime.bounded_media.convex_clip import seen_from
+    from realtime.numerics.array_types import array_types
+    from realtime.scene.medium import Medium
+    from realtime.scene.phase import Phase
+    from realtime.scene.read_media import convex_body
+
+    types = array_types(precision)
+    medium = Medium((types.scalar(1.0),), types.color(1.0), Phase("isotropic"))
+    body = convex_body(medium, bounds_of(name), types)
+    return seen_from(body, types.vector(*(float(c) for c in light))), types
+
+
+def lines_in(name, light, *, count=400, seed=5):
+    """Return lines from random places through the body: v_0 and d, and where they are in it, by the slabs of planes."""
+    rng = np.random.default_rng(seed)
+    bounds = bounds_of(name)
+    origin = CENTRE + rng.normal(size=(count, 3)) * 3
+    target = CENTRE + rng.uniform(-0.4, 0.4, (count, 3))
+    direction = (target - origin) / np.linalg.norm(target - origin, axis=1)[:, None]
+    along, room = direction @ bounds.normals.T, bounds.offsets - origin @ bounds.normals.T
+    low = np.where(along < 0, room / along, 0).max(axis=1)
+    high = np.where(along > 0, room / along, np.inf).min(axis=1)
+    kept = high > low + 1e-3
+    return origin[kept] - light, direction[kept], low[kept], high[kept]
+
+
+def least_of_all(name, light, v):
+    """Return 1/f of the way in, over all planes that the light is outside of, and of the way out, over the others."""
+    bounds = bounds_of(name)
+    room = bounds.offsets - bounds.normals @ light
+    u = v @ (bounds.normals / room[:, None]).T
+    return u[..., room < 0].min(axis=-1, initial=np.inf), u[..., room > 0].max(axis=-1)
+
+
+@pytest.mark.parametrize("precision", ["single", "double"])
+@pytest.mark.parametrize("light", [(2.4, 1.9, 2.1), (-1.9, 1.5, 0.9)])
+@pytest.mark.parametrize("name", SOLIDS)
+def test_a_walk_meets_the_least_of_all_planes_everywhere(variant, name, light, precision):
+    import drjit as dr
+
+    from realtime.bounded_media.facet_walk import entry_planes, first_entry, next_bend
+
+    light = np.array(light)
+    seen, types = seen_body(name, light, precision)
+    start, direction, low, high = lines_in(name, light)
+    planes = entry_planes(seen)
+    v0, d = types.vector(*start.T), types.vector(*direction.T)
+    entry = first_entry(planes, v0, d, types.scalar(low))
+    x, bends = low, 0
+    for _ in range(60):
+        if np.all(x == high):
+            break
+        until, beyond = next_bend(planes, v0, d, entry)
+        dr.eval(until, entry, beyond)
+        end = np.minimum(np.array(until, dtype=np.float64), high)
+        for share in (0.01, 0.5, 0.99):
+            at = x + share * (end - x)
+            found = np.array(entry.constant, dtype=np.float64) + np.array(entry.slope, dtype=np.float64) * at
+            expected, _ = least_of_all(name, light, start + at[:, None] * direction)
+            # Rounding of v, a few units in the last place of some metres, times g: large where the light is nearly in
+            # the plane.
+            assert found == pytest.approx(expected, rel=2e-4 if precision == "single" else 1e-9)
+        bends += np.sum(end < high)
+        x, entry = end, dr.select(types.scalar(end) < types.scalar(high), beyond, entry)
+    assert np.all(x == high)
+    assert bends > 10
+
+
+def test_a_light_in_the_body_has_no_plane_to_enter_by(variant):
+    from realtime.bounded_media.facet_walk import entry_planes
+
+    assert entry_planes(seen_body("gem", CENTRE + 0.1)[0]).within[0]
+    assert not entry_planes(seen_body("gem", CENTRE + 3.0)[0]).within[0]
+    assert entry_planes(seen_body("gem", CENTRE + 3.0)[0]).sides == 3
+
+
+@pytest.mark.parametrize("name", SOLIDS)
+def test_no_leg_to_a_segment_that_is_called_clear_meets_the_body(variant, name):
+    from realtime.bounded_media.facet_walk import clear_of, entry_planes, exit_planes
+
+    light = np.array([1.7, 0.4, 2.9])
+    seen, types = seen_body(name, light)
+    rng = np.random.default_rng(9)
+    start = CENTRE + rng.normal(size=(900, 3)) * 1.7 - light
+    direction = rng.normal(size=(900, 3))
+    direction /= np.linalg.norm(direction, axis=1)[:, None]
+    length = rng.uniform(0.1, 1.5, 900)
+    ends = types.scalar(np.zeros(900)), types.scalar(length)
+    planes = entry_planes(seen), exit_planes(seen)
+    clear = clear_of(planes, types.vector(*start.T), types.vector(*direction.T), *ends)
+    clear = np.array(clear)
+    x = np.linspace(0, 1, 51) * length[:, None]
+    enter, leave = least_of_all(name, light, start[:, None] + x[..., None] * direction[:, None])
+    meets = np.any(enter > np.maximum(leave, 1), axis=1)
+    assert not np.any(clear & meets)
+    # Most that pass are found to.
+    assert np.mean(clear[~meets]) > 0.9
+
+
+@pytest.mark.parametrize("light", [(1.7, 0.4, 2.9), (0.15, 0.1, 0.4)])
+@pytest.mark.parametrize("name", SOLIDS)
+def test_lines_enter_and_leave_by_the_planes_that_all_planes_name(variant, name, light):
+    """From outside and from within the body, towards it, past it and away from it."""
+    from realtime.bounded_media.facet_walk import entry_planes, exit_planes, line_crossings
+
+    light = np.array(light)
+    seen, types = seen_body(name, light)
+    v = CENTRE - light + np.random.default_rng(3).normal(size=(3000, 3)) * 1.3
+    found = line_crossings((entry_planes(seen), exit_planes(seen)), types.vector(*v.T))
+    enter, leave = (np.array(one) for one in found)
+    first, last = least_of_all(name, light, v)
+    hits = (first > 0) & (first > last)
+    assert hits.sum() > 0
+    assert np.array_equal(enter > 0, hits)
+    assert leave[hits] == pytest.approx(last[hits], rel=1e-9)
+    assert enter[hits] == pytest.approx(first[hits], rel=1e-9)
+
+
+def test_neighbours_share_an_edge():
+    from realtime.scene.convex_bounds import plane_neighbours
+
+    table = plane_neighbours(bounds_of("box"))
+    normals = bounds_of("box").normals
+    assert table.shape == (6, 4)
+    # All but the plane itself and the one opposite.
+    assert np.abs(np.einsum("kc,kjc->kj", normals, normals[table])).max() < 1e-6
+    column = plane_neighbours(bounds_of("column"))
+    assert column.shape == (14, 12)
+    assert sorted((row != k).sum() for k, row in enumerate(column)) == [4] * 12 + [12] * 2

@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a frame keeps of the last one: the images are those of frames made afresh, bit by bit."""
+
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from realtime.frame.incremental import next_frame
+from realtime.frame.renderer import FrameRenderer, frame_renderer, image_frame, run_stages
+from realtime.kernels.registry import KERNELS
+from realtime.methods.registry import METHODS
+from realtime.scene.animate import coloured_light, read_objects, thicker_medium, turned_light, turned_objects
+from realtime.scene.read_scene import Scene, read_scene
+from tests.helpers.scenes import tiny_scene
+
+STILL = {"camera_moved": False, "geometry_moved": False, "light_moved": False}
+TURN = np.array([[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]])
+#: What moves from frame to frame; together every pair of neighbours that matters.
+STEPS = ("light", "medium", "colour", "camera", "light", "objects", "colour", "light", "objects", "camera", "medium")
+
+
+def made(scene: Scene, method: str, **parameters) -> FrameRenderer:
+    kernel = KERNELS["taylor"].function if METHODS[method].uses_kernel else None
+    return frame_renderer(scene, METHODS[method], kernel=kernel, **parameters)
+
+
+def built_in(name: str) -> Scene:
+    from validation.scenes.loading import load_scene
+
+    return read_scene(load_scene(name, (32, 24)).scene)
+
+
+def ball() -> Scene:
+    """A scene whose surfaces Mitsuba is asked for."""
+    import mitsuba as mi
+
+    return read_scene(mi.load_dict(tiny_scene(size=(32, 24))))
+
+
+def frames(scene: Scene, steps, share: float = 0.1):
+    """Yield the scene after each step, and what moved."""
+    from realtime.methods.shadow_planes.mesh_adjacency import read_casters
+    from realtime.scene.animate import closed_shapes
+
+    objects = read_objects(scene, closed_shapes(read_casters(scene.geometry))) if "objects" in steps else None
+    turn = np.eye(3)
+    for step in steps:
+        moved = dict(STILL)
+        if step == "light":
+            about = np.array(scene.lights[0].position, dtype=np.float64).ravel() + np.array([0.21, -0.13, 0.05])
+            scene = replace(scene, lights=tuple(turned_light(light, about, TURN) for light in scene.lights))
+            moved["light_moved"] = True
+        elif step == "medium":
+            scene = replace(scene, medium=thicker_medium(scene.medium, 1.3))
+        elif step == "colour":
+            scene = replace(scene, lights=tuple(coloured_light(light, share) for light in scene.lights))
+        elif step == "camera":
+            scene = replace(scene, camera=aside(scene.camera))
+            moved["camera_moved"] = True
+        elif step == "objects":
+            turn = turn @ TURN
+            scene = turned_objects(scene, objects, turn)
+            moved["geometry_moved"] = True
+        yield scene, moved
+
+
+def aside(camera):
+    import drjit as dr
+
+    origin = type(camera.origin)(camera.origin + 0.03 * camera.forward + 9 * camera.left)
+    dr.make_opaque(origin)
+    return replace(camera, origin=origin)
+
+
+def host(renderer, stages):
+    frame = image_frame(renderer, stages)
+    return {name: getattr(frame, name) for name in ("airlight", "surface", "distance")}
+
+
+CASES = [
+    pytest.param(lambda: built_in("two-pens"), "shadow-planes", {}, STEPS, id="planes"),
+    pytest.param(lambda: built_in("two-pens"), "light-volumes", {"map": 64}, STEPS, id="volumes"),
+    pytest.param(lambda: built_in("two-pens"), "shadow-planes", {"tolerance": 0.1}, STEPS, id="planes by tiles"),
+    pytest.param(
+        lambda: built_in("three-media"),
+        "shadow-planes",
+        {},
+        ("light", "medium", "camera", "colour"),
+        id="bounded media",
+    ),
+    pytest.param(ball, "light-volumes", {"map": 64}, ("light", "medium", "camera", "colour"), id="surfaces of Mitsuba"),
+    pytest.param(ball, "light-volumes", {"map": 64, "evaluation": "mesh"}, ("light", "colour", "camera"), id="mesh"),
+    pytest.param(ball, "ray-march", {"steps": 8}, ("light", "medium", "camera"), id="shadow rays"),
+    pytest.param(lambda: built_in("open-fog"), "shadow-planes", {}, ("light", "medium", "camera"), id="no surfaces"),
+]
+
+
+@pytest.mark.parametrize(("scene", "method", "parameters", "steps"), CASES)
+def test_images_are_those_of_frames_made_afresh(variant, scene, method, parameters, steps):
+    renderer, afresh = (made(scene := scene() if callable(scene) else scene, method, **parameters) for _ in range(2))
+    stages, kept = next_frame(renderer, renderer.scene, None, **STILL)
+    last = host(renderer, stages)
+    for now, moved in frames(renderer.scene, steps):
+        stages, kept = next_frame(renderer, now, kept, **moved)
+        found = host(renderer, stages)
+        wanted = host(afresh, run_stages(replace(afresh, scene=now), afresh.prepare(now)))
+        for name, image in found.items():
+            np.testing.assert_array_equal(image, wanted[name], err_msg=f"{name} after {moved}")
+        assert np.any(found["airlight"] != last["airlight"]), moved  # each step does change the image
+        last = found
+
+
+def counting(renderer: FrameRenderer, counts: Counter) -> FrameRenderer:
+    def counted(name):
+        work = getattr(renderer, name)
+
+        def run(*arguments):
+            counts[name] += 1
+            return work(*arguments)
+
+        return run  # without the method `start` of a preparation: the order of the stages is another, nothing else
+
+    return replace(renderer, **{name: counted(name) for name in ("prepare", "surface", "shade", "tiles", "airlight")})
+
+
+@pytest.mark.parametrize(
+    ("method", "moved", "ran"),
+    [
+        ("shadow-planes", (), ("shade",)),
+        ("shadow-planes", ("light",), ("shade", "prepare", "tiles")),
+        ("shadow-planes", ("camera",), ("surface", "prepare", "tiles")),
+        ("shadow-planes", ("geometry",), ("surface", "prepare", "tiles")),
+        ("light-volumes", (), ("shade",)),
+        ("light-volumes", ("light",), ("shade", "prepare", "tiles")),
+        ("light-volumes", ("camera",), ("surface", "tiles")),
+        ("light-volumes", ("geometry",), ("surface", "prepare", "tiles")),
+    ],
+)
+def test_nothing_runs_that_nothing_asks_for(variant, method, moved, ran):
+    counts: Counter = Counter()
+    renderer = counting(made(built_in("sphere-spot"), method), counts)
+    _, kept = next_frame(renderer, renderer.scene, None, **STILL)
+    assert set(counts.values()) == {1}
+    counts.clear()
+    next_frame(renderer, renderer.scene, kept, **STILL | {f"{what}_moved": True for what in moved})
+    assert counts == Counter((*ran, "airlight"))
+
+
+def test_what_a_method_of_ones_own_prepares_is_made_anew_unless_it_says_otherwise(variant):
+    """It may have looked at the medium."""
+
+    def of_medium(scene, **_):
+        return lambda scene: tuple(scene.medium.sigma_t[0] for _ in scene.lights)
+
+    def method(view, *, kernel):
+        return type(view.medium.albedo)(view.prepared[0] + 0 * view.direction.x)
+
+    own = replace(METHODS["unshadowed"], function=method, prepare=of_medium, uses_kernel=False)
+    renderer = frame_renderer(ball(), own)
+    _, kept = next_frame(renderer, renderer.scene, None, **STILL)
+    thick = replace(renderer.scene, medium=thicker_medium(renderer.scene.medium, 2.0))
+    stages, _ = next_frame(renderer, thick, kept, **STILL)
+    np.testing.assert_allclose(host(renderer, stages)["airlight"], 2 * 0.31, rtol=1e-6)
+
+
+@pytest.mark.parametrize("tolerance", [0.0, 0.1])
+def test_frames_replay_whatever_moves(variant, tolerance):
+    """No stage is recorded again, but for the camera rays, once, where part of Mitsuba's scene is another."""
+    renderer = made(built_in("two-pens"), "shadow-planes", tolerance=tolerance)
+    _, kept = next_frame(renderer, renderer.scene, None, **STILL)
+    for now, moved in frames(renderer.scene, STEPS):
+        _, kept = next_frame(renderer, now, kept, **moved)
+    assert renderer.surface.n_recordings <= 2
+    assert [stage.n_recordings for stage in (renderer.shade, renderer.tiles, renderer.airlight)] == [1, 1, 1]

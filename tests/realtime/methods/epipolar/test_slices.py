@@ -1,0 +1,286 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Slices, their height maps, trees and samples, each against brute force in NumPy."""
+
+import numpy as np
+import pytest
+
+from tests.helpers.scenes import tiny_scene
+
+SIZE = (40, 30)
+#: Where the light is, seen from a camera at the origin that looks along +y with +z up.
+PLACES = {
+    "in view": (0.3, 2.1, -0.2),
+    "to the left": (-3.1, 1.7, 0.1),
+    "above": (0.2, 1.1, 2.3),
+    "beyond a corner": (2.9, 1.3, -2.2),
+    "beside": (1.7, 0.0, 0.4),
+    "behind": (0.1, -1.9, 0.3),
+    "behind, to the right": (2.3, -0.7, -0.4),
+    "at the camera": (0.0, 0.0, 0.0),
+}
+
+
+def read(position, *, kind="point", **changes):
+    import mitsuba as mi
+
+    from realtime.scene.read_scene import read_scene
+
+    look = mi.ScalarTransform4f().look_at([0, 0, 0], [0, 1, 0], [0, 0, 1])
+    lamp = {"type": "point", "position": list(position), "intensity": 1.0}
+    if kind == "spot":
+        aim = mi.ScalarTransform4f().look_at(list(position), [0.1, 2.4, -0.9], [1, 0, 0])
+        lamp = {"type": "spot", "to_world": aim, "cutoff_angle": 37.0, "beam_width": 37.0, "intensity": 1.0}
+    ball = {"type": "sphere", "center": [0.3, 1.6, 0.6], "radius": 0.41}
+    floor = {"type": "rectangle", "to_world": mi.ScalarTransform4f().translate([0, 0, -1]).scale(6.3)}
+    scene = tiny_scene(size=SIZE, **({"lamp": lamp, "ball": ball, "floor": floor} | changes))
+    scene["sensor"] = scene["sensor"] | {"to_world": look}
+    return read_scene(mi.load_dict(scene))
+
+
+def vectors(value):
+    return np.array(value, dtype=float).T
+
+
+def slices_of(scene, count=24):
+    from realtime.methods.epipolar.slices import image_slices
+
+    return image_slices(scene.camera, scene.lights[0], count)
+
+
+def points_on(slices, share):
+    """Return (i, j) on all slices, a share of the way from where they enter to where they leave."""
+    import mitsuba as mi
+
+    ends = np.array(slices.ends, dtype=float).reshape(-1, 4)
+    point = ends[:, :2] * (1 - share) + ends[:, 2:] * share
+    return mi.Float(point[:, 0]), mi.Float(point[:, 1])
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_points_of_a_slice_lie_in_its_half_plane(variant, place):
+    scene = read(PLACES[place])
+    slices, camera = slices_of(scene), scene.camera
+    towards, across = vectors(slices.towards), vectors(slices.across)
+    for share in (0.1, 0.5, 1.0):
+        i, j = points_on(slices, share)
+        direction = vectors(camera.forward + camera.left * i + camera.up * j)
+        normal = np.cross(towards, across)
+        assert np.abs(np.sum(direction * normal, axis=1)).max() < 1e-5  # float32, of lengths of about 1
+        assert np.sum(direction * across, axis=1).min() > -1e-6
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_a_point_of_a_slice_is_found_there(variant, place):
+    from realtime.methods.epipolar.slices import slice_coordinate
+
+    slices = slices_of(read(PLACES[place]))
+    for share in (0.3, 0.8):
+        found = np.array(slice_coordinate(slices, *points_on(slices, share)), dtype=float)
+        # Lines that run along the border are found less sharply.
+        assert found == pytest.approx(np.arange(slices.count), abs=2e-3)
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_slices_leave_at_equal_steps_and_reach_every_pixel(variant, place):
+    import mitsuba as mi
+
+    from realtime.methods.epipolar.slices import image_point, neighbour, pixel_number, slice_coordinate
+
+    scene = read(PLACES[place])
+    slices, camera = slices_of(scene, 200), scene.camera
+    ends = np.array(slices.ends, dtype=float).reshape(-1, 4)
+    steps = np.abs(np.diff(ends[:, 2:], axis=0)).sum(axis=1)  # along the border, round corners too
+    assert steps == pytest.approx(float(slices.length[0]) / 200, rel=1e-4)
+    pixel = np.arange(SIZE[0] * SIZE[1])
+    i, j = (SIZE[0] - 1) / 2 - pixel % SIZE[0], (SIZE[1] - 1) / 2 - pixel // SIZE[0]
+    direction = camera.forward + camera.left * mi.Float(i) + camera.up * mi.Float(j)
+    point = image_point(camera, direction)
+    assert np.array(point[0]) == pytest.approx(i, abs=1e-4)
+    assert np.array_equal(np.array(pixel_number(slices, *point)), pixel)
+    number = neighbour(slices, mi.Int32(slice_coordinate(slices, *point) + 0.5))
+    # No pixel is farther from the slice that stands for it than half a step between slices, but for the few in whose
+    # square the epipole lies.
+    across = vectors(slices.across)[np.array(number)]
+    normal = np.cross(vectors(slices.towards), across)
+    offset = np.abs(np.sum(vectors(direction) * normal, axis=1))
+    pixel_width = float(np.linalg.norm(vectors(camera.left)))
+    half_step = 0.5 * float(slices.length[0]) / 200 * pixel_width
+    assert offset.max() < 1.02 * half_step
+    inside = np.sum(vectors(direction) * across, axis=1) > -1e-6
+    assert np.mean(inside) > 0.99
+
+
+def height_maps(scene, size=32, count=24):
+    from realtime.methods.epipolar.min_max_tree import slice_heights
+    from realtime.methods.light_volumes.height_field import inverse_depth
+    from realtime.shadow_maps.shadow_map import cast_shadow_map
+
+    light = scene.lights[0]
+    shadow_map = cast_shadow_map(scene.geometry, light, size)
+    return slice_heights(shadow_map, inverse_depth(shadow_map), slices_of(scene, count), light)
+
+
+def trees(heights):
+    with np.errstate(invalid="ignore"):  # the first place of a tree is never written, and may hold anything
+        values = np.array(heights.tree).astype(float)
+    return values.reshape(heights.slices.count, 2 * heights.leaves, 2)
+
+
+def samples_of(heights):
+    """Return the heights S at all samples of all slices."""
+    leaves = trees(heights)[:, heights.leaves :]
+    assert np.array_equal(leaves[:, 1:, 0], leaves[:, :-1, 1])
+    return np.concatenate([leaves[:, :, 0], leaves[:, -1:, 1]], axis=1)
+
+
+@pytest.mark.parametrize("kind", ["point", "spot"])
+def test_a_plane_is_where_it_is(variant, kind):
+    """Planes are linear in projective coordinates: not even the coarsest map distorts one."""
+    import mitsuba as mi
+
+    from realtime.methods.epipolar.min_max_tree import line_point
+
+    turned = mi.ScalarTransform4f().translate([0, 0, -1.3]).scale(1000)
+    floor = {"type": "rectangle", "to_world": turned}
+    scene = read((0.4, 1.9, 0.9), kind=kind, ball=None, floor=floor)
+    heights = height_maps(scene, size=8)
+    values = samples_of(heights)
+    number, q = (one.ravel() for one in np.mgrid[: values.shape[0], : values.shape[1]])
+    kx, ky = line_point(heights, mi.UInt32(number), mi.Float(q))
+    slices = heights.slices
+    k = np.outer(np.array(kx), vectors(slices.towards)) + np.array(ky)[:, None] * vectors(slices.across)[number]
+    s = values.ravel() / float(slices.distance[0])
+    light = np.array([0.4, 1.9, 0.9])
+    seen = s > 0.02  # nearer than 50 m: farther, texels hold the edge of the floor
+    if kind == "spot":  # beyond the cone the map ends
+        axis = vectors(scene.lights[0].axis).ravel()
+        seen &= k @ axis > float(scene.lights[0].cos_cutoff[0]) * np.linalg.norm(k, axis=1)
+    assert np.count_nonzero(seen) > 50
+    hit = light + k[seen] / s[seen, None]
+    assert hit[:, 2] == pytest.approx(-1.3, abs=1e-4)
+    if kind == "point":
+        assert np.all(values.ravel()[k[:, 2] > 0.3] == 0)
+
+
+@pytest.mark.parametrize("kind", ["point", "spot"])
+def test_the_tree_holds_the_bounds(variant, kind):
+    heights = height_maps(read((0.4, 1.9, 1.9), kind=kind), size=16)
+    values, tree = samples_of(heights), trees(heights)
+    assert heights.leaves == (32 if kind == "point" else 16)
+    for level in range(1, heights.top + 1):
+        side = 1 << level
+        for node in range(heights.leaves // side):
+            own = values[:, node * side : (node + 1) * side + 1]
+            assert np.array_equal(tree[:, heights.leaves // side + node, 0], own.min(axis=1))
+            assert np.array_equal(tree[:, heights.leaves // side + node, 1], own.max(axis=1))
+
+
+@pytest.mark.parametrize("kind", ["point", "spot"])
+def test_lit_pieces_are_those_of_many_points(variant, kind):
+    """A ray of the slice looked at point by point in float64: where is it, and what does the map hold there?"""
+    import mitsuba as mi
+
+    from realtime.methods.epipolar.walk import sum_lit_pieces
+    from realtime.rays.ray_light import RayGeometry
+
+    scene = read((0.4, 1.9, 1.9), kind=kind)
+    heights = height_maps(scene, size=32)
+    values, slices = samples_of(heights), heights.slices
+    rng = np.random.default_rng(8311)
+    count, points = 200, 10000
+    number = rng.integers(0, slices.count, count)
+    angle = rng.uniform(0.02, np.pi - 0.02, count)
+    distance = float(slices.distance[0])
+    direction = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    x1 = rng.uniform(0.5, 9.0, count)
+    x = (np.arange(points) + 0.5) / points * x1[:, None]
+    position = np.array([distance, 0.0]) + x[..., None] * direction[:, None, :]
+    if kind == "point":
+        begin, edges = x1 * 0, np.array([[[1.0, 0.0], [0.0, 1.0]], [[0.0, 1.0], [-1.0, 0.0]]])
+        edges = np.broadcast_to(edges, (count, 2, 2, 2))
+    else:
+        chord = np.stack([np.array(one, dtype=float) for one in heights.chord], axis=1)[number]
+        edges, begin = chord.reshape(count, 1, 2, 2), x1 * 0
+    total, inside_all = np.zeros(count), np.zeros(count)
+    for edge in range(heights.edges):
+        start, end = edges[:, edge, None, 0], edges[:, edge, None, 1]
+        before = start[..., 0] * position[..., 1] - start[..., 1] * position[..., 0]
+        beyond = position[..., 0] * end[..., 1] - position[..., 1] * end[..., 0]
+        inside = (before >= 0) & (beyond > 0)
+        q = np.where(inside, before / (before + beyond), 0.0)
+        k = start + q[..., None] * (end - start)
+        s = np.linalg.norm(k, axis=2) / np.linalg.norm(position, axis=2)
+        at = np.minimum(q * heights.size, heights.size - 1e-9)
+        leaf = at.astype(int)
+        own = values[number[:, None], leaf + edge * heights.size]
+        after = values[number[:, None], leaf + edge * heights.size + 1]
+        lit = inside & (distance * s >= own + (at - leaf) * (after - own))
+        total += lit.sum(axis=1) * (x1 / points)
+        inside_all += inside.sum(axis=1) * (x1 / points)
+    if kind == "spot":  # the walk is asked for the part of the ray in the chord only
+        has = inside.any(axis=1)
+        begin = np.where(has, x[np.arange(count), inside.argmax(axis=1)], 0.0)
+        x1 = np.where(has, x[np.arange(count), points - 1 - inside[:, ::-1].argmax(axis=1)], 0.0)
+    geometry = RayGeometry(mi.Float(-distance * np.cos(angle)), mi.Float(distance * np.sin(angle)), None, None)
+    zero = mi.Float(np.zeros(count))
+    segment = mi.Float(begin), mi.Float(x1)
+    found = np.array(sum_lit_pieces(heights, mi.UInt32(number), geometry, segment, lambda a, b: b - a, zero))
+    assert np.mean((total > 0) & (total < inside_all - 1e-2)) > 0.1  # some rays are lit in part
+    # The points are 9e-4 m apart at most; few rays have more than two pieces, of two ends each.
+    assert found == pytest.approx(total, abs=4e-3)
+
+
+def test_marked_are_the_first_of_each_step_and_both_sides_of_breaks(variant):
+    import mitsuba as mi
+
+    from realtime.methods.epipolar.samples import mark_samples, marked_samples, sample_ray
+
+    slices = slices_of(read(PLACES["in view"]), 10)
+    depth = np.full(SIZE[::-1], 5.0)
+    depth[8:19, 11:22] = 2.0
+    depth[22:] = np.inf
+    samples = mark_samples(slices, mi.Float(depth.ravel()), count=64, step=8)
+    marked, count = marked_samples(samples)
+    every = np.arange(10 * 64)
+    _, number, seen = sample_ray(samples, mi.UInt32(every))
+    assert np.array_equal(np.array(number), every // 64)
+    seen = np.array(seen).reshape(10, 64)
+    expected = np.zeros((10, 64), dtype=bool)
+    expected[:, ::8] = expected[:, -1] = True
+    changes = seen[:, 1:] != seen[:, :-1]
+    expected[:, 1:] |= changes
+    expected[:, :-1] |= changes
+    found = np.array(marked)[: int(count[0])]
+    assert sorted(found) == sorted(every[expected.ravel()])
+    assert changes.sum() > 5
+
+
+def test_what_is_linear_along_slices_is_interpolated_exactly(variant):
+    import drjit as dr
+    import mitsuba as mi
+
+    from realtime.methods.epipolar.samples import between_samples, mark_samples, sample_ray
+
+    slices = slices_of(read(PLACES["to the left"]), 400)
+    depth = mi.Float(np.full(SIZE[0] * SIZE[1], 3.0))
+    samples = mark_samples(slices, depth, count=64, step=16)
+    (i, j), _, _ = sample_ray(samples, dr.arange(mi.UInt32, 400 * 64))
+    values = 50 + 0.5 * i - 0.25 * j
+    pixel = np.arange(SIZE[0] * SIZE[1])
+    point = SIZE[0] / 2 - 0.5 - pixel % SIZE[0], SIZE[1] / 2 - 0.5 - pixel // SIZE[0]
+    value, found = between_samples(samples, values, tuple(mi.Float(one) for one in point), depth)
+    assert np.all(np.array(found))
+    # Slices are at most a quarter of a pixel apart, and pixels beyond the last one take its value.
+    assert np.array(value) == pytest.approx(50 + 0.5 * point[0] - 0.25 * point[1], abs=0.1)
+    # A pixel that is as near as none of its samples is not found.
+    _, found = between_samples(samples, values, tuple(mi.Float(one) for one in point), depth * 0.5)
+    assert not np.any(np.array(found))
+
+
+@pytest.mark.parametrize("width", [1, 16, 1000, 1024, 70000])
+def test_spread_numbers_come_once(variant, width):
+    from realtime.methods.epipolar.samples import spread
+
+    numbers = np.array(spread(width))
+    assert np.array_equal(np.sort(numbers), np.arange(len(numbers)))
+    assert width <= len(numbers) < width + 1025

@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The sum of signs is exact for every closed mesh, the distances are those of an intersection in another form."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from realtime.methods.light_volumes.published.mesh import VolumeMesh
+from tests.helpers.volumes import HEIGHT, WIDTH, light_pyramid, make_camera, simple_camera, tetrahedron
+
+
+def winding_number(mesh: VolumeMesh, point) -> int | None:
+    """Return how often a mesh surrounds a point, by its solid angle (Van Oosterom, Strackee 1983); None if it is on it.
+
+    Next to a triangle that a point is on (rounding apart), half of all directions end; there `top` is 0.
+    """
+    corner = mesh.vertices[:, :3] - mesh.vertices[:, 3:] * np.asarray(point)
+    length = np.linalg.norm(corner, axis=1)
+    if np.min(length) < 1e-9:
+        return None
+    a, b, c = np.moveaxis((corner / length[:, None])[mesh.triangles], 1, 0)
+    top = np.sum(a * np.cross(b, c), axis=1)
+    bottom = 1 + np.sum(a * b, axis=1) + np.sum(b * c, axis=1) + np.sum(c * a, axis=1)
+    if np.any((np.abs(top) < 1e-9) & (bottom < 1e-9)):
+        return None
+    turns = 2 * np.arctan2(top, bottom).sum() / (4 * np.pi)
+    assert turns == pytest.approx(round(turns), abs=1e-6)
+    return round(turns)
+
+
+def found_crossings(mesh, camera, **settings):
+    """Return pixel, distance and sign of all crossings, sorted by pixel and distance."""
+    from realtime.methods.light_volumes.published.raster import signed_crossings
+
+    batches = list(signed_crossings(mesh, camera, **settings))
+    if not batches:
+        return np.zeros(0, dtype=int), np.zeros(0), np.zeros(0)
+    pixel, distance, sign = (
+        np.concatenate([np.array(getattr(found, name)) for found in batches]) for name in ("pixel", "distance", "sign")
+    )
+    order = np.lexsort((distance, pixel))
+    return pixel[order].astype(int), distance[order], sign[order]
+
+
+def sums_of_signs(mesh, camera, **settings):
+    pixel, distance, sign = found_crossings(mesh, camera, **settings)
+    assert np.all(distance >= 0)  # and so no NaN
+    return np.bincount(pixel, weights=sign, minlength=camera.width * camera.height)
+
+
+def check_signs(mesh: VolumeMesh, camera) -> None:
+    inside = winding_number(mesh, np.array(camera.origin).ravel())
+    if inside is not None:
+        assert np.all(sums_of_signs(mesh, camera) == inside)
+
+
+coordinates = st.floats(-3, 3, allow_subnormal=False)
+points = st.tuples(coordinates, coordinates, coordinates)
+whole = st.integers(-4, 4)
+
+
+@settings(max_examples=60, deadline=None)
+@given(corners=st.lists(points, min_size=4, max_size=4), eye=points)
+def test_signs_add_up_for_tetrahedra(variant, corners, eye):
+    corners = np.array(corners)
+    if abs(np.linalg.det(corners[1:] - corners[0])) < 1e-6 or np.linalg.norm(eye) < 1e-3:
+        return
+    check_signs(tetrahedron(corners), make_camera(eye))
+
+
+@settings(max_examples=60, deadline=None)
+@given(corners=st.lists(st.tuples(whole, whole, whole), min_size=4, max_size=4))
+def test_signs_add_up_where_edges_pass_through_pixel_centres(variant, corners):
+    """Corners at whole coordinates before a camera at 0: every edge and plane meets centres, or passes the camera."""
+    corners = np.array(corners, dtype=float)
+    if abs(np.linalg.det(corners[1:] - corners[0])) > 0.5:
+        check_signs(tetrahedron(corners), simple_camera())
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    inverse=st.lists(st.sampled_from((0.0, 0.05, 0.2, 0.21, 0.5, 4.0)), min_size=36, max_size=36),
+    eye=points,
+    aim=points,
+)
+def test_signs_add_up_for_light_volumes(variant, inverse, eye, aim):
+    """With vertices at infinity and behind the camera, the camera in the light, in shadow, or beside."""
+    if np.linalg.norm(np.subtract(eye, aim)) < 1e-3:
+        return
+    check_signs(light_pyramid(np.reshape(inverse, (6, 6))), make_camera(eye, aim, fov=100.0))
+
+
+def test_a_camera_in_the_light_and_one_outside(variant):
+    mesh = light_pyramid(np.full((5, 5), 0.0))
+    assert winding_number(mesh, (0.2, 0.0, 0.0)) == 1
+    assert np.all(sums_of_signs(mesh, make_camera((0.2, 0.0, 0.0), (5, 1, 0))) == 1)
+    assert np.all(sums_of_signs(mesh, make_camera((3.0, 3.0, 2.5), (0, 0, 0))) == 0)
+    beyond = found_crossings(mesh, make_camera((0.2, 0.0, 0.0), (0.2, 0.1, -1.0), fov=10.0))
+    assert np.all(np.isinf(beyond[1]))
+    assert len(beyond[1]) == WIDTH * HEIGHT
+
+
+def test_every_pixel_of_a_shared_edge_belongs_to_one_triangle(variant):
+    """A square of two triangles with all edges and the diagonal through pixel centres, as rasterizers are tested."""
+    square = np.array([(-3, -2, 1, 1), (2, -2, 1, 1), (2, 3, 1, 1), (-3, 3, 1, 1)], dtype=float)
+    for triangles in ([(0, 1, 2), (0, 2, 3)], [(1, 2, 3), (1, 3, 0)]):
+        pixel, distance, sign = found_crossings(VolumeMesh(square, np.array(triangles)), simple_camera())
+        # Columns 5 - x and rows 4 - y; the left and upper edges belong to the square.
+        columns, rows = np.meshgrid(np.arange(3, 8), np.arange(1, 6))
+        assert np.array_equal(pixel, np.sort((rows * 11 + columns).ravel()))
+        assert distance == pytest.approx(np.sqrt(1 + (5 - pixel % 11) ** 2 + (4 - pixel // 11) ** 2.0), rel=1e-15)
+        assert np.all(sign == 1)  # the normal is +z, along the view
+
+
+def test_distances_are_those_of_an_intersection(variant):
+    """Against Moller and Trumbore's test in float64, ray by ray, for a volume that surrounds part of the camera."""
+    rng = np.random.default_rng(3)
+    mesh = light_pyramid(rng.uniform(0.1, 0.6, (9, 9)))
+    camera = make_camera((0.4, 0.3, 0.2), (1.0, 0.5, -2.0), fov=80.0)
+    origin, forward, left, up = (np.array(v).ravel() for v in (camera.origin, camera.forward, camera.left, camera.up))
+    row, column = np.divmod(np.arange(WIDTH * HEIGHT), WIDTH)
+    ray = forward + (5 - column)[:, None] * left + (3.5 - row)[:, None] * up
+    ray /= np.linalg.norm(ray, axis=1)[:, None]
+    corner = (mesh.vertices[:, :3] / mesh.vertices[:, 3:])[mesh.triangles]
+    e1, e2 = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
+    p = np.cross(ray[:, None], e2)
+    determinant = np.sum(p * e1, axis=2)
+    offset = origin - corner[:, 0]
+    u = np.sum(p * offset, axis=2) / determinant
+    q = np.cross(offset, e1)
+    v = np.sum(ray[:, None] * q, axis=2) / determinant
+    x = np.sum(e2 * q, axis=1) / determinant
+    number, triangle = np.nonzero((u >= 0) & (v >= 0) & (u + v <= 1) & (x > 0))
+    order = np.lexsort((x[number, triangle], number))
+    pixel, distance, sign = found_crossings(mesh, camera)
+    assert np.array_equal(pixel, number[order])
+    assert len(pixel) > 100
+    # Rounding is 1e-16 of coordinates of up to 10 m, over the sine of the angle to the plane, 1e-3 at the least here.
+    assert distance == pytest.approx(x[number, triangle][order], rel=1e-11)
+    assert np.array_equal(sign, -np.sign(determinant[number, triangle][order]))
+
+
+def test_batches_change_nothing(variant):
+    mesh = light_pyramid(np.random.default_rng(4).choice((0.0, 0.2, 0.7), (9, 9)))
+    camera = make_camera((2.4, 0.3, 0.2), (0.1, 0.5, -1.0))
+    whole_run, pieces = found_crossings(mesh, camera), found_crossings(mesh, camera, batch=7)
+    for one, other in zip(whole_run, pieces):
+        assert np.array_equal(one, other)
+    assert len(whole_run[0]) > 100
+
+
+def test_a_mesh_out_of_sight_has_no_crossings(variant):
+    from realtime.methods.light_volumes.published.raster import signed_crossings
+
+    mesh = light_pyramid(np.full((5, 5), 0.5))
+    assert list(signed_crossings(mesh, make_camera((0.0, 9.0, 0.0), (0.0, 19.0, 0.0)))) == []

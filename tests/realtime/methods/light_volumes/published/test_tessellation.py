@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: BSD-3-Clause
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from realtime.errors import InputError
+from realtime.methods.light_volumes.published.tessellation import (
+    RING,
+    configuration,
+    divide,
+    edges,
+    quads,
+    tessellated_heights,
+    triangles,
+)
+
+
+def directed_edges(found):
+    return Counter((int(a), int(b)) for one in found for a, b in zip(one, np.roll(one, -1), strict=True))
+
+
+def areas(points, found):
+    """Twice the signed areas."""
+    a, b, c = (points[found[:, k]] for k in range(3))
+    (p, q), (r, s) = (b - a).T, (c - a).T
+    return p * s - q * r
+
+
+def grid_points(numbers, size: int):
+    return np.stack([numbers % (size + 1), numbers // (size + 1)], axis=-1)
+
+
+def random_edges(rng, *, faces: int, levels: int, share: float):
+    return [rng.random((faces, 2**level, 2**level)) < share for level in range(levels)]
+
+
+@pytest.mark.parametrize("sides", range(16))
+def test_configuration_covers_its_quad_once(sides):
+    found = np.array(configuration(sides))
+    assert len(found) == 2 + bin(sides).count("1") <= 6
+    points = np.array(RING)
+    area = areas(points, found)
+    assert np.all(area > 0)
+    assert area.sum() == 8  # twice the square of two halves a side
+    # Each edge twice, in opposite directions, but for those of the quad: these once, with the middles that there are.
+    seen = directed_edges(found)
+    assert set(seen.values()) == {1}
+    border = {edge for edge in seen if edge[::-1] not in seen}
+    ring = [k for k in range(8) if k % 2 == 0 or sides >> (k // 2) & 1]
+    assert border == set(zip(ring, ring[1:] + ring[:1], strict=True))
+    # No point of the inside is in two triangles or in none.
+    rng = np.random.default_rng(sides)
+    p = rng.uniform(0, 2, (500, 2))
+    inside = np.zeros(len(p), int)
+    for a, b, c in points[found]:
+        signs = [(q - o)[0] * (p - o)[:, 1] - (q - o)[1] * (p - o)[:, 0] for o, q in ((a, b), (b, c), (c, a))]
+        inside += np.all(np.array(signs) > 0, axis=0)
+    assert np.all(inside == 1)
+
+
+def test_meshes_of_random_divisions_have_no_gaps():
+    rng = np.random.default_rng(4)
+    configurations = set()
+    size = 32
+    for share in (0.02, 0.1, 0.3):
+        divided = divide(random_edges(rng, faces=1, levels=5, share=share))
+        for _, _, sides in quads(divided):
+            configurations |= set(sides.tolist())
+        found = triangles(divided)
+        points = grid_points(np.arange((size + 1) ** 2), size)
+        area = areas(points, found)
+        assert np.all(area > 0)
+        assert area.sum() == 2 * size**2
+        seen = directed_edges(found)
+        assert set(seen.values()) == {1}
+        for a, b in seen:
+            on_border = np.any((points[a] == points[b]) & ((points[a] == 0) | (points[a] == size)))
+            assert ((b, a) in seen) != on_border
+    assert configurations == set(range(16))
+
+
+def test_divided_sides_differ_by_one_level():
+    """Seen through the depth of the quad at every texel, not through the flags."""
+    rng = np.random.default_rng(7)
+    edge = random_edges(rng, faces=1, levels=6, share=0.01)
+    divided = divide(edge)
+    depth = np.zeros((64, 64), int)
+    for flags in divided:
+        depth += np.kron(flags[0], np.ones((64 // flags.shape[1],) * 2, int))
+    assert abs(np.diff(depth, axis=0)).max() == 1
+    assert abs(np.diff(depth, axis=1)).max() == 1
+    assert depth.min() < 5  # something was left to be coarse
+    for level, flags in enumerate(edge):
+        fine = depth.reshape(2**level, 64 >> level, 2**level, 64 >> level).min(axis=(1, 3))
+        assert np.all(fine[flags[0]] > level)
+
+
+def test_no_division_means_two_triangles_a_face():
+    divided = divide([np.zeros((6, 2**level, 2**level), bool) for level in range(3)])
+    assert len(triangles(divided)) == 12
+
+
+def height_of(function, size: int):
+    u = np.linspace(-1, 1, size + 1)
+    return function(u[None, None, :], u[None, :, None]) + np.zeros((1, size + 1, size + 1))
+
+
+def test_planes_have_no_edges():
+    for flags in edges(height_of(lambda u, v: 0.7 + 0.21 * u - 0.4 * v, 64), 1e-9):
+        assert not flags.any()
+    for flags in edges(np.zeros((6, 17, 17)), 1e-3):
+        assert not flags.any()
+
+
+@pytest.mark.parametrize("saddle", [lambda u, v: 1 + 0.3 * u * v, lambda u, v: 1 + 0.3 * (u * u - v * v)])
+def test_saddles_have_edges(saddle):
+    """The sum of the second differences vanishes there, the error of the mesh does not."""
+    height = height_of(saddle, 64)
+    found = edges(height, 1e-3)
+    assert found[0].all()
+    assert not found[-1].any()
+    error = abs(tessellated_heights(height, divide(found)) / height - 1).max()
+    assert 1e-4 < error < 2e-3
+
+
+def test_an_edge_is_found_wherever_it_lies():
+    for column in range(1, 32):
+        height = height_of(lambda u, v: 1 + 0.1 * u, 32)
+        height[:, :, column:] *= 0.5
+        divided = divide(edges(height, 1e-3))
+        assert tessellated_heights(height, divided) == pytest.approx(height, rel=1e-12)
+        assert len(triangles(divided)) < 32 * 32
+
+
+def test_the_edge_of_infinity_is_found():
+    height = np.zeros((1, 33, 33))
+    height[0, 11, 14] = 1e-20
+    assert np.array_equal(tessellated_heights(height, divide(edges(height, 0.5))), height)
+
+
+def test_errors_stay_a_small_multiple_of_the_threshold():
+    def bumps(u, v):
+        return 1 + 0.4 * np.sin(5 * u + 3 * v) * np.cos(7 * v) + (u * u + v * v < 0.3) * 0.5
+
+    height = height_of(bumps, 128)
+    counts = []
+    for threshold in (1e-3, 1e-2, 1e-1):
+        divided = divide(edges(height, threshold))
+        error = abs(tessellated_heights(height, divided) / height - 1).max()
+        # The errors of a corner and of those it was interpolated from add up; on a smooth surface they fall by 4 from
+        # level to level, which makes 4/3, and a diagonal sees the derivatives along both sides.
+        assert threshold / 8 < error < 4 * threshold
+        counts.append(len(triangles(divided)))
+    assert counts[0] > 2 * counts[1] > 4 * counts[2]
+
+
+def test_tessellated_heights_are_those_of_the_triangles():
+    rng = np.random.default_rng(12)
+    size = 16
+    height = rng.uniform(1, 2, (2, size + 1, size + 1))
+    divided = divide(random_edges(rng, faces=2, levels=4, share=0.08))
+    found = tessellated_heights(height, divided)
+    flat = height.ravel()
+    corner = grid_points(np.arange((size + 1) ** 2), size)
+    seen = np.zeros((2, len(corner)), bool)
+    for three in triangles(divided):
+        face = three[0] // (size + 1) ** 2
+        a, b, c = corner[three % (size + 1) ** 2]
+        # The plane through the three, at every corner inside the triangle.
+        slope = np.linalg.solve(np.array([b - a, c - a], float), flat[three[1:]] - flat[three[0]])
+        inside = np.ones(len(corner), bool)
+        for p, q in ((a, b), (b, c), (c, a)):
+            inside &= (q - p)[0] * (corner - p)[:, 1] - (q - p)[1] * (corner - p)[:, 0] >= 0
+        expected = flat[three[0]] + (corner[inside] - a) @ slope
+        assert found[face].ravel()[inside] == pytest.approx(expected, rel=1e-12)
+        seen[face] |= inside
+    assert seen.all()
+
+
+@pytest.mark.parametrize("threshold", [0.0, -1.0, float("nan"), float("inf")])
+def test_what_is_no_threshold(threshold):
+    with pytest.raises(InputError, match=r"threshold: got .* wanted a positive number"):
+        edges(np.ones((1, 9, 9)), threshold)

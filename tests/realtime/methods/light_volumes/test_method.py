@@ -1,0 +1,295 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Frames of light volumes, walked and drawn, against the float64 twin with the very map that they used."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.helpers.light_frames import (
+    EVALUATIONS,
+    GRID,
+    SCENES,
+    camera,
+    differ,
+    lamp,
+    loaded_scene,
+    render,
+    render_both,
+    renderer_of,
+    twin_of,
+)
+from tests.helpers.scenes import spot
+
+#: One of a kind; a kernel in float64, above all of a spot, takes seconds to compile.
+FEW = {
+    "single": ("light in view", "fence", "spot in view", "coarse map", "fine map"),
+    "double": ("along diagonals",),
+}
+
+#: Share of the pixels that must be within 1e-4 of their own value. Where many rays graze the rim of a cone, some
+#: millimetres of 3 m are lit, of which float32 holds 1e-4, or at the rim of a soft one what is lit is as dim.
+SHARES = {"spot": 0.997, "soft spot": 0.994, "three lights": 0.998}
+ALL = [
+    pytest.param(name, precision, marks=() if name in few else pytest.mark.slow)
+    for precision, few in FEW.items()
+    for name in SCENES
+]
+
+
+@pytest.mark.parametrize(("name", "precision"), ALL)
+def test_frames_are_exact_with_respect_to_the_map(variant, name, precision):
+    loaded, size = loaded_scene(name), SCENES[name][1]
+    frames = render_both(loaded, precision, map=size)
+    wanted = twin_of(loaded, frames[0], size, precision)
+    assert np.max(wanted) > 5e-4
+    for frame in frames:
+        error = np.abs(frame.airlight - wanted)
+        # The kernel's 5e-6 of the value, and room for the rounding of some terms. In double precision what is left is
+        # the scene's own: it holds its numbers in float32, 6e-8 each.
+        assert np.max(error) < (1e-5 if precision == "single" else 1e-7) * np.max(wanted)
+        assert np.mean(error <= 1e-4 * wanted) > (SHARES.get(name, 0.999) if precision == "single" else 0.999)
+    if precision == "double":
+        # The same terms but for their order, of which those of the mesh cancel.
+        assert differ(*(frame.airlight for frame in frames)) < 1e-12
+
+
+@pytest.mark.parametrize(("name", "precision"), ALL)
+def test_frames_with_upright_walls_are_exact_with_respect_to_the_map(variant, name, precision):
+    """As above, with the walls that the rays of the map found."""
+    loaded, size = loaded_scene(name), SCENES[name][1]
+    frame = render(loaded, precision=precision, map=size)
+    wanted = twin_of(loaded, frame, size, precision, walls="upright")
+    assert np.max(wanted) > 5e-4
+    error = np.abs(frame.airlight - wanted)
+    assert np.max(error) < (1e-5 if precision == "single" else 1e-7) * np.max(wanted)
+    assert np.mean(error <= 1e-4 * wanted) > (SHARES.get(name, 0.999) if precision == "single" else 0.999)
+
+
+def test_rays_cross_the_fence_more_often_than_a_queue_holds(variant):
+    from realtime.methods.light_volumes.crossings import PLACES
+    from realtime.methods.light_volumes.published.mesh import volume_mesh
+    from realtime.methods.light_volumes.published.raster import signed_crossings
+    from realtime.scene.read_scene import read_scene
+    from realtime.shadow_maps.shadow_map import cast_shadow_map
+
+    scene = read_scene(loaded_scene("fence"))
+    mesh = volume_mesh(cast_shadow_map(scene.geometry, scene.lights[0], SCENES["fence"][1]), scene.lights[0])
+    pixels = np.concatenate([np.array(found.pixel) for found in signed_crossings(mesh, scene.camera)])
+    assert np.max(np.bincount(pixels)) > 2 * PLACES
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 7), (5, 3), (18, 13), (20, 16)])
+def test_any_size_of_image(variant, size):
+    """Tiles of 4 x 4 pixels are squares in few of them."""
+    loaded = loaded_scene(size=size)
+    frames = render_both(loaded, map=64)
+    wanted = twin_of(loaded, frames[0], 64)
+    for frame in frames:
+        assert frame.airlight.shape == (size[1], size[0], 3)
+        assert differ(frame.airlight, wanted) < 1e-5
+
+
+@pytest.mark.parametrize("rooms", [(6, 1), (8, 3), (24, 9)])
+def test_lists_that_overflow_change_nothing(variant, monkeypatch, rooms):
+    import realtime.methods.light_volumes.tile_lists
+
+    loaded = loaded_scene("fence")
+    wanted = render(loaded, map=64).airlight
+    monkeypatch.setattr(realtime.methods.light_volumes.tile_lists, "_TILE_ROOM", rooms[0])
+    monkeypatch.setattr(realtime.methods.light_volumes.tile_lists, "_BLOCK_ROOM", rooms[1])
+    # Larger squares begin elsewhere on the line: rounding.
+    assert differ(render(loaded, map=64).airlight, wanted) < 2e-6
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("evaluation", EVALUATIONS)
+def test_rays_on_the_border_of_two_faces_are_lit_once(variant, axis, evaluation):
+    """The plane of the border holds the camera, and a column, a row or a diagonal of its pixels."""
+    origin, target, up, light = (np.roll(one, axis) for one in ((1, -4, 1.5), (1, 4, 1.5), (0, 0, 1), (0, 0, 2.5)))
+    speck = {"type": "sphere", "center": [0.3, 0.2, -90.0], "radius": 1e-3}  # falls between the rays of the map
+    changes = camera(origin, target, size=GRID, up=up) | {"lamp": lamp(*light), "ball": speck, "floor": None}
+    loaded = loaded_scene(**changes)
+    wanted = render(loaded, "unshadowed").airlight
+    # Three faces have nodes of their own: within the kernel's 5e-6.
+    assert render(loaded, map=64, evaluation=evaluation).airlight == pytest.approx(wanted, rel=1e-5)
+
+
+HEIGHTS = (0.0, 0.15, 0.4, 0.7, 1.9)  # inverse depths [1/m]; few, so that many texels are flat
+VIEWS = (((0.2, -4.1, 1.3), (0.1, 0.0, 0.6)), ((0.31, -1.2, 1.13), (0.9, 0.6, 1.7)), ((1.3, 0.4, 2.1), (5, 4, 2.7)))
+SMALL = 4  # texels
+
+
+@cache
+def renderers(kind, view):
+    """Return a scene, its renderers in float64, and a map to replace the values of."""
+    from realtime.shadow_maps.shadow_map import cast_shadow_map
+
+    changes = camera(*VIEWS[view], size=(13, 9)) | ({"lamp": spot(cutoff=50.0, beam=50.0)} if kind == "spot" else {})
+    loaded = loaded_scene(**changes)
+    both = [renderer_of(loaded, precision="double", map=SMALL, evaluation=one, walls="slanted") for one in EVALUATIONS]
+    scene = both[0].scene
+    return loaded, both, cast_shadow_map(scene.geometry, scene.lights[0], SMALL)
+
+
+def vertices_of(shadow_map):
+    """Return for each corner of the texels the number of its vertex: faces of a cube meet in the same ones."""
+    size = shadow_map.size
+    face, row, column = np.indices((shadow_map.faces, size + 1, size + 1)).reshape(3, -1)
+    place = np.stack([np.where(face % 2, -size, size), 2 * column - size, 2 * row - size])
+    lattice = np.empty_like(place)
+    for one in range(3):
+        lattice[(face // 2 + one) % 3, np.arange(len(face))] = place[one]
+    return np.unique(lattice, axis=1, return_inverse=True)[1].ravel()
+
+
+def with_heights(shadow_map, heights):
+    """Return a map that has these inverse depths at its corners."""
+    import mitsuba as mi
+
+    from realtime.methods.light_volumes.height_field import inverse_depth
+
+    length = np.array(inverse_depth(replace(shadow_map, distance=mi.Float64(np.ones(len(heights))))))
+    with np.errstate(divide="ignore"):
+        return replace(shadow_map, distance=mi.Float64(length / heights))
+
+
+@pytest.mark.parametrize("kind", ["point", pytest.param("spot", marks=pytest.mark.slow)])
+@settings(max_examples=20, deadline=None, derandomize=True, database=None)
+@given(data=st.data())
+def test_any_map(variant, kind, data):
+    """Whatever the heights: three routes to the same volume."""
+    from realtime.frame.renderer import image_frame, run_stages
+    from realtime.methods.light_volumes.height_field import light_heights
+    from realtime.methods.light_volumes.published.mesh import volume_mesh
+    from reference.scene.read import read_truth
+    from validation.oracles.light_volume import twin_airlight
+
+    loaded, (walk, mesh), shadow_map = renderers(kind, data.draw(st.integers(0, len(VIEWS) - 1)))
+    vertex = vertices_of(shadow_map)
+    count = int(np.max(vertex)) + 1
+    heights = data.draw(st.lists(st.sampled_from(HEIGHTS), min_size=count, max_size=count))
+    found = with_heights(shadow_map, np.array(heights)[vertex])
+    walked = image_frame(walk, run_stages(walk, (light_heights(found),)))
+    drawn = image_frame(mesh, run_stages(mesh, (volume_mesh(found, walk.scene.lights[0]),)))
+    wanted = twin_airlight(read_truth(loaded), [found], distance=walked.distance)
+    # As in the frames above; what is lit may be next to nothing, so the scale is the light's.
+    scale = np.max(np.array(walk.scene.lights[0].intensity))
+    assert np.max(np.abs(walked.airlight - drawn.airlight)) < 1e-13 * scale
+    assert np.max(np.abs(walked.airlight - wanted)) < 1e-7 * scale
+
+
+def any_walls(rng, faces, share):
+    """Return the numbers of walls of texels of which a share of the sides has one, anywhere."""
+    from realtime.methods.light_volumes.texel_walls import PLACES
+
+    level, upright = rng.integers(1, PLACES + 1, (2, faces, SMALL + 1, SMALL + 1), dtype=np.uint32)
+    level[rng.random(level.shape) >= share] = 0
+    upright[rng.random(upright.shape) >= share] = 0
+    sides = level[:, :-1, :-1], level[:, 1:, :-1], upright[:, :-1, :-1], upright[:, :-1, 1:]
+    return sum(side << np.uint32(8 * k) for k, side in enumerate(sides)).ravel()
+
+
+@pytest.mark.parametrize("kind", ["point", pytest.param("spot", marks=pytest.mark.slow)])
+@settings(max_examples=20, deadline=None, derandomize=True, database=None)
+@given(data=st.data())
+def test_any_walls_in_any_map(variant, kind, data):
+    """Wherever walls stand, on any number of a texel's sides, between heights that jump or do not."""
+    import mitsuba as mi
+
+    from realtime.frame.renderer import image_frame, run_stages
+    from realtime.methods.light_volumes.height_field import light_heights
+    from realtime.methods.light_volumes.texel_walls import walled_heights
+    from reference.scene.read import read_truth
+    from validation.oracles.light_volume import twin_airlight
+
+    loaded, (walk, _), shadow_map = renderers(kind, data.draw(st.integers(0, len(VIEWS) - 1)))
+    vertex = vertices_of(shadow_map)
+    rng = np.random.default_rng(data.draw(st.integers(0, 2**32)))
+    # Heights of no two corners are the same, so that no ray lies in the height field over a length.
+    heights = (rng.choice(HEIGHTS[1:], vertex.max() + 1) * rng.uniform(0.9, 1.1, vertex.max() + 1))[vertex]
+    found = with_heights(shadow_map, heights)
+    walls = any_walls(rng, found.faces, data.draw(st.sampled_from([0.0, 0.2, 0.5, 1.0])))
+    field = walled_heights(light_heights(found), mi.UInt32(walls), mi.UInt32(np.flatnonzero(walls)))
+    walked = image_frame(walk, run_stages(walk, (field,)))
+    wanted = twin_airlight(read_truth(loaded), [found], distance=walked.distance, walls=[walls])
+    scale = np.max(np.array(walk.scene.lights[0].intensity))
+    assert np.max(np.abs(walked.airlight - wanted)) < 1e-7 * scale
+
+
+def test_a_light_that_moves_between_frames(variant):
+    """The frozen frame of the walk replays with it, the mesh has other sizes."""
+    import drjit as dr
+    import mitsuba as mi
+
+    from realtime.frame.renderer import image_frame, run_stages
+
+    renderer = {one: renderer_of(loaded_scene(), map=64, evaluation=one, walls="slanted") for one in EVALUATIONS}
+    scene = renderer["walk"].scene
+    frames = []
+    for height in (1.9, 2.3, 2.9):
+        light = replace(scene.lights[0], position=mi.Vector3f(0.9, 0.7, height))
+        dr.make_opaque(light.position)
+        there = replace(scene, lights=(light,))
+        for one in EVALUATIONS:
+            moved = replace(renderer[one], scene=there)
+            frames.append(image_frame(moved, run_stages(moved, moved.prepare(there))).airlight)
+        assert differ(frames[-1], frames[-2]) < 1e-5
+    assert renderer["walk"].airlight.n_recordings == 1
+    assert np.max(np.abs(frames[0] - frames[-1])) > 0.01 * np.max(frames[0])
+
+
+def test_adaptive_meshes_come_closer_with_the_threshold(variant):
+    """In a dome, which is curved everywhere."""
+    loaded = loaded_scene(floor={"type": "sphere", "center": [0.3, 0.4, 0.2], "radius": 5.1})
+    exact = render(loaded, map=128, walls="slanted").airlight
+    thresholds = (1e-1, 1e-2, 1e-3)
+    errors = []
+    for threshold in thresholds:
+        found = render(loaded, map=128, evaluation="mesh", tessellation="adaptive", threshold=threshold).airlight
+        errors.append(np.sqrt(np.mean((found - exact) ** 2)) / np.mean(exact))
+    # The airlight up to the dome is wrong by less than the depth of the dome is: all of it lies before.
+    assert np.all(np.array(errors) < thresholds)
+    assert errors == sorted(errors, reverse=True)
+    assert errors[0] > 10 * errors[-1]
+
+
+def test_a_map_that_sees_nothing_lights_everything(variant):
+    """Nothing in the cone of a spot, or between the rays of the map: as without shadows."""
+    speck = {"type": "sphere", "center": [0.3, 0.2, -90.0], "radius": 1e-3}
+    for lights in ({}, {"lamp": spot()}):
+        loaded = loaded_scene(ball=speck, floor=None, **lights)
+        wanted = render(loaded, "unshadowed").airlight
+        assert np.max(wanted) > 0.01
+        for frame in render_both(loaded, map=64):
+            # Each face's part of a ray has nodes of its own: within the kernel's 5e-6.
+            assert np.all(np.abs(frame.airlight - wanted) <= 1e-5 * wanted)
+
+
+@pytest.mark.parametrize("shape", ["sphere", "cube"])
+@pytest.mark.parametrize("kind", ["point", "spot"])
+def test_a_light_inside_a_closed_occluder_lights_nothing_outside(variant, shape, kind):
+    import mitsuba as mi
+
+    place = mi.ScalarTransform4f().translate([0.11, 0.13, 0.72]).rotate([0.3, 1, 0.2], 17).scale(0.39)
+    inside = [0.173, 0.052, 0.781]
+    light = {"to_world": mi.ScalarTransform4f().look_at(inside, [0, 1, 2], [1, 0, 0])}
+    lights = {"lamp": lamp(*inside) if kind == "point" else spot() | light}
+    loaded = loaded_scene(ball={"type": shape, "to_world": place}, **lights)
+    assert np.max(render(loaded, "unshadowed").airlight) > 0.01
+    # Before a wall that the camera sees, 0.3 m from the light and 3 m away, rounding leaves 1e-6 m at most.
+    at_wall = 0.31 * 9 / (4 * np.pi * 0.3**2)
+    for frame in render_both(loaded, map=32):
+        assert np.max(np.abs(frame.airlight)) < 1e-6 * at_wall
+
+
+def test_a_light_outside_the_bounds_of_the_scene(variant):
+    loaded = loaded_scene(lamp=lamp(9.1, -7.3, 12.7))
+    frames = render_both(loaded, map=128)
+    wanted = twin_of(loaded, frames[0], 128)
+    for frame in frames:
+        assert differ(frame.airlight, wanted) < 1e-5
+    assert np.max(np.abs(wanted - render(loaded, "unshadowed").airlight)) > 0.01 * np.max(wanted)

@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import numpy as np
+import pytest
+
+from realtime.methods.shadow_planes.published_crossings import Buffer, sum_crossings
+from tests.helpers.planes import CAMERA, bundles, casters_of, crossings, drawn_lists, index_of, lit_lengths, rays_of
+
+
+def added_up(index, ways, end, *, order, buffer=None, at=None):
+    """The sum of 1 - exp(-x) over the crossings."""
+    import drjit as dr
+
+    Float = type(index.distance)
+    lists, _ = drawn_lists(index, ways, end, order=order)
+    at = at or (lambda x: 1 - dr.exp(-x))
+    gammas = (lambda plane, ray, x: at(x)), at
+    distance = Float(np.asarray(end, dtype=np.float64))
+    total, lit = sum_crossings(index, lists, rays_of(index, lists, ways), distance, gammas, order=order, buffer=buffer)
+    return np.array(total, dtype=np.float64), np.array(lit)
+
+
+def most(wrong):
+    """All but one ray in a hundred, which rounding takes past an edge, or to a plane before another."""
+    return wrong.mean() < 0.01
+
+
+def weight(x):
+    return 1 - np.exp(-x)
+
+
+@pytest.mark.parametrize("order", ["none", "paper", "exact"])
+@pytest.mark.parametrize("camera", ["in the light", "in shadow"])
+def test_orders_agree_where_no_shadow_lies_in_another(variant, order, camera):
+    """One convex body: two crossings a ray at most."""
+    place = CAMERA if camera == "in the light" else np.array([-0.93, 0.31, -1.2])
+    index = index_of(casters_of("sphere"), camera=place)
+    assert np.array(index.layers).item() == (camera == "in shadow")
+    ways = bundles(1920, spread=0.01, camera=place)
+    end = np.full(len(ways), 4.7)
+    expected, lit = lit_lengths(index, ways, end, weight=weight)
+    found, found_lit = added_up(index, ways, end, order=order)
+    assert most((np.abs(found - expected) > 1e-4) | (found_lit != lit))
+    assert np.any(lit)
+    assert not np.all(lit)
+
+
+def test_exact_order_is_right_where_shadows_overlap(variant):
+    index = index_of(casters_of("torus", "open cylinder", "crossing spheres"))
+    ways = bundles(1920, spread=0.003)
+    end = np.full(len(ways), 4.7)
+    expected, lit = lit_lengths(index, ways, end, weight=weight)
+    found, found_lit = added_up(index, ways, end, order="exact")
+    # Two crossings can come in the wrong order within a tile: that is counted, not mended.
+    wrong = (np.abs(found - expected) > 1e-4) | (found_lit != lit)
+    assert wrong.mean() < 0.03
+
+
+def test_without_an_order_every_plane_counts(variant):
+    """The artefact of Fig. 4, by formula: Gamma at the surface if it is lit, and all planes with their signs."""
+    index = index_of(casters_of("torus", "crossing spheres"))
+    ways = bundles(1920, spread=0.003)
+    end = np.full(len(ways), 4.7)
+    x, gain = crossings(index, ways)
+    _, lit = lit_lengths(index, ways, end, weight=weight)
+    crossed = x < end[:, None]
+    of_planes = np.sum(np.where(crossed, gain * weight(np.where(crossed, x, 0)), 0), axis=1)
+    expected = np.where(lit, weight(end), 0) + of_planes
+    found, _ = added_up(index, ways, end, order="none")
+    assert most(np.abs(found - expected) > 1e-4)
+    assert np.max(np.abs(expected - lit_lengths(index, ways, end, weight=weight)[0])) > 0.1
+
+
+def test_order_of_the_paper_is_by_the_stencil_rule(variant):
+    """Plane by plane in NumPy, towards the camera by the cosine of the edge's middle."""
+    index = index_of(casters_of("torus", "crossing spheres"), precision="double")
+    ways = bundles(960, spread=0.003)
+    end = np.full(len(ways), 4.7)
+    x, gain = crossings(index, ways)
+    cosine = np.array(index.spans).reshape(-1, 4)[: len(gain), 3]
+    found, lit = added_up(index, ways, end, order="paper")
+    expected = np.zeros(len(ways))
+    for ray in range(len(ways)):
+        order = np.argsort(cosine, kind="stable")
+        order = order[x[ray][order] < end[ray]]
+        stencil = np.array(index.layers).item() + gain[order].sum()
+        expected[ray] = weight(end[ray]) if stencil <= 0 else 0
+        for plane in order:
+            if gain[plane] > 0:
+                expected[ray] += weight(x[ray][plane]) if stencil == 1 else 0
+            else:
+                expected[ray] -= weight(x[ray][plane]) if stencil == 0 else 0
+            stencil -= gain[plane]
+    # Planes of one cosine come in either order.
+    assert most(np.abs(found - expected) > 1e-9)
+    assert np.any(lit)
+
+
+def test_buffer_of_eight_bits_has_steps_and_clamps(variant):
+    import mitsuba as mi
+
+    buffer = Buffer(2.0)
+    values = np.linspace(-1, 3, 4001)
+    stored = np.array(buffer.stored(mi.Float(values)), dtype=np.float64)
+    assert len(set(stored.tolist())) == 256
+    assert (stored.min(), stored.max()) == (0.0, 2.0)
+    inside = (values >= 0) & (values <= 2)
+    assert np.max(np.abs(stored - values)[inside]) <= 2 / 255 / 2 + 1e-6
+
+
+def test_buffer_clamps_after_every_plane(variant):
+    """Full at the surface, it forgets what is above, and the planes then take away too much."""
+    index = index_of(casters_of("sphere"))
+    ways = bundles(960, spread=0.003)
+    end = np.full(len(ways), 4.7)
+    free, lit = added_up(index, ways, end, order="exact")
+    clamped, _ = added_up(index, ways, end, order="exact", buffer=Buffer(0.5))
+    rounded, _ = added_up(index, ways, end, order="exact", buffer=Buffer(3.0))
+    shadowed = lit & (free < weight(4.7) - 1e-3)
+    assert shadowed.any()
+    # The sum never exceeds two: no clamping, three roundings by half a step.
+    assert np.max(np.abs(rounded - free)) < 1.5 * 3 / 255 + 1e-5
+    assert np.all(clamped[lit & ~shadowed] == pytest.approx(0.5))
+    assert np.mean(free[shadowed] - clamped[shadowed]) > 0.05
+
+
+@pytest.mark.parametrize("room", [1, 3])
+@pytest.mark.parametrize("order", ["none", "paper", "exact"])
+def test_tiles_without_room_add_up_in_the_same_order(variant, monkeypatch, order, room):
+    """From the list of their block or from the bins; by the stencil rule and by rounding after every plane."""
+    import realtime.methods.shadow_planes.tile_lists as module
+
+    index = index_of(casters_of("torus", "crossing spheres"), precision="double")
+    ways = bundles(1920, spread=0.003)
+    end = np.full(len(ways), 4.7)
+    wanted, lit = added_up(index, ways, end, order=order)
+    stepped, _ = added_up(index, ways, end, order=order, buffer=Buffer(0.9))
+    monkeypatch.setattr(module, "ROOM", room)
+    monkeypatch.setattr(module, "LEAST", 0)
+    assert np.array(drawn_lists(index, ways, end, order=order)[0].sorted).mean() < 0.9
+    found, found_lit = added_up(index, ways, end, order=order)
+    found_stepped, _ = added_up(index, ways, end, order=order, buffer=Buffer(0.9))
+    # With room, crossings are in the order of the tile's middle ray; without, in that of the ray itself: one ray in a
+    # hundred differs. The paper's order is that of the planes, the same for all rays.
+    differing = 0.0 if order == "paper" else 0.01
+    assert np.mean((np.abs(found - wanted) > 1e-9) | (found_lit != lit)) <= differing
+    assert np.mean(np.abs(found_stepped - stepped) > 1e-9) <= differing

@@ -1,0 +1,205 @@
+# SPDX-License-Identifier: BSD-3-Clause
+from collections import Counter
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from realtime.methods.shadow_planes.mesh_adjacency import make_casters
+from realtime.methods.shadow_planes.silhouettes import layers, silhouette
+from tests.helpers.casters import ALL, SOUND, closed_box, closed_sphere, flat_roof
+
+LIGHTS = {"aside": (2.9, -1.7, 2.3), "near": (0.31, 0.47, 0.71), "inside": (0.11, -0.05, 0.17)}
+
+small = st.integers(-3, 3)
+points = st.tuples(small, small, small)
+
+
+def casters_of(mesh):
+    return make_casters([("mesh", *mesh)])
+
+
+def determinant(a, b, c):
+    return np.einsum("...i,...i->...", a, np.cross(b, c))
+
+
+def layers_over(casters, light, way):
+    """How many layers lie over a direction, triangle by triangle: those of a closed body that face the light."""
+    a, b, c = (casters.vertices[casters.triangles[:, k]] - light for k in range(3))
+    towards = -determinant(a, b, c)  # the normal is turned to the light if the corners run clockwise from outside
+    sides = np.stack([determinant(p, q, way) for p, q in ((a, b), (b, c), (c, a))])
+    hit = np.all(sides > 0, axis=0) | np.all(sides < 0, axis=0)
+    # All corners lie on the far side of the light, or the three sides agree behind it.
+    hit &= np.sign(determinant(a, b, c)) * sides[0] > 0
+    counts = hit & ((towards > 0) | (~casters.closed[casters.body] & (towards != 0)))
+    return int(counts.sum())
+
+
+def layers_gained(casters, found, light, start, end):
+    """What the silhouette says is gained on the way from one direction to another, along the shorter arc."""
+    a, b = casters.vertices[found.edges[:, 0]] - light, casters.vertices[found.edges[:, 1]] - light
+    across = np.sign(determinant(a, b, start)) - np.sign(determinant(a, b, end))
+    within = determinant(start, end, a) * determinant(start, end, b) < 0
+    # Two great circles meet twice: the arcs do if a crossing lies on the near side of both.
+    crossing = np.cross(np.cross(a, b), np.cross(start, end))
+    with np.errstate(invalid="ignore"):
+        middle = a / np.linalg.norm(a, axis=1)[:, None] + b / np.linalg.norm(b, axis=1)[:, None]
+    near = np.sum(crossing * middle, axis=-1) * np.sum(crossing * (start + end), axis=-1) > 0
+    # As the light sees it, w is to the left of the way from a to b where det(a, b, w) < 0.
+    return int(np.sum(found.coefficient * across * (within & near)) / 2)
+
+
+def random_directions(seed, count):
+    ways = np.random.default_rng(seed).normal(size=(count, 3))
+    return ways / np.linalg.norm(ways, axis=1)[:, None]
+
+
+def assert_counts_layers(casters, light, *, seed=3, count=12):
+    light = np.asarray(light, dtype=float)
+    found = silhouette(casters, light)
+    ways = random_directions(seed, count)
+    for start, end in pairwise(ways):
+        change = layers_over(casters, light, end) - layers_over(casters, light, start)
+        assert layers_gained(casters, found, light, start, end) == change
+
+
+def assert_is_cycle(found):
+    balance: Counter = Counter()
+    for (a, b), c in zip(found.edges.tolist(), found.coefficient.tolist()):
+        balance[a] += c
+        balance[b] -= c
+    assert not any(balance.values())
+
+
+def link_loops(found):
+    """Link directed silhouette edges into closed loops of vertices, the last of which is joined to the first.
+
+    An edge with the coefficient c is passed |c| times, in its direction for c > 0 and against it for c < 0. Where loops
+    touch, they are parted at the vertex.
+    """
+    count = np.abs(found.coefficient)
+    along = found.coefficient > 0
+    tail = np.repeat(np.where(along, found.edges[:, 0], found.edges[:, 1]), count)
+    head = np.repeat(np.where(along, found.edges[:, 1], found.edges[:, 0]), count)
+    leaving: dict[int, list[int]] = {}
+    for edge, vertex in enumerate(tail.tolist()):
+        leaving.setdefault(vertex, []).append(edge)
+    loops = []
+    for start in tail.tolist():
+        while leaving.get(start):
+            loops.append(loop_from(start, leaving, head))
+    return loops
+
+
+def loop_from(start, leaving, head):
+    """Follow edges until the first vertex that was met before, and give the way to it back."""
+    path, place = [start], {start: 0}
+    edges: list[int] = []
+    while True:
+        edge = leaving[path[-1]].pop()
+        vertex = int(head[edge])
+        if vertex in place:
+            first = place[vertex]
+            for number, unused in enumerate(edges[:first]):
+                leaving[path[number]].append(unused)
+            return np.array(path[first:], dtype=np.int32)
+        place[vertex] = len(path)
+        path.append(vertex)
+        edges.append(edge)
+
+
+@pytest.mark.parametrize("light", LIGHTS)
+@pytest.mark.parametrize("name", ALL)
+def test_silhouette_counts_layers(name, light):
+    casters = casters_of(ALL[name]())
+    assert_counts_layers(casters, LIGHTS[light], count=30)
+    assert_is_cycle(silhouette(casters, np.array(LIGHTS[light])))
+
+
+@settings(max_examples=80, deadline=None)
+@given(
+    vertices=st.lists(points, min_size=4, max_size=9, unique=True),
+    faces=st.lists(st.tuples(*3 * [st.integers(0, 8)]), min_size=1, max_size=14),
+    light=points,
+    seed=st.integers(0, 1000),
+)
+def test_any_triangles_and_any_light(vertices, faces, light, seed):
+    """Whole numbers, so that lights lie in planes, on edges and on vertices, and triangles lie upon one another."""
+    mesh = np.array(vertices, dtype=float), np.array(faces) % len(vertices)
+    casters = casters_of(mesh)
+    assume(len(casters.triangles))
+    assert_is_cycle(silhouette(casters, np.array(light, dtype=float)))
+    assert_counts_layers(casters, light, seed=seed, count=4)
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    corners=st.lists(points, min_size=8, max_size=8, unique=True),
+    light=points,
+    flips=st.lists(st.booleans(), min_size=2, max_size=2),
+)
+def test_tetrahedra_either_way_round(corners, light, flips):
+    """Closed bodies, one or both of which may be inside out, flat, or about the light."""
+    faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
+    parts = [faces[:, ::-1] if flip else faces for flip in flips]
+    casters = casters_of((np.array(corners, dtype=float), np.concatenate([parts[0], parts[1] + 4])))
+    assume(len(casters.triangles))
+    assert_is_cycle(silhouette(casters, np.array(light, dtype=float)))
+    assert_counts_layers(casters, light, count=6)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_closed_body_has_the_silhouette_of_the_paper(turned):
+    """The edges between a facing and an averted triangle, whichever side is out."""
+    vertices, faces = closed_sphere()
+    casters = casters_of((vertices, faces[:, ::-1] if turned else faces))
+    light = np.array(LIGHTS["aside"])
+    found = silhouette(casters, light)
+    faces_light = np.einsum("ij,ij->i", casters.normals, light - casters.vertices[casters.triangles[:, 0]]) > 0
+    expected = casters.edges[faces_light[casters.left] != faces_light[casters.right]]
+    assert np.array_equal(found.edges, expected)
+    assert set(np.abs(found.coefficient).tolist()) == {1}
+
+
+def test_light_in_the_plane_of_a_roof():
+    mesh, light = flat_roof()
+    casters = casters_of(mesh)
+    assert int(np.sum(layers(casters, light)[:-1] == 0)) > 0
+    assert_counts_layers(casters, light, count=80)
+
+
+def test_light_inside_a_convex_caster_has_no_silhouette():
+    assert len(silhouette(casters_of(closed_box()), np.array([-0.1, 0.15, 0.1])).edges) == 0
+
+
+def test_only_bodies_in_use_are_looked_at():
+    both = casters_of(SOUND["nested spheres"]())
+    light = np.array(LIGHTS["aside"])
+    parts = [silhouette(both, light, used=np.array(used)) for used in ((True, False), (False, True))]
+    together = silhouette(both, light)
+    edges = np.concatenate([part.edges for part in parts])
+    assert sorted(map(tuple, edges.tolist())) == sorted(map(tuple, together.edges.tolist()))
+    assert min(len(part.edges) for part in parts) > 10
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_loops_use_every_edge_once(name):
+    casters = casters_of(ALL[name]())
+    found = silhouette(casters, np.array(LIGHTS["aside"]))
+    loops = link_loops(found)
+    used: Counter = Counter()
+    for loop in loops:
+        assert len(set(loop.tolist())) == len(loop) >= 2
+        used.update(zip(loop.tolist(), np.roll(loop, -1).tolist()))
+    wanted: Counter = Counter()
+    for (a, b), c in zip(found.edges.tolist(), found.coefficient.tolist()):
+        wanted[(a, b) if c > 0 else (b, a)] += abs(c)
+    assert used == wanted
+
+
+def test_ball_has_one_loop_and_two_balls_two():
+    light = np.array(LIGHTS["aside"])
+    assert len(link_loops(silhouette(casters_of(closed_sphere()), light))) == 1
+    assert len(link_loops(silhouette(casters_of(SOUND["nested spheres"]()), light))) == 2

@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import numpy as np
+import pytest
+
+from realtime.errors import InputError
+from realtime.methods.shadow_planes.spot_pyramid import cone_ring, is_outside, ring_edges
+
+_AXIS = np.array([0.31, -0.57, 0.43]) / np.linalg.norm([0.31, -0.57, 0.43])
+_COSINE = np.cos(np.deg2rad(24.3))
+
+
+def frame(parameters, *, size=(64, 48), **changes):
+    """A frame of the sphere under the spot; its scene can be turned so that the camera is in the cone."""
+    import mitsuba as mi
+
+    from realtime.frame.renderer import render_frame
+    from realtime.scene.read_scene import read_scene
+    from validation.configurations.methods import configuration, prepared
+    from validation.scenes.loading import resize
+    from validation.scenes.sphere_spot import sphere_spot
+
+    scene = mi.load_dict(sphere_spot() | changes)
+    resize(scene, size)
+    return render_frame(prepared(read_scene(scene), configuration("shadow-planes", None, parameters)))
+
+
+@pytest.mark.parametrize("sides", [3, 4, 32])
+def test_corners_lie_on_the_cone_and_turn_left_as_the_light_sees_them(sides):
+    ring = cone_ring(_AXIS, _COSINE, sides)
+    np.testing.assert_allclose(ring @ _AXIS, _COSINE, rtol=1e-14)
+    np.testing.assert_allclose(np.linalg.norm(ring, axis=1), 1, rtol=1e-14)
+    # For one who looks along the axis the cross products of counter-clockwise corners point back at him.
+    assert np.all(np.cross(ring, np.roll(ring, -1, axis=0)) @ _AXIS < 0)
+    assert ring_edges(ring).shape == (sides, 2, 3)
+    np.testing.assert_array_equal(ring_edges(ring)[-1, 1], ring[0])
+
+
+def test_outside_is_what_the_pyramid_does_not_hold():
+    ring = cone_ring(_AXIS, _COSINE, 5)
+    middle_of_edge = ring[0] + ring[1]
+    assert not is_outside(ring, _AXIS)
+    assert not is_outside(ring, 0.999 * ring[2] + 0.001 * _AXIS)
+    assert is_outside(ring, 1.001 * ring[2] - 0.001 * _AXIS)
+    assert is_outside(ring, -_AXIS)
+    # Between two corners the cone bulges beyond the pyramid.
+    assert is_outside(ring, middle_of_edge - 0.01 * _AXIS)
+    assert not is_outside(ring, middle_of_edge + 0.01 * _AXIS)
+
+
+def test_many_edges_are_the_cone_itself_and_fewer_are_darker_by_the_square(variant):
+    """A regular polygon has the share 1 - (2 pi / N)^2 / 6 of its circle: four times the edges, a sixteenth missing."""
+    whole = frame({}).airlight
+    missing = [1 - frame({"cone": sides}).airlight.mean() / whole.mean() for sides in (16, 64, 4096)]
+    assert 0.01 < missing[0] < 0.05
+    # The 3072 pixels and the sphere's shadow in the middle leave a share of it to chance.
+    assert missing[0] / missing[1] == pytest.approx(16, rel=0.2)
+    assert abs(missing[2]) < 1e-5
+    many = frame({"cone": 4096})
+    # (2 pi / 4096)^2 / 6 = 4e-7 of the cone's section; rays along its edge see more of that, and float32 adds 1e-5.
+    np.testing.assert_allclose(many.airlight, whole, rtol=1e-3, atol=1e-4 * whole.mean())
+
+
+def test_a_camera_in_the_cone_sees_its_light(variant):
+    from validation.scenes.parts import camera
+
+    # 14 degrees from the axis of the cone of 24.3, the sphere takes 11.
+    sensor = camera((0.9, -0.6, 0.37), (0.2, 4.9, 1.47), fov=71.3, size=(32, 24))
+    whole = frame({}, size=(32, 24), sensor=sensor).airlight
+    planes = frame({"cone": 4096}, size=(32, 24), sensor=sensor).airlight
+    assert whole.min() > 0
+    np.testing.assert_allclose(planes, whole, rtol=1e-3)
+
+
+@pytest.mark.parametrize("order", ["paper", "none"])
+def test_one_shadow_in_a_cone_is_the_same_in_every_order(variant, order):
+    """Nothing is behind anything here but the sphere's own shadow on the cone: no plane is in shadow."""
+    exact, other = frame({"cone": 32}).airlight, frame({"cone": 32, "order": order}).airlight
+    # Sums of Gammas of both signs in float32 instead of segments.
+    np.testing.assert_allclose(other, exact, rtol=1e-4, atol=1e-4 * exact.mean())
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        ({"cone": 2}, "cone: got 2, wanted 0 for the cone itself, or 3 to 4096 edges"),
+        ({"cone": -1}, "cone: got -1"),
+        ({"cone": 32, "evaluation": "vertex"}, "cone: wanted evaluation=pixel"),
+    ],
+)
+def test_what_a_cone_cannot_be_is_refused(variant, parameters, message):
+    with pytest.raises(InputError, match=message):
+        frame(parameters, size=(8, 6))

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: BSD-3-Clause
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.helpers.planes import CAMERA, LIGHT, bundles, casters_of, drawn_lists, index_of, lit_lengths, rays_of
+
+CAMERAS = {"in the light": CAMERA, "in shadow": -0.7 * LIGHT, "among the casters": np.array([0.1, -0.05, 0.31])}
+NAMES = ["torus", "crossing spheres", "open cylinder", "Moebius strip", "boxes sharing an edge"]
+
+
+def walked(index, lists, ways, end, *, begin=0.0):
+    """The sum over lit segments of 1 - exp(-x), and whether the light reaches the end."""
+    import drjit as dr
+
+    from realtime.methods.shadow_planes.sweep import sum_lit_segments
+
+    Float = type(index.distance)
+    rays = rays_of(index, lists, ways)
+    segment = Float(np.full(len(ways), begin)), Float(np.asarray(end, dtype=np.float64))
+    total, lit = sum_lit_segments(
+        index, lists, rays, segment, lambda a, b: dr.exp(-a) - dr.exp(-b), dr.zeros(Float, len(ways))
+    )
+    return np.array(total, dtype=np.float64), np.array(lit)
+
+
+def weight(x):
+    return -np.exp(-x)
+
+
+def assert_same(found, expected, *, tolerance):
+    """All but one ray in a thousand: one that passes a vertex or an edge within rounding may miss it or not."""
+    wrong = (np.abs(found[0] - expected[0]) > tolerance) | (found[1] != expected[1])
+    assert wrong.sum() <= len(wrong) // 1000
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+@pytest.mark.parametrize("name", NAMES)
+def test_lit_segments_are_those_between_the_crossings(variant, name, camera):
+    index = index_of(casters_of(name), camera=CAMERAS[camera])
+    ways = bundles(1920, spread=0.01, camera=CAMERAS[camera])
+    end = np.random.default_rng(3).choice([0.9, 2.7, 6.1, np.inf], len(ways))
+    lists, _ = drawn_lists(index, ways, end)
+    # float32 crossings at grazing angles: 1e-7 over the sine of the angle between ray and plane.
+    expected = lit_lengths(index, ways, end, weight=weight)
+    assert_same(walked(index, lists, ways, end), expected, tolerance=1e-4)
+    assert expected[1].any()
+
+
+def test_double_precision_is_right_to_more_digits(variant):
+    index = index_of(casters_of("torus", "open cylinder"), precision="double")
+    ways = bundles(1920, spread=0.01)
+    end = np.full(len(ways), 4.3)
+    lists, _ = drawn_lists(index, ways, end)
+    assert_same(walked(index, lists, ways, end), lit_lengths(index, ways, end, weight=weight), tolerance=1e-11)
+
+
+@pytest.mark.parametrize(
+    "order", ["shuffled", "backwards", "two changed", "five at a time backwards", "said to be unsorted"]
+)
+def test_rays_notice_an_order_that_is_wrong(variant, order):
+    """And find their segments with a longer queue, or by selection."""
+    import mitsuba as mi
+
+    index = index_of(casters_of("torus", "open cylinder", "crossing spheres"))
+    ways = bundles(960, spread=0.01)
+    end = np.full(len(ways), np.inf)
+    lists, _ = drawn_lists(index, ways, end)
+    entries = np.array(lists.entries)
+    rng = np.random.default_rng(9)
+    changed = 0
+    for first, count in zip(np.array(lists.source.first), np.array(lists.source.count)):
+        places = np.arange(first, first + count)
+        if order == "shuffled":
+            entries[places] = entries[rng.permutation(places)]
+        elif order == "backwards":
+            entries[places] = entries[places[::-1]]
+        elif order == "five at a time backwards" and count:  # too much for a queue of two, nothing for one of eight
+            entries[places] = entries[np.concatenate([places[k : k + 5][::-1] for k in range(0, count, 5)])]
+        elif order == "two changed" and count > 3:
+            entries[places[[0, -1]]] = entries[places[[-1, 0]]]
+        changed += count > 3
+    unsorted = mi.Bool(False) & lists.sorted if order == "said to be unsorted" else lists.sorted
+    lists = replace(lists, entries=mi.UInt32(entries), sorted=unsorted)
+    assert changed > 20
+    expected = lit_lengths(index, ways, end, weight=weight)
+    assert_same(walked(index, lists, ways, end), expected, tolerance=1e-4)
+
+
+def test_wide_tiles_are_out_of_order_and_right(variant):
+    """Bundles a quarter of a turn wide: no order is right for all their rays."""
+    index = index_of(casters_of("torus", "crossing spheres"))
+    ways = bundles(960, spread=0.4)
+    end = np.full(len(ways), 5.1)
+    lists, _ = drawn_lists(index, ways, end)
+    assert_same(walked(index, lists, ways, end), lit_lengths(index, ways, end, weight=weight), tolerance=1e-4)
+
+
+def test_segments_begin_where_they_are_told_to(variant):
+    """Between two distances, as a spot's cone cuts them: what is lit up to the second less what is up to the first."""
+    index = index_of(casters_of("torus", "open cylinder"))
+    ways = bundles(960, spread=0.01)
+    begin, end = 1.7, np.full(len(ways), 3.3)
+    lists, _ = drawn_lists(index, ways, end)
+    until_end, lit = lit_lengths(index, ways, end, weight=weight)
+    until_begin, _ = lit_lengths(index, ways, np.full(len(ways), begin), weight=weight)
+    found = walked(index, lists, ways, end, begin=begin)
+    assert_same(found, (until_end - until_begin, lit), tolerance=1e-4)
+
+
+def test_empty_segments_are_nothing(variant):
+    index = index_of(casters_of("torus"))
+    ways = bundles(160, spread=0.01)
+    lists, _ = drawn_lists(index, ways, np.full(len(ways), 2.0))
+    total, _ = walked(index, lists, ways, np.full(len(ways), 2.0), begin=2.0)
+    assert np.all(total == 0)

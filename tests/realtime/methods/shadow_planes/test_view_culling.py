@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import numpy as np
+import pytest
+
+from realtime.methods.shadow_planes.mesh_adjacency import make_casters
+from realtime.methods.shadow_planes.view_culling import bodies_in_view, view_planes
+from tests.helpers.scenes import tiny_scene
+
+
+def camera_at(origin, target, size=(40, 30)):
+    import mitsuba as mi
+
+    from realtime.scene.camera import read_camera
+    from realtime.scene.read_scene import read_scene
+
+    scene = tiny_scene(size=size, ball=None, floor=None)
+    look = mi.ScalarTransform4f().look_at(list(origin), list(target), [0.1, 0.3, 1])
+    scene["sensor"] = scene["sensor"] | {"to_world": look}
+    return read_camera(read_scene(mi.load_dict(scene)).camera)
+
+
+def sees(camera, points):
+    """Whether points lie in the image: along the ray through a pixel, by projection."""
+    origin, forward, left, up = camera.origin, camera.forward, camera.left, camera.up
+    away = points - origin
+    depth = away @ forward
+    across = away @ left / (left @ left) / np.where(depth > 0, depth, np.inf)
+    upward = away @ up / (up @ up) / np.where(depth > 0, depth, np.inf)
+    return (depth > 0) & (np.abs(across) < camera.width / 2) & (np.abs(upward) < camera.height / 2)
+
+
+def boxes(rng, count):
+    """Boxes of triangles, one a body."""
+    corners = np.array([[i >> k & 1 for k in range(3)] for i in range(8)], dtype=float)
+    faces = np.array([[0, 1, 3], [0, 3, 2], [4, 5, 7], [4, 7, 6], [0, 1, 5], [0, 5, 4]])
+    meshes = []
+    for number in range(count):
+        size, place = rng.uniform(0.1, 1.2, 3), rng.normal(size=3) * 3
+        meshes.append((f"box {number}", corners * size + place, faces))
+    return make_casters(meshes)
+
+
+def test_no_body_is_dropped_whose_shadow_is_seen(variant):
+    rng = np.random.default_rng(11)
+    dropped = 0
+    for _ in range(40):
+        casters = boxes(rng, 8)
+        light, origin, target = rng.normal(size=(3, 3)) * 3
+        camera = camera_at(origin, target)
+        used = bodies_in_view(casters, camera, light)
+        for body, (low, high) in enumerate(casters.boxes):
+            points = rng.uniform(low, high, (4000, 3))
+            beyond = rng.exponential(3, (len(points), 1)) * (rng.random((len(points), 1)) < 0.9)
+            if sees(camera, points + beyond * (points - light)).any():
+                assert used[body]
+        dropped += int(np.sum(~used))
+    # A third at least has its shadow elsewhere: the test is worth its time only if there is something to drop.
+    assert dropped > 100
+
+
+def test_planes_of_the_view_hold_what_is_seen(variant):
+    camera = camera_at((0.3, -2.0, 0.9), (0.1, 0.4, 0.2))
+    points = np.random.default_rng(1).normal(size=(20000, 3)) * 3
+    origin, normals = view_planes(camera)
+    inside = np.all((points - origin) @ normals.T > 0, axis=1)
+    assert np.array_equal(inside, sees(camera, points))
+    assert 0.01 < inside.mean() < 0.5
+
+
+@pytest.mark.parametrize("place", ["behind the camera", "between", "far aside"])
+def test_culling_by_hand(variant, place):
+    """Light behind the camera, which looks along +y."""
+    camera = camera_at((0.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+    centre = {"behind the camera": (0, -1, 0), "between": (0, 2, 0), "far aside": (30, 1, 0)}[place]
+    corners = np.array([[-0.1, -0.1, -0.1], [0.1, -0.1, -0.1], [0, 0.1, -0.1], [0, 0, 0.1]]) + centre
+    casters = make_casters([("caster", corners, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])])
+    assert bodies_in_view(casters, camera, np.array([0.0, -5.0, 0.0]))[0] == (place != "far aside")
+
+
+def test_no_casters_are_nothing_to_cull(variant):
+    found = bodies_in_view(make_casters([]), camera_at((0, 0, 0), (0, 1, 0)), np.zeros(3))
+    assert found.shape == (0,)

@@ -1,0 +1,252 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import re
+import textwrap
+
+import numpy as np
+import pytest
+
+from realtime.errors import InputError
+from realtime.frame.recorded import Frozen
+from realtime.frame.renderer import frame_renderer, render_frame
+from realtime.methods.registry import METHODS, Method, find_method
+from tests.helpers.scenes import tiny_scene
+
+SOURCE = """
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from realtime.errors import InputError
+from realtime.methods.method import Method
+from realtime.methods.registry import METHODS
+
+NUMBER = 3
+
+class Kind: pass
+
+def grey(view, gain=0.5): return mi.Float(gain)
+def vector(view): return mi.Vector3d(1, 2, 3)
+def plain(view): return np.array([[0.25, 0.5, 1.0]]) * np.ones((dr.width(view.pixel), 1))
+def constant(view): return 2
+def nothing(view): pass
+def words(view): return "bright"
+def truth(view): return view.distance > 1
+def turned(view): return np.ones((3, dr.width(view.pixel)))
+def short(view): return mi.Color3f(mi.Float([1.0, 2.0]))
+def dark(view): return np.where(np.arange(dr.width(view.pixel)) == dr.width(view.pixel) - 1, np.nan, 1.0)
+def wants(view, steps): return 1
+def blind(): return 1
+def refuses(view): raise InputError("refuses: wanted another scene")
+
+def divides(view):
+    'Divide by zero.'
+    return 1 / (NUMBER - 3)
+
+def loops(view):
+    def body(i):
+        raise ValueError("in the\\nloop")
+    return dr.while_loop((mi.UInt32(0),), lambda i: i < 3, body)
+
+def calls(view, *, kernel=None, steps=7, share=0.5, word="a", on=True, other=None, **rest):
+    return 1.0 if callable(kernel) else 0.0
+calls.shadows = False
+calls.frozen = True
+
+def ready(view, size=2): return mi.Color3f(view.prepared[0])
+ready.prepare = lambda scene, size: lambda scene: (float(size),)
+def unready(view): return 1
+unready.prepare = lambda scene: None
+def wrong_ready(view): return 1
+wrong_ready.prepare = 5
+def full(view, *, kernel): return 2
+record = Method("theirs", full, "", "", uses_kernel=False)
+lights = Method("lights", full, "", "", uses_kernel=False, lights_surfaces=lambda settings: True)
+"""
+
+
+def refused(text):
+    return pytest.raises(InputError, match=re.escape(text))
+
+
+@pytest.fixture
+def own(tmp_path):
+    """A file of methods, good and bad; its path."""
+    path = tmp_path / "own_for_tests.py"
+    path.write_text(SOURCE)
+    return str(path)
+
+
+@pytest.fixture
+def render(own, variant):
+    """Render the tiny scene by a method of that file."""
+    import mitsuba as mi
+
+    from realtime.kernels.registry import KERNELS
+    from realtime.scene.read_scene import read_scene
+
+    scene = read_scene(mi.load_dict(tiny_scene()))
+
+    def rendered(name, **parameters):
+        renderer = frame_renderer(scene, find_method(f"{own}:{name}"), kernel=KERNELS["exact"].function, **parameters)
+        return render_frame(renderer).airlight
+
+    return rendered
+
+
+def test_a_built_in_name_gives_the_record_itself():
+    assert all(find_method(name) is record for name, record in METHODS.items())
+
+
+def test_the_signature_decides(own):
+    found = find_method(f"{own}:calls")
+    assert found.uses_kernel
+    assert found.parameters == {"steps": 7, "share": 0.5, "word": "a", "on": True}
+    assert (found.shadows, found.frozen({}), found.casts_rays({})) == (False, True, True)
+    found = find_method(f"{own}:divides")
+    assert not found.uses_kernel
+    assert (found.parameters, found.shadows, found.frozen({})) == ({}, True, False)
+    assert (found.summary, found.source) == ("Divide by zero.", own)
+
+
+@pytest.mark.parametrize(
+    ("name", "wanted"),
+    [
+        ("grey", (0.5, 0.5, 0.5)),
+        ("vector", (1, 2, 3)),
+        ("plain", (0.25, 0.5, 1)),
+        ("constant", (2, 2, 2)),
+        ("calls", (1, 1, 1)),
+        ("ready", (2, 2, 2)),
+        ("record", (2, 2, 2)),
+    ],
+)
+def test_what_is_returned_becomes_an_image(render, name, wanted):
+    np.testing.assert_array_equal(render(name), np.broadcast_to(wanted, (12, 16, 3)))
+
+
+def test_parameters_arrive(render):
+    assert render("grey", gain=0.75)[0, 0, 0] == 0.75
+    assert render("ready", size=5)[3, 4, 1] == 5
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("nothing", "returned a NoneType; wanted the radiance of every pixel"),
+        ("words", "returned a str; wanted"),
+        ("truth", "returned a drjit.llvm.ad.Bool; wanted"),
+        ("turned", "returned an array of shape (3, 192) for 192 pixels"),
+        ("short", "returned 2 values for 192 pixels"),
+        ("dark", "of 1 of 192 pixels is not finite, first in column 15 of row 11: nan, nan, nan"),
+        ("lights", "returned a int; wanted (radiance, lit by light)"),
+        ("unready", "`prepare` returned a NoneType; wanted a function of the scene"),
+    ],
+)
+def test_a_wrong_result_is_refused_with_the_name_and_what_came(render, own, name, message):
+    with refused(message) as caught:
+        render(name)
+    assert f"method {own}:{name}: " in str(caught.value)
+
+
+def test_an_exception_names_file_and_line(render, own):
+    lines = SOURCE.splitlines()
+    for name, text, kind in (
+        ("divides", "return 1 / (NUMBER - 3)", "ZeroDivisionError: division by zero"),
+        ("loops", "raise ValueError", "ValueError: in the loop"),
+    ):
+        number = next(number for number, line in enumerate(lines, 1) if text in line)
+        with refused(f"method {own}:{name}: {own}, line {number}: {kind}") as caught:
+            render(name)
+        assert caught.value.__cause__ is not None
+
+
+def test_its_own_refusal_stays_as_it_is(render):
+    with pytest.raises(InputError, match=r"^refuses: wanted another scene$"):
+        render("refuses")
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("gone", "has no 'gone'; it has grey, vector"),
+        ("Kind", "this is a class; wanted a function of the view"),
+        ("NUMBER", "this is a int; wanted a function of the view"),
+        ("wants", "nothing gives 'steps' a value; wanted a keyword with a default"),
+        ("blind", "it takes no view"),
+        ("wrong_ready", "its `prepare` is a int; wanted a function of the scene"),
+        ("1x", "wanted 'module:function'"),
+        ("", "wanted 'module:function'"),
+    ],
+)
+def test_what_is_no_method_is_refused(own, name, message):
+    with refused(message):
+        find_method(f"{own}:{name}")
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("gone_for_tests:f", "there is no module 'gone_for_tests'"),
+        ("realtime.gone:f", "there is no module 'realtime.gone'"),
+        ("..realtime:f", "no module can have the name '..realtime'"),
+        ("gone/fog.py:f", "there is no file gone/fog.py"),
+        (":f", "wanted 'module:function'"),
+        ("rey-march", "did you mean 'ray-march'?"),
+    ],
+)
+def test_what_is_not_there_is_refused(name, message):
+    with refused(message):
+        find_method(name)
+
+
+def test_faults_in_the_file_are_told_with_their_line(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "broken_for_tests.py").write_text("def f(view):\n    return (\n")
+    (tmp_path / "imports_for_tests.py").write_text("\nimport not_there_for_tests\n")
+    for module in ("broken_for_tests", "broken_for_tests.py"):
+        with refused("broken_for_tests.py, line 2: SyntaxError"):
+            find_method(f"{module}:f")
+    for module in ("imports_for_tests", "imports_for_tests.py"):
+        with refused("imports_for_tests.py, line 2: ModuleNotFoundError: No module named 'not_there_for_tests'"):
+            find_method(f"{module}:f")
+
+
+def test_a_module_of_the_current_folder_is_found_and_the_path_left_as_it_was(tmp_path, monkeypatch):
+    import sys
+
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "here_for_tests.py").write_text("def f(view):\n    return 1\n")
+    before = list(sys.path)
+    assert find_method("here_for_tests:f").name == "here_for_tests:f"
+    assert sys.path == before
+
+
+def test_a_file_that_was_changed_is_read_again(own, tmp_path):
+    assert find_method(f"{own}:calls").parameters["steps"] == 7
+    tmp_path.joinpath("own_for_tests.py").write_text(SOURCE.replace("steps=7", "steps=77"))
+    assert find_method(f"{own}:calls").parameters["steps"] == 77
+
+
+def test_only_a_method_that_says_so_is_frozen(own, variant):
+    import mitsuba as mi
+
+    from realtime.scene.read_scene import read_scene
+
+    scene = read_scene(mi.load_dict(tiny_scene()))
+    assert not isinstance(frame_renderer(scene, find_method(f"{own}:constant")).airlight, Frozen)
+    assert isinstance(frame_renderer(scene, find_method(f"{own}:calls"), kernel=print).airlight, Frozen)
+
+
+def test_a_record_keeps_what_it_says(tmp_path):
+    path = tmp_path / "record_for_tests.py"
+    path.write_text(
+        textwrap.dedent("""
+        from dataclasses import replace
+        from realtime.methods.registry import METHODS
+        mine = replace(METHODS["ray-march"], name="mine")
+    """)
+    )
+    found = find_method(f"{path}:mine")
+    assert isinstance(found, Method)
+    assert found.name == "mine"
+    assert found.parameters == METHODS["ray-march"].parameters
+    assert found.prepare is METHODS["ray-march"].prepare

@@ -1,0 +1,201 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import numpy as np
+import pytest
+
+
+def point_light(types, position):
+    from realtime.scene.lights import Light
+
+    return Light("point", False, types.vector(*(float(p) for p in position)), types.color(1))
+
+
+def spot_light(types, position, axis, degrees):
+    from realtime.scene.lights import Light, spot_fields
+
+    angle = float(np.deg2rad(degrees))
+    fields = spot_fields(np.asarray(axis) / np.linalg.norm(axis), angle, angle, types)
+    return Light("spot", False, types.vector(*(float(p) for p in position)), types.color(1), **fields)
+
+
+@pytest.mark.parametrize("kind", ["point", "spot"])
+def test_height_of_rays_that_nearly_meet_the_light(variant, kind):
+    """Rays towards the light, off by 1e-6 to 1: the textbook form has no correct digit at the small end."""
+    import mitsuba as mi
+
+    from realtime.numerics.array_types import array_types
+    from realtime.rays.ray_light import ray_geometry
+
+    rng = np.random.default_rng(7)
+    light = np.array([1.25, -2.5, 3.75])  # exact in float32, as is light - origin below
+    direction = (light + 10.0 ** rng.uniform(-6, 0, (4000, 1)) * rng.normal(size=(4000, 3))).astype(np.float32)
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    types = array_types()
+    axis = np.array([0.6, 0.0, -0.8])
+    lamp = point_light(types, light) if kind == "point" else spot_light(types, light, axis, 40.0)
+    geometry = ray_geometry(mi.Vector3f(0), mi.Vector3f(direction.T), lamp)
+    exact = direction.astype(np.float64)
+    height = np.linalg.norm(np.cross(light, exact), axis=1)
+    # 1.5 units in the last place for each component, and one for each step of the norm.
+    assert np.max(np.abs(np.array(geometry.height) / height - 1)) < 3e-7
+    assert np.max(np.abs(np.array(geometry.foot) - exact @ light)) < 4 * np.finfo(np.float32).eps * np.linalg.norm(
+        light
+    )
+
+
+@pytest.mark.parametrize("kind", ["point", "spot"])
+def test_rounding_of_light_and_direction_is_no_height(variant, kind):
+    """Where light - origin and direction are rounded, their low parts make up for it: 1e-7 m of a height of 1e-4 m."""
+    from realtime.numerics.array_types import array_types
+    from realtime.rays.ray_light import ray_geometry
+    from realtime.scene.lights import with_low
+
+    types = array_types()
+    rng = np.random.default_rng(8)
+    light, origin = (with_low(one, types)[0] for one in ((1.237, -2.519, 3.751), (-0.33, 0.71, 0.123)))
+    direction = light - origin + 10.0 ** rng.uniform(-4, 0, (2000, 1)) * rng.normal(size=(2000, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    high, low = with_low(direction, types)
+    axis = np.array([0.48, 0.6, -0.64])
+    lamp = point_light(types, light) if kind == "point" else spot_light(types, light, axis, 40.0)
+    at = types.vector(*(float(x) for x in origin))
+    geometry = ray_geometry(at, types.vector(high.T), lamp, low=types.vector(low.T))
+    cross = np.cross(light - origin, direction)
+    height = np.linalg.norm(cross, axis=1)
+    assert np.max(np.abs(np.array(geometry.height) / height - 1)) < 4e-7  # three roundings of a component and a norm
+    if kind == "spot":
+        offset = np.cross(cross, direction) @ axis
+        assert np.max(np.abs(np.array(geometry.offset) - offset) / height) < 4e-7
+
+
+@pytest.mark.parametrize("precision", ["single", "double"])
+def test_cone_clip_against_sampling(variant, precision):
+    """A sample lies in the clipped segment if and only if it lies in the cone, but for a rounding at its ends."""
+    from realtime.numerics.array_types import array_types
+    from realtime.rays.ray_light import clip_to_cone, ray_geometry
+
+    types = array_types(precision)
+    rng = np.random.default_rng(11)
+    n, m = 400, 300
+    origin, direction = rng.normal(size=(n, 3)) * 2, rng.normal(size=(n, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    for degrees in (3.0, 37.0, 71.0, 89.0):
+        light = spot_light(types, (0.3, -0.2, 0.1), (0.4, 0.5, -0.7), degrees)
+        geometry = ray_geometry(types.vector(origin.T), types.vector(direction.T), light)
+        clipped = clip_to_cone(geometry, types.scalar(0), types.scalar(9.0))
+        low, high = (np.broadcast_to(np.array(x, dtype=np.float64), n) for x in clipped)
+        x = np.linspace(0.01, 8.99, m)
+        away = origin[:, None] + x[:, None] * direction[:, None] - np.array([0.3, -0.2, 0.1])
+        axis = np.array([0.4, 0.5, -0.7]) / np.linalg.norm([0.4, 0.5, -0.7])
+        cosine = (away @ axis) / np.linalg.norm(away, axis=2)
+        clear = np.abs(cosine - np.cos(np.deg2rad(degrees))) > 1e-4  # of the cone's surface
+        inside = (x > low[:, None]) & (x < high[:, None])
+        assert np.array_equal(inside[clear], (cosine > np.cos(np.deg2rad(degrees)))[clear]), degrees
+        assert inside.any()
+
+
+def test_endless_rays_are_clipped_to_half_lines(variant):
+    from realtime.numerics.array_types import array_types
+    from realtime.rays.ray_light import clip_to_cone, ray_geometry
+
+    types = array_types()
+    light = spot_light(types, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 30.0)
+    along = ray_geometry(types.vector(0.5, 0.0, -3.0), types.vector(0.0, 0.0, 1.0), light)
+    low, high = clip_to_cone(along, types.scalar(0), types.scalar(np.inf))
+    assert np.array(low)[0] == pytest.approx(3 + 0.5 / np.tan(np.deg2rad(30)), rel=1e-6)
+    assert np.isinf(np.array(high)[0])
+    against = ray_geometry(types.vector(0.5, 0.0, 3.0), types.vector(0.0, 0.0, 1.0), light)
+    assert np.array(clip_to_cone(against, types.scalar(0), types.scalar(np.inf))[0])[0] == 0
+
+
+@pytest.mark.parametrize("degrees", [40.0, 50.0])
+def test_rays_through_the_light(variant, degrees):
+    """Height and all products with it are 0; in the cone lies what is beyond the light, before it, or nothing."""
+    from realtime.numerics.array_types import array_types
+    from realtime.rays.ray_light import clip_to_cone, ray_geometry
+
+    types = array_types()
+    light = spot_light(types, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), degrees)
+    direction = np.array([(0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (0.6, 0.0, 0.8), (0.6, 0.0, -0.8), (1.0, 0.0, 0.0)])
+    origin = -2 * direction.astype(np.float32).astype(np.float64)
+    geometry = ray_geometry(types.vector(origin.T), types.vector(direction.T), light)
+    assert np.all(np.array(geometry.height) == 0)
+    low, high = (np.array(x) for x in clip_to_cone(geometry, types.scalar(0), types.scalar(np.inf)))
+    foot = np.array(geometry.foot)
+    np.testing.assert_array_equal(low[:4], [foot[0], 0, foot[2], 0])
+    np.testing.assert_array_equal(high[:4], [np.inf, foot[1], np.inf, foot[3]])
+    assert high[4] == low[4]
+
+
+@pytest.mark.parametrize(("sine", "cosine"), [(0.6, 0.8), (0.8, 0.6)])
+def test_rays_parallel_to_a_line_on_the_cone(variant, sine, cosine):
+    """The quadratic equation has one root: a half line inside the cone, or on the other side of the axis nothing.
+
+    The other root is infinite, or at 1e7 m by the rounding of sine and cosine.
+    """
+    from realtime.numerics.array_types import array_types
+    from realtime.rays.ray_light import clip_to_cone, ray_geometry
+
+    types = array_types()
+    light = spot_light(types, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), np.rad2deg(np.arcsin(sine)))
+    assert np.array(light.cos_cutoff)[0] == np.float32(cosine)
+    # In the cone |x| <= tan z; from (-1, 0, 0) that is 1 - sine t <= sine t on one side, and always on the other.
+    for x, sign, wanted in ((-1, 1, (0.5 / sine, np.inf)), (1, 1, None), (-1, -1, None), (1, -1, None)):
+        direction = types.vector(sign * sine, 0.0, sign * cosine)
+        beside = ray_geometry(types.vector(x, 0.0, 0.0), direction, light)
+        low, high = (np.array(end)[0] for end in clip_to_cone(beside, types.scalar(0), types.scalar(np.inf)))
+        if wanted is None:
+            assert low == high == 0 or low > 1e7
+        else:
+            assert low == pytest.approx(wanted[0], rel=1e-6)
+            assert high > 1e7
+
+
+@pytest.mark.parametrize(("cutoff", "beam"), [(3.0, 2.0), (33.0, 0.0), (70.0, 69.0)])
+def test_falloff_near_the_axis_and_the_edge(variant, cutoff, beam):
+    """Against the angle from the cross product in float64; an arc cosine in float32 is off by 3e-4 near the axis."""
+    from realtime.numerics.array_types import array_types
+    from realtime.rays.ray_light import falloff, ray_geometry
+    from realtime.scene.lights import Light, spot_fields, with_low
+
+    types = array_types()
+    rng = np.random.default_rng(12)
+    light, origin = (with_low(one, types)[0] for one in ((1.237, -2.519, 3.751), (-0.33, 0.71, 0.123)))
+    axis = np.array([0.48, 0.6, -0.64])
+    angle = np.deg2rad(cutoff)
+    fields = spot_fields(axis, float(angle), float(np.deg2rad(beam)), types)
+    lamp = Light("spot", True, types.vector(*(float(x) for x in light)), types.color(1), **fields)
+    across = np.cross(axis, rng.normal(size=(3000, 3)))
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    aim = np.concatenate([10.0 ** rng.uniform(-6, 0, 1000), 1 - 10.0 ** rng.uniform(-6, 0, 1000), rng.random(1000)])
+    distance = rng.uniform(0.5, 5, (3000, 1))
+    point = light + distance * (axis + np.tan(aim * angle)[:, None] * across)
+    x = np.linalg.norm(point - origin, axis=1)
+    direction = (point - origin) / x[:, None]
+    high, low = with_low(direction, types)
+    at = types.vector(*(float(one) for one in origin))
+    geometry = ray_geometry(at, types.vector(high.T), lamp, low=types.vector(low.T))
+    x = x.astype(np.float32).astype(np.float64)
+    away = origin + x[:, None] * direction - light
+    exact = np.arctan2(np.linalg.norm(np.cross(axis, away), axis=1), away @ axis)
+    wanted = np.clip((angle - exact) / (angle - np.deg2rad(beam)), 0, 1)
+    found = np.array(falloff(geometry, lamp, types.scalar(x)))
+    # Distances of up to 10 m, rounded, over a distance from the light of 0.5 m or more; measured 9e-7.
+    assert np.max(np.abs(found - wanted)) * (angle - np.deg2rad(beam)) < 2e-6
+    assert np.mean((wanted > 0) & (wanted < 1)) > 0.05
+
+
+def test_falloff_along_the_axis_and_through_the_light(variant):
+    """A ray parallel to the axis, at 0.5 m and at none, and one through the light, aslant: no product is left of it."""
+    from realtime.numerics.array_types import array_types
+    from realtime.rays.ray_light import falloff, ray_geometry
+    from realtime.scene.lights import Light, spot_fields
+
+    types = array_types()
+    fields = spot_fields((0.0, 0.0, 1.0), 1.0, 0.25, types)
+    light = Light("spot", True, types.vector(0.0), types.color(1), **fields)
+    origin = np.array([(0.5, 0.0, -2.0), (0.0, 0.0, -2.0), (-1.2, 0.0, -1.6)])
+    direction = np.array([(0.0, 0.0, 1.0), (0.0, 0.0, 1.0), (0.6, 0.0, 0.8)])
+    geometry = ray_geometry(types.vector(origin.T), types.vector(direction.T), light)
+    found = np.array(falloff(geometry, light, types.scalar(3.0)))
+    angle = np.array([np.arctan2(0.5, 1.0), 0.0, np.arctan2(0.6, 0.8)])
+    np.testing.assert_allclose(found, np.clip((1 - angle) / 0.75, 0, 1), atol=1e-6)

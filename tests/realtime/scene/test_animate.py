@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: BSD-3-Clause
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from realtime.errors import InputError
+from realtime.methods.shadow_planes.mesh_adjacency import read_casters, with_positions
+from realtime.scene.animate import (
+    closed_shapes,
+    coloured_light,
+    read_objects,
+    thicker_medium,
+    turned_light,
+    turned_objects,
+)
+from tests.helpers.scenes import spot, tiny_scene
+from validation.scenes.parts import rotation
+
+
+def host(array) -> np.ndarray:
+    return np.array(array, dtype=np.float64).ravel()
+
+
+@pytest.fixture
+def scene(variant):
+    import mitsuba as mi
+
+    from realtime.scene.read_scene import read_scene
+
+    return read_scene(mi.load_dict(tiny_scene(ball=None, floor=None, lamp=spot())))
+
+
+@pytest.fixture
+def pens(variant):
+    from realtime.scene.read_scene import read_scene
+    from validation.scenes.loading import load_scene
+
+    return read_scene(load_scene("two-pens", (16, 12)).scene)
+
+
+def test_a_spot_turns_with_its_axis_and_keeps_all_else(scene):
+    light = scene.lights[0]
+    turned = turned_light(light, np.array([0.1, 0.1, 0.4]), rotation((0, 0, 1), 90))
+    # (0.7, -0.3) - (0.1, 0.1) = (0.6, -0.4) becomes (0.4, 0.6); float32.
+    np.testing.assert_allclose(host(turned.position), [0.5, 0.7, 2.6], rtol=1e-6)
+    x, y, z = host(light.axis)
+    np.testing.assert_allclose(host(turned.axis), [-y, x, z], rtol=1e-5, atol=1e-7)
+    whole, before = (host(one.axis) + host(one.axis_low) for one in (turned, light))
+    x, y, z = before
+    np.testing.assert_allclose(whole, [-y, x, z], rtol=0, atol=1e-14)  # twice the digits of float32
+    assert turned.kind == light.kind
+    np.testing.assert_array_equal(host(turned.intensity), host(light.intensity))
+    assert type(turned.position) is type(light.position)
+
+
+def test_colours_go_round_and_keep_their_sum(scene):
+    light = scene.lights[0]
+    red, green, blue = host(light.intensity)
+    np.testing.assert_array_equal(host(coloured_light(light, 0).intensity), [red, green, blue])
+    np.testing.assert_allclose(host(coloured_light(light, 1 / 3).intensity), [blue, red, green], rtol=1e-6)
+    for share in (0.1, 0.47, 0.93):
+        colour = host(coloured_light(light, share).intensity)
+        assert colour.sum() == pytest.approx(red + green + blue, rel=1e-6)
+        assert colour.min() >= min(red, green, blue) * (1 - 1e-6)
+
+
+def test_a_thicker_medium_keeps_its_albedo(scene):
+    medium = thicker_medium(scene.medium, 1.5)
+    assert [float(value[0]) for value in medium.sigma_t] == pytest.approx(
+        [1.5 * float(value[0]) for value in scene.medium.sigma_t], rel=1e-6
+    )
+    np.testing.assert_array_equal(host(medium.albedo), host(scene.medium.albedo))
+    with pytest.raises(InputError, match="factor of the extinction"):
+        thicker_medium(scene.medium, -0.1)
+
+
+def test_turned_objects_are_where_rays_meet_them_and_where_casters_are(pens):
+    """Mitsuba's own vertices, and the casters read anew from them, tell where the objects should be."""
+    casters = read_casters(pens.geometry)
+    objects = read_objects(pens, ["pens"])
+    moved = turned_objects(pens, objects, rotation((0, 0, 1), 37.0))
+    again = read_casters(moved.geometry)
+    here = with_positions(casters, moved.positions)
+    assert np.abs(here.vertices - casters.vertices).max() > 0.1
+    # The vertices come in another order, the triangles may begin at another corner: compare what has no order.
+    for one, other in ((here.vertices, again.vertices), (here.boxes[:, 0], again.boxes[:, 0])):
+        np.testing.assert_array_equal(np.unique(one, axis=0), np.unique(other, axis=0))
+    np.testing.assert_allclose(np.sort(here.offsets), np.sort(again.offsets), rtol=0, atol=1e-15)
+
+
+def test_a_whole_turn_ends_where_it_began(pens):
+    objects = read_objects(pens, ["pens", "flag"])
+    turned_objects(pens, objects, rotation((0, 0, 1), 180.0))
+    back = turned_objects(pens, objects, np.eye(3))
+    for name, vertices in objects.vertices.items():
+        np.testing.assert_array_equal(back.positions[name], vertices)
+
+
+def test_moved_objects_render_as_a_scene_read_anew(pens):
+    """Frozen functions recorded before the move, against a renderer made after it."""
+    from realtime.frame.renderer import render_frame
+    from realtime.scene.read_scene import read_scene
+    from validation.configurations.methods import configuration, prepared
+
+    renderer = prepared(pens, configuration("shadow-planes"))
+    before = render_frame(renderer)
+    moved = turned_objects(pens, read_objects(pens, ["pens"]), rotation((0, 0, 1), 71.0))
+    frame = render_frame(replace(renderer, scene=moved))
+    fresh = render_frame(prepared(read_scene(pens.geometry), configuration("shadow-planes")))
+    assert np.abs(frame.airlight - before.airlight).max() > 1e-3 * before.airlight.mean()
+    # Planes come in another order: the float32 sums of a few segments differ by rounding.
+    np.testing.assert_allclose(frame.airlight, fresh.airlight, rtol=2e-5, atol=1e-6 * fresh.airlight.mean())
+    # A surface that ends a plane of its own silhouette is before or behind it by rounding: two pixels of 192 here.
+    same = np.isclose(frame.surface, fresh.surface, rtol=2e-5, atol=1e-6 * fresh.surface.mean()).all(axis=-1)
+    assert np.mean(~same) < 0.02
+
+
+def test_a_shape_that_is_not_there_cannot_move(pens):
+    with pytest.raises(InputError, match="shape 'pencil' cannot move"):
+        read_objects(pens, ["pencil"])
+
+
+def test_closed_shapes_are_things_not_floors(pens):
+    assert closed_shapes(read_casters(pens.geometry)) == ("pens",)

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import numpy as np
+import pytest
+
+
+@pytest.mark.parametrize("size", [(64, 48), (37, 53)])
+@pytest.mark.parametrize("axis", ["x", "y", "smaller"])
+def test_rays_are_those_of_mitsuba(variant, size, axis):
+    import mitsuba as mi
+
+    from realtime.numerics.array_types import array_types
+    from realtime.scene.camera import ray_directions
+    from realtime.scene.read_scene import _read_camera
+
+    sensor = {
+        "type": "perspective",
+        "fov": 47.0,
+        "fov_axis": axis,
+        "to_world": mi.ScalarTransform4f().look_at([1.3, -2.1, 0.7], [0.2, 0.4, 0.9], [0.1, 0.2, 1.0]),
+        "film": {"type": "hdrfilm", "width": size[0], "height": size[1]},
+    }
+    scene = mi.load_dict({"type": "scene", "sensor": sensor})
+    camera, plugin = _read_camera(scene, array_types("double"))
+    pixel = np.arange(size[0] * size[1])
+    direction = np.array(ray_directions(camera, mi.UInt32(pixel.astype(np.uint32)))[0])
+    position = mi.Point2f((pixel % size[0] + 0.5) / size[0], (pixel // size[0] + 0.5) / size[1])
+    ray, _ = plugin.sample_ray(0.0, 0.5, position, mi.Point2f(0.5))
+    assert np.max(np.abs(direction - np.array(ray.d))) < 5e-7  # float32 matrices on Mitsuba's side
+    assert np.max(np.abs(np.linalg.norm(direction, axis=0) - 1)) < 1e-14
+
+
+def test_aim_is_kept_to_twice_the_digits(variant):
+    """Single precision with its low part against double precision: the angle between the two."""
+    import mitsuba as mi
+
+    from realtime.numerics.array_types import array_types
+    from realtime.scene.camera import ray_directions
+    from realtime.scene.read_scene import _read_camera
+
+    matrix = mi.ScalarTransform4f().look_at([1.3, -2.1, 0.7], [0.2, 0.4, 0.9], [0.1, 0.2, 1.0])
+    film = {"type": "hdrfilm", "width": 801, "height": 601}
+    scene = mi.load_dict({"type": "scene", "s": {"type": "perspective", "fov": 63.7, "to_world": matrix, "film": film}})
+    pixel = mi.UInt32(np.arange(0, 801 * 601, 7, dtype=np.uint32))
+    high, low = (
+        np.array(part, dtype=np.float64) for part in ray_directions(_read_camera(scene, array_types())[0], pixel)
+    )
+    exact = np.array(ray_directions(_read_camera(scene, array_types("double"))[0], pixel)[0])
+    plain = np.linalg.norm(np.cross(high.T, exact.T), axis=1)
+    kept = np.linalg.norm(np.cross((high + low).T, exact.T), axis=1)
+    assert plain.max() > 2e-8  # what float32 alone leaves
+    assert kept.max() < 1e-13
+
+
+@pytest.mark.parametrize("size", [(8, 8), (800, 600), (37, 53), (1, 5)])
+def test_tiles_hold_every_pixel_once(size):
+    from realtime.scene.camera import tiled_pixels
+
+    pixels = tiled_pixels(*size)
+    assert np.array_equal(np.sort(pixels), np.arange(size[0] * size[1]))
+    if size == (8, 8):
+        assert pixels[:16].tolist() == [row * 8 + column for row in range(4) for column in range(4)]

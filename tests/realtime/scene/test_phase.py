@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import numpy as np
+import pytest
+
+
+def phases():
+    from realtime.scene.phase import Phase
+
+    yield "isotropic", 0.0, Phase("isotropic")
+    yield "rayleigh", 0.0, Phase("rayleigh")
+    yield "hazy", 0.0, Phase("hazy")
+    yield "murky", 0.0, Phase("murky")
+    for g in (-0.93, -0.2, 1e-4, 0.61, 0.97):
+        yield "hg", g, Phase("hg", g=g)
+
+
+def test_against_the_analytic_side(variant):
+    """The same functions written twice, in float32 here and in float64 there."""
+    import mitsuba as mi
+
+    from analytic.phase import PhaseFunction
+    from realtime.scene.phase import evaluate
+
+    cosine = np.linspace(-1, 1, 2001).astype(np.float32)
+    for name, g, phase in phases():
+        value = np.broadcast_to(np.array(evaluate(phase, mi.Float(cosine)), dtype=np.float64), cosine.shape)
+        expected = PhaseFunction(name, g=g)(cosine.astype(np.float64))
+        # float32: the sharpest lobe, g = 0.97, amplifies the rounding of 1 - g by 3/2 g/(1 - g).
+        assert np.max(np.abs(value / expected - 1)) < 1e-5, (name, g)
+
+
+def test_tabulated_interpolates_between_its_cosines(variant):
+    import mitsuba as mi
+
+    from realtime.scene.phase import Phase, evaluate
+
+    values = np.array([0.2, 0.7, 1.9, 0.4])
+    cosine = np.linspace(-1, 1, 101)
+    value = np.array(evaluate(Phase("tabulated", values=mi.Float64(values)), mi.Float64(cosine)))
+    assert value == pytest.approx(np.interp(cosine, np.linspace(-1, 1, 4), values), rel=1e-12)

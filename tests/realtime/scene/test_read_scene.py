@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import numpy as np
+import pytest
+
+from realtime.errors import InputError
+from tests.helpers.scenes import spot, tiny_scene
+
+
+def read(**changes):
+    import mitsuba as mi
+
+    from realtime.scene.read_scene import read_scene
+
+    return read_scene(mi.load_dict(tiny_scene(**changes)))
+
+
+def test_reads_what_the_scene_holds(variant):
+    scene = read(spot=spot(cutoff=33.0, beam=21.0))
+    assert float(scene.medium.sigma_t[0][0]) == pytest.approx(0.31)
+    assert np.array(scene.medium.albedo).ravel() == pytest.approx([0.9, 0.8, 0.7], rel=1e-6)
+    point, cone = scene.lights
+    assert np.array(point.position).ravel() == pytest.approx([0.9, 0.7, 1.9])
+    assert np.array(point.intensity).ravel() == pytest.approx([5, 4, 3])
+    assert np.array(cone.intensity).ravel() == pytest.approx([9, 7, 8])
+    assert float(cone.cutoff[0]) == pytest.approx(np.deg2rad(33))
+    assert float(cone.inverse_transition[0]) == pytest.approx(1 / np.deg2rad(12))
+    towards = np.array([0.1, 0.1, 0.4]) - [0.7, -0.3, 2.6]
+    assert np.array(cone.axis).ravel() == pytest.approx(towards / np.linalg.norm(towards), abs=1e-6)
+
+
+def test_plan_names_only_what_is_needed(variant):
+    plan = read(ball=None, floor=None).plan
+    assert not plan.shadows
+    assert not plan.surfaces
+    assert plan.extinctions == 1
+    assert plan.isotropic
+    assert (plan.point_lights, plan.spot_lights, plan.soft_spots, plan.vacuum) == (1, 0, False, False)
+    plan = read(spot=spot(beam=20.0)).plan
+    assert plan.shadows
+    assert plan.soft_spots
+    assert not read(spot=spot()).plan.soft_spots
+
+
+def test_coloured_extinction_asks_for_three_integrals(variant):
+    medium = tiny_scene()["fog"] | {
+        "sigma_t": {"type": "rgb", "value": [0.1, 0.2, 0.4]},
+        "has_spectral_extinction": True,
+    }
+    assert read(fog=medium).plan.extinctions == 3
+
+
+def test_vacuum_and_black_media_are_read(variant):
+    assert read(fog=tiny_scene()["fog"] | {"sigma_t": 0.0}).plan.vacuum
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        (lambda fog: {"lamp": None}, "no light"),
+        (lambda fog: {"sky": {"type": "constant"}}, "ConstantBackgroundEmitter"),
+        (lambda fog: {"fog": fog | {"sigma_t": -1.0}}, "sigma_t is"),
+        (lambda fog: {"fog": fog | {"sigma_t": float("nan")}}, "sigma_t is"),
+        (lambda fog: {"fog": fog | {"albedo": 1.5}}, "albedo is"),
+        (lambda fog: {"ball": {"type": "sphere", "emitter": {"type": "area"}}}, "AreaLight"),
+        (lambda fog: {"ball": {"type": "sphere", "bsdf": {"type": "null"}}}, "transparent"),
+        (lambda fog: {"ball": {"type": "sphere", "interior": {"type": "homogeneous"}}}, "bounds a medium"),
+        (lambda fog: {"spot": spot(cutoff=95.0, beam=90.0)}, "cutoff_angle"),
+        (lambda fog: {"sensor": {"type": "thinlens", "aperture_radius": 0.1}}, "ThinLens"),
+    ],
+)
+def test_refusals_name_what_is_in_the_way(variant, changes, message):
+    with pytest.raises(InputError, match=message):
+        read(**changes(tiny_scene()["fog"]))
+
+
+def test_camera_outside_the_medium_is_refused(variant):
+    sensor = {name: value for name, value in tiny_scene()["sensor"].items() if name != "medium"}
+    with pytest.raises(InputError, match="would be in a vacuum"):
+        read(sensor=sensor)
+
+
+def test_glossy_surfaces_are_noted(variant):
+    notes = read(ball={"type": "sphere", "bsdf": {"type": "roughplastic"}}).plan.notes
+    assert len(notes) == 1
+    assert "not purely diffuse" in notes[0]
+    assert read().plan.notes == ()

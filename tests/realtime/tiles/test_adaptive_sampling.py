@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Airlight between the corners of tiles, against the airlight of every pixel."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from realtime.errors import InputError
+from realtime.frame.renderer import frame_renderer, render_frame
+from realtime.kernels.registry import KERNELS
+from realtime.methods.registry import METHODS
+from realtime.tiles.adaptive_sampling import between_corners, tile_corners
+from tests.helpers.scenes import tiny_scene
+
+SIZE = 48, 32
+
+
+def image_of(function, tolerance, *, depth=None, lit=None):
+    """Return the image of a function of column and row between corners, and how many pixels were computed."""
+    import drjit as dr
+    import mitsuba as mi
+
+    from realtime.scene.camera import tiled_pixels
+
+    width, height = SIZE
+    pixel = mi.UInt32(tiled_pixels(width, height))
+    corners = tile_corners(pixel, SimpleNamespace(width=width, height=height), tolerance, by_rays=True, lights=1)
+    values, lights, distance = (
+        np.ascontiguousarray(np.broadcast_to(one, (height, width)).ravel(), dtype=kind)
+        for one, kind in (
+            (function(*np.meshgrid(np.arange(width), np.arange(height))), np.float32),
+            (True if lit is None else lit, np.uint32),
+            (1.0 if depth is None else depth, np.float32),
+        )
+    )
+    table, light = mi.Float(values), mi.UInt32(lights)
+    computed = dr.zeros(mi.UInt32, width * height)
+
+    def sample(pixel, distance, tile):
+        value = dr.gather(mi.Float, table, pixel)
+        dr.scatter(computed, mi.UInt32(1), pixel)
+        return mi.Color3f(value, 2 * value, 0.5 * value), (dr.gather(mi.UInt32, light, pixel) != 0,)
+
+    found, (reached,) = between_corners(
+        corners, pixel, dr.gather(mi.Float, mi.Float(distance), pixel), sample, width=width, tolerance=tolerance
+    )
+    order, image = np.array(pixel), np.empty((width * height, 3))
+    image[order] = np.array(found).T
+    shown = np.empty(width * height, dtype=bool)
+    shown[order] = np.array(reached)
+    assert np.allclose(image[:, 1], 2 * image[:, 0], rtol=1e-6)
+    return image[:, 0].reshape(height, width), shown.reshape(height, width), np.array(computed).reshape(height, width)
+
+
+def test_a_linear_function_is_computed_at_corners_and_along_two_sides(variant):
+    found, _, computed = image_of(lambda x, y: 3 + 0.2 * x + 0.1 * y, 1e-4)
+    assert found == pytest.approx(3 + 0.2 * np.arange(48) + 0.1 * np.arange(32)[:, None], rel=1e-6)
+    inner = np.zeros((32, 48), dtype=bool)
+    inner[:28, :44] = True
+    inner[::4, ::4] = False
+    assert np.array_equal(computed == 0, inner)
+
+
+@settings(deadline=None, max_examples=60)
+@given(seed=st.integers(0, 2**32 - 1), tolerance=st.sampled_from([1e-3, 5e-3, 0.03]))
+def test_smooth_functions_and_kinks_err_by_the_tolerance_at_most(variant, seed, tolerance):
+    """Sums of a paraboloid and of kinks along rows, columns and oblique lines, more than a tile apart."""
+    random = np.random.default_rng(seed)
+    bend, slope = random.normal(size=3) * 3e-4, random.normal(size=2) * 0.01
+    normal = np.array([(1, 0), (0, 1), (0.8, 0.6)])[random.integers(3)]
+    place, jump = random.uniform(-5, 45), random.normal() * 0.05
+
+    def function(x, y):
+        smooth = bend[0] * (x - 20) ** 2 + bend[1] * (y - 15) ** 2 + bend[2] * (x - 20) * (y - 15)
+        return 4 + smooth + slope[0] * x + slope[1] * y + jump * np.maximum(normal[0] * x + normal[1] * y - place, 0)
+
+    wanted = function(*np.meshgrid(np.arange(48), np.arange(32)))
+    if wanted.min() < 0.5:
+        return
+    found, _, computed = image_of(function, tolerance)
+    assert np.max(np.abs(found - wanted) / wanted) <= 1.05 * tolerance + 1e-6
+    assert np.all(found[computed > 0] == wanted.astype(np.float32)[computed > 0])
+
+
+def test_edges_of_surfaces_and_of_shadows_are_computed(variant):
+    """Behind the same airlight: a step in depth, a thin pole between the corners, an edge of the light."""
+    columns = np.arange(48)
+    depth = np.where(columns < 21, 1.0, 3.0) * np.where(columns == 34, 0.5, 1.0)
+    lit = np.broadcast_to(columns > 9, (32, 48))
+    _, shown, computed = image_of(lambda x, y: 0 * x + 1, 0.1, depth=depth, lit=lit)
+    assert np.array_equal(shown, lit)
+    wanted = {*range(8, 12), *range(20, 24), *range(32, 36), *range(44, 48)}
+    assert {*np.flatnonzero(computed[1] > 0).tolist()} == wanted
+
+
+@pytest.mark.parametrize(
+    ("method", "parameters"),
+    [("shadow-planes", {}), ("light-volumes", {"map": 64}), ("ray-march", {"steps": 24, "shadow": "ray"})],
+)
+def test_frames_err_by_about_the_tolerance(variant, method, parameters):
+    whole, parted = (frame(method, parameters | {"tolerance": tolerance}) for tolerance in (0.0, 0.01))
+    error = np.abs(parted.airlight - whole.airlight).max(axis=-1)
+    assert np.max(error) / np.mean(whole.airlight) > 1e-7
+    # Thin shadows fall between corners: this image is small.
+    assert np.mean(error <= 0.01 * whole.airlight.max(axis=-1)) > 0.98
+    assert np.mean(np.abs(parted.surface - whole.surface).max(axis=-1) > 1e-6) < 0.01
+    assert np.array_equal(parted.distance, whole.distance)
+
+
+@pytest.mark.parametrize("name", ["three-media", "windows"])
+def test_bounded_media(variant, name):
+    """Images this small are all edges: with less tolerance every tile would be computed."""
+    from realtime.scene.read_scene import read_scene
+    from validation.scenes.loading import load_scene
+
+    scene = read_scene(load_scene(name, (192, 144)).scene)
+    method = METHODS["light-volumes"]
+    kernel = KERNELS["exact"].function
+    whole, parted = (
+        render_frame(frame_renderer(scene, method, kernel=kernel, map=128, tolerance=tolerance)).airlight
+        for tolerance in (0.0, 0.3)
+    )
+    assert np.max(np.abs(parted - whole)) > 0
+    assert np.sqrt(np.mean((parted - whole) ** 2)) < 0.2 * np.mean(whole)
+
+
+def frame(method, parameters, size=(96, 72)):
+    import mitsuba as mi
+
+    from realtime.scene.read_scene import read_scene
+
+    chosen = METHODS[method]
+    turned = mi.ScalarTransform4f().translate([0.1, 0.1, 0.7]).rotate([1, 2, 3], 40).scale(0.33)
+    scene = read_scene(mi.load_dict(tiny_scene(size=size, ball={"type": "cube", "to_world": turned})))
+    kernel = KERNELS["exact"].function if chosen.uses_kernel else None
+    return render_frame(frame_renderer(scene, chosen, kernel=kernel, **parameters))
+
+
+@pytest.mark.parametrize(
+    ("parameters", "size", "message"),
+    [
+        ({"tolerance": -0.1}, (96, 72), "tolerance: got -0.1, wanted a share"),
+        ({"tolerance": 1.0}, (96, 72), "tolerance: got 1.0, wanted a share"),
+        ({"tolerance": 0.01}, (98, 72), "got an image of 98 x 72, wanted sides that are multiples of 4"),
+        ({"tolerance": 0.01}, (8, 72), "got an image of 8 x 72"),
+        ({"tolerance": 0.01, "evaluation": "vertex"}, (96, 72), "evaluation=mesh and vertex do not"),
+    ],
+)
+def test_bad_input(variant, parameters, size, message):
+    with pytest.raises(InputError, match=message):
+        frame("shadow-planes", parameters, size)
+
+
+def test_a_mesh_has_no_tiles(variant):
+    with pytest.raises(InputError, match="evaluation=mesh and vertex do not"):
+        frame("light-volumes", {"tolerance": 0.01, "evaluation": "mesh"})

@@ -1,0 +1,224 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Sampling distances: the densities against histograms, integrals and a single technique at a time.
+
+The spans cover what a camera can see: a light behind it, beside it, beyond the surface, very close to the ray, spans
+that are short, endless, thin or many mean free paths thick, and the spans that a spot's cone cuts out.
+"""
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+SPANS = {  # height, start, length, extinctions
+    "light ahead": (0.7, -3.1, 7.3, [0.31]),
+    "light behind": (0.9, 2.3, 4.7, [0.5]),
+    "beyond the surface": (1.3, -6.1, 2.9, [0.21]),
+    "endless": (0.4, -2.2, np.inf, [0.17]),
+    "endless, light behind": (0.4, 1.7, np.inf, [0.6]),
+    "near": (2e-3, -1.9, 5.3, [0.4]),
+    "near and endless": (1e-4, -41.0, np.inf, [1.3e-3]),
+    "short": (0.8, -0.3, 1e-3, [2.0]),
+    "distant": (0.6, -900.0, 0.5, [0.05]),
+    "thin": (0.5, -1.1, 3.0, [1e-9]),
+    "thick": (0.9, -8.0, 19.0, [7.0]),
+    "coloured": (0.7, -2.5, 6.0, [0.02, 0.4, 3.1]),
+    "coloured and endless": (0.3, -1.5, np.inf, [0.1, 0.3, 0.7]),
+}
+SAMPLES = 1 << 16
+CELLS = 101
+
+
+def _span(case):
+    import mitsuba as mi
+
+    from reference.monte_carlo.single_scatter.distance_sampling import Span
+
+    height, start, length, _ = SPANS[case]
+    return Span(mi.Float64(height), mi.Float64(start), mi.Float64(length))
+
+
+def _mixture(case):
+    import mitsuba as mi
+
+    from reference.monte_carlo.single_scatter.distance_sampling import mixture_of
+
+    return mixture_of(_span(case), [mi.Float64(rate) for rate in SPANS[case][3]])
+
+
+def _technique(case, name):
+    """Return a sampler of u and a density of y of one technique."""
+    import mitsuba as mi
+
+    from reference.monte_carlo.single_scatter import distance_sampling as ds
+
+    if name == "equi-angular":
+        return lambda u: ds.equi_angular(u, _span(case)), lambda y: ds.equi_angular_pdf(y, _span(case))
+    if name == "free-flight":
+        flight = ds.free_flights(_span(case).length, mi.Float64(SPANS[case][3][-1]))
+        return lambda u: ds.free_flight(u, flight), lambda y: ds.free_flight_pdf(y, flight)
+    mixture = _mixture(case)
+    return lambda u: mi.Float64(ds.sample_distance(u, mixture)[0]), lambda y: sum(ds.mixture_pdfs(y, mixture))
+
+
+def _edges(case, sample):
+    """Return cells that hold about equal shares of the samples and of the length, to the end of the span."""
+    import mitsuba as mi
+
+    length = SPANS[case][2]
+    shares = np.array(sample(mi.Float64(np.arange(1, CELLS) / CELLS)), dtype=np.float64)
+    return np.concatenate([[0.0], np.unique(shares), [length]])
+
+
+def _probabilities(edges, density):
+    """Integrate a density over cells by the tanh-sinh rule, whose nodes crowd at the ends, where the peaks are."""
+    import mitsuba as mi
+
+    step = 0.05
+    k = step * np.arange(-80, 81)
+    v = 1 / (1 + np.exp(-np.pi * np.sinh(k)))
+    rest = 1 / (1 + np.exp(np.pi * np.sinh(k)))  # 1 - v without cancellation
+    weight = step * np.pi * np.cosh(k) * v * rest
+    low, high = edges[:-1, None], edges[1:, None]
+    width = np.where(np.isinf(high), edges[-2] - edges[0], high - low)
+    # An endless cell goes by y = low + width v/(1 - v).
+    y = np.where(np.isinf(high), low + width * v / rest, low + width * v)
+    jacobian = np.where(np.isinf(high), width / rest**2, width)
+    values = np.array(density(mi.Float64(y.ravel())), dtype=np.float64).reshape(y.shape)
+    return (values * jacobian * weight).sum(axis=1)
+
+
+def _p_value(case, name, *, sample=None, density=None, seed=0):
+    import mitsuba as mi
+
+    own_sample, own_density = _technique(case, name)
+    sample, density = sample or own_sample, density or own_density
+    edges = _edges(case, own_sample)
+    expected = SAMPLES * _probabilities(edges, density)
+    u = np.random.default_rng(seed).random(SAMPLES)
+    y = np.array(sample(mi.Float64(u)), dtype=np.float64)
+    assert y.min() >= 0
+    observed = np.histogram(np.minimum(y, np.finfo(float).max), edges)[0]
+    assert observed.sum() == SAMPLES
+    assert expected.min() > 5  # Pearson's statistic needs that
+    return chi2.sf(np.sum((observed - expected) ** 2 / expected), len(expected) - 1)
+
+
+@pytest.mark.parametrize("name", ["equi-angular", "free-flight", "mixture"])
+def test_samples_follow_the_density(variant, name):
+    """Rationale: chi-square tests of 13 spans, Sidak's level for all of them together is 1e-4 with fixed seeds."""
+    level = 1 - (1 - 1e-4) ** (1 / len(SPANS))
+    p_values = {case: _p_value(case, name, seed=number) for number, case in enumerate(SPANS)}
+    assert min(p_values.values()) > level, p_values
+
+
+def test_p_values_are_uniform(variant):
+    """Rationale: a test that never rejects proves nothing; under the null hypothesis p is uniform.
+
+    Expected: Kolmogorov-Smirnov over 40 seeds does not reject at 1e-4.
+    """
+    from scipy.stats import kstest
+
+    p_values = [_p_value("light ahead", "mixture", seed=seed) for seed in range(100, 140)]
+    assert kstest(p_values, "uniform").pvalue > 1e-4
+
+
+@pytest.mark.parametrize("case", ["light ahead", "endless", "thick", "coloured"])
+def test_broken_densities_are_rejected(variant, case):
+    """Rationale: 75:25 instead of even odds in the density, or a shift of the samples by 2 %, must be seen."""
+    from reference.monte_carlo.single_scatter.distance_sampling import mixture_pdfs
+
+    mixture = _mixture(case)
+
+    def wrong_odds(y):
+        equi, free = mixture_pdfs(y, mixture)
+        return 1.5 * equi + 0.5 * free
+
+    sample, _ = _technique(case, "mixture")
+    assert _p_value(case, "mixture", density=wrong_odds) < 1e-4
+    assert _p_value(case, "mixture", sample=lambda u: 0.98 * sample(u)) < 1e-4
+
+
+@pytest.mark.parametrize("case", SPANS)
+@pytest.mark.parametrize("name", ["equi-angular", "free-flight", "mixture"])
+def test_densities_integrate_to_one(variant, case, name):
+    sample, density = _technique(case, name)
+    total = _probabilities(_edges(case, sample), density).sum()
+    # The integrals of the cells are good to 1e-9; a free flight is cut after 60 mean free paths, worth 1e-26.
+    assert total == pytest.approx(1, abs=1e-8)
+
+
+@pytest.mark.parametrize("case", SPANS)
+def test_weights_of_both_techniques_add_up(variant, case):
+    """Rationale: the balance heuristic's weights sum to 1, and each is its technique's share of the density."""
+    import mitsuba as mi
+
+    from reference.monte_carlo.single_scatter.distance_sampling import equi_angular_pdf, mixture_pdfs, sample_distance
+
+    mixture = _mixture(case)
+    y, _, density = (np.array(a, dtype=np.float64) for a in sample_distance(mi.Float64(np.arange(1, 64) / 64), mixture))
+    equi, free = (np.array(a, dtype=np.float64) for a in mixture_pdfs(mi.Float64(y), mixture))
+    assert np.all(equi >= 0)
+    assert np.all(free >= 0)
+    own = 0.5 * np.array(equi_angular_pdf(mi.Float64(y), _span(case)), dtype=np.float64)
+    assert equi == pytest.approx(own, rel=1e-12)
+    # `sample_distance` rounds y and the density to single precision: what passes a light at 1e-4 m feels the first.
+    assert equi + free == pytest.approx(density, rel=2e-6 if SPANS[case][0] > 0.1 else 0.2)
+
+
+def test_mixture_is_inverted(variant):
+    """Rationale: the estimator divides by the mixture's density, so its distribution must be inverted to rounding.
+
+    Setup: random spans over many orders of magnitude, endless ones among them.
+    """
+    import mitsuba as mi
+
+    from reference.monte_carlo.single_scatter.distance_sampling import Span, mixture_cdf, mixture_of, sample_distance
+
+    rng = np.random.default_rng(5)
+    n = 20000
+    height = 10 ** rng.uniform(-2, 1.5, n)
+    start = rng.choice([-1, 1], n) * 10 ** rng.uniform(-2, 2, n)
+    length = np.where(rng.random(n) < 0.3, np.inf, 10 ** rng.uniform(-3, 2, n))
+    mixture = mixture_of(
+        Span(mi.Float64(height), mi.Float64(start), mi.Float64(length)),
+        [mi.Float64(10 ** rng.uniform(-3, 1.3, n)) for _ in range(3)],
+    )
+    u = rng.random(n)
+    y, s, _ = sample_distance(mi.Float64(u), mixture)
+    # y has all its digits near the start of the span, s has them near the light; either may be rounded elsewhere.
+    errors = [
+        np.abs(np.array(mixture_cdf(at, mixture)) - u) for at in (mi.Float64(y), mi.Float64(s) - mi.Float64(start))
+    ]
+    # Tolerance: single precision's rounding 6e-8 of y, times up to y pdf(y), at most about 40 by the cut of flights.
+    assert np.minimum(*errors).max() < 3e-6
+
+
+def test_spots_cone_is_covered(variant):
+    """Rationale: samples may fall beside a cone, never may the cone reach beyond the samples.
+
+    Setup: random rays and cones; points on the ray inside the cone, by the angle to the axis in plain NumPy.
+    """
+    import mitsuba as mi
+
+    from reference.monte_carlo.single_scatter.distance_sampling import closest_approach, cone_ends
+
+    rng = np.random.default_rng(11)
+    n = 400
+    for cutoff_degrees in (0.5, 12.0, 40.0, 89.0, 90.0, 130.0):
+        origin, direction, axis = rng.normal(size=(3, n, 3))
+        direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+        axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+        approach = closest_approach(mi.Point3d(origin.T), mi.Vector3d(direction.T), mi.Point3d(0, 0, 0))
+        cutoff = np.deg2rad(cutoff_degrees)
+        ends = cone_ends(approach, mi.Vector3d(direction.T), axis=mi.Vector3d(axis.T), cutoff=cutoff)
+        low, high = (np.broadcast_to(np.array(end, dtype=np.float64), n) for end in ends)
+        foot = -np.sum(origin * direction, axis=1)
+        x = np.linspace(-30, 30, 2001)
+        point = origin[:, None] + x[:, None] * direction[:, None]
+        cosine = np.sum(point * axis[:, None], axis=2) / np.linalg.norm(point, axis=2)
+        inside = cosine > np.cos(cutoff)
+        s = x - foot[:, None]
+        assert np.all((s >= low[:, None]) & (s <= high[:, None]) | ~inside)
+        if cutoff_degrees < 90:  # and the ends are not much too generous
+            sampled = (s >= low[:, None]) & (s <= high[:, None])
+            assert np.sum(sampled & ~inside) < 0.02 * inside.sum() + 5

@@ -1,0 +1,393 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The integrator `single-scatter` against everything that leads to the same radiance without its code."""
+
+import numpy as np
+import pytest
+
+from tests.helpers.scenes import spot, tiny_scene
+
+_BATCHES = 32
+
+
+def _load(**changes):
+    import mitsuba as mi
+
+    return mi.load_dict(tiny_scene(**changes))
+
+
+def _run(scene, *, samples=64, first_seed=0, batches=_BATCHES):
+    from reference.monte_carlo.batches import merged
+    from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
+    from reference.scene.read import read_truth
+
+    truth = read_truth(scene)
+    done = single_scatter_batch(truth, first_seed, samples)
+    for seed in range(first_seed + 1, first_seed + batches):
+        done = merged(done, single_scatter_batch(truth, seed, samples))
+    return done
+
+
+def _along(scene, origin, direction, *, samples, seed, medium=None):
+    """Return airlight and surface along rays, (rays, 3) each."""
+    import drjit as dr
+    import mitsuba as mi
+
+    from reference.monte_carlo.single_scatter.estimator import double_ray, ray_light
+    from reference.monte_carlo.single_scatter.scene_data import read_task
+
+    sampler = mi.load_dict({"type": "independent"})
+    sampler.seed(seed, len(direction))
+    ray = double_ray(mi.Point3d(np.broadcast_to(origin, direction.shape).T), mi.Vector3d(direction.T))
+    task = read_task(scene, medium, samples)
+    layers = ray_light(task, sampler, ray, medium, dr.full(mi.Bool, True, len(direction)))
+    return [np.array(layer, dtype=np.float64).T for layer in layers]
+
+
+def _mean_and_error(scene, origin, direction, *, medium=None, batches=24, samples=64):
+    runs = [_along(scene, origin, direction, samples=samples, seed=seed, medium=medium)[0] for seed in range(batches)]
+    return np.mean(runs, axis=0), np.std(runs, axis=0, ddof=1) / np.sqrt(batches)
+
+
+def _assert_agrees(mean, error, expected, *, batches, largest_error):
+    """Assert that no value is off by more than chance, family level 1e-4, and that the run could have seen a bias."""
+    from scipy.stats import t
+
+    lit = expected > 0
+    assert np.all(mean[~lit] == 0)
+    # Rounding in single precision: 3e-6 of a value, to be seen where the sampling error is smaller still.
+    score = (mean - expected)[lit] / np.hypot(error[lit], 3e-6 * expected[lit])
+    assert np.abs(score).max() < t.isf(0.5e-4 / lit.sum(), batches - 1)
+    assert np.median(error[lit] / expected[lit]) < largest_error
+
+
+FOG = {"type": "homogeneous", "id": "fog", "sigma_t": 0.31, "albedo": 0.8}
+COLOURED = {"sigma_t": {"type": "rgb", "value": [0.1, 0.3, 0.7]}, "has_spectral_extinction": True}
+CASES = {
+    "ball and floor": {},
+    "no surface": {"ball": None, "floor": None},
+    "spot": {"lamp": "hard spot"},
+    "soft spot": {"lamp": "soft spot"},
+    "two lights": {"second": "soft spot"},
+    "forward lobe": {"fog": FOG | {"phase": {"type": "hg", "g": 0.8}}},
+    "backward lobe": {"fog": FOG | {"phase": {"type": "hg", "g": -0.5}}},
+    "rayleigh": {"fog": FOG | {"phase": {"type": "rayleigh"}}},
+    "coloured": {"fog": FOG | COLOURED},
+    "dense": {"fog": FOG | {"sigma_t": 2.3}},
+}
+
+
+def _case(name):
+    spots = {"hard spot": spot(), "soft spot": spot(beam=11.0)}
+    return {key: spots[value] if isinstance(value, str) else value for key, value in CASES[name].items()}
+
+
+_FAST = ("ball and floor", "soft spot", "coloured")
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[] if name in _FAST else pytest.mark.statistical) for name in CASES]
+)
+def test_agrees_with_the_quadrature(variant, name):
+    """Rationale: the certified integral over lit intervals and this estimator share no derivation.
+
+    Setup: 16 x 12 pixels, 32 batches of 64 stratified distances, fixed seeds.
+    Expected: each pixel within its error at a family level of 1e-4, pooled bias within four standard errors, and those
+    below 0.1 %; surfaces, which need no sampling, to the rounding of single precision.
+    """
+    from reference.quadrature.image import quadrature_image
+    from reference.scene.read import read_truth
+
+    scene = _load(**_case(name))
+    truth = quadrature_image(read_truth(scene))
+    batches = _run(scene)
+    expected = truth.airlight.reshape(-1, 3)
+    mean, error = batches.mean[0], batches.standard_error[0]
+    _assert_agrees(mean, error, expected, batches=_BATCHES, largest_error=0.01)
+    for channel in range(3):
+        total = expected[:, channel].sum()
+        pooled = np.sqrt(np.sum(error[:, channel] ** 2)) / total
+        assert pooled < 1e-3
+        assert abs(mean[:, channel].sum() / total - 1) < 4 * pooled + 1e-6
+    # A pixel at the terminator or on an edge of a shadow may fall on either side: none does in these scenes.
+    assert batches.mean[1] == pytest.approx(truth.surface.reshape(-1, 3), rel=5e-6, abs=1e-12)
+    assert np.all(batches.standard_error[1] == 0)
+
+
+def test_agrees_with_the_certified_integral_on_random_rays(variant):
+    """Rationale: directly against J of the airlight equation, one ray after the other, without a scene's reading.
+
+    Setup: 60 rays from random places past a light in endless fog, Henyey-Greenstein, light behind or ahead.
+    """
+    import mitsuba as mi
+
+    from analytic.integral import integrate_angle
+    from analytic.phase import PhaseFunction
+
+    rng = np.random.default_rng(3)
+    light, sigma_t, g = np.array([0.4, -0.3, 0.9]), 0.43, 0.35
+    origin = light + rng.normal(size=(60, 3)) * 2
+    direction = rng.normal(size=(60, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    medium = mi.load_dict(
+        {"type": "homogeneous", "sigma_t": sigma_t, "albedo": 0.8, "phase": {"type": "hg", "g": g}, "scale": 1.0}
+    )
+    scene = mi.load_dict({"type": "scene", "lamp": {"type": "point", "position": list(light), "intensity": 3.0}})
+    mean, error = _mean_and_error(scene, origin, direction, medium=medium)
+    foot = np.sum((light - origin) * direction, axis=1)
+    height = np.linalg.norm(origin + foot[:, None] * direction - light, axis=1)
+    phase = PhaseFunction("hg", g=g)
+    J = [integrate_angle(t, h, 0.0, np.inf, sigma_t, phase).value for t, h in zip(foot, height)]
+    expected = 0.8 * sigma_t * 3.0 * np.array(J)[:, None] / (4 * np.pi) * np.ones(3)
+    _assert_agrees(mean, error, expected, batches=24, largest_error=2e-3)
+
+
+def _box_and_ball(lamp):
+    """Return a scene of two bounded media, coloured fog in a box and grey fog in a ball, over a wall, with a lamp."""
+    import mitsuba as mi
+
+    transform = mi.ScalarTransform4f()
+    return mi.load_dict(
+        {
+            "type": "scene",
+            "box": {
+                "type": "cube",
+                "to_world": transform.scale(_HALF),
+                "bsdf": {"type": "null"},
+                "interior": {
+                    "type": "homogeneous",
+                    "sigma_t": {"type": "rgb", "value": list(_BOX_SIGMA)},
+                    "has_spectral_extinction": True,
+                    "albedo": 0.8,
+                    "phase": {"type": "hg", "g": 0.5},
+                },
+            },
+            "ball": {
+                "type": "sphere",
+                "center": list(_CENTRE),
+                "radius": _RADIUS,
+                "bsdf": {"type": "null"},
+                "interior": {"type": "homogeneous", "sigma_t": _BALL_SIGMA, "albedo": 0.6},
+            },
+            "wall": {
+                "type": "rectangle",
+                "to_world": transform.translate([0, 0, -3]).scale(9),
+                "bsdf": {"type": "diffuse", "reflectance": 0.5},
+            },
+            "lamp": {"type": "point", "position": list(lamp), "intensity": 5.0},
+        }
+    )
+
+
+_HALF, _BOX_SIGMA = np.array([1.1, 0.9, 0.8]), np.array([0.9, 0.4, 0.2])
+_CENTRE, _RADIUS, _BALL_SIGMA = np.array([2.6, 0.2, 0.0]), 0.7, 0.5
+_LAMPS = {"in clear air": np.array([1.7, 0.4, 1.5]), "in the box": np.array([0.31, 0.23, 0.11])}
+
+
+def _box_crossing(start, step):
+    """Return at which shares of a leg the box begins and ends."""
+    with np.errstate(divide="ignore"):
+        one, two = (-_HALF - start) / step, (_HALF - start) / step
+    begin = np.clip(np.minimum(one, two).max(axis=-1), 0, 1)
+    return begin, np.maximum(np.clip(np.maximum(one, two).min(axis=-1), 0, 1), begin)
+
+
+def _ball_crossing(start, step):
+    """Return at which shares of a leg the ball begins and ends."""
+    length2 = np.sum(step * step, axis=-1)
+    middle = -np.sum((start - _CENTRE) * step, axis=-1) / length2
+    off = np.sum((start - _CENTRE) ** 2, axis=-1) - length2 * middle**2
+    half = np.sqrt(np.maximum(_RADIUS**2 - off, 0) / length2)
+    return np.clip(middle - half, 0, 1), np.clip(middle + half, 0, 1)
+
+
+def _optical_depth(start, end):
+    step = end - start
+    length = np.linalg.norm(step, axis=-1)
+    box, ball = _box_crossing(start, step), _ball_crossing(start, step)
+    in_box, in_ball = length * (box[1] - box[0]), length * (ball[1] - ball[0])
+    return in_box[..., None] * _BOX_SIGMA + in_ball[..., None] * _BALL_SIGMA
+
+
+def _brute_force(lamp, origin, direction, steps=4000):
+    """Sum the airlight of one ray by the midpoint rule in either medium."""
+    total, reach = np.zeros(3), 12.0
+    media = ((_box_crossing, _BOX_SIGMA * 0.8, 0.5), (_ball_crossing, np.full(3, _BALL_SIGMA * 0.6), 0.0))
+    for crossing, sigma_s, g in media:
+        begin, end = (float(share) * reach for share in crossing(origin, direction * reach))
+        x = begin + (end - begin) * (np.arange(steps) + 0.5) / steps
+        point = origin + x[:, None] * direction
+        away = point - lamp
+        r = np.linalg.norm(away, axis=1)
+        # Light goes from the lamp to the point, then back along the camera ray.
+        cosine = -(away @ direction) / r
+        phase = (1 - g * g) / (1 + g * g - 2 * g * cosine) ** 1.5 / (4 * np.pi)
+        depth = _optical_depth(np.broadcast_to(origin, point.shape), point) + _optical_depth(lamp, point)
+        total += sigma_s * 5.0 * np.sum(np.exp(-depth) * (phase / r**2)[:, None], axis=0) * (end - begin) / steps
+    return total
+
+
+@pytest.mark.parametrize("place", _LAMPS)
+def test_bounded_media_against_a_plain_sum(variant, place):
+    """Rationale: boundaries are walked on both legs; slabs and spheres have crossings in closed form.
+
+    Setup: coloured fog in a box, grey in a ball, camera in clear air, a wall behind; 40 rays, 4000 midpoints
+    each, whose own error is below 1e-6.
+    """
+    lamp = _LAMPS[place]
+    scene = _box_and_ball(lamp)
+    rng = np.random.default_rng(0)
+    origin = np.array([-4.0, -1.0, 0.6])
+    direction = rng.uniform([-1, -0.8, -0.7], [3, 0.8, 0.7], (40, 3)) - origin
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    expected = np.array([_brute_force(lamp, origin, one) for one in direction])
+    mean, error = _mean_and_error(scene, origin, direction, batches=16, samples=128)
+    assert np.count_nonzero(expected[:, 0]) > 30
+    _assert_agrees(mean, error, expected, batches=16, largest_error=1e-3)
+
+    surface = _along(scene, origin, direction, samples=1, seed=0)[1]
+    reach = (-3 - origin[2]) / direction[:, 2]
+    wall = origin + reach[:, None] * direction
+    hit = (reach > 0) & (np.abs(wall[:, :2]).max(axis=1) < 9)
+    away = wall - lamp
+    r = np.linalg.norm(away, axis=1)
+    depth = _optical_depth(np.broadcast_to(origin, wall.shape), wall) + _optical_depth(lamp, wall)
+    lit = (0.5 / np.pi * 5.0 * -away[:, 2] / r**3)[:, None] * np.exp(-depth)
+    assert hit.sum() > 3
+    assert surface[hit] == pytest.approx(lit[hit], rel=5e-6)
+    assert np.all(surface[~hit] == 0)
+
+
+def test_rays_that_graze_a_boundary(variant):
+    """Rationale: points just beneath a boundary; a leg that missed it must not count the whole way as fog.
+
+    Setup: rays that dip at most 2 mm into the box, the lamp above.
+    Expected: the plain sum within 4.5 standard errors and 1e-3: where single precision puts the ends of a chord that
+    meets the boundary at 1/500. (Taking the medium at the point for that of a leg without boundaries cost 0.4 %.)
+    """
+    lamp = _LAMPS["in clear air"]
+    begin = np.linspace(-0.7, 0.3, 12)[:, None] * [1.0, 0.3, 0.0] + [0.0, 0.0, _HALF[2]]
+    slope = np.array([1.0, 0.1, -0.002])
+    direction = np.broadcast_to(slope / np.linalg.norm(slope), begin.shape)
+    origin = begin - 1.3 * direction
+    expected = np.array([_brute_force(lamp, *ray) for ray in zip(origin, direction)])
+    mean, error = _mean_and_error(_box_and_ball(lamp), origin, direction, samples=128)
+    assert np.all(np.abs(mean - expected) < 4.5 * error + 1e-3 * expected)
+    assert np.median(error / expected) < 1e-3
+
+
+def test_camera_in_a_bounded_medium_far_from_its_bounds(variant):
+    """Rationale: a box so large that nothing beyond it matters is fog without bounds."""
+    import mitsuba as mi
+
+    medium = mi.load_dict({"type": "homogeneous", "sigma_t": 0.7, "albedo": 0.8})
+    box = {"type": "cube", "to_world": mi.ScalarTransform4f().scale(60.0), "bsdf": {"type": "null"}}
+    lamp = {"type": "point", "position": [0.3, 0.2, 1.4], "intensity": 2.0}
+    direction = np.random.default_rng(2).normal(size=(30, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    origin = np.array([0.1, -0.4, 0.2])
+    bounded = mi.load_dict({"type": "scene", "box": box | {"interior": medium}, "lamp": lamp})
+    inside = _mean_and_error(bounded, origin, direction, medium=medium)
+    outside = _mean_and_error(mi.load_dict({"type": "scene", "lamp": lamp}), origin, direction, medium=medium)
+    error = np.hypot(inside[1], outside[1])
+    # Another three in a million for rounding; 4.5 standard errors at 24 batches, 90 values.
+    assert np.all(np.abs(inside[0] - outside[0]) < 4.5 * error + 3e-6 * outside[0])
+    assert np.median(error / outside[0]) < 2e-3
+
+
+def test_enclosed_light_gives_exactly_zero(variant):
+    closed = {"type": "sphere", "center": [0.9, 0.7, 1.9], "radius": 0.21}
+    batches = _run(_load(shell=closed), batches=2, samples=16)
+    assert np.all(batches.mean == 0)
+
+
+def test_light_without_fog_leaves_the_surface(variant):
+    batches = _run(_load(fog=FOG | {"sigma_t": 0.0}), batches=2, samples=4)
+    assert np.all(batches.mean[0] == 0)
+    assert batches.mean[1].max() > 0
+
+
+def test_plugin_works_like_any_integrator(variant):
+    """Rationale: what `mi.render` gives by name, averaged over the pixel, is the mean over batches at pixel centres.
+
+    Setup: no surface, the light behind the camera, so that the radiance is almost linear over a pixel.
+    Expected: the two images' means within 0.1 %.
+    """
+    import mitsuba as mi
+
+    from reference.monte_carlo.single_scatter.integrator import register
+
+    lamp = {"type": "point", "position": [1.9, -7.0, 2.3], "intensity": 5.0}
+    scene = _load(ball=None, floor=None, lamp=lamp)
+    integrator = mi.load_dict({"type": register(), "samples": 8})
+    assert "samples = 8" in str(integrator)
+    image = np.array(mi.render(scene, integrator=integrator, spp=64, seed=5), dtype=np.float64)
+    assert image.shape == (12, 16, 3)
+    centres = _run(scene, batches=4).mean.sum(axis=0).reshape(12, 16, 3)
+    assert image.mean(axis=(0, 1)) == pytest.approx(centres.mean(axis=(0, 1)), rel=1e-3)
+    again = np.array(mi.render(scene, integrator=integrator, spp=64, seed=5), dtype=np.float64)
+    assert np.array_equal(image, again)
+
+
+def test_plugin_refuses_samples_out_of_range(variant):
+    import mitsuba as mi
+
+    from reference.monte_carlo.single_scatter.integrator import register
+
+    with pytest.raises(Exception, match="samples is 0; wanted an integer from 1 to 256"):
+        mi.load_dict({"type": register(), "samples": 0})
+
+
+def test_seeds_decide(variant):
+    """Rationale: a batch is a function of its seed, and batches of different seeds are not correlated."""
+    from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
+    from reference.scene.read import read_truth
+
+    truth = read_truth(_load())
+    one, again = single_scatter_batch(truth, 7, 8), single_scatter_batch(truth, 7, 8)
+    assert np.array_equal(one.mean, again.mean)
+    centre = _run(_load(), first_seed=50).mean[0]
+    signs = [np.sign(single_scatter_batch(truth, seed, 8).mean[0] - centre)[:, 0] for seed in range(20)]
+    correlation = np.corrcoef(signs)[np.triu_indices(20, 1)]
+    # 190 pairs of 192 pixels; coefficients have the standard error 1/sqrt(192), their mean that over sqrt(190).
+    assert abs(correlation.mean()) < 4 / np.sqrt(190 * 192)
+    assert np.abs(correlation).max() < 5 / np.sqrt(192)
+
+
+def test_one_sample_is_unbiased(variant):
+    """Rationale: stratification must not hide a bias; with one distance a ray there is none to hide behind."""
+    few, many = _run(_load(), samples=1, batches=64, first_seed=1000), _run(_load())
+    for channel in range(3):
+        total = many.mean[0][:, channel].sum()
+        error = np.sqrt(np.sum(few.standard_error[0][:, channel] ** 2)) / total
+        assert error < 0.02
+        assert abs(few.mean[0][:, channel].sum() / total - 1) < 4 * error
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"sky": {"type": "constant"}}, "emitter of class ConstantBackgroundEmitter; wanted 'point', 'spot' or"),
+        (
+            {"ball": {"type": "sphere", "id": "ball", "bsdf": {"type": "mask", "nested": {"type": "diffuse"}}}},
+            "shape 'ball' has a material that is transparent in part",
+        ),
+        (
+            {"ball": {"type": "sphere", "id": "ball", "bsdf": {"type": "dielectric"}, "interior": FOG | {"id": "in"}}},
+            "shape 'ball' bounds a medium with a material that stops or bends light",
+        ),
+    ],
+)
+def test_unsupported_scenes_are_refused_by_name(variant, changes, words):
+    from analytic.errors import InputError
+    from reference.monte_carlo.single_scatter.scene_data import read_task
+
+    with pytest.raises(InputError, match=words):
+        read_task(_load(**changes), None, 1)
+
+
+def test_batch_size_is_checked(variant):
+    from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
+    from reference.scene.read import read_truth
+
+    with pytest.raises(ValueError, match="samples: got 257, wanted 1 to 256"):
+        single_scatter_batch(read_truth(_load()), 0, 257)

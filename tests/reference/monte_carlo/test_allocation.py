@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Where samples go: laws of the counts, and of a path tracer that follows them."""
+
+import numpy as np
+import pytest
+
+from reference.monte_carlo.allocation import EQUAL, allocated
+from reference.monte_carlo.batches import LAYERS, merged, single_batch
+from reference.monte_carlo.volpath.integrator import volpath_batch
+from reference.scene.read import read_truth
+from tests.helpers.scenes import tiny_scene
+
+SHAPE = (6, 8)
+PIXELS = SHAPE[0] * SHAPE[1]
+
+
+def pilot_with(spread):
+    """Two batches whose pixels differ by twice the given spread in each layer."""
+    image = np.repeat(np.asarray(spread).reshape(1, PIXELS, 1), 2, axis=0) * np.ones(3)
+    return merged(single_batch(0, 4, image), single_batch(1, 4, -image))
+
+
+def everywhere():
+    return {layer: np.ones(SHAPE, dtype=bool) for layer in LAYERS}
+
+
+def test_pixels_that_spread_alike_get_the_same():
+    counts = allocated(pilot_with(np.full(SHAPE, 0.3)), 64, shape=SHAPE, masks=everywhere())
+    assert counts.shape == (2, PIXELS)
+    assert np.all(counts == 64)
+
+
+def test_a_pilot_without_spread_shares_out_equally():
+    assert np.all(allocated(pilot_with(np.zeros(SHAPE)), 17, shape=SHAPE, masks=everywhere()) == 17)
+
+
+def test_more_goes_where_more_spreads_and_the_sum_stays():
+    spread = np.full(SHAPE, 0.01)
+    spread[:3] = 0.09
+    counts = allocated(pilot_with(spread), 1000, shape=SHAPE, masks=everywhere())[0].reshape(SHAPE)
+    # Away from the border between the halves: a quarter for all, the rest by 9 to 1.
+    assert counts[0, 0] / counts[-1, 0] == pytest.approx((EQUAL + 0.75 * 1.8) / (EQUAL + 0.75 * 0.2), rel=0.1)
+    assert counts.mean() == pytest.approx(1000, rel=1e-3)  # rounding of 48 counts
+
+
+def test_pixels_that_are_left_out_get_the_equal_share():
+    masks = everywhere()
+    masks["airlight"][0] = False
+    counts = allocated(pilot_with(np.full(SHAPE, 0.3)), 64, shape=SHAPE, masks=masks)
+    assert np.all(counts[0].reshape(SHAPE)[0] == 64 * EQUAL)
+    assert np.all(counts[1] == 64)
+
+
+def test_every_pixel_has_a_sample():
+    spread = np.zeros(SHAPE)
+    spread[2, 3] = 1.0
+    assert allocated(pilot_with(spread), 1, shape=SHAPE, masks=everywhere()).min() == 1
+
+
+@pytest.mark.statistical
+def test_the_mean_is_the_same_and_spreads_less(variant):
+    """Rationale: counts that follow the spread leave the mean of every pixel where it was.
+
+    Setup: 64 batches with equal counts and 64 with allocated ones, other seeds. Expected: image means that differ by
+    less than 4 of their standard errors (1 in 16 000 by chance), and a smaller error of the image mean for the
+    airlight.
+    """
+    import mitsuba as mi
+
+    truth = read_truth(mi.load_dict(tiny_scene(size=(12, 9))))
+    shape = (truth.height, truth.width)
+    masks = {layer: np.ones(shape, dtype=bool) for layer in LAYERS}
+
+    def run(first, count, counts=None):
+        batches = [volpath_batch(truth, first + number, 32, counts=counts) for number in range(count)]
+        found = batches[0]
+        for batch in batches[1:]:
+            found = merged(found, batch)
+        return found
+
+    counts = allocated(run(1000, 16), 32, shape=shape, masks=masks)
+    assert counts.max() > 2 * counts.min()
+    equal, unequal = run(0, 64), run(200, 64, counts)
+    for number in range(len(LAYERS)):
+        means = [found.mean[number].mean() for found in (equal, unequal)]
+        errors = [
+            np.sqrt((found.standard_error[number][:, 1] ** 2).sum()) / len(counts[0]) for found in (equal, unequal)
+        ]
+        assert means[0] > 0
+        assert abs(means[0] - means[1]) < 4 * np.hypot(*errors)
+        # By how much depends on the scene; it must not be worse.
+        assert errors[1] < errors[0]
+
+
+def test_counts_are_those_of_each_pixel(variant):
+    """A pixel with as many samples as it had in a batch of its own scene has the same law; one part or many agree."""
+    import mitsuba as mi
+
+    truth = read_truth(mi.load_dict(tiny_scene(size=(4, 3))))
+    counts = np.stack([np.arange(1, 13), np.arange(12, 0, -1)]).astype(np.uint32)
+    batch = volpath_batch(truth, 5, 8, counts=counts)
+    assert batch.mean.shape == (2, 12, 3)
+    assert np.all(np.isfinite(batch.mean))
+    equal = volpath_batch(truth, 5, 8)
+    same = volpath_batch(truth, 5, 8, counts=np.full((2, 12), 8, dtype=np.uint32))
+    assert np.array_equal(equal.mean, same.mean)
+
+
+def test_counts_are_for_single_scattering(variant):
+    import mitsuba as mi
+
+    truth = read_truth(mi.load_dict(tiny_scene(size=(4, 3))))
+    with pytest.raises(ValueError, match="counts"):
+        volpath_batch(truth, 0, 8, max_depth=3, counts=np.ones((2, 12), dtype=np.uint32))
+
+
+def test_pixels_are_traced_in_parts_of_so_many_paths(monkeypatch):
+    import reference.monte_carlo.volpath.integrator
+
+    monkeypatch.setattr(reference.monte_carlo.volpath.integrator, "_PATHS", 10)
+    parts = reference.monte_carlo.volpath.integrator._parts(np.array([5, 5, 30, 1, 1, 8, 2], dtype=np.uint32))
+    assert [(part.start, part.stop) for part in parts] == [(0, 2), (2, 3), (3, 6), (6, 7)]

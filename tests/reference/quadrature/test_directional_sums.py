@@ -1,0 +1,215 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The airlight of directional lights in bodies of media, against sums and closed forms that share nothing with it."""
+
+import numpy as np
+import pytest
+
+from tests.helpers.suns import BRICK, brick, chord, midpoint_airlight, pearl, sun, sunny
+
+HG = {"phase": {"type": "hg", "g": 0.6}}
+TABLE = {"phase": {"type": "tabphase", "values": "0.5, 0.2, 0.4, 1.7"}}
+
+
+def truth_and_image(scene, **settings):
+    import mitsuba as mi
+
+    from reference.quadrature.image import quadrature_image
+    from reference.scene.read import read_truth
+
+    truth = read_truth(mi.load_dict(scene))
+    return truth, quadrature_image(truth, **settings)
+
+
+CASES = {
+    "box": lambda: sunny(brick=brick(**HG)),
+    "ball": lambda: sunny(pearl=pearl(**HG)),
+    "one in the light of the other": lambda: sunny(brick=brick(**TABLE), pearl=pearl(3.1), sun=sun([1.0, 0.07, -0.11])),
+    "the other way round": lambda: sunny(brick=brick(2.9), pearl=pearl(**TABLE), sun=sun([-1.0, 0.07, -0.11])),
+    "light along an axis": lambda: sunny(brick=brick(), pearl=pearl(), sun=sun([-1.0, 0.0, 0.0])),
+    "towards the camera": lambda: sunny(brick=brick(**HG), pearl=pearl(), sun=sun([-0.07, -1.0, -0.1])),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_airlight_is_the_sum_over_small_steps(variant, case):
+    """Rationale: nothing is shared with the estimator but the rays: own chords, own rule, no kinks looked for.
+
+    Expected: to 2e-8; the rule's error at a kink is of the order of 1/200000^2, at a tangent of a ball 1/200000^1.5,
+    where the light enters a face or passes beside it 1/200000.
+    """
+    rtol = 2e-5 if case == "light along an axis" else 2e-8
+    truth, image = truth_and_image(CASES[case]())
+    airlight, bound = image.airlight.reshape(-1, 3), image.airlight_bound.reshape(-1, 3)
+    lit = np.flatnonzero(airlight.max(axis=1) > 0)
+    assert len(lit) >= 3
+    for pixel in lit[:: max(1, len(lit) // 5)]:
+        assert airlight[pixel] == pytest.approx(midpoint_airlight(truth, 0, pixel), rel=rtol), pixel
+    assert np.all(bound[lit] <= 2e-9 * airlight[lit])
+    assert np.all(bound[lit] > 0)
+
+
+@pytest.mark.parametrize("way", ["across", "with the ray", "against it"])
+def test_ray_through_a_box_in_closed_form(variant, way):
+    """Light that falls on the box's upper face, along the ray's own direction, and against it.
+
+    From above: the leg of depth z below the upper face; along the ray both depths add up to that of the chord, or the
+    leg is as long as the way of the view.
+    """
+    from dataclasses import replace
+
+    from reference.quadrature.image import ray_values
+
+    origin, direction = np.array([-0.5, -2.0, 0.71875]), np.array([0.0, 1.0, 0.0])
+    directions = {"across": [0.0, 0.0, -1.0], "with the ray": [0.0, 1.0, 0.0], "against it": [0.0, -1.0, 0.0]}
+    truth, _ = truth_and_image(sunny(brick=brick(**HG), sun=sun(directions[way])))
+    around = replace(truth, origin=origin, direction=direction[None], width=1, height=1)
+    found = ray_values(around)
+    (medium,) = truth.media
+    sigma_t, length = medium.sigma_t, 2 * BRICK[1][1]
+    cos_scatter = -float(np.dot(directions[way], direction))
+    if way == "across":
+        above = BRICK[0][2] + BRICK[1][2] - origin[2]
+        integral = np.exp(-sigma_t * above) * (1 - np.exp(-sigma_t * length)) / sigma_t
+    elif way == "with the ray":  # the leg goes back to the face at which the ray came in
+        integral = (1 - np.exp(-2 * sigma_t * length)) / (2 * sigma_t)
+    else:
+        integral = np.exp(-sigma_t * length) * length
+    g = float(np.float32(0.6))
+    p = (1 - g * g) / (1 + g * g - 2 * g * cos_scatter) ** 1.5
+    expected = truth.directional[0].irradiance / (4 * np.pi) * medium.albedo * sigma_t * p * integral
+    assert found.airlight[0] == pytest.approx(expected, rel=1e-12)  # the closed form, but for rounding
+    assert np.all(found.bound < 1e-6 * found.airlight)
+
+
+def test_panels_give_the_closed_form(variant):
+    """Two ways to integrate the same pieces, of a polyhedron: Kronrod's rule and the exponential."""
+    import mitsuba as mi
+
+    from reference.quadrature.directional_sums import sum_directional
+    from reference.quadrature.segments import camera_segments, scattering_range
+    from reference.scene.directional_light import parallel_rays
+    from reference.scene.read import read_truth
+    from reference.visibility.directional_casting import directional_intervals, edge_scale
+
+    caster = {"type": "cube", "to_world": mi.ScalarTransform4f().translate([-0.6, 0.1, 1.4]).scale([0.1, 0.3, 0.05])}
+    truth = read_truth(mi.load_dict(sunny(brick=brick((0.71, 0.3, 0.02), scale=9.7), caster=caster, size=(32, 24))))
+    light = truth.directional[0]
+    segments = camera_segments(truth, np.full(len(truth.direction), np.inf))
+    rays = parallel_rays(truth.origin, truth.direction, light, scattering_range(segments))
+    lit = directional_intervals(truth, rays)
+    scale = edge_scale(truth, rays)
+    one, other = (
+        sum_directional(truth, light, rays, lit, segments, scale=scale, closed=closed)[0] for closed in (True, False)
+    )
+    assert lit.transitions > 10
+    assert one.max() > 0
+    assert other == pytest.approx(one, rel=2e-9)  # 1e-9 is asked of the panels
+
+
+def test_whole_light_scattered_out_of_a_thin_ball(variant):
+    """As sigma_t goes to 0 the airlight is albedo sigma_t E p chord / (4 pi)."""
+    sigma_t = 2.0**-30
+    truth, image = truth_and_image(sunny(pearl=pearl(sigma_t, (0.5, 0.5, 0.5))))
+    near, far = chord("pearl", truth.origin, truth.direction)
+    expected = 0.5 * sigma_t * (far - near)[:, None] * truth.directional[0].irradiance / (4 * np.pi)
+    assert np.sum(far > near) > 5
+    # tau is below 4e-10, chords are those of a float64 ball.
+    assert image.airlight.reshape(-1, 3) == pytest.approx(expected, rel=2e-9)
+
+
+def test_camera_inside_of_a_body(variant):
+    import mitsuba as mi
+
+    scene = sunny(brick=brick(**HG), pearl=pearl())
+    to_world = mi.ScalarTransform4f().look_at([-0.6, 0.0, 0.7], [0.1, 0.3, 0.6], [0, 0, 1])
+    inside = scene["brick"].pop("interior") | {"id": "mist"}
+    scene["sensor"] |= {"to_world": to_world, "medium": {"type": "ref", "id": "mist"}}
+    scene["brick"]["interior"] = {"type": "ref", "id": "mist"}
+    truth, image = truth_and_image({"type": "scene", "mist": inside} | scene)
+    airlight = image.airlight.reshape(-1, 3)
+    assert np.all(airlight > 0)
+    for pixel in (0, 13, 27, 40):
+        assert airlight[pixel] == pytest.approx(midpoint_airlight(truth, 0, pixel), rel=2e-8)
+
+
+def test_shadow_of_a_ball_in_fog(variant):
+    """A ball between sun and box: of points by the distance of the ball's centre from their legs, and the plain sum."""
+    centre, radius = np.array([-0.71875, 0.25, 1.21875]), 0.1875
+    caster = {"type": "sphere", "center": centre.tolist(), "radius": radius}
+    truth, image = truth_and_image(sunny(brick=brick(), caster=caster))
+    towards = -truth.directional[0].direction
+
+    def lit(point):
+        off = centre - point
+        along = off @ towards
+        return ~((along > 0) & (np.sum(off**2, axis=1) - along**2 < radius**2))
+
+    airlight = image.airlight.reshape(-1, 3)
+    pixels = np.flatnonzero(airlight.max(axis=1) > 0)
+    shadowed = 0
+    for pixel in pixels[::3]:
+        expected = midpoint_airlight(truth, 0, pixel, lit=lit)
+        shadowed += int(np.any(expected < 0.999 * midpoint_airlight(truth, 0, pixel)))
+        # Both edges are met to half a step of 1/200000.
+        assert airlight[pixel] == pytest.approx(expected, rel=1e-5), pixel
+    assert shadowed >= 2
+    assert image.checked > 0
+    assert image.left == 0
+
+
+def test_enclosed_medium_is_dark(variant):
+    """A closed box about body and camera: exactly zero, surfaces too."""
+    import mitsuba as mi
+
+    shell = {
+        "type": "cube",
+        "to_world": mi.ScalarTransform4f().scale(9.0),
+        "bsdf": {"type": "twosided", "bsdf": {"type": "diffuse"}},
+    }
+    _, image = truth_and_image(sunny(brick=brick(), pearl=pearl(), shell=shell))
+    assert not image.airlight.any()
+    assert not image.surface.any()
+    assert image.left == 0
+
+
+def test_surface_is_dimmed_by_the_bodies_before_it_and_above(variant):
+    """The floor below the ball of fog: E cos albedo/pi, less the chords of the leg and of the view."""
+    import mitsuba as mi
+
+    floor = {"type": "rectangle", "to_world": mi.ScalarTransform4f().scale(6.3), "bsdf": {"type": "diffuse"}}
+    truth, image = truth_and_image(sunny(pearl=pearl(), floor=floor))
+    distance = image.distance.reshape(-1)
+    hit = np.isfinite(distance)
+    point = truth.origin + distance[hit, None] * truth.direction[hit]
+    towards = np.broadcast_to(-truth.directional[0].direction, point.shape)
+    depth = np.zeros(len(point))
+    for origin, direction, end in ((truth.origin, truth.direction[hit], distance[hit]), (point, towards, np.inf)):
+        near, far = chord("pearl", origin, direction)
+        depth += np.maximum(np.minimum(far, end) - np.maximum(near, 0), 0)
+    clear = 0.5 / np.pi * towards[0, 2] * truth.directional[0].irradiance
+    expected = clear * np.exp(-1.3 * depth)[:, None]
+    assert np.sum(depth > 0.1) > 5
+    assert image.surface.reshape(-1, 3)[hit] == pytest.approx(
+        expected, rel=2e-5
+    )  # surfaces are met in float32, and the ball at a grazing angle
+
+
+def test_mean_over_pixels(variant):
+    """The mean over the area against that of 15 x 15 rays: to what these miss at edges of shadows, and the bound."""
+    from dataclasses import replace
+
+    from reference.quadrature.image import ray_values
+    from reference.scene.camera import film_directions
+
+    caster = {"type": "sphere", "center": [-0.71875, 0.25, 1.21875], "radius": 0.1875}
+    truth, image = truth_and_image(sunny(brick=brick(), pearl=pearl(), caster=caster, size=(8, 6)), pixel="area")
+    row, column = np.divmod(np.arange(48), 8)
+    sub = (np.arange(15) + 0.5) / 15
+    at = np.stack([(column[:, None, None] + sub[:, None] + 0 * sub), (row[:, None, None] + 0 * sub[:, None] + sub)], -1)
+    direction = film_directions(truth.scene.sensors()[0], at.reshape(-1, 2), (8, 6))
+    many = ray_values(replace(truth, direction=direction)).airlight.reshape(48, 225, 3)
+    # A row of 15 points that an edge crosses is off by up to half a point: 1/15/sqrt(12) of the pixel's spread.
+    allowed = np.ptp(many, axis=1) / 15 / np.sqrt(12) * 2 + image.airlight_bound.reshape(48, 3)
+    assert np.all(np.abs(image.airlight.reshape(48, 3) - many.mean(axis=1)) <= allowed)
+    assert image.airlight.max() > 0
+    assert image.airlight_bound.max() < 0.03 * image.airlight.max()

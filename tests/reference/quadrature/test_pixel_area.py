@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: BSD-3-Clause
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analytic.errors import InputError
+from tests.helpers.polygons import box_scene
+from tests.helpers.scenes import tiny_scene
+
+
+def truth_of(scene):
+    import mitsuba as mi
+
+    from reference.scene.read import read_truth
+
+    return read_truth(mi.load_dict(scene))
+
+
+def brute_force(truth, n, regular=False):
+    """Return the means of n x n sub-pixels, a random point in each: airlight, surface, and the brightest surface.
+
+    Regular points would all be wrong the same way where an edge runs along the rows; close to a light they are better,
+    where a random one may come too close.
+    """
+    from reference.quadrature.image import ray_values
+    from reference.scene.camera import film_directions
+
+    row, column = np.divmod(np.arange(truth.width * truth.height), truth.width)
+    y, x = np.divmod(np.arange(n * n), n)
+    u, v = (0.5, 0.5) if regular else np.random.default_rng(11).random((2, len(row), n * n))
+    positions = np.stack([column[:, None] + (x + u) / n, row[:, None] + (y + v) / n], axis=-1).reshape(-1, 2)
+    direction = film_directions(truth.scene.sensors()[0], positions, (truth.width, truth.height))
+    values = ray_values(replace(truth, direction=direction), samples=64)
+    shape = (truth.height, truth.width, n * n, 3)
+    surface = values.surface.reshape(shape)
+    return values.airlight.reshape(shape).mean(axis=2), surface.mean(axis=2), surface.max()
+
+
+def test_directions_through_the_middles_are_those_of_the_image(variant):
+    from reference.scene.camera import film_directions
+
+    truth = truth_of(tiny_scene())
+    row, column = np.divmod(np.arange(truth.width * truth.height), truth.width)
+    positions = np.stack([column + 0.5, row + 0.5], axis=1)
+    found = film_directions(truth.scene.sensors()[0], positions, (truth.width, truth.height))
+    assert found == pytest.approx(truth.direction, abs=1e-15)
+
+
+def test_smooth_fog_is_the_integral_over_the_pixel(variant):
+    """Gauss's product rule with 12 x 12 points, converged for what is smooth: the light is out of view."""
+    from reference.quadrature.image import ray_values
+    from reference.quadrature.pixel_area import area_image
+    from reference.scene.camera import film_directions
+
+    lamp = {"type": "point", "position": [3.9, 0.7, 3.9], "intensity": {"type": "rgb", "value": [5.0, 4.0, 3.0]}}
+    truth = truth_of(tiny_scene(ball=None, floor=None, lamp=lamp, size=(4, 3)))
+    node, weight = np.polynomial.legendre.leggauss(12)
+    node, weight = 0.5 * (node + 1), 0.5 * weight
+    row, column = np.divmod(np.arange(12), 4)
+    x, y = np.meshgrid(node, node)
+    positions = np.stack([column[:, None] + x.ravel(), row[:, None] + y.ravel()], axis=-1).reshape(-1, 2)
+    direction = film_directions(truth.scene.sensors()[0], positions, (4, 3))
+    values = ray_values(replace(truth, direction=direction)).airlight.reshape(3, 4, 144, 3)
+    expected = np.einsum("ijkc,k->ijc", values, np.outer(weight, weight).ravel())
+    image = area_image(truth, tolerance=1e-4)
+    error = np.abs(image.airlight - expected)
+    assert np.all(error <= image.airlight_bound)
+    assert np.all(error < 1e-4 * expected)
+
+
+@pytest.mark.parametrize("scene", [tiny_scene, box_scene], ids=["ball", "boxes"])
+def test_edges_against_brute_force(variant, scene):
+    from reference.quadrature.image import quadrature_image
+
+    truth = truth_of(scene(size=(8, 6)))
+    image = quadrature_image(truth, samples=64, pixel="area")
+    airlight, surface, brightest = brute_force(truth, 24)
+    # The light is seen: in its pixel regular sub-pixels converge slowly.
+    near = image.light_angle < 0.1
+    # Of 24 x 24 random sub-pixels an edge crosses about 24 and leaves sqrt(24)/2/576 = 0.4 % of its jump open; a jump
+    # may be larger than the pixel's value, the beam being in front of the light's glow.
+    error = np.abs(image.airlight - airlight)[~near]
+    assert np.mean(error > 0.02 * airlight[~near] + image.airlight_bound[~near]) == 0
+    assert np.mean(error <= 2e-3 * airlight[~near] + image.airlight_bound[~near]) > 0.9
+    assert np.abs(image.airlight[~near].mean() / airlight[~near].mean() - 1) < 2e-3
+    # The top of the beam, seen almost edge-on, is a strip of a 160th of a pixel with a radiance of 0.2.
+    assert np.abs(image.surface - surface).max() < 0.02 * (0.2 if scene is box_scene else brightest)
+    assert np.abs(image.surface.mean() / surface.mean() - 1) < 0.01
+    centre = quadrature_image(truth, samples=64)
+    assert np.abs(centre.airlight - airlight)[~near].max() > 5 * error.max()  # the centre is another thing
+
+
+@pytest.mark.slow
+def test_smaller_tolerance_comes_closer(variant):
+    from reference.quadrature.pixel_area import area_image
+
+    truth = truth_of(box_scene(size=(6, 4)))
+    expected, *_ = brute_force(truth, 32)
+    images = [area_image(truth, samples=8, tolerance=tolerance) for tolerance in (0.5, 0.03, 2e-3)]
+    errors = [np.abs(image.airlight - expected).mean() / expected.mean() for image in images]
+    bounds = [image.airlight_bound.mean() / expected.mean() for image in images]
+    assert errors[0] > 2 * errors[1] > 2 * errors[2]
+    assert bounds[0] > 2 * bounds[1] > 2 * bounds[2]
+    assert errors[2] < 3e-3  # 32 x 32 random sub-pixels leave 0.3 % of a jump open
+
+
+def test_a_light_in_the_middle_of_a_pixel_has_a_finite_mean(variant):
+    """The ray through the centre meets the light; the mean over the area is what the one over r leaves."""
+    from reference.quadrature.image import quadrature_image
+
+    truth = truth_of(tiny_scene(ball=None, floor=None, size=(3, 3)))
+    light = truth.lights[0]
+    middle = truth.origin + 2.7 * truth.direction[4]
+    truth = replace(truth, lights=(replace(light, position=middle),))
+    centre, area = quadrature_image(truth), quadrature_image(truth, pixel="area")
+    assert not np.isfinite(centre.airlight[1, 1]).all() or centre.airlight[1, 1].max() > 1e6
+    assert np.isfinite(area.airlight).all()
+    expected, *_ = brute_force(truth, 32)
+    # Around the light the airlight is c/rho: the sub-pixel that holds it leaves about a 32nd of the mean open.
+    assert area.airlight[1, 1] == pytest.approx(expected[1, 1], rel=0.05)
+    assert np.all(area.airlight_bound[1, 1] < 0.1 * area.airlight[1, 1])
+
+
+def test_another_word_is_refused(variant):
+    from reference.quadrature.image import quadrature_image
+
+    with pytest.raises(InputError, match="pixel is 'middle'; wanted 'centre' or 'area'"):
+        quadrature_image(truth_of(tiny_scene()), pixel="middle")
+
+
+def test_a_light_on_the_corner_of_four_pixels_has_a_finite_mean(variant):
+    """An image with an even number of pixels whose camera aims at the light: a point of the grid meets it."""
+    from reference.quadrature.image import quadrature_image
+    from reference.scene.camera import film_directions
+
+    truth = truth_of(tiny_scene(ball=None, floor=None, size=(2, 2)))
+    (aim,) = film_directions(truth.scene.sensors()[0], np.array([[1.0, 1.0]]), (2, 2))
+    truth = replace(truth, lights=(replace(truth.lights[0], position=truth.origin + 2.7 * aim),))
+    image = quadrature_image(truth, pixel="area")
+    expected, *_ = brute_force(truth, 48, regular=True)
+    # Of c/rho the cell next to the light has a 48th, and its middle gives sqrt(2), not 1.76 times its side: 0.4 %.
+    assert image.airlight == pytest.approx(expected, rel=6e-3)
+    assert np.all(image.airlight_bound < 0.05 * image.airlight)
+
+
+def test_smooth_pixels_take_few_rays(variant, monkeypatch):
+    """A pixel alone in the open: its middle, and shared with its neighbours the corners and sides of its quarters."""
+    import reference.quadrature.pixel_area as pixel_area
+
+    lamp = {"type": "point", "position": [3.9, 0.7, 3.9], "intensity": {"type": "rgb", "value": [5.0, 4.0, 3.0]}}
+    truth = truth_of(tiny_scene(ball=None, floor=None, lamp=lamp, size=(24, 18)))
+    cast, compute = [], pixel_area.ray_values
+
+    def counted(part, **how):
+        cast.append(len(part.direction))
+        return compute(part, **how)
+
+    monkeypatch.setattr(pixel_area, "ray_values", counted)
+    image = pixel_area.area_image(truth, tolerance=1e-3)
+    assert sum(cast) < 9 * 24 * 18
+    assert np.all(image.airlight_bound < 1.001e-3 * image.airlight)

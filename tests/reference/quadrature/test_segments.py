@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import numpy as np
+import pytest
+
+from reference.quadrature.segments import AMBIENT, camera_segments, leg_kinks, optical_depth, scattering_range
+from reference.scene.convex_bodies import crossings
+from tests.helpers.scenes import body, clear_scene, tiny_scene
+
+FOG = {"type": "homogeneous", "id": "fog", "sigma_t": 0.11, "albedo": 0.6, "has_spectral_extinction": False}
+
+
+def shapes(**extra):
+    import mitsuba as mi
+
+    turn = mi.ScalarTransform4f().translate([-0.5, 0.1, 0.5]).rotate([0, 0, 1], 27.0).scale([0.31, 0.43, 0.37])
+    return {
+        "brick": body({"type": "cube", "to_world": turn} | extra, (0.9, 0.5, 0.2), (0.9, 0.4, 0.3)),
+        "pearl": body({"type": "sphere", "center": [0.6, 0.2, 0.6], "radius": 0.43} | extra, 1.3, (0.2, 0.5, 0.8)),
+    }
+
+
+def truth_of(*, ambient=False, **changes):
+    import mitsuba as mi
+
+    from reference.scene.read import read_truth
+
+    if not ambient:
+        return read_truth(mi.load_dict(clear_scene(size=(9, 7), **shapes(), **changes)))
+    scene = tiny_scene(size=(9, 7), fog=FOG, ball=None, floor=None)
+    return read_truth(mi.load_dict(scene | shapes(exterior={"type": "ref", "id": "fog"}) | changes))
+
+
+def inside(name, points):
+    """Membership written once more, from the numbers in `shapes`."""
+    if name == "pearl":
+        return np.linalg.norm(points - [0.6, 0.2, 0.6], axis=-1) < 0.43
+    angle = np.deg2rad(27.0)
+    x, y, z = np.moveaxis(points - [-0.5, 0.1, 0.5], -1, 0)
+    u, v = np.cos(angle) * x + np.sin(angle) * y, -np.sin(angle) * x + np.cos(angle) * y
+    return (np.abs(u) < 0.31) & (np.abs(v) < 0.43) & (np.abs(z) < 0.37)
+
+
+def midpoints(low, high, steps):
+    return low + (high - low) * (np.arange(steps) + 0.5) / steps
+
+
+@pytest.mark.parametrize("ambient", [False, True])
+def test_optical_depth_is_the_sum_over_small_steps(variant, ambient):
+    truth = truth_of(ambient=ambient)
+    rng = np.random.default_rng(2)
+    # Between points all around, and between points inside of the two bodies.
+    start, end = rng.uniform(-1.2, 1.2, (40, 3)), rng.uniform(-1.2, 1.2, (40, 3))
+    start[20:], end[20:] = start[20:] * 0.2 + [-0.5, 0.1, 0.5], end[20:] * 0.2 + [0.6, 0.2, 0.6]
+    length = np.linalg.norm(end - start, axis=1)
+    found = optical_depth(truth, start, (end - start) / length[:, None], np.zeros(40), length)
+    share = midpoints(0, 1, 20_000)[None, :, None]
+    points = start[:, None] + share * (end - start)[:, None]
+    where = {medium.name: inside(medium.name, points).mean(axis=1) * length for medium in truth.media}
+    expected = (length - sum(where.values()))[:, None] * truth.medium.sigma_t
+    expected += sum(where[medium.name][:, None] * medium.sigma_t for medium in truth.media)
+    assert found == pytest.approx(expected, abs=4 * 1.3 * 4 / 20_000)  # a step at each of up to four boundaries
+    assert np.ptp(found) > 0.3
+
+
+@pytest.mark.parametrize("ambient", [False, True])
+def test_segments_cover_what_scatters(variant, ambient):
+    truth = truth_of(ambient=ambient)
+    distance = np.full(63, 4.7)  # through the middle of the scene, in places inside of a body
+    segments = camera_segments(truth, distance)
+    x = midpoints(0, 4.7, 4000)
+    points = truth.origin + x[None, :, None] * truth.direction[:, None]
+    number = np.full(points.shape[:2], AMBIENT)
+    for index, medium in enumerate(truth.media):
+        number[inside(medium.name, points)] = index
+    found = np.full_like(number, AMBIENT if ambient else -2)
+    covered = np.zeros(number.shape, int)
+    for start, end, medium in zip(segments.start, segments.end, segments.medium, strict=True):
+        part = (x >= start[:, None]) & (x < end[:, None])
+        covered += part
+        found = np.where(part, medium[:, None], found)
+    expected = number if ambient else np.where(number == AMBIENT, -2, number)
+    assert np.mean(found != expected) < 1e-3  # a step at a boundary
+    assert covered.max() == 1
+    assert np.all(covered == 1) if ambient else np.mean(covered) < 0.5
+    assert len(np.unique(found)) == 3
+    low, high = scattering_range(segments)
+    assert np.all(low[high > low] >= 0)
+    assert np.array_equal(high > low, np.any(covered > 0, axis=1))
+
+
+def test_between_its_kinks_the_chord_of_the_leg_is_smooth(variant):
+    """Rationale: a kink that is not found costs digits. Second differences jump there, and nowhere else.
+
+    The part of the leg inside of a body, for legs to points 2e-4 m apart on rays that pass beyond it: its second
+    differences are 4e-8 m^2 times its curvature, which is below 50/m but beside the tangents of a ball.
+    """
+    truth = truth_of()
+    light, step = np.array([-0.9, 0.7, 1.4]), 2e-4
+    for medium in truth.media:
+        steep = medium.name == "pearl"
+        direction = np.array([[1.0, 0.2, 0.1], [0.9, -0.3, 0.25]])
+        direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+        through = medium.bounds.centre if steep else np.array([-0.5, 0.1, 0.5])
+        offset = through + 0.4 * (through - light) - light
+        foot = offset - np.sum(offset * direction, axis=1, keepdims=True) * direction
+        height = np.linalg.norm(foot, axis=1)
+        ray, kink = leg_kinks(medium.bounds, light, (direction, foot / height[:, None]), height)
+        for number in range(2):
+            s = np.arange(-1.6, 1.6, step)
+            leg = foot[number] + s[:, None] * direction[number]
+            reach = np.linalg.norm(leg, axis=1)
+            enter, leave = crossings(medium.bounds, light, leg / reach[:, None])
+            chord = np.maximum(np.minimum(leave, reach) - np.maximum(enter, 0), 0)
+            bend = np.abs(np.diff(chord, 2))
+            own = np.concatenate([kink[ray == number], s[1:][np.diff((leave > reach) & (enter < reach)) != 0]])
+            near = np.min(np.abs(s[1:-1, None] - own[None, :]), axis=1) < (0.1 if steep else 2 * step)
+            assert len(own) >= 2
+            assert chord.max() > 0.1
+            assert bend[~near].max() < 5e-6  # that of a kink at which the slope changes by 0.025
+            assert bend.max() > 5e-5
+
+
+def test_the_digest_of_a_scene_tells_its_media_apart(variant):
+    """A cached truth must not stand in for that of another medium inside, or of other surroundings."""
+    import mitsuba as mi
+
+    from reference.storage.cache import scene_digest
+
+    def digest(**changes):
+        return scene_digest(mi.load_dict(clear_scene(size=(3, 2), **(shapes() | changes))))
+
+    def pearl(sigma_t, **medium):
+        return {
+            "pearl": body(
+                {"type": "sphere", "center": [0.6, 0.2, 0.6], "radius": 0.43}, sigma_t, (0.2, 0.5, 0.8), **medium
+            )
+        }
+
+    air = {key: entry for key, entry in FOG.items() if key != "id"}
+    surroundings = {name: shape | {"exterior": air} for name, shape in shapes().items()}
+    variants = [
+        digest(**change)
+        for change in (
+            {},
+            pearl(1.3001),
+            pearl(1.3, phase={"type": "rayleigh"}),
+            pearl(1.3, phase={"type": "hg", "g": 0.1}),
+            {"pearl": None},
+            surroundings,
+        )
+    ]
+    assert len(set(variants)) == len(variants)
+    assert digest() == variants[0]

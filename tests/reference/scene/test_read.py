@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import numpy as np
+import pytest
+
+from analytic.errors import InputError
+from tests.helpers.scenes import body, clear_scene, spot, tiny_scene
+
+
+def test_both_sides_read_the_same_scene(variant):
+    """The truth and the methods under test read a scene by routes of their own; the numbers must be the same."""
+    import mitsuba as mi
+
+    from realtime.scene.camera import ray_directions
+    from realtime.scene.read_scene import read_scene
+    from reference.scene.read import read_truth
+
+    fog = tiny_scene()["fog"] | {"scale": 1.7, "phase": {"type": "hg", "g": -0.31}}
+    scene = mi.load_dict(tiny_scene(fog=fog, spot=spot(cutoff=31.0, beam=17.0)))
+    truth, other = read_truth(scene), read_scene(scene, "double")
+    assert np.array(other.camera.origin).ravel() == pytest.approx(truth.origin)
+    direction = np.array(ray_directions(other.camera, mi.UInt32(np.arange(truth.width * truth.height)))[0]).T
+    assert np.max(np.abs(direction - truth.direction)) < 1e-14
+    assert float(other.medium.sigma_t[0][0]) == pytest.approx(truth.medium.sigma_t[0], rel=1e-6)
+    assert np.array(other.medium.albedo).ravel() == pytest.approx(truth.medium.albedo, rel=1e-6)
+    assert truth.medium.phase.g == pytest.approx(-0.31)
+    for mine, theirs in zip(truth.lights, other.lights, strict=True):
+        assert mine.position == pytest.approx(np.array(theirs.position).ravel(), rel=1e-6)
+        assert mine.intensity == pytest.approx(np.array(theirs.intensity).ravel(), rel=1e-6)
+    cone = truth.lights[1]
+    assert cone.axis == pytest.approx(np.array(other.lights[1].axis).ravel(), abs=1e-6)
+    assert np.rad2deg([cone.cutoff, cone.beam]) == pytest.approx([31, 17])
+
+
+def test_rays_are_those_of_mitsuba(variant):
+    import mitsuba as mi
+
+    from reference.scene.read import read_truth
+
+    scene = mi.load_dict(tiny_scene(size=(33, 21)))
+    truth = read_truth(scene)
+    number = np.arange(33 * 21)
+    position = mi.Point2f((number % 33 + 0.5) / 33, (number // 33 + 0.5) / 21)
+    ray, _ = scene.sensors()[0].sample_ray(0.0, 0.5, position, mi.Point2f(0.5))
+    assert np.max(np.abs(np.array(ray.d).T - truth.direction)) < 5e-7  # float32 matrices on Mitsuba's side
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [({"lamp": None}, "no light"), ({"sky": {"type": "constant"}}, "ConstantBackgroundEmitter")],
+)
+def test_refusals(variant, changes, message):
+    import mitsuba as mi
+
+    from reference.scene.read import read_truth
+
+    with pytest.raises(InputError, match=message):
+        read_truth(mi.load_dict(tiny_scene(**changes)))
+
+
+def test_reading_a_scene_renames_none_of_its_shapes(variant):
+    """Shapes are told by their names, and these count in the digest under which results are kept."""
+    import mitsuba as mi
+
+    from reference.scene.read import read_truth
+    from reference.storage.cache import scene_digest
+
+    ball = body({"type": "sphere", "center": [0.2, 0.1, 0.9], "radius": 0.4}, 0.7, (0.5, 0.5, 0.5))
+    scene = mi.load_dict(clear_scene(size=(4, 3), mist=ball, floor=tiny_scene()["floor"]))
+    before = scene_digest(scene)
+    truth = read_truth(scene)
+    assert [shape.id() for shape in truth.occluders.shapes()] == ["floor"]
+    assert {shape.id() for shape in scene.shapes()} == {"mist", "floor"}
+    assert scene_digest(scene) == before

@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import numpy as np
+import pytest
+
+from analytic.errors import InputError
+from tests.helpers.scenes import spot, tiny_scene
+
+
+def test_distance_to_a_plane_is_exact(variant):
+    import mitsuba as mi
+
+    from reference.quadrature.surface import surface_hits
+    from reference.scene.read import read_truth
+    from reference.scene.shapes import exact_distance
+
+    truth = read_truth(mi.load_dict(tiny_scene(ball=None)))
+    hits = surface_hits(truth)
+    distance = exact_distance(truth, hits.interaction, hits.distance)
+    met = np.isfinite(hits.distance)
+    assert met.sum() > 50
+    assert distance[met] == pytest.approx((-truth.origin[2] / truth.direction[:, 2])[met], rel=1e-14)
+    assert np.isinf(distance[~met]).all()
+
+
+@pytest.mark.parametrize("inside", [False, True], ids=["outside", "inside"])
+def test_distance_to_a_ball_is_exact(variant, inside):
+    """The points lie on the sphere in float64, and they are those that were cast."""
+    import mitsuba as mi
+
+    from reference.quadrature.surface import surface_hits
+    from reference.scene.read import read_truth
+    from reference.scene.shapes import exact_distance, read_shapes
+
+    ball = {"type": "sphere", "center": [0.1, -3.9, 1.2], "radius": 1.9} if inside else tiny_scene()["ball"]
+    truth = read_truth(mi.load_dict(tiny_scene(ball=ball, floor=None)))
+    hits = surface_hits(truth)
+    distance = exact_distance(truth, hits.interaction, hits.distance)
+    met = np.isfinite(hits.distance)
+    assert met.all() if inside else 5 < met.sum() < 100
+    shapes = read_shapes(truth.occluders)
+    point = truth.origin + distance[met, None] * truth.direction[met]
+    assert np.linalg.norm(point - shapes.centre, axis=1) == pytest.approx(shapes.radius.item(), rel=1e-14)
+    assert distance[met] == pytest.approx(hits.distance[met], rel=1e-5)
+    assert np.isinf(distance[~met]).all()
+
+
+def test_rays_that_touch_a_ball_keep_the_distance_that_was_cast(variant):
+    from reference.scene.convex_bodies import Ball
+    from reference.scene.shapes import _to_ball
+
+    ball = Ball(np.array([0.0, 0.0, 5.0]), 1.0)
+    direction = np.array([[np.sin(a), 0.0, np.cos(a)] for a in (0.0, np.arcsin(0.2) + 1e-9)])
+    assert _to_ball(ball, np.zeros(3), direction, np.array([4.00001, 4.9])).tolist() == [4.0, 4.9]
+
+
+@pytest.mark.parametrize("scale", [[2.0, 1.0, 1.0], [1.0, 2.0, 0.5], [-1.5, 1.5, 1.5]])
+def test_a_stretched_sphere_is_the_ball_that_mitsuba_makes_of_it(variant, scale):
+    """Mitsuba warns of it, and intersects a ball whose radius is the first of the scales."""
+    import mitsuba as mi
+
+    from reference.scene.shapes import read_shapes
+
+    turned = mi.ScalarTransform4f().translate([0.3, 0.2, 0.1]).rotate([0.0, 0.6, 0.8], 40.0).scale(scale)
+    scene = mi.load_dict({"type": "scene", "ball": {"type": "sphere", "to_world": turned, "flip_normals": True}})
+    shapes = read_shapes(scene)
+    assert shapes.radius == pytest.approx(abs(scale[0]), rel=1e-6)
+    direction = np.random.default_rng(3).normal(size=(3, 50))
+    direction /= np.linalg.norm(direction, axis=0)
+    start = shapes.centre[0][:, None] + 7 * direction
+    found = scene.ray_intersect_preliminary(mi.Ray3f(mi.Point3f(start), mi.Vector3f(-direction)), coherent=False)
+    assert np.array(found.t) == pytest.approx(7 - shapes.radius.item(), rel=1e-5)
+
+
+def test_shapes_are_sorted_and_others_refused_by_name(variant):
+    import mitsuba as mi
+
+    from reference.scene.shapes import read_shapes, refuse_others
+
+    disk = {"type": "disk", "to_world": mi.ScalarTransform4f().translate([0, 0, 3])}
+    shapes = read_shapes(mi.load_dict(tiny_scene(lid=disk)))
+    assert shapes.triangles.shape == (2, 3, 3)
+    assert shapes.centre == pytest.approx(np.array([[0.1, 0.1, 0.7]]), rel=1e-6)
+    assert [shape.id() for shape in shapes.others.shapes()] == ["lid"]
+    with pytest.raises(InputError, match="'lid' is a Disk; wanted meshes, rectangles and spheres"):
+        refuse_others(shapes)
+    plain = read_shapes(mi.load_dict(tiny_scene(ball=None, lamp=spot())))
+    assert (plain.triangles.shape, len(plain.radius), plain.others) == ((2, 3, 3), 0, None)
+    refuse_others(plain)

@@ -1,0 +1,260 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import resource
+import struct
+
+import numpy as np
+import pytest
+
+from analytic.errors import InputError
+from reference.storage.exr import Image, layer, read_exr, write_exr
+
+SIZE = (5, 7)
+
+
+@pytest.fixture
+def image():
+    rng = np.random.default_rng(3)
+    layers = {
+        name: rng.gamma(0.3, 1.7, (*SIZE, 3)).astype(np.float32)
+        for name in ("airlight", "surface", "airlight_se", "surface_se")
+    }
+    depth = rng.random(SIZE).astype(np.float32)
+    depth[0, 0] = np.inf
+    attributes = {"airlight:method": "ray-march é", "airlight:spp": 256, "airlight:step": 0.125}
+    return Image(layers, depth, attributes)
+
+
+def write_raw(path, channels, header=None):
+    import OpenEXR
+
+    OpenEXR.File(header or {}, channels).write(str(path))
+
+
+def test_round_trip_is_exact(tmp_path, image):
+    write_exr(tmp_path / "a.exr", image)
+    back = read_exr(tmp_path / "a.exr")
+    assert sorted(back.layers) == ["airlight", "airlight_se", "surface", "surface_se", "total"]
+    for name, values in image.layers.items():
+        assert back.layers[name].dtype == np.float32
+        np.testing.assert_array_equal(back.layers[name], values)
+    np.testing.assert_array_equal(back.layers["total"], image.layers["airlight"] + image.layers["surface"])
+    np.testing.assert_array_equal(back.depth, image.depth)
+    assert dict(back.attributes) == dict(image.attributes)
+    # What was read can be written again, total included.
+    write_exr(tmp_path / "b.exr", back)
+    assert (tmp_path / "a.exr").read_bytes() == (tmp_path / "b.exr").read_bytes()
+
+
+def test_file_is_single_part_float32_zip_with_plain_names(tmp_path, image):
+    import OpenEXR
+
+    write_exr(tmp_path / "a.exr", image)
+    with OpenEXR.File(str(tmp_path / "a.exr"), separate_channels=True) as file:
+        names = {f"{name}.{c}" for name in image.layers for c in "RGB"} | {"R", "G", "B", "depth.Z"}
+        assert len(file.parts) == 1
+        assert set(file.channels()) == names
+        assert {c.pixels.dtype for c in file.channels().values()} == {np.dtype(np.float32)}
+        assert file.header()["compression"] == OpenEXR.ZIP_COMPRESSION
+
+
+def test_strided_arrays_are_written_as_they_are(tmp_path):
+    values = np.arange(6 * 8 * 3, dtype=np.float64).reshape(6, 8, 3)
+    turned = values.transpose(1, 0, 2)[::-1]
+    write_exr(tmp_path / "a.exr", Image({"airlight": turned}, depth=values[:, ::-1, 1].T))
+    back = read_exr(tmp_path / "a.exr")
+    np.testing.assert_array_equal(back.layers["airlight"], turned)
+    np.testing.assert_array_equal(back.layers["total"], turned)  # the airlight alone where there is no surface
+    np.testing.assert_array_equal(back.depth, values[:, ::-1, 1].T)
+
+
+def test_nonfinite_and_negative_values_survive(tmp_path):
+    values = np.zeros((2, 2, 3), np.float32)
+    values[0, 0], values[0, 1], values[1, 0] = np.nan, np.inf, -1.5
+    write_exr(tmp_path / "a.exr", Image({"airlight": values}))
+    np.testing.assert_array_equal(read_exr(tmp_path / "a.exr").layers["airlight"], values)
+
+
+def test_attributes_keep_their_value(tmp_path):
+    attributes = {
+        "airlight:seed": 2**40 + 1,  # beyond the 32 bits of the format
+        "airlight:small": np.int64(-3),
+        "airlight:third": np.float64(1 / 3),
+        "airlight:huge": 1e300,
+        "airlight:a-name-of-more-than-thirty-one-letters": "long",
+        "owner": "",
+    }
+    write_exr(tmp_path / "a.exr", Image({"airlight": np.ones((1, 1, 3))}, attributes=attributes))
+    back = read_exr(tmp_path / "a.exr").attributes
+    assert back["airlight:seed"] == str(2**40 + 1)
+    assert back["airlight:small"] == -3
+    assert back["airlight:third"] == pytest.approx(1 / 3, rel=6e-8)  # float32
+    assert float(back["airlight:huge"]) == 1e300
+    assert back["airlight:a-name-of-more-than-thirty-one-letters"] == "long"
+    assert back["owner"] == ""
+    assert len(attributes) == len(back)
+
+
+@pytest.mark.parametrize(
+    ("attributes", "message"),
+    [({"compression": "none"}, "cannot name"), ({"n" * 256: 1}, "cannot name"), ({"airlight:x": [1]}, "is a list")],
+)
+def test_refuses_attributes_that_the_format_cannot_keep(tmp_path, attributes, message):
+    with pytest.raises(InputError, match=message):
+        write_exr(tmp_path / "a.exr", Image({"airlight": np.ones((1, 1, 3))}, attributes=attributes))
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("layers", "message"),
+    [
+        ({}, "without layers"),
+        ({"airlight": np.ones((2, 2))}, r"shape \(2, 2\); wanted \(height, width, 3\)"),
+        ({"airlight": np.ones((0, 2, 3))}, "none of them zero"),
+        ({"airlight": np.ones((2, 2, 3)), "surface": np.ones((2, 3, 3))}, "two sizes: 'airlight'.*'surface'"),
+        ({"airlight": np.full((2, 2, 3), 1e39)}, "12 values of 'airlight' exceed"),
+        ({"airlight": np.ones((2, 2, 3)), "total": np.full((2, 2, 3), 1.01)}, "'total' is not airlight"),
+    ],
+)
+def test_refuses_layers_that_do_not_fit(tmp_path, layers, message):
+    (tmp_path / "a.exr").write_bytes(b"old")
+    with pytest.raises(InputError, match=message):
+        write_exr(tmp_path / "a.exr", Image(layers))
+    assert (tmp_path / "a.exr").read_bytes() == b"old"
+
+
+def test_refuses_a_depth_of_another_size(tmp_path):
+    with pytest.raises(InputError, match=r"depth has shape \(2, 3\)"):
+        write_exr(tmp_path / "a.exr", Image({"airlight": np.ones((2, 2, 3))}, depth=np.ones((2, 3))))
+
+
+def test_layer_names_what_is_there_and_the_nearest(image):
+    assert layer(image, "surface") is image.layers["surface"]
+    with pytest.raises(InputError, match=r"x\.exr has no layer 'airligth'; it has airlight, .*did you mean 'airlight'"):
+        layer(image, "airligth", "x.exr")
+    with pytest.raises(InputError, match="ask for one of them"):
+        layer(image, "qqq")
+    with pytest.raises(InputError, match="no layer of colours at all"):
+        layer(Image({}), "airlight")
+
+
+def test_reads_plain_half_images_and_says_so(tmp_path):
+    # Thirds are not half floats; the file holds their roundings.
+    thirds = (np.arange(12, dtype=np.float32).reshape(3, 4) / 3).astype(np.float16)
+    write_raw(tmp_path / "a.exr", {"R": thirds, "G": thirds, "B": thirds, "A": np.ones((3, 4), np.float16)})
+    image = read_exr(tmp_path / "a.exr")
+    assert list(image.layers) == ["total"]
+    assert layer(image, "").dtype == np.float32
+    np.testing.assert_array_equal(layer(image, "")[:, :, 2], thirds.astype(np.float32))
+    assert "half floats" in image.attributes["airlight:read"]
+    assert "channels left out: A" in image.attributes["airlight:read"]
+
+
+@pytest.mark.parametrize("names", ["rgb", ("Red", "Green", "Blue"), "RGB"])
+@pytest.mark.parametrize("prefix", ["", "Final."])
+def test_reads_colours_by_the_names_of_other_programs(tmp_path, names, prefix):
+    path = tmp_path / "other.exr"
+    pixels = [np.full((3, 4), value, dtype=np.float32) for value in (0.1, 0.2, 0.3, 1.0)]
+    channels = {prefix + name: values for name, values in zip([*names, "A"], pixels)}
+    write_raw(path, channels)
+    image = read_exr(path)
+    np.testing.assert_array_equal(image.layers[prefix[:-1] or "total"], np.stack(pixels[:3], axis=-1))
+    assert image.attributes["airlight:read"] == f"channels left out: {prefix}A"
+
+
+def test_reads_grey_images_and_says_so(tmp_path):
+    grey = np.arange(12, dtype=np.float32).reshape(3, 4)
+    write_raw(tmp_path / "a.exr", {"Y": grey, "airlight.Y": 2 * grey, "Z": 3 * grey})
+    image = read_exr(tmp_path / "a.exr")
+    np.testing.assert_array_equal(image.layers["total"], np.stack([grey] * 3, axis=-1))
+    np.testing.assert_array_equal(image.layers["airlight"][:, :, 1], 2 * grey)
+    np.testing.assert_array_equal(image.depth, 3 * grey)
+    assert image.attributes["airlight:read"] == "grey, Y repeated as R, G, B: airlight, total"
+
+
+def test_names_channels_that_it_leaves_out(tmp_path):
+    plane = np.ones((3, 4), np.float32)
+    ids = np.ones((3, 4), np.uint32)
+    write_raw(tmp_path / "a.exr", {"a.R": plane, "a.G": plane, "id": ids, "n.X": plane})
+    image = read_exr(tmp_path / "a.exr")
+    assert not image.layers
+    assert image.attributes["airlight:read"] == "channels left out: a.G, a.R, id, n.X"
+
+
+def test_missing_file(tmp_path, capfd):
+    with pytest.raises(InputError, match=r"cannot read .*none\.exr: No such file"):
+        read_exr(tmp_path / "none.exr")
+    with pytest.raises(InputError, match="Is a directory"):
+        read_exr(tmp_path)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_broken_files_give_one_line_and_nothing_on_the_terminal(tmp_path, capfd):
+    noise = np.random.default_rng(1).random((64, 64, 3))
+    write_exr(tmp_path / "good.exr", Image({"airlight": noise}))
+    good = (tmp_path / "good.exr").read_bytes()
+    path = tmp_path / "bad.exr"
+    for cut in (0, 3, 8, 100, 400, len(good) // 2, len(good) - 600, len(good) - 1):
+        path.write_bytes(good[:cut])
+        with pytest.raises(InputError, match=r"bad\.exr is (not an EXR|a broken EXR) file") as caught:
+            read_exr(path)
+        assert "\n" not in str(caught.value)
+    path.write_text("<scene/>")
+    with pytest.raises(InputError, match="not an EXR file"):
+        read_exr(path)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_refuses_tiled_deep_and_multi_part_files(tmp_path):
+    import OpenEXR
+
+    plane = np.ones((3, 4), np.float32)
+    write_raw(tmp_path / "tiled.exr", {"R": plane}, {"type": OpenEXR.tiledimage, "tiles": OpenEXR.TileDescription()})
+    OpenEXR.File([OpenEXR.Part({}, {"R": plane}, name) for name in ("left", "right")]).write(
+        str(tmp_path / "multi.exr")
+    )
+    deep = np.empty((3, 4), object)
+    for index in np.ndindex(deep.shape):
+        deep[index] = np.zeros(2, np.float32)
+    write_raw(
+        tmp_path / "deep.exr", {"Z": deep}, {"type": OpenEXR.deepscanline, "compression": OpenEXR.ZIPS_COMPRESSION}
+    )
+    for name, kind in (("tiled", "tiled"), ("multi", "multi-part"), ("deep", "deep")):
+        with pytest.raises(InputError, match=rf"{name}\.exr is a {kind} EXR file; save it as a single part"):
+            read_exr(tmp_path / f"{name}.exr")
+
+
+def test_refuses_a_window_of_a_larger_frame(tmp_path):
+    window = (np.array([1, 1], np.int32), np.array([4, 3], np.int32))
+    frame = (np.array([0, 0], np.int32), np.array([9, 9], np.int32))
+    write_raw(tmp_path / "a.exr", {"R": np.ones((3, 4), np.float32)}, {"dataWindow": window, "displayWindow": frame})
+    with pytest.raises(InputError, match="another window of pixels than its frame"):
+        read_exr(tmp_path / "a.exr")
+
+
+def test_refuses_luminance_and_chroma(tmp_path):
+    plane = np.ones((4, 4), np.float32)
+    write_raw(tmp_path / "a.exr", {"Y": plane, "RY": plane, "BY": plane})
+    with pytest.raises(InputError, match="luminance and subsampled chroma"):
+        read_exr(tmp_path / "a.exr")
+
+
+def test_magic_number_is_little_endian(tmp_path, image):
+    write_exr(tmp_path / "a.exr", image)
+    assert struct.unpack("<I", (tmp_path / "a.exr").read_bytes()[:4])[0] == 20000630
+
+
+def test_a_full_disk_names_the_file_and_leaves_it(tmp_path):
+    """OpenEXR says in words what the system said; a limit on the size of a file stands for the disk."""
+    write_exr(tmp_path / "a.exr", Image({"surface": np.zeros((2, 2, 3))}))
+    before = (tmp_path / "a.exr").read_bytes()
+    noise = np.random.default_rng(1).random((64, 64, 3))
+    old = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, old[1]))
+    try:
+        with pytest.raises(OSError, match="File too large") as caught:
+            write_exr(tmp_path / "a.exr", Image({"surface": noise}))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, old)
+    assert caught.value.filename == str(tmp_path / "a.exr")
+    assert [path.name for path in tmp_path.iterdir()] == ["a.exr"]
+    assert (tmp_path / "a.exr").read_bytes() == before

@@ -1,0 +1,204 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Lit intervals under a light at infinity: exact geometry against definitions, rays that are cast, and closed forms."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.helpers.polygons import lit_lengths
+from tests.helpers.suns import ball_over_floor, brick, sunny
+
+
+def random_rays(count, seed, towards):
+    """Return rays from the origin in all directions, looked at between 0.1 and 5 m."""
+    from reference.scene.directional_light import DirectionalLight, parallel_rays
+
+    direction = np.random.default_rng(seed).normal(size=(count, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    light = DirectionalLight(-np.asarray(towards), np.ones(3), None)
+    return parallel_rays(np.zeros(3), direction, light, (np.full(count, 0.1), np.full(count, 5.0)))
+
+
+def unit(vector):
+    return np.asarray(vector) / np.linalg.norm(vector)
+
+
+def samples(rays, found, count, seed):
+    """Return random points of rays, whether `found` calls them lit, and their distance from the nearest edge [m]."""
+    share = np.random.default_rng(seed).random((len(rays.first), count))
+    lit, gap = np.zeros(share.shape, bool), np.full(share.shape, np.inf)
+    for ray, low, high in zip(found.ray, found.low, found.high, strict=True):
+        lit[ray] |= (share[ray] > low) & (share[ray] < high)
+        gap[ray] = np.minimum(gap[ray], np.minimum(np.abs(share[ray] - low), np.abs(share[ray] - high)))
+    x = rays.first[:, None] + share * (rays.last - rays.first)[:, None]
+    return (
+        rays.origin + x[..., None] * rays.direction[:, None],
+        lit,
+        np.minimum(gap, 1) * (rays.last - rays.first)[:, None],
+    )
+
+
+def hits_triangles(point, towards, triangles):
+    """Return whether half lines from points meet triangles: Cramer's rule for point + t towards = a + u e + v f."""
+    hit = np.zeros(point.shape[:-1], bool)
+    for a, b, c in triangles:
+        inverse = np.linalg.inv(np.stack([b - a, c - a, -towards], axis=1))
+        u, v, t = np.moveaxis((point - a) @ inverse.T, -1, 0)
+        hit |= (u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0)
+    return hit
+
+
+def hits_balls(point, towards, balls):
+    hit = np.zeros(point.shape[:-1], bool)
+    for centre, radius in balls:
+        off = centre - point
+        along = off @ towards
+        inside = np.sum(off**2, axis=-1) < radius**2
+        hit |= inside | ((along > 0) & (np.sum(off**2, axis=-1) - along**2 < radius**2))
+    return hit
+
+
+@pytest.mark.parametrize("towards", [(0.3, -0.5, 0.7), (0.0, 0.0, 1.0), (-0.9, 0.02, 0.0)])
+def test_random_points_by_the_definition(towards):
+    """Triangles and balls all around the camera, one ball around it: points far from an edge are lit or not."""
+    from reference.scene.shapes import Shapes
+    from reference.visibility.directional_geometry import parallel_intervals
+
+    towards, generator = unit(towards), np.random.default_rng(4)
+    triangles = generator.uniform(-4, 4, (60, 1, 3)) + generator.normal(size=(60, 3, 3)) * 0.6
+    centres, radii = generator.uniform(-4, 4, (9, 3)), generator.uniform(0.1, 0.9, 9)
+    rays = random_rays(900, 7, towards)
+    found = parallel_intervals(rays, Shapes(triangles, centres, radii))
+    point, lit, gap = samples(rays, found, 60, 2)
+    hidden = hits_triangles(point, towards, triangles) | hits_balls(point, towards, list(zip(centres, radii)))
+    assert found.transitions > 500
+    assert 0.1 < hidden.mean() < 0.9
+    # Where a plane all but touches a ball, or a ray is all but along the light, rounding is worth more.
+    assert not np.any((lit == hidden)[gap > 1e-9])
+
+
+def test_one_triangle_in_closed_form():
+    """Light, triangle and ray in one plane: z - y cot for the corners, the crossing where it goes through the ray."""
+    from reference.scene.directional_light import DirectionalLight, parallel_rays
+    from reference.scene.shapes import Shapes
+    from reference.visibility.directional_geometry import parallel_intervals
+
+    light = DirectionalLight(unit([-3.0, 0.0, -4.0]), np.ones(3), None)  # cot = 3/4 for a ray along x
+    rays = parallel_rays(np.zeros(3), np.array([[1.0, 0, 0]]), light, (np.zeros(1), np.array([10.0])))
+    out = np.array([0.0, 0.3, 0.0])
+    for ends, expected in (
+        (((4.0, 0.0, 2.0), (6.0, 0.0, 1.0)), (2.5, 5.25)),
+        (((4.0, 0.0, -2.0), (6.0, 0.0, 2.0)), (4.5, 5.0)),  # half of it lies on the dark side
+    ):
+        a, b = (np.array(end) for end in ends)
+        found = parallel_intervals(rays, Shapes(np.array([[a + out, a - out, b]])))
+        low, high = expected
+        assert 10 * found.low == pytest.approx([0, high], abs=1e-13)
+        assert 10 * found.high == pytest.approx([low, 10], abs=1e-13)
+        assert found.transitions == 2
+        below = parallel_intervals(rays, Shapes(np.array([[a + out, a - out, b]]) * [1, 1, -1]))
+        assert len(below.ray) == (1 if ends[0][2] > 0 else 2)
+
+
+@pytest.mark.parametrize("sign", [1, -1], ids=["towards the light", "away from it"])
+def test_rays_along_the_light(sign):
+    """All of such a ray has one leg: what lies behind its end, or behind the camera, hides it all or not at all."""
+    from reference.scene.directional_light import DirectionalLight, parallel_rays
+    from reference.scene.shapes import Shapes
+    from reference.visibility.directional_geometry import parallel_intervals
+
+    towards = unit([0.3, 0.4, 0.5])
+    light = DirectionalLight(-towards, np.ones(3), None)
+    rays = parallel_rays(np.zeros(3), sign * towards[None], light, (np.array([0.5]), np.array([2.0])))
+    for distance, count in ((3.0, 0), (-3.0, 1)):  # along the way to the light, from the camera
+        plate = distance * towards + np.array([[1.0, 0.1, -0.3], [-0.7, 0.8, 0.1], [-0.2, -0.9, 0.4]])
+        found = parallel_intervals(rays, Shapes(plate[None]))
+        # Looking away from the light, what is before the camera lies behind it as seen from the light.
+        assert len(found.ray) == count, (sign, distance)
+        ball = parallel_intervals(rays, Shapes(np.empty((0, 3, 3)), distance * towards[None], np.array([0.3])))
+        assert len(ball.ray) == count
+
+
+def scene_of_many(**changes):
+    import mitsuba as mi
+
+    slats = {
+        f"slat{k}": {
+            "type": "cube",
+            "to_world": mi.ScalarTransform4f()
+            .translate([-0.9 + 0.13 * k, 0.1, 1.3 + 0.03 * k])
+            .scale([0.02, 0.6, 0.011]),
+        }
+        for k in range(7)
+    }
+    return sunny(brick=brick(), **ball_over_floor(), **slats, **changes)
+
+
+def rays_and_truth(scene):
+    import mitsuba as mi
+
+    from reference.quadrature.segments import camera_segments, scattering_range
+    from reference.quadrature.surface import surface_hits
+    from reference.scene.directional_light import parallel_rays
+    from reference.scene.read import read_truth
+
+    truth = read_truth(mi.load_dict(scene))
+    span = scattering_range(camera_segments(truth, surface_hits(truth).distance))
+    return truth, parallel_rays(truth.origin, truth.direction, truth.directional[0], span)
+
+
+def test_cast_rays_find_the_edges_of_the_geometry(variant):
+    """Two routes that share no code, edge by edge, and neither is contradicted by random shadow rays."""
+    from reference.visibility.directional_casting import directional_intervals
+
+    truth, rays = rays_and_truth(scene_of_many(size=(64, 48)))
+    exact = directional_intervals(truth, rays, edges="geometry")
+    cast = directional_intervals(truth, rays, edges="rays")
+    assert exact.transitions > 100
+    assert exact.certificate.checked == 32 * np.sum(rays.last > rays.first)
+    assert exact.certificate.left == cast.certificate.left == 0
+    lit = [lit_lengths(found, rays.ends) * (rays.last - rays.first) for found in (exact, cast)]
+    # Legs and their ends are rounded to 2e-6 of some metres. One shadow is so thin that all samples step over it.
+    assert np.sum(np.abs(lit[0] - lit[1]) > 2e-5) <= 1
+
+
+def test_shapes_of_other_kinds_are_cast_at(variant):
+    """A disk in the place of the square that it fills to pi/4: its shadow by rays, all else by geometry."""
+    import mitsuba as mi
+
+    from reference.visibility.directional_casting import directional_intervals
+
+    disk = {"type": "disk", "to_world": mi.ScalarTransform4f().translate([-0.6, 0.2, 1.3]).scale(0.2)}
+    truth, rays = rays_and_truth(sunny(brick=brick(), disk=disk, **ball_over_floor(), size=(24, 18)))
+    found = directional_intervals(truth, rays)
+    towards = -truth.directional[0].direction
+    point, lit, gap = samples(rays, found, 50, 3)
+    height = (1.3 - point[..., 2]) / towards[2]
+    on_disk = np.linalg.norm((point + height[..., None] * towards)[..., :2] - [-0.6, 0.2], axis=-1) < 0.2
+    ball = hits_balls(point, towards, [(np.array([0.1, 0.1, 0.7]), 0.41)])
+    used = (rays.last > rays.first)[:, None] & (gap > 1e-5)
+    assert found.transitions > 10
+    assert not np.any((lit == (on_disk | ball))[used])
+
+
+def test_wrong_geometry_is_left_in_doubt(variant, monkeypatch):
+    """Were slats forgotten, the check would tell, and the bound of the image would grow."""
+    import reference.visibility.directional_casting as module
+    from reference.visibility.directional_geometry import parallel_intervals
+
+    truth, rays = rays_and_truth(scene_of_many(size=(48, 36)))
+    right = module.directional_intervals(truth, rays)
+
+    def with_fewer_slats(rays, shapes):
+        # By where they stand: Mitsuba may load shapes in any order.
+        x = shapes.triangles[..., 0]
+        slats = np.any([np.all(np.abs(x - (-0.9 + 0.13 * k)) < 0.03, axis=1) for k in (0, 1)], axis=0)
+        assert slats.sum() == 24
+        return parallel_intervals(rays, replace(shapes, triangles=shapes.triangles[~slats]))
+
+    monkeypatch.setattr(module, "parallel_intervals", with_fewer_slats)
+    wrong = module.directional_intervals(truth, rays)
+    assert right.certificate.left == 0
+    assert wrong.certificate.left > 5
+    assert wrong.doubt is not None

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import numpy as np
+import pytest
+
+
+@pytest.mark.parametrize("degrees", [2.0, 31.0, 78.0, 89.5])
+def test_interval_against_sampling(degrees):
+    from reference.scene.read import TruthLight
+    from reference.visibility.spot_cone import cone_interval, perpendicular
+
+    rng = np.random.default_rng(13)
+    axis = np.array([0.3, -0.8, 0.5]) / np.linalg.norm([0.3, -0.8, 0.5])
+    angle = np.deg2rad(degrees)
+    light = TruthLight(np.array([0.2, 0.5, -0.4]), np.ones(3), axis, angle, angle)
+    origin = np.array([1.1, -0.7, 0.9])
+    direction = rng.normal(size=(500, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    normal = perpendicular(origin, direction, light)
+    low, high = cone_interval(direction, normal, light, angle)
+    theta = np.linspace(-0.499 * np.pi, 0.499 * np.pi, 401)
+    away = direction[:, None] * np.sin(theta)[:, None] + normal[:, None] * np.cos(theta)[:, None]
+    cosine = away @ axis
+    clear = np.abs(cosine - np.cos(angle)) > 1e-9
+    inside = (theta >= low[:, None]) & (theta <= high[:, None])
+    assert np.array_equal(inside[clear], (cosine > np.cos(angle))[clear])
+    assert inside.any()
+
+
+def test_normals_point_from_the_light_to_the_foot():
+    from reference.scene.read import TruthLight
+    from reference.visibility.spot_cone import perpendicular
+
+    light = TruthLight(np.array([0.0, 0.0, 2.0]), np.ones(3))
+    direction = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    normal = perpendicular(np.zeros(3), direction, light)
+    assert normal[0] == pytest.approx([0, 0, -1])
+    assert np.linalg.norm(normal[1]) == pytest.approx(1)  # the ray meets the light: any normal will do
+    assert abs(normal[1] @ direction[1]) < 1e-15
+
+
+def test_profile_is_that_of_mitsuba(variant):
+    import drjit as dr
+    import mitsuba as mi
+
+    from reference.scene.read import read_truth
+    from reference.visibility.spot_cone import falloff, perpendicular
+    from tests.helpers.scenes import spot, tiny_scene
+
+    scene = mi.load_dict(tiny_scene(lamp=spot(cutoff=37.0, beam=14.0)))
+    truth = read_truth(scene)
+    light = truth.lights[0]
+    normal = perpendicular(truth.origin, truth.direction, light)
+    theta = np.linspace(-1.3, 1.3, 57)
+    value = falloff(np.broadcast_to(theta, (len(normal), 57)), truth.direction, normal, light)
+    away = truth.direction[:, None] * np.sin(theta)[:, None] + normal[:, None] * np.cos(theta)[:, None]
+    interaction = dr.zeros(mi.Interaction3f, away[..., 0].size)
+    interaction.p = mi.Point3f((light.position + away).reshape(-1, 3).T)
+    _, arriving = scene.emitters()[0].sample_direction(interaction, mi.Point2f(0.5))
+    expected = np.array(arriving)[0].reshape(value.shape) / light.intensity[0]
+    assert np.max(np.abs(value - expected)) < 2e-5  # acos of a float32 cosine close to 1
+    assert value.max() == 1
+    assert value.min() == 0

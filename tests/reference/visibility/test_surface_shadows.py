@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Where Mitsuba starts its shadow rays: edges that move, and the exact test that says so."""
+
+import numpy as np
+import pytest
+
+from reference.scene.read import read_truth
+from reference.scene.shapes import Shapes, read_shapes
+from reference.visibility.surface_shadows import reached_by_shadow_rays, segments_blocked
+from tests.helpers.scenes import tiny_scene
+
+LIGHT = np.array([1.0, 0.0, 3.0])
+NEAR, FAR = 2e-5, 1e-3  # from the edge of the shadow: less and more than half of what the rays start off the floor [m]
+
+
+def half_covered_floor():
+    """A floor whose left is shadowed: the edge of a roof at x = 0, one above it, has its shadow at x = -1/2."""
+    import mitsuba as mi
+
+    to_roof = mi.ScalarTransform4f().translate([-2, 0, 1]).scale([2, 3, 1])
+    return mi.load_dict(
+        {
+            "type": "scene",
+            "floor": {"type": "rectangle", "to_world": mi.ScalarTransform4f().scale([3, 3, 1])},
+            "roof": {"type": "rectangle", "to_world": to_roof},
+        }
+    )
+
+
+def on_the_floor(scene, x):
+    import mitsuba as mi
+
+    point = mi.Point3f(mi.Float(x), 0.1, 0.4)  # below the roof
+    return scene.ray_intersect(mi.Ray3f(point, mi.Vector3f(0, 0, -1)))
+
+
+def test_edges_of_shadows_move(variant):
+    scene = half_covered_floor()
+    x = -0.5 + np.array([-FAR, NEAR, FAR])
+    interaction = on_the_floor(scene, x)
+    # By hand: rays start 1e-4 (1 + 0.5) up, where the shadow ends 7.5e-5 further to the right.
+    found = reached_by_shadow_rays(
+        interaction, LIGHT, np.array([False, True, True]), scene=scene, shapes=read_shapes(scene)
+    )
+    assert found.tolist() == [False, False, True]
+
+
+def test_a_wrong_interval_is_not_excused(variant):
+    """Where the exact test from the moved start contradicts what was said to be reached, it holds."""
+    scene = half_covered_floor()
+    interaction = on_the_floor(scene, -0.5 + np.array([-0.2, 0.2]))
+    wrong = np.array([True, False])
+    found = reached_by_shadow_rays(interaction, LIGHT, wrong, scene=scene, shapes=read_shapes(scene))
+    assert found.tolist() == [False, True]
+
+
+def test_what_agrees_stays(variant):
+    scene = half_covered_floor()
+    interaction = on_the_floor(scene, np.linspace(-1.7, 1.3, 40))
+    reached = np.linspace(-1.7, 1.3, 40) > -0.5
+    found = reached_by_shadow_rays(interaction, LIGHT, reached, scene=scene, shapes=read_shapes(scene))
+    assert np.array_equal(found, reached)
+
+
+def test_segments_are_blocked_as_rays_are(variant):
+    """Against Mitsuba's rays, among triangles and balls of all sizes; float32 errs on edges, one in a million."""
+    import mitsuba as mi
+
+    scene = mi.load_dict(tiny_scene())
+    shapes = read_shapes(read_truth(scene).occluders)
+    random = np.random.default_rng(5)
+    start, end = random.uniform(-1.3, 1.3, (2, 4000, 3)) + np.array([0, 0, 0.6])
+    way = end - start
+    length = np.linalg.norm(way, axis=1)
+    ray = mi.Ray3f(mi.Point3f(start.T), mi.Vector3f((way / length[:, None]).T))
+    ray.maxt = mi.Float(length)
+    cast = np.array(read_truth(scene).occluders.ray_test(ray), dtype=bool)
+    assert 0.1 < cast.mean() < 0.9
+    assert np.sum(segments_blocked(start, end, shapes) != cast) <= 2
+
+
+def test_triangles_that_are_left_out_block_nothing(monkeypatch):
+    """Rays to one light from points here and there, among small triangles: as with all triangles tested."""
+    import reference.visibility.surface_shadows as module
+
+    random = np.random.default_rng(7)
+    place = random.uniform(-1, 1, (400, 1, 3))
+    triangles = place + random.uniform(0.02, 0.3, (400, 1, 1)) * random.normal(size=(400, 3, 3))
+    shapes = Shapes(triangles, np.empty((0, 3)), np.empty(0))
+    start = random.uniform(-1.4, 1.4, (700, 3))
+    start[::7] = LIGHT  # no way at all: no direction
+    end = np.broadcast_to(LIGHT, start.shape)
+    found = segments_blocked(start, end, shapes)
+    corner = triangles[:, 0]
+    longest = np.linalg.norm(triangles - corner[:, None], axis=2).max(axis=1)
+    groups = list(module._groups(start))
+    left = [len(module._near_triangles(start[group], end[group], corner, longest)) for group in groups]
+    assert sorted(np.concatenate(groups).tolist()) == list(range(700))
+    assert np.median(left) < 250
+    monkeypatch.setattr(module, "_SLACK", np.inf)
+    assert np.array_equal(found, segments_blocked(start, end, shapes))
+    assert 0.2 < found.mean() < 0.8
+
+
+def test_no_segments_are_no_trouble():
+    shapes = Shapes(np.ones((2, 3, 3)), np.empty((0, 3)), np.empty(0))
+    assert len(segments_blocked(np.empty((0, 3)), np.empty((0, 3)), shapes)) == 0
+
+
+@pytest.mark.parametrize(
+    ("start", "end", "blocked"),
+    [
+        ((0, 0, -2), (0, 0, 2), True),  # through the ball
+        ((0, 0, 0), (0, 0, 2), True),  # out of it
+        ((0, 0, 0), (0, 0, 0.9), False),  # within
+        ((0, 0, -2), (0, 0, -1.1), False),  # before it
+        ((1.1, 0, -2), (1.1, 0, 2), False),  # past it
+    ],
+)
+def test_balls(start, end, blocked):
+    ball = Shapes(np.empty((0, 3, 3)), np.zeros((1, 3)), np.ones(1))
+    found = segments_blocked(np.array([start], dtype=float), np.array([end], dtype=float), ball)
+    assert found.tolist() == [blocked]
+
+
+def test_the_truth_of_a_renderer_with_an_epsilon_has_its_edges(variant):
+    """A camera that sees nothing but the band between the two edges: lit in the truth, dark for such a renderer."""
+    import mitsuba as mi
+
+    from reference.quadrature.image import quadrature_image
+
+    to_roof = mi.ScalarTransform4f().translate([-2, 0, 1]).scale([2, 3, 1])
+    camera = mi.ScalarTransform4f().look_at(
+        origin=[-0.5 + NEAR, 0.1, 0.4], target=[-0.5 + NEAR, 0.1, 0.0], up=[0, 1, 0]
+    )
+    scene = tiny_scene(
+        size=(1, 1),
+        ball=None,
+        lamp=None,
+        floor={"type": "rectangle", "to_world": mi.ScalarTransform4f().scale([3, 3, 1])},
+        roof={"type": "rectangle", "to_world": to_roof},
+        light={"type": "point", "position": LIGHT.tolist(), "intensity": 3.0},
+    )
+    scene["sensor"] = scene["sensor"] | {"to_world": camera}
+    truth = read_truth(mi.load_dict(scene))
+    assert quadrature_image(truth).surface.min() > 0
+    assert np.all(quadrature_image(truth, shadow_scale=0.999).surface == 0)

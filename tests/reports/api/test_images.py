@@ -1,0 +1,301 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`import airlight`: the functions do what the parts they are made of do, and refuse in one line what they cannot."""
+
+import ast
+import doctest
+import importlib
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import airlight
+from realtime.errors import InputError as RealtimeInputError
+from reports.api.inputs import one_error, telling
+from tests.helpers.api import FUNCTIONS, ROOT, TINY, brighter, third
+from validation.scenes.registry import SCENES
+
+
+def gone(view):
+    raise ZeroDivisionError("nothing there")
+
+
+def test_the_names_that_editors_complete_are_those_of_the_api():
+    tree = ast.parse((ROOT / "airlight.py").read_text())
+    (block,) = [node for node in tree.body if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test)]
+    named = {node.names[0].asname: node.module for node in block.body if isinstance(node, ast.ImportFrom)}
+    assert named == airlight._API
+    assert set(FUNCTIONS) < set(dir(airlight))
+    for name in airlight._API:
+        assert getattr(airlight, name) is not None
+    with pytest.raises(AttributeError, match="no attribute 'no_such'"):
+        _ = airlight.no_such
+
+
+def test_the_import_is_light_and_the_variant_is_chosen_on_first_use():
+    code = (
+        "import sys, airlight\n"
+        "assert not {'numpy', 'mitsuba', 'reports.api.images'} & set(sys.modules)\n"
+        "frame = airlight.render('open-fog', 'unshadowed', size=(8, 6))\n"
+        "import mitsuba; assert mitsuba.variant() == airlight.activate(); print(frame)\n"
+    )
+    ran = subprocess.run([sys.executable, "-W", "error", "-c", code], cwd=ROOT, capture_output=True, text=True)
+    assert ran.stdout == "Rendering(open-fog by unshadowed (exact), 8 x 6)\n", ran.stderr
+
+
+@pytest.mark.parametrize("module", ["airlight", "reports.api.images", "reports.api.reference"])
+def test_examples_of_the_docstrings(module, variant):
+    found = doctest.testmod(importlib.import_module(module))
+    assert found.attempted
+    assert not found.failed
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_every_function_has_parameters_raises_and_an_example(name):
+    text = getattr(airlight, name).__doc__
+    for heading in ("Parameters", "Raises", "Examples"):
+        assert f"{heading}\n    {'-' * len(heading)}\n" in text, heading
+
+
+def test_both_sides_raise_one_exception():
+    @one_error
+    def refuses():
+        raise RealtimeInputError("no such thing")
+
+    with pytest.raises(airlight.InputError, match="no such thing"):
+        refuses()
+
+
+# Scenes
+
+
+def test_a_scene_by_name_dictionary_mitsuba_scene_and_again(variant):
+    import mitsuba as mi
+
+    scene = airlight.load_scene("open-fog", "16x12")
+    assert scene.size == TINY
+    assert scene.name == "open-fog"
+    assert airlight.load_scene(scene) is scene
+    assert airlight.load_scene(scene, TINY) is scene
+    named = airlight.load_scene(SCENES["open-fog"].build(), TINY)
+    assert named.size == TINY
+    assert airlight.load_scene(mi.load_dict(SCENES["open-fog"].build())).size == (800, 600)
+    by_name, by_dictionary = (airlight.render(one, "unshadowed") for one in (scene, named))
+    np.testing.assert_array_equal(by_name.airlight, by_dictionary.airlight)
+    assert "1 point" in scene._repr_html_()
+
+
+def test_a_scene_of_another_variant_is_refused(variant):
+    class Scene:
+        pass
+
+    Scene.__module__ = "mitsuba"  # to make a real one another variant would have to be current
+    with pytest.raises(airlight.InputError, match="of another variant than"):
+        airlight.load_scene(Scene())
+
+
+def test_a_scene_that_no_method_can_render_shows_why(variant):
+    dark = {name: value for name, value in SCENES["open-fog"].build().items() if not _is_light(value)}
+    scene = airlight.load_scene(dark, TINY)
+    assert "the scene has no light" in scene._repr_html_()
+    with pytest.raises(airlight.InputError, match="the scene has no light"):
+        scene.plan()
+
+
+def test_progress_can_be_a_bar_a_function_or_nothing():
+    told = []
+    for progress in (True, None, lambda share, what: told.append((share, what))):
+        with telling(progress, "work") as tell:
+            tell(0.5, "half")
+    assert told == [(0.5, "half")]
+
+
+def _is_light(value):
+    return isinstance(value, dict) and value.get("type") in ("point", "spot")
+
+
+@pytest.mark.parametrize(
+    ("scene", "size", "words"),
+    [
+        ("open-fgo", None, "did you mean 'open-fog'"),
+        ("no/such.xml", None, "there is no file"),
+        (3.5, None, "got float, wanted a name"),
+        ({"type": "scene"}, None, "no sensor"),
+        ({"type": "no-such"}, None, "cannot build the dictionary"),
+        ("open-fog", (0, 4), "at least 1x1"),
+        ("open-fog", (8.5, 4), "wanted \\(width, height\\)"),
+        ("open-fog", 8, "wanted \\(width, height\\)"),
+        ("open-fog", "8*4", "wanted WIDTHxHEIGHT"),
+    ],
+)
+def test_what_is_no_scene_is_refused(scene, size, words, variant):
+    with pytest.raises(airlight.InputError, match=words) as raised:
+        airlight.load_scene(scene, size)
+    assert "\n" not in str(raised.value)
+
+
+def test_another_size_of_a_loaded_scene_is_refused_and_the_scene_stays_as_it_is(variant):
+    scene = airlight.load_scene("open-fog", TINY)
+    with pytest.raises(airlight.InputError, match="got 8x6 for a scene that is loaded already, at 16x12"):
+        airlight.render(scene, size=(8, 6))
+    assert scene.size == TINY
+
+
+# Frames
+
+
+def test_a_frame_is_that_of_the_parts_it_is_made_of(variant):
+    from validation.configurations.methods import configuration, prepared
+
+    frame = airlight.render("sphere-spot", "shadow-planes", "quadrature-32", size=TINY, order="paper")
+    scene = airlight.read_scene(airlight.load_scene("sphere-spot", TINY).scene)
+    chosen = configuration("shadow-planes", "quadrature-32", {"order": "paper"})
+    direct = airlight.render_frame(prepared(scene, chosen))
+    np.testing.assert_array_equal(frame.airlight, direct.airlight)
+    np.testing.assert_array_equal(frame.surface, direct.surface)
+    np.testing.assert_array_equal(frame.depth, direct.distance)
+    assert (frame.method, frame.kernel, dict(frame.parameters)) == (
+        "shadow-planes",
+        "quadrature-32",
+        {"order": "paper"},
+    )
+    assert frame.plan["lights"] == "1 spot"
+    assert frame.image.attributes["airlight:order"] == "paper"
+    assert frame.times is None
+
+
+def test_precision_decides_the_type(variant):
+    single, double = (
+        airlight.render("open-fog", "unshadowed", size=TINY, precision=one) for one in ("single", "double")
+    )
+    assert (single.airlight.dtype, double.airlight.dtype) == (np.float32, np.float64)
+    np.testing.assert_allclose(single.airlight, double.airlight, rtol=1e-4)  # float32, beside the light
+    assert np.any(single.airlight != double.airlight)
+
+
+def test_what_a_frame_costs_where_it_is_asked_for(variant):
+    times = airlight.render("open-fog", "unshadowed", "taylor", size=(8, 6), timed=True).times
+    assert 0 < times.frame.low_ms <= times.frame.median_ms <= times.frame.high_ms
+
+
+def test_a_function_of_ones_own_is_a_method(variant):
+    usual = airlight.render("open-fog", "unshadowed", size=TINY)
+    own = airlight.render("open-fog", brighter, size=TINY, times=3.0)
+    np.testing.assert_allclose(own.airlight, 3 * usual.airlight, rtol=1e-6)
+    assert own.label.endswith(":brighter (exact, times=3.0)")
+    assert airlight.render("open-fog", own.method, size=TINY).kernel == "exact"
+    thirds = airlight.render("open-fog", brighter, third, size=TINY)
+    np.testing.assert_allclose(thirds.airlight, 2 / 3 * usual.airlight, rtol=1e-6)
+    with pytest.raises(airlight.InputError, match=r"test_api\.py, line \d+: ZeroDivisionError: nothing there"):
+        airlight.render("open-fog", gone, size=TINY)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"method": "ray-marhc"}, "did you mean 'ray-march'"),
+        ({"method": "unshadowed", "kernel": "exakt"}, "did you mean 'exact'"),
+        ({"method": "ray-march", "kernel": "exact"}, "calls no kernel"),
+        ({"method": "ray-march", "step": 3}, "did you mean 'steps'"),
+        ({"method": "ray-march", "steps": 2.5}, "wanted a whole number"),
+        ({"method": lambda view: 0}, "wanted a name or a function at the top of a module"),
+        ({"method": 7}, "wanted a name or a function at the top of a module"),
+        ({"method": "unshadowed", "kernel": lambda *_: 0}, "wanted a name or a function at the top of a module"),
+        ({"precision": "half"}, "precision"),
+        ({"method": "ray-march", "spacing": "random"}, "spacing"),
+    ],
+)
+def test_what_cannot_be_rendered_is_refused(arguments, words, variant):
+    with pytest.raises(airlight.InputError, match=words) as raised:
+        airlight.render("open-fog", size=(8, 6), **arguments)
+    assert "\n" not in str(raised.value)
+
+
+# The truth
+
+
+def test_the_truth_with_its_bound(variant):
+    told = []
+    scene = airlight.load_scene("sphere-spot", TINY)
+    truth = airlight.reference(scene, progress=lambda share, what: told.append((share, what)))
+    np.testing.assert_array_equal(truth.airlight, airlight.quadrature_reference(scene).layers["airlight"])
+    assert truth.bound.shape == truth.airlight.shape == (12, 16, 3)
+    assert truth.airlight.dtype == np.float64
+    assert truth.standard_error is truth.surface_standard_error is None
+    assert truth.relative_error == pytest.approx(float(truth.bound.mean() / truth.airlight.mean()))
+    assert truth.details["left"] == 0
+    assert told[-1] == (1.0, "quadrature")
+    assert np.isfinite(truth.depth).any()
+
+
+def test_a_truth_by_samples_with_its_standard_error(variant):
+    traced = airlight.reference("open-fog", "single-scatter", size=TINY, samples=64, seed=7)
+    truth = airlight.reference("open-fog", size=TINY)
+    assert traced.bound is None
+    assert traced.details["spp"] == 64
+    assert traced.details["seeds"].startswith("7")
+    assert 0 < traced.relative_error < 0.1
+    compared = airlight.compare(traced, truth, margin=0.1)
+    assert compared.statistics.equivalent
+    assert compared.passed
+    # Student's law for 32 batches: one of 576 values is beyond 8 standard errors with a probability of 3e-6.
+    assert np.max(np.abs(traced.airlight - truth.airlight) / traced.standard_error) < 8
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"estimator": "quadratur"}, "did you mean 'quadrature'"),
+        ({"samples": 64}, "samples: is for 'single-scatter'"),
+        ({"estimator": "volpath", "pixel": "area"}, "traces pixel centres"),
+        ({"estimator": "volpath", "samples": 64, "seconds": 1}, "samples and seconds exclude each other"),
+        ({"estimator": "volpath", "samples": -1}, "samples: got -1"),
+        ({"estimator": "volpath", "samples": 64.5}, "wanted a whole number"),
+        ({"estimator": "volpath", "error": "small"}, "error: got 'small'"),
+        ({"estimator": "volpath", "error": 0.1, "target": "best"}, "'pooled' or 'worst'"),
+        ({"pixel": "corner"}, "'centre' or 'area'"),
+    ],
+)
+def test_what_an_estimator_has_no_use_for_is_refused(arguments, words, variant):
+    with pytest.raises(airlight.InputError, match=words):
+        airlight.reference("open-fog", size=(8, 6), **arguments)
+
+
+# Comparisons
+
+
+def test_images_files_and_arrays_compare_alike(variant, tmp_path):
+    truth = airlight.reference("sphere-spot", size=TINY)
+    frame = airlight.render("sphere-spot", "ray-march", size=TINY, steps=16)
+    one, two = truth.save(tmp_path / "truth.exr"), frame.save(tmp_path / "frame.exr")
+    direct = airlight.compare(truth, frame)
+    assert direct.metrics == airlight.error_metrics(truth.airlight, frame.airlight)
+    assert airlight.compare(truth.airlight, frame.airlight).metrics == direct.metrics
+    assert airlight.compare(truth, airlight.read_exr(two)).metrics == direct.metrics
+    # A file keeps float32.
+    files = airlight.compare(one, two)
+    assert files.metrics.relative_rmse == pytest.approx(direct.metrics.relative_rmse, rel=1e-5)
+    assert files.names == ("truth.exr", "frame.exr")
+    total = airlight.compare(truth, frame, "total")
+    assert total.metrics == airlight.error_metrics(truth.total, frame.total)
+    mask = np.zeros((12, 16), bool)
+    mask[4:8] = True
+    assert airlight.compare(truth, frame, mask=mask).masked == 192 - 64
+    assert airlight.compare(truth, frame, all_metrics=True).colour.ciede2000_mean > 0
+
+
+@pytest.mark.parametrize(
+    ("reference", "test", "options", "words"),
+    [
+        (np.ones((2, 2, 3)), np.ones((2, 3, 3)), {}, "two sizes"),
+        (np.ones((2, 2, 3)), np.ones((2, 2, 3)), {"margin": 0.1}, "a margin wants standard errors"),
+        (np.ones((2, 2, 3)), "no-such.exr", {}, "no-such.exr"),
+        (np.ones((2, 2, 3)), object(), {}, "the test image: got object"),
+        ([["a"]], np.ones((2, 2, 3)), {}, "the reference: got list"),
+        (np.ones((2, 2, 3)), np.ones((2, 2, 3)), {"mask": np.ones((2, 2))}, "wanted truth values"),
+    ],
+)
+def test_what_cannot_be_compared_is_refused(reference, test, options, words):
+    with pytest.raises(airlight.InputError, match=words):
+        airlight.compare(reference, test, **options)

@@ -1,0 +1,239 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Results of the Python API: frozen, arrays for NumPy, HTML and PNG for a notebook; from made-up numbers, no scene."""
+
+import copy
+import dataclasses
+import io
+import pickle
+from html.parser import HTMLParser
+from types import MappingProxyType
+
+import numpy as np
+import pytest
+from PIL import Image as Picture
+
+from analytic.errors import InputError
+from reference.storage.exr import Image, read_exr
+from reports.api.html import bullets, picture, table
+from reports.api.images import compare
+from reports.api.results import Reference, Rendering, sealed
+from reports.api.tables import BenchTable, Report
+from validation.configurations.timing import FrameTimes, Timing
+
+VOID = {"img", "br", "hr"}
+
+
+class Checker(HTMLParser):
+    """Collects tags and text, and fails where tags do not nest."""
+
+    def __init__(self):
+        super().__init__()
+        self.open, self.seen, self.text = [], [], []
+
+    def handle_starttag(self, tag, attrs):
+        self.seen.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.text.append(data)
+
+
+def parsed(html):
+    checker = Checker()
+    checker.feed(html)
+    checker.close()
+    assert checker.open == []
+    return checker
+
+
+def tags(html, name):
+    return [attributes for tag, attributes in parsed(html).seen if tag == name]
+
+
+def layered(scale=1.0, dtype=np.float32, **more):
+    ramp = scale * np.linspace(0.1, 1.0, 4 * 6 * 3, dtype=dtype).reshape(4, 6, 3)
+    layers = {"airlight": ramp, "surface": np.full((4, 6, 3), 0.25, dtype)} | more
+    return Image(layers, np.full((4, 6), 2.0, dtype), {"airlight:scene": "made-up"})
+
+
+def rendering(scale=1.0, dtype=np.float32, **fields):
+    made = {"kernel": None, "parameters": {"steps": 3}, "precision": "single", "plan": {}, "label": "slow (steps=3)"}
+    image = sealed(layered(scale, dtype))
+    return Rendering(scene="<made & up>", image=image, method="slow", **(made | fields))
+
+
+def truth(**more):
+    image = sealed(layered(dtype=np.float64, **more))
+    return Reference(scene="<made & up>", image=image, estimator="quadrature", relative_error=1e-9)
+
+
+RESULTS = {"rendering": rendering, "reference": truth, "comparison": lambda: compare(truth(), rendering(1.01))}
+
+
+@pytest.mark.parametrize("name", RESULTS)
+def test_a_notebook_is_given_valid_html_and_a_png(name):
+    result = RESULTS[name]()
+    html = result._repr_html_()
+    found = parsed(html)
+    assert not [tag for tag, _ in found.seen if tag in ("script", "link", "style", "iframe")]
+    assert all(image["src"].startswith("data:image/png;base64,") and image["alt"] for image in tags(html, "img"))
+    assert tags(html, "img")
+    assert all(header["scope"] in ("row", "col") for header in tags(html, "th"))
+    assert any("<made & up>" in text for text in found.text)  # escaped on the way, so that it is text again
+    png = result._repr_png_()
+    assert png.startswith(b"\x89PNG\r\n\x1a\n")
+    assert Picture.open(io.BytesIO(png)).size == (6, 4)
+    assert len(repr(result)) < 250
+
+
+@pytest.mark.parametrize("name", RESULTS)
+def test_results_are_frozen_and_so_are_their_arrays(name):
+    result = RESULTS[name]()
+    for field in dataclasses.fields(result):
+        with pytest.raises(dataclasses.FrozenInstanceError):
+            setattr(result, field.name, None)
+    with pytest.raises(ValueError, match="read-only"):
+        np.asarray(result)[0] = 0
+    own = result.numpy()
+    own[0] = 0  # one's own
+
+
+@pytest.mark.parametrize("name", RESULTS)
+def test_results_can_be_sent_to_another_process(name):
+    result = RESULTS[name]()
+    again = pickle.loads(pickle.dumps(result))
+    assert repr(again) == repr(result)
+    np.testing.assert_array_equal(np.asarray(again), np.asarray(result))
+    assert copy.deepcopy(result)._repr_html_() == result._repr_html_()
+
+
+def test_layers_are_arrays_of_the_precision_of_what_made_them():
+    frame = rendering()
+    for layer in (frame.airlight, frame.surface, frame.total):
+        assert layer.shape == (4, 6, 3)
+        assert layer.dtype == np.float32
+    assert frame.depth.shape == (4, 6)
+    assert frame.size == (6, 4)
+    assert rendering(dtype=np.float64).total.dtype == truth().total.dtype == np.float64
+    np.testing.assert_array_equal(frame.total, frame.airlight + np.float32(0.25))
+
+
+def test_numpy_takes_a_result_as_its_total():
+    frame = rendering()
+    assert np.asarray(frame) is not None
+    assert np.shares_memory(np.asarray(frame), frame.total)
+    assert not np.shares_memory(np.array(frame), frame.total)
+    assert np.asarray(frame, dtype=np.float64).dtype == np.float64
+    assert float(np.mean(frame)) == pytest.approx(0.55 + 0.25, rel=1e-6)  # the mean of a ramp is its middle
+    with pytest.raises(ValueError, match="copy"):
+        np.array(frame, dtype=np.float64, copy=False)
+
+
+def test_the_picture_of_a_frame_takes_an_exposure_in_stops():
+    frame = rendering()
+    dark, bright = frame.picture(exposure=-4), frame.picture(exposure=0)
+    assert dark.dtype == np.uint8
+    assert dark.shape == (4, 6, 3)
+    assert dark.mean() < bright.mean()
+    # sRGB of 0.25 + 0.1 is 0.6262 (IEC 61966-2-1)
+    assert bright[0, 0, 0] == round(255 * (1.055 * 0.35 ** (1 / 2.4) - 0.055))
+    with pytest.raises(InputError, match="no layer 'fog'"):
+        frame.picture("fog")
+
+
+def test_save_writes_exr_and_png_and_refuses_others(tmp_path):
+    frame = rendering()
+    read = read_exr(frame.save(tmp_path / "frame.exr"))
+    np.testing.assert_array_equal(read.layers["airlight"], frame.airlight)
+    assert any(key.startswith("airlight:version:") for key in read.attributes)
+    with Picture.open(frame.save(tmp_path / "frame.png")) as shown:
+        assert shown.size == (6, 4)
+    with pytest.raises(InputError, match=r"\.exr .* or \.png"):
+        frame.save(tmp_path / "frame.jpg")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["frame.exr", "frame.png"]
+
+
+def test_times_and_oddities_stand_in_the_table():
+    timing = Timing(12.5, 12.0, 13.0, 9)
+    frame = rendering(times=FrameTimes(timing, timing, Timing(7.5, 7, 8, 9), timing, timing, timing, timing))
+    facts = frame.facts()
+    assert "12.5 ms" in facts["a frame"]
+    assert facts["of it airlight"] == "7.5 ms"
+    broken = layered()
+    broken.layers["airlight"][0, 0] = np.nan
+    broken.layers["airlight"][1, 0] = -1
+    odd = dataclasses.replace(frame, image=sealed(broken))
+    assert "1 pixels not finite, 1 pixels negative" in odd.facts()["mean airlight"]
+    parsed(odd._repr_html_())
+    assert odd._repr_png_()
+
+
+def test_the_error_of_a_comparison_by_hand():
+    found = compare(np.full((2, 2, 3), 2.0), np.full((2, 2, 3), 3.0))
+    np.testing.assert_array_equal(found.error, np.full((2, 2, 3), 0.5))
+    np.testing.assert_array_equal(np.asarray(found), found.error)
+    assert found.metrics.relative_rmse == 0.5
+    assert found.passed
+    # The whole map is one red: too bright.
+    red, green, blue = found.picture()[0, 0]
+    assert red > green
+    assert red > blue
+
+
+def test_a_failed_comparison_says_so():
+    found = compare(np.ones((2, 2, 3)), np.full((2, 2, 3), -1.0))
+    assert not found.passed
+    assert "4 pixels of the test image are negative" in repr(found)
+    assert any("negative" in text for text in parsed(found._repr_html_()).text)
+
+
+def test_small_pictures_are_enlarged_in_whole_multiples():
+    (image,) = tags(picture(b"png", 50, alt="a", caption="c"), "img")
+    (figure,) = tags(picture(b"png", 50, alt="a", caption="c"), "figure")
+    assert "pixelated" in image["style"]
+    assert "width:250px" in figure["style"]
+    assert "pixelated" not in picture(b"png", 800, alt="a", caption="c")
+
+
+def test_pieces_of_html_escape_what_they_are_given():
+    html = table([("<b>", "&")], ("a<b", "c")) + bullets(["<script>alert(1)</script>"])
+    assert {tag for tag, _ in parsed(html).seen} == {"table", "thead", "tbody", "tr", "th", "td", "ul", "li"}
+    assert bullets([]) == ""
+
+
+def row(label, frame_ms, error, **more):
+    made = {"scene": "fog", "width": 8, "height": 6, "label": label, "frame_ms": frame_ms, "airlight_ms": 1.0}
+    made |= {"rebuild_ms": 2.0, "relative_rmse": error, "relative_bias": 0.0, "p99": 0.1, "nonfinite": 0}
+    return MappingProxyType(made | {"refused": None, "note": None} | more)
+
+
+def test_the_fastest_row_is_finite_and_within_the_error():
+    refused = row("d", None, None, refused="no <lights>", nonfinite=None)
+    rows = (row("a", 9.0, 1e-4), row("b", 2.0, 1e-4, nonfinite=3), row("c", 1.0, 0.2), refused)
+    found = BenchTable(rows=rows, environment={"processor": "p", "threads": 2, "variant": "v"})
+    assert found.fastest(0.01)["label"] == "a"
+    assert found.fastest(0.5)["label"] == "c"
+    assert found.fastest(1e-6) is None
+    assert found.fastest(0.5, scene="other") is None
+    assert len(found) == 4
+    assert found[1]["label"] == "b"
+    assert found.to_dict()["label"] == ["a", "b", "c", "d"]
+    assert any("no <lights>" in text for text in parsed(found._repr_html_()).text)
+
+
+def test_a_report_shows_its_claims_and_leads_to_the_page(tmp_path, monkeypatch):
+    scenes = [{"name": "fog", "agreement": {"x": {"statistics": {"equivalent": False}}}}]
+    data = {"claims": [{"kind": "truth", "text": "It is <so>.", "good": True}], "scenes": scenes, "created": "today"}
+    found = Report(folder=tmp_path / "out", data=data)
+    assert found.claims == ("It is <so>.",)
+    assert not found.confirmed
+    assert any("It is <so>." in text for text in parsed(found._repr_html_()).text)
+    (link,) = tags(found._repr_html_(), "a")
+    assert link["href"] == (tmp_path / "out" / "report.html").as_uri()
+    monkeypatch.chdir(tmp_path)
+    (link,) = tags(found._repr_html_(), "a")
+    assert link["href"] == "out/report.html"  # a notebook shows no files by an absolute address

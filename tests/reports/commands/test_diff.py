@@ -1,0 +1,331 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import copy
+import json
+
+import pytest
+
+from reports.commands.main import run
+from reports.diff.compare import compare_reports, read_report
+from tests.helpers.reports import agreement, errors, method, report, slow_down
+
+
+def words(difference, verdict="worse"):
+    found = [one for one in difference.findings if one.verdict == verdict]
+    return [" ".join(part for part in (one.scene, one.method, one.what) if part) for one in found]
+
+
+@pytest.fixture
+def files(tmp_path):
+    """Return a function that writes two reports and returns their paths as words."""
+
+    def write(old, new):
+        for name, data in (("old", old), ("new", new)):
+            (tmp_path / name).mkdir(exist_ok=True)
+            (tmp_path / name / "report.json").write_text(json.dumps(data), encoding="utf-8")
+        return [str(tmp_path / "old"), str(tmp_path / "new" / "report.json")]
+
+    return write
+
+
+def test_the_same_report_has_no_differences(files, capsys):
+    assert run(["diff", *files(report(1), report(1))]) == 0
+    out = capsys.readouterr().out
+    assert "0 worse, 0 better" in out
+    assert "12 configurations, one machine" in out
+
+
+@pytest.mark.parametrize(("busy", "alarms"), [(0.0, 0), (0.05, 1), (0.2, 1)])
+def test_the_same_code_on_the_same_machine_does_not_fail(busy, alarms):
+    """Pairs with other noise: none fails on a quiet machine, hardly any where 5 or 20 % of the timings were hit."""
+    pairs = [(report(seed, busy=busy), report(seed + 1, busy=busy)) for seed in range(0, 80, 2)]
+    assert sum(bool(compare_reports(*pair).worse) for pair in pairs) <= alarms
+
+
+def test_twice_the_time_is_found_on_a_quiet_machine():
+    for seed in range(0, 40, 2):
+        new = report(seed + 1)
+        slow_down(method(new), 2.0)
+        found = compare_reports(report(seed), new)
+        assert {one.method for one in found.worse} == {"shadow-planes (exact)"}
+        assert {one.what for one in found.worse} >= {"frame [ms]", "airlight [ms]"}
+
+
+def test_what_cannot_be_seen_on_a_busy_machine_is_said(files, capsys):
+    old, new = report(1, busy=0.5), report(2, busy=0.5)
+    slow_down(method(new), 1.3)
+    assert run(["diff", *files(old, new)]) == 0
+    assert "the machine was busy" in capsys.readouterr().out
+
+
+def test_brackets_are_printed(files, capsys):
+    new = report()
+    slow_down(method(new), 2.0)
+    method(new, "fog").update(refused="wanted a mesh [obj] in [0, 1]", times=None, error=None)
+    assert run(["diff", *files(report(), new)]) == 1
+    out = capsys.readouterr().out
+    assert "frame [ms]" in out
+    assert "wanted a mesh [obj] in [0, 1]" in out
+
+
+def test_everything_slower_is_one_finding():
+    new = report(machine=2.0)
+    found = compare_reports(report(), new)
+    (one,) = found.worse
+    assert "every frame" in one.what
+    assert one.new == pytest.approx(2.0)
+    assert words(compare_reports(new, report()), "better") == [one.what]
+
+
+def test_two_machines_are_compared_beside_the_median_of_all():
+    new = report(machine=3.0)
+    new["environment"]["threads"] = 16
+    found = compare_reports(report(), new)
+    assert words(found) == []
+    assert not found.times.same_machine
+    assert "threads: 2 -> 16" in words(found, "note")
+    slow_down(method(new), 2.5)  # more than 1 + 4 times the tolerance
+    assert words(compare_reports(report(), new))[0].startswith("hall shadow-planes (exact)")
+
+
+def test_another_version_is_said_and_compared():
+    new = report()
+    new["environment"]["versions"]["drjit"] = "1.6.0"
+    slow_down(method(new), 2.0)
+    found = compare_reports(report(), new)
+    assert "drjit: 1.5.0 -> 1.6.0" in words(found, "note")
+    assert found.worse
+
+
+def test_three_times_the_error_is_found_and_named(files, capsys):
+    new = report()
+    method(new)["error"] = errors(3e-3)
+    paths = files(report(), new)
+    assert run(["diff", *paths, "--json"]) == 1
+    data = json.loads(capsys.readouterr().out)
+    assert {one["what"] for one in data["findings"]} >= {"relative_rmse", "relative_bias", "p50", "p99", "max"}
+    assert data["worse"] == 5
+    assert run(["diff", paths[1], paths[0]]) == 0
+    assert "5 better" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("factor", "tolerance", "status"), [(1.01, "0.02", 0), (1.05, "0.02", 1), (1.05, "0.1", 0)])
+def test_the_error_tolerance_decides(files, factor, tolerance, status):
+    new = report()
+    method(new)["error"] = errors(factor * 1e-3)
+    assert run(["diff", *files(report(), new), "--error-tolerance", tolerance]) == status
+
+
+def test_rounding_is_no_error():
+    old, new = report(), report()
+    # The 99 % quantile, three times as large, grows by 1.2e-6, which rounding was seen to do.
+    method(old)["error"], method(new)["error"] = errors(4e-7), errors(8e-7)
+    assert words(compare_reports(old, new)) == []
+
+
+def test_errors_of_the_surface_and_flip_count():
+    new = report()
+    method(new)["surface_error"] = errors(1e-3)
+    method(new)["flip"]["value"] = 0.06
+    found = words(compare_reports(report(), new))
+    assert "hall shadow-planes (exact) surface relative_rmse" in found
+    assert "hall shadow-planes (exact) HDR-FLIP" in found
+
+
+def test_a_bias_of_the_other_sign_is_not_worse():
+    new = report()
+    method(new)["error"]["relative_bias"] *= -1
+    assert words(compare_reports(report(), new)) == []
+
+
+def test_pixels_that_are_not_finite_or_negative():
+    new = report()
+    method(new)["error"]["nonfinite"] = 1
+    method(new, "pens")["error"]["negative"] = 60  # of 76800: less than a thousandth
+    assert words(compare_reports(report(), new)) == ["hall shadow-planes (exact) nonfinite"]
+    method(new, "pens")["error"]["negative"] = 90
+    assert len(compare_reports(report(), new).worse) == 2
+
+
+def test_an_error_that_is_no_number_any_more():
+    new = report()
+    method(new)["error"]["max"] = None
+    assert words(compare_reports(report(), new)) == ["hall shadow-planes (exact) max"]
+    assert words(compare_reports(new, report()), "better") == ["hall shadow-planes (exact) max"]
+    assert words(compare_reports(new, new)) == []
+
+
+def test_what_is_gone_fails_unless_only_the_common_is_compared(files):
+    new = report()
+    new["scenes"] = new["scenes"][:2]
+    del new["scenes"][0]["methods"][1]
+    found = compare_reports(report(), new)
+    assert words(found) == ["fog ray-march (steps=100) gone", "pens the scene is gone"]
+    assert run(["diff", *files(report(), new), "--common"]) == 0
+    assert {"fog ray-march (steps=100) new", "pens the scene is new"} <= set(
+        words(compare_reports(new, report()), "note")
+    )
+
+
+def test_newly_refused():
+    new = report()
+    method(new).update(refused="too many planes", times=None, error=None, surface_error=None, flip=None)
+    assert words(compare_reports(report(), new)) == ["hall shadow-planes (exact) refused: too many planes"]
+    assert words(compare_reports(new, report()), "better") == ["hall shadow-planes (exact) no longer refused"]
+    method(new)["left_out"] = True  # a decision of who measured
+    assert words(compare_reports(report(), new)) == []
+
+
+def test_a_truth_that_is_no_longer_confirmed(files, capsys):
+    new = report()
+    new["scenes"][0]["agreement"]["volpath airlight"] = agreement(False)
+    assert run(["diff", *files(report(), new)]) == 1
+    assert "fog: the truth is no longer confirmed" in capsys.readouterr().out
+    assert "fog the truth is confirmed now" in words(compare_reports(new, report()), "better")
+
+
+def test_a_comparison_of_the_truth_that_is_gone():
+    new = report()
+    new["scenes"][0]["agreement"] = {}
+    assert words(compare_reports(report(), new)) == ["fog the comparison with volpath airlight is gone"]
+
+
+def test_another_scene_by_the_same_name_is_not_compared():
+    new = report()
+    new["scenes"][0]["truth"]["mean"] *= 1.001
+    method(new, "fog")["error"] = errors(0.9)
+    (one,) = compare_reports(report(), new).worse
+    assert "the truth moved" in one.what
+
+
+def test_lit_intervals_on_which_shadow_rays_disagree():
+    new = report()
+    new["scenes"][1]["truth"]["disagreements"] = 2
+    assert words(compare_reports(report(), new)) == ["hall lit intervals of the truth: disagreements"]
+
+
+def test_claims_that_flipped():
+    new = report()
+    new["claims"] = [{"kind": "truth", "text": "The truth is NOT confirmed.", "good": False}]
+    assert words(compare_reports(report(), new)) == ["claim: The truth is NOT confirmed."]
+    assert "no longer: The truth is NOT confirmed." in words(compare_reports(new, report()), "better")
+
+
+def test_kernels_and_mutations():
+    new = report()
+    new["stability"][0]["broken"] = ["float32 maximum 0.1 > 0.01"]
+    new["mutations"]["caught"] = 19
+    found = words(compare_reports(report(), new))
+    assert found == ["exact breaks its bar: float32 maximum 0.1 > 0.01", "faults that nothing catches"]
+
+
+def test_another_method_is_the_fastest_is_a_note():
+    new = report()
+    method(new, "fog", "ray-march (steps=100)")["error"] = errors(1e-4)
+    found = words(compare_reports(report(), new), "note")
+    assert found == ["fog fastest within 0.1 %: shadow-planes (exact) before, ray-march (steps=100) now"]
+
+
+def test_images_of_an_engine_have_no_times():
+    old = report()
+    method(old).update(kind="image", layer="total", times=None, surface_error=None)
+    new = copy.deepcopy(old)
+    assert words(compare_reports(old, new)) == []
+    method(new)["error"] = errors(0.5)
+    assert len(compare_reports(old, new).worse) == 5
+    method(new)["layer"] = "airlight"
+    assert words(compare_reports(old, new)) == []
+    assert any("different layers" in one for one in words(compare_reports(old, new), "note"))
+
+
+def test_other_sizes_are_not_compared_and_said():
+    new = report()
+    new["scenes"][0]["size"] = [640, 480]
+    method(new, "fog")["error"] = errors(0.9)
+    new["settings"]["timed"] = [640, 480]
+    slow_down(method(new), 9.0)
+    found = compare_reports(report(), new)
+    assert words(found) == []
+    notes = " ".join(words(found, "note"))
+    assert "errors not compared: the images are 320x240 and 640x480 pixels" in notes
+    assert "times not compared: the frames timed are 320x240 and 640x480 pixels" in notes
+    for scene in new["scenes"]:
+        scene["size"] = [640, 480]
+    with pytest.raises(ValueError, match="no number can be compared"):
+        compare_reports(report(), new)
+
+
+def test_a_method_timed_at_another_size_is_not_compared():
+    new = report()
+    slow_down(method(new), 9.0)
+    method(new)["note"] = "timed at 320 x 240: larger frames take minutes"
+    found = compare_reports(report(), new)
+    assert words(found) == []
+    assert found.times.compared == 11
+    assert any("times not compared: as usual before, timed at 320 x 240" in one for one in words(found, "note"))
+
+
+def test_each_scene_may_have_a_size_of_its_own():
+    old, new = report(), report()
+    old["scenes"][1]["timed"], new["scenes"][1]["timed"] = [320, 240], [640, 480]
+    slow_down(method(new), 9.0)
+    found = compare_reports(old, new)
+    assert words(found) == []
+    assert found.times.compared == 8
+    assert "hall times not compared: the frames timed are 320x240 and 640x480 pixels" in words(found, "note")
+
+
+def test_times_can_be_left_out(files, capsys):
+    paths = files(report(), report(machine=5.0))
+    assert run(["diff", *paths]) == 1
+    assert run(["diff", *paths, "--no-times"]) == 0
+    assert run(["diff", *paths, "--time-tolerance", "6"]) == 0
+    assert "times: none compared" in capsys.readouterr().out
+
+
+def test_results_that_were_kept_are_named():
+    assert any("3 results" in one for one in words(compare_reports(report(), report() | {"kept": 3}), "note"))
+
+
+def test_the_first_schema_is_read(files, capsys):
+    old = report()
+    old |= {"schema": "airlight-report/1", "claims": ["The truth is confirmed."], "kernels": old.pop("stability")}
+    for scene in old["scenes"]:
+        for one in scene["methods"]:
+            del one["kind"], one["layer"]
+    new = report()
+    method(new)["error"] = errors(3e-3)
+    assert run(["diff", *files(old, new)]) == 1
+    out = capsys.readouterr().out
+    assert "claims not compared" in out
+    assert "relative_rmse" in out
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (None, "there is no file"),
+        ("{", "no JSON"),
+        ("[]", "the schema is None"),
+        ('{"schema": "airlight-report/9"}', "the schema is 'airlight-report/9'"),
+        ('{"schema": "airlight-report/2", "scenes": []}', "'environment' is missing"),
+    ],
+)
+def test_what_is_no_report_is_refused(tmp_path, capsys, text, message):
+    good, bad = tmp_path / "good.json", tmp_path / "bad.json"
+    good.write_text(json.dumps(report()), encoding="utf-8")
+    if text is not None:
+        bad.write_text(text, encoding="utf-8")
+    assert run(["diff", str(good), str(bad)]) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert "bad.json" in error
+
+
+def test_tolerances_that_are_none_are_refused(files, capsys):
+    assert run(["diff", *files(report(), report()), "--time-tolerance", "-1"]) == 2
+    assert "--time-tolerance: got -1" in capsys.readouterr().err
+
+
+def test_reports_are_read_by_their_folder(files):
+    folder, file = files(report(), report())
+    assert read_report(folder) == read_report(file)

@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The command `airlight report`: what it refuses, and what it hands on; nothing is measured here but tiny frames."""
+
+import numpy as np
+import pytest
+
+from reference.storage.exr import Image, write_exr
+from reports.commands.main import run
+
+METHOD = """
+def half(view, *, kernel=None):
+    from realtime.methods.unshadowed import unshadowed
+    return 0.5 * unshadowed(view, kernel=kernel)
+
+
+def broken(view):
+    return {}["nothing"]
+
+
+def flat(view):
+    import numpy as np
+    return np.zeros((3, 7))
+"""
+
+
+@pytest.fixture
+def mine(tmp_path, monkeypatch):
+    """A folder with a user's module, made current."""
+    (tmp_path / "fog_of_mine.py").write_text(METHOD)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def handed_on(monkeypatch):
+    """What the command hands to `write_report`."""
+    given = {}
+
+    def write(folder, **options):
+        given.update(options, folder=folder)
+        return {"claims": [], "scenes": [], "seconds": 1.2, "kept": 0, "computed": 3, "measured": None}
+
+    monkeypatch.setattr("reports.report.measure.write_report", write)
+    return given
+
+
+def refused(capsys, *arguments):
+    assert run(["report", *arguments]) == 2
+    printed = capsys.readouterr().err
+    assert printed.count("\n") == 1
+    assert printed.startswith("airlight: error: ")
+    return printed
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("fog_of_mine:broken", "fog_of_mine.py, line 8: KeyError: 'nothing'"),
+        ("fog_of_mine:flat", "returned an array of shape (3, 7) for"),
+        ("fog_of_mine:missing", "has no 'missing'; it has half, broken, flat"),
+        ("nowhere:half", "there is no module 'nowhere'"),
+    ],
+)
+def test_faults_of_ones_own_method_are_one_line_before_any_work(variant, mine, capsys, own_cache, name, words):
+    printed = refused(capsys, "--quick", "--scenes", "open-fog", "--methods", "unshadowed", "--method", name)
+    assert f"method {name}" in printed
+    assert words in printed
+    assert not any(mine.rglob("report.*"))
+    assert not any(own_cache.rglob("*.npz"))  # not even the truth
+
+
+def test_ones_own_methods_come_after_the_others(variant, mine, handed_on, capsys):
+    own = ["--method", "fog_of_mine:half", "--method", "fog_of_mine.py:half"]
+    assert run(["report", "--quick", "--scenes", "open-fog", "--methods", "min-max", *own]) == 0
+    names = [one.method for one in handed_on["configurations"]]
+    assert names == ["min-max", "fog_of_mine:half", "fog_of_mine.py:half"]
+    assert handed_on["configurations"][1].kernel == "exact"
+    assert "3 results in 1 s" in capsys.readouterr().out
+
+
+def test_without_scenes_those_of_the_effort_are_studied(variant, mine, handed_on):
+    assert run(["report", "--quick"]) == 0
+    assert tuple(handed_on["scenes"]) == handed_on["effort"].scenes == ("open-fog", "sphere-spot", "two-pens")
+    assert handed_on["fresh"] is False
+    assert run(["report", "--quick", "--fresh", "-o", "elsewhere"]) == 0
+    assert handed_on["fresh"] is True
+    assert str(handed_on["folder"]) == "elsewhere"
+
+
+@pytest.fixture
+def images(tmp_path):
+    folder = tmp_path / "engine"
+    folder.mkdir()
+    for name in ("open-fog.a.exr", "open-fog.b.exr", "omni-box.exr"):
+        write_exr(folder / name, Image({"total": np.ones((6, 8, 3))}))
+    return folder
+
+
+def test_with_images_alone_their_scenes_are_studied(variant, images, handed_on):
+    assert run(["report", "--quick", "--images", str(images)]) == 0
+    assert sorted(handed_on["scenes"]) == ["omni-box", "open-fog"]
+    labels = {name: [one.label for one in several] for name, several in handed_on["images"].items()}
+    assert labels == {"omni-box": ["engine"], "open-fog": ["a", "b"]}
+
+
+def test_scenes_pick_among_the_images(variant, images, handed_on):
+    assert run(["report", "--quick", "--images", str(images), "--scenes", "omni-box,sphere-spot"]) == 0
+    assert handed_on["scenes"] == ["omni-box", "sphere-spot"]
+    assert list(handed_on["images"]) == ["omni-box"]
+
+
+def test_images_that_cannot_be_used_are_refused(images, capsys):
+    write_exr(images / "opn-fog.exr", Image({"total": np.ones((6, 8, 3))}))
+    assert "names no scene" in refused(capsys, "--images", str(images))
+    (images / "opn-fog.exr").unlink()
+    assert "has no image of hall, only of" in refused(capsys, "--images", str(images), "--scenes", "hall")
+    assert "wanted a folder with EXR files" in refused(capsys, "--images", str(images / "none"))
+
+
+def test_two_sizes_of_one_scene_are_refused_before_any_work(variant, images, capsys, tmp_path):
+    write_exr(images / "open-fog.b.exr", Image({"total": np.ones((6, 9, 3))}))
+    printed = refused(capsys, "--images", str(images), "--scenes", "open-fog", "-o", str(tmp_path / "out"))
+    assert "render all images of a scene at one size" in printed
+
+
+def test_two_efforts_at_once_are_refused(capsys):
+    assert "both --quick and --full" in refused(capsys, "--quick", "--full")
+
+
+@pytest.mark.slow
+def test_images_and_ones_own_method_in_one_report(variant, mine, images, capsys):
+    import json
+
+    from validation.estimates.quadrature import truth_image
+    from validation.scenes.loading import load_scene
+
+    truth = truth_image(load_scene("open-fog", (32, 24)).scene)
+    for name, factor in (("a", 1.0), ("b", 0.9)):
+        write_exr(images / f"open-fog.{name}.exr", Image({"airlight": factor * truth.airlight}))
+    options = ["--scenes", "open-fog", "--methods", "unshadowed", "--method", "fog_of_mine:half", "-o", "out"]
+    assert run(["report", "--quick", "--images", str(images), *options]) == 0
+    (scene,) = json.loads((mine / "out" / "report.json").read_text())["scenes"]
+    assert scene["size"] == scene["timed"] == [32, 24]
+    found = {one["label"]: one for one in scene["methods"]}
+    assert found["fog_of_mine:half (exact)"]["kind"] == "function"
+    assert found["fog_of_mine:half (exact)"]["error"]["relative_bias"] == pytest.approx(-0.5, abs=1e-5)
+    assert found["a"]["kind"] == found["b"]["kind"] == "image"
+    assert found["a"]["times"] is None
+    # float32 in the file
+    assert found["a"]["error"]["relative_rmse"] == pytest.approx(0, abs=1e-7)
+    assert found["b"]["error"]["relative_bias"] == pytest.approx(-0.1, abs=1e-6)
+    assert "The image b of open-fog, judged by its airlight" in capsys.readouterr().out

@@ -1,0 +1,254 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import copy
+
+from reports.data.claims import claims, confirmed, unstudied, verdict
+
+
+def timing(median):
+    return {"median_ms": median, "low_ms": 0.9 * median, "high_ms": 1.2 * median, "repetitions": 7}
+
+
+def method(label, rmse, median, *, refused=None):
+    """What a report says of a configuration, by hand."""
+    if refused:
+        return {"label": label, "refused": refused, "error": None, "times": None}
+    times = {name: timing(median) for name in ("frame", "surface", "airlight", "rebuild")}
+    return {"label": label, "refused": None, "error": {"relative_rmse": rmse}, "times": times}
+
+
+def agreed(equivalent, detectable, *, layer="airlight", margin=0.005, estimator="volpath"):
+    return {
+        "estimator": estimator,
+        "layer": layer,
+        "statistics": {"equivalent": equivalent, "detectable_bias": detectable, "margin": margin},
+    }
+
+
+def texts(scenes):
+    return [one["text"] for one in claims(scenes)]
+
+
+def fastest_of(scene, target):
+    (found,) = [t for t in texts([{"agreement": {}, "multiple": MULTIPLE} | scene]) if f" {100 * target:g} %" in t]
+    return found
+
+
+MULTIPLE = {"medium": {"value": 0.123, "interval": [0.12, 0.126]}, "everything": {"value": 0.2, "interval": [0.1, 0.3]}}
+
+SCENES = [
+    {
+        "name": "fog",
+        "agreement": {"airlight": agreed(True, 0.0031)},
+        "multiple": MULTIPLE,
+        "methods": [method("fast", 0.02, 1.0), method("good", 0.004, 2.0), method("slow", 0.0001, 8.0)],
+    },
+    {
+        "name": "hall",
+        "agreement": {"airlight": agreed(True, 0.0042), "surface": agreed(True, 0.0007, layer="surface")},
+        "multiple": MULTIPLE,
+        "methods": [method("fast", 0.2, 1.0), method("good", 0.005, 40.0), method("slow", 0.004, 80.0)],
+    },
+]
+
+
+def scenes():
+    return copy.deepcopy(SCENES)
+
+
+def test_claims_on_a_truth_that_is_confirmed():
+    trust, *fastest, left_out = texts(scenes())
+    assert [one["good"] for one in claims(scenes())] == [True, True, True, None, None]
+    assert [one["kind"] for one in claims(scenes())] == ["truth", *["fastest"] * 3, "left-out"]
+    assert "confirmed by Mitsuba's volpath in 3 of 3 comparisons" in trust
+    assert "±0.5 %" in trust
+    assert "at worst 0.42 %" in trust
+    assert "NOT" not in trust
+    assert fastest == [
+        "In all 2 scenes the fastest method within 1 % relative RMSE is good: fog 2 ms, hall 40 ms.",
+        "fog: the fastest method within 0.1 % relative RMSE is slow: 8 ms a frame (125 frames/s).",
+        "hall: no method reaches a relative RMSE of 0.1 %.",
+    ]
+    assert left_out.endswith("The share of the airlight that this leaves out: fog 12 %; hall 12 %.")
+
+
+def test_each_estimator_that_checked_the_truth_has_a_sentence():
+    data = scenes()
+    data[0]["agreement"]["single-scatter airlight"] = agreed(False, 1e-4, margin=5e-4, estimator="single-scatter")
+    volpath, single, *_ = claims(data)
+    assert "confirmed by Mitsuba's volpath in 3 of 3 comparisons" in volpath["text"]
+    assert "NOT confirmed within 0.05 % by our own Mitsuba integrator in fog (airlight)" in single["text"]
+    assert (volpath["good"], single["good"]) == (True, False)
+    assert not confirmed(data)
+
+
+def test_claims_on_a_truth_that_is_not_confirmed():
+    data = scenes()
+    data[1]["agreement"]["surface"]["statistics"]["equivalent"] = False
+    trust = texts(data)[0]
+    assert "NOT confirmed within 0.5 % by Mitsuba's volpath in hall (surface)" in trust
+    assert "fog" not in trust
+
+
+def test_claims_when_equivalence_could_not_be_decided():
+    """None (a black layer, no variance) is not a yes."""
+    data = scenes()
+    data[0]["agreement"]["airlight"]["statistics"] = {"equivalent": None, "detectable_bias": None, "margin": 0.005}
+    assert "NOT confirmed" in texts(data)[0]
+    assert "fog (airlight)" in texts(data)[0]
+
+
+def test_claims_without_any_comparison_confirm_nothing():
+    """A scene that is black has no layer to compare."""
+    data = scenes()
+    for scene in data:
+        scene["agreement"] = {}
+    trust = texts(data)[0]
+    assert trust.startswith("There is no light to compare with Mitsuba's volpath")
+
+
+def test_refused_methods_are_named_and_do_not_win():
+    data = scenes()
+    data[0]["methods"].insert(0, method("taylor", None, 0.0, refused="no series"))
+    sentences = texts(data)
+    assert sentences[-1] == "Refused, with the reason in the tables: taylor in fog."
+    assert not any("method within" in one and "taylor" in one for one in sentences)
+
+
+def test_claims_on_nothing():
+    assert claims([]) == []
+
+
+def test_fastest_passes_over_methods_without_an_error():
+    """A black truth has no relative error; nor has what was refused."""
+    scene = {
+        "name": "x",
+        "methods": [method("none", None, 0.1), method("no", 0, 0, refused="x"), method("best", 0.009, 3.0)],
+    }
+    assert fastest_of(scene, 0.01).startswith("x: the fastest method within 1 % relative RMSE is best: 3 ms")
+    scene["methods"].pop()
+    assert fastest_of(scene, 0.01) == "x: no method reaches a relative RMSE of 1 %."
+    assert fastest_of({"name": "x", "methods": []}, 0.01) == "x: no method reaches a relative RMSE of 1 %."
+
+
+def test_error_of_just_the_target_counts():
+    scene = {"name": "x", "methods": [method("edge", 0.01, 3.0)]}
+    assert "is edge" in fastest_of(scene, 0.01)
+
+
+def test_claims_never_name_a_method_with_nonfinite_pixels():
+    """Its RMSE leaves out the very pixels that are wrong."""
+    data = scenes()[:1]
+    for one in data[0]["methods"]:
+        one["error"]["nonfinite"] = 0
+    data[0]["methods"][1]["error"]["nonfinite"] = 3
+    assert "is slow" in fastest_of(data[0], 0.01)
+
+
+def test_one_scene_or_different_winners_have_a_sentence_each():
+    assert "fog: the fastest method within 1 % relative RMSE is good: 2 ms a frame (500 frames/s)." in texts(
+        scenes()[:1]
+    )
+    data = scenes()
+    data[1]["methods"][0]["error"]["relative_rmse"] = 0.003
+    found = texts(data)
+    assert found[1].startswith("fog: the fastest method within 1 % relative RMSE is good")
+    assert found[2].startswith("hall: the fastest method within 1 % relative RMSE is fast")
+
+
+def test_a_target_that_nothing_reaches_anywhere_is_said_once():
+    data = scenes()
+    data[0]["methods"].pop()
+    assert "In none of the 2 scenes a method reaches a relative RMSE of 0.1 %." in texts(data)
+
+
+def out_of_time(interval):
+    found = agreed(False, 0.02, margin=0.005)
+    found["statistics"]["relative_bias_ci"] = interval
+    return found | {"finished": False}
+
+
+def test_out_of_time_is_neither_confirmed_nor_against_the_truth():
+    data = scenes()
+    data[1]["agreement"]["airlight"] = out_of_time([-0.01, 0.004])
+    first = claims(data)[0]
+    assert first["good"] is None
+    assert "confirmed by Mitsuba's volpath in 2 of 3 comparisons" in first["text"]
+    assert "not decided within the time in hall (airlight)" in first["text"]
+    assert "at worst 0.31 %" in first["text"]  # of those that were decided
+    # No other estimator says anything about the airlight of the hall.
+    assert not confirmed(data)
+    data[1]["agreement"]["single-scatter airlight"] = agreed(True, 1e-5, estimator="single-scatter")
+    assert confirmed(data)
+
+
+def test_out_of_time_can_still_speak_against_the_truth():
+    data = scenes()
+    data[1]["agreement"]["airlight"] = out_of_time([0.006, 0.03])
+    assert verdict(data[1]["agreement"]["airlight"]) is False
+    assert "NOT confirmed within 0.5 %" in claims(data)[0]["text"]
+    data[1]["agreement"]["single-scatter airlight"] = agreed(True, 1e-5, estimator="single-scatter")
+    assert not confirmed(data)
+
+
+def test_a_finished_comparison_without_equivalence_is_against_the_truth():
+    one = agreed(False, 0.01)
+    one["statistics"]["relative_bias_ci"] = [-0.02, 0.004]
+    assert verdict(one) is False
+    assert verdict(agreed(True, 0.01)) is True
+
+
+def test_what_failed_is_named_with_its_pixels():
+    data = scenes()
+    data[0]["methods"][0]["error"] |= {"nonfinite": 3, "negative": 2}
+    data[1]["truth"] = {"left": 7}
+    failed = [one for one in claims(data) if one["kind"] == "failed"]
+    assert [one["good"] for one in failed] == [False] * 3
+    assert failed[0]["text"] == "Images with values that are not finite: fast in fog (3 pixels)."
+    assert failed[1]["text"] == "Images with negative values: fast in fog (2 pixels)."
+    assert "hall (7)" in failed[2]["text"]
+
+
+def test_images_of_an_engine_are_judged_and_never_the_fastest():
+    data = scenes()[:1]
+    image = method("engine", 0.001, 0.1) | {"kind": "image", "layer": "total", "times": None}
+    image["error"]["relative_bias"] = -0.02
+    data[0]["methods"].append(image)
+    found = claims(data)
+    (judged,) = [one["text"] for one in found if one["kind"] == "image"]
+    assert judged == (
+        "The image engine of fog, judged by its total of airlight and surface: relative RMSE 0.1 %, relative bias -2 %."
+    )
+    assert not any("engine" in one["text"] for one in found if one["kind"] == "fastest")
+
+
+def test_missing_flip_is_said_once_for_each_reason():
+    data = scenes()
+    for one in data[0]["methods"]:
+        one["flip"] = {"value": None, "note": "flip-evaluator is not installed"}
+    (found,) = [one["text"] for one in claims(data) if one["kind"] == "not-measured"]
+    assert found == ("No HDR-FLIP (flip-evaluator is not installed): fast in fog; good in fog; slow in fog.")
+
+
+def test_missing_flip_of_different_counts_is_one_reason():
+    data = scenes()
+    for count, one in zip((3, 185), data[0]["methods"]):
+        one["flip"] = {"value": None, "note": f"{count} pixels of the test image are negative: FLIP is not defined"}
+    (found,) = [one["text"] for one in claims(data) if one["kind"] == "not-measured"]
+    assert found == (
+        "No HDR-FLIP (pixels of the test image are negative: FLIP is not defined): fast in fog; good in fog."
+    )
+
+
+def test_what_takes_too_long_is_not_among_the_refused():
+    data = scenes()
+    data[0]["methods"].append(method("slow", None, 0, refused="a frame would take 8 min") | {"left_out": True})
+    kinds = {one["kind"]: one["text"] for one in claims(data)}
+    assert "refused" not in kinds
+    assert kinds["not-measured"].endswith("in the tables: slow in fog.")
+
+
+def test_scenes_that_the_effort_leaves_out_are_named():
+    assert unstudied(["fog", "hall"], ["fog", "hall"]) == []
+    (found,) = unstudied(["fog"], ["fog", "hall", "tangle"])
+    assert (found["kind"], found["good"]) == ("not-measured", None)
+    assert found["text"].startswith("Scenes not studied, for the time that they take: hall, tangle.")

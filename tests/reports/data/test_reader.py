@@ -1,0 +1,242 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analytic.errors import InputError
+from reference.storage.exr import Image, write_exr
+from reports.data.reader import load_report, redraw_report
+from reports.plotting.pictures import write_png
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+def timing(median):
+    return {"median_ms": median, "low_ms": 0.9 * median, "high_ms": 1.1 * median, "repetitions": 5}
+
+
+def error(rmse):
+    numbers = {name: rmse for name in ("bias", "relative_bias", "rmse", "relative_rmse", "p50", "p99", "max")}
+    return {"pixels": 12, **numbers, "nonfinite": 0, "negative": 0}
+
+
+def small_report():
+    """The content of a report of one scene and one method, by hand."""
+    share = {"value": 0.1, "interval": [0.05, 0.15]}
+    method = {
+        "label": "unshadowed (exact)",
+        "kind": "built-in",
+        "layer": "airlight",
+        "method": "unshadowed",
+        "kernel": "exact",
+        "parameters": {},
+        "knows_shadows": False,
+        "refused": None,
+        "left_out": False,
+        "note": None,
+        "times": {name: timing(2.0) for name in ("frame", "surface", "airlight", "rebuild", "moved")},
+        "error": error(0.002),
+        "surface_error": None,
+        "flip": None,
+        "files": {"exr": "fog/unshadowed-exact.exr"},
+        "measured": "2026-11-21 12:00:00 +0000",
+        "seconds": 1.5,
+        "kept": False,
+    }
+    scene = {
+        "name": "fog",
+        "purpose": "A test.",
+        "published": "",
+        "path": None,
+        "size": [4, 3],
+        "timed": [4, 3],
+        "plan": {"shadows": "none"},
+        "notes": [],
+        "truth": {
+            "mean": 1.0,
+            "relative_bound": 1e-9,
+            "transitions": 0,
+            "missed": 0.0,
+            "checked": 0,
+            "disagreements": 0,
+            "refined": 0,
+            "left": 0,
+        },
+        "exposure": 1.0,
+        "agreement": {},
+        "multiple": {"medium": share, "everything": share, "max_depth": 64, "batches": 4, "samples": 1},
+        "files": {
+            "exr": "fog/reference.exr",
+            "picture": "fog/reference.png",
+            "airlight": "fog/reference-airlight.png",
+        },
+        "methods": [method],
+        "seconds": {"truth": 0.5},
+    }
+    settings = {
+        "name": "tiny",
+        "scenes": [],
+        "image": [4, 3],
+        "timed": [4, 3],
+        "checked": [4, 3],
+        "margins": {"volpath": 0.01},
+        "seconds": 0.1,
+        "samples": 4,
+        "batches": 8,
+        "multiple": [4, 1],
+        "patience": 1.0,
+        "slow": 1.0,
+        "limit": 1.0,
+        "flip": "none",
+        "mutations": False,
+        "rays": 0,
+        "papers": [],
+        "paper_kernels": ["exact"],
+    }
+    return {
+        "schema": "airlight-report/2",
+        "created": "2026-11-21 12:00:01 +0000",
+        "command": "airlight report",
+        "seconds": 2.0,
+        "parts": {"scenes": 2.0},
+        "kept": 0,
+        "computed": 4,
+        "measured": {"first": "2026-11-21 12:00:00 +0000", "last": "2026-11-21 12:00:00 +0000"},
+        "settings": settings,
+        "environment": {
+            "versions": {"airlight": "0", "mitsuba": "0", "drjit": "0"},
+            "platform": "none",
+            "processor": "abacus",
+            "threads": 1,
+            "variant": "none",
+        },
+        "claims": [{"kind": "truth", "text": "It is so.", "good": True}],
+        "scenes": [scene],
+        "stability": [],
+        "mutations": None,
+        "published": None,
+    }
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A whole small report but for its page."""
+    data = small_report()
+    (tmp_path / "old" / "fog").mkdir(parents=True)
+    light = np.full((3, 4, 3), 0.5, dtype=np.float32)
+    for name in ("fog/reference.exr", "fog/unshadowed-exact.exr"):
+        write_exr(tmp_path / "old" / name, Image({"airlight": light, "surface": 0 * light}, light[..., 0]))
+    for name in ("reference.png", "reference-airlight.png"):
+        write_png(tmp_path / "old" / "fog" / name, np.zeros((3, 4, 3), dtype=np.uint8))
+    (tmp_path / "old" / "report.json").write_text(json.dumps(data))
+    return tmp_path / "old"
+
+
+def without_ids(page):
+    """Leave out the names that matplotlib gives to parts of a drawing, by chance."""
+    return re.sub(r"\b[mpc][0-9a-f]{10}\b", "", page)
+
+
+def changed(folder, change):
+    data = small_report()
+    change(data)
+    (folder / "report.json").write_text(json.dumps(data))
+
+
+def test_a_report_is_read_by_its_file_or_its_folder(folder):
+    for path in (folder, folder / "report.json", str(folder)):
+        data, where = load_report(path)
+        assert data == small_report()
+        assert where == folder
+
+
+def test_the_page_is_drawn_again_in_place_and_as_a_whole_elsewhere(folder, tmp_path):
+    data, where = load_report(folder)
+    redraw_report(data, where, folder)
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    assert "It is so." in page
+    new = tmp_path / "new"
+    redraw_report(data, where, new)
+    assert without_ids((new / "report.html").read_text(encoding="utf-8")) == without_ids(page)
+    assert load_report(new)[0] == data
+    # A report in itself: its own page can be drawn again, too.
+    redraw_report(*load_report(new), new)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("{", "is no JSON"),
+        ("[]", "has no schema, wanted 'airlight-report/2'"),
+        ('{"schema": "airlight-report/1"}', "the schema 'airlight-report/1', wanted 'airlight-report/2'; make the"),
+        ('{"schema": "airlight-report/2"}', "does not keep to airlight-report/2: report: has no 'created'"),
+    ],
+)
+def test_what_is_no_report_is_refused(folder, text, message):
+    (folder / "report.json").write_text(text)
+    with pytest.raises(InputError, match=message):
+        load_report(folder)
+
+
+def test_a_damaged_report_is_refused_with_the_place(folder):
+    changed(folder, lambda data: data["scenes"][0]["methods"][0]["times"].pop("frame"))
+    with pytest.raises(InputError, match=r"report\.scenes\.0\.methods\.0\.times: has no 'frame'"):
+        load_report(folder)
+    changed(folder, lambda data: data["scenes"][0]["methods"][0].update(kind="magic"))
+    with pytest.raises(InputError, match=r"methods\.0\.kind: got 'magic', wanted one of 'built-in'"):
+        load_report(folder)
+
+
+def test_a_missing_file_is_named(folder, tmp_path):
+    (folder / "fog" / "unshadowed-exact.exr").unlink()
+    with pytest.raises(InputError, match=r"names fog/unshadowed-exact\.exr, which is not beside it"):
+        load_report(folder)
+    with pytest.raises(InputError, match=r"cannot read .*nowhere.*No such file"):
+        load_report(tmp_path / "nowhere")
+
+
+@pytest.mark.parametrize("name", ["../outside.exr", "/etc/hostname", "fog/../../outside.exr"])
+def test_files_elsewhere_are_refused(folder, name):
+    """A report is copied with its files: none may lie, or be written, outside of its folder."""
+    (folder.parent / "outside.exr").write_text("x")
+    changed(folder, lambda data: data["scenes"][0]["methods"][0]["files"].update(exr=name))
+    with pytest.raises(InputError, match=r"names .*, which is not in its folder"):
+        load_report(folder)
+
+
+def test_keys_of_later_versions_are_passed_over(folder):
+    changed(folder, lambda data: data.update(later={"a": 1}) or data["scenes"][0].update(more=[1]))
+    assert load_report(folder)[0]["later"] == {"a": 1}
+
+
+def test_the_command_needs_no_mitsuba_to_draw_a_page_again(folder):
+    code = (
+        "import sys, airlight\n"
+        "sys.modules['mitsuba'] = sys.modules['drjit'] = None  # an import of them fails\n"
+        f"sys.argv = ['airlight', 'report', '--from', {str(folder / 'report.json')!r}]\n"
+        "airlight.main()\n"
+    )
+    ran = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
+    assert ran.returncode == 0, ran.stderr
+    assert "1 scene, drawn again" in ran.stdout
+    assert (folder / "report.html").is_file()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [(["--quick"], "together with --quick"), (["--method", "m:f"], "together with --method"), ([], "has no schema")],
+)
+def test_the_command_refuses_in_one_line(folder, capsys, arguments, message):
+    from reports.commands.main import run
+
+    if not arguments:
+        (folder / "report.json").write_text("{}")
+    assert run(["report", "--from", str(folder), *arguments]) == 2
+    printed = capsys.readouterr().err
+    assert message in printed
+    assert printed.count("\n") == 1

@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import json
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from reports.data.serialize import measurement_data, plain, truth_data
+from validation.configurations.methods import Configuration
+from validation.frames.benchmark import Measurement
+
+
+@dataclass(frozen=True)
+class Sample:
+    number: float
+    pair: tuple
+
+
+def test_plain_makes_what_json_can_hold():
+    given = {
+        "sample": Sample(np.float64(0.5), (np.int64(3), np.float32(0.25))),
+        1: [np.bool_(True), None, "word", float("nan"), float("-inf"), np.float32("inf")],
+    }
+    found = plain(given)
+    assert json.loads(json.dumps(found, allow_nan=False)) == {
+        "sample": {"number": 0.5, "pair": [3, 0.25]},
+        "1": [True, None, "word", None, None, None],
+    }
+
+
+def test_refused_measurement_has_every_entry():
+    refused = Measurement(Configuration("unshadowed", "taylor"), None, None, None, None, refused="no series")
+    data = measurement_data(refused)
+    assert (data["label"], data["refused"]) == ("unshadowed (taylor)", "no series")
+    assert data["times"] is data["error"] is data["surface_error"] is None
+    assert data["files"] == {}
+    assert data["knows_shadows"] is False
+    json.dumps(data, allow_nan=False)
+
+
+@pytest.mark.parametrize("airlight", [np.zeros((2, 3, 3)), np.full((2, 3, 3), np.inf)])
+def test_truth_without_light_that_is_finite_has_no_numbers_rather_than_nan(airlight):
+    from reference.quadrature.image import TruthImage
+
+    black = np.zeros_like(airlight)
+    data = truth_data(TruthImage(airlight, black, black, np.ones((2, 3)), np.ones((2, 3)), 0, float("nan")))
+    json.dumps(data, allow_nan=False)
+    assert data["relative_bound"] is None
+    assert data["missed"] is None

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The documentation's numbers and pictures come from a report, whole or not at all."""
+
+import io
+import json
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from analytic.errors import InputError
+from reports.docs.data import LARGEST, WIDTH, refresh, small
+
+TIMES = {"median_ms": 2.0, "low_ms": 1.9, "high_ms": 2.2, "repetitions": 9}
+ERROR = {name: 0.01 for name in ("relative_rmse", "relative_bias", "p50", "p99", "max", "rmse", "bias")} | {
+    "nonfinite": 0,
+    "negative": 0,
+    "pixels": 4,
+}
+
+
+def method(name, kernel=None, parameters=None, **changes):
+    label = f"{name} ({kernel})" if kernel else name
+    files = {"picture": "open-fog/a.png", "error": "open-fog/b.png"}
+    times = {key: TIMES for key in ("frame", "surface", "airlight", "rebuild", "moved")}
+    found = {"label": label, "method": name, "kernel": kernel, "parameters": parameters or {}, "knows_shadows": True}
+    found |= {"refused": None, "note": None, "times": times, "error": ERROR, "files": files, "flip": None}
+    return found | changes
+
+
+def report(**changes):
+    share = {"value": 0.4, "interval": [0.3, 0.5]}
+    scene = {
+        "name": "open-fog",
+        "path": None,
+        "size": [4, 1],
+        "plan": {"lights": "1 point", "medium": "unbounded", "extinction": "one"},
+        "truth": {"mean": 0.1, "relative_bound": 1e-10},
+        "multiple": {"medium": share, "everything": share},
+        "files": {"picture": "open-fog/a.png"},
+        "methods": [
+            method("unshadowed", "taylor"),
+            method("unshadowed", "exact", error=ERROR | {"relative_rmse": 1e-6}),
+            method("min-max", "exact", refused="not in this fog", times=None, error=None, files={}),
+            method("mine.py:march", kind="function"),
+        ],
+    }
+    found = {
+        "schema": "airlight-report/2",
+        "created": "2026-11-21 12:00:00 +0000",
+        "command": "airlight report",
+        "settings": {"name": "quick", "timed": [8, 6]},
+        "environment": {"processor": "P", "threads": 2, "variant": "llvm_ad_rgb", "versions": {"mitsuba": "3.9.1"}},
+        "claims": [{"kind": "truth", "text": "All is well.", "good": True}],
+        "scenes": [scene, {**scene, "name": "own", "path": "own.xml"}],
+    }
+    return found | changes
+
+
+def noise(height, width):
+    """The hardest there is to compress."""
+    return np.random.default_rng(7).integers(0, 256, (height, width, 3), dtype=np.uint8)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    target = tmp_path / "results"
+    (target / "open-fog").mkdir(parents=True)
+    for name in ("a", "b"):
+        Image.fromarray(noise(6, 8)).save(target / f"open-fog/{name}.png")
+    (target / "report.json").write_text(json.dumps(report()))
+    return target
+
+
+def test_a_report_is_kept_without_what_is_not_shown(variant, folder, tmp_path):
+    data = tmp_path / "data"
+    written = refresh(data, report=folder)
+    assert {path.name for path in written} == {path.name for path in data.iterdir()}
+    found = json.loads((data / "report.json").read_text())
+    assert found["schema"] == "airlight-docs/1"
+    assert found["claims"] == ["All is well."]
+    (scene,) = found["scenes"]  # the user's own is nobody's documentation, and so is his method
+    assert [one["method"] for one in scene["methods"]] == ["unshadowed", "unshadowed", "min-max"]
+    assert scene["counts"] == {"shapes": 0, "triangles": 0, "lights": 1}
+    assert scene["methods"][2]["refused"] == "not in this fog"
+    assert set(scene["methods"][0]["times"]) == {"frame", "airlight", "rebuild"}
+    assert found["pictures"]["unshadowed"]["label"] == "unshadowed (exact)"  # the one that shows the method best
+    assert "min-max" not in found["pictures"]
+    assert (data / "method-unshadowed-error.png").exists()
+
+
+def test_costs_of_kernels_come_and_stay(variant, folder, tmp_path):
+    data, costs = tmp_path / "data", tmp_path / "kernels.json"
+    row = {"kernel": "taylor-4", "family": "taylor", "size": 4, "phase": "isotropic", "g": 0.0, "rays": 9}
+    row |= {"device": None, "wall": TIMES, "median": 1e-3, "p99": 1.0, "max": 9.0, "nonfinite": 0, "refused": None}
+    content = {"environment": report()["environment"], "kernels": {"costs": [row], "levels": []}, "convergence": []}
+    costs.write_text(json.dumps(content))
+    refresh(data, kernels=costs)
+    refresh(data, report=folder)
+    kept = json.loads((data / "report.json").read_text())["kernels"]["costs"]
+    assert [one["kernel"] for one in kept] == ["taylor-4"]
+    costs.write_text("{}")
+    with pytest.raises(InputError, match=r"kernels.json.*bench --kernels --json"):
+        refresh(data, kernels=costs)
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ('{"schema": "airlight-report/9"}', "wanted airlight-report/1 or airlight-report/2"),
+        ("[1]", "wanted the folder of a report"),
+        ("{", "is no JSON"),
+    ],
+)
+def test_what_is_no_report_is_refused(content, words, folder, tmp_path):
+    (folder / "report.json").write_text(content)
+    with pytest.raises(InputError, match=words):
+        refresh(tmp_path / "data", report=folder)
+    with pytest.raises(InputError, match="No such file"):
+        refresh(tmp_path / "data", report=tmp_path / "nowhere")
+    assert not (tmp_path / "data").exists()
+
+
+def test_nothing_is_written_where_a_picture_is_missing(variant, folder, tmp_path):
+    (folder / "open-fog/b.png").unlink()
+    with pytest.raises(InputError, match=r"b\.png: no picture"):
+        refresh(tmp_path / "data", report=folder)
+    assert not (tmp_path / "data").exists()
+
+
+def test_pictures_are_small(tmp_path):
+    large, little = tmp_path / "large.png", tmp_path / "little.png"
+    Image.fromarray(noise(300, 500)).save(large)
+    Image.fromarray(noise(6, 8)).save(little)
+    found = small(large)
+    assert len(found) <= LARGEST
+    assert Image.open(io.BytesIO(found)).width < WIDTH
+    assert Image.open(io.BytesIO(small(little))).size == (8, 6)

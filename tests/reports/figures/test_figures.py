@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import csv
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from analytic.errors import InputError
+from reports.commands import figures as command_figures
+from reports.commands.figures import FIGURES, figures
+from reports.figures.polynomials import THICKNESSES, compute, plot
+
+
+@pytest.fixture(scope="module")
+def folder(variant, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("figures")
+    compute(folder, rays=256)
+    plot(folder, column="single")
+    return folder
+
+
+def read(path):
+    with open(path, newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def test_curves_meet_at_the_foot_and_leave_it(folder):
+    """At theta = 0 all three are p(0); half a radian on, the derived polynomial is the closer one if isotropic."""
+    rows = read(folder / "polynomials.csv")
+    assert len(rows) == 4 * len(THICKNESSES) * 301
+    middle = [row for row in rows if float(row["theta"]) == 0]
+    assert len(middle) == 12
+    for row in middle:
+        for name in ("taylor", "taylor-printed"):
+            assert float(row[name]) == pytest.approx(float(row["exact"]), rel=1e-7)  # nine digits are written
+    aside = next(
+        r for r in rows if (r["phase"], r["a"]) == ("isotropic", "0.5") and abs(float(r["theta"]) - 0.5) < 1e-9
+    )
+    exact = float(aside["exact"])
+    assert abs(float(aside["taylor"]) - exact) < 0.2 * abs(float(aside["taylor-printed"]) - exact)
+
+
+def test_shares_are_counted(folder):
+    rows = read(folder / "polynomials-shares.csv")
+    assert {row["kernel"] for row in rows} == {"exact", "taylor", "taylor-printed"}
+    assert all(float(row["within_1_percent"]) == 1 for row in rows if row["kernel"] == "exact")
+    assert any(float(row["within_1_percent"]) < 0.5 for row in rows if row["kernel"] == "taylor-printed")
+
+
+def test_drawing_again_only_reads_and_gives_the_same_bytes_without_mitsuba(folder, tmp_path):
+    """In another process, by the command; and what is embedded are TrueType fonts, no date."""
+    program = (
+        "import sys; from reports.commands.main import run\n"
+        f"assert run(['figures', '--from', {str(folder)!r}, '-o', {str(tmp_path)!r}, '--column', 'single']) == 0\n"
+        "assert not {'mitsuba', 'drjit'} & set(sys.modules), 'drawing started Mitsuba'\n"
+    )
+    subprocess.run([sys.executable, "-c", program], check=True, cwd=Path(__file__).parents[3])
+    for suffix, start in ((".pdf", b"%PDF"), (".png", b"\x89PNG")):
+        content = (tmp_path / f"polynomials{suffix}").read_bytes()
+        assert content == (folder / f"polynomials{suffix}").read_bytes()
+        assert content.startswith(start)
+    pdf = (tmp_path / "polynomials.pdf").read_bytes()
+    assert b"/FontFile2" in pdf
+    assert b"/Type3" not in pdf
+    assert b"CreationDate" not in pdf
+    assert sorted(path.suffix for path in tmp_path.iterdir()) == [".pdf", ".png"]
+
+
+def test_every_figure_has_a_module_with_its_name_and_summary():
+    modules = {path.stem for path in (Path(__file__).parents[3] / "reports" / "figures").glob("*.py")}
+    helpers = {"__init__", "files", "report", "published_rows"}
+    assert {module for module, _ in FIGURES.values()} == modules - helpers
+    for name in FIGURES:
+        module = command_figures._module(name)
+        assert name == module.NAME
+        assert module.SUMMARY
+        assert callable(module.compute)
+        assert callable(module.plot)
+
+
+def test_the_page_of_the_figures_names_each():
+    page = (Path(__file__).parents[3] / "docs" / "figures.md").read_text(encoding="utf-8")
+    for name in FIGURES:
+        assert f"airlight figures {name}" in page
+
+
+def test_unknown_figures_are_refused_with_the_nearest(tmp_path):
+    with pytest.raises(InputError, match="did you mean 'polynomials'"):
+        figures(["polynomial"], output=tmp_path)
+
+
+def test_unknown_columns_are_refused_with_the_nearest(tmp_path):
+    with pytest.raises(InputError, match="--column: got 'singel', wanted one of single, double; did you mean 'single'"):
+        figures(["polynomials"], output=tmp_path, column="singel")
+
+
+def test_a_figure_of_a_report_without_one_says_what_to_run(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match="frame-speed, strip: made from a report: write one with `airlight report -o"):
+        figures(["frame-speed", "strip"], output=tmp_path)
+    with pytest.raises(InputError, match=r"report\.json is missing; write a report with `airlight report -o"):
+        figures(["frame-speed"], output=tmp_path, report=tmp_path / "nowhere")
+    assert not list(tmp_path.iterdir())
+
+
+def test_drawing_from_a_folder_without_data_says_what_to_run(tmp_path):
+    with pytest.raises(InputError, match="holds no data of a figure; write some with `airlight figures -o"):
+        figures(None, source=tmp_path)
+    with pytest.raises(
+        InputError, match=r"map-size\.csv is missing: .*; write them with `airlight figures map-size -o"
+    ):
+        figures(["map-size"], source=tmp_path)
+
+
+def test_options_of_the_strip_are_refused_without_it(tmp_path):
+    with pytest.raises(InputError, match="--scene and --methods choose images of the figure strip"):
+        figures(["polynomials"], output=tmp_path, scene="hall")

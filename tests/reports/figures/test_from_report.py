@@ -1,0 +1,209 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Figures and tables that are made from a report: of a small one, written by hand."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+from analytic.errors import InputError
+from reference.storage.exr import Image, read_exr, write_exr
+from reports.figures import frame_speed as figure_frame_speed
+from reports.figures import methods_table as figure_methods_table
+from reports.figures import published as figure_published
+from reports.figures import stages as figure_stages
+from reports.figures import strip as figure_strip
+
+_SIZE = (24, 32)  # height, width
+_WRONG = {"sound": 1e-6, "march (steps=8)": 0.02}
+
+
+def timing(median):
+    return {"median_ms": median, "low_ms": 0.9 * median, "high_ms": 1.2 * median, "repetitions": 7}
+
+
+def method(label, error, *, layer="airlight", files=None):
+    metrics = {"relative_rmse": error, "relative_bias": -error, "p99": 3 * error, "nonfinite": 0}
+    return {
+        "label": label,
+        "method": label.split(" ")[0],
+        "refused": None,
+        "layer": layer,
+        "times": {"frame": timing(12.5), "moved": timing(25.0)} if layer == "airlight" else None,
+        "error": metrics,
+        "files": files or {},
+    }
+
+
+def published():
+    biri = {
+        "scene": "two-pens",
+        "where": "Fig. 7a",
+        "size": [800, 600],
+        "fps": 23,
+        "shares": [1, 9, 22, 9, 59],
+        "note": "",
+        "cone": 0,
+    }
+    row = {
+        "published": biri,
+        "kernel": "exact",
+        "cone": 0,
+        "size": [800, 600],
+        "triangles": 34_549,
+        "stages_ms": [1.0, 2.0, 3.0, 4.0, 10.0],
+        "shares": [5.0, 10.0, 15.0, 20.0, 50.0],
+        "rebuilt": timing(20.0),
+        "static": timing(10.0),
+        "error": {"relative_rmse": 8e-7},
+    }
+    entry = {
+        "where": "Fig. 6a",
+        "scene": "omni-box",
+        "map": 32,
+        "method": "light-volumes",
+        "parameters": [["evaluation", "mesh"]],
+        "fps": 230,
+    }
+    image = {"entry": entry, "size": [512, 512], "rebuilt": timing(50.0), "error": {"relative_rmse": 0.04}}
+    view = {
+        "published": {"what": "Sponza", "fps": 86, "passes": {}},
+        "scene": "colonnade",
+        "map": 1024,
+        "evaluation": "static",
+        "size": [1024, 1024],
+        "rebuilt": None,
+        "missing": "a frame takes 40 s",
+    }
+    stages = ["silhouettes", "scene", "airlight of the scene", "sorting", "shadow planes"]
+    return {
+        "biri": {"stages": stages, "rows": [row], "needless": []},
+        "billeter": {"figures": [image], "table": [view]},
+    }
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("report")
+    truth = 0.5 + np.random.default_rng(3).random((*_SIZE, 3))
+    write_exr(folder / "reference.exr", Image({"airlight": truth}))
+    methods = []
+    for label, error in _WRONG.items():
+        wrong = truth * (1 + error)
+        wrong[2:6, 20:24] *= 1.5 if error > 1e-3 else 1.0
+        write_exr(folder / f"{label[:5]}.exr", Image({"airlight": wrong}))
+        methods.append(method(label, error, files={"exr": f"{label[:5]}.exr"}))
+    methods.append(method("engine", 0.1, layer="total"))
+    refused = method("refused_one", 0.1) | {"refused": "no such media", "error": None, "times": None}
+    scene = {
+        "name": "a_scene",
+        "size": [32, 24],
+        "plan": {"shadows": "visibility tests"},
+        "truth": {"relative_bound": 4e-11},
+        "files": {"exr": "reference.exr"},
+        "methods": [*methods, refused],
+    }
+    data = {
+        "schema": "airlight-report/2",
+        "created": "2031-01-02 03:04:05 +0000",
+        "command": "airlight report",
+        "settings": {"image": [32, 24], "timed": [32, 24]},
+        "environment": {"processor": "a slide rule"},
+        "scenes": [scene],
+        "published": published(),
+    }
+    (folder / "report.json").write_text(json.dumps(data))
+    return folder
+
+
+def rows_of(path):
+    with open(path, newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def drawn(module, folder):
+    """Draw in one column, coarsely; return the bytes of PDF and PNG."""
+    coarse = folder / "coarse.mplstyle"
+    coarse.write_text("savefig.dpi: 50\n")
+    module.plot(folder, column="single", extra=(str(coarse),))
+    return [(folder / f"{module.NAME}{suffix}").read_bytes() for suffix in (".pdf", ".png")]
+
+
+def test_frame_speed_keeps_medians_quartiles_and_errors(report, tmp_path):
+    figure_frame_speed.compute(tmp_path, report=report)
+    rows = rows_of(tmp_path / "frame-speed.csv")
+    assert [row["label"] for row in rows] == list(_WRONG)  # neither the refused one nor the one without times
+    shown = {name: float(rows[1][name]) for name in ("frame_ms", "frame_ms_low", "frame_ms_high", "relative_rmse")}
+    assert shown == {"frame_ms": 12.5, "frame_ms_low": 11.25, "frame_ms_high": 15.0, "relative_rmse": 0.02}
+    origin = json.loads((tmp_path / "frame-speed.json").read_text())
+    assert origin["report"]["created"].startswith("2031-01-02")
+    assert origin["environment"] == {"processor": "a slide rule"}  # the machine that measured, not this one
+    assert drawn(figure_frame_speed, tmp_path) == drawn(figure_frame_speed, tmp_path)
+
+
+def test_methods_table_has_units_quartiles_and_what_was_refused(report, tmp_path):
+    figure_methods_table.compute(tmp_path, report=report)
+    figure_methods_table.plot(tmp_path)
+    text = (tmp_path / "methods-table.tex").read_text(encoding="utf-8")
+    assert r"\textit{a\_scene}, 32 $\times$ 24, truth known to $4.0\times10^{-11}$" in text
+    assert r"march (steps=8) & $12.5_{-1.2}^{+2.5}$ & $25.0_{-2.5}^{+5.0}$ & $0.020$ & $-0.020$ & $0.060$ \\" in text
+    assert r"engine (total) & -- & -- & $0.10$" in text
+    assert r"refused\_one & \multicolumn{5}{l}{refused} \\" in text
+    assert "[ms]" in text
+    for line in text.splitlines():  # as many cells as columns
+        if line.endswith(r"\\") and "multicolumn" not in line:
+            assert line.count("&") == 5
+
+
+def test_stages_come_from_the_report_and_add_up(report, tmp_path):
+    figure_stages.compute(tmp_path, report=report)
+    rows = rows_of(tmp_path / "stages.csv")
+    for name in ("published", "exact"):
+        assert sum(float(row["share_percent"]) for row in rows if row["row"] == name) == 100
+    assert drawn(figure_stages, tmp_path) == drawn(figure_stages, tmp_path)
+    text = (tmp_path / "stages.tex").read_text(encoding="utf-8")
+    assert r"published & $1$ & $9$ & $22$ & $9$ & $59$ & -- \\" in text
+    assert r"exact, 800 $\times$ 600 & $5.00$ & $10.0$ & $15.0$ & $20.0$ & $50.0$ & $20.0$ \\" in text
+
+
+def test_published_compares_only_what_has_the_published_size(report, tmp_path):
+    figure_published.compute(tmp_path, report=report)
+    rows = rows_of(tmp_path / "published.csv")
+    assert [float(rows[0][name]) for name in ("published_fps", "fps")] == [23, 50]
+    # The slower quartile of the time is the lower one of the rate.
+    assert float(rows[0]["fps_low"]) == pytest.approx(1000 / 24)
+    assert float(rows[0]["fps_high"]) == pytest.approx(1000 / 18)
+    assert rows[2]["fps"] == ""
+    assert rows[2]["missing"] == "a frame takes 40 s"
+    assert drawn(figure_published, tmp_path) == drawn(figure_published, tmp_path)
+    text = (tmp_path / "published.tex").read_text(encoding="utf-8")
+    assert r"& $23$ & $50.0_{-8.3}^{+5.6}$ & $2.2$ & $8.0\times10^{-7}$ \\" in text
+    assert r"light-volumes, mesh, 512 $\times$ 512 & $230$ & $20.0_{-3.3}^{+2.2}$ & -- & $0.040$ \\" in text
+
+
+def test_the_strip_shows_where_methods_are_wrong(report, tmp_path):
+    figure_strip.compute(tmp_path, report=report)
+    rows = rows_of(tmp_path / "strip.csv")
+    assert [row["label"] for row in rows] == ["reference", *_WRONG]
+    side = int(rows[0]["side"])
+    corner = int(rows[0]["x0"]), int(rows[0]["y0"])
+    assert (corner, side) == ((20, 2), 4)  # where one method is half as bright again
+    assert abs(int(rows[0]["x1"]) - 20) >= side or abs(int(rows[0]["y1"]) - 2) >= side
+    kept = read_exr(tmp_path / rows[1]["file"]).layers["airlight"]
+    assert np.array_equal(kept, read_exr(report / "sound.exr").layers["airlight"])
+    assert drawn(figure_strip, tmp_path) == drawn(figure_strip, tmp_path)
+
+
+def test_the_strip_refuses_what_the_report_has_not(report, tmp_path):
+    with pytest.raises(InputError, match="--scene: got 'a_scnee', wanted one of a_scene; did you mean 'a_scene'"):
+        figure_strip.compute(tmp_path, report=report, scene="a_scnee")
+    with pytest.raises(InputError, match=r"--methods: got 'sond', wanted some of .*; did you mean 'sound'"):
+        figure_strip.compute(tmp_path, report=report, methods="sond")
+
+
+@pytest.mark.parametrize("content", ["{", '{"schema": "airlight-report/9"}', "[]"])
+def test_another_report_json_is_refused(tmp_path, content):
+    (tmp_path / "report.json").write_text(content)
+    with pytest.raises(InputError, match=r"report\.json"):
+        figure_frame_speed.compute(tmp_path / "out", report=tmp_path)

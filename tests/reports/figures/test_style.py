@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: BSD-3-Clause
+from itertools import combinations
+
+import pytest
+
+from analytic.errors import InputError
+from realtime.kernels.registry import KERNELS
+from realtime.methods.registry import METHODS
+from reports.plotting.style import (
+    COLOURS,
+    LEAST_DIFFERENCE,
+    WIDTHS,
+    figure_style,
+    kernel_style,
+    method_style,
+    report_styles,
+)
+
+_SIGHTS = ("normal", "Protanomaly", "Deuteranomaly", "Tritanomaly")
+
+
+def lab(hexadecimal: str, sight: str):
+    """CIE Lab of a colour as seen without one kind of cones, by the matrices of Machado et al. 2009 on linear RGB."""
+    import colour
+    import numpy as np
+
+    linear = colour.cctf_decoding(colour.notation.HEX_to_RGB(hexadecimal), function="sRGB")
+    if sight != "normal":
+        linear = np.clip(colour.matrix_cvd_Machado2009(sight, 1.0) @ linear, 0, 1)
+    return colour.XYZ_to_Lab(colour.RGB_to_XYZ(linear, "sRGB", apply_cctf_decoding=False))
+
+
+@pytest.mark.parametrize("sight", _SIGHTS)
+@pytest.mark.filterwarnings("ignore")  # colour-science warns of optional packages
+def test_any_two_colours_differ_for_every_sight(sight):
+    import colour
+
+    seen = {name: lab(value, sight) for name, value in (COLOURS | {"truth": "#000000", "paper": "#ffffff"}).items()}
+    for one, other in combinations(seen, 2):
+        difference = float(colour.delta_E(seen[one], seen[other], method="CIE 2000"))
+        assert difference > LEAST_DIFFERENCE, (one, other, sight, difference)
+
+
+def test_the_simulation_sees_what_such_eyes_do_not():
+    """Red and green of one lightness, far apart for most, are closer than the bound without the middle cones."""
+    import colour
+
+    pair = ("#b8711a", "#7f8b1a")
+    normal, without = (
+        float(colour.delta_E(*(lab(one, sight) for one in pair), method="CIE 2000"))
+        for sight in ("normal", "Deuteranomaly")
+    )
+    assert normal > 2 * LEAST_DIFFERENCE > 2 * without
+
+
+def test_one_colour_and_one_marker_for_each_method():
+    looks = [method_style(name) for name in METHODS]
+    assert len({look["color"] for look in looks}) == len({look["marker"] for look in looks}) == len(METHODS)
+    own = method_style("my_module:fog")
+    assert own == method_style("my_module:fog")
+    assert own["color"] not in {look["color"] for look in looks}
+
+
+def test_one_pair_of_colour_and_marker_for_each_kernel():
+    looks = {(kernel_style(name)["color"], kernel_style(name)["marker"]) for name in (*KERNELS, "my_module:kernel")}
+    assert len(looks) == len(KERNELS) + 1
+    assert kernel_style("quadrature-32") == kernel_style("quadrature")
+    assert kernel_style("quadrature-theta-8") == kernel_style("quadrature-theta")
+
+
+def test_variants_keep_colour_and_marker():
+    looks = [method_style("ray-march", number) for number in range(12)]
+    assert {(look["color"], look["marker"]) for look in looks} == {(looks[0]["color"], looks[0]["marker"])}
+    assert len({(look["fillstyle"], look["markeredgecolor"]) for look in looks}) == 12
+
+
+def test_a_report_has_a_style_for_each_label_in_every_scene():
+    def methods(*pairs):
+        return {"methods": [{"method": method, "label": label} for method, label in pairs]}
+
+    scenes = [
+        methods(("ray-march", "ray-march (steps=16)"), ("a:f", "a:f"), ("b:f", "b:f")),
+        methods(("ray-march", "ray-march (steps=100)"), ("ray-march", "ray-march (steps=16)")),
+    ]
+    styles = report_styles(scenes)
+    assert styles["ray-march (steps=16)"] == method_style("ray-march", 0)
+    assert styles["ray-march (steps=100)"] == method_style("ray-march", 1)
+    assert styles["a:f"]["color"] != styles["b:f"]["color"]
+
+
+@pytest.mark.parametrize(("column", "width"), [("single", 3.5), ("double", 7.16)])
+def test_style_sheets_give_the_width_and_are_gone_after_the_block(column, width):
+    import matplotlib
+
+    before = matplotlib.rcParams["font.size"], matplotlib.rcParams["pdf.fonttype"]
+    with figure_style(column) as given:
+        assert given == WIDTHS[column] == width == matplotlib.rcParams["figure.figsize"][0]
+        assert matplotlib.rcParams["pdf.fonttype"] == 42
+    assert (matplotlib.rcParams["font.size"], matplotlib.rcParams["pdf.fonttype"]) == before
+
+
+def test_further_style_sheets_lie_on_top(tmp_path):
+    import matplotlib
+
+    (tmp_path / "mine.mplstyle").write_text("font.size: 11\n")
+    with figure_style("single", (str(tmp_path / "mine.mplstyle"),)):
+        assert matplotlib.rcParams["font.size"] == 11
+        assert matplotlib.rcParams["pdf.fonttype"] == 42
+
+
+def test_unknown_columns_and_sheets_are_refused():
+    with pytest.raises(InputError, match="column: got 'triple', wanted one of single, double"), figure_style("triple"):
+        pass
+    with (
+        pytest.raises(InputError, match="style: got nothing-like-this"),
+        figure_style("single", ("nothing-like-this",)),
+    ):
+        pass

@@ -1,0 +1,263 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import json
+import struct
+
+import numpy as np
+import pytest
+
+from analytic.errors import InputError
+from reports.interchange.gltf import write_gltf
+from reports.interchange.meshes import SIDES, shape_mesh
+from tests.helpers.scenes import body, spot, tiny_scene
+from validation.scenes.loading import LoadedScene, load_scene
+
+
+def loaded(**changes):
+    import mitsuba as mi
+
+    return LoadedScene("tiny", mi.load_dict(tiny_scene(**changes)), "A tiny scene.", "")
+
+
+def parts(path):
+    """Return the JSON and the binary part of a .glb file, its framing checked."""
+    data = path.read_bytes()
+    magic, version, length = struct.unpack("<4sII", data[:12])
+    assert (magic, version, length) == (b"glTF", 2, len(data))
+    chunks, place = [], 12
+    while place < len(data):
+        size, kind = struct.unpack("<I4s", data[place : place + 8])
+        assert size % 4 == 0
+        chunks.append((kind, data[place + 8 : place + 8 + size]))
+        place += 8 + size
+    assert [kind for kind, _ in chunks] == [b"JSON", b"BIN\0"][: len(chunks)]
+    return json.loads(chunks[0][1]), chunks[1][1] if len(chunks) > 1 else b""
+
+
+def arrays(document, binary):
+    """Return the vertices, normals (or None) and faces of every mesh."""
+    found = []
+    for mesh in document["meshes"]:
+        (primitive,) = mesh["primitives"]
+        attributes = primitive["attributes"]
+        numbers = [attributes["POSITION"], attributes.get("NORMAL"), primitive["indices"]]
+        found.append([None if number is None else accessor(document, binary, number) for number in numbers])
+    return found
+
+
+def accessor(document, binary, number):
+    entry = document["accessors"][number]
+    view = document["bufferViews"][entry["bufferView"]]
+    kind = {5126: "<f4", 5125: "<u4"}[entry["componentType"]]
+    values = np.frombuffer(binary[view["byteOffset"] : view["byteOffset"] + view["byteLength"]], dtype=kind)
+    values = values.reshape(-1, 3)
+    assert values.size == entry["count"] * {"VEC3": 3, "SCALAR": 1}[entry["type"]]
+    if "min" in entry:
+        np.testing.assert_array_equal(values.min(axis=0), np.float32(entry["min"]))
+        np.testing.assert_array_equal(values.max(axis=0), np.float32(entry["max"]))
+    return values
+
+
+def project(document, points):
+    """Return where points of glTF's world are in the image, in shares of its width and height from the upper left."""
+    node = next(node for node in document["nodes"] if "camera" in node)
+    lens = document["cameras"][node["camera"]]["perspective"]
+    matrix = np.array(node["matrix"]).reshape(4, 4).T
+    x, y, z = ((points - matrix[:3, 3]) @ matrix[:3, :3]).T
+    half = np.tan(lens["yfov"] / 2)
+    return np.stack([0.5 + 0.5 * x / (-z * half * lens["aspectRatio"]), 0.5 - 0.5 * y / (-z * half)], axis=1)
+
+
+@pytest.mark.parametrize("up", [(0, 0, 1), (0, 1, 0), (0.1, -1, 0.2), (-1, 0, 0.3)])
+def test_vertices_are_in_the_image_where_mitsuba_has_them(variant, tmp_path, up):
+    import mitsuba as mi
+
+    sensor = tiny_scene(size=(40, 24))["sensor"]
+    view = mi.ScalarTransform4f().look_at([0.2, -4.1, 1.3], [0.1, 0.2, 0.6], list(up))
+    one = loaded(
+        sensor=sensor | {"to_world": view}, ball={"type": "cube", "to_world": mi.ScalarTransform4f().scale(0.4)}
+    )
+    write_gltf(tmp_path / "tiny.glb", one)
+    document, binary = parts(tmp_path / "tiny.glb")
+    number = next(k for k, mesh in enumerate(document["meshes"]) if mesh["name"] == "ball")
+    found = project(document, arrays(document, binary)[number][0].astype(np.float64))
+    shape = next(shape for shape in one.scene.shapes() if shape.id() == "ball")
+    interaction = mi.Interaction3f()
+    interaction.p = mi.Point3f(mi.traverse(shape)["vertex_positions"].numpy().reshape(-1, 3).T.copy())
+    sample, _ = one.scene.sensors()[0].sample_direction(interaction, mi.Point2f(0.5))
+    wanted = np.array(sample.uv, dtype=np.float64).T / [40, 24]
+    assert wanted.min() > 0
+    np.testing.assert_allclose(found, wanted, atol=1e-6)
+
+
+def test_trimesh_reads_it_back(variant, tmp_path):
+    import trimesh
+
+    one = load_scene("sphere-spot")
+    written = write_gltf(tmp_path / "scene.glb", one)
+    assert written["triangles"] == 1090
+    assert written["bytes"] == (tmp_path / "scene.glb").stat().st_size
+    assert written["tessellated"] == []
+    back = trimesh.load(tmp_path / "scene.glb", process=False)
+    assert set(back.geometry) == {"sphere", "floor"}
+    sphere = back.geometry["sphere"]
+    assert (len(sphere.faces), sphere.is_watertight) == (1088, True)
+    assert sphere.volume > 0  # outward normals
+    # Biri's sphere, at (0.11, -0.07, 1.93) with z up.
+    np.testing.assert_allclose(sphere.bounds.mean(axis=0), [0.11, 1.93, 0.07], atol=2e-3)
+    # trimesh keeps a colour in 8 bits.
+    np.testing.assert_allclose(sphere.visual.material.baseColorFactor[:3] / 255, [0.57, 0.31, 0.23], atol=0.003)
+    # trimesh takes the aspect ratio for the ratio of the angles of view, so the other one comes back wrong.
+    np.testing.assert_allclose(back.camera.fov[1], 39.9394506, rtol=1e-6)
+    np.testing.assert_allclose(back.camera_transform[:3, 3], [0.63, 1.87, 5.31], rtol=1e-6)
+
+
+def test_lights_are_those_of_the_scene(variant, tmp_path):
+    one = loaded(spot=spot(cutoff=40.0, beam=25.0), hard=spot())
+    write_gltf(tmp_path / "tiny.glb", one)
+    document, _ = parts(tmp_path / "tiny.glb")
+    lights = document["extensions"]["KHR_lights_punctual"]["lights"]
+    assert [light["type"] for light in lights] == ["point", "spot", "spot"]
+    for light, intensity in zip(lights, ([5, 4, 3], [9, 7, 8], [9, 7, 8])):
+        np.testing.assert_allclose(light["intensity"] * np.array(light["color"]), intensity, rtol=1e-12)
+        assert light["extras"]["intensity_w_per_sr"] == intensity
+        assert max(light["color"]) == 1
+    np.testing.assert_allclose(np.rad2deg(lights[1]["spot"]["innerConeAngle"]), 25, rtol=1e-6)
+    np.testing.assert_allclose(np.rad2deg(lights[1]["spot"]["outerConeAngle"]), 40, rtol=1e-6)
+    assert 0.999 < lights[2]["spot"]["innerConeAngle"] / lights[2]["spot"]["outerConeAngle"] < 1
+    nodes = [node for node in document["nodes"] if "KHR_lights_punctual" in node.get("extensions", {})]
+    assert [node["extensions"]["KHR_lights_punctual"]["light"] for node in nodes] == [0, 1, 2]
+    matrix = np.array(nodes[1]["matrix"]).reshape(4, 4).T
+    np.testing.assert_allclose(matrix[:3, 3], [0.7, 2.6, 0.3], rtol=1e-6)
+    axis = np.array([0.1, 0.1, 0.4]) - [0.7, -0.3, 2.6]
+    axis = (axis / np.linalg.norm(axis))[[0, 2, 1]] * [1, 1, -1]
+    np.testing.assert_allclose(-matrix[:3, 2], axis, atol=1e-6)
+    np.testing.assert_allclose(matrix[:3, :3].T @ matrix[:3, :3], np.eye(3), atol=1e-12)
+    assert np.linalg.det(matrix[:3, :3]) > 0
+
+
+def test_every_number_in_the_file_is_in_its_bounds(variant, tmp_path):
+    bubble = body({"type": "sphere", "center": [2.0, 0.3, 1.1], "radius": 0.3}, 0.5, (0.5, 0.5, 0.5))
+    one = loaded(bubble=bubble | {"exterior": {"type": "ref", "id": "fog"}})
+    write_gltf(tmp_path / "tiny.glb", one)
+    document, binary = parts(tmp_path / "tiny.glb")
+    assert document["buffers"] == [{"byteLength": len(binary)}]
+    for view in document["bufferViews"]:
+        assert view["byteOffset"] % 4 == 0
+        assert view["byteOffset"] + view["byteLength"] <= len(binary)
+    for vertices, normals, faces in arrays(document, binary):
+        assert faces.max() == len(vertices) - 1
+        corners = vertices[faces].astype(np.float64)
+        area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        assert (np.linalg.norm(area, axis=1) > 0).all()
+        if normals is not None:
+            np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1, rtol=1e-6)
+            assert (np.sum(normals[faces].mean(axis=1) * area, axis=1) > 0).all()
+    for node in document["nodes"]:
+        assert node.get("mesh", 0) < len(document["meshes"])
+    for mesh in document["meshes"]:
+        assert mesh["primitives"][0]["material"] < len(document["materials"])
+    names = [mesh["name"] for mesh in document["meshes"]]
+    material = document["materials"][document["meshes"][names.index("bubble")]["primitives"][0]["material"]]
+    assert material["alphaMode"] == "BLEND"
+    assert material["extras"]["medium"]["sigma_t"] == [0.5, 0.5, 0.5]
+    ball = document["materials"][document["meshes"][names.index("ball")]["primitives"][0]["material"]]
+    assert ball["pbrMetallicRoughness"]["baseColorFactor"] == [0.6, 0.5, 0.3, 1.0]
+    assert (ball["doubleSided"], ball["extensions"]["KHR_materials_specular"]["specularFactor"]) == (False, 0)
+
+
+def test_a_scene_without_surfaces_has_a_camera_and_lights_alone(variant, tmp_path):
+    write_gltf(tmp_path / "tiny.glb", loaded(ball=None, floor=None))
+    document, binary = parts(tmp_path / "tiny.glb")
+    assert binary == b""
+    assert not {"meshes", "materials", "accessors", "bufferViews", "buffers"} & set(document)
+    assert len(document["nodes"]) == 2
+
+
+def test_the_same_scene_gives_the_same_bytes(variant, tmp_path):
+    for name in ("a", "b"):
+        write_gltf(tmp_path / f"{name}.glb", loaded())
+    assert (tmp_path / "a.glb").read_bytes() == (tmp_path / "b.glb").read_bytes()
+
+
+@pytest.mark.parametrize("transform", ["plain", "turned", "mirrored"])
+@pytest.mark.parametrize(
+    ("kind", "flipped"),
+    # Mitsuba's cube cannot be turned inside out.
+    [("cube", False), *((kind, way) for kind in ("sphere", "disk", "cylinder", "rectangle") for way in (False, True))],
+)
+def test_shapes_become_meshes_that_lie_on_them(variant, kind, transform, flipped):
+    """Rays of Mitsuba meet shape and mesh at the same place, with normals on the same side."""
+    import mitsuba as mi
+
+    place = mi.ScalarTransform4f()
+    if transform != "plain":
+        place = place.translate([0.3, 0.2, -0.1]).rotate([0.6, 0, 0.8], 40).scale(0.7)
+    if transform == "mirrored":
+        place = place.scale([1, 1, -1])
+    entry = {"type": kind, "to_world": place} | ({"flip_normals": True} if flipped else {})
+    shape = mi.load_dict(entry)
+    mesh = shape_mesh(shape)
+    twin = mi.Mesh("twin", vertex_count=len(mesh.vertices), face_count=len(mesh.faces))
+    parameters = mi.traverse(twin)
+    parameters["vertex_positions"] = mesh.vertices.astype(np.float32).ravel()
+    parameters["faces"] = mesh.faces.astype(np.uint32).ravel()
+    parameters.update()
+    rng = np.random.default_rng(5)
+    start = rng.standard_normal((3, 4096))
+    start *= 4 / np.linalg.norm(start, axis=0)
+    aim = rng.uniform(-0.6, 0.6, (3, 4096)) - start
+    ray = mi.Ray3f(mi.Point3f(start), mi.Vector3f(aim / np.linalg.norm(aim, axis=0)))
+    scenes = [mi.load_dict({"type": "scene", "shape": one}) for one in (shape, twin)]
+    hits = [scene.ray_intersect(ray) for scene in scenes]
+    distance = [np.array(hit.t, dtype=np.float64) for hit in hits]
+    both = np.isfinite(distance[0]) & np.isfinite(distance[1])
+    assert both.mean() > 0.05
+    # An edge moves by 3e-4 of the radius; rays that graze it meet one of the two.
+    assert (np.isfinite(distance[0]) != np.isfinite(distance[1])).mean() < 0.005
+    assert mesh.exact == (kind in ("rectangle", "cube"))
+    normal = [np.array(hits[0].sh_frame.n), np.array(hits[1].n)]
+    cosine = np.abs(np.sum(np.array(ray.d) * normal[0], axis=0))
+    steep = both & (cosine > 0.2)
+    away = np.abs(distance[0][steep] - distance[1][steep]) * cosine[steep]
+    # A sphere is cut along both of its angles. Rays are float32, 4 m from the shape.
+    cuts = {"sphere": 2, "cylinder": 1}.get(kind, 0)
+    assert away.max() < cuts * (1 - np.cos(np.pi / SIDES)) + 1e-5
+    assert (np.sum(normal[0] * normal[1], axis=0)[steep] > 0.99).all()
+    if mesh.normals is not None:
+        corners = mesh.vertices[mesh.faces]
+        area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        assert (np.sum(mesh.normals[mesh.faces].mean(axis=1) * area, axis=1) > 0).all()
+
+
+def test_shapes_that_cannot_be_meshes_are_refused_by_name(variant, tmp_path):
+    import mitsuba as mi
+
+    curve = tmp_path / "curve.txt"
+    curve.write_text("\n".join(f"{k} 0 1 0.1" for k in range(5)))
+    shape = mi.load_dict({"type": "scene", "hair": {"type": "bsplinecurve", "filename": str(curve)}}).shapes()[0]
+    with pytest.raises(InputError, match=r"shape 'hair' is a BSplineCurve; wanted meshes"):
+        shape_mesh(shape)
+
+
+def test_a_camera_that_mirrors_is_refused(variant, tmp_path):
+    import mitsuba as mi
+
+    sensor = tiny_scene()["sensor"]
+    view = mi.ScalarTransform4f().look_at([0.2, -4.1, 1.3], [0.1, 0, 0.6], [0, 0, 1]).scale([-1, 1, 1])
+    with pytest.raises(InputError, match="mirrors"):
+        write_gltf(tmp_path / "tiny.glb", loaded(sensor=sensor | {"to_world": view}))
+    assert not (tmp_path / "tiny.glb").exists()
+
+
+def test_a_light_at_infinity_is_directional_in_watts_a_square_metre(variant, tmp_path):
+    write_gltf(tmp_path / "windows.glb", load_scene("windows", (8, 6)))
+    document, _ = parts(tmp_path / "windows.glb")
+    (light,) = document["extensions"]["KHR_lights_punctual"]["lights"]
+    assert light["type"] == "directional"
+    np.testing.assert_allclose(light["intensity"] * np.array(light["color"]), [33.1, 28.7, 22.3], rtol=1e-12)
+    assert light["extras"]["irradiance_w_per_m2"] == [33.1, 28.7, 22.3]
+    (node,) = [node for node in document["nodes"] if "KHR_lights_punctual" in node.get("extensions", {})]
+    matrix = np.array(node["matrix"]).reshape(4, 4).T
+    x, y, z = np.array([0.737, -0.271, -0.419]) / np.linalg.norm([0.737, -0.271, -0.419])
+    # It shines along its own -z; y of glTF is the scene's z.
+    np.testing.assert_allclose(-matrix[:3, 2], [x, z, -y], atol=1e-6)

@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import json
+
+import numpy as np
+import pytest
+
+from reports.commands.main import run
+from reports.interchange.scene import describe_scene, up_axis
+from reports.tables.scene import description_text
+from tests.helpers.scenes import body, spot, tiny_scene
+from validation.scenes.loading import LoadedScene, load_scene
+from validation.scenes.registry import SCENES
+
+
+def described(**changes):
+    import mitsuba as mi
+
+    return describe_scene(LoadedScene("tiny", mi.load_dict(tiny_scene(**changes)), "A tiny scene.", ""))
+
+
+def test_camera_is_enough_to_make_mitsubas_rays(variant):
+    import mitsuba as mi
+
+    camera = described(size=(16, 12))["camera"]
+    forward, right, up = (np.array(camera[name]) for name in ("forward", "right", "up"))
+    tangents = [np.tan(0.5 * np.deg2rad(camera[f"fov_{way}"])) for way in ("horizontal", "vertical")]
+    sensor = mi.load_dict(tiny_scene(size=(16, 12))).sensors()[0]
+    for column, row in ((0, 0), (15, 11), (3, 8)):
+        x, y = 2 * (column + 0.5) / 16 - 1, 1 - 2 * (row + 0.5) / 12
+        wanted = forward + x * tangents[0] * right + y * tangents[1] * up
+        place = mi.Point2f((column + 0.5) / 16, (row + 0.5) / 12)
+        ray, _ = sensor.sample_ray(0, 0, place, mi.Point2f(0.5))
+        # float32
+        np.testing.assert_allclose(wanted / np.linalg.norm(wanted), np.array(ray.d)[:, 0], atol=5e-7)
+    assert camera["position"] == [0.2, -4.1, 1.3]
+    # Right-handed.
+    np.testing.assert_allclose(np.cross(right, up), -forward, atol=1e-6)
+
+
+def test_medium_is_in_every_form_that_engines_ask_for(variant):
+    medium = described()["medium"]
+    assert medium["sigma_t"] == [0.31] * 3
+    assert medium["albedo"] == [0.9, 0.8, 0.7]
+    np.testing.assert_allclose(medium["sigma_s"], [0.279, 0.248, 0.217], rtol=1e-7)
+    np.testing.assert_allclose(np.add(medium["sigma_s"], medium["sigma_a"]), 0.31, rtol=1e-7)
+    np.testing.assert_allclose(medium["mean_free_path"], 1 / 0.31, rtol=1e-7)
+    assert medium["phase"] == {"name": "isotropic", "formula": "1/(4 pi) [1/sr]"}
+
+
+def test_phase_functions_have_their_numbers(variant):
+    fog = tiny_scene()["fog"]
+    assert described(fog=fog | {"phase": {"type": "hg", "g": 0.37}})["medium"]["phase"]["g"] == 0.37
+    table = described(fog=fog | {"phase": {"type": "tabphase", "values": "1, 2, 4"}})["medium"]["phase"]
+    assert (table["name"], len(table["table"])) == ("tabulated", 3)
+
+
+def test_bodies_of_media_are_listed_with_their_bounds(variant):
+    ball = body({"type": "sphere", "center": [2.0, 0.3, 1.1], "radius": 0.3}, (0.5, 0.25, 1.0), (0.5, 0.4, 0.3))
+    cube = body({"type": "cube"}, 0.7, (0.5, 0.4, 0.3))
+    sensor = {key: entry for key, entry in tiny_scene()["sensor"].items() if key != "medium"}
+    found = described(fog=None, sensor=sensor, haze=ball, box=cube, ball=None)
+    assert found["medium"] is None
+    assert [one["name"] for one in found["bounded_media"]] == ["haze", "box"]
+    haze, box = found["bounded_media"]
+    assert haze["bounds"] == {"kind": "ball", "centre": [2.0, 0.3, 1.1], "radius": 0.3}
+    assert haze["sigma_t"] == [0.5, 0.25, 1.0]
+    assert box["bounds"]["kind"] == "convex mesh"
+    text = description_text(found)
+    assert "around all bodies: none, clear air" in text
+    assert "a ball about (2, 0.3, 1.1), radius 0.3" in text
+
+
+def test_lights_have_what_their_kind_needs(variant):
+    lamp, soft, hard = described(soft=spot(cutoff=40.0, beam=25.0), hard=spot())["lights"]
+    assert lamp["intensity"] == [5.0, 4.0, 3.0]
+    assert "axis" not in lamp
+    assert (soft["beam_angle"], soft["cutoff_angle"]) == (25.0, 40.0)
+    assert "(cutoff - angle)/(cutoff - beam)" in soft["falloff"]
+    assert (hard["beam_angle"], hard["cutoff_angle"]) == (33.0, 33.0)
+    assert "full intensity within the cut-off" in hard["falloff"]
+    axis = np.array([0.1, 0.1, 0.4]) - [0.7, -0.3, 2.6]
+    np.testing.assert_allclose(soft["axis"], axis / np.linalg.norm(axis), atol=1e-6)
+
+
+def test_a_light_at_infinity_has_a_direction_and_no_place(variant):
+    loaded = load_scene("windows", (8, 6))
+    (sun,) = describe_scene(loaded)["lights"]
+    assert sun["kind"] == "directional"
+    assert "position" not in sun
+    assert sun["irradiance"] == [33.1, 28.7, 22.3]
+    direction = np.array([0.737, -0.271, -0.419])
+    np.testing.assert_allclose(sun["axis"], direction / np.linalg.norm(direction), atol=1e-6)
+    text = description_text(describe_scene(loaded))
+    assert "directional, travels along (0.828" in text
+    assert "(33.1, 28.7, 22.3) W/m^2 on a plane that faces it" in text
+
+
+def test_surfaces_have_their_reflectance(variant):
+    checkers = {"type": "diffuse", "reflectance": {"type": "checkerboard", "color0": 0.2, "color1": 0.6}}
+    floor = tiny_scene()["floor"] | {"bsdf": {"type": "twosided", "bsdf": checkers}}
+    ball, floor = described(floor=floor)["surfaces"]
+    assert ball == {
+        "name": "ball",
+        "kind": "Sphere",
+        "triangles": None,
+        "reflectance": [0.6, 0.5, 0.3],
+        "textured": False,
+        "two_sided": False,
+        "diffuse": True,
+    }
+    assert (floor["kind"], floor["triangles"], floor["textured"], floor["two_sided"]) == ("Rectangle", 2, True, True)
+    np.testing.assert_allclose(floor["reflectance"], 0.4, atol=0.05)  # the mean of 64 places
+
+
+@pytest.mark.parametrize(("up", "axis"), [((0, 0.1, 1), "z"), ((0.1, -1, 0), "-y"), ((1, 0, 0), "x")])
+def test_up_axis_is_the_nearest(up, axis):
+    assert up_axis(np.array(up)) == axis
+
+
+def test_text_says_what_the_numbers_are(variant):
+    text = description_text(described(ball=None, floor=None, spot=spot(cutoff=40.0, beam=25.0)))
+    for words in (
+        "tiny, 16 x 12 pixels. A tiny scene.",
+        "sigma_t 0.31 1/m",
+        "(0.9, 0.8, 0.7)",
+        "49 degrees horizontally, 37.7",
+        "beam 25, cut-off 40 degrees from the axis",
+        "(5, 4, 3) W/sr",
+        "surfaces         none",
+        "airlight compare --scene tiny tiny.exr",
+    ):
+        assert words in text
+    assert max(len(line) for line in text.splitlines()) <= 120
+
+
+def test_long_lists_are_cut_in_the_text_alone(variant):
+    many = {f"ball{k}": tiny_scene()["ball"] | {"center": [0.1 * k, 3.0, 1.0]} for k in range(20)}
+    found = described(**many)
+    assert len(found["surfaces"]) == 22
+    assert "and 10 more: --json lists them" in description_text(found)
+
+
+def test_command_prints_json_and_writes_gltf(capsys, tmp_path):
+    glb = tmp_path / "fog.glb"
+    assert run(["describe", "open-fog", "--size", "64x48", "--json", "--gltf", str(glb)]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert (found["scene"], found["camera"]["size"]) == ("open-fog", [64, 48])
+    assert found["gltf"]["bytes"] == glb.stat().st_size
+    assert run(["describe", "open-fog", "--gltf", str(tmp_path / "fog.gltf")]) == 2
+    assert "wanted a name that ends in .glb" in capsys.readouterr().err
+    assert run(["describe", "open-frog"]) == 2
+    assert "did you mean 'open-fog'?" in capsys.readouterr().err
+
+
+XML = """<scene version="3.0.0">
+    <medium type="homogeneous" id="fog"><float name="sigma_t" value="0.31"/><float name="albedo" value="0.83"/></medium>
+    <emitter type="point"><point name="position" value="0.7, 0.3, 1.9"/></emitter>
+    <sensor type="perspective">
+        <transform name="to_world"><lookat origin="0.2, -4.1, 1.3" target="0.1, 0, 0.6" up="0, 0, 1"/></transform>
+        <ref name="medium" id="fog"/>
+        <film type="hdrfilm"><integer name="width" value="16"/><integer name="height" value="12"/></film>
+    </sensor>
+    <shape type="sphere" id="ball"><point name="center" value="0.1, 0.1, 0.7"/><float name="radius"
+    value="0.4"/></shape>
+</scene>
+"""
+
+
+def test_command_takes_an_xml(capsys, tmp_path):
+    path, glb = tmp_path / "own.xml", tmp_path / "own.glb"
+    path.write_text(XML)
+    assert run(["describe", str(path), "--gltf", str(glb)]) == 0
+    out = capsys.readouterr().out
+    assert f"airlight compare --scene {path} own.exr" in out
+    assert f"{glb}: " in out
+    assert "cut into triangles: ball" in out
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SCENES)
+def test_every_built_in_scene_can_be_described_and_written(name, variant, tmp_path, capsys):
+    assert run(["describe", name, "--gltf", str(tmp_path / "scene.glb")]) == 0
+    assert "sigma_t" in capsys.readouterr().out

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`airlight doctor`: whole, piped, and on machines where something is wrong."""
+
+import json
+
+import pytest
+
+from reports.commands.main import run
+from reports.machine import doctor
+from reports.machine.environment import MissingError
+
+
+@pytest.fixture(scope="module")
+def diagnosis(variant):
+    """Return the diagnosis of this machine, made once."""
+    return doctor.diagnose()
+
+
+def test_this_machine_works(diagnosis, variant):
+    assert diagnosis["works"]
+    assert diagnosis["problem"] is None
+    assert diagnosis["variant"] == variant
+    # 15 000 roundings of float32, as Mitsuba 3.9 has it; a later rule would be of the same order or smaller
+    assert 0 < diagnosis["kernel"]["epsilon"] < 2e-3
+    assert json.loads(json.dumps(diagnosis)) == diagnosis
+
+
+def test_the_table_says_what_the_diagnosis_says(diagnosis, capsys):
+    doctor.print_diagnosis(diagnosis)
+    words = capsys.readouterr().out
+    assert "Everything that airlight needs works." in words
+    for piece in (diagnosis["versions"]["mitsuba"], "CUDA", "OptiX", "shadow-ray epsilon", diagnosis["variant"]):
+        assert piece in words
+    assert "\x1b" not in words  # plain where it is no terminal
+
+
+def test_a_missing_library_is_shown_with_what_to_do(monkeypatch, capsys):
+    def missing():
+        raise MissingError("no libLLVM found: install it")
+
+    monkeypatch.setattr(doctor, "prepare", missing)
+    monkeypatch.setattr(doctor, "find_llvm", lambda: [])
+    assert run(["doctor", "--json"]) == 3
+    found = json.loads(capsys.readouterr().out)
+    assert (found["works"], found["problem"], found["llvm"]) == (False, "no libLLVM found: install it", [])
+    assert run(["doctor"]) == 3
+    assert "Not ready: no libLLVM found: install it" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("code", "words"),
+    [
+        ("import os; os.abort()", "killed by SIGABRT"),
+        ("import sys; sys.exit('cannot import mitsuba')", "exit status 1: cannot import mitsuba"),
+        ("import time; time.sleep(30)", "did not end within"),
+    ],
+)
+def test_a_kernel_that_crashes_is_shown_and_crashes_nothing(code, words, monkeypatch):
+    real = doctor.subprocess.run
+
+    def other_program(command, **options):
+        return real([command[0], "-c", code], **options)
+
+    monkeypatch.setattr(doctor.subprocess, "run", other_program)
+    # half a second is enough for an interpreter to start and fail, and not for the one that sleeps
+    assert words in doctor.try_kernel("llvm_ad_rgb", patience=5.0 if "sleep" not in code else 0.5)["problem"]
+
+
+def test_the_launcher_gets_packages_and_a_line(monkeypatch, capsys):
+    monkeypatch.setattr("reports.machine.environment.missing_packages", lambda: [])
+    assert run(["doctor", "--missing"]) == 0
+    assert capsys.readouterr().out == "\n\n"
+    monkeypatch.setattr("reports.machine.environment.missing_packages", lambda: ["libllvm19", "libatomic1"])
+    run(["doctor", "--missing"])
+    packages, line = capsys.readouterr().out.splitlines()
+    assert packages == "libllvm19 libatomic1"
+    assert line

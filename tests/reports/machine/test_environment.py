@@ -1,0 +1,282 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which libLLVM, which variant, and what is said where something is missing."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from analytic.errors import InputError
+from reports.machine import environment, gpu, llvm
+from reports.machine.environment import (
+    MissingError,
+    activate,
+    describe_environment,
+    missing_packages,
+    prepare,
+    versions,
+)
+from reports.machine.llvm import examine_llvm, find_llvm
+
+ROOT = Path(__file__).resolve().parents[3]
+HEADER = Path(sys.executable).read_bytes()[:64]  # of a binary that suits this machine
+
+linux = pytest.mark.skipif(sys.platform != "linux", reason="looks at ELF files and Linux' library names")
+
+
+def _library(folder: Path, name: str, content: bytes = HEADER) -> Path:
+    folder.mkdir(exist_ok=True)
+    path = folder / name
+    path.write_bytes(content)
+    return path
+
+
+@pytest.fixture
+def only(tmp_path, monkeypatch):
+    """A folder that is the only one in which libLLVM is looked for; no user's settings, no GPU."""
+    folder = tmp_path / "lib"
+    folder.mkdir()
+    for name in ("DRJIT_LIBLLVM_PATH", "AIRLIGHT_VARIANT"):
+        monkeypatch.setenv(name, "")  # so that it is as it was after the test, also where `prepare` sets it
+        monkeypatch.delenv(name)
+    monkeypatch.setattr(llvm, "llvm_folders", lambda: [folder])
+    monkeypatch.setattr(environment, "cuda_problem", lambda: "no GPU")
+    return folder
+
+
+@linux
+class TestFindLlvm:
+    """Candidates by file name alone."""
+
+    @pytest.mark.parametrize(
+        ("name", "version", "works"),
+        [
+            ("libLLVM-14.so.1", (14, 0), False),
+            ("libLLVM-14.0.6.so", (14, 0), False),
+            ("libLLVM-15.so", (15, 0), False),
+            ("libLLVM-16.so.1", (16, 0), False),
+            ("libLLVM-17.so.1", (17, 0), True),
+            ("libLLVM.so.18.1", (18, 1), True),
+            ("libLLVM.so.19.1", (19, 1), True),
+            ("libLLVM.so.20.1", (20, 1), True),
+        ],
+    )
+    def test_version_from_name(self, only, name, version, works):
+        _library(only, name)
+        (found,) = find_llvm()
+        assert (found.version, found.works) == (version, works)
+
+    def test_version_through_links_and_folders(self, tmp_path, only):
+        real = _library(only, "libLLVM.so.19.1")
+        linked = tmp_path / "llvm-19" / "lib"
+        linked.mkdir(parents=True)
+        (linked / "libLLVM.so").symlink_to(real)
+        assert examine_llvm(str(linked / "libLLVM.so")).version == (19, 1)
+        brewed = tmp_path / "llvm" / "18.1.8" / "lib"
+        brewed.mkdir(parents=True)
+        _library(brewed, "libLLVM.so")
+        assert examine_llvm(str(brewed / "libLLVM.so")).version == (18, 1)
+
+    def test_the_newest_that_works_first_and_each_once(self, only):
+        for name in ("libLLVM-14.so.1", "libLLVM.so.18.1", "libLLVM.so.20.1", "libLLVM.so.19.1"):
+            _library(only, name)
+        (only / "libLLVM-19.so").symlink_to(only / "libLLVM.so.19.1")
+        assert [found.version for found in find_llvm()] == [(20, 1), (19, 1), (18, 1), (14, 0)]
+
+    def test_what_is_no_whole_llvm_is_not_listed(self, only):
+        for name in ("libLLVMCore.so.19.1", "libLLVMX86CodeGen.a", "libLLVM.a", "libclang-19.so"):
+            _library(only, name)
+        assert find_llvm() == []
+
+    def test_files_that_cannot_be_loaded_here(self, only):
+        other_machine = HEADER[:18] + bytes([HEADER[18] ^ 0x80, HEADER[19]]) + HEADER[20:]
+        assert not examine_llvm(str(_library(only, "libLLVM.so.19.1", other_machine))).works
+        assert "kind of processor" in examine_llvm(str(only / "libLLVM.so.19.1")).reason
+        assert "not a shared library" in examine_llvm(str(_library(only, "libLLVM.so.18.1", b"text"))).reason
+        assert "no such file" in examine_llvm(str(only / "libLLVM.so.17.1")).reason
+
+    def test_a_library_that_does_not_tell_is_asked_in_another_process(self, only):
+        found = examine_llvm(str(_library(only, "libLLVM.so")))  # a header alone cannot be loaded
+        assert (found.version, found.works) == (None, False)
+
+    def test_asking_and_naming_agree_on_this_machine(self):
+        here = [found for found in find_llvm() if found.works]
+        if not here:
+            pytest.skip("no libLLVM that works on this machine")
+        asked = llvm._version_asked(here[0].path)
+        assert asked is not None
+        assert asked[0] == here[0].version[0]
+
+
+@linux
+class TestPrepare:
+    """The check before the first kernel."""
+
+    def test_tells_drjit_the_newest_that_works(self, only, monkeypatch):
+        _library(only, "libLLVM-14.so.1")
+        newest = _library(only, "libLLVM.so.19.1")
+        assert prepare().variant == "llvm_ad_rgb"
+        assert os.environ["DRJIT_LIBLLVM_PATH"] == str(newest)
+
+    def test_the_users_setting_wins_if_it_works(self, only, tmp_path, monkeypatch):
+        own = _library(tmp_path, "libLLVM-17.so.1")
+        _library(only, "libLLVM.so.19.1")
+        monkeypatch.setenv("DRJIT_LIBLLVM_PATH", str(own))
+        assert prepare().llvm.path == str(own)
+
+    def test_a_setting_that_does_not_work_is_named(self, only, tmp_path, monkeypatch):
+        own = _library(tmp_path, "libLLVM-14.so.1")
+        _library(only, "libLLVM.so.19.1")
+        monkeypatch.setenv("DRJIT_LIBLLVM_PATH", str(own))
+        with pytest.raises(MissingError, match=r"DRJIT_LIBLLVM_PATH names .*libLLVM-14.so.1.*unset it"):
+            prepare()
+        assert "libllvm19" not in missing_packages()
+
+    @pytest.mark.parametrize("names", [[], ["libLLVM-14.so.1", "libLLVM-15.so.1"]])
+    def test_without_a_working_llvm(self, only, names, monkeypatch):
+        monkeypatch.setattr(environment.shutil, "which", lambda name: "/usr/bin/apt-get" if "apt" in name else None)
+        for name in names:
+            _library(only, name)
+        with pytest.raises(MissingError, match=r"17 or newer is needed.*apt-get install -y libllvm19") as caught:
+            prepare()
+        assert "\n" not in str(caught.value)
+        assert "DRJIT_LIBLLVM_PATH" not in os.environ
+
+    def test_without_libatomic_both_are_named_in_one_line(self, only, monkeypatch):
+        monkeypatch.setattr(environment, "atomic_problem", lambda: "libatomic.so.1 is missing")
+        monkeypatch.setattr(environment.shutil, "which", lambda name: "/usr/bin/apt-get" if "apt" in name else None)
+        with pytest.raises(MissingError, match=r"no libLLVM.*libatomic.*apt-get install -y libllvm19 libatomic1"):
+            prepare()
+
+    def test_cuda_is_chosen_where_it_works_and_does_without_llvm(self, only, monkeypatch):
+        monkeypatch.setattr(environment, "cuda_problem", lambda: "")
+        assert prepare() == environment.Prepared("cuda_ad_rgb", None)
+
+    def test_cuda_is_refused_with_its_reason(self, only):
+        with pytest.raises(MissingError, match=r"no GPU; use --variant llvm_ad_rgb"):
+            prepare("cuda_ad_rgb")
+
+    def test_unknown_variant_names_the_nearest(self, only, monkeypatch):
+        with pytest.raises(InputError, match=r"'llvm_rgb'.*did you mean llvm_ad_rgb"):
+            prepare("llvm_rgb")
+        monkeypatch.setenv("AIRLIGHT_VARIANT", "scalar_rgb")
+        with pytest.raises(InputError, match="scalar_rgb"):
+            prepare()
+
+    def test_without_fma(self, only, monkeypatch):
+        monkeypatch.setattr(environment, "_cpuinfo", lambda key: "fpu sse2")
+        monkeypatch.setattr(environment.os, "uname", lambda: os.uname_result(("Linux", "x", "6", "1", "x86_64")))
+        _library(only, "libLLVM.so.19.1")
+        with pytest.raises(MissingError, match="FMA"):
+            prepare()
+
+
+@linux
+def test_a_machine_with_llvm_14_alone_gets_a_message_and_no_abort(tmp_path):
+    _library(tmp_path / "lib", "libLLVM-14.so.1")
+    code = (
+        "import sys, pathlib, reports.machine.llvm, reports.machine.environment\n"
+        f"reports.machine.llvm.llvm_folders = lambda: [pathlib.Path({str(tmp_path / 'lib')!r})]\n"
+        "reports.machine.environment.cuda_problem = lambda: 'no GPU'\n"
+        "import airlight\n"
+        "sys.argv = ['airlight', 'render', 'open-fog', '--size', '8x6']\n"
+        "airlight.main()\n"
+    )
+    variables = {key: value for key, value in os.environ.items() if key != "DRJIT_LIBLLVM_PATH"}
+    variables |= {"PYTHONPATH": str(ROOT)}
+    ran = subprocess.run([sys.executable, "-c", code], env=variables, capture_output=True, text=True, timeout=120)
+    assert (ran.returncode, ran.stdout, ran.stderr.count("\n")) == (3, "", 1)
+    assert ran.stderr.startswith("airlight: error: the newest libLLVM here")
+    assert "libllvm19" in ran.stderr or "installer" in ran.stderr or "llvm" in ran.stderr
+
+
+def test_drjit_loads_the_library_that_was_chosen(variant):
+    if variant != "llvm_ad_rgb" or not Path("/proc/self/maps").exists():
+        pytest.skip("needs the LLVM backend and a system that tells what a process has loaded")
+    from reports.machine.doctor import try_kernel
+
+    found = try_kernel(variant)
+    assert os.path.realpath(found["library"]) == os.path.realpath(os.environ["DRJIT_LIBLLVM_PATH"])
+    assert found["threads"] >= 1
+
+
+def test_activate_keeps_a_current_variant(variant):
+    import mitsuba as mi
+
+    assert activate() == variant == mi.variant()
+
+
+def test_no_gpu_gives_a_reason(monkeypatch):
+    monkeypatch.setattr(gpu, "_load", lambda name, variable: None)
+    for status in (gpu.cuda_status(), gpu.optix_status()):
+        assert not status.works
+        assert "driver" in status.reason
+
+
+class _Driver:
+    """A CUDA driver that answers as a test wants."""
+
+    def __init__(self, version=12040, capability=(9, 0), devices=1, init=0):
+        self.version, self.capability, self.devices, self.init = version, capability, devices, init
+
+    def cuInit(self, flags):
+        return self.init
+
+    def cuDriverGetVersion(self, out):
+        out._obj.value = self.version
+        return 0
+
+    def cuDeviceGetCount(self, out):
+        out._obj.value = self.devices
+        return 0
+
+    def cuDeviceGet(self, out, number):
+        return 0
+
+    def cuDeviceGetName(self, out, size, device):
+        out.value = b"A GPU"
+        return 0
+
+    def cuDeviceGetAttribute(self, out, attribute, device):
+        out._obj.value = self.capability[attribute - 75]
+        return 0
+
+
+@pytest.mark.parametrize(
+    ("driver", "works", "word"),
+    [
+        (_Driver(), True, "A GPU, compute capability 9.0, CUDA 12.4"),
+        (_Driver(version=12010), False, "driver too old: CUDA 12.1"),
+        (_Driver(capability=(7, 0)), False, "7.5 or newer"),
+        (_Driver(devices=0), False, "no device"),
+        (_Driver(init=100), False, "no device"),
+    ],
+)
+def test_cuda_by_what_the_driver_says(driver, works, word, monkeypatch):
+    monkeypatch.setattr(gpu, "_load", lambda name, variable: driver)
+    status = gpu.cuda_status()
+    assert status.works == works
+    assert word in status.reason
+
+
+def test_optix_needs_its_library_and_a_driver_that_is_not_refused(monkeypatch):
+    found = {"libcuda.so.1": _Driver(version=12070)}
+    monkeypatch.setattr(gpu, "_load", lambda name, variable: found.get(name))
+    assert "565" in gpu.optix_status().reason
+    found["libcuda.so.1"] = _Driver()
+    assert "libnvoptix.so.1 cannot be loaded" in gpu.optix_status().reason
+    found["libnvoptix.so.1"] = type("OptiX", (), {"optixQueryFunctionTable": None})()
+    assert gpu.optix_status().works
+
+
+def test_versions_and_description_are_json_ready(variant):
+    import json
+
+    found = versions()
+    assert found["mitsuba"].startswith("3.9.")
+    assert "missing" not in found.values()
+    described = json.loads(json.dumps(describe_environment()))
+    assert described["versions"] == found
+    assert described["variant"] == variant

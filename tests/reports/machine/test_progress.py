@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import io
+import itertools
+import re
+from types import SimpleNamespace
+
+import pytest
+
+import reports.machine.progress
+from reports.machine.progress import counted, part_of, progress_bar
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    """A clock of our own; `clock.now` is what it shows [s]."""
+    clock = SimpleNamespace(now=100.0)
+    monkeypatch.setattr(reports.machine.progress, "time", SimpleNamespace(monotonic=lambda: clock.now))
+    return clock
+
+
+def test_short_work_says_nothing(capsys, clock):
+    with progress_bar("report") as tell:
+        for step in range(10):
+            clock.now += 0.19
+            tell(step / 10, "working")
+    captured = capsys.readouterr()
+    assert captured.err == captured.out == ""
+
+
+def test_long_work_says_what_is_left_in_plain_lines(capsys, clock):
+    with progress_bar("report") as tell:
+        clock.now += 30
+        tell(0.25, "sphere-spot: volpath")
+    captured = capsys.readouterr()
+    # A quarter took 30 s: three quarters take 90 s.
+    assert captured.err == "report: 25 %, about 90 s left, sphere-spot: volpath\n"
+    assert captured.out == ""  # --json must stay JSON
+
+
+def test_plain_lines_are_ten_seconds_apart(capsys, clock):
+    with progress_bar("bench") as tell:
+        for step in range(1, 101):
+            clock.now += 0.5
+            tell(step / 101, "x")
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 5
+    shares = [int(re.findall(r"(\d+) %", line)[0]) for line in lines]
+    assert shares == sorted(shares)
+
+
+@pytest.mark.parametrize("share", [0.0, 1.0])
+def test_beginning_and_end_are_no_news(capsys, clock, share):
+    """Nothing can be said of the time left at 0, and at 1 the result says it."""
+    with progress_bar("x") as tell:
+        clock.now += 60
+        tell(share, "x")
+    assert capsys.readouterr().err == ""
+
+
+def test_failure_goes_through(clock):
+    with pytest.raises(KeyError), progress_bar("x"):
+        raise KeyError
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+@pytest.mark.parametrize(("seconds", "shown"), [(0.5, False), (5.0, True)])
+def test_bar_on_a_terminal_appears_after_two_seconds_and_goes_away(monkeypatch, clock, seconds, shown):
+    screen = Terminal()
+    monkeypatch.setattr("sys.stderr", screen)
+    monkeypatch.setenv("TERM", "xterm-256color")
+    monkeypatch.setenv("COLUMNS", "120")
+    with progress_bar("report") as tell:
+        clock.now += seconds
+        tell(0.25, "open-fog: volpath")
+    text = screen.getvalue()
+    assert ("open-fog: volpath" in text) is shown
+    assert ("25 %" in text) is shown
+    if shown:
+        assert "\x1b[2K" in text  # the line is erased at the end
+    else:
+        assert text == ""
+
+
+def test_bar_goes_away_after_a_failure(monkeypatch, clock):
+    screen = Terminal()
+    monkeypatch.setattr("sys.stderr", screen)
+    monkeypatch.setenv("TERM", "xterm-256color")
+
+    def fail():
+        with progress_bar("report") as tell:
+            clock.now += 5
+            tell(0.25, "work")
+            raise KeyError
+
+    with pytest.raises(KeyError):
+        fail()
+    assert screen.getvalue().endswith("\x1b[2K") or "\x1b[?25h" in screen.getvalue()  # the cursor is back
+
+
+def test_parts_tell_shares_of_the_whole():
+    """From end to end, where the parts meet too, to the last digit; and nothing goes wrong where nobody listens."""
+    told = []
+    whole = [0.0, 0.3, 0.9, 1.0]  # 0.3 + (0.9 - 0.3) is not 0.9
+    for first, last in itertools.pairwise(whole):
+        tell = counted(part_of(lambda share, what: told.append((share, what)), first, last, before="map: "))
+        for done in range(3):
+            tell(done, 2, str(done))
+    assert [share for share, _ in told] == pytest.approx([0, 0.15, 0.3, 0.3, 0.6, 0.9, 0.9, 0.95, 1])
+    assert [share for share, what in told if what != "map: 1"] == [0, 0.3, 0.3, 0.9, 0.9, 1]
+    assert told[1][1] == "map: 1"
+    counted(part_of(None, 0, 1))(1, 2, "nobody")
+    counted(None)(1, 2, "nobody")

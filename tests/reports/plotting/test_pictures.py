@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import io
+
+import numpy as np
+import pytest
+
+from reports.plotting.pictures import (
+    ERROR_CEILING,
+    ERROR_FLOOR,
+    error_map,
+    error_scale,
+    exposure,
+    png_bytes,
+    tone_mapped,
+    write_png,
+)
+
+MAGENTA = (255, 0, 255)
+
+
+def one_pixel(*values):
+    return np.array([[values]], dtype=np.float64)
+
+
+def relative(error, *, level=1.0):
+    """The map of a pixel with a relative error in all channels."""
+    reference = np.full((1, 1, 3), level)
+    return error_map(reference, reference * (1 + error))[0, 0].astype(int)
+
+
+def test_exposure_brings_the_bright_pixels_to_nine_tenths():
+    image = np.random.default_rng(1).lognormal(size=(50, 40, 3))
+    assert np.percentile(exposure(image) * image, 99) == pytest.approx(0.9)
+    assert exposure(1e-6 * image) == pytest.approx(1e6 * exposure(image))
+
+
+def test_exposure_ignores_what_is_not_finite():
+    image = np.full((10, 10, 3), 0.3)
+    with_holes = image.copy()
+    with_holes[0, 0], with_holes[1, 1] = np.nan, np.inf
+    assert exposure(with_holes) == exposure(image) == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize("image", [np.zeros((4, 4, 3)), np.full((4, 4, 3), np.nan), np.zeros((0, 0, 3))])
+def test_exposure_of_nothing_is_one(image):
+    assert exposure(image) == 1.0
+
+
+@pytest.mark.parametrize(
+    ("linear", "encoded"),
+    # IEC 61966-2-1: 12.92 v below 0.0031308, 1.055 v^(1/2.4) - 0.055 above, times 255.
+    [(0.0, 0), (0.001, 3), (0.0031308, 10), (0.18, 118), (0.5, 188), (1.0, 255), (7.0, 255), (-0.5, 0)],
+)
+def test_tone_mapping_is_srgb(linear, encoded):
+    picture = tone_mapped(one_pixel(linear, linear, linear), 1.0)
+    assert picture.dtype == np.uint8
+    assert tuple(picture[0, 0]) == (encoded,) * 3
+
+
+def test_tone_mapping_multiplies_and_keeps_channels_apart():
+    picture = tone_mapped(one_pixel(0.25, 0.0, 0.09), 2.0)
+    assert tuple(picture[0, 0]) == (188, 0, 118)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_pixels_that_are_not_finite_are_magenta(bad):
+    image = np.full((2, 2, 3), 0.5)
+    image[0, 1, 2] = bad
+    for picture in (tone_mapped(image, 1.0), error_map(image, np.full((2, 2, 3), 0.5))):
+        assert tuple(picture[0, 1]) == MAGENTA
+        assert all(tuple(picture[p]) != MAGENTA for p in [(0, 0), (1, 0), (1, 1)])
+    assert tuple(error_map(np.full((2, 2, 3), 0.5), image)[0, 1]) == MAGENTA
+
+
+def test_error_map_is_red_where_too_bright_and_blue_where_too_dark():
+    bright, dark = relative(0.3), relative(-0.3)
+    assert bright[0] > bright[2] + 50
+    assert dark[2] > dark[0] + 50
+
+
+@pytest.mark.parametrize("error", [0.0, 0.9 * ERROR_FLOOR, -0.9 * ERROR_FLOOR])
+def test_error_below_the_floor_is_white(error):
+    assert relative(error).min() >= 250  # the middle of the colour scale is (250, 250, 250)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_colours_deepen_with_each_decade_up_to_the_ceiling(sign):
+    # In the middle of a diverging scale green falls off on both sides.
+    green = [relative(sign * error)[1] for error in (1e-4, 1e-3, 1e-2, 1e-1, 0.99)]
+    assert green == sorted(green, reverse=True)
+    assert len(set(green)) == len(green)
+    if sign > 0:
+        np.testing.assert_array_equal(relative(ERROR_CEILING), relative(50.0))
+
+
+def test_error_map_does_not_depend_on_the_brightness():
+    np.testing.assert_array_equal(relative(0.02), relative(0.02, level=1e-7))
+
+
+def test_largest_error_of_the_channels_counts_with_its_sign():
+    reference = np.ones((1, 1, 3))
+    mixed = error_map(reference, reference + np.array([0.01, -0.2, 0.05]))[0, 0]
+    np.testing.assert_array_equal(mixed, relative(-0.2))
+
+
+def test_dark_pixels_are_measured_against_a_thousandth_of_the_mean():
+    reference = np.full((1, 1000, 3), 1.0)
+    reference[0, 0] = 0
+    test = reference.copy()
+    test[0, 0] = 1e-5  # 1e-2 of the floor of 0.999e-3
+    np.testing.assert_allclose(error_map(reference, test)[0, 0].astype(int), relative(0.01), atol=2)
+
+
+def test_black_images_that_are_equal_are_white():
+    black = np.zeros((2, 3, 3))
+    assert error_map(black, black).min() >= 246
+
+
+def test_scale_runs_from_the_darkest_blue_to_the_darkest_red():
+    scale = error_scale()
+    assert scale.shape == (12, 510, 3)
+    np.testing.assert_allclose(scale[0, -1].astype(int), relative(ERROR_CEILING), atol=2)
+    np.testing.assert_allclose(scale[0, 0].astype(int), relative(-ERROR_CEILING), atol=2)
+    assert scale[0, 254:256].min() >= 250
+
+
+def test_png_brings_the_same_pixels_back(tmp_path):
+    from PIL import Image
+
+    picture = np.random.default_rng(2).integers(0, 256, (7, 5, 3), dtype=np.uint8)
+    write_png(tmp_path / "folder" / "a.png", picture)
+    with Image.open(tmp_path / "folder" / "a.png") as image:
+        assert image.mode == "RGB"
+        np.testing.assert_array_equal(np.asarray(image), picture)
+    with Image.open(io.BytesIO(png_bytes(picture))) as image:
+        np.testing.assert_array_equal(np.asarray(image), picture)

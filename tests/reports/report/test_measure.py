@@ -1,0 +1,317 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import json
+import re
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from analytic.errors import InputError
+from reports.data.reader import SCHEMA_FILE, named_files
+from reports.machine.progress import Interrupted
+from reports.page.filters import number, percent
+from reports.report.measure import write_report
+from reports.report.scene import file_stems
+from validation.configurations.methods import STANDARD, Configuration
+from validation.frames.scene_study import EFFORTS, Effort
+
+SCENE = """<scene version="3.0.0">
+    <medium type="homogeneous" id="fog">
+        <float name="sigma_t" value="0.31"/>
+        <rgb name="albedo" value="0.9, 0.8, 0.7"/>
+        <phase type="tabphase"><string name="values" value="0.3, 0.2, 0.4, 0.9, 2.0"/></phase>
+    </medium>
+    <emitter type="point">
+        <point name="position" value="0.9, 0.7, 1.9"/>
+        <rgb name="intensity" value="5, 4, 3"/>
+    </emitter>
+    <sensor type="perspective">
+        <float name="fov" value="41.7"/>
+        <transform name="to_world"><lookat origin="0.2, -4.1, 1.3" target="0.1, 0, 0.6" up="0, 0, 1"/></transform>
+        <ref name="medium" id="fog"/>
+        <film type="hdrfilm"><integer name="width" value="16"/><integer name="height" value="12"/></film>
+    </sensor>
+    <shape type="sphere"><point name="center" value="0.1, 0.1, 0.7"/><float name="radius" value="0.41"/></shape>
+    <shape type="rectangle"><transform name="to_world"><scale value="6.3"/></transform></shape>
+</scene>
+"""
+TINY = Effort(
+    "tiny",
+    (20, 15),
+    (12, 9),
+    (10, 8),
+    {"single-scatter": 0.2, "volpath": 0.5},
+    {"single-scatter": 4, "volpath": 4},
+    0.01,
+    multiple=(4, 1),
+)
+MARCH = Configuration("ray-march", None, (("steps", 50),))
+CHOSEN = (Configuration("unshadowed", "taylor"), Configuration("unshadowed", "quadrature"), MARCH)
+
+
+@pytest.fixture(scope="module")
+def monkeypatch_of_module():
+    with pytest.MonkeyPatch.context() as patch:
+        yield patch
+
+
+@pytest.fixture(scope="module")
+def written(variant, tmp_path_factory, monkeypatch_of_module):
+    """A report of one small scene; taylor refuses its tabulated phase function."""
+    # The cache that all tests share: what each of them finds in it is what this one left.
+    monkeypatch_of_module.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path_factory.getbasetemp() / "airlight-cache"))
+    folder = tmp_path_factory.mktemp("report")
+    (folder / "my <fog>.xml").write_text(SCENE)
+    told = []
+    data = write_report(
+        folder / "out" / "here",
+        scenes=[str(folder / "my <fog>.xml")],
+        effort=TINY,
+        configurations=CHOSEN,
+        command="airlight report --tiny",
+        progress=lambda share, what: told.append((share, what)),
+    )
+    return SimpleNamespace(folder=folder / "out" / "here", data=data, told=told)
+
+
+def test_json_file_is_what_is_returned(written):
+    def refuse(constant):
+        raise AssertionError(f"{constant} is not JSON")
+
+    text = (written.folder / "report.json").read_text(encoding="utf-8")
+    assert json.loads(text, parse_constant=refuse) == json.loads(json.dumps(written.data))
+
+
+def test_data_have_the_schema(written):
+    data = written.data
+    assert data["schema"] == "airlight-report/2"
+    assert re.fullmatch(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d [+-]\d{4}", data["created"])
+    assert data["command"] == "airlight report --tiny"
+    assert data["settings"]["name"] == "tiny"
+    assert data["environment"]["versions"]["mitsuba"]
+    (scene,) = data["scenes"]
+    assert scene["name"] == "my <fog>"
+    assert scene["path"].endswith("my <fog>.xml")
+    assert scene["size"] == [20, 15]
+    checks = {f"{estimator} {layer}" for estimator in TINY.margins for layer in ("airlight", "surface")}
+    assert set(scene["agreement"]) == checks
+    assert 0 < scene["multiple"]["medium"]["value"] < 1
+    assert [one["label"] for one in scene["methods"]] == [one.label for one in CHOSEN]
+
+
+def test_claims_follow_from_the_numbers(written):
+    (scene,) = written.data["scenes"]
+    assert "confirmed by Mitsuba's volpath in 2 of 2 comparisons" in written.data["claims"][1]["text"]
+    assert "confirmed by our own Mitsuba integrator in 2 of 2 comparisons" in written.data["claims"][0]["text"]
+    assert (
+        written.data["claims"][-1]["text"] == "Refused, with the reason in the tables: unshadowed (taylor) in my <fog>."
+    )
+    rmse = {one["label"]: one["error"]["relative_rmse"] for one in scene["methods"] if one["error"]}
+    reached = min(rmse.values()) <= 0.01
+    assert ("no method reaches a relative RMSE of 1 %" in written.data["claims"][2]["text"]) is not reached
+
+
+def test_refused_method_has_its_reason_and_no_files(written):
+    taylor = written.data["scenes"][0]["methods"][0]
+    assert "tabulated" in taylor["refused"]
+    assert taylor["files"] == {}
+    assert taylor["times"] is taylor["error"] is None
+
+
+def test_every_file_that_is_named_is_there(written):
+    (scene,) = written.data["scenes"]
+    named = [*scene["files"].values(), *(name for one in scene["methods"] for name in one["files"].values())]
+    assert len(named) == len(set(named)) == 3 + 2 * 3
+    assert all((written.folder / name).stat().st_size > 0 for name in named)
+    there = {str(path.relative_to(written.folder)) for path in written.folder.rglob("*") if path.is_file()}
+    assert there == {*named, "report.json", "report.html"}
+
+
+def test_images_can_be_read_and_give_the_errors_of_the_table(written):
+    from reference.storage.exr import read_exr
+    from validation.metrics.errors import error_metrics
+
+    (scene,) = written.data["scenes"]
+    reference = read_exr(written.folder / scene["files"]["exr"])
+    assert set(reference.layers) >= {"airlight", "airlight_bound", "surface"}
+    assert reference.attributes["airlight:estimator"] == "quadrature"
+    assert reference.layers["airlight"].shape == (15, 20, 3)
+    for one in scene["methods"][1:]:
+        image = read_exr(written.folder / one["files"]["exr"])
+        found = error_metrics(reference.layers["airlight"], image.layers["airlight"])
+        # The file of the reference is rounded to float32: 6e-8 of the mean in each pixel.
+        assert found.relative_rmse == pytest.approx(one["error"]["relative_rmse"], abs=2e-7)
+        assert found.relative_bias == pytest.approx(one["error"]["relative_bias"], abs=2e-7)
+        assert image.attributes["airlight:method"] == one["method"]
+    assert image.attributes["airlight:steps"] == "50"
+
+
+def test_pictures_have_the_size_of_the_images(written):
+    from PIL import Image
+
+    (scene,) = written.data["scenes"]
+    for one in scene["methods"][1:]:
+        for kind in ("picture", "error"):
+            with Image.open(written.folder / one["files"][kind]) as picture:
+                assert picture.size == (20, 15)
+    with Image.open(written.folder / scene["files"]["picture"]) as picture:
+        pixels = np.asarray(picture)
+    # The exposure brings the 99th percentile to 0.9, sRGB 243.
+    assert 235 <= np.percentile(pixels, 99) <= 255
+
+
+def test_every_number_of_the_data_is_on_the_page(written):
+    page = (written.folder / "report.html").read_text(encoding="utf-8")
+    (scene,) = written.data["scenes"]
+    for one in scene["methods"][1:]:
+        for name in ("frame", "airlight", "surface", "rebuild"):
+            assert number(one["times"][name]["median_ms"]) in page
+        for name in ("relative_rmse", "relative_bias", "p50", "p99"):
+            assert percent(one["error"][name]) in page
+    for agreed in scene["agreement"].values():
+        assert percent(agreed["statistics"]["relative_bias"]) in page
+        assert percent(agreed["uncorrected_bias"]) in page
+    assert number(scene["truth"]["mean"], 5) in page
+    assert str(scene["truth"]["transitions"]) in page
+    assert "my &lt;fog&gt;" in page
+    assert "my <fog>" not in page
+    assert not re.search(r"""(src|href)\s*=\s*["']?(https?:)?//""", page)
+
+
+def test_progress_rises_to_one(written):
+    shares = [share for share, _ in written.told]
+    assert shares == sorted(shares)
+    assert shares[0] == 0.0
+    assert shares[-1] == pytest.approx(1.0)
+    assert all(what.startswith("my <fog>: ") for _, what in written.told[:-2])
+    assert [what for _, what in written.told[-2:]] == ["the page", "done"]
+
+
+def again(written, tmp_path, **options):
+    """The same report, into another folder."""
+    given = {"scenes": [written.data["scenes"][0]["path"]], "effort": TINY, "configurations": CHOSEN}
+    return write_report(tmp_path / "again", **(given | options))
+
+
+def test_a_second_report_is_kept_in_full(written, variant, tmp_path):
+    found = again(written, tmp_path)
+    assert (found["kept"], found["computed"]) == (3 + len(CHOSEN), 0)
+    assert found["measured"] == written.data["measured"]
+    (one,), (two,) = written.data["scenes"], found["scenes"]
+    assert [m["kept"] for m in two["methods"]] == [True] * len(CHOSEN)
+    for before, after in zip(one["methods"], two["methods"], strict=True):
+        assert before | {"kept": True} == after
+    assert {name: one[name] for name in one if name != "methods"} == {
+        name: two[name] for name in two if name != "methods"
+    }
+    for name in named_files(found):
+        assert (tmp_path / "again" / name).read_bytes() == (written.folder / name).read_bytes()
+
+
+def test_fresh_measures_again_and_finds_the_same_errors(written, variant, tmp_path):
+    found = again(written, tmp_path, fresh=True, configurations=CHOSEN[1:])
+    assert (found["kept"], found["computed"]) == (0, 3 + len(CHOSEN) - 1)
+    # From the same truth and the same frames: all but the times.
+    for one, two in zip(written.data["scenes"][0]["methods"][1:], found["scenes"][0]["methods"], strict=True):
+        assert one["error"] == two["error"]
+        assert one["times"] != two["times"]
+    assert written.data["scenes"][0]["agreement"] == found["scenes"][0]["agreement"]
+
+
+def test_a_changed_scene_is_measured_again(written, variant, tmp_path, monkeypatch, own_cache):
+    """In a cache of its own: what it finds anew replaces what was kept."""
+    multiple = written.data["scenes"][0]["multiple"]
+    monkeypatch.setattr("reports.report.scene.check_truth", lambda study, progress: {})
+    monkeypatch.setattr("reports.report.scene.study_multiple", lambda study: multiple)
+    path = tmp_path / "mine.xml"
+    counts = []
+    for sigma_t in ("0.31", "0.31", "0.37"):
+        path.write_text(SCENE.replace("0.31", sigma_t))
+        found = again(written, tmp_path, scenes=[str(path)], configurations=())
+        counts.append((found["kept"], found["computed"]))
+    assert counts == [(0, 3), (3, 0), (0, 3)]
+    assert found["scenes"][0]["truth"]["mean"] != written.data["scenes"][0]["truth"]["mean"]
+
+
+def test_ctrl_c_leaves_nothing_half_written_and_says_what_is_kept(written, variant, tmp_path, monkeypatch):
+    def stopped(*args, **kwargs):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("reports.report.scene.study_configuration", stopped)
+    target = tmp_path / "again"
+    target.mkdir()
+    (target / "report.html").write_text("the one before")
+    changed = (Configuration("unshadowed", "exact"),)
+    with pytest.raises(Interrupted, match="3 results are kept; nothing was written; run the same command again"):
+        again(written, tmp_path, configurations=changed)
+    assert [path.name for path in target.rglob("*")] == ["report.html"]
+    assert (target / "report.html").read_text() == "the one before"
+
+
+def test_json_keeps_to_its_schema(written):
+    import jsonschema
+
+    schema = json.loads(SCHEMA_FILE.read_text(encoding="utf-8"))
+    jsonschema.Draft202012Validator.check_schema(schema)
+    jsonschema.validate(json.loads((written.folder / "report.json").read_text(encoding="utf-8")), schema)
+
+
+def test_folder_that_is_a_file_is_refused_before_the_work(variant, tmp_path):
+    (tmp_path / "taken").write_text("mine")
+    with pytest.raises(InputError, match="not a folder"):
+        write_report(tmp_path / "taken", scenes=["open-fog"], effort=TINY)
+    assert (tmp_path / "taken").read_text() == "mine"
+
+
+def test_scenes_of_one_name_are_refused_before_the_work(variant, tmp_path):
+    """Their images would lie in one folder, and the second would replace the first."""
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "x.xml").write_text(SCENE)
+    names = [str(tmp_path / folder / "x.xml") for folder in ("a", "b")]
+    with pytest.raises(InputError, match="two scenes are called x"):
+        write_report(tmp_path / "out", scenes=names, effort=TINY)
+
+
+def test_unknown_scene_leaves_no_page(variant, tmp_path):
+    with pytest.raises(InputError, match="did you mean 'open-fog'"):
+        write_report(tmp_path, scenes=["open-fg"], effort=TINY)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_files_of_configurations_do_not_collide():
+    stems = file_stems([one.label for one in STANDARD])
+    assert len(set(stems)) == len(stems)
+    assert all(re.fullmatch(r"[a-z0-9-]+", stem) for stem in stems)
+    assert "reference" not in stems
+
+
+def test_labels_that_would_share_a_file_get_numbers():
+    # `x` has the picture x-error.png, which would be that of the label `x error` too.
+    stems = file_stems(["x", "X!", "x error", "reference", "\N{GREEK SMALL LETTER PHI}", "my.module:shafts (exact)"])
+    assert stems == ["x", "x-2", "x-error-2", "reference-2", "image", "my-module-shafts-exact"]
+
+
+def test_efforts_cost_more_and_promise_more_in_turn():
+    quick, default, full = (EFFORTS[name] for name in ("quick", "default", "full"))
+    for less, more in ((quick, default), (default, full)):
+        assert all(less.margins[name] >= more.margins[name] for name in less.margins)
+        assert less.margins["volpath"] > more.margins["volpath"]
+        assert less.checked[0] < more.checked[0]
+        assert less.image[0] < more.image[0]
+        assert less.seconds < more.seconds
+
+
+@pytest.mark.slow
+@pytest.mark.statistical
+def test_built_in_scene_with_all_standard_configurations(variant, tmp_path):
+    data = write_report(tmp_path, scenes=["open-fog", "sphere-spot"], effort=TINY)
+    fog, spot = data["scenes"]
+    assert fog["plan"]["shadows"].startswith("none")
+    assert set(fog["agreement"]) == {"single-scatter airlight", "volpath airlight"}
+    # Neither has bounded media, for which one configuration is.
+    assert len(fog["methods"]) < len(spot["methods"]) == len(STANDARD) - 1
+    best = {one["label"]: one["error"]["relative_rmse"] for one in fog["methods"]}
+    # 16 nodes without any shadow are the integral itself; float32 and the light in view leave 1e-5.
+    assert best["unshadowed (quadrature)"] < 1e-4
+    assert not any(one["error"]["nonfinite"] for scene in data["scenes"] for one in scene["methods"])

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import json
+
+import pytest
+import typer
+
+from reports.commands.stability import stability as command
+from reports.data.serialize import plain
+from reports.tables.kernels import convergence_data, print_convergence, print_kernel_bench
+from reports.tables.stability import boost
+from validation.kernels.benchmark import KernelBench, KernelCost, Spread, speed_against_error
+from validation.kernels.convergence import Convergence
+from validation.kernels.errors import Errors
+
+SPREAD = Spread(7.5, 7.25, 8.0, 9)
+ERRORS = Errors(3, 0, 2.0**-23, 1e-6, 2.0**-20, 2.0**-22, 0, 0, 0, None)
+
+
+def test_errors_are_printed_in_the_manner_of_boost():
+    assert boost(ERRORS, "single") == "Max = 8ε (Mean = 2ε)"
+    assert boost(Errors(0, 3, None, None, None, None, 0, 0, 0, None), "double") == "-"
+
+
+def test_costs_and_levels_are_printed(capsys):
+    costs = (
+        KernelCost("exact", "exact", None, "isotropic", 0.0, 480_000, SPREAD, SPREAD, 1e-7, 1e-6, 2e-5),
+        KernelCost("uniform-8", "uniform", 8, "isotropic", 0.0, 0, SPREAD, SPREAD, 0.1, 0.5, 0.9),
+        KernelCost("closed-form", "closed-form", None, "isotropic", 0.0, refused="not today"),
+    )
+    print_kernel_bench(KernelBench(costs, speed_against_error(costs)))
+    printed = capsys.readouterr().out
+    assert "closed-form, isotropic: refused: not today" in printed
+    exact, uniform = (next(line for line in printed.splitlines() if name in line) for name in ("exact", "uniform-8"))
+    assert exact.split()[:3] == ["exact", "7.5", "7.25..8"]
+    assert uniform.split()[1] == "~7.5"
+    cheapest = [line.split() for line in printed.splitlines() if line.strip().startswith(("0.0001 ", "1e-06 "))]
+    assert [line[:2] for line in cheapest] == [
+        ["0.0001", "exact"],
+        ["1e-06", "none"],
+        ["0.0001", "exact"],
+        ["1e-06", "exact"],
+    ]
+
+
+def test_convergence_without_a_declaration_is_printed(capsys):
+    print_convergence([Convergence("own", (4, 8), (0.1, 0.01), 3.3, 0.5)])
+    assert capsys.readouterr().out.splitlines()[-2].split() == ["own", "-", "-", "-", "4..8"]
+
+
+@pytest.fixture
+def few_laws(monkeypatch):
+    """The laws have tests of their own and cost most of the time."""
+    monkeypatch.setattr("validation.kernels.stability.laws", lambda function, rays: [])
+
+
+def test_command_prints_rays_that_can_be_run_again(variant, few_laws, capsys):
+    command(kernels="taylor-1", rays=64, json=False)
+    printed = capsys.readouterr().out
+    assert "=== taylor-1 ===" in printed
+    assert "refuses tabulated: kernel taylor" in printed
+    assert "tag,phase,g,t,h,x0,x1,sigma_t,value" in printed.splitlines()
+    assert "BROKEN" not in printed
+
+
+def test_command_prints_json_with_the_bar(variant, few_laws, capsys):
+    command(kernels="taylor-1", rays=64, json=True)
+    data = json.loads(capsys.readouterr().out)
+    assert data["bar"]["single_max"] == 3e-5
+    assert [one["kernel"] for one in data["kernels"]] == ["taylor-1"]
+    assert [one["name"] for one in data["kernels"][0]["sets"]] == [*data["certified"], "generated"]
+
+
+def test_command_fails_where_the_claim_is_broken(variant, few_laws, monkeypatch, capsys):
+    from realtime.kernels.registry import KERNELS
+
+    monkeypatch.setitem(KERNELS, "exact", KERNELS["taylor"])
+    with pytest.raises(typer.Exit) as caught:
+        command(kernels="exact", rays=64, json=False)
+    assert caught.value.exit_code == 1
+    assert "BROKEN: exact, airlight_integral.csv: float32 maximum" in capsys.readouterr().out
+
+
+def test_numbers_of_a_study_fit_json():
+    json.dumps(plain(Errors(1, 0, float("nan"), float("inf"), 1.0, 1.0, 0, 0, 0, None)), allow_nan=False)
+
+
+def test_a_convergence_is_json_without_its_rays(variant):
+    from validation.kernels.convergence import convergence
+
+    data = convergence_data(convergence("uniform", (4, 8)))
+    assert json.loads(json.dumps(data)) == data
+    assert data["declared"] == {"kind": "order", "value": 2.0, "power": 0.0}
+    assert len(data["errors"]) == len(data["sizes"]) == 2

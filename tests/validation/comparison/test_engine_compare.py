@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import re
+
+import numpy as np
+import pytest
+
+from analytic.errors import InputError
+from reference.storage.exr import Image, write_exr
+from validation.comparison.engine_compare import compare_scene, scene_of_size, truth_layer
+from validation.estimates.quadrature import truth_image
+from validation.scenes.loading import load_scene
+
+SCENE = """<scene version="3.0.0">
+    <medium type="homogeneous" id="fog"><float name="sigma_t" value="0.31"/><float name="albedo" value="0.83"/></medium>
+    <emitter type="point"><point name="position" value="0.7, 0.3, 1.9"/></emitter>
+    <sensor type="perspective">
+        <transform name="to_world"><lookat origin="0.2, -4.1, 1.3" target="0.1, 0, 0.6" up="0, 0, 1"/></transform>
+        <ref name="medium" id="fog"/>
+        <film type="hdrfilm"><integer name="width" value="32"/><integer name="height" value="24"/></film>
+    </sensor>
+    <shape type="sphere" id="ball"><float name="radius" value="0.4"/></shape>
+</scene>
+"""
+
+
+def refused(text):
+    return pytest.raises(InputError, match=re.escape(text))
+
+
+@pytest.fixture
+def scene(tmp_path):
+    path = tmp_path / "own.xml"
+    path.write_text(SCENE)
+    return str(path)
+
+
+@pytest.fixture
+def truth(scene, variant):
+    return truth_image(load_scene(scene, (16, 12)).scene)
+
+
+@pytest.fixture
+def write(tmp_path):
+    """Write layers as an EXR file."""
+
+    def written(**layers):
+        path = tmp_path / "engine.exr"
+        write_exr(path, Image({name.replace("__", "."): values for name, values in layers.items()}))
+        return path
+
+    return written
+
+
+def test_airlight_is_compared_where_there_is_one(scene, truth, write):
+    found = compare_scene(scene, write(airlight=truth.airlight, surface=2 * truth.surface))
+    assert (found.scene, found.size, found.expected, found.comparison.layer) == ("own", (16, 12), *["airlight"] * 2)
+    assert found.comparison.metrics.relative_rmse < 1e-6  # the file is float32
+    assert (found.failures, found.hints.words) == ((), ())
+    assert 0 <= found.truth_error < 1e-6
+    found = compare_scene(scene, write(airlight=truth.airlight, surface=2 * truth.surface), layer="surface")
+    np.testing.assert_allclose(found.comparison.metrics.relative_bias, 1, rtol=1e-6)
+
+
+def test_plain_channels_are_compared_with_all_light(scene, truth, write):
+    total = truth_layer(truth, "total")
+    for layers in ({"total": total}, {"Final__Combined": total}):
+        found = compare_scene(scene, write(**layers))
+        assert found.expected == "total"
+        assert found.comparison.metrics.relative_rmse < 1e-6
+    assert "airlight + surface, at pixel centres" in found.summary()
+
+
+def test_one_kind_of_light_alone_is_recognised(scene, truth, write):
+    for name in ("airlight", "surface"):
+        (words,) = compare_scene(scene, write(total=getattr(truth, name))).hints.words
+        assert words.startswith(f"the image is the {name} alone")
+
+
+def test_margin_decides_without_standard_errors(scene, truth, write):
+    file = write(airlight=1.01 * truth.airlight)
+    assert compare_scene(scene, file, margin=0.011).failures == ()
+    (reason,) = compare_scene(scene, file, margin=0.009).failures
+    assert reason == "the relative bias, +0.01, is not within +-0.009"
+    with refused("margin: got 0, wanted a relative bias above 0"):
+        compare_scene(scene, file, margin=0)
+    nan = truth.airlight.copy()
+    nan[2, 3] = np.nan
+    assert len(compare_scene(scene, write(airlight=nan), margin=0.01).failures) == 1
+
+
+def test_standard_errors_of_the_file_are_used(scene, truth, write):
+    error = 0.01 * truth.airlight
+    noisy = truth.airlight + error * np.random.default_rng(6).standard_normal(error.shape)
+    found = compare_scene(scene, write(airlight=noisy, airlight_se=error), margin=0.01)
+    assert found.comparison.statistics is not None
+    assert found.comparison.statistics.equivalent
+    assert found.failures == ()
+
+
+def test_pixels_can_be_means(scene, truth, write):
+    """The mean over a pixel differs from its centre most where the lamp is; both have the same scale."""
+    area = truth_image(load_scene(scene, (16, 12)).scene, pixel="area")
+    file = write(airlight=area.airlight)
+    assert compare_scene(scene, file, pixel="area").comparison.metrics.relative_rmse < 1e-6
+    assert compare_scene(scene, file).comparison.metrics.relative_rmse > 1e-3
+
+
+def test_json_has_every_number_once(scene, truth, write):
+    found = compare_scene(scene, write(airlight=2 * truth.airlight), margin=0.5).to_json()
+    assert (found["scene"], found["size"], found["expected"], found["pixel"]) == ("own", [16, 12], "airlight", "centre")
+    np.testing.assert_allclose([found["factor"], found["relative_bias"]], [0.5, 1], rtol=1e-6)
+    assert "2 times as bright" in found["hints"][0]
+    assert found["failures"] == ["the relative bias, +1, is not within +-0.5"]
+
+
+@pytest.mark.parametrize("size", [(32, 24), (16, 12), (64, 48), (31, 23), (33, 25), (8, 6), (1, 1)])
+def test_sizes_of_the_same_aspect_are_taken(scene, variant, size):
+    film = scene_of_size(scene, size, "engine.exr").scene.sensors()[0].film()
+    assert tuple(film.size()) == size
+
+
+@pytest.mark.parametrize("size", [(32, 20), (24, 32), (100, 100)])
+def test_another_aspect_is_refused_with_the_scenes_own(scene, variant, size):
+    with refused("own is 32 x 24, 1.333 to 1"):
+        scene_of_size(scene, size, "engine.exr")
+
+
+def test_layers_that_are_not_there_are_refused(scene, truth, write):
+    total = truth_layer(truth, "total")
+    with refused("has no layer 'airlihgt'"):
+        compare_scene(scene, write(airlight=truth.airlight), layer="airlihgt")
+    file = write(A__Combined=total, B__Combined=total)
+    with refused("it has A.Combined, B.Combined; name one by --layer"):
+        compare_scene(scene, file)
+    assert compare_scene(scene, file, layer="B.Combined").comparison.metrics.relative_rmse < 1e-6

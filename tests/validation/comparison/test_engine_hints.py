@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import math
+
+import numpy as np
+import pytest
+
+from validation.comparison.engine_hints import find_hints
+
+
+@pytest.fixture
+def truth():
+    """An image without symmetry, its channels apart."""
+    row, column = np.mgrid[:12, :16]
+    light = np.exp(-0.1 * (row - 3.2) ** 2 - 0.05 * (column - 10.7) ** 2) + 0.02 * column
+    return light[..., None] * np.array([0.9, 0.4, 0.2])
+
+
+def srgb(image):
+    return np.where(image <= 0.0031308, 12.92 * image, 1.055 * image ** (1 / 2.4) - 0.055)
+
+
+def test_the_right_image_raises_no_suspicion(truth):
+    noisy = truth * (1 + 0.005 * np.random.default_rng(3).standard_normal(truth.shape))
+    for image in (truth, noisy):
+        hints = find_hints(truth, image)
+        assert hints.words == ()
+        assert abs(hints.factor - 1) < 0.002
+    assert find_hints(truth, truth).factor_rmse == 0
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda image: image[::-1], ["upside down"]),
+        (lambda image: image[:, ::-1], ["mirrored left to right"]),
+        (lambda image: image[::-1, ::-1], ["turned by 180 degrees"]),
+        (lambda image: image[..., ::-1], ["channel order B, G, R"]),
+        (srgb, ["sRGB curve"]),
+        (lambda image: math.pi * image, ["3.142 times as bright as it should be (pi, +1.65 stops)"]),
+        (lambda image: image / (4 * math.pi), ["(1/(4 pi), -3.65 stops)"]),
+        (lambda image: 683 * image, ["683, lumens a watt"]),
+        (lambda image: image * 2**-2.5, ["0.1768 times as bright as it should be (-2.50 stops)"]),
+        (lambda image: 4 * math.pi * image[::-1], ["upside down", "(4 pi, +3.65 stops)"]),
+        (lambda image: srgb(image[..., ::-1]), ["channel order", "sRGB curve"]),
+        (lambda image: -image, ["the image is negative"]),
+    ],
+)
+def test_each_fault_is_named_and_nothing_else(truth, change, words):
+    found = find_hints(truth, change(truth)).words
+    assert len(found) == len(words)
+    for one, word in zip(found, words):
+        assert word in one
+    assert found[-1].endswith(f"instead of {relative_rmse(truth, change(truth)):.3g}")
+
+
+def relative_rmse(truth, image):
+    return np.sqrt(np.mean((image - truth) ** 2)) / truth.mean()
+
+
+def test_best_factor_is_that_of_least_squares(truth):
+    noisy = truth + 0.1 * np.random.default_rng(4).standard_normal(truth.shape)
+    hints = find_hints(truth, noisy)
+    wanted, *_ = np.linalg.lstsq(noisy.reshape(-1, 1), truth.reshape(-1), rcond=None)
+    np.testing.assert_allclose(hints.factor, wanted[0], rtol=1e-12)
+    np.testing.assert_allclose(hints.factor_rmse, relative_rmse(truth, wanted[0] * noisy), rtol=1e-12)
+
+
+def test_values_that_stop_are_found(truth):
+    (words,) = find_hints(truth, np.minimum(truth, 0.5)).words
+    assert words.startswith(f"{(truth >= 0.5).sum()} values stop at 0.5 where the truth goes up to ")
+    # A plateau of the truth itself is none.
+    assert find_hints(np.minimum(truth, 0.5), np.minimum(truth, 0.5)).words == ()
+
+
+def test_values_that_are_not_finite_are_left_out(truth):
+    image = 2 * truth
+    image[3, 4] = np.nan
+    hints = find_hints(truth, image)
+    np.testing.assert_allclose(hints.factor, 0.5, rtol=1e-12)
+    assert len(hints.words) == 1
+
+
+def test_black_images_raise_no_suspicion(truth):
+    assert find_hints(0 * truth, truth).words == ()
+    black = find_hints(truth, 0 * truth)
+    assert black.words == ()
+    assert math.isnan(black.factor)
+    assert find_hints(truth, np.full_like(truth, np.nan)).words == ()

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: BSD-3-Clause
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from analytic.errors import InputError
+from reference.storage.exr import Image, write_exr
+from validation.comparison.engine_images import EngineImage, find_images, image_flip, images_size, measure_image
+
+SCENES = {"open-fog": "open-fog", "hall": "hall", "hall.small": "hall.small", "mine": "folder/mine.xml"}
+SHAPE = (4, 6, 3)
+RANDOM = np.random.default_rng(5)
+AIRLIGHT, SURFACE = RANDOM.uniform(0.5, 2, SHAPE), RANDOM.uniform(0, 3, SHAPE)
+TRUTH = SimpleNamespace(airlight=AIRLIGHT, surface=SURFACE)
+
+
+def write(folder, name, **layers):
+    path = folder / name
+    write_exr(path, Image(layers or {"total": np.ones(SHAPE, dtype=np.float32)}))
+    return path
+
+
+def test_files_are_found_by_the_name_of_their_scene(tmp_path):
+    for name in ("open-fog.exr", "hall.godot.exr", "hall.unreal 5.4.exr", "hall.small.exr", "mine.EXR"):
+        write(tmp_path, "x.exr").rename(tmp_path / name)
+    (tmp_path / "notes.txt").write_text("not an image")
+    found = find_images(tmp_path, SCENES)
+    labels = {scene: [one.label for one in several] for scene, several in found.items()}
+    assert labels == {
+        "hall": ["godot", "unreal 5.4"],
+        "hall.small": [tmp_path.name],
+        "mine": [tmp_path.name],
+        "open-fog": [tmp_path.name],
+    }
+
+
+def test_a_file_that_names_no_scene_is_refused_with_the_nearest(tmp_path):
+    write(tmp_path, "open_fog.exr")
+    with pytest.raises(InputError, match=r"open_fog\.exr names no scene.*the nearest is open-fog"):
+        find_images(tmp_path, SCENES)
+
+
+def test_a_folder_without_images_is_refused(tmp_path):
+    with pytest.raises(InputError, match="has no EXR file"):
+        find_images(tmp_path, SCENES)
+    with pytest.raises(InputError, match="wanted a folder with EXR files"):
+        find_images(tmp_path / "nowhere", SCENES)
+
+
+def test_images_of_a_scene_have_one_size(tmp_path):
+    one, two = write(tmp_path, "hall.a.exr"), write(tmp_path, "hall.b.exr")
+    images = tuple(find_images(tmp_path, SCENES)["hall"])
+    assert images_size(images) == (6, 4)
+    write_exr(two, Image({"total": np.ones((4, 8, 3), dtype=np.float32)}))
+    with pytest.raises(InputError, match=r"hall\.b\.exr is 8 x 4 pixels and .*hall\.a\.exr 6 x 4"):
+        images_size(images)
+    assert one.is_file()
+
+
+def shown(path):
+    return EngineImage("hall", "godot", path)
+
+
+def test_a_layer_of_airlight_is_judged_as_such(tmp_path):
+    path = write(tmp_path, "hall.exr", airlight=1.1 * AIRLIGHT, surface=SURFACE)
+    found = measure_image(shown(path), TRUTH, surfaces=True)
+    assert found.layer == "airlight"
+    # The file holds float32: 6e-8.
+    assert found.error.relative_bias == pytest.approx(0.1, abs=1e-7)
+    assert found.surface_error.relative_rmse == pytest.approx(0, abs=1e-7)
+    np.testing.assert_allclose(found.light, 1.1 * AIRLIGHT + SURFACE, rtol=1e-6)
+    assert measure_image(shown(path), TRUTH, surfaces=False).surface_error is None
+
+
+def test_plain_channels_are_judged_against_all_light(tmp_path):
+    path = write(tmp_path, "hall.exr", total=0.9 * (AIRLIGHT + SURFACE))
+    found = measure_image(shown(path), TRUTH, surfaces=True)
+    assert (found.layer, found.surface_error) == ("total", None)
+    assert found.error.relative_bias == pytest.approx(-0.1, abs=1e-7)
+
+
+def test_what_the_reader_left_out_is_noted(tmp_path):
+    import OpenEXR
+
+    channels = {name: np.ones((4, 6), dtype=np.float16) for name in ("R", "G", "B", "A")}
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    OpenEXR.File(header, channels).write(str(tmp_path / "hall.exr"))
+    note = measure_image(shown(tmp_path / "hall.exr"), TRUTH, surfaces=True).note
+    assert "half floats" in note
+    assert "A" in note
+
+
+def test_a_file_without_any_light_is_refused(tmp_path):
+    path = write(tmp_path, "hall.exr", beauty=np.ones(SHAPE))
+    with pytest.raises(InputError, match="has no layer 'total'"):
+        measure_image(shown(path), TRUTH, surfaces=True)
+
+
+def test_there_is_no_flip_where_the_surface_is_missing(tmp_path):
+    path = write(tmp_path, "hall.exr", airlight=AIRLIGHT)
+    found = measure_image(shown(path), TRUTH, surfaces=True)
+    assert image_flip(found, TRUTH) is None
+    dark = SimpleNamespace(airlight=AIRLIGHT, surface=np.zeros(SHAPE))
+    assert image_flip(replace(found, surface_error=None), dark) is not None

@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import json
+
+import numpy as np
+import pytest
+
+from analytic.errors import InputError
+from reference.storage.exr import Image, write_exr
+from validation.comparison.images import compare_files, compare_images
+from validation.metrics.colour import colour_difference
+from validation.metrics.errors import error_metrics
+from validation.metrics.other_tools import published_errors
+
+SHAPE = (9, 12, 3)
+# The keys that the design promises to scripts.
+METRIC_KEYS = ["pixels", "bias", "relative_bias", "rmse", "relative_rmse", "p50", "p99", "max", "nonfinite", "negative"]
+STATISTIC_KEYS = ["z_mean", "z_std", "rejected", "expected_rejections", "relative_bias_ci", "detectable_bias"]
+
+
+@pytest.fixture
+def pair():
+    """Return a reference with standard errors and a test image, both with the same mean."""
+    rng = np.random.default_rng(9)
+    truth = rng.gamma(2.0, 0.3, SHAPE)
+    error = 0.02 * truth
+    layers = {"airlight": truth + error * rng.standard_normal(SHAPE), "airlight_se": error, "surface": 2 * truth}
+    return Image(layers, attributes={"airlight:batches": 64}), Image({"airlight": truth, "surface": 2.02 * truth})
+
+
+def test_metrics_and_statistics_of_a_layer(pair):
+    comparison = compare_images(*pair, margin=0.02)
+    assert comparison.metrics == error_metrics(pair[0].layers["airlight"], pair[1].layers["airlight"])
+    assert comparison.statistics.tested == 9 * 12 * 3
+    # The mean z of 324 values has the error 0.056; four of them.
+    assert abs(comparison.statistics.z_mean) < 0.23
+    assert comparison.statistics.equivalent is True
+    assert comparison.failures == ()
+
+
+def test_batches_of_the_header_widen_the_law(pair):
+    reference, test = pair
+    few = Image(reference.layers, attributes={"airlight:batches": 2})
+    many, two = (compare_images(image, test).statistics for image in (reference, few))
+    assert two.exceeding < many.exceeding + 1
+    assert two.detectable_bias > many.detectable_bias
+    for wrong, message in (("many", "airlight:batches 'many'; wanted an integer"), (1, "got 1, wanted at least 2")):
+        with pytest.raises(InputError, match=message):
+            compare_images(Image(reference.layers, attributes={"airlight:batches": wrong}), test)
+
+
+def test_standard_errors_of_the_test_image_count_too(pair):
+    reference, test = pair
+    swapped = compare_images(test, reference)
+    assert swapped.statistics.tested == 324
+    both = compare_images(reference, reference)
+    assert both.statistics.detectable_bias == pytest.approx(
+        np.sqrt(2) * compare_images(reference, test).statistics.detectable_bias, rel=0.02
+    )
+
+
+def test_json_has_the_promised_keys_and_plain_values(pair):
+    text = json.dumps(compare_images(*pair).to_json(), allow_nan=False)
+    values = json.loads(text)
+    assert set(METRIC_KEYS + STATISTIC_KEYS) <= values.keys()
+    assert values["relative_bias_ci"][0] < values["relative_bias"] < values["relative_bias_ci"][1]
+    assert values["layer"] == "airlight"
+    assert values["failures"] == []
+
+
+def test_without_standard_errors_there_are_metrics_alone(pair):
+    comparison = compare_images(*pair, layer="surface")
+    assert comparison.statistics is None
+    assert comparison.metrics.relative_bias == pytest.approx(0.01, rel=1e-12)
+    values = comparison.to_json()
+    assert set(METRIC_KEYS) <= values.keys()
+    assert not set(STATISTIC_KEYS) & values.keys()
+    assert "z " not in comparison.summary()
+
+
+def test_a_margin_without_standard_errors_is_refused(pair):
+    with pytest.raises(InputError, match="neither the reference nor the test image has a layer 'surface_se'"):
+        compare_images(*pair, layer="surface", margin=0.01)
+
+
+def test_failures_name_what_is_wrong(pair):
+    reference, test = pair
+    wrong = 1.05 * test.layers["airlight"]
+    wrong[0, 0, 0] = np.nan
+    wrong[2, 1:3, 1] = -1e-9
+    comparison = compare_images(reference, Image({"airlight": wrong}), margin=0.01)
+    assert comparison.failures == (
+        "1 pixels are NaN or infinite",
+        "2 pixels of the test image are negative",
+        "the relative bias is not shown to be within +-0.01",
+    )
+    assert comparison.metrics.relative_bias == pytest.approx(comparison.statistics.relative_bias, rel=1e-12)
+    assert "NOT inside" in comparison.summary()
+
+
+def test_mask(pair):
+    mask = np.zeros(SHAPE[:2], dtype=bool)
+    mask[3:5] = True
+    comparison = compare_images(*pair, mask=mask)
+    assert comparison.metrics.pixels == 24
+    assert comparison.statistics.tested == 72
+    assert (comparison.masked, comparison.statistics.masked, comparison.to_json()["masked"]) == (84, 84, 84)
+    assert "24 pixels, 84 masked" in comparison.summary()
+
+
+def test_summary_is_plain_text(pair):
+    text = compare_images(*pair, margin=0.02).summary()
+    for part in ("airlight, 108 pixels", "relative bias", "95 % interval", "inside", "Sidak", "90 % power"):
+        assert part in text
+    assert text.isascii()
+    assert max(map(len, text.splitlines())) <= 132
+
+
+def test_files(pair, tmp_path):
+    for name, image in zip("ab", pair):
+        write_exr(tmp_path / f"{name}.exr", image)
+    comparison = compare_files(tmp_path / "a.exr", tmp_path / "b.exr", margin=0.02)
+    in_memory = compare_images(*pair, margin=0.02)
+    # Files hold float32: each value is rounded by at most 6e-8 of itself.
+    assert comparison.metrics.rmse == pytest.approx(in_memory.metrics.rmse, rel=1e-4)
+    assert comparison.statistics.detectable_bias == pytest.approx(in_memory.statistics.detectable_bias, rel=1e-5)
+    total = compare_files(tmp_path / "a.exr", tmp_path / "b.exr", "total")
+    assert total.statistics is None
+    assert total.metrics.pixels == 108
+
+
+def test_a_mask_from_a_file(pair, tmp_path):
+    mask = np.zeros(SHAPE, dtype=np.float32)
+    mask[3:5, :, 1] = 1
+    for name, image in zip("abm", (*pair, Image({"total": mask}))):
+        write_exr(tmp_path / f"{name}.exr", image)
+    comparison = compare_files(tmp_path / "a.exr", tmp_path / "b.exr", mask=tmp_path / "m.exr")
+    assert (comparison.metrics.pixels, comparison.masked) == (24, 84)
+    mask[0, 0, 0] = np.nan
+    write_exr(tmp_path / "m.exr", Image({"total": mask}))
+    with pytest.raises(InputError, match=r"m\.exr as a mask has values that are not finite"):
+        compare_files(tmp_path / "a.exr", tmp_path / "b.exr", mask=tmp_path / "m.exr")
+
+
+def test_zero_reference_and_both_variances_are_shown(pair):
+    reference, test = pair
+    dark = reference.layers["airlight"].copy()
+    dark[0] = 0
+    comparison = compare_images(Image({**reference.layers, "airlight": dark}), test)
+    assert comparison.to_json()["zero_reference"] == 36
+    assert "zero reference   36 values, the test image there up to" in comparison.summary()
+    assert "variance         100 % of it the reference's" in comparison.summary()
+
+
+def test_all_metrics_are_those_of_their_modules(pair):
+    comparison = compare_images(*pair, all_metrics=True, exposure=-1.0)
+    one, two = (image.layers["airlight"] for image in pair)
+    assert comparison.errors == published_errors(one, two)
+    assert comparison.errors_normalised == published_errors(one, two, unit=None)
+    assert comparison.colour == colour_difference(one, two, exposure=-1.0)
+    values = json.loads(json.dumps(comparison.to_json(), allow_nan=False))
+    assert values["errors"]["mrse_pbrt"] == comparison.errors.mrse_pbrt
+    assert values["colour"]["exposure"] == -1
+    assert "flip" not in values
+    assert set(METRIC_KEYS + STATISTIC_KEYS) <= values.keys()
+    text = comparison.summary()
+    for part in ("mrse_pbrt", "smape", "CIEDE2000", "Delta E ITP", "-1.00 stops", "dark values"):
+        assert part in text
+    assert max(map(len, text.splitlines())) <= 132
+
+
+def test_flip_that_fails_is_a_note_and_no_failure(pair):
+    comparison = compare_images(Image({"airlight": np.zeros(SHAPE)}), pair[1], flip=True)
+    assert comparison.flip.value is None
+    assert comparison.failures == ()
+    assert "HDR-FLIP         none: the reference is black" in comparison.summary()
+    assert comparison.to_json()["flip"]["note"].startswith("the reference is black")
+
+
+def test_an_exposure_for_nothing_is_refused(pair):
+    with pytest.raises(InputError, match="exposure is for the colour differences and FLIP"):
+        compare_images(*pair, exposure=1.0)
+
+
+def test_messages_name_the_file(pair, tmp_path):
+    write_exr(tmp_path / "a.exr", pair[0])
+    write_exr(tmp_path / "b.exr", Image({"airlight": np.ones((4, 4, 3))}))
+    with pytest.raises(InputError, match=r"b\.exr has no layer 'surface'; it has airlight, total"):
+        compare_files(tmp_path / "a.exr", tmp_path / "b.exr", "surface")
+    with pytest.raises(InputError, match="reference is 12 x 9 pixels with 3 channels, the test 4 x 4"):
+        compare_files(tmp_path / "a.exr", tmp_path / "b.exr")
+    with pytest.raises(InputError, match=r"cannot read .*c\.exr"):
+        compare_files(tmp_path / "a.exr", tmp_path / "c.exr")

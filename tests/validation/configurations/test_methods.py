@@ -1,0 +1,205 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import re
+
+import numpy as np
+import pytest
+
+from analytic.errors import InputError
+from realtime.kernels.registry import KERNELS
+from realtime.methods.registry import METHODS
+from tests.helpers.scenes import tiny_scene
+from validation.configurations.kernel_names import find_kernel
+from validation.configurations.methods import (
+    QUICK,
+    STANDARD,
+    Configuration,
+    chosen_configurations,
+    configuration,
+    parse_settings,
+    prepared,
+)
+
+
+def refused(text):
+    return pytest.raises(InputError, match=re.escape(text))
+
+
+def test_unknown_method_is_refused_with_the_nearest():
+    with refused("did you mean 'ray-march'?"):
+        configuration("raymarch")
+    with refused(", ".join(METHODS)):
+        configuration("")
+
+
+def test_unknown_kernel_is_refused_with_the_nearest():
+    with refused("did you mean 'quadrature'?"):
+        configuration("unshadowed", "quadratur")
+
+
+def test_unknown_parameter_is_refused_with_the_nearest():
+    with refused("did you mean 'steps'?") as caught:
+        configuration("ray-march", None, {"step": 7})
+    assert all(name in str(caught.value) for name in METHODS["ray-march"].parameters)
+
+
+def test_parameter_of_a_method_without_any_is_refused():
+    with refused("wanted one of: none"):
+        configuration("unshadowed", None, {"steps": 7})
+
+
+def test_kernel_for_a_method_that_calls_none_is_refused():
+    with refused("calls no kernel"):
+        configuration("ray-march", "taylor")
+
+
+@pytest.mark.parametrize("value", ["many", "1.5", "", "0x10", None, [3]])
+def test_value_of_the_wrong_type_is_refused(value):
+    with refused("wanted a whole number"):
+        configuration("ray-march", None, {"steps": value})
+
+
+@pytest.mark.parametrize("value", [7.9, True])
+def test_number_that_is_not_whole_is_refused_rather_than_rounded(value):
+    with refused("wanted a whole number"):
+        configuration("ray-march", None, {"steps": value})
+
+
+def test_words_become_values_of_the_type_of_the_default():
+    chosen = configuration("ray-march", None, {"steps": "17", "shadow": "map", "map": " 64 "})
+    assert chosen == Configuration("ray-march", None, (("steps", 17), ("shadow", "map"), ("map", 64)))
+    assert configuration("ray-march", None, {"steps": np.int64(17)}).parameters == (("steps", 17),)
+
+
+def test_method_that_calls_a_kernel_has_the_exact_one_by_default():
+    assert configuration("unshadowed") == Configuration("unshadowed", "exact")
+    assert configuration("ray-march") == Configuration("ray-march")
+
+
+@pytest.mark.parametrize(
+    ("chosen", "label"),
+    [
+        (Configuration("ray-march"), "ray-march"),
+        (Configuration("unshadowed", "taylor"), "unshadowed (taylor)"),
+        (Configuration("m", "k", (("steps", 3), ("shadow", "map"))), "m (k, steps=3, shadow=map)"),
+    ],
+)
+def test_label_says_all(chosen, label):
+    assert chosen.label == label
+
+
+def test_standard_configurations_are_valid_and_tell_apart():
+    assert [configuration(one.method, one.kernel, dict(one.parameters)) for one in STANDARD] == list(STANDARD)
+    assert len({one.label for one in STANDARD}) == len(STANDARD)
+
+
+def test_every_method_has_a_standard_configuration():
+    assert {one.method for one in STANDARD} == set(METHODS)
+    assert {one.method for one in QUICK} == set(METHODS)
+    assert set(QUICK) <= set(STANDARD)
+    assert {one.kernel for one in STANDARD} - {None} <= set(KERNELS)
+
+
+def test_chosen_methods_bring_their_standard_configurations():
+    assert chosen_configurations(["unshadowed"]) == tuple(one for one in STANDARD if one.method == "unshadowed")
+    assert set(chosen_configurations(list(METHODS))) == set(STANDARD)
+    with refused("did you mean"):
+        chosen_configurations(["unshadowed", "unshadwed"])
+
+
+def test_method_without_a_standard_configuration_is_measured_with_its_defaults(monkeypatch):
+    monkeypatch.setattr("validation.configurations.methods.STANDARD", ())
+    assert chosen_configurations(["unshadowed"]) == (Configuration("unshadowed", "exact"),)
+
+
+def test_settings_are_read():
+    assert parse_settings(["steps=100", " shadow = map ", "a=b=c"]) == {"steps": "100", "shadow": "map", "a": "b=c"}
+    assert parse_settings([]) == {}
+
+
+@pytest.mark.parametrize("word", ["steps", "steps=", "=100", "", "steps 100"])
+def test_setting_that_is_no_pair_is_refused(word):
+    with refused(f"got {word!r}, wanted NAME=VALUE"):
+        parse_settings([word])
+
+
+def test_kernels_of_ones_own_come_through_the_same_door(variant):
+    import mitsuba as mi
+
+    from realtime.frame.renderer import render_frame
+    from realtime.scene.read_scene import read_scene
+
+    scene = read_scene(mi.load_dict(tiny_scene(ball=None)))
+    own, built_in = (
+        render_frame(prepared(scene, configuration("unshadowed", kernel)))
+        for kernel in ("realtime.kernels.taylor:taylor", "taylor")
+    )
+    np.testing.assert_array_equal(own.airlight, built_in.airlight)
+
+
+@pytest.mark.parametrize(
+    "name", ["gone:function", "realtime.kernels:gone", "realtime.kernels.:x", ":x", "realtime.kernels:"]
+)
+def test_kernel_that_cannot_be_imported_is_refused(name):
+    with refused("wanted an importable 'module:function'") as caught:
+        find_kernel(name)
+    assert name in str(caught.value)
+
+
+def test_kernel_of_ones_own_that_is_no_function_is_refused():
+    with refused("wanted an importable 'module:function'"):
+        find_kernel("math:pi")
+
+
+@pytest.mark.parametrize(("word", "value"), [("yes", True), ("False", False), (True, True), ("0", False)])
+def test_truth_values_of_ones_own_method_are_read(own_module, word, value):
+    assert configuration(f"{own_module}:f", None, {"on": word}).parameters == (("on", value),)
+
+
+def test_method_of_ones_own_has_no_kernel_unless_it_takes_one(own_module):
+    assert configuration(f"{own_module}:f") == Configuration(f"{own_module}:f")
+    assert configuration(f"{own_module}:g") == Configuration(f"{own_module}:g", "exact")
+    assert chosen_configurations([f"{own_module}:g"]) == (Configuration(f"{own_module}:g", "exact"),)
+    with refused("calls no kernel"):
+        configuration(f"{own_module}:f", "taylor")
+    with refused("on got 'maybe', wanted true or false"):
+        configuration(f"{own_module}:f", None, {"on": "maybe"})
+    with refused("has no 'h'"):
+        configuration(f"{own_module}:h")
+
+
+def test_function_itself_is_taken_by_its_name(own_module, monkeypatch):
+    import importlib
+    import sys
+
+    monkeypatch.setattr(sys, "path", [str(own_module.parent), *sys.path])
+    module = importlib.import_module(own_module.stem)
+    assert configuration(module.f).method == f"{own_module.stem}:f"
+    with refused("wanted a name or a function at the top of a module"):
+        configuration(lambda view: 1)
+    with refused("wanted a name or a function"):
+        configuration(7)
+
+
+@pytest.fixture
+def own_module(tmp_path):
+    """The path of a file with two methods of one's own."""
+    path = tmp_path / "own_configuration_for_tests.py"
+    path.write_text("def f(view, on=True):\n    return 1\n\n\ndef g(view, *, kernel):\n    return 1\n")
+    return path
+
+
+def test_prepared_renderer_has_the_parameters(variant):
+    """More steps are nearer to the integral: the parameter arrives."""
+    import mitsuba as mi
+
+    from realtime.frame.renderer import render_frame
+    from realtime.scene.read_scene import read_scene
+
+    scene = read_scene(mi.load_dict(tiny_scene(ball=None)))
+    integral = render_frame(prepared(scene, configuration("unshadowed"))).airlight
+    errors = [
+        np.abs(render_frame(prepared(scene, configuration("ray-march", None, {"steps": steps}))).airlight - integral)
+        for steps in (4, 64)
+    ]
+    # Midpoint steps converge with the square of their number: 256 times, where rounding of 1e-6 does not end it.
+    assert errors[1].mean() < 0.05 * errors[0].mean()

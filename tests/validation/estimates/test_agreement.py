@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: BSD-3-Clause
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from reference.scene.read import read_truth
+from tests.helpers.scenes import tiny_scene
+from validation.estimates.agreement import MASK_PIXELS, agreement, pixel_angle
+
+pytestmark = pytest.mark.statistical
+
+BUDGET = {"margin": 0.02, "batches": 40, "samples": 64}
+
+
+@pytest.fixture(scope="module")
+def scene(variant):
+    import mitsuba as mi
+
+    return mi.load_dict(tiny_scene(size=(24, 18)))
+
+
+def false_truth(monkeypatch, change):
+    """Let the comparison take a changed image for the truth."""
+    import validation.estimates.agreement
+
+    true = validation.estimates.agreement.truth_image
+    monkeypatch.setattr(
+        validation.estimates.agreement, "truth_image", lambda *args, **kwargs: change(true(*args, **kwargs))
+    )
+
+
+def test_volpath_agrees_with_the_truth(scene):
+    found = agreement(scene, **BUDGET)
+    assert set(found) == {"airlight", "surface"}
+    for layer, one in found.items():
+        assert (one.layer, one.width, one.height, one.samples) == (layer, 24, 18, 64)
+        assert 32 <= one.batches <= 40
+        statistics = one.statistics
+        # The half width is 0.7 %: a right truth would be called wrong once in 10 000 seeds, and the seeds are fixed.
+        assert statistics.equivalent is True, layer
+        assert statistics.rejected == 0
+        assert statistics.rejected_blocks == 0
+        # 40 batches: the standard deviation of z is sqrt(39/37) = 1.03, with 1000 values +-0.03.
+        assert statistics.z_std == pytest.approx(1.03, abs=0.12)
+        assert statistics.margin == 0.02
+        assert statistics.detectable_bias < 0.05
+
+
+@pytest.mark.parametrize("layer", ["airlight", "surface"])
+@pytest.mark.parametrize("factor", [1.05, 0.95])
+def test_truth_that_is_five_per_cent_off_does_not_agree(scene, monkeypatch, layer, factor):
+    """In one layer alone; the other one still agrees."""
+    false_truth(monkeypatch, lambda image: replace(image, **{layer: factor * getattr(image, layer)}))
+    found = agreement(scene, **BUDGET)
+    assert found[layer].statistics.equivalent is False
+    assert found[layer].statistics.relative_bias == pytest.approx(1 / factor - 1, abs=0.015)
+    (other,) = set(found) - {layer}
+    assert found[other].statistics.equivalent is True
+
+
+def test_truth_that_is_wrong_in_a_corner_is_rejected_there(scene, monkeypatch):
+    """A wrong shadow is no bias of the image; the tests of pixels and blocks must find it."""
+
+    def corner(image):
+        airlight = image.airlight.copy()
+        airlight[:6, :6] *= 1.4
+        return replace(image, airlight=airlight)
+
+    false_truth(monkeypatch, corner)
+    statistics = agreement(scene, **BUDGET)["airlight"].statistics
+    assert statistics.rejected + statistics.rejected_blocks > 0
+
+
+def test_leg_from_the_light_that_is_too_short_does_not_agree(scene, monkeypatch):
+    """A tenth of the leg left out is exp(0.1 sigma_t r), some 4 % too bright."""
+    import validation.estimates.agreement
+
+    monkeypatch.setattr(validation.estimates.agreement, "measure_shadow_epsilon", lambda: 0.1)
+    found = agreement(scene, **BUDGET)
+    assert not any(one.statistics.equivalent for one in found.values())
+    assert found["airlight"].epsilon == 0.1
+
+
+def test_correction_for_the_epsilon_is_the_difference_of_the_two_biases(scene):
+    """The truth of the shortened leg is brighter by about sigma_t epsilon r = 0.31 * 8.94e-4 * 2."""
+    for one in agreement(scene, **BUDGET).values():
+        shift = one.uncorrected_bias - one.statistics.relative_bias
+        assert shift == pytest.approx(0.31 * one.epsilon * 2, rel=0.5)
+
+
+def test_pixels_near_a_light_are_left_out(scene):
+    from validation.estimates.quadrature import truth_image
+
+    near = truth_image(scene).light_angle <= MASK_PIXELS * pixel_angle(read_truth(scene))
+    found = agreement(scene, **BUDGET)
+    assert found["airlight"].masked == near.sum()
+    assert 4 <= near.sum() <= 16  # a disc of two pixels' radius
+    assert found["surface"].masked == 0
+
+
+def test_pixel_angle_is_that_of_the_middle(scene):
+    # 49 degrees over 24 pixels; the tangent is linear to 1e-3 at the centre.
+    assert pixel_angle(read_truth(scene)) == pytest.approx(2 * np.tan(np.deg2rad(24.5)) / 24, rel=2e-3)
+
+
+def test_scene_without_surfaces_has_the_airlight_alone(variant):
+    import mitsuba as mi
+
+    found = agreement(mi.load_dict(tiny_scene(size=(12, 9), ball=None, floor=None)), margin=0.5, samples=4)
+    assert set(found) == {"airlight"}
+    # A margin that wide is met at once: the least number of batches is what it takes.
+    assert found["airlight"].batches == 32
+
+
+def test_progress_is_told(variant):
+    import mitsuba as mi
+
+    told = []
+    agreement(
+        mi.load_dict(tiny_scene(size=(4, 3))),
+        margin=1e-9,
+        batches=33,
+        samples=1,
+        progress=lambda *args: told.append(args),
+    )
+    # The least number is expected to do until eight batches show that it will not.
+    expected = [(number, 32, "volpath") for number in range(1, 9)] + [
+        (number, 33, "volpath") for number in range(9, 34)
+    ]
+    assert told == expected
+
+
+def test_out_of_time_is_said_and_is_no_verdict(scene, own_cache):
+    """Two batches are traced whatever the time; they do not decide about a bias of one in ten million."""
+    found = agreement(scene, estimator="single-scatter", margin=1e-7, batches=40, samples=4, seconds=0.0)
+    assert {one.batches for one in found.values()} == {2}
+    assert not found["airlight"].finished
+    assert found["airlight"].statistics.equivalent is False
+
+
+def test_what_became_narrow_enough_is_finished(scene):
+    assert all(one.finished for one in agreement(scene, **BUDGET).values())
+    # Out of batches, not of time, before the interval was narrow: the same.
+    short = agreement(scene, margin=1e-6, batches=3, samples=4)
+    assert not short["airlight"].finished

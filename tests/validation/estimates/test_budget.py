@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""When a Monte Carlo run ends."""
+
+import numpy as np
+import pytest
+
+from analytic.errors import InputError
+from reference.monte_carlo.batches import Batches
+from tests.helpers.scenes import tiny_scene
+from validation.estimates.budget import Budget, batch_plan, near_light, relative_errors
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({}, "got none of --spp, --target-error, --time-budget; give one"),
+        ({"samples": 64, "error": 0.01}, "got --spp 64 and --target-error 0.01 of"),
+        ({"error": 0.01, "seconds": 3.0}, "got --target-error 0.01 and --time-budget 3 of"),
+        ({"samples": 64, "error": 0.01, "seconds": 3.0}, "--spp 64 and --target-error 0.01 and --time-budget 3"),
+        ({"error": 0.0}, "--target-error: got 0, wanted a positive number"),
+        ({"error": float("nan")}, "--target-error: got nan"),
+        ({"seconds": -1.0}, "--time-budget: got -1"),
+        ({"seconds": float("inf")}, "--time-budget: got inf"),
+        ({"error": 1.5}, "--target-error: got 1.5, wanted less than 1; 0.01 is 1 %"),
+    ],
+)
+def test_exactly_one_limit_is_wanted(given, words):
+    with pytest.raises(InputError, match=words):
+        Budget(**given)
+
+
+@pytest.mark.parametrize("samples", [1, 2, 31, 64, 100, 1024, 2048, 4096, 8193, 100_000])
+def test_samples_are_split_into_batches_that_have_at_least_as_many(samples):
+    batches, each = batch_plan(Budget(samples=samples), 100)
+    assert batches >= min(32, max(2, samples))  # 32 give a standard error that is known to 13 %
+    assert each in (1, 2, 4, 8, 16, 32, 64)
+    # Never less than asked for, and not a whole batch more, but for the two that a standard error needs.
+    assert samples <= batches * each < samples + max(each, 2)
+
+
+def test_longer_runs_go_on_from_the_batches_of_shorter_ones():
+    assert [batch_plan(Budget(samples=n), 100) for n in (2048, 4096, 6400)] == [(32, 64), (64, 64), (100, 64)]
+
+
+@pytest.mark.parametrize(("pixels", "samples"), [(100, 64), (65536, 64), (65537, 32), (480_000, 8), (2**23, 1)])
+def test_batches_of_open_runs_are_short(pixels, samples):
+    """At most four million samples: so that a run overshoots its time or target by little."""
+    assert batch_plan(Budget(seconds=1.0), pixels)[1] == samples
+    assert batch_plan(Budget(error=0.1), pixels)[1] == samples
+
+
+def batches(mean, error, count=4):
+    mean, error = np.asarray(mean, float), np.asarray(error, float)
+    return Batches(tuple(range(count)), 1, mean, error**2 * count * (count - 1), np.zeros((count, 2, 3)))
+
+
+def test_errors_by_hand():
+    """Two pixels; each channel of each layer has its own error, and the largest counts."""
+    airlight = [[1.0, 2.0, 1.0], [3.0, 2.0, 1.0]]
+    airlight_error = [[0.3, 0.0, 0.0], [0.4, 0.0, 0.0]]  # red: sqrt(0.09 + 0.16)/4; the worst is 0.3 of 1
+    surface = [[5.0, 5.0, 5.0], [0.0, 5.0, 5.0]]
+    surface_error = [[0.5, 0.0, 0.0], [0.0, 0.0, 0.5]]  # 0.5 of 5 and of 10
+    found = batches([airlight, surface], [airlight_error, surface_error])
+    errors = relative_errors(found, np.zeros(2, dtype=bool))
+    assert errors.pooled == pytest.approx(0.125, rel=1e-12)
+    assert errors.worst == pytest.approx(0.3, rel=1e-12)
+    # Without the first pixel of the airlight: 0.4/3 pooled and worst.
+    errors = relative_errors(found, np.array([True, False]))
+    assert (errors.pooled, errors.worst) == pytest.approx((0.4 / 3, 0.4 / 3), rel=1e-12)
+
+
+def test_a_dim_pixel_counts_against_a_thousandth_of_the_mean():
+    mean = np.full((2, 1000, 3), 1.0)
+    mean[:, 0] = 1e-9
+    error = np.zeros_like(mean)
+    error[0, 0] = 1e-6
+    found = relative_errors(batches(mean, error), np.zeros(1000, dtype=bool))
+    assert found.worst == pytest.approx(1e-6 / (1e-3 * 0.999), rel=1e-6)
+
+
+def test_the_unit_of_radiance_changes_nothing():
+    rng = np.random.default_rng(5)
+    mean, error = rng.exponential(size=(2, 9, 3)), rng.exponential(size=(2, 9, 3))
+    near = np.zeros(9, dtype=bool)
+    one, two = relative_errors(batches(mean, error), near), relative_errors(batches(mean * 1e-30, error * 1e-30), near)
+    assert (two.pooled, two.worst) == pytest.approx((one.pooled, one.worst), rel=1e-9)
+
+
+@pytest.mark.parametrize("near", [[False, False], [True, True]])
+def test_no_light_has_no_error(near):
+    found = relative_errors(batches(np.zeros((2, 2, 3)), np.zeros((2, 2, 3))), np.array(near))
+    assert (found.pooled, found.worst) == (0.0, 0.0)
+
+
+def test_pixels_beside_a_light_are_those_that_the_truth_names(variant):
+    """The same pixels as from the quadrature's own angles; a light in view, one behind us, one in the ball."""
+    import mitsuba as mi
+
+    from reference.quadrature.surface import surface_hits
+    from reference.scene.read import read_truth
+    from validation.estimates.agreement import MASK_PIXELS, pixel_angle
+    from validation.estimates.quadrature import truth_image
+
+    behind = {"type": "point", "position": [0.3, -6.0, 1.1]}
+    hidden = {"type": "point", "position": [0.1, 0.3, 0.65]}
+    scene = mi.load_dict(tiny_scene(size=(40, 30), behind=behind, hidden=hidden))
+    truth = read_truth(scene)
+    expected = truth_image(scene, samples=16).light_angle <= MASK_PIXELS * pixel_angle(truth)
+    assert 0 < expected.sum() < 40
+    np.testing.assert_array_equal(near_light(truth, surface_hits(truth).distance), expected.ravel())

@@ -1,0 +1,322 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Batches through the cache: the same numbers whatever was in it, and nothing lost by an interruption."""
+
+import errno
+import os
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+import validation.estimates.monte_carlo
+from analytic.errors import InputError
+from reference.monte_carlo.batches import LARGEST_SEED, Batches, merged, single_batch
+from reference.monte_carlo.volpath.integrator import volpath_batch
+from reference.scene.read import read_truth
+from reference.storage.cache import cache_folder
+from tests.helpers.scenes import tiny_scene
+from validation.estimates.monte_carlo import BLOCK, monte_carlo_batches
+
+
+@pytest.fixture
+def scene(variant):
+    import mitsuba as mi
+
+    return mi.load_dict(tiny_scene(size=(4, 3)))
+
+
+@pytest.fixture
+def traced(monkeypatch, own_cache):
+    """Put random numbers in the place of the tracer, and list the seeds that were asked for."""
+    seeds = []
+
+    def trace(truth, seed, samples, *, max_depth=2, counts=None):
+        seeds.append(seed)
+        mean = np.random.default_rng([seed, samples, max_depth]).exponential(size=(2, 12, 3))
+        return single_batch(seed, samples, mean)
+
+    monkeypatch.setattr(validation.estimates.monte_carlo, "volpath_batch", trace)
+    return seeds
+
+
+def volpath(scene, **options):
+    return monte_carlo_batches(scene, "volpath", **({"samples": 4} | options))
+
+
+def assert_same(one, two):
+    for field in fields(Batches):
+        np.testing.assert_array_equal(getattr(one, field.name), getattr(two, field.name), err_msg=field.name)
+        assert type(getattr(one, field.name)) is type(getattr(two, field.name))
+
+
+@pytest.mark.parametrize(("first", "count"), [(0, 2), (0, 8), (0, 21), (5, 2), (5, 3), (5, 20), (8, 8), (1000, 9)])
+def test_the_cache_never_changes_what_is_returned(scene, traced, monkeypatch, tmp_path, first, count):
+    """A run from an empty cache, a second one, and one from a cache that holds more on both sides: the same bits."""
+    fresh = volpath(scene, batches=count, first_seed=first)
+    assert traced == list(range(first, first + count))
+    again = volpath(scene, batches=count, first_seed=first)
+    assert (fresh.cached, again.cached, again.damaged) == (0, count, 0)
+    assert_same(again.batches, fresh.batches)
+    monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path / "other"))
+    volpath(scene, batches=count + 17, first_seed=max(0, first - 3))
+    assert_same(volpath(scene, batches=count, first_seed=first).batches, fresh.batches)
+    assert fresh.batches.seeds == tuple(range(first, first + count))
+
+
+def test_moments_are_those_of_all_batches(scene, traced):
+    found = volpath(scene, batches=21, first_seed=5).batches
+    means = np.stack(
+        [validation.estimates.monte_carlo.volpath_batch(read_truth(scene), seed, 4).mean for seed in range(5, 26)]
+    )
+    # Sums of 21 numbers in another order: a few roundings.
+    np.testing.assert_allclose(found.mean, means.mean(axis=0), rtol=1e-13)
+    np.testing.assert_allclose(found.standard_error, means.std(axis=0, ddof=1) / np.sqrt(21), rtol=1e-12)
+    np.testing.assert_array_equal(found.totals, means.mean(axis=2))
+
+
+def test_full_blocks_are_kept_as_one_file(scene, traced):
+    volpath(scene, batches=2 * BLOCK + 3)
+    (folder,) = cache_folder().iterdir()
+    names = sorted(path.stem for path in folder.iterdir())
+    assert names == ["000000-000007", "000008-000015", "000016", "000017", "000018"]
+
+
+def test_fewer_batches_than_are_kept_trace_at_most_a_part_of_a_block(scene, traced):
+    whole = volpath(scene, batches=3 * BLOCK)
+    traced.clear()
+    few = volpath(scene, batches=BLOCK + 2)
+    assert traced == [BLOCK, BLOCK + 1]
+    assert few.batches.seeds == tuple(range(BLOCK + 2))
+    assert_same(volpath(scene, batches=3 * BLOCK).batches, whole.batches)
+    assert len(traced) == 2
+
+
+@pytest.mark.parametrize("stop", [1, 7, 8, 9, 13])
+def test_an_interrupted_run_goes_on_where_it_stopped(scene, traced, stop):
+    def interrupt(done, total, what):
+        assert (total, what) == (14, "volpath")
+        if done == stop:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt, match=rf"^{stop - 1} finished batches are kept; run again|^nothing was"):
+        volpath(scene, batches=14, progress=interrupt)
+    traced.clear()
+    resumed = volpath(scene, batches=14)
+    assert traced == list(range(stop, 14))
+    assert resumed.cached == stop
+    traced.clear()
+    assert_same(resumed.batches, volpath(scene, batches=14).batches)
+
+
+def test_settings_are_kept_apart(scene, traced):
+    one = volpath(scene, batches=2)
+    deep = volpath(scene, batches=2, max_depth=9)
+    fine = volpath(scene, batches=2, samples=8)
+    assert traced == [0, 1] * 3
+    assert not np.array_equal(one.batches.mean, deep.batches.mean)
+    assert not np.array_equal(one.batches.mean, fine.batches.mean)
+
+
+@pytest.mark.parametrize("damage", ["flipped byte", "truncated", "empty", "of another seed"])
+@pytest.mark.parametrize("name", ["000000-000007", "000009"])
+def test_damage_is_found_counted_and_mended(scene, traced, damage, name):
+    whole = volpath(scene, batches=11)
+    (folder,) = cache_folder().iterdir()
+    path = folder / f"{name}.npz"
+    content = bytearray(path.read_bytes())
+    if damage == "flipped byte":
+        content[len(content) // 2] ^= 1
+    elif damage == "of another seed":
+        volpath(scene, batches=8, first_seed=16)
+        content = bytearray((folder / ("000016-000023.npz" if "-" in name else "000008.npz")).read_bytes())
+    path.write_bytes(content[: {"truncated": len(content) // 3, "empty": 0}.get(damage, len(content))])
+    found = volpath(scene, batches=11)
+    assert_same(found.batches, whole.batches)
+    assert found.damaged == 1
+    assert volpath(scene, batches=11).damaged == 0
+
+
+def test_numbers_edited_by_hand_are_not_believed(scene, traced):
+    """An archive that is whole in itself, written by NumPy, with one number changed."""
+    whole = volpath(scene, batches=BLOCK)
+    (folder,) = cache_folder().iterdir()
+    (path,) = folder.iterdir()
+    with np.load(path) as stored:
+        arrays = {name: stored[name] for name in stored.files}
+    arrays["mean"][0, 0, 0] *= 1.001
+    np.savez(path, **arrays)
+    found = volpath(scene, batches=BLOCK)
+    assert (found.damaged, found.cached) == (1, 0)
+    assert_same(found.batches, whole.batches)
+
+
+@pytest.mark.parametrize("failing", [2, 7])
+def test_a_full_disk_says_what_was_kept(scene, traced, monkeypatch, failing):
+    write = validation.estimates.monte_carlo.store_arrays
+    stored: list[str] = []
+
+    def full(key, arrays):
+        if len(stored) == failing:
+            raise OSError(errno.ENOSPC, "No space left on device", "file.npz")
+        stored.append(key)
+        write(key, arrays)
+
+    monkeypatch.setattr(validation.estimates.monte_carlo, "store_arrays", full)
+    with pytest.raises(OSError, match=f"{failing} finished batches are kept; make room") as raised:
+        volpath(scene, batches=12)
+    assert raised.value.filename == str(cache_folder())
+    monkeypatch.setattr(validation.estimates.monte_carlo, "store_arrays", write)
+    traced.clear()
+    volpath(scene, batches=12)
+    assert traced == list(range(failing, 12))
+
+
+def test_enough_is_asked_at_the_end_of_blocks_and_sees_the_same_from_the_cache(scene, traced):
+    asked = []
+
+    def enough(found):
+        asked.append(found)
+        return len(found.seeds) >= 16
+
+    first = volpath(scene, batches=40, enough=enough)
+    volpath(scene, batches=40)
+    second = volpath(scene, batches=40, enough=enough)
+    assert [len(found.seeds) for found in asked] == [8, 16, 8, 16]
+    assert_same(asked[1], asked[3])
+    assert_same(first.batches, second.batches)
+
+
+def test_enough_needs_two_batches(scene, traced):
+    """A first seed of 7 makes a first block of one batch, which has no standard error."""
+    asked = []
+    volpath(scene, batches=20, first_seed=7, enough=lambda found: asked.append(len(found.seeds)))
+    assert asked == [9, 17]
+
+
+def test_go_on_is_asked_before_tracing_but_not_for_what_is_kept(scene, traced):
+    asked = []
+
+    def go_on(done):
+        asked.append(done)
+        return done < 5
+
+    assert len(volpath(scene, batches=40, go_on=go_on).batches.seeds) == 5
+    assert asked == [2, 3, 4, 5]
+    volpath(scene, batches=12)
+    asked.clear()
+    assert len(volpath(scene, batches=40, go_on=go_on).batches.seeds) == 12
+    assert asked == [12]
+
+
+def test_leftovers_of_a_killed_run_are_swept_when_they_are_old(scene, traced):
+    volpath(scene, batches=2)
+    (folder,) = cache_folder().iterdir()
+    old, new = folder / ".000001-0123abcd.npz", folder / ".000002-0123abcd.npz"
+    for path in (old, new):
+        path.write_bytes(b"half")
+    os.utime(old, (1e9, 1e9))
+    volpath(scene, batches=2)
+    assert not old.exists()
+    assert new.exists()  # another run may be writing it
+
+
+@pytest.mark.parametrize("seed", [-1, LARGEST_SEED - 1, LARGEST_SEED])
+def test_seeds_out_of_range_are_refused(scene, traced, seed):
+    with pytest.raises(InputError, match=rf"seed: got {seed} for 2 batches"):
+        volpath(scene, batches=2, first_seed=seed)
+
+
+def test_unknown_estimators_are_refused(scene, own_cache):
+    with pytest.raises(ValueError, match="wanted one of single-scatter, volpath"):
+        monte_carlo_batches(scene, "pathtracer", batches=2, samples=4)
+    with pytest.raises(ValueError, match="max_depth 3"):
+        monte_carlo_batches(scene, "single-scatter", batches=2, samples=4, max_depth=3)
+
+
+def test_single_scatter_goes_the_same_way(scene, own_cache):
+    from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
+
+    truth = read_truth(scene)
+    found = monte_carlo_batches(scene, "single-scatter", batches=3, samples=4, first_seed=2)
+    batches = [single_scatter_batch(truth, seed, 4) for seed in (2, 3, 4)]
+    assert_same(found.batches, merged(merged(batches[0], batches[1]), batches[2]))
+    assert next(cache_folder().iterdir()).name.startswith("single-scatter-")
+
+
+# --- traced, not drawn -----------------------------------------------------------------------------------------------
+
+
+def interrupted_after(count):
+    def progress(done, total, what):
+        if done == count:
+            raise KeyboardInterrupt
+
+    return progress
+
+
+def test_interrupted_batches_go_on_where_they_stopped(scene, monkeypatch, tmp_path):
+    monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path / "one"))
+    whole = volpath(scene, batches=5).batches
+    monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path / "two"))
+    with pytest.raises(KeyboardInterrupt):
+        volpath(scene, batches=5, progress=interrupted_after(3))
+    seeds = []
+    trace = validation.estimates.monte_carlo.volpath_batch
+
+    def counted(truth, seed, samples, **kwargs):
+        seeds.append(seed)
+        return trace(truth, seed, samples, **kwargs)
+
+    monkeypatch.setattr(validation.estimates.monte_carlo, "volpath_batch", counted)
+    resumed = volpath(scene, batches=5).batches
+    assert seeds == [3, 4]
+    assert_same(resumed, whole)
+
+
+def test_more_batches_add_to_those_that_are_there(scene, own_cache):
+    told = []
+    few = volpath(scene, batches=2).batches
+    more = volpath(scene, batches=4, progress=lambda *args: told.append(args)).batches
+    assert told == [(3, 4, "volpath"), (4, 4, "volpath")]
+    assert (few.seeds, more.seeds) == ((0, 1), (0, 1, 2, 3))
+    np.testing.assert_array_equal(more.totals[:2], few.totals)
+
+
+def test_mean_and_standard_error_are_those_of_the_batches(scene, own_cache):
+    found = volpath(scene, batches=4, first_seed=7).batches
+    means = np.stack([volpath_batch(read_truth(scene), seed, 4).mean for seed in range(7, 11)])
+    np.testing.assert_allclose(found.mean, means.mean(axis=0), rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(found.standard_error, means.std(axis=0, ddof=1) / 2, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(found.totals.mean(axis=0), found.mean.mean(axis=1), rtol=1e-12)
+
+
+def test_other_samples_and_seeds_are_kept_apart(scene, own_cache):
+    one = volpath(scene, batches=2).batches
+    two = volpath(scene, batches=2, samples=5).batches
+    three = volpath(scene, batches=2, first_seed=2).batches
+    assert (one.samples, two.samples) == (4, 5)
+    assert three.seeds == (2, 3)
+    assert not np.array_equal(one.mean, three.mean)
+
+
+def test_enough_is_asked_at_every_eighth_batch(scene, own_cache):
+    asked = []
+
+    def enough(found):
+        asked.append(len(found.seeds))
+        return len(found.seeds) >= 16
+
+    assert len(volpath(scene, batches=40, samples=1, enough=enough).batches.seeds) == 16
+    assert asked == [8, 16]
+
+
+def test_damaged_batches_are_traced_again(scene, own_cache):
+    whole = volpath(scene, batches=2).batches
+    path = next(cache_folder().glob("volpath-*/000001.npz"))
+    path.write_bytes(path.read_bytes()[:-40])
+    assert_same(volpath(scene, batches=2).batches, whole)
+
+
+def test_one_batch_is_refused(scene):
+    with pytest.raises(ValueError, match="at least 2"):
+        volpath(scene, batches=1)

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The share of multiple scattering."""
+
+import numpy as np
+import pytest
+
+from reference.monte_carlo.volpath.integrator import volpath_batch
+from reference.scene.read import read_truth
+from tests.helpers.scenes import tiny_scene
+from validation.estimates.multiple_scattering import left_out, multiple_scattering_share
+
+
+def scene(albedo=0.9, sigma_t=0.31, **changes):
+    import mitsuba as mi
+
+    fog = {"albedo": {"type": "rgb", "value": [albedo] * 3}, "sigma_t": sigma_t}
+    return mi.load_dict(tiny_scene(size=(8, 6), fog=tiny_scene()["fog"] | fog, **changes))
+
+
+def layers(albedo, depth):
+    return volpath_batch(read_truth(scene(albedo)), 3, 16, max_depth=depth).mean
+
+
+def test_the_nth_scattering_grows_with_the_nth_power_of_the_albedo(variant):
+    """With the same seed the same paths are traced, so this holds path by path, to float32 rounding."""
+    full = [layers(0.8, depth)[0] for depth in (2, 3, 4)]
+    half = [layers(0.4, depth)[0] for depth in (2, 3, 4)]
+    orders = [(one[0], one[1] - one[0], one[2] - one[1]) for one in (full, half)]
+    for order, (of_full, of_half) in enumerate(zip(*orders), start=1):
+        assert of_full.sum() > 0
+        # Differences of float32 numbers: sums over 16 samples, relative 1e-6 of the whole.
+        np.testing.assert_allclose(of_full.sum(), 2**order * of_half.sum(), rtol=1e-4)
+
+
+def test_more_scattering_adds_light_and_never_takes_any(variant):
+    one, two, many = (layers(0.9, depth)[0] for depth in (2, 3, 9))
+    assert (two - one).min() >= -1e-7 * one.max()
+    assert (many - two).min() >= -1e-6 * one.max()
+
+
+def test_black_surfaces_leave_the_airlight_alone(variant):
+    """With real surfaces the rest of the light is more than the single scattering of surfaces."""
+    direct, all_orders = layers(0.9, 2)[1], layers(0.9, 9)[1]
+    assert all_orders.mean() > direct.mean() > 0
+
+
+def test_share_grows_with_the_optical_depth(variant):
+    thin, thick = (multiple_scattering_share(scene(sigma_t=s), max_depth=6, batches=6, samples=8) for s in (0.01, 0.6))
+    assert 0 < thin.medium.value < 0.1 < thick.medium.value < 1
+    assert thick.everything.value > 0
+    for share in (thin.medium, thick.medium, thick.everything):
+        assert share.interval[0] < share.value < share.interval[1]
+    assert (thin.batches, thin.samples, thin.max_depth) == (6, 8, 6)
+
+
+def test_a_medium_that_only_absorbs_has_no_share(variant):
+    found = multiple_scattering_share(scene(albedo=0.0), max_depth=3, batches=2, samples=4)
+    assert found.medium.value == 0.0
+    assert found.medium.interval == (0.0, 0.0)
+
+
+def test_one_scattering_is_refused(variant):
+    with pytest.raises(ValueError, match="at least 3"):
+        multiple_scattering_share(scene(), max_depth=2)
+
+
+def test_the_interval_holds_the_share_in_95_of_100_runs():
+    """Batches whose parts are correlated, as those of the same seeds are; the true share is 0.2.
+
+    4000 runs: the standard deviation of the count is 13.8, so 3800 +- 55 at four of them.
+    """
+    rng = np.random.default_rng(11)
+    held = 0
+    for _ in range(4000):
+        part = rng.normal(0.8, 0.08, 16)
+        whole = part + rng.normal(0.2, 0.02, 16)
+        low, high = left_out(part, whole).interval
+        held += low <= 0.2 <= high
+    assert abs(held - 3800) < 55
+
+
+def test_equal_parts_leave_nothing_out():
+    means = np.array([1.0, 2.0, 3.0])
+    assert left_out(means, means).value == 0.0
+    assert left_out(0.75 * means, means).interval == pytest.approx((0.25, 0.25), abs=1e-12)

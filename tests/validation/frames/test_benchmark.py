@@ -1,0 +1,216 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from realtime.scene.features import Plan
+from tests.helpers.scenes import tiny_scene
+from validation.configurations.methods import STANDARD, Configuration, configuration
+from validation.frames.benchmark import bench, configurations_for, knows_shadows, measure
+from validation.scenes.loading import LoadedScene
+
+MARCH = Configuration("ray-march", None, (("steps", 200),))
+UNSHADOWED = Configuration("unshadowed", "quadrature")
+PLAN = Plan(
+    shadows=True,
+    surfaces=True,
+    extinctions=1,
+    isotropic=True,
+    bounded=False,
+    vacuum=False,
+    point_lights=1,
+    spot_lights=0,
+    soft_spots=False,
+)
+
+
+@pytest.fixture(scope="module")
+def loaded(variant):
+    import mitsuba as mi
+
+    return LoadedScene("tiny", mi.load_dict(tiny_scene(size=(16, 12))), "A tiny scene.", "")
+
+
+@pytest.fixture(scope="module")
+def measured(loaded):
+    from realtime.scene.read_scene import read_scene
+    from validation.estimates.quadrature import truth_image
+
+    scene, truth = read_scene(loaded.scene), truth_image(loaded.scene)
+    return {chosen: measure(scene, chosen, truth=truth, seconds=0.01) for chosen in (MARCH, UNSHADOWED)}
+
+
+def test_marching_with_visibility_is_near_the_truth(measured):
+    error = measured[MARCH].error
+    # Every step that straddles the edge of a shadow is wrong by up to half of itself: 200 steps leave a few per mille.
+    assert error.relative_rmse < 0.02
+    assert error.nonfinite == error.negative == 0
+    assert error.pixels == 16 * 12
+
+
+def test_method_without_shadows_is_too_bright_by_what_shadows_take_away(measured):
+    error = measured[UNSHADOWED].error
+    assert error.relative_bias > 0.003
+    assert error.relative_rmse > 3 * measured[MARCH].error.relative_rmse
+
+
+def test_error_is_that_of_the_frame_against_the_truth(loaded, measured):
+    from validation.estimates.quadrature import truth_image
+
+    truth, frame = truth_image(loaded.scene).airlight, measured[MARCH].frame.airlight
+    difference = np.asarray(frame, dtype=np.float64) - truth
+    assert measured[MARCH].error.rmse == pytest.approx(np.sqrt(np.mean(difference**2)), rel=1e-9)
+    assert measured[MARCH].error.relative_bias == pytest.approx(difference.mean() / truth.mean(), rel=1e-9)
+
+
+def test_surface_is_compared_too(measured):
+    # A pixel at the rim of the ball may see it with one method's rays and the floor with the other's.
+    assert measured[MARCH].surface_error.p50 < 1e-4
+    assert measured[MARCH].surface_error.relative_bias == pytest.approx(0, abs=0.02)
+
+
+def test_other_size_is_timed_without_changing_what_is_compared(loaded, measured, variant):
+    import mitsuba as mi
+
+    from realtime.scene.read_scene import read_scene
+    from validation.estimates.quadrature import truth_image
+
+    large = read_scene(mi.load_dict(tiny_scene(size=(160, 120))))
+    scene, truth = read_scene(loaded.scene), truth_image(loaded.scene)
+    found = measure(scene, MARCH, truth=truth, timed=large, seconds=0.02)
+    assert found.frame.airlight.shape == (12, 16, 3)
+    assert found.error == measured[MARCH].error
+    # A hundred times the pixels; small frames cost a constant, so that much less than 100 is left of it.
+    assert found.times.airlight.median_ms > 2 * measured[MARCH].times.airlight.median_ms
+
+
+def test_refusal_is_kept_and_not_raised(variant):
+    """What a method cannot do is a line of the table; one bad configuration must not end a report."""
+    import mitsuba as mi
+
+    from realtime.scene.read_scene import read_scene
+    from validation.estimates.quadrature import truth_image
+
+    scene = mi.load_dict(
+        tiny_scene(
+            size=(4, 3), fog=tiny_scene()["fog"] | {"phase": {"type": "tabphase", "values": "0.3, 0.2, 0.4, 0.9, 2.0"}}
+        )
+    )
+    found = measure(read_scene(scene), Configuration("unshadowed", "taylor"), truth=truth_image(scene, samples=16))
+    assert found.frame is None
+    assert found.times is None
+    assert found.error is None
+    assert "tab" in found.refused
+    assert "\n" not in found.refused
+
+
+def test_bench_measures_one_after_the_other_and_tells(loaded):
+    told = []
+    found = list(bench(loaded, [UNSHADOWED, MARCH], progress=lambda *args: told.append(args)))
+    assert [one.configuration for _, one in found] == [UNSHADOWED, MARCH]
+    assert told == [(1, 2, "tiny"), (2, 2, "tiny")]
+    assert found[0][0].camera.width == 16
+
+
+def test_variants_of_shadows_are_left_out_where_nothing_casts_one():
+    assert configurations_for(replace(PLAN, bounded=True, clear=True)) == STANDARD
+    unbounded = configurations_for(PLAN)
+    (left_out,) = (one for one in STANDARD if one not in unbounded)
+    assert dict(left_out.parameters) == {"media": "paper"}
+    left = configurations_for(replace(PLAN, shadows=False))
+    assert 0 < len(left) < len(STANDARD)
+    assert all(not {"shadow", "map"} & set(dict(one.parameters)) for one in left)
+    assert {one.method for one in left} == {one.method for one in STANDARD}
+
+
+def test_configuration_says_whether_it_knows_shadows():
+    assert not knows_shadows(UNSHADOWED)
+    assert knows_shadows(MARCH)
+    assert knows_shadows(Configuration("ray-march", None, (("shadow", "map"),)))
+    assert not knows_shadows(Configuration("ray-march", None, (("shadow", "none"),)))
+
+
+def test_slow_configurations_are_not_timed_at_a_larger_size(variant, loaded, monkeypatch):
+    import mitsuba as mi
+
+    from realtime.scene.read_scene import read_scene
+    from validation.estimates.quadrature import truth_image
+    from validation.frames import benchmark as module
+
+    truth = truth_image(loaded.scene)
+    scene = read_scene(loaded.scene)
+    timed = read_scene(mi.load_dict(tiny_scene(size=(32, 24))))
+    assert measure(scene, MARCH, truth=truth, timed=timed, seconds=0.01).note is None
+    monkeypatch.setattr(module, "_LONG", 0.0)
+    slow = measure(scene, MARCH, truth=truth, timed=timed, seconds=0.01)
+    assert "16 x 12" in slow.note
+    assert slow.times is not None
+
+
+def test_a_method_of_ones_own_that_is_not_frozen_has_a_note(tmp_path, variant):
+    import mitsuba as mi
+
+    from realtime.scene.read_scene import read_scene
+    from validation.estimates.quadrature import truth_image
+
+    path = tmp_path / "own_bench_for_tests.py"
+    path.write_text("def f(view):\n    return 1\n\n\ndef g(view):\n    return 1\n\n\ng.frozen = True\n")
+    loaded = mi.load_dict(tiny_scene())
+    truth = truth_image(loaded)
+    notes = [
+        measure(read_scene(loaded), configuration(f"{path}:{name}"), truth=truth, seconds=0.01).note for name in "fg"
+    ]
+    assert notes == ["not frozen: its Python runs again for every frame", None]
+
+
+def probed(loaded, monkeypatch, chosen, *, seconds, limit):
+    """Measure a configuration whose small frame takes so long."""
+    import mitsuba as mi
+
+    from realtime.scene.read_scene import read_scene
+    from validation.estimates.quadrature import truth_image
+    from validation.frames import benchmark as module
+
+    monkeypatch.setattr(module, "_DOUBTFUL", -1.0)
+    render = module.render_frame
+
+    def slowed(renderer):
+        if renderer.scene.camera.width == 8:
+            time.sleep(seconds)
+        return render(renderer)
+
+    monkeypatch.setattr(module, "render_frame", slowed)
+    scene, truth = read_scene(loaded.scene), truth_image(loaded.scene)
+    small = read_scene(mi.load_dict(tiny_scene(size=(8, 6))))
+    return measure(scene, chosen, truth=truth, seconds=0.01, limit=limit, probe=lambda: small)
+
+
+def test_what_would_take_too_long_is_left_out_with_what_it_would_take(loaded, monkeypatch):
+    # 16 x 12 pixels are four times 8 x 6: 0.05 s there are at least 0.2 s here.
+    found = probed(loaded, monkeypatch, MARCH, seconds=0.05, limit=0.1)
+    assert found.left_out
+    assert found.frame is found.times is found.error is None
+    assert "by one of 8 x 6 pixels" in found.refused
+    assert "more than the limit of 0.1 s" in found.refused
+
+
+def test_what_takes_less_than_the_limit_is_measured(loaded, monkeypatch):
+    found = probed(loaded, monkeypatch, MARCH, seconds=0.05, limit=60.0)
+    assert not found.left_out
+    assert found.refused is None
+    assert found.error.relative_rmse < 0.02
+
+
+def test_a_quick_preparation_asks_for_no_small_frame(loaded, measured, monkeypatch):
+    from realtime.scene.read_scene import read_scene
+    from validation.estimates.quadrature import truth_image
+    from validation.frames import benchmark as module
+
+    def never():
+        raise AssertionError("no doubt about this one")
+
+    monkeypatch.setattr(module, "_DOUBTFUL", 1e6)
+    scene, truth = read_scene(loaded.scene), truth_image(loaded.scene)
+    assert measure(scene, MARCH, truth=truth, seconds=0.01, limit=1e-9, probe=never).refused is None

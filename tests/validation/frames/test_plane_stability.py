@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: BSD-3-Clause
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from reports.tables.stability import print_plane_stability
+from validation.frames.plane_stability import _compared, broken, hard_cases, plane_stability
+
+
+@pytest.fixture(scope="module")
+def found():
+    from reports.machine.environment import activate
+
+    activate()
+    told = []
+    result = plane_stability(size=(20, 16), progress=lambda *progress: told.append(progress))
+    assert [done for done, *_ in told] == list(range(len(hard_cases())))
+    return result
+
+
+def test_default_keeps_its_bar(found):
+    assert {one.case for one in found} == set(hard_cases())
+    assert broken(found) == []
+
+
+def test_float64_of_either_sum_is_the_truth(found):
+    """What float64 leaves is the kernel's tolerance and float32 distances to surfaces."""
+    assert max(one.p99 for one in found if one.precision == "double") < 1e-6
+
+
+@pytest.mark.parametrize("case", hard_cases())
+def test_adding_up_gamma_loses_more(found, case):
+    """Cancellation: little within a segment, whose two Gammas share their rounding, much where all planes add up."""
+    by_sum = {one.sum: one for one in found if one.case == case and one.precision == "single"}
+    assert by_sum["gamma"].p99 > by_sum["segments"].p99
+    assert by_sum["planes"].p99 > 20 * by_sum["segments"].p99
+
+
+def test_errors_are_counted_in_units_of_the_true_value():
+    truth = np.full((2, 5), 2.0)
+    image = truth.copy()
+    image[0, :3] = 2.0 + 2e-3, -1.0, np.nan
+    one = _compared(("case", "segments", "single"), image, truth, scale=truth)
+    assert (one.pixels, one.beyond, one.negative, one.nonfinite, one.max, one.median) == (10, 2, 1, 1, 1.5, 0.0)
+    words = broken([one, replace(one, sum="gamma")])
+    assert len(words) == 3
+    assert any("case, single: 1 negative" in line for line in words)
+
+
+def test_table_names_what_is_broken(found, capsys):
+    print_plane_stability(found, ["deep stack, single: 3 negative"])
+    text = capsys.readouterr().out
+    assert "deep stack" in text
+    assert "BROKEN: shadow planes, deep stack, single: 3 negative" in text

@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: BSD-3-Clause
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from validation.configurations.methods import QUICK, STANDARD, Configuration
+from validation.frames import scene_study as study
+from validation.frames.benchmark import Measurement
+from validation.frames.scene_study import EFFORTS, Effort, open_study, wants_flip, with_flips
+from validation.scenes.registry import SCENES
+
+TINY = Effort("tiny", (16, 12), (16, 12), (8, 6), {"volpath": 0.5}, {"volpath": 8}, 0.01)
+OWN = Configuration("mine.py:fog")
+
+
+def test_every_effort_studies_scenes_that_there_are():
+    quick, default, full = (EFFORTS[name].scenes for name in ("quick", "default", "full"))
+    assert set(quick) < set(default) < set(full) == set(SCENES)
+
+
+@pytest.mark.parametrize(
+    ("flip", "count"), [("none", 0), ("kinds", len(QUICK) + 1), ("all", len({*QUICK, *STANDARD}) + 1)]
+)
+def test_flip_is_asked_for_by_kind(flip, count):
+    effort = replace(TINY, flip=flip)
+    assert sum(wants_flip(effort, one) for one in {*QUICK, *STANDARD, OWN}) == count
+
+
+def test_flip_is_computed_where_it_is_asked_for_and_there_is_a_frame(monkeypatch):
+    asked = []
+    monkeypatch.setattr(study, "flip_hdr", lambda truth, test: asked.append((truth.mean(), test.mean())) or "flip")
+    black = np.zeros((2, 3, 3))
+    frame = SimpleNamespace(airlight=black + 2, surface=black + 1)
+    measured = [
+        Measurement(QUICK[0], frame, None, None, None),
+        Measurement(QUICK[1], None, None, None, None, refused="no"),
+        Measurement(Configuration("ray-march", None, (("steps", 3),)), frame, None, None, None),
+    ]
+    truth = SimpleNamespace(airlight=black + 5, surface=black)
+    found = with_flips(SimpleNamespace(effort=replace(TINY, flip="kinds"), truth=truth), measured, workers=2)
+    assert [one.flip for one in found] == ["flip", None, None]
+    assert [one.configuration for one in found] == [one.configuration for one in measured]
+    assert asked == [(5.0, 3.0)]
+
+
+def test_images_from_elsewhere_set_the_size_of_everything(variant):
+    studied = open_study("open-fog", replace(TINY, timed=(32, 24)), size=(20, 10))
+    assert studied.effort.image == studied.effort.timed == (20, 10)
+    assert (studied.scene.camera.width, studied.scene.camera.height) == (20, 10)
+    assert studied.timed is None
+
+
+def test_frames_are_timed_at_their_own_size(variant):
+    studied = open_study("open-fog", replace(TINY, timed=(32, 24)))
+    assert (studied.scene.camera.width, studied.timed.camera.width, studied.probe.camera.width) == (16, 32, 64)
+    assert studied.scene is studied.scene  # read once
+
+
+def test_the_digest_is_that_of_the_content(variant):
+    one, two = (open_study(name, TINY).digest for name in ("open-fog", "sphere-spot"))
+    assert one != two
+    assert one == open_study("open-fog", TINY).digest

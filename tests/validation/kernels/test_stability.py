@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: BSD-3-Clause
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analytic.cases import read_cases
+from analytic.errors import InputError
+from realtime.errors import InputError as RealtimeInputError
+from validation.kernels import stability as module
+from validation.kernels.errors import errors_by_group, groups
+from validation.kernels.rays import hard_rays, slivers, table
+from validation.kernels.stability import GENERATED, certified_files, gamma_difference, kernel_stability, stability
+from validation.kernels.values import Values, evaluate_cases, take
+
+
+def gauss(geometry, x0, x1, medium, light):
+    from realtime.kernels.quadrature import quadrature
+
+    return quadrature(geometry, x0, x1, medium, light, nodes=8)
+
+
+def isotropic(cases):
+    return take(cases, np.array(cases.phase) == "isotropic")
+
+
+def study(function, name="own:kernel"):
+    return kernel_stability(name, function, {GENERATED: isotropic(hard_rays(256))}, slivers(64))
+
+
+def four_rays():
+    columns = {name: np.ones(4) for name in ("foot", "height", "sigma_t")}
+    rays = table(
+        ["isotropic"] * 3 + ["hg"], np.zeros(4), x0=np.zeros(4), x1=np.arange(1.0, 5.0), tags="aabb", **columns
+    )
+    return replace(rays, value=np.array([1.0, 2.0, 4.0, 8.0]))
+
+
+def test_errors_are_counted_by_group():
+    rays = four_rays()
+    values = Values(np.array([1.1, 2.0, -4.0, 8.0]), {}, np.ones(4, dtype=bool))
+    found = errors_by_group(rays, values, "single", groups(rays))
+    assert list(found) == ["all", "a", "b", "phase hg", "phase isotropic"]
+    assert found["all"].max == 2.0
+    assert found["all"].negative == 1
+    assert found["all"].worst.startswith("b,isotropic,0.0,1.0,1.0,0.0,3.0,1.0,4.0")
+    assert found["a"].max == pytest.approx(0.1)
+    assert found["a"].mean == pytest.approx(0.05)
+    assert (found["phase hg"].rays, found["phase hg"].max) == (1, 0.0)
+
+
+def test_what_is_not_finite_is_counted_and_shown_as_the_worst():
+    rays = four_rays()
+    found = errors_by_group(
+        rays, Values(np.array([9.0, np.nan, np.inf, 8.0]), {}, np.ones(4, dtype=bool)), "double", groups(rays)
+    )["all"]
+    assert (found.nan, found.infinite, found.negative) == (1, 1, 0)
+    assert found.max == 8.0
+    assert ",2.0,1.0,2.0" in found.worst
+    nothing = errors_by_group(rays, Values(np.full(4, np.nan), {}, np.ones(4, dtype=bool)), "single", groups(rays))
+    assert (nothing["all"].max, nothing["all"].median, nothing["all"].nan) == (None, None, 4)
+
+
+def test_infinite_where_the_truth_is_infinite_is_right():
+    rays = replace(four_rays(), value=np.array([np.inf, 2.0, 4.0, 8.0]))
+    values = Values(np.array([np.inf, 2.0, 4.0, 8.0]), {}, np.ones(4, dtype=bool))
+    found = errors_by_group(rays, values, "single", groups(rays))["all"]
+    assert (found.infinite, found.max) == (0, 0.0)
+
+
+def test_refused_rays_are_neither_errors_nor_failures():
+    rays = four_rays()
+    values = Values(np.array([1.0, 2.0, 4.0, np.nan]), {"hg": "no"}, np.array([True, True, True, False]))
+    found = errors_by_group(rays, values, "single", groups(rays))
+    assert (found["all"].rays, found["all"].refused, found["all"].nan) == (3, 1, 0)
+    assert (found["phase hg"].rays, found["phase hg"].worst) == (0, None)
+
+
+@pytest.mark.parametrize("error", [InputError, RealtimeInputError])
+def test_refusal_keeps_the_words_of_the_kernel(variant, error):
+    def refuses(geometry, x0, x1, medium, light):
+        if medium.phase.name == "hg":
+            raise error("no lobes here")
+        return gauss(geometry, x0, x1, medium, light)
+
+    found = evaluate_cases(four_rays(), refuses, "single")
+    assert found.refused == {"hg": "no lobes here"}
+    assert found.accepted.tolist() == [True, True, True, False]
+    assert np.isnan(found.J[3])
+    assert np.isfinite(found.J[:3]).all()
+
+
+def test_faults_of_a_kernel_are_not_refusals(variant):
+    def broken(geometry, x0, x1, medium, light):
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        evaluate_cases(four_rays(), broken, "single")
+
+
+def test_small_relative_mistake_is_found_where_it_is(variant):
+    """One part in a thousand, only for rays whose light is behind the camera."""
+
+    def wrong_behind(geometry, x0, x1, medium, light):
+        import drjit as dr
+
+        from realtime.kernels.quadrature import quadrature
+
+        J = quadrature(geometry, x0, x1, medium, light, nodes=16)
+        return dr.select(geometry.foot < 0, 1.001 * J, J)
+
+    found = study(wrong_behind)
+    tags = found.sets[0].double
+    assert tags["behind"].median == pytest.approx(1e-3, rel=1e-3)
+    assert tags["thin"].max < 1e-4
+    assert found.sets[0].single["all"].worst.split(",")[0] in ("behind", "infinite")
+    # Both precisions have the same mistake: they agree.
+    assert found.sets[0].single_against_double["behind"].median < 1e-6
+    assert (found.exact, found.broken) == (False, ())
+
+
+def test_kernel_that_claims_to_be_exact_is_held_to_it(variant):
+    found = study(gauss, "exact")
+    assert found.exact
+    assert any("float32 maximum, |g| up to 0.9" in words and "isotropic" in words for words in found.broken)
+    assert any("float64 maximum" in words for words in found.broken)
+    assert not any("NaN" in words or "negative" in words for words in found.broken)
+
+
+def test_negative_and_missing_values_break_the_claim(variant):
+    def bad(geometry, x0, x1, medium, light):
+        import drjit as dr
+
+        J = gauss(geometry, x0, x1, medium, light)
+        return dr.select(geometry.foot < 0, -J, dr.select(x0 > 0, dr.nan, J))
+
+    words = study(bad, "exact").broken
+    for precision in ("float32", "float64"):
+        assert any(precision in one and "negative" in one for one in words)
+        assert any(precision in one and "NaN" in one for one in words)
+
+
+def test_differences_of_gamma_lose_what_theory_says(variant):
+    """Rounding of the two terms, each to about half an epsilon, over their difference."""
+    found = gamma_difference(gauss, slivers(256), "single")
+    assert found.direct.max < 1e-4
+    assert found.difference.median > 1e-3
+    assert 0.05 < found.median_rounding < 5
+
+
+@pytest.mark.parametrize("name", ["airlight_integral.csv", "airlight_integral_rays.csv"])
+def test_exact_keeps_its_bar_on_the_certified_values(variant, data_folder, name):
+    from validation.configurations.kernel_names import find_kernel
+
+    cases = read_cases(data_folder / name)
+    values = {precision: evaluate_cases(cases, find_kernel("exact"), precision) for precision in ("single", "double")}
+    assert module._broken(module.Bar(), name, cases, values) == []
+
+
+def test_certified_values_are_used_where_they_are(data_folder, monkeypatch, tmp_path):
+    assert [path.parent for path in certified_files()] == [data_folder, data_folder]
+    monkeypatch.setattr(module, "__file__", str(tmp_path / "validation" / "kernels" / "stability.py"))
+    assert certified_files() == ()
+
+
+def test_study_runs_kernels_by_name(variant, monkeypatch):
+    """Without the certified files, as from a wheel."""
+    monkeypatch.setattr(module, "certified_files", lambda: ())
+    told = []
+    found = stability(["taylor-2"], count=256, progress=lambda *progress: told.append(progress))
+    assert [one.kernel for one in found] == ["taylor-2"]
+    assert [one.name for one in found[0].sets] == [GENERATED]
+    assert found[0].refused.keys() == {"tabulated"}
+    assert told == [(0, 1, "taylor-2")]
+    assert found[0].sets[0].single["phase tabulated"].rays == 0
+
+
+def test_wrong_name_is_refused_before_any_work(monkeypatch):
+    monkeypatch.setattr(module, "hard_rays", None)
+    with pytest.raises(InputError, match="did you mean 'taylor'"):
+        stability(["exact", "tailor"])

@@ -1,0 +1,216 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Tests of HDR-FLIP: with the real package where it is installed, and with fakes that die, hang or are missing."""
+
+import importlib.util
+import json
+import os
+import time
+
+import numpy as np
+import pytest
+
+from analytic.errors import InputError
+from validation.metrics.flip import Flip, exposure_range, flip_hdr
+
+real = pytest.mark.skipif(
+    importlib.util.find_spec("flip_evaluator") is None, reason="flip-evaluator has no wheel for this machine"
+)
+SHAPE = (24, 32, 3)
+
+
+@pytest.fixture
+def pair():
+    """Return a reference and a test image that is brighter by a tenth."""
+    reference = np.random.default_rng(1).gamma(2.0, 0.3, SHAPE)
+    return reference, 1.1 * reference
+
+
+@pytest.fixture
+def fake(tmp_path, monkeypatch):
+    """Return a function that puts a package with this body before the real one."""
+
+    def install(body):
+        (tmp_path / "flip_evaluator.py").write_text(body)
+        monkeypatch.setenv("PYTHONPATH", f"{tmp_path}{os.pathsep}{os.environ.get('PYTHONPATH', '')}")
+
+    return install
+
+
+def answer(expression):
+    """Return the body of a package that answers with this expression of the reference r and the test t."""
+    return (
+        f"import numpy as np\ndef evaluate(r, t, *args, parameters, **kw):\n    return {expression}, -1, parameters\n"
+    )
+
+
+# --- with the real package -------------------------------------------------------------------------------------------
+
+
+@real
+def test_the_value_is_that_of_the_package(pair):
+    import flip_evaluator
+
+    found = flip_hdr(*pair)
+    parameters = {
+        "ppd": found.pixels_per_degree,
+        "startExposure": found.start_exposure,
+        "stopExposure": found.stop_exposure,
+        "numExposures": found.exposures,
+        "tonemapper": "aces",
+    }
+    single = [image.astype(np.float32) for image in pair]
+    _, mean, _ = flip_evaluator.evaluate(*single, "HDR", applyMagma=False, parameters=parameters)
+    # Scaling by a power of two changes no digit of the image, but the exposure is added to it in float32.
+    assert found.value == pytest.approx(mean, abs=1e-5)
+    assert found.note == ""
+    assert found.error_map.shape == SHAPE[:2]
+
+
+@real
+def test_the_range_of_exposures_is_that_of_the_package(pair):
+    import flip_evaluator
+
+    single = [image.astype(np.float32) for image in pair]
+    _, _, used = flip_evaluator.evaluate(*single, "HDR", applyMagma=False)
+    start, stop = exposure_range(pair[0])
+    # Its weights of luminance have more digits; its median of an even number is the upper of the two in the middle.
+    assert start == pytest.approx(used["startExposure"], abs=1e-3)
+    assert stop == pytest.approx(used["stopExposure"], abs=0.02)
+
+
+@real
+def test_equal_images_have_none_and_larger_errors_more(pair):
+    reference, test = pair
+    assert flip_hdr(reference, reference).value == 0
+    assert 0.01 < flip_hdr(reference, test).value < flip_hdr(reference, 2 * reference).value < 1
+
+
+@pytest.mark.slow
+@real
+def test_a_single_exposure_is_used_alone(pair):
+    found = flip_hdr(*pair, exposure=1.0)
+    assert (found.start_exposure, found.stop_exposure, found.exposures) == (1, 1, 2)
+    assert 0.01 < found.value < flip_hdr(*pair).value + 1e-5
+
+
+@pytest.mark.slow
+@real
+@pytest.mark.parametrize("factor", [1e-30, 1e30])
+def test_the_unit_changes_nothing(pair, factor):
+    # 1e-5: the tool's own statement of its precision.
+    here, there = flip_hdr(*pair), flip_hdr(*(factor * image for image in pair))
+    assert there.value == pytest.approx(here.value, abs=1e-5)
+    assert there.start_exposure == pytest.approx(here.start_exposure - np.log2(factor), abs=1e-6)
+
+
+@real
+def test_masked_pixels_add_nothing(pair):
+    reference, test = (image.copy() for image in pair)
+    mask = np.ones(SHAPE[:2], dtype=bool)
+    mask[:4] = False
+    test[4:] = reference[4:]
+    assert flip_hdr(reference, test, mask=mask).value == 0
+    assert flip_hdr(reference, test).value > 0
+    reference[1, 2], test[0, 3] = np.nan, -1
+    assert flip_hdr(reference, test, mask=mask).value == 0
+
+
+@pytest.mark.slow
+@real
+def test_one_channel_is_grey(pair):
+    reference, test = (image[..., 0] for image in pair)
+    grey = flip_hdr(reference, test)
+    assert grey.value == flip_hdr(*(np.repeat(v[..., None], 3, axis=2) for v in (reference, test))).value
+    assert grey.value == flip_hdr(reference[..., None], test[..., None]).value
+
+
+# --- what it has no answer for ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("side", ["reference", "test image"])
+@pytest.mark.parametrize(("bad", "what"), [(np.nan, "NaN or inf"), (np.inf, "NaN or inf"), (-1e-9, "negative")])
+def test_bad_pixels_are_a_note(pair, side, bad, what):
+    images = dict(zip(("reference", "test image"), (image.copy() for image in pair)))
+    images[side][3, 4:6, 1] = bad
+    found = flip_hdr(images["reference"], images["test image"])
+    assert found.value is None
+    assert f"2 pixels of the {side} are {what}" in found.note
+
+
+def test_a_black_reference_is_a_note_and_a_black_test_is_not(pair, fake):
+    assert "the reference is black" in flip_hdr(np.zeros(SHAPE), pair[1]).note
+    fake(answer("np.full(r.shape[:2], 0.5, np.float32)"))
+    assert flip_hdr(pair[0], np.zeros(SHAPE)).value == 0.5
+
+
+@pytest.mark.parametrize(
+    ("arguments", "options", "message"),
+    [
+        ((np.ones((3, 4, 3)), np.ones((3, 4))), {}, "two sizes: the reference is 4 x 3 pixels with 3 channels"),
+        ((np.ones((3, 4, 2)), np.ones((3, 4, 2))), {}, "2 channels has no colour"),
+        ((np.ones((3, 4)), np.ones((3, 4))), {"exposure": np.nan}, "exposure: got nan"),
+        ((np.ones((3, 4)), np.ones((3, 4))), {"timeout": 0.0}, "time-out 0.0 s; wanted both above 0"),
+        ((np.ones((3, 4)), np.ones((3, 4))), {"mask": np.zeros((3, 4), bool)}, "the mask leaves no pixel"),
+    ],
+)
+def test_refuses_what_does_not_fit(arguments, options, message):
+    with pytest.raises(InputError, match=message):
+        flip_hdr(*arguments, **options)
+
+
+def test_a_black_image_has_no_range():
+    with pytest.raises(InputError, match="black reference has no range"):
+        exposure_range(np.zeros(SHAPE))
+
+
+# --- a package that fails --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("body", "note"),
+    [
+        ("raise ModuleNotFoundError('No module named flip_evaluator')", "is not installed"),
+        ("raise ImportError('wrong libgomp')", r"not installed (wrong libgomp)"),
+        ("import os\nos._exit(255)", "died with exit status 255: it said nothing"),
+        ("import os\nos._exit(0)", "died with exit status 0"),
+        ("import os\nos.kill(os.getpid(), 11)", "died with exit status -11"),
+        ("print('Exiting.')\nraise SystemExit(1)", "died with exit status 1: Exiting."),
+        (answer("1 / 0"), "ZeroDivisionError"),
+        (answer("np.full(r.shape[:2], np.nan)"), "no map of errors between 0 and 1"),
+        (answer("np.zeros((2, 2))"), "no map of errors between 0 and 1"),
+        (answer("np.full(r.shape[:2], 7.0)"), "no map of errors between 0 and 1"),
+        (answer("np.array([None])"), "no map that can be read"),
+    ],
+)
+def test_a_package_that_fails_is_a_note(pair, fake, body, note):
+    fake(body)
+    found = flip_hdr(*pair)
+    assert found.value is None
+    assert note in found.note
+    assert "\n" not in found.note
+
+
+def test_a_test_image_beyond_float32_is_a_note(pair):
+    assert "more than float32 holds" in flip_hdr(pair[0], 1e60 * pair[1]).note
+
+
+def test_a_package_that_hangs_is_ended(pair, fake):
+    fake("import time\ntime.sleep(600)")
+    began = time.perf_counter()
+    found = flip_hdr(*pair, timeout=1.0)
+    assert time.perf_counter() - began < 30
+    assert found.note == "flip-evaluator did not answer within 1 s and was ended"
+
+
+def test_json_has_no_map(pair, fake):
+    fake(answer("np.full(r.shape[:2], 0.25, np.float32)"))
+    as_json = json.loads(json.dumps(flip_hdr(*pair, exposure=-1.5).to_json(), allow_nan=False))
+    assert as_json == {
+        "value": 0.25,
+        "note": "",
+        "start_exposure": -1.5,
+        "stop_exposure": -1.5,
+        "exposures": 2,
+        "pixels_per_degree": 67.0,
+    }
+    assert json.loads(json.dumps(Flip(None, "why").to_json()))["note"] == "why"

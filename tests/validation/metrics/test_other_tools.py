@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import json
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+from analytic.errors import InputError
+from validation.metrics.other_tools import PublishedErrors, published_errors
+
+EXACT = 1e-13  # some roundings of double precision
+
+# r = 0.09, 0.19, 0.99 and t = r + 0.1, r - 0.1, r: every denominator below is a number that a hand can divide by.
+REFERENCE = np.array([[0.09, 0.19, 0.99]])
+TEST = REFERENCE + np.array([[0.1, -0.1, 0.0]])
+
+
+def test_names_are_stable():
+    names = (
+        "unit values nonfinite dark mse rmse mae rae_tev rse_tev mrse_pbrt relmse relmse_trim mape smape mrse_jeri psnr"
+    )
+    assert [f.name for f in fields(PublishedErrors)] == [*names.split(), "relative", "relative_max", "dark_max"]
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("mse", (0.01 + 0.01) / 3),
+        ("rmse", np.sqrt(0.02 / 3)),
+        ("mae", 0.2 / 3),
+        ("rae_tev", (0.1 / 0.1 + 0.1 / 0.2) / 3),
+        ("rse_tev", (0.01 / 0.0181 + 0.01 / 0.0461) / 3),
+        ("mrse_pbrt", (0.01 / 0.01 + 0.01 / 0.04) / 3),
+        ("relmse", (0.01 / 0.0181 + 0.01 / 0.0461) / 3),
+        ("relmse_trim", (0.01 / 0.0181 + 0.01 / 0.0461) / 3),  # 0.1 % of three values is none
+        ("mape", (0.1 / 0.1 + 0.1 / 0.2) / 3),
+        ("smape", (0.2 / (0.09 + 0.19 + 0.02) + 0.2 / (0.19 + 0.09 + 0.02)) / 3),
+        ("mrse_jeri", (0.01 / 0.0082 + 0.01 / 0.0362) / 3),
+        ("psnr", 10 * np.log10(0.99**2 * 3 / 0.02)),
+        ("relative", (0.1 / 0.09 + 0.1 / 0.19) / 3),
+        ("relative_max", 0.1 / 0.09),
+        ("dark_max", 0.0),
+    ],
+)
+def test_hand_computed_values(name, value):
+    assert getattr(published_errors(REFERENCE, TEST), name) == pytest.approx(value, rel=EXACT)
+
+
+def test_trimming_leaves_out_the_largest_thousandth():
+    reference = np.ones((20, 50, 3))  # 3000 values: three go
+    test = reference.copy()
+    test[0, :4, 0] += [5.0, 4.0, 3.0, 2.0]
+    found = published_errors(reference, test)
+    assert found.relmse_trim == pytest.approx(4 / 1.01 / 2997, rel=EXACT)
+    assert found.relmse == pytest.approx((25 + 16 + 9 + 4) / 1.01 / 3000, rel=EXACT)
+
+
+def test_dark_values_are_counted_and_judged_in_absolute_terms():
+    # mean(r) = 1: below 0.001 lie the black value, wrong by 0.02, and the dim one, wrong by 0.01.
+    reference = np.array([[0.0, 0.0005, 1.5, 2.4995]])
+    found = published_errors(reference, reference + np.array([[0.02, -0.01, 0.15, 0.0]]))
+    assert (found.values, found.dark) == (4, 2)
+    assert found.dark_max == pytest.approx(0.02, rel=EXACT)
+    assert found.relative == pytest.approx(0.1 / 2, rel=EXACT)
+    assert found.relative_max == pytest.approx(0.1, rel=EXACT)
+
+
+def test_the_unit_divides_both_images():
+    found = published_errors(50 * REFERENCE, 50 * TEST, unit=50.0)
+    for name, value in published_errors(REFERENCE, TEST).to_json().items():
+        if name != "unit":
+            assert getattr(found, name) == pytest.approx(value, rel=1e-12), name
+
+
+@pytest.mark.parametrize("factor", [1e-30, 1e30])
+def test_with_the_mean_as_unit_nothing_has_a_unit(factor):
+    rng = np.random.default_rng(3)
+    reference = rng.gamma(0.5, 0.01, (12, 9, 3))
+    test = reference * rng.normal(1, 0.1, reference.shape)
+    one, two = (published_errors(f * reference, f * test, unit=None) for f in (1.0, factor))
+    assert two.unit == pytest.approx(factor * one.unit, rel=1e-12)
+    for field in fields(PublishedErrors)[1:]:
+        # 1e-11: the rounding of the factor, squared and divided.
+        assert getattr(two, field.name) == pytest.approx(getattr(one, field.name), rel=1e-11), field.name
+
+
+def test_equal_images_have_no_error_and_a_psnr_that_json_cannot_hold():
+    found = published_errors(REFERENCE, REFERENCE)
+    assert found.psnr == np.inf
+    as_json = json.loads(json.dumps(found.to_json(), allow_nan=False))
+    assert as_json["psnr"] is None
+    for name in ("mse", "mae", "relmse", "relmse_trim", "smape", "relative", "relative_max", "dark_max"):
+        assert as_json[name] == 0, name
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("side", ["reference", "test"])
+def test_nonfinite_pixels_are_left_out_and_counted(bad, side):
+    reference, test = (np.repeat(image[..., None], 3, axis=2) for image in (REFERENCE, TEST))
+    wide = {"reference": np.concatenate([reference, reference]), "test": np.concatenate([test, test])}
+    wide[side][1, :, 1] = bad
+    found = published_errors(wide["reference"], wide["test"])
+    assert (found.nonfinite, found.values) == (3, 9)
+    assert found.smape == pytest.approx(published_errors(reference, test).smape, rel=EXACT)
+
+
+def test_nothing_finite_gives_nan():
+    found = published_errors(np.full((2, 2), np.nan), np.ones((2, 2)))
+    assert (found.values, found.nonfinite) == (0, 4)
+    assert all(value is None for value in list(found.to_json().values())[4:])
+
+
+def test_black_reference_has_absolute_errors_and_those_with_an_epsilon():
+    found = published_errors(np.zeros((2, 2)), np.full((2, 2), 0.1))
+    assert (found.mse, found.mae) == pytest.approx((0.01, 0.1), rel=EXACT)
+    assert found.mrse_pbrt == pytest.approx(0.01 / 0.0001, rel=EXACT)
+    assert found.dark == 4
+    assert np.isnan([found.psnr, found.relative, found.relative_max, found.dark_max]).all()
+    assert published_errors(np.zeros((2, 2)), np.ones((2, 2)), unit=None).unit == 1
+
+
+def test_negative_values_stay_in_and_are_not_clamped():
+    found = published_errors(np.array([[1.0, 1.0]]), np.array([[-1.0, 1.0]]))
+    assert found.mae == 1
+    assert found.smape == pytest.approx(4 / 2.02 / 2, rel=EXACT)
+    # A reference of exactly -0.01 makes pbrt's and tev's denominators zero: infinite, None in JSON.
+    singular = published_errors(np.array([[-0.01, 1.0]]), np.array([[0.0, 1.0]]))
+    assert singular.mrse_pbrt == np.inf
+    assert singular.to_json()["rae_tev"] is None
+
+
+def test_the_mask_chooses_pixels():
+    mask = np.array([[True, True, False]])
+    assert published_errors(REFERENCE, TEST, mask=mask).mae == pytest.approx(0.1, rel=EXACT)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "options", "message"),
+    [
+        ((np.ones((3, 4)), np.ones((4, 3))), {}, "reference is 4 x 3 pixels, the test 3 x 4"),
+        ((np.ones((3, 4, 3)), np.ones((3, 4))), {}, "with 3 channels, the test 4 x 3 pixels; render both"),
+        ((np.ones((3, 4)), np.ones((3, 4))), {"unit": 0.0}, "unit: got 0.0, wanted a radiance above 0"),
+        ((np.ones((3, 4)), np.ones((3, 4))), {"unit": np.nan}, "unit: got nan"),
+    ],
+)
+def test_refuses_what_does_not_fit(arguments, options, message):
+    with pytest.raises(InputError, match=message):
+        published_errors(*arguments, **options)

@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import json
+
+import pytest
+
+from reports.commands import main as cli
+from validation.papers.biri import PUBLISHED, STAGES, biri_row, biri_rows
+
+
+def test_published_figures_are_those_of_the_paper():
+    rates = {(one.scene, one.size): one.fps for one in PUBLISHED}
+    assert [rates[name, (800, 600)] for name in ("two-pens", "three-media", "clutter", "hall")] == [23, 35, 25, 12]
+    assert (rates["sphere-spot", (800, 600)], rates["sphere-spot", (1024, 768)]) == (120, 107)
+    for one in PUBLISHED:
+        # Table 1 is printed with one decimal at most: its rows add up to 100 within 5 x 0.05.
+        assert one.shares is None or sum(one.shares) == pytest.approx(100, abs=0.25)
+
+
+def test_a_row_has_every_stage_and_its_error(variant):
+    row = biri_row(PUBLISHED[0], "exact", size=(48, 36), error_size=(24, 18), seconds=0.02)
+    assert row.triangles == 2 * 32 * 17 + 2
+    assert len(row.stages_ms) == len(STAGES)
+    assert all(stage > 0 for stage in row.stages_ms[:4])
+    assert sum(row.shares) == pytest.approx(100)
+    assert row.error.relative_rmse < 1e-3  # the target of the method in every built-in scene
+    assert all(one.median_ms > 0 for one in (row.rebuilt, row.static, row.relit, row.recoloured, row.rays))
+
+
+def test_every_entry_is_measured_with_every_kernel(variant):
+    told = []
+    rows = biri_rows(
+        PUBLISHED[:2], ("exact", "taylor"), scale=0.02, seconds=0.0, progress=lambda *what: told.append(what)
+    )
+    assert [(row.size, row.kernel, row.cone, row.tolerance) for row in rows] == [
+        (size, *what)
+        for size in ((16, 12), (20, 16))
+        for what in (("exact", 0, 0), ("exact", 32, 0), ("exact", 0, 0.005), ("taylor", 0, 0), ("taylor", 32, 0))
+    ]
+    assert [share for share, _ in told] == [number / 10 for number in range(10)]
+
+
+def test_command_prints_both_tables_beside_the_published_figures(variant, capfd):
+    arguments = ["published", "--scenes", "two-pens", "--kernels", "exact", "--scale", "0.03", "--no-needless"]
+    assert cli.run([*arguments, "--markdown"]) == 0
+    out = capfd.readouterr().out
+    assert "| two-pens: Table 1, Fig. 7a | 1 % | 8.7 % | 21.7 % | 9.6 % | 59 % | - |" in out
+    assert "two-pens, 24 x 16 (exact) | 34549 | 23 |" in out
+    assert "more than 35" in out
+    assert cli.run([*arguments, "--json"]) == 0
+    found = json.loads(capfd.readouterr().out)
+    assert found["rows"][0]["published"]["fps"] == 23
+    assert len(found["rows"][0]["shares"]) == len(found["stages"]) == 5
+
+
+def test_unknown_scene_is_refused(capfd):
+    assert cli.run(["published", "--scenes", "three-pens"]) == cli.WRONG_INPUT
+    assert "--scenes: got 'three-pens', wanted some of sphere-spot" in capfd.readouterr().err

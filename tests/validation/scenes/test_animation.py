@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: BSD-3-Clause
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analytic.errors import InputError
+from realtime.frame.incremental import next_frame
+from validation.scenes.animation import animate, middle, moved_parts, parse_moves, vertical
+from validation.scenes.record import MOVES, Animation
+from validation.scenes.registry import SCENES
+
+
+def host(array) -> np.ndarray:
+    return np.array(array, dtype=np.float64).ravel()
+
+
+def read(name):
+    from realtime.scene.read_scene import read_scene
+    from validation.scenes.loading import load_scene
+
+    loaded = load_scene(name, (16, 12))
+    return read_scene(loaded.scene), loaded.animation
+
+
+def test_moves_are_named():
+    assert parse_moves("light, colour,light") == ("light", "colour")
+    with pytest.raises(InputError, match="--animate: got 'lamp', wanted some of light, objects, medium, colour"):
+        parse_moves("lamp")
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_every_scene_states_what_moves(name):
+    animation = SCENES[name].animation
+    assert animation.moves
+    assert set(animation.moves) <= set(MOVES)
+
+
+@pytest.mark.parametrize("name", ["open-fog", "sphere-spot"])
+def test_lights_circle_at_one_height_and_come_back(variant, name):
+    scene, animation = read(name)
+    about = np.array(animation.about)
+    places = np.array([host(moved.lights[0].position) for moved in animate(scene, animation, 8)])
+    np.testing.assert_allclose(places[0], host(scene.lights[0].position), rtol=1e-7)
+    np.testing.assert_allclose(places[:, 2], places[0, 2], rtol=1e-6)
+    radius = np.linalg.norm(places[:, :2] - about[:2], axis=1)
+    assert radius[0] > 0.1
+    np.testing.assert_allclose(radius, radius[0], rtol=1e-5)
+    steps = np.linalg.norm(places - np.roll(places, 1, axis=0), axis=1)
+    np.testing.assert_allclose(steps, steps[0], rtol=1e-4)  # the step from the last to the first included
+
+
+def test_medium_swings_between_half_and_one_and_a_half(variant):
+    scene, _ = read("open-fog")
+    base = float(scene.medium.sigma_t[0][0])
+    factors = [
+        float(moved.medium.sigma_t[0][0]) / base for moved in animate(scene, Animation(("medium",), (0, 0, 0)), 4)
+    ]
+    assert factors == pytest.approx([1, 1.5, 1, 0.5], rel=1e-6)
+
+
+def test_axis_of_a_scene_without_one(variant):
+    scene, _ = read("sphere-spot")
+    np.testing.assert_array_equal(vertical(scene), [0, 0, 1])
+    # The floor spans x -9.1..9.1, y -6.3..9.4.
+    np.testing.assert_allclose(middle(scene)[:2], [0, 1.55], atol=1e-5)
+    fog, _ = read("open-fog")
+    towards = middle(fog) - host(fog.camera.origin)
+    np.testing.assert_allclose(np.cross(towards, host(fog.camera.forward)), 0, atol=1e-4)
+
+
+def test_nothing_closed_cannot_turn(variant):
+    scene, _ = read("open-fog")
+    with pytest.raises(InputError, match="no closed mesh that could turn"):
+        next(animate(scene, Animation(("objects",)), 3))
+
+
+@pytest.mark.parametrize(
+    ("name", "moves"),
+    [("sphere-spot", ("light",)), ("clutter", ("light", "colour")), ("open-fog", ("light", "medium", "colour"))],
+)
+def test_frames_record_nothing_and_compile_nothing(variant, name, moves):
+    """From the second frame on every kernel is replayed; what moves is data."""
+    import drjit as dr
+
+    from validation.configurations.methods import configuration, prepared
+
+    scene, animation = read(name)
+    renderer = prepared(scene, configuration("shadow-planes"))
+    animation, kept = replace(animation, moves=moves), None
+    for number, moved in enumerate(animate(scene, animation, 6)):
+        with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+            dr.kernel_history_clear()
+            _, kept = next_frame(renderer, moved, kept, **moved_parts(animation))
+            compiled = [one for one in dr.kernel_history() if one.get("cache_hit") is False]
+        if number:
+            assert not compiled
+    assert renderer.airlight.n_recordings == 1
+    assert all(getattr(stage, "n_recordings", 1) == 1 for stage in (renderer.surface, renderer.shade, renderer.tiles))
+
+
+def test_turning_objects_record_the_surface_once_more_at_most(variant):
+    """It casts rays, so it is given Mitsuba's scene, part of which Mitsuba makes anew: Dr.Jit may notice that once."""
+    from validation.configurations.methods import configuration, prepared
+
+    scene, animation = read("two-pens")
+    renderer = prepared(scene, configuration("shadow-planes"))
+    kept = None
+    for moved in animate(scene, animation, 5):
+        _, kept = next_frame(renderer, moved, kept, **moved_parts(animation))
+    assert renderer.airlight.n_recordings == 1
+    assert renderer.surface.n_recordings <= 2
+
+
+def test_shapes_keep_their_names_beside_bounded_media(variant):
+    """What is opaque is rendered in a Mitsuba scene of its own: warnings and animations speak of its shapes."""
+    scene, _ = read("three-media")
+    names = [shape.id() for shape in scene.geometry.shapes()]
+    assert {"bar", "floor"} <= set(names)
+    assert not {"red", "green", "blue"} & set(names)
+    frames = animate(scene, Animation(("objects", "medium"), objects=("bar",)), 4)
+    base = [float(body.medium.sigma_t[0][0]) for body in scene.medium.bodies]
+    moved = [
+        (step.positions["bar"], [float(body.medium.sigma_t[0][0]) for body in step.medium.bodies]) for step in frames
+    ]
+    assert np.abs(moved[1][0] - moved[0][0]).max() > 1
+    np.testing.assert_allclose(moved[1][1], 1.5 * np.array(base), rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("moves", "casts", "prepared_frames"),
+    [(("light",), 1, 4), (("medium", "colour"), 1, 1), (("light", "colour"), 1, 4), (("objects", "medium"), 4, 4)],
+)
+def test_what_stands_still_is_kept(variant, moves, casts, prepared_frames):
+    """Four frames: camera rays are cast again where objects move alone, planes are found again where the light does."""
+    from validation.configurations.methods import configuration, prepared
+
+    scene, animation = read("two-pens")
+    animation = replace(animation, moves=moves)
+    renderer = prepared(scene, configuration("shadow-planes"))
+    calls = {"surface": 0, "prepare": 0}
+
+    def counted(name):
+        def run(*arguments):
+            calls[name] += 1
+            return getattr(renderer, name)(*arguments)
+
+        return run
+
+    counting, kept = replace(renderer, surface=counted("surface"), prepare=counted("prepare")), None
+    for moved in animate(scene, animation, 4):
+        _, kept = next_frame(counting, moved, kept, **moved_parts(animation))
+    assert calls == {"surface": casts, "prepare": prepared_frames}

@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The scenes of Billeter 2010: their meshes, what the lamp reaches, and that methods and truth agree about it."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from realtime.methods.shadow_planes.mesh_adjacency import make_casters
+from tests.helpers.meshes import areas, volume
+from validation.scenes.omni_box import SCENE as OMNI_BOX
+from validation.scenes.omni_box import _bars, _room, _standing
+from validation.scenes.tangle import _MIDDLE, _TUBES, _WAVES, _bent, _tubes
+from validation.scenes.tangle import SCENE as TANGLE
+
+RECORDS = {record.name: record for record in (OMNI_BOX, TANGLE)}
+
+
+@cache
+def parts(name):
+    """Return the parts of a scene that must be closed, {part: mesh}."""
+    if name == "omni-box":
+        return {f"box {number}": mesh for number, mesh in enumerate([*_bars(), *_standing()])}
+    vertices, faces = _tubes()
+    ends = np.cumsum([tube.cells[0] * tube.cells[1] for tube in _TUBES]).tolist()
+    cut = {}
+    for number, (first, last) in enumerate(zip([0, *ends], ends, strict=False)):
+        own = faces[(faces[:, 0] >= first) & (faces[:, 0] < last)]
+        cut[f"tube {number}"] = vertices[first:last], own - first
+    return cut
+
+
+@cache
+def scene_of(name, size):
+    """Return a scene as methods read it."""
+    from realtime.scene.read_scene import read_scene
+    from validation.scenes.loading import load_scene
+
+    return read_scene(load_scene(name, size).scene)
+
+
+@cache
+def map_of(name, size):
+    """Return the distances of a shadow map of the scene's one light, (faces, size + 1, size + 1)."""
+    from realtime.shadow_maps.shadow_map import cast_shadow_map
+
+    scene = scene_of(name, (8, 6))
+    return np.array(cast_shadow_map(scene.geometry, scene.lights[0], size).distance).reshape(-1, size + 1, size + 1)
+
+
+@pytest.mark.parametrize(("name", "count"), [("omni-box", 166), ("tangle", 188_082)])
+def test_triangle_counts_are_those_that_the_records_state(variant, name, count):
+    import mitsuba as mi
+
+    shapes = mi.load_dict(RECORDS[name].build()).shapes()
+    assert sum(shape.face_count() for shape in shapes) == count
+    assert f"{count:,}".replace(",", " ") in RECORDS[name].purpose
+
+
+@pytest.mark.parametrize("name", RECORDS)
+def test_every_part_is_closed_and_faces_outwards(name):
+    """Shadow planes take closed casters; each part is one connected body, its edges met once each way."""
+    casters = make_casters([(part, *mesh) for part, mesh in parts(name).items()])
+    assert casters.warnings == ()
+    assert casters.closed.tolist() == [True] * len(parts(name))
+    assert not np.any(casters.same_way)
+    for part, (vertices, faces) in parts(name).items():
+        assert volume(vertices - vertices.mean(axis=0), faces) > 0, part
+        # Boxes have Euler's number 2, tubes that close on themselves 0.
+        euler = len(vertices) - 3 * len(faces) // 2 + len(faces)
+        assert euler == (2 if name == "omni-box" else 0), part
+
+
+@pytest.mark.parametrize("name", RECORDS)
+def test_no_face_is_degenerate_in_float32(name):
+    for part, (vertices, faces) in parts(name).items():
+        # The smallest faces, of the tangle's thinnest sections, are of 1e-5 m^2; one without area would be nought but
+        # for rounding: 4 m are held to 2e-7, over an edge of 1 cm that is 2e-9.
+        assert areas(vertices.astype(np.float32).astype(np.float64), faces).min() > 1e-6, part
+
+
+def test_room_turns_its_inside_to_the_lamp():
+    from validation.scenes.omni_box import _LAMP
+
+    vertices, faces = _room()
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    assert np.all(np.einsum("ij,ij->i", np.cross(b - a, c - a), np.array(_LAMP) - a) > 0)
+
+
+def test_boxes_of_the_room_stand_in_it_and_keep_clear_of_the_lamp():
+    from validation.scenes.omni_box import _LAMP
+
+    for mesh, lowest in [(mesh, 0.1) for mesh in _bars()] + [(mesh, -0.1) for mesh in _standing()]:
+        vertices, _ = mesh
+        assert vertices[:, 2].min() > lowest
+        # Without a gap: a box that stands sinks into the floor a little.
+        assert lowest > 0 or vertices[:, 2].min() < 0
+        assert np.linalg.norm(vertices - np.array(_LAMP), axis=1).min() > 0.4
+
+
+def test_tangle_is_bent_without_folding_space():
+    """Two points move against each other by less than they are apart: the waves' Lipschitz bounds add to below 1."""
+    assert sum(np.linalg.norm(displacement) * np.linalg.norm(wave) for displacement, wave, _ in _WAVES) < 1
+    points = np.random.default_rng(20100621).uniform(-1.7, 1.7, (4000, 3))
+    step = 1e-5
+    columns = [(_bent(points + step * axis) - _bent(points - step * axis)) / (2 * step) for axis in np.eye(3)]
+    determinants = np.linalg.det(np.stack(columns, axis=2))
+    assert determinants.min() > 0
+    assert determinants.max() / determinants.min() > 2  # and yet it is bent
+
+
+def test_tubes_are_uneven():
+    """Irregular: the thinnest section of each tube is less than half as thick as the thickest."""
+    vertices, _ = _tubes()
+    first = 0
+    for tube in _TUBES:
+        rings, sides = tube.cells
+        points = vertices[first : first + rings * sides].reshape(rings, sides, 3)
+        first += rings * sides
+        thickness = np.linalg.norm(points - points.mean(axis=1, keepdims=True), axis=2).mean(axis=1)
+        assert thickness.min() < 0.5 * thickness.max()
+
+
+def test_tangle_lies_in_the_cone_of_its_spot(variant):
+    vertices, _ = _tubes()
+    light = scene_of("tangle", (8, 6)).lights[0]
+    lamp = np.array(light.position).reshape(3)
+    towards = np.array(_MIDDLE) - lamp
+    from_lamp = vertices - lamp
+    cosine = from_lamp @ towards / np.linalg.norm(from_lamp, axis=1) / np.linalg.norm(towards)
+    assert np.arccos(cosine.min()) < float(light.cutoff[0])
+
+
+def test_every_face_of_the_lamps_map_sees_a_box_before_a_wall(variant):
+    """The floor, nearest of what is open, is 1.57 m below the lamp: what is nearer is a box, and some rays go on."""
+    for number, face in enumerate(map_of("omni-box", 32)):
+        assert face.min() < 1.2, number
+        assert face.max() > 1.57, number
+
+
+def test_map_of_the_tangle_has_edges_all_over(variant):
+    """Many small holes: what is nearest changes often along each row of the map; some rays leave the scene."""
+    (face,) = map_of("tangle", 256)
+    assert np.isinf(face).any()
+    assert face.min() > 2.5
+    # A ray that falls at an angle e to a floor 4.2 m below has the inverse distance sin(e) / 4.2 m, so from texel to
+    # texel, 2 tan(26.3 degrees) / 256 apart at most, it changes by 1e-3 [1/m]. A row meets the floor's border twice.
+    jumps = np.count_nonzero(np.abs(np.diff(1 / face, axis=1)) > 0.01, axis=1)
+    assert np.median(jumps) > 12  # 20; one ball before the floor has 4 at most
+
+
+def frame_of(name, method, *, kernel=None, **parameters):
+    """Return a small frame of a scene."""
+    from realtime.frame.renderer import frame_renderer, render_frame
+    from realtime.kernels.registry import KERNELS
+    from realtime.methods.registry import METHODS
+
+    function = KERNELS[kernel].function if kernel else None
+    return render_frame(frame_renderer(scene_of(name, (24, 18)), METHODS[method], kernel=function, **parameters))
+
+
+@pytest.mark.parametrize("name", RECORDS)
+def test_shadows_take_most_of_some_pixels_and_little_of_others(variant, name):
+    """By the truth against the same frame without volumetric shadows; and marching finds the same shadows."""
+    from validation.estimates.quadrature import truth_image
+    from validation.scenes.loading import load_scene
+
+    truth = truth_image(load_scene(name, (24, 18)).scene).airlight[..., 1]
+    kept = truth / frame_of(name, "unshadowed", kernel="exact").airlight[..., 1]
+    assert kept.max() < 1 + 1e-5  # shadows add nothing; float32 keeps 1e-6
+    assert kept.min() < 0.5
+    assert kept.max() > 0.9
+    marched = frame_of(name, "ray-march", steps=400).airlight[..., 1]
+    # 400 steps miss a little at each edge of a shadow: 8e-4 and 3e-3 of the mean.
+    assert np.sqrt(np.mean((marched - truth) ** 2)) < 0.01 * truth.mean()
+
+
+@pytest.mark.parametrize("name", RECORDS)
+def test_records_say_what_they_answer_to(name):
+    record = RECORDS[name]
+    assert record.purpose.endswith(".")
+    assert record.published.startswith("Billeter, Sintorn, Assarsson 2010, Fig. ")
+    assert record.animation.moves == ("light",)

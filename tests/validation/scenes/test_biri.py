@@ -1,0 +1,312 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The scenes of Biri 2006's Table 2, the solids that they are made of, and the casters that other tests share."""
+
+from collections import Counter
+from functools import cache
+
+import numpy as np
+import pytest
+
+from tests.helpers.casters import AWKWARD, SOUND, flat_roof
+from tests.helpers.meshes import areas, directed_edges, is_closed, normals_by_area, volume
+from validation.scenes.clutter import SCENE as CLUTTER
+from validation.scenes.hall import SCENE as HALL
+from validation.scenes.parts import skin
+from validation.scenes.solids import (
+    arch,
+    box,
+    gable,
+    gem,
+    icosphere,
+    pierced,
+    prism,
+    star,
+    tetrahedron,
+    torus,
+)
+from validation.scenes.three_media import SCENE as THREE_MEDIA
+
+RECORDS = {record.name: record for record in (THREE_MEDIA, CLUTTER, HALL)}
+OPEN = {
+    "three-media": {"floor", "wall"},
+    "clutter": {"table", "backdrop"},
+    "hall": {"floor", "ceiling", "wall-left", "wall-right", "end-wall"},
+}
+MEDIA = {"red", "green", "blue"}
+SOLIDS = {
+    # name: mesh, triangles, Euler's number
+    "box": (box((0.7, 1.3, 0.9)), 12, 2),
+    "tetrahedron": (tetrahedron(0.7), 4, 2),
+    "icosphere": (icosphere(2), 320, 2),
+    "gem": (gem(13, 5), 130, 2),
+    "prism": (prism(star(0.3, 0.7, 5), 0.4), 40, 2),
+    "arch": (arch((0.9, 1.3), 0.4, 11), 96, 2),
+    "torus": (torus(0.9, 0.3, (20, 9)), 360, 0),
+}
+
+
+def winding_number(point, vertices, faces) -> float:
+    """How often the surface runs around the point: solid angles by van Oosterom and Strackee 1983, eq. 8, over 4 pi."""
+    a, b, c = (vertices[faces[:, k]] - point for k in range(3))
+    la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
+    below = la * lb * lc + np.sum(a * b, 1) * lc + np.sum(b * c, 1) * la + np.sum(c * a, 1) * lb
+    return float(np.sum(np.arctan2(np.einsum("ij,ij->i", a, np.cross(b, c)), below)) / (2 * np.pi))
+
+
+@cache
+def built(name):
+    return RECORDS[name].build()
+
+
+def meshes(name):
+    """Return the meshes of a scene as Mitsuba has them, {name: (vertices, faces)}."""
+    import mitsuba as mi
+
+    result = {}
+    for key, value in built(name).items():
+        if isinstance(value, mi.Mesh):
+            parameters = mi.traverse(value)
+            vertices = np.array(parameters["vertex_positions"], dtype=np.float64).reshape(-1, 3)
+            result[key] = vertices, np.array(parameters["faces"], dtype=np.int64).reshape(-1, 3)
+    return result
+
+
+@pytest.mark.parametrize("name", SOLIDS)
+def test_solids_are_closed_and_face_outwards(name):
+    (vertices, faces), count, euler = SOLIDS[name]
+    assert len(faces) == count
+    assert is_closed(faces)
+    assert len(vertices) - 3 * len(faces) // 2 + len(faces) == euler
+    assert set(faces.reshape(-1)) == set(range(len(vertices)))
+    assert volume(vertices - vertices.mean(axis=0), faces) > 0
+
+
+def test_volumes_of_solids_by_their_formulas():
+    assert volume(*box((0.7, 1.3, 0.9))) == pytest.approx(0.7 * 1.3 * 0.9)
+    # Edge of the tetrahedron: R sqrt(8/3); volume: edge^3 / (6 sqrt 2).
+    assert volume(*tetrahedron(0.7)) == pytest.approx((0.7 * np.sqrt(8 / 3)) ** 3 / (6 * np.sqrt(2)))
+    # A star of 2 n corners is 2 n triangles of area inner outer sin(pi / n) / 2.
+    assert volume(*prism(star(0.3, 0.7, 5), 0.4)) == pytest.approx(10 * 0.5 * 0.3 * 0.7 * np.sin(np.pi / 5) * 0.4)
+    steps = 11
+    ring = 0.5 * steps * np.sin(np.pi / steps) * (1.3**2 - 0.9**2)
+    assert volume(*arch((0.9, 1.3), 0.4, steps)) == pytest.approx(ring * 0.4)
+    # Pappus, with both circles as polygons, in the limit: the corners of the polygons leave out less than 1e-3.
+    assert volume(*torus(0.9, 0.3, (300, 200))) == pytest.approx(2 * np.pi**2 * 0.9 * 0.3**2, rel=1e-3)
+    assert volume(*icosphere(5)) == pytest.approx(4 * np.pi / 3, rel=2e-3)
+
+
+def test_an_icosphere_is_round_and_its_base_an_icosahedron():
+    vertices, _ = icosphere(3)
+    np.testing.assert_allclose(np.linalg.norm(vertices, axis=1), 1, rtol=1e-14)
+    base, triangles = icosphere(0)
+    assert len(triangles) == 20
+    np.testing.assert_allclose(areas(base, triangles), areas(base, triangles)[0], rtol=1e-12)
+
+
+@pytest.mark.parametrize("ring_of_rings", [False, True])
+def test_skin_has_two_triangles_for_every_point_of_a_ring(ring_of_rings):
+    angle = 2 * np.pi * np.arange(6) / 6
+    rings = [np.stack([np.cos(angle), np.sin(angle), np.full(6, 0.3 * k)], axis=1) for k in range(4)]
+    _, faces = skin(rings, ring_of_rings=ring_of_rings)
+    assert len(faces) == 2 * 4 * 6
+    assert is_closed(faces)
+
+
+def test_walls_cover_what_they_should_and_face_across_times_up():
+    vertices, faces = gable((1.0, 2.0, 3.0), (4.0, 0, 0), (0, 0, 2.0), (7, 3))
+    normal = normals_by_area(vertices, faces)
+    assert len(faces) == 2 * 7 * 3 + 7
+    # The rectangle, and half of one half as high.
+    np.testing.assert_allclose(normal.sum(axis=0), [0, -(4 * 2 + 0.5 * 4 * 1), 0], atol=1e-12)
+    assert np.all(normal[:, 1] < 0)
+    vertices, faces = pierced((1.0, 2.0, 3.0), (4.0, 0, 0), (0, 0, 2.0), hole=(0.41, 0.53, 0.61), cells=(24, 3))
+    normal = normals_by_area(vertices, faces)
+    assert len(faces) == 2 * 24 * 3
+    # The hole is a polygon of 24 corners.
+    np.testing.assert_allclose(normal.sum(axis=0), [0, -(4 * 2 - 12 * 0.61**2 * np.sin(np.pi / 12)), 0], atol=1e-12)
+    assert np.all(normal[:, 1] < 0)
+    np.testing.assert_allclose([vertices.min(axis=0), vertices.max(axis=0)], [[1, 2, 3], [5, 2, 5]], atol=1e-12)
+    edges = directed_edges(faces)
+    borders = [edge for edge in edges if (edge[1], edge[0]) not in edges]
+    assert len(borders) == 2 * 24
+
+
+@pytest.mark.parametrize(("name", "count"), [("three-media", 14_785), ("clutter", 20_747), ("hall", 107_514)])
+def test_triangle_counts_are_those_of_table_2(variant, name, count):
+    assert sum(len(faces) for _, faces in meshes(name).values()) == count
+
+
+@pytest.mark.parametrize("name", RECORDS)
+def test_all_shapes_are_closed_but_the_named_ones(variant, name):
+    for shape, (vertices, faces) in meshes(name).items():
+        assert is_closed(faces) == (shape not in OPEN[name]), shape
+        assert set(directed_edges(faces).values()) == {1}, shape  # also open parts are oriented one way
+        if shape not in OPEN[name]:
+            assert volume(vertices - vertices.mean(axis=0), faces) > 0, shape
+
+
+@pytest.mark.parametrize("name", RECORDS)
+def test_meshes_are_welded_and_have_no_degenerate_or_doubled_faces(variant, name):
+    for shape, (vertices, faces) in meshes(name).items():
+        assert len(np.unique(vertices, axis=0)) == len(vertices), shape
+        assert set(faces.reshape(-1)) == set(range(len(vertices))), shape
+        assert len(np.unique(np.sort(faces, axis=1), axis=0)) == len(faces), shape
+        # The smallest faces, of fans and candles, are of 2e-6 m^2; one without area would be nought but for rounding.
+        assert areas(vertices, faces).min() > 1e-7, shape
+
+
+@pytest.mark.parametrize("name", RECORDS)
+def test_lamp_and_camera_are_in_no_solid(variant, name):
+    import mitsuba as mi
+
+    scene = mi.load_dict(built(name))
+    lamp = np.array(mi.traverse(scene.emitters()[0])["position"], dtype=np.float64).reshape(3)
+    camera = np.array(scene.sensors()[0].world_transform().matrix, dtype=np.float64).reshape(4, 4)[:3, 3]
+    for shape, (vertices, faces) in meshes(name).items():
+        if shape not in OPEN[name]:
+            for point in (lamp, camera):
+                # An integer, 0 outside; float64 sums of at most 5120 angles keep it to 1e-9.
+                assert winding_number(point, vertices, faces) == pytest.approx(0, abs=1e-9), shape
+
+
+def test_winding_number_tells_inside_from_outside():
+    assert winding_number(np.array([0.1, 0.2, 0.1]), *icosphere(2)) == pytest.approx(1)
+    assert winding_number(np.array([1.1, 0.2, 0.1]), *icosphere(2)) == pytest.approx(0, abs=1e-12)
+
+
+def test_media_are_convex_and_apart(variant):
+    found = {name: mesh for name, mesh in meshes("three-media").items() if name in MEDIA}
+    normals = {}
+    for name, (vertices, faces) in found.items():
+        a, b, c = (vertices[faces[:, k]] for k in range(3))
+        normal = np.cross(b - a, c - a)
+        normal /= np.linalg.norm(normal, axis=1)[:, None]
+        normals[name] = normal
+        height = normal @ vertices.T - np.sum(normal * a, axis=1)[:, None]
+        # Positions of 2 m are rounded to 1e-7 in float32; the box's sides have two coplanar triangles each.
+        assert height.max() < 1e-6, name
+    for one in MEDIA:
+        for other in MEDIA - {one}:
+            # Convex bodies are apart where a plane lies between them; here one of the faces' planes, or one across the
+            # line of centres, does.
+            line = found[other][0].mean(axis=0) - found[one][0].mean(axis=0)
+            axes = np.concatenate([normals[one], -normals[other], [line / np.linalg.norm(line)]])
+            gap = (axes @ found[other][0].T).min(axis=1) - (axes @ found[one][0].T).max(axis=1)
+            assert gap.max() > 0.05, (one, other)
+
+
+def test_media_differ_and_belong_to_their_boundaries_only(variant):
+    import mitsuba as mi
+
+    scene = mi.load_dict(built("three-media"))
+    assert scene.sensors()[0].get_medium() is None
+    media = {shape.id(): shape.interior_medium() for shape in scene.shapes() if shape.interior_medium() is not None}
+    assert set(media) == MEDIA
+    assert all(shape.exterior_medium() is None for shape in scene.shapes())
+    for shape in scene.shapes():
+        assert mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.Null) == (shape.id() in MEDIA), shape.id()
+    assert len({medium.phase_function().class_name() for medium in media.values()}) == 3
+    albedo = {name: np.array(mi.traverse(medium)["albedo.value.value"]).reshape(3) for name, medium in media.items()}
+    assert [int(np.argmax(albedo[name])) for name in ("red", "green", "blue")] == [0, 1, 2]
+
+
+def test_casters_lie_within_across_and_outside_media(variant):
+    """The bar pierces all three, one ring and star lie wholly within, and others have no point in any medium."""
+    found = meshes("three-media")
+
+    def share(caster, medium):
+        return np.mean([winding_number(point, *found[medium]) > 0.5 for point in found[caster][0][::7]])
+
+    bar, _ = found["bar"]
+    for medium in MEDIA:
+        along = np.linspace(bar[[0, 2, 4, 6]].mean(axis=0), bar[[1, 3, 5, 7]].mean(axis=0), 199)
+        inside = [winding_number(point, *found[medium]) > 0.5 for point in along]
+        assert 10 < sum(inside) < 190, medium
+    assert share("ring-within", "red") == 1
+    assert share("star", "green") == 1
+    assert 0 < share("star-across", "blue") < 1
+    for caster in ("ring-above", "ball", "slats", "tetrahedron", "vase"):
+        assert all(share(caster, medium) == 0 for medium in MEDIA), caster
+
+
+def test_things_stand_on_the_table_and_sink_in_a_little(variant):
+    """A gap would let light pass below; a ball or ring that rests on it dips in by its facets less."""
+    for shape, (vertices, _) in meshes("clutter").items():
+        if shape not in OPEN["clutter"]:
+            assert -0.03 < vertices[:, 2].min() < 0, shape
+
+
+@pytest.mark.parametrize("name", RECORDS)
+def test_records_say_what_they_answer_to(name):
+    record = RECORDS[name]
+    assert record.purpose.endswith(".")
+    assert "Biri, Arques, Michelin 2006" in record.published
+    assert "Table 2" in record.published
+
+
+@pytest.mark.parametrize("name", ["clutter", "hall"])
+def test_methods_and_truth_can_read_the_scenes_in_unbounded_fog(variant, name):
+    import mitsuba as mi
+
+    from realtime.scene.read_scene import read_scene
+    from reference.scene.read import read_truth
+
+    scene = mi.load_dict(built(name))
+    one, other = read_scene(scene), read_truth(scene)
+    assert len(one.lights) == len(other.lights) == 1
+    # Mitsuba holds it in float32: 6e-8.
+    np.testing.assert_allclose(np.array(one.medium.albedo).reshape(-1), other.medium.albedo, rtol=3e-7)
+
+
+@pytest.mark.parametrize("name", RECORDS)
+def test_no_number_of_the_scenes_is_round(variant, name):
+    import mitsuba as mi
+
+    parameters = mi.traverse(mi.load_dict(built(name)))
+    for key in parameters.keys():  # noqa: SIM118 - SceneParameters iterates over items
+        if key.endswith(("albedo.value.value", "intensity.value", "position", "x_fov", "reflectance.value")):
+            for value in np.array(parameters[key], dtype=np.float64).reshape(-1):
+                assert value % 0.5 != 0 or value > 10, (key, value)
+
+
+@pytest.mark.parametrize("name", SOUND)
+def test_sound_casters_are_sound(name):
+    vertices, faces = SOUND[name]()
+    assert is_closed(faces)
+    assert volume(vertices, faces) > 0
+    assert len(np.unique(vertices, axis=0)) == len(vertices)
+    assert areas(vertices, faces).min() > 1e-5
+
+
+def edge_meetings(name) -> Counter:
+    """Count the edges of an awkward caster by how many triangles meet there."""
+    _, faces = AWKWARD[name]()
+    return Counter(Counter(tuple(sorted(edge)) for edge in directed_edges(faces).elements()).values())
+
+
+def test_awkward_casters_have_the_flaw_that_they_are_named_for():
+    assert edge_meetings("open grid")[1] == 18
+    assert edge_meetings("open cylinder")[1] == 26
+    assert edge_meetings("Moebius strip")[1] == 48
+    assert max(directed_edges(AWKWARD["Moebius strip"]()[1]).values()) == 2
+    assert edge_meetings("boxes sharing an edge") == {2: 34, 4: 1}
+    assert edge_meetings("doubled faces")[4] > 0
+    vertices, faces = AWKWARD["doubled faces"]()
+    assert len(np.unique(np.sort(faces, axis=1), axis=0)) == len(faces) - 7
+    assert list(areas(*AWKWARD["degenerate faces"]()) == 0).count(True) == 2
+    assert is_closed(AWKWARD["sliver"]()[1])
+    assert list(areas(*AWKWARD["sliver"]()) < 1e-15).count(True) == 1
+    vertices, faces = AWKWARD["inside out"]()
+    assert is_closed(faces)
+    assert volume(vertices - vertices.mean(axis=0), faces) < 0
+    assert edge_meetings("mixed winding") == {2: 480}
+    assert not is_closed(AWKWARD["mixed winding"]()[1])
+
+
+def test_light_of_the_flat_roof_lies_exactly_in_its_plane():
+    (vertices, faces), light = flat_roof()
+    corners = vertices[faces]
+    roof = np.all(corners[:, :, 2] == 0.375, axis=1)
+    assert roof.sum() == 32
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert np.all(np.einsum("ij,ij->i", normal[roof], light - corners[roof, 0]) == 0)

@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import re
+
+import numpy as np
+import pytest
+
+from analytic.errors import InputError
+from validation.scenes.loading import load_scene, nearest, parse_size
+from validation.scenes.registry import SCENES
+
+SMALL = """<scene version="3.0.0">
+    <medium type="homogeneous" id="fog">
+        <float name="sigma_t" value="0.31"/>
+        <float name="albedo" value="0.83"/>
+    </medium>
+    <emitter type="point">
+        <point name="position" value="0.7, 0.3, 1.9"/>
+        <rgb name="intensity" value="5, 4, 3"/>
+    </emitter>
+    <sensor type="perspective">
+        <float name="fov" value="41.7"/>
+        <transform name="to_world"><lookat origin="0.2, -4.1, 1.3" target="0.1, 0, 0.6" up="0, 0, 1"/></transform>
+        <ref name="medium" id="fog"/>
+        <film type="hdrfilm"><integer name="width" value="16"/><integer name="height" value="12"/></film>
+    </sensor>
+    <shape type="sphere"><point name="center" value="0.1, 0.1, 0.7"/><float name="radius" value="0.41"/></shape>
+</scene>
+"""
+
+
+@pytest.fixture
+def small_file(tmp_path):
+    path = tmp_path / "my fog.xml"
+    path.write_text(SMALL)
+    return path
+
+
+def refused(text):
+    return pytest.raises(InputError, match=re.escape(text))
+
+
+@pytest.mark.parametrize(
+    ("given", "meant"), [("open-fg", "open-fog"), ("colonade", "colonnade"), ("twopens", "two-pens")]
+)
+def test_unknown_name_is_refused_with_the_nearest(variant, given, meant):
+    with refused(f"did you mean '{meant}'?"):
+        load_scene(given)
+
+
+def test_unknown_name_without_a_likeness_lists_what_there_is(variant):
+    with pytest.raises(InputError) as caught:
+        load_scene("qqqq")
+    assert "did you mean" not in str(caught.value)
+    assert all(name in str(caught.value) for name in SCENES)
+    assert "\n" not in str(caught.value)
+
+
+def test_folder_is_refused(variant, tmp_path):
+    with refused(f"{tmp_path} is a folder"):
+        load_scene(str(tmp_path))
+
+
+@pytest.mark.parametrize("name", ["gone.xml", "sub/gone"])
+def test_missing_file_is_refused(variant, tmp_path, name):
+    with refused(f"there is no file {tmp_path / name}"):
+        load_scene(str(tmp_path / name))
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('<scene version="3.0.0"><shape type="sphere"></scene>', "line 1"),
+        ("", "No document element"),
+        ('<scene version="3.0.0"><shape type="spher"/></scene>', '"spher" not found'),
+        (
+            '<scene version="3.0.0"><shape type="ply"><string name="filename" value="gone.ply"/></shape></scene>',
+            "gone.ply",
+        ),
+        ('<bsdf type="diffuse" version="3.0.0"/>', "a whole <scene>"),
+    ],
+    ids=["malformed", "empty", "unknown plugin", "missing mesh", "no scene"],
+)
+def test_broken_file_is_refused_by_name_and_reason_in_one_line(variant, tmp_path, text, said):
+    path = tmp_path / "broken.xml"
+    path.write_text(text)
+    with refused(said) as caught:
+        load_scene(str(path))
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_file_is_named_by_its_stem(variant, small_file):
+    loaded = load_scene(str(small_file))
+    assert (loaded.name, loaded.path) == ("my fog", small_file)
+    assert small_file.name in loaded.purpose
+    assert list(loaded.scene.sensors()[0].film().size()) == [16, 12]
+
+
+@pytest.mark.parametrize("size", [(0, 0), (0, 5), (5, 0), (16385, 5), (-1, 5)])
+def test_size_that_no_image_has_is_refused(variant, size):
+    with refused(f"got {size[0]}x{size[1]}"):
+        load_scene("open-fog", size)
+
+
+@pytest.mark.parametrize("text", ["abc", "", "800", "800x", "x600", "-8x6", "8x6x3", "8.5x6", "8 x 6"])
+def test_size_in_other_words_is_refused(text):
+    with refused(f"got {text!r}, wanted WIDTHxHEIGHT"):
+        parse_size(text)
+
+
+def test_size_is_read():
+    assert parse_size("800x600") == (800, 600)
+    assert parse_size(" 16384X1 ") == (16384, 1)
+
+
+@pytest.mark.parametrize("size", [(16, 12), (31, 12), (9, 40), (1, 1)])
+def test_resized_scene_has_the_rays_of_one_built_at_that_size(variant, small_file, size):
+    """For Mitsuba's own rays and for both readers."""
+    import mitsuba as mi
+
+    from realtime.scene.read_scene import read_scene
+    from reference.scene.read import read_truth
+
+    text = SMALL.replace('value="16"', f'value="{size[0]}"').replace('value="12"', f'value="{size[1]}"')
+    expected = mi.load_string(text)
+    resized = load_scene(str(small_file), size).scene
+    np.testing.assert_array_equal(read_truth(resized).direction, read_truth(expected).direction)
+    one, two = read_scene(resized).camera, read_scene(expected).camera
+    assert (one.width, one.height) == size
+    for name in ("origin", "forward", "left", "up", "forward_low", "left_low", "up_low"):
+        np.testing.assert_array_equal(np.array(getattr(one, name)), np.array(getattr(two, name)))
+    for place in [(0.13, 0.29), (0.71, 0.93)]:
+        rays = [
+            s.sensors()[0].sample_ray(0.0, 0.5, mi.Point2f(*place), mi.Point2f(0.5))[0] for s in (resized, expected)
+        ]
+        # The projections are derived by the same code in float32.
+        np.testing.assert_allclose(np.array(rays[0].d), np.array(rays[1].d), rtol=0, atol=1e-6)
+        np.testing.assert_allclose(np.array(rays[0].o), np.array(rays[1].o), rtol=0, atol=1e-6)
+
+
+def test_resizing_moves_the_corner_rays(variant, small_file):
+    """The test of the test above: another size is another bundle of rays."""
+    from reference.scene.read import read_truth
+
+    one, two = (read_truth(load_scene(str(small_file), size).scene) for size in [(16, 12), (32, 24)])
+    assert len(two.direction) == 4 * len(one.direction)
+    assert np.abs(one.direction[0] - two.direction[0]).max() > 1e-3
+
+
+def test_nearest_says_nothing_rather_than_nonsense():
+    assert nearest("quadratur", ["taylor", "quadrature"]) == "; did you mean 'quadrature'?"
+    assert nearest("zzz", ["taylor", "quadrature"]) == ""

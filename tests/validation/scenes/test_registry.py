@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: BSD-3-Clause
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from tests.helpers.meshes import directed_edges, volume
+from validation.scenes.colonnade import _column
+from validation.scenes.parts import grid, joined, lathe, placed, rotation
+from validation.scenes.registry import SCENES
+from validation.scenes.sphere_spot import _CENTRE, _LIGHT, _sphere
+from validation.scenes.two_pens import _pen
+
+CLOSED = {
+    "cylinder": lambda: lathe([0.3, 0.4], [0.1, 1.7], 7),
+    "column": _column,
+    "pen": lambda: _pen(1.83),
+    "sphere": _sphere,
+}
+
+
+@pytest.mark.parametrize("name", CLOSED)
+def test_closed_parts_are_oriented_the_same_way_everywhere(name):
+    """Every edge has two faces that run through it in opposite directions, and the normals point outwards."""
+    vertices, faces = CLOSED[name]()
+    edges = directed_edges(faces)
+    assert set(edges.values()) == {1}
+    assert {(b, a) for a, b in edges} == set(edges)
+    # Euler's formula of a closed surface without holes; every vertex is used.
+    assert len(vertices) - len(edges) // 2 + len(faces) == 2
+    assert set(faces.reshape(-1)) == set(range(len(vertices)))
+    assert volume(vertices - vertices.mean(axis=0), faces) > 0
+
+
+@pytest.mark.parametrize("name", CLOSED)
+def test_no_face_of_a_part_is_degenerate(name):
+    vertices, faces = CLOSED[name]()
+    a, b, c = (vertices[faces[:, k]].astype(np.float32).astype(np.float64) for k in range(3))
+    area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    # The smallest faces, in the fans, are of 1e-7 m^2; a face without area would be nought but for rounding, 1e-10.
+    assert area.min() > 1e-8
+
+
+def test_sphere_has_a_silhouette_of_32_edges_in_one_ring():
+    """Seen from the light: the edges between a face turned to it and one turned away."""
+    vertices, faces = _sphere()
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    lit = np.einsum("ij,ij->i", np.cross(b - a, c - a), np.asarray(_LIGHT) - a) > 0
+    face_of = {
+        edge: number
+        for number, face in enumerate(faces)
+        for edge in zip(face.tolist(), face[[1, 2, 0]].tolist(), strict=True)
+    }
+    silhouette = [(p, q) for (p, q), number in face_of.items() if lit[number] and not lit[face_of[q, p]]]
+    assert len(silhouette) == 32
+    following = dict(silhouette)
+    ring = [silhouette[0][0]]
+    while following[ring[-1]] != ring[0]:
+        ring.append(following[ring[-1]])
+    assert len(ring) == 32
+
+
+def test_sphere_turns_its_axis_to_the_light_and_lies_in_the_cone():
+    vertices, _ = _sphere()
+    axis = vertices[-1] - vertices[-2]
+    towards = np.subtract(_LIGHT, _CENTRE)
+    assert axis @ towards / np.linalg.norm(axis) / np.linalg.norm(towards) == pytest.approx(1, abs=1e-12)
+    # The shadow of the sphere must lie in the cone of 24.3 degrees whole, or the scene shows no silhouette.
+    from_light = vertices - np.asarray(_LIGHT)
+    cosine = -from_light @ towards / np.linalg.norm(from_light, axis=1) / np.linalg.norm(towards)
+    assert np.rad2deg(np.arccos(cosine.min())) < 24.3
+
+
+@pytest.mark.parametrize(
+    ("name", "triangles"),
+    [
+        ("open-fog", 0),
+        ("sphere-spot", 2 * 32 * 17 + 2),
+        ("colonnade", 66_132),
+        ("two-pens", 34_549),
+        ("three-media", 14_785),
+        ("clutter", 20_747),
+        ("hall", 107_514),
+        ("omni-box", 166),
+        ("tangle", 188_082),
+        ("windows", 1_748),
+    ],
+)
+def test_triangle_counts(variant, name, triangles):
+    from validation.scenes.loading import load_scene
+
+    shapes = load_scene(name, (8, 6)).scene.shapes()
+    assert sum(shape.face_count() for shape in shapes) == triangles
+
+
+def test_column_has_the_triangles_that_its_docstring_states():
+    _, faces = _column()
+    assert len(faces) == 2 * 72 * 32
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_methods_and_truth_can_read_every_scene_alike(variant, name):
+    """The two readers share no code: that they agree says that both are right."""
+    from realtime.scene.read_scene import read_scene
+    from reference.scene.read import read_truth
+    from validation.scenes.loading import load_scene
+
+    loaded = load_scene(name, (8, 6))
+    scene, truth = read_scene(loaded.scene), read_truth(loaded.scene)
+    assert loaded.name == name
+    assert loaded.purpose.endswith(".")
+    assert (scene.camera.width, scene.camera.height) == (truth.width, truth.height) == (8, 6)
+    sigma_t = np.array([np.array(value)[0] for value in scene.medium.sigma_t])
+    # Mitsuba holds both in float32: 6e-8.
+    np.testing.assert_allclose(np.broadcast_to(sigma_t, 3), truth.medium.sigma_t, rtol=3e-7)
+    np.testing.assert_allclose(np.array(scene.medium.albedo).reshape(-1), truth.medium.albedo, rtol=3e-7)
+    (light,) = scene.lights
+    (other,) = truth.lights + truth.directional
+    if light.kind == "directional":
+        one, two = light.axis, other.direction
+        np.testing.assert_allclose(np.array(light.intensity).reshape(-1), other.irradiance, rtol=3e-7)
+    else:
+        one, two = light.position, other.position
+    np.testing.assert_allclose(np.array(one).reshape(-1), two, rtol=3e-7)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_no_number_of_a_scene_is_round(variant, name):
+    """A constant of the code must not hide behind a 1 or a 2 of the scene."""
+    import mitsuba as mi
+
+    from validation.scenes.loading import load_scene
+
+    scene = load_scene(name).scene
+    parameters = mi.traverse(scene)
+    for key in parameters.keys():  # noqa: SIM118 - SceneParameters iterates over items
+        if key.endswith(
+            ("albedo.value.value", "intensity.value", "irradiance.value", "position", "x_fov", "reflectance.value")
+        ):
+            for value in np.array(parameters[key], dtype=np.float64).reshape(-1):
+                assert value % 0.5 != 0 or value > 10, (key, value)
+
+
+def test_scenes_are_the_same_at_every_call(variant):
+    from reference.storage.cache import scene_digest
+    from validation.scenes.loading import load_scene
+
+    for name in SCENES:
+        assert scene_digest(load_scene(name).scene) == scene_digest(load_scene(name).scene)
+
+
+def test_grid_covers_its_rectangle_and_faces_across_times_up():
+    vertices, faces = grid((1.0, 2.0, 3.0), (2.0, 0.0, 0.0), (0.0, 0.0, 5.0), (4, 3))
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    normal = np.cross(b - a, c - a)
+    assert len(faces) == 2 * 4 * 3
+    # across x up = (2, 0, 0) x (0, 0, 5) = (0, -10, 0): half the sum of the cross products is its area and direction.
+    np.testing.assert_allclose(0.5 * normal.sum(axis=0), [0, -10, 0], atol=1e-12)
+    assert np.all(normal[:, 1] < 0)
+    assert set(Counter(directed_edges(faces)).values()) == {1}
+
+
+def test_rotation_turns_by_the_right_hand():
+    np.testing.assert_allclose(rotation((0, 0, 2.5), 90) @ [1, 0, 0], [0, 1, 0], atol=1e-15)
+    turn = rotation((0.3, -1.0, 0.7), 37.0)
+    np.testing.assert_allclose(turn @ turn.T, np.eye(3), atol=1e-15)
+    assert np.linalg.det(turn) == pytest.approx(1)
+    assert np.trace(turn) == pytest.approx(1 + 2 * np.cos(np.deg2rad(37)))
+
+
+def test_joined_meshes_keep_their_faces_apart():
+    one = lathe([0.3, 0.2], [0.0, 1.0], 5)
+    two = placed(one, (3.0, 0.0, 0.0), rotation((0, 0, 1), 17))
+    vertices, faces = joined([one, two])
+    assert len(vertices) == 2 * len(one[0])
+    assert volume(vertices, faces) == pytest.approx(2 * volume(*one))
+    half = len(one[1])
+    assert faces[half:].min() == len(one[0])
+    np.testing.assert_allclose(vertices[faces[half:]], two[0][two[1]])

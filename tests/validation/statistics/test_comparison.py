@@ -1,0 +1,223 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Tests of the statistical tests by values computed by hand; their rates are in `test_statistics_rates`."""
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from analytic.errors import InputError
+from tests.helpers.estimates import BATCHES, SIZE, monte_carlo, normal
+from validation.statistics.comparison import Estimate, compare_statistics
+
+
+def test_hand_computed_values():
+    # d = 0.1, -0.1, 0.2, 0; s = 0.1 (3-4-5 triangles of 0.06 and 0.08): z = 1, -1, 2, 0.
+    reference = Estimate(np.array([[1.0, 2.0], [3.0, 4.0]]), np.full((2, 2), 0.06))
+    test = Estimate(np.array([[1.1, 1.9], [3.2, 4.0]]), np.full((2, 2), 0.08))
+    s = compare_statistics(reference, test, margin=0.1)
+    assert s.tested == 4
+    assert s.z_mean == pytest.approx(0.5, rel=1e-12)
+    assert s.z_std == pytest.approx(np.sqrt((0.25 + 2.25 + 2.25 + 0.25) / 3), rel=1e-12)
+    assert s.relative_bias == pytest.approx(0.02, rel=1e-12)
+    error = np.sqrt(4 * 0.08**2 + 1.02**2 * 4 * 0.06**2) / 10
+    assert s.relative_bias_ci == pytest.approx((0.02 - 1.959964 * error, 0.02 + 1.959964 * error), rel=1e-6)
+    assert s.detectable_bias == pytest.approx((1.959964 + 1.281552) * error, rel=1e-6)
+    assert s.largest_share == pytest.approx(0.25, rel=1e-12)
+    assert s.relative_bias_ci_batches is None
+    assert s.equivalent is True
+    assert s.blocks == 1
+    assert s.rejected_blocks == 0  # z = 0.2 / 0.2
+
+
+def test_students_law_and_welchs_degrees_of_freedom():
+    # z = 3.2 with 3 degrees of freedom: p = 0.0493; normal: p = 0.0014. Equal variances of 4 batches each give 6.
+    one = Estimate(np.ones((1, 1)))
+    z = 3.2
+    level = 0.01
+    random = Estimate(np.full((1, 1), 1 + 0.1 * z), np.full((1, 1), 0.1), 4)
+    exact = dataclasses.replace(random, batches=None)
+    assert compare_statistics(one, random, plain_level=level).exceeding == 0
+    assert compare_statistics(one, exact, plain_level=level).exceeding == 1
+    both = Estimate(np.ones((1, 1)), np.full((1, 1), 0.1), 4)
+    p = 2 * stats.t.sf(0.1 * z / np.hypot(0.1, 0.1), 6)
+    for factor, exceeding in ((0.999, 0), (1.001, 1)):
+        assert compare_statistics(both, random, plain_level=factor * p).exceeding == exceeding
+
+
+def test_sidak_level_counts_all_values():
+    # 300 values at the family level 1 %: a = 1 - 0.99^(1/300) = 3.35e-5, critical |z| = 4.148.
+    critical = stats.norm.isf(-np.expm1(np.log(0.99) / 300) / 2)
+    assert critical == pytest.approx(4.148, abs=1e-3)
+    for factor, rejected in ((0.999, 0), (1.001, 1)):
+        values = np.ones((10, 10, 3))
+        values[4, 5, :2] += 0.1 * critical * factor  # two channels of one pixel
+        s = compare_statistics(Estimate(np.ones((10, 10, 3))), Estimate(values, np.full((10, 10, 3), 0.1)))
+        assert s.rejected == rejected
+    assert s.expected_rejections == pytest.approx(-np.log(0.99), rel=1e-3)
+
+
+def test_small_errors_of_a_whole_block_show_in_the_block():
+    # 1.5 standard errors in each of 64 pixels: z = 12 in their block, nothing to see in any pixel.
+    values = np.ones((24, 20))
+    values[8:16, 16:20] += 0.15  # the block at the edge is half a block, z = 8.5
+    values[:8, :8] += 0.15
+    s = compare_statistics(Estimate(np.ones((24, 20))), Estimate(values, np.full((24, 20), 0.1)))
+    assert (s.blocks, s.rejected_blocks, s.rejected) == (9, 2, 0)
+
+
+def test_values_without_variance_are_compared_in_absolute_terms():
+    reference = np.full((4, 4), 2.0)
+    reference[0] = 0.0
+    error = np.full((4, 4), 0.1)
+    error[0] = 0.0
+    test = reference.copy()
+    test[0, 1] = 0.3
+    s = compare_statistics(Estimate(reference, error), Estimate(test))
+    assert (s.tested, s.zero_variance) == (12, 4)
+    assert s.zero_variance_error == pytest.approx(0.2, rel=1e-12)
+    assert s.relative_bias == pytest.approx(0.3 / 24, rel=1e-12)
+    assert s.z_std == 0
+
+
+def test_light_where_the_reference_has_none_shows_in_absolute_terms():
+    reference = np.full((4, 4), 2.0)
+    reference[0] = 0.0  # mean 1.5
+    test = reference.copy()
+    test[0, 1:3] = [0.03, -0.06]
+    found = compare_statistics(Estimate(reference), Estimate(test, np.full((4, 4), 0.1)))
+    assert (found.zero_reference, found.tested) == (4, 16)
+    assert found.zero_reference_error == pytest.approx(0.04, rel=1e-12)
+    black = compare_statistics(Estimate(np.zeros((4, 4))), Estimate(test, np.full((4, 4), 0.1)))
+    assert black.zero_reference == 16
+    assert np.isnan(black.zero_reference_error)
+
+
+def test_the_variance_of_both_sides_counts_and_is_told_apart():
+    # Variances of 0.09 and of 0.16 a pixel at equal means: the reference has 9/25 of the sum.
+    found = compare_statistics(
+        Estimate(np.ones((3, 4)), np.full((3, 4), 0.3)), Estimate(np.ones((3, 4)), np.full((3, 4), 0.4))
+    )
+    assert found.reference_variance_share == pytest.approx(9 / 25, rel=1e-12)
+    assert found.relative_bias_se == pytest.approx(0.5 / np.sqrt(12), rel=1e-12)
+    assert (found.relative_bias_p, found.relative_bias_freedom) == (1, np.inf)
+    one = compare_statistics(Estimate(np.ones((3, 4))), Estimate(np.ones((3, 4)), np.full((3, 4), 0.4), 5))
+    assert one.reference_variance_share == 0
+    assert one.relative_bias_freedom == pytest.approx(12 * 4, rel=1e-12)
+
+
+def test_the_p_value_of_the_bias_is_below_five_percent_where_the_interval_leaves_zero_out():
+    for shift, inside in ((1.95, True), (1.97, False)):
+        test = Estimate(np.full((4, 4), 1 + shift * 0.01), np.full((4, 4), 0.04))
+        found = compare_statistics(Estimate(np.ones((4, 4))), test)
+        assert (found.relative_bias_p > 0.05) is inside
+        assert (found.relative_bias_ci[0] < 0) is inside
+
+
+def test_no_floor_under_the_variance():
+    # Errors of 1e-9 of the radiance count in full.
+    test = np.ones((8, 8)) + 1e-8
+    s = compare_statistics(Estimate(np.ones((8, 8)), np.full((8, 8), 1e-9)), Estimate(test))
+    assert s.z_mean == pytest.approx(10, rel=1e-6)
+    assert s.rejected == 64
+
+
+def test_images_without_noise_have_a_bias_but_no_z():
+    s = compare_statistics(Estimate(np.ones((4, 4)), np.zeros((4, 4))), Estimate(np.full((4, 4), 1.5)), margin=0.01)
+    assert (s.tested, s.zero_variance, s.blocks, s.equivalent) == (0, 16, 0, False)
+    assert s.relative_bias_ci == (0.5, 0.5)
+    as_json = json.loads(json.dumps(s.to_json(), allow_nan=False))
+    assert as_json["z_mean"] is None
+    assert as_json["exceeding_p"] is None
+    assert as_json["largest_share"] is None
+
+
+def test_black_reference_has_no_relative_bias():
+    s = compare_statistics(Estimate(np.zeros((4, 4)), np.ones((4, 4))), Estimate(np.zeros((4, 4))), margin=0.01)
+    assert s.to_json()["relative_bias_ci"] == [None, None]
+    assert s.equivalent is False
+    assert s.z_mean == 0
+
+
+def test_mask_and_nonfinite_pixels_leave_no_trace():
+    rng = np.random.default_rng(2)
+    estimate = monte_carlo(normal(rng, (BATCHES, 8, 8, 3)))
+    wide = np.full((8, 16, 3), np.nan)
+    wide[:, :8] = estimate.mean
+    error = np.full((8, 16, 3), -1.0)
+    error[:, :8] = estimate.standard_error
+    mask = np.arange(16) < 8
+    alone = compare_statistics(Estimate(np.ones((8, 8, 3))), dataclasses.replace(estimate, batch_means=None))
+    masked = Estimate(wide, error, BATCHES)
+    found = compare_statistics(Estimate(np.ones((8, 16, 3))), masked, mask=np.tile(mask, (8, 1)))
+    assert found == dataclasses.replace(alone, masked=64)  # no trace but their number
+    # Without the mask the same pixels fall away because they are not finite, and batch means with them.
+    with_means = dataclasses.replace(masked, batch_means=estimate.batch_means)
+    assert compare_statistics(Estimate(np.ones((8, 16, 3))), with_means) == alone
+
+
+@pytest.mark.parametrize("factor", [2.0**-300, 1e-30, 1e-12, 7e5, 1e30, 2.0**300])
+def test_numbers_have_no_unit(factor):
+    rng = np.random.default_rng(4)
+    profile = rng.gamma(0.5, 2.0, (16, 16, 3))
+    one, two = (monte_carlo(profile * normal(rng, (BATCHES, 16, 16, 3))) for _ in range(2))
+
+    def scaled(estimate):
+        values = (factor * np.asarray(v) for v in (estimate.mean, estimate.standard_error, estimate.batch_means))
+        mean, error, batch_means = values
+        return Estimate(mean, error, BATCHES, batch_means)
+
+    before = compare_statistics(one, two, margin=0.01).to_json()
+    after = compare_statistics(scaled(one), scaled(two), margin=0.01).to_json()
+    for name, value in before.items():
+        # 1e-9: the rounding of a factor that is no power of two, magnified by differences of the two images.
+        assert after[name] == pytest.approx(value, rel=1e-9), name
+
+
+def test_dependent_channels_do_not_narrow_the_interval():
+    rng = np.random.default_rng(5)
+    grey = monte_carlo(normal(rng, (BATCHES, *SIZE)))
+    colour = Estimate(*(np.repeat(np.asarray(v)[..., None], 3, axis=-1) for v in (grey.mean, grey.standard_error)), 16)
+    one = compare_statistics(Estimate(np.ones(SIZE)), grey)
+    three = compare_statistics(Estimate(np.ones((*SIZE, 3))), colour)
+    assert three.relative_bias_ci == pytest.approx(one.relative_bias_ci, rel=1e-12)
+
+
+def test_detectable_bias_is_that_of_the_wider_interval():
+    rng = np.random.default_rng(10)
+    estimate = monte_carlo(normal(rng, (BATCHES, *SIZE)) * rng.normal(1, 0.1, (BATCHES, 1, 1)))
+    s = compare_statistics(Estimate(np.ones(SIZE)), estimate)
+    # Few batches: (q(0.975) + q(0.90)) / q(0.975) of Student's law with 15 degrees of freedom, 2.131 and 1.341.
+    half = 0.5 * (s.relative_bias_ci_batches[1] - s.relative_bias_ci_batches[0])
+    assert s.detectable_bias == pytest.approx(half * (2.1314 + 1.3406) / 2.1314, rel=1e-4)
+    assert s.relative_bias_ci[1] - s.relative_bias_ci[0] < half
+
+
+GOOD = Estimate(np.ones((4, 4)), np.ones((4, 4)), 8)
+
+
+@pytest.mark.parametrize(
+    ("test", "options", "message"),
+    [
+        (Estimate(np.ones((4, 5))), {}, "two sizes: the reference is 4 x 4 pixels, the test 5 x 4"),
+        (dataclasses.replace(GOOD, standard_error=np.ones((4, 4, 3))), {}, r"has shape \(4, 4, 3\); wanted that"),
+        (dataclasses.replace(GOOD, standard_error=-np.ones((4, 4))), {}, "negative or not finite in 16 pixels"),
+        (dataclasses.replace(GOOD, standard_error=np.full((4, 4), np.inf)), {}, "not finite in 16 pixels; mask"),
+        (dataclasses.replace(GOOD, batches=1), {}, "batches of the test: got 1, wanted at least 2"),
+        (dataclasses.replace(GOOD, batch_means=[1.0]), {}, "the 1 batch means of the test"),
+        (dataclasses.replace(GOOD, batch_means=[0.9, 1.0]), {}, "have the mean 0.95, the pixels compared 1; give"),
+        (GOOD, {"margin": 0.0}, "margin: got 0.0"),
+        (GOOD, {"plain_level": 1.0}, "plain_level: got 1.0"),
+        (GOOD, {"family_level": 0.0}, "family_level: got 0.0"),
+    ],
+)
+def test_refuses_what_does_not_fit(test, options, message):
+    with pytest.raises(InputError, match=message):
+        compare_statistics(GOOD, test, **options)
+
+
+def test_refuses_two_images_without_errors():
+    with pytest.raises(InputError, match="neither image has a standard error"):
+        compare_statistics(Estimate(np.ones((4, 4))), Estimate(np.ones((4, 4))))

@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import pytest
+
+from tests.helpers.reports import report, times, timing
+from validation.statistics.noise import (
+    ERROR_TOLERANCE,
+    FLOORS,
+    ROUNDING,
+    TIME_TOLERANCE,
+    drift,
+    error_band,
+    least_ratio,
+    slower_stages,
+    spread,
+)
+
+
+def test_the_band_of_an_error_is_relative_plus_rounding():
+    assert error_band("relative_rmse", 0.1) == pytest.approx(0.1 * ERROR_TOLERANCE + 24 * ROUNDING)
+    assert error_band("relative_bias", -0.1) == error_band("relative_bias", 0.1)
+    assert error_band("max", 0.1) == pytest.approx(0.2 * ERROR_TOLERANCE + FLOORS["max"])
+    assert error_band("p99", 0.0) == FLOORS["p99"]
+
+
+def test_a_bias_in_which_errors_cancel_has_the_band_of_a_tenth_of_the_rmse():
+    assert error_band("relative_bias", 1e-6, rmse=0.1) == pytest.approx(error_band("relative_bias", 0.01))
+    assert error_band("relative_bias", 0.05, rmse=0.1) == error_band("relative_bias", 0.05)
+    assert error_band("relative_rmse", 0.1, rmse=5.0) == error_band("relative_rmse", 0.1)
+
+
+def test_counts_have_bands_of_their_own():
+    assert error_band("nonfinite", 100) == 0
+    assert error_band("negative", 0, pixels=3072) == pytest.approx(3.072)
+    assert error_band("negative", 1000, tolerance=0.05, pixels=3072) == pytest.approx(53.072)
+
+
+def test_floors_let_rounding_pass_and_no_more():
+    # Seen between AVX2 and AVX-512: 8.9e-7 became 2.0e-6 (two-pens, shadow planes), the maximum moved by 1.9e-5.
+    assert abs(2.0e-6 - 8.9e-7) < error_band("relative_rmse", 8.9e-7)
+    assert error_band("max", 2.9e-5) > 1.9e-5
+    # Three times the error of an exact kernel is more than rounding.
+    assert error_band("p99", 1.28e-6) < 3 * 1.28e-6 - 1.28e-6
+
+
+def test_spread_is_the_geometric_mean_of_the_quartiles():
+    one = {"median_ms": 1.0, "low_ms": 1.0, "high_ms": 4.0, "repetitions": 9}
+    quiet = {"median_ms": 1.0, "low_ms": 1.0, "high_ms": 1.0, "repetitions": 9}
+    assert spread([{"frame": one, "airlight": quiet}]) == pytest.approx(2.0)
+    # A single repetition, and what is shorter than a launch, say nothing of the machine.
+    assert spread([{"frame": one | {"repetitions": 1}, "surface": one | {"median_ms": 0.002}}]) == 1.0
+    assert spread([]) == 1.0
+
+
+def test_drift_is_the_median_of_all_frames():
+    pairs = [(times(1.0), times(factor)) for factor in (1.1, 1.2, 5.0)]
+    assert drift(pairs) == pytest.approx(1.2)
+    assert drift([]) == 1.0
+
+
+def test_least_ratio_grows_with_the_noise_and_between_machines():
+    assert least_ratio(1.02, same_machine=True) == pytest.approx((1 + TIME_TOLERANCE) * 1.02)
+    assert least_ratio(1.0, same_machine=False, tolerance=0.1) == pytest.approx(1.4)
+
+
+def test_more_work_is_seen_in_all_that_contains_it():
+    old, new = times(1.0), times(1.0)
+    for stage in ("airlight", "frame", "rebuild", "moved"):
+        new[stage] = timing([old[stage]["median_ms"] + 0.7] * 20)
+    assert slower_stages(old, new, least=1.25, scale=1.0) == ["airlight", "frame"]
+    assert slower_stages(old, new, least=1.1, scale=1.0) == ["airlight", "frame", "rebuild", "moved"]
+    assert slower_stages(new, old, least=1.1, scale=1.0) == []
+
+
+@pytest.mark.parametrize("stage", ["airlight", "frame", "rebuild"])
+def test_a_burst_over_one_timing_has_no_witness(stage):
+    old, new = times(1.0), times(1.0)
+    new[stage] = timing([3 * old[stage]["median_ms"]] * 20)
+    assert slower_stages(old, new, least=1.25, scale=1.0) == []
+
+
+def test_the_fewer_witnesses_the_more_is_needed():
+    old, new = times(1.0), times(1.0)
+    new["moved"] = {"median_ms": 2.9, "low_ms": 2.8, "high_ms": 3.0, "repetitions": 9}  # 1.53 times 1.9
+    assert slower_stages(old, new, least=1.2, scale=1.0) == []  # none: 1.2^3 = 1.73
+    assert slower_stages(old, new, least=1.15, scale=1.0) == ["moved"]  # 1.52
+    new["rebuild"] = {"median_ms": 1.9, "low_ms": 1.8, "high_ms": 2.0, "repetitions": 9}  # 1.36 times 1.4
+    assert slower_stages(old, new, least=1.2, scale=1.0) == []  # one: 1.2^2 = 1.44
+    assert slower_stages(old, new, least=1.16, scale=1.0) == ["rebuild"]
+    new["rebuild"] |= {"low_ms": 1.3}  # the quartiles overlap
+    assert slower_stages(old, new, least=1.16, scale=1.0) == []
+
+
+def test_a_single_repetition_needs_the_square():
+    old, new = ({"frame": timing([ms]), "moved": timing([ms]), "rebuild": timing([ms])} for ms in (9e3, 1.4e4))
+    assert slower_stages(old, new, least=1.24, scale=1.0) == ["frame", "rebuild"]  # 1.56 times
+    assert slower_stages(old, new, least=1.26, scale=1.0) == []
+
+
+def test_differences_below_a_launch_are_none():
+    assert slower_stages(times(0.1), times(0.2), least=1.25, scale=1.0) != []
+    assert slower_stages(times(0.01), times(0.02), least=1.25, scale=1.0) == []
+
+
+def test_a_machine_that_is_slower_excuses_as_much():
+    assert slower_stages(times(1.0), times(2.0), least=1.25, scale=1.0) != []
+    assert slower_stages(times(1.0), times(2.0), least=1.25, scale=1.7) == []
+
+
+def test_quiet_and_busy_machines_are_told_apart():
+    quiet, busy = (
+        [one["times"] for scene in report(3, busy=share)["scenes"] for one in scene["methods"]] for share in (0.0, 0.2)
+    )
+    assert spread(quiet) < 1.05
+    assert spread(busy) > 1.2

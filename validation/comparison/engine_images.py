@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Images that another renderer wrote, a game engine for instance: EXR files named by scene, judged against the truth.
+
+A folder holds SCENE.exr, or SCENE.NAME.exr where several images of a scene are to be told apart. An image with a layer
+`airlight` is judged by that; else its plain channels are judged against airlight plus surface. It is judged at its own
+size: all images of a scene must have the same one.
+"""
+
+import difflib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analytic.errors import InputError
+from reference.quadrature.image import TruthImage
+from reference.storage.exr import NOTE, TOTAL, Image, layer, read_exr
+from validation.metrics.errors import Metrics, error_metrics
+from validation.metrics.flip import Flip, flip_hdr
+
+AIRLIGHT = "airlight"
+
+
+@dataclass(frozen=True)
+class EngineImage:
+    """An image from elsewhere, and the scene that it claims to show."""
+
+    scene: str  #: name of the scene
+    label: str  #: NAME in its file's name, or the name of the folder
+    path: Path
+
+
+@dataclass(frozen=True)
+class ImageMeasurement:
+    """How wrong an image from elsewhere is."""
+
+    shown: EngineImage
+    image: Image  #: only the layers that were judged
+    layer: str  #: what `error` is of: 'airlight', or 'total' for airlight and surface together
+    error: Metrics
+    surface_error: Metrics | None  #: where the image has both layers
+    note: str | None  #: what the reader of the file changed or left out
+    flip: Flip | None = None
+
+    @property
+    def light(self) -> NDArray[np.float64]:
+        """All light in the image, to look at (height, width, 3) [W/(m^2 sr)]."""
+        return _light(self.image)
+
+
+def find_images(folder: Path | str, scenes: Mapping[str, str]) -> dict[str, tuple[EngineImage, ...]]:
+    """Return the images in a folder by the name of their scene.
+
+    Parameters
+    ----------
+    folder
+        Holds EXR files; other files are not looked at.
+    scenes
+        The scenes that files may name: a name, and what `validation.scenes.loading.load_scene` takes for it.
+
+    Raises
+    ------
+    InputError
+        If there is no such folder, no EXR file in it, or a file that names no scene.
+    """
+    place = Path(folder)
+    if not place.is_dir():
+        raise InputError(f"--images: got {folder}, wanted a folder with EXR files named by scene, such as open-fog.exr")
+    files = sorted(path for path in place.iterdir() if path.suffix.lower() == ".exr" and not path.name.startswith("."))
+    if not files:
+        raise InputError(f"--images: the folder {folder} has no EXR file; wanted SCENE.exr or SCENE.NAME.exr in it")
+    found: dict[str, tuple[EngineImage, ...]] = {}
+    for path in files:
+        scene = _scene_of(path, scenes)
+        label = path.stem[len(scene) + 1 :] or place.resolve().name or "image"
+        found[scene] = (*found.get(scene, ()), EngineImage(scene, label, path))
+    return found
+
+
+def images_size(images: tuple[EngineImage, ...]) -> tuple[int, int]:
+    """Return the size of the images of one scene, (width, height).
+
+    Raises
+    ------
+    InputError
+        If two sizes differ, or a file cannot be read.
+    """
+    sizes = {one.path: _size(read_exr(one.path)) for one in images}
+    first = images[0]
+    for path, size in sizes.items():
+        if size != sizes[first.path]:
+            wanted, got = (f"{width} x {height}" for width, height in (sizes[first.path], size))
+            raise InputError(
+                f"--images: {path} is {got} pixels and {first.path} {wanted}; render all images of a scene at one size"
+            )
+    return sizes[first.path]
+
+
+def measure_image(shown: EngineImage, truth: TruthImage, *, surfaces: bool) -> ImageMeasurement:
+    """Compare an image from elsewhere with the truth of its scene at its size.
+
+    Parameters
+    ----------
+    shown
+        The image.
+    truth
+        The quadrature truth.
+    surfaces
+        Whether the scene has surfaces at all.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, has none of the layers, or has another size than the truth.
+    """
+    image = read_exr(shown.path)
+    note = str(image.attributes[NOTE]) if NOTE in image.attributes else None
+    if AIRLIGHT in image.layers:
+        layers = {name: image.layers[name] for name in (AIRLIGHT, "surface") if name in image.layers}
+        of, expected = AIRLIGHT, truth.airlight
+    else:
+        layers = {TOTAL: layer(image, TOTAL, shown.path)}
+        of, expected = TOTAL, truth.airlight + truth.surface
+    error = error_metrics(expected, layers[of])
+    surface = error_metrics(truth.surface, layers["surface"]) if surfaces and "surface" in layers else None
+    return ImageMeasurement(shown, Image(layers), of, error, surface, note)
+
+
+def image_flip(measured: ImageMeasurement, truth: TruthImage) -> Flip | None:
+    """Return HDR-FLIP of all light, or of the airlight where an image has no more; None if it lacks the surface."""
+    layers = measured.image.layers
+    if AIRLIGHT in layers and "surface" not in layers and np.any(truth.surface > 0):
+        return None
+    return flip_hdr(truth.airlight + truth.surface, measured.light)
+
+
+def _light(image: Image) -> NDArray[np.float64]:
+    return np.sum([np.asarray(values, dtype=np.float64) for values in image.layers.values()], axis=0)
+
+
+def _size(image: Image) -> tuple[int, int]:
+    height, width, _ = next(iter(image.layers.values())).shape
+    return width, height
+
+
+def _scene_of(path: Path, scenes: Mapping[str, str]) -> str:
+    """Return the scene that a file names: the longest name that its own name begins with."""
+    stem = path.stem
+    names = [name for name in scenes if stem == name or stem.startswith(f"{name}.")]
+    if names:
+        return max(names, key=len)
+    near = difflib.get_close_matches(stem.split(".")[0], scenes, n=1, cutoff=0.0)
+    hint = f"; the nearest is {near[0]}" if near else ""
+    raise InputError(
+        f"--images: {path} names no scene, wanted SCENE.exr or SCENE.NAME.exr with one of {', '.join(scenes)}{hint}"
+    )

@@ -1,0 +1,221 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Comparison of two image files: how large the error is, and whether it is more than noise."""
+
+import os
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from analytic.errors import InputError
+from reference.storage.exr import TOTAL, Image, read_exr
+from reference.storage.exr import layer as image_layer
+from validation.comparison.compare_text import colour_lines, errors_lines, flip_line, percent, statistics_lines
+from validation.metrics.colour import ColourDifference, colour_difference
+from validation.metrics.errors import Metrics, error_metrics
+from validation.metrics.flip import Flip, flip_hdr
+from validation.metrics.other_tools import PublishedErrors, published_errors
+from validation.statistics.comparison import Estimate, Statistics, compare_statistics
+
+BATCHES = "airlight:batches"  #: header attribute: how many batch means gave the standard errors
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What `airlight compare` prints."""
+
+    layer: str
+    metrics: Metrics
+    statistics: Statistics | None  #: None where neither image has standard errors
+    masked: int = 0  #: pixels that the mask leaves out
+    errors: PublishedErrors | None = None  #: as other tools print them
+    errors_normalised: PublishedErrors | None = None  #: the same with the mean of the reference as the unit
+    colour: ColourDifference | None = None
+    flip: Flip | None = None
+
+    @property
+    def failures(self) -> tuple[str, ...]:
+        """Why the comparison must be called failed; empty if it is not."""
+        reasons = []
+        if self.metrics.nonfinite:
+            reasons.append(f"{self.metrics.nonfinite} pixels are NaN or infinite")
+        if self.metrics.negative:
+            reasons.append(f"{self.metrics.negative} pixels of the test image are negative")
+        if self.statistics is not None and self.statistics.equivalent is False:
+            reasons.append(f"the relative bias is not shown to be within +-{self.statistics.margin:.3g}")
+        return tuple(reasons)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return every number by name, those of the metrics first; what is not finite is None.
+
+        The metrics of other tools, the colour differences and FLIP are in objects of their own, where asked for.
+        `relative_bias` is the same in the metrics and in the statistics, sum(test - ref) / sum(ref).
+        """
+        statistics = {} if self.statistics is None else self.statistics.to_json()
+        extras = {
+            name: getattr(self, name).to_json()
+            for name in ("errors", "errors_normalised", "colour", "flip")
+            if getattr(self, name) is not None
+        }
+        flat = {"layer": self.layer, **statistics, **self.metrics.to_json(), "masked": self.masked}
+        return {**flat, **extras, "failures": list(self.failures)}
+
+    def summary(self) -> str:
+        """Return the numbers as text, a line for each group."""
+        m = self.metrics
+        lines = [
+            f"layer            {self.layer}, {m.pixels} pixels, {self.masked} masked, {m.nonfinite} not finite, "
+            f"{m.negative} negative",
+            f"bias             {m.bias:.4g} W/(m^2 sr), relative {percent(m.relative_bias)}",
+            f"rmse             {m.rmse:.4g} W/(m^2 sr), relative {percent(m.relative_rmse)}",
+            f"relative error   p50 {m.p50:.3g}, p99 {m.p99:.3g}, max {m.max:.3g}",
+        ]
+        if self.statistics is not None:
+            lines += statistics_lines(self.statistics)
+        for errors in (self.errors, self.errors_normalised):
+            lines += [] if errors is None else errors_lines(errors)
+        lines += [] if self.colour is None else colour_lines(self.colour)
+        lines += [] if self.flip is None else [flip_line(self.flip)]
+        return "\n".join(lines + [f"failed           {reason}" for reason in self.failures])
+
+
+def compare_images(
+    reference: Image,
+    test: Image,
+    *,
+    layer: str = "airlight",
+    mask: ArrayLike | None = None,
+    margin: float | None = None,
+    all_metrics: bool = False,
+    flip: bool = False,
+    exposure: float | None = None,
+) -> Comparison:
+    """Compare a layer of two images.
+
+    Statistics need the standard errors in the layer `<layer>_se` of either image; with both, both count. The header
+    attribute `airlight:batches` says from how many batch means they come.
+
+    Parameters
+    ----------
+    reference, test
+        The images; their errors must be independent.
+    layer
+        The layer, `total` for the plain channels.
+    mask
+        Pixels to compare, (height, width) of truth values; all by default.
+    margin
+        Largest relative bias that counts as agreement, such as 0.005; wants standard errors.
+    all_metrics
+        Also the errors by the formulae of other tools (`published_errors`) and the colour differences.
+    flip
+        Also HDR-FLIP, in a child process; what goes wrong with it is a note.
+    exposure
+        Of the colour differences and of FLIP [stops]; each chooses its own from the reference by default.
+
+    Raises
+    ------
+    InputError
+        If a layer is not there, the sizes differ, a standard error is negative or not finite, or an exposure is given
+        for nothing.
+    """
+    extras = _Extras(all_metrics, flip, exposure)
+    names = ("the reference", reference), ("the test image", test)
+    return _compare(*names, name=layer, mask=mask, margin=margin, extras=extras)
+
+
+def compare_files(
+    reference: str | os.PathLike[str],
+    test: str | os.PathLike[str],
+    layer: str = "airlight",
+    *,
+    mask: str | os.PathLike[str] | None = None,
+    margin: float | None = None,
+    all_metrics: bool = False,
+    flip: bool = False,
+    exposure: float | None = None,
+) -> Comparison:
+    """Compare a layer of two EXR files (see `compare_images`); messages name the file.
+
+    Parameters
+    ----------
+    mask
+        An EXR file; pixels whose R, G and B (or Y) are all zero there are left out.
+
+    Raises
+    ------
+    InputError
+        Also if a file is missing, broken or of a kind that is not read.
+    """
+    one, two = read_exr(reference), read_exr(test)
+    chosen = None if mask is None else read_mask(mask)
+    names = (str(reference), one), (str(test), two)
+    return _compare(*names, name=layer, mask=chosen, margin=margin, extras=_Extras(all_metrics, flip, exposure))
+
+
+@dataclass(frozen=True)
+class _Extras:
+    """What is computed beside the metrics and the statistics."""
+
+    all_metrics: bool
+    flip: bool
+    exposure: float | None
+
+
+def _compare(
+    one: tuple[str, Image],
+    two: tuple[str, Image],
+    *,
+    name: str,
+    mask: ArrayLike | None,
+    margin: float | None,
+    extras: _Extras,
+) -> Comparison:
+    """Compare a layer of two images that have names."""
+    if extras.exposure is not None and not (extras.all_metrics or extras.flip):
+        raise InputError("an exposure is for the colour differences and FLIP; ask for all metrics or for FLIP too")
+    reference, test = (_estimate(path, image, name) for path, image in (one, two))
+    metrics = error_metrics(reference.mean, test.mean, mask=mask)
+    statistics = None
+    if reference.standard_error is not None or test.standard_error is not None:
+        statistics = compare_statistics(reference, test, mask=mask, margin=margin)
+    elif margin is not None:
+        raise InputError(
+            f"a margin wants standard errors, and neither {one[0]} nor {two[0]} has a layer '{name}_se'; "
+            "leave the margin out, or make the reference by Monte Carlo"
+        )
+    images: tuple[ArrayLike, ArrayLike] = (reference.mean, test.mean)
+    wanted = extras.all_metrics
+    return Comparison(
+        name,
+        metrics,
+        statistics,
+        masked=0 if mask is None else int((~np.asarray(mask)).sum()),
+        errors=published_errors(*images, mask=mask) if wanted else None,
+        errors_normalised=published_errors(*images, mask=mask, unit=None) if wanted else None,
+        colour=colour_difference(*images, mask=mask, exposure=extras.exposure) if wanted else None,
+        flip=flip_hdr(*images, mask=mask, exposure=extras.exposure) if extras.flip else None,
+    )
+
+
+def read_mask(path: str | os.PathLike[str]) -> NDArray[np.bool_]:
+    """Return where the plain channels of an EXR file are not zero, (height, width).
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, has no plain channels or values that are not finite.
+    """
+    values = np.asarray(image_layer(read_exr(path), TOTAL, path))
+    if not np.isfinite(values).all():
+        raise InputError(f"{path} as a mask has values that are not finite; wanted 0 for out and 1 for in")
+    return (values != 0).any(axis=2)
+
+
+def _estimate(path: str, image: Image, name: str) -> Estimate:
+    """Take a layer with its standard error out of an image."""
+    error = image.layers.get(f"{name}_se")
+    batches = image.attributes.get(BATCHES) if error is not None else None
+    if batches is not None and not isinstance(batches, int):
+        raise InputError(f"{path} has the attribute {BATCHES} {batches!r}; wanted an integer; correct it or remove it")
+    return Estimate(image_layer(image, name, path), error, batches)

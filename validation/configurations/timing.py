@@ -1,0 +1,292 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Timing: medians after warm-up, with their spread.
+
+A frame is timed from the call to the arrays being ready on the device (`drjit.sync_thread`), kernels compiled and
+recorded before. The wall clock is used on purpose: launch and replay are part of what a user waits for.
+"""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realtime.frame.incremental import Kept, next_frame
+from realtime.frame.recorded import Frozen
+from realtime.frame.renderer import (
+    FrameRenderer,
+    run_airlight,
+    run_cast_and_shade,
+    run_shade,
+    run_stages,
+    run_surface,
+    run_tiles,
+    run_tiles_and_airlight,
+)
+from realtime.frame.surface import cast_rays
+from realtime.scene.animate import Objects, read_objects, turned_objects
+from realtime.scene.camera import ray_directions
+from realtime.scene.read_scene import Scene
+
+#: Of a frame that takes longer than this the stages are timed once, in one more frame: its spread matters little, and
+#: some thirty such frames, as others have, would take minutes [s].
+SLOW = 8.0
+_TURNS = 1.5  # about so long is spent on frames that are timed stage by stage, one to five of them [s]
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Repeated measurements of one piece of work [ms]."""
+
+    median_ms: float
+    low_ms: float  #: first quartile
+    high_ms: float  #: third quartile
+    repetitions: int
+
+
+def time_repeated(work: Callable[[], Any], *, seconds: float = 0.6, least: int = 5, most: int = 200) -> Timing:
+    """Time a piece of work again and again.
+
+    Parameters
+    ----------
+    work
+        Called with nothing; must leave its results evaluated.
+    seconds
+        Stop after about this long, but not before `least` repetitions.
+    least, most
+        Bounds of the number of repetitions.
+    """
+    (timing,) = time_in_turns([work], seconds=seconds, least=least, most=most)
+    return timing
+
+
+def time_in_turns(
+    works: Sequence[Callable[[], Any]], *, seconds: float = 3.0, least: int = 5, most: int = 200
+) -> list[Timing]:
+    """Time several pieces of work in turns; parameters as in `times_in_turns`."""
+    times = times_in_turns(works, seconds=seconds, least=least, most=most)
+    quartiles = np.percentile(times, [25, 50, 75], axis=0).T
+    return [Timing(float(median), float(low), float(high), len(times)) for low, median, high in quartiles]
+
+
+def times_in_turns(
+    works: Sequence[Callable[[], Any]], *, seconds: float, least: int, most: int, alternate: bool = False
+) -> NDArray[np.float64]:
+    """Time several pieces of work in turns, so that whatever else the machine does hits all of them alike.
+
+    Parameters
+    ----------
+    works
+        Each called with nothing; must leave its results evaluated.
+    seconds
+        Stop after about this long, but not before `least` turns.
+    least, most
+        Bounds of the number of turns.
+    alternate
+        Whether every other turn goes backwards: what comes second may find the caches warm.
+
+    Returns
+    -------
+    array
+        The times after two turns of warm-up [ms], (turns, works).
+    """
+    import drjit as dr
+
+    for _ in range(2):  # the first call compiles and records, the second is the first replay
+        for work in works:
+            work()
+            dr.sync_thread()
+    times: list[list[float]] = []
+    stop = time.perf_counter() + seconds
+    while len(times) < least or (time.perf_counter() < stop and len(times) < most):
+        turn = [0.0] * len(works)
+        backwards = alternate and len(times) % 2
+        for place in reversed(range(len(works))) if backwards else range(len(works)):
+            start = time.perf_counter()
+            works[place]()
+            dr.sync_thread()
+            turn[place] = 1e3 * (time.perf_counter() - start)
+        times.append(turn)
+    return np.array(times)
+
+
+def timed_frame(renderer: FrameRenderer, scene: Scene, kept: Kept | None, **moved: bool):
+    """Render the next frame, as `realtime.frame.incremental.next_frame`; return stages, what is kept, and the time
+    [ms].
+    """
+    import drjit as dr
+
+    begin = time.perf_counter()
+    stages, kept = next_frame(renderer, scene, kept, **moved)
+    dr.sync_thread()
+    return stages, kept, 1e3 * (time.perf_counter() - begin)
+
+
+def moved_light(renderer: FrameRenderer) -> Callable[[], Any]:
+    """Return a frame after the light moved, the camera rays cast again: all but the acceleration structure is anew."""
+    return _step(renderer, None, light_moved=True)
+
+
+def moved_light_alone(renderer: FrameRenderer, kept: Kept) -> Callable[[], Any]:
+    """Return a frame after the light moved, camera and geometry as they stood: camera rays are kept."""
+    return _step(renderer, kept, light_moved=True)
+
+
+def changed_look(renderer: FrameRenderer, kept: Kept) -> Callable[[], Any]:
+    """Return a frame after the medium or colours of lights changed: only surface and airlight are computed."""
+    return _step(renderer, kept, light_moved=False)
+
+
+def camera_rays(renderer: FrameRenderer) -> Callable[[], Any]:
+    """Return the camera rays of a frame alone, cast and not shaded: no frame that casts them takes less."""
+    import drjit as dr
+
+    scene = renderer.scene
+
+    @Frozen
+    def cast(geometry, facets, pixel, camera):
+        return cast_rays(geometry, facets, camera.origin, ray_directions(camera, pixel)[0]).distance
+
+    return lambda: dr.eval(cast(scene.geometry, scene.facets, renderer.pixel, scene.camera))
+
+
+def _step(renderer: FrameRenderer, kept: Kept | None, *, light_moved: bool) -> Callable[[], Any]:
+    moved = {"camera_moved": kept is None, "geometry_moved": False, "light_moved": light_moved}
+    return lambda: next_frame(renderer, renderer.scene, kept, **moved)
+
+
+def first_frame(renderer: FrameRenderer) -> Kept:
+    """Render the frame of the renderer's scene and return what it leaves."""
+    return next_frame(renderer, renderer.scene, None, camera_moved=True, geometry_moved=True, light_moved=True)[1]
+
+
+@dataclass(frozen=True)
+class FrameTimes:
+    """What a frame costs [ms]."""
+
+    frame: Timing  #: camera rays, lit surface, tiles and airlight; shadow maps or planes are there
+    surface: Timing  #: camera rays and lit surface
+    airlight: Timing  #: tiles and airlight: the kernel with its ray set-up, or the marching
+    rebuild: Timing  #: a frame after the light moved: shadow maps or silhouettes and planes, all stages
+    moved: Timing  #: a frame after the objects moved too: acceleration structure, adjacent planes, all of the above
+    relit: Timing  #: a frame after the light alone moved: that of `rebuild` with the camera rays of the last frame
+    recoloured: (
+        Timing  #: a frame after nothing moved, medium or colours changed: surface and airlight from what is there
+    )
+
+
+def time_frame(renderer: FrameRenderer, *, seconds: float = 0.6, slow: float | None = None) -> FrameTimes:
+    """Time the stages of a frame, the whole frame, and frames after light, objects or only colours changed.
+
+    Parameters
+    ----------
+    renderer
+        Of the frame.
+    seconds
+        Time to spend on each of the first three, and half of it on each of the others.
+    slow
+        If the airlight takes longer than this, whole frames are run stage by stage and the seven are added up from
+        them: up to five frames in place of some forty; `SLOW` by default [s].
+    """
+    import drjit as dr
+
+    scene = renderer.scene
+    kept = first_frame(renderer)
+    prepared, distance = kept.prepared, kept.cast.distance
+    by_light = run_shade(renderer, kept.cast)
+    dr.eval(distance, by_light)
+
+    def airlight():
+        dr.eval(run_tiles_and_airlight(renderer, prepared, distance, by_light))
+
+    dr.sync_thread()
+    begin = time.perf_counter()
+    airlight()
+    dr.sync_thread()
+    took = time.perf_counter() - begin
+    if took > (SLOW if slow is None else slow):
+        return _slow_frame(renderer, turns=int(np.clip(_TURNS / took, 1, 5)))
+
+    def surface():
+        dr.eval(run_surface(renderer))
+
+    objects = _objects(scene)
+
+    def moved():
+        # Where they stand: the work is that of any other place.
+        there = turned_objects(scene, objects, np.eye(3)) if objects else scene
+        next_frame(renderer, there, None, camera_moved=False, geometry_moved=True, light_moved=True)
+
+    def few(work: Callable[[], Any]) -> Timing:
+        return time_repeated(work, seconds=0.5 * seconds, least=3)
+
+    return FrameTimes(
+        frame=time_repeated(lambda: run_stages(renderer, prepared), seconds=seconds),
+        surface=time_repeated(surface, seconds=seconds),
+        airlight=time_repeated(airlight, seconds=seconds),
+        rebuild=few(moved_light(renderer)),
+        moved=few(moved),
+        relit=few(moved_light_alone(renderer, kept)),
+        recoloured=few(changed_look(renderer, kept)),
+    )
+
+
+def _slow_frame(renderer: FrameRenderer, *, turns: int) -> FrameTimes:
+    """Time the stages of some frames."""
+    import drjit as dr
+
+    scene = renderer.scene
+    objects = _objects(scene)
+    steps = []
+    for _ in range(turns):
+        times = [time.perf_counter()]
+
+        def done(times: list[float] = times) -> None:
+            dr.sync_thread()
+            times.append(time.perf_counter())
+
+        there = turned_objects(scene, objects, np.eye(3)) if objects else scene
+        done()
+        prepared = renderer.prepare(there)
+        done()
+        cast, by_light = run_cast_and_shade(renderer)
+        dr.eval(cast, by_light)
+        done()
+        dr.eval(run_shade(renderer, cast))
+        done()
+        tiles = run_tiles(renderer, prepared, cast.distance)
+        done()
+        dr.eval(run_airlight(renderer, prepared, cast.distance, by_light, tiles))
+        done()
+        steps.append(1e3 * np.diff(times))
+    move, prepare, surface, shade, in_tiles, rest = np.array(steps).T
+    needed = renderer.method.prepared_from
+
+    def timing(milliseconds: NDArray[np.float64]) -> Timing:
+        low, median, high = (float(value) for value in np.percentile(milliseconds, [25, 50, 75]))
+        return Timing(median, low, high, turns)
+
+    airlight = in_tiles + rest
+    rebuild = prepare + surface + airlight
+    return FrameTimes(
+        frame=timing(surface + airlight),
+        surface=timing(surface),
+        airlight=timing(airlight),
+        rebuild=timing(rebuild),
+        moved=timing(move + rebuild),
+        relit=timing(shade + airlight + prepare * bool(needed & {"light", "look"})),
+        recoloured=timing(shade + rest + prepare * ("look" in needed)),
+    )
+
+
+def _objects(scene: Scene) -> Objects | None:
+    """Read all meshes of a scene whose vertices can be moved; None where there are none."""
+    import mitsuba as mi
+
+    if not scene.geometry.shapes():
+        return None
+    keys = list(mi.traverse(scene.geometry).keys())
+    names = [key.rsplit(".", 1)[0] for key in keys if key.endswith(".vertex_positions")]
+    return read_objects(scene, names) if names else None

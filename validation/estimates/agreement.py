@@ -1,0 +1,248 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The routes to the truth against each other: the quadrature image, our own integrator and Mitsuba's path tracer.
+
+They share no code but Mitsuba's ray casting. `single-scatter` estimates the same integral as the quadrature by other
+means: agreement of a few hundredths of a percent says that neither has a fault. `volpath` is code that nobody here
+wrote. It attenuates over a shadow ray that ends a relative epsilon before the light (DESIGN section 6.1), so it is
+compared with the quadrature image of *that* integral, exp(-sigma_t (x + (1 - epsilon) r)), with the epsilon measured on
+this machine. The bias without this correction is given beside it.
+
+Rays that pass closer to a light than `MASK_PIXELS` pixel widths are left out: the contribution of one path there is
+bounded only by 1/h^2, so that no number of samples gives a standard error to trust (DESIGN section 6.6).
+"""
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.monte_carlo.allocation import allocated
+from reference.monte_carlo.batches import LARGEST_SEED, LAYERS, Batches
+from reference.quadrature.image import TruthImage
+from reference.scene.read import TruthScene, read_truth
+from reference.scene.shadow_epsilon import measure_shadow_epsilon
+from validation.estimates.monte_carlo import monte_carlo_batches
+from validation.estimates.quadrature import truth_image
+from validation.statistics.comparison import Estimate, Statistics, compare_statistics
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Progress = Callable[[int, int, str], None]
+
+MASK_PIXELS = 2.0
+#: Below 32 batches the standard error of a standard error exceeds 13 %; those of single-scatter cost little.
+_LEAST_BATCHES = {"volpath": 32, "single-scatter": 96}
+_SAMPLES = 64  # a pixel in each batch
+_PILOT = 8  # batches that say where volpath's samples go, with seeds that no run reaches
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How far an estimator is from the quadrature image in one layer."""
+
+    estimator: str  #: 'volpath' or 'single-scatter'
+    layer: str  #: 'airlight' or 'surface'
+    width: int
+    height: int
+    batches: int
+    samples: int  #: a pixel and batch
+    epsilon: float  #: the shadow-ray epsilon that was corrected for; 0 for single-scatter, which has none
+    masked: int  #: pixels left out because a light is close to their ray
+    statistics: Statistics  #: of the estimator against the quadrature, for volpath that of the shortened shadow ray
+    uncorrected_bias: float  #: pooled relative bias against the plain truth
+    finished: bool = True  #: whether the intervals became as narrow as wanted; else time or batches ran out before
+
+
+def agreement(
+    scene,
+    *,
+    estimator: str = "volpath",
+    margin: float = 0.005,
+    batches: int = 256,
+    samples: int = _SAMPLES,
+    seconds: float | None = None,
+    progress: Progress | None = None,
+) -> dict[str, Agreement]:
+    """Compare an estimator with the quadrature image of a Mitsuba scene at its own size.
+
+    It runs until the half width of every interval is below 0.4 times the margin: a rule that looks at the spread
+    alone, so that stopping favours no verdict. Nor does the end of its time.
+
+    Parameters
+    ----------
+    scene
+        The `mi.Scene`; a small size will do, since the comparison pools all pixels.
+    estimator
+        'volpath' or 'single-scatter'.
+    margin
+        The two agree if the 95 % interval of the relative bias lies inside +- this.
+    batches, samples
+        Batches at most, and samples a pixel in each; those of volpath go where its pilot spread most
+        (`reference.monte_carlo.allocation`).
+    seconds
+        Trace no further batch after so long; without a limit by default.
+    progress
+        Called with (done, total, what) after every batch.
+
+    Returns
+    -------
+    dict
+        By layer; the surface is left out where nothing lit is visible.
+    """
+    epsilon = measure_shadow_epsilon() if estimator == "volpath" else 0.0
+    plain = truth_image(scene)
+    shortened = truth_image(scene, shadow_scale=1 - epsilon) if epsilon else plain
+    masks = layer_masks(read_truth(scene), plain)
+    layers = [layer for layer in LAYERS if np.any(getattr(plain, layer) > 0)]
+
+    def compared(found: Batches, layer: str) -> Statistics:
+        mask = masks[layer]
+        test = batch_estimate(found, layer, mask)
+        return compare_statistics(Estimate(getattr(shortened, layer)), test, mask=mask, margin=margin)
+
+    start = time.monotonic()
+    counts = None
+    if estimator == "volpath" and layers:
+        pilot = monte_carlo_batches(scene, estimator, batches=_PILOT, samples=samples, first_seed=LARGEST_SEED // 2)
+        counts = allocated(pilot.batches, samples, shape=plain.distance.shape, masks=masks)
+    go_on = None if seconds is None else (lambda done: time.monotonic() - start <= seconds)
+    expected = least = _LEAST_BATCHES[estimator]
+
+    def enough(found: Batches) -> bool:
+        nonlocal expected
+        if not layers:
+            return True
+        widest = max(width_to_reach(compared(found, layer), margin) for layer in layers)
+        done = len(found.seeds)
+        # The width falls with the square root of the batches: that is when this will be over.
+        expected = max(least, round(done * widest**2) if np.isfinite(widest) else batches)
+        return done >= least and widest < 1
+
+    def tell(done: int, total: int, what: str) -> None:
+        if progress is not None:
+            progress(min(done, expected), min(total, expected), what)
+
+    found = monte_carlo_batches(
+        scene,
+        estimator,
+        batches=batches,
+        samples=samples,
+        counts=counts,
+        enough=enough,
+        go_on=go_on,
+        progress=tell,
+    ).batches
+    results = {layer: compared(found, layer) for layer in layers}
+    return {
+        layer: Agreement(
+            estimator,
+            layer,
+            plain.distance.shape[1],
+            plain.distance.shape[0],
+            len(found.seeds),
+            found.samples,
+            epsilon,
+            int((~masks[layer]).sum()),
+            results[layer],
+            _bias(getattr(plain, layer), found, layer, masks[layer]),
+            width_to_reach(results[layer], margin) < 1,
+        )
+        for layer in layers
+    }
+
+
+def agreements(
+    scene,
+    margins: Mapping[str, float],
+    *,
+    batches: int = 256,
+    samples: Mapping[str, int] | None = None,
+    seconds: float | None = None,
+    progress: Callable[[float, str], None] | None = None,
+) -> dict[str, Agreement]:
+    """Compare several estimators with the quadrature image.
+
+    Parameters
+    ----------
+    scene
+        The `mi.Scene`.
+    margins
+        By estimator, the margin.
+    samples
+        By estimator, see `agreement`; its default otherwise.
+    batches, seconds
+        Of each estimator, see `agreement`.
+    progress
+        Called with (share done, what).
+
+    Returns
+    -------
+    dict
+        By estimator and layer, as in 'volpath airlight'.
+    """
+    tell = progress or (lambda share, what: None)
+    found: dict[str, Agreement] = {}
+    for number, (estimator, margin) in enumerate(margins.items()):
+
+        def told(done: int, total: int, what: str, first: int = number) -> None:
+            tell((first + done / total) / len(margins), what)
+
+        by_layer = agreement(
+            scene,
+            estimator=estimator,
+            margin=margin,
+            batches=batches,
+            samples=(samples or {}).get(estimator, _SAMPLES),
+            seconds=seconds,
+            progress=told,
+        )
+        found |= {f"{estimator} {layer}": one for layer, one in by_layer.items()}
+    return found
+
+
+def _bias(expected: Array, found: Batches, layer: str, mask: Mask) -> float:
+    return float(layer_mean(found, layer, mask)[mask].sum() / expected[mask].sum() - 1)
+
+
+def layer_masks(truth: TruthScene, image: TruthImage) -> dict[str, Mask]:
+    """Return the pixels to compare, by layer, (height, width): of the airlight those whose ray keeps off the lights."""
+    near = image.light_angle <= MASK_PIXELS * pixel_angle(truth)
+    return {"airlight": ~near & np.isfinite(image.airlight).all(axis=2), "surface": np.ones_like(near)}
+
+
+def layer_mean(batches: Batches, layer: str, mask: Mask) -> Array:
+    """Return the mean image of a layer, (height, width, 3), for a mask of the whole image."""
+    return batches.mean[LAYERS.index(layer)].reshape(*mask.shape, 3)
+
+
+def batch_estimate(batches: Batches, layer: str, mask: Mask) -> Estimate:
+    """Return a layer of some batches as one side of a comparison of the pixels of a mask."""
+    number = LAYERS.index(layer)
+    return Estimate(
+        layer_mean(batches, layer, mask),
+        batches.standard_error[number].reshape(*mask.shape, 3),
+        len(batches.seeds),
+        # The batch means are those of whole images.
+        batches.totals[:, number] if mask.all() else None,
+    )
+
+
+def widest_interval(found: Statistics) -> tuple[float, float]:
+    """Return the wider of the 95 % intervals of the relative bias."""
+    intervals = [found.relative_bias_ci, found.relative_bias_ci_batches]
+    return max((pair for pair in intervals if pair is not None), key=lambda pair: pair[1] - pair[0])
+
+
+def width_to_reach(found: Statistics, margin: float) -> float:
+    """Return the half width of the wider interval over 0.4 times the margin: runs stop where it is below 1."""
+    low, high = widest_interval(found)
+    return 0.5 * (high - low) / (0.4 * margin)
+
+
+def pixel_angle(truth: TruthScene) -> float:
+    """Return the angle between the two pixels in the middle of the image [rad]."""
+    middle = (truth.height // 2) * truth.width + truth.width // 2
+    beside = middle - 1 if truth.width > 1 else middle
+    return float(np.arccos(np.clip(truth.direction[middle] @ truth.direction[beside], -1, 1)))

@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""References as layered images, ready to be written."""
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realtime.frame.renderer import Frame
+from reference.monte_carlo.batches import LARGEST_SEED, LAYERS, Batches, seed_ranges
+from reference.quadrature.image import TruthImage
+from reference.quadrature.surface import surface_hits
+from reference.scene.read import read_truth
+from reference.storage.cache import scene_digest
+from reference.storage.exr import Image
+from validation.configurations.methods import Configuration
+from validation.estimates.budget import LEAST_BATCHES, Budget, RelativeErrors, batch_plan, near_light, relative_errors
+from validation.estimates.monte_carlo import monte_carlo_batches
+from validation.estimates.quadrature import truth_image
+from validation.scenes.loading import LoadedScene
+
+Progress = Callable[[float, str], None]
+
+
+def quadrature_reference(loaded: LoadedScene, *, pixel: str = "centre", progress: Progress | None = None) -> Image:
+    """Return the quadrature truth of a scene; the layer `airlight_bound` bounds the error of `airlight`.
+
+    Parameters
+    ----------
+    loaded
+        The scene.
+    pixel
+        'centre' or 'area', see `reference.quadrature.image.quadrature_image`.
+    progress
+        Called with (share done, what) as the work goes on.
+    """
+
+    def tell(done: int, total: int, what: str) -> None:
+        if progress is not None:
+            progress(done / total, what)
+
+    return whole_truth(loaded, truth_image(loaded.scene, pixel=pixel, progress=tell), pixel=pixel)
+
+
+def whole_truth(loaded: LoadedScene, truth: TruthImage, *, pixel: str = "centre") -> Image:
+    """Return the quadrature truth of a loaded scene as layers; the header says of which bytes of the scene."""
+    image = layered_truth(loaded.name, truth)
+    made = {"airlight:pixel": pixel, "airlight:scene_digest": scene_digest(loaded.scene)}
+    return replace(image, attributes=dict(image.attributes) | made)
+
+
+def layered_truth(name: str, truth: TruthImage) -> Image:
+    """Return the quadrature truth of the scene of that name as layers."""
+    layers = {"airlight": truth.airlight, "airlight_bound": truth.airlight_bound, "surface": truth.surface}
+    return Image(layers, truth.distance, {"airlight:scene": name, "airlight:estimator": "quadrature"})
+
+
+def layered_frame(name: str, chosen: Configuration, frame: Frame) -> Image:
+    """Return a frame of the scene of that name as layers; the header says what rendered it."""
+    attributes = {"airlight:scene": name, "airlight:method": chosen.method}
+    attributes |= {"airlight:kernel": chosen.kernel} if chosen.kernel else {}
+    attributes |= {f"airlight:{key}": str(value) for key, value in chosen.parameters}
+    return Image({"airlight": frame.airlight, "surface": frame.surface}, frame.distance, attributes)
+
+
+@dataclass(frozen=True)
+class MonteCarloReference:
+    """A reference by random samples, and how it came about."""
+
+    image: Image  #: layers with their standard errors
+    errors: RelativeErrors
+    reached: bool | None  #: whether the target error was reached; None if none was set
+    masked: int  #: pixels beside a light, whose airlight is left out of `errors`
+    cached: int  #: batches that were in the cache
+    damaged: int  #: files of the cache that were damaged and have been replaced
+
+
+def monte_carlo_reference(
+    loaded: LoadedScene, estimator: str, *, budget: Budget, seed: int = 0, progress: Progress | None = None
+) -> MonteCarloReference:
+    """Return the mean of an estimator's batches with its standard errors.
+
+    The same samples and seed give the same numbers, whatever was in the cache.
+
+    Parameters
+    ----------
+    loaded
+        The scene.
+    estimator
+        'single-scatter' or 'volpath'.
+    budget
+        When to stop.
+    seed
+        Seed of the first batch; the others count up.
+    progress
+        Called with (share done, what) after every batch.
+    """
+    truth = read_truth(loaded.scene)
+    distance = surface_hits(truth).distance
+    near = near_light(truth, distance)
+    batches, samples = batch_plan(budget, len(near))
+    watch = _Watch(budget, near, progress)
+    run = monte_carlo_batches(
+        loaded.scene,
+        estimator,
+        batches=batches if budget.samples is not None else min(batches, LARGEST_SEED - seed),
+        samples=samples,
+        first_seed=seed,
+        enough=None if budget.error is None else watch.enough,
+        go_on=None if budget.seconds is None else watch.go_on,
+        progress=watch.tell,
+    )
+    errors = relative_errors(run.batches, near)
+    reached = None if budget.error is None else getattr(errors, budget.target) <= budget.error
+    distance = distance.reshape(truth.height, truth.width)
+    image = _layered_batches(loaded, estimator, run.batches, distance=distance)
+    return MonteCarloReference(image, errors, reached, int(near.sum()), run.cached, run.damaged)
+
+
+class _Watch:
+    """What a run knows of its own progress: the time that it took, and how its error fell."""
+
+    def __init__(self, budget: Budget, near: NDArray[np.bool_], progress: Progress | None) -> None:
+        self._budget, self._near, self._progress = budget, near, progress
+        self._expected = 0  # batches until the target is reached; not known before the first error
+        self._words = ""
+        self._start = self._last = time.monotonic()
+        self._step = 0.0
+
+    def enough(self, found: Batches) -> bool:
+        """Say whether the target is reached; expect the error to fall with the square root of the batches."""
+        assert self._budget.error is not None
+        error = getattr(relative_errors(found, self._near), self._budget.target)
+        done = len(found.seeds)
+        self._expected = max(LEAST_BATCHES, math.ceil(done * min(1e6, error / self._budget.error) ** 2))
+        self._words = f", {self._budget.target} error {error:.3g} of {self._budget.error:.3g}"
+        return done >= LEAST_BATCHES and error <= self._budget.error
+
+    def go_on(self, done: int) -> bool:
+        """Say whether another batch will end in time: it may take as long as the one before."""
+        assert self._budget.seconds is not None
+        return time.monotonic() - self._start + self._step <= self._budget.seconds
+
+    def tell(self, done: int, total: int, estimator: str) -> None:
+        now = time.monotonic()
+        self._step, self._last = now - self._last, now
+        if self._progress is None:
+            return
+        if self._budget.seconds is not None:
+            share = (now - self._start) / self._budget.seconds
+        elif self._budget.samples is not None:
+            share = done / total
+        else:
+            share = done / max(self._expected, done + 1) if self._expected else 0.0
+        self._progress(min(1.0, share), f"{estimator}, {done} batches{self._words}")
+
+
+def _layered_batches(loaded: LoadedScene, estimator: str, found: Batches, *, distance: NDArray[np.float64]) -> Image:
+    shape = (*distance.shape, 3)
+    layers = {}
+    for number, name in enumerate(LAYERS):
+        layers[name] = found.mean[number].reshape(shape)
+        layers[f"{name}_se"] = found.standard_error[number].reshape(shape)
+    attributes: dict[str, str | int | float] = {
+        "airlight:scene": loaded.name,
+        "airlight:scene_digest": scene_digest(loaded.scene),
+        "airlight:estimator": estimator,
+        "airlight:spp": found.samples * len(found.seeds),
+        "airlight:batch_spp": found.samples,
+        "airlight:batches": len(found.seeds),
+        "airlight:seed": found.seeds[0],
+        "airlight:seeds": seed_ranges(found.seeds),
+    }
+    return Image(layers, distance, attributes)
+
+
+def volpath_reference(loaded: LoadedScene, *, samples: int, seed: int = 0, progress: Progress | None = None) -> Image:
+    """Return volpath's mean with its standard errors; see `monte_carlo_reference`."""
+    return monte_carlo_reference(loaded, "volpath", budget=Budget(samples=samples), seed=seed, progress=progress).image

@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""References of several machines as one.
+
+A file holds for each value the mean m of its K batches and their standard error s, so the sum of squared deviations
+is K (K - 1) s^2, and files add up as batches do: the spread within each and that between their means
+(`reference.monte_carlo.batches.pooled`). What merging loses is the rounding of files to single precision: the mean
+keeps a relative 2^-24 = 6e-8 or so, the standard error likewise. The spread between two means that differ by rounding
+alone shows as a relative standard error of the order of 6e-8, where the estimator has no noise at all.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analytic.errors import InputError
+from reference.monte_carlo.batches import LAYERS, parse_seed_ranges, pooled, seed_ranges
+from reference.storage.exr import Attribute, Image
+
+Array = NDArray[np.float64]
+
+#: What must be the same in all files: the header's name, and what it means.
+_SAME = {
+    "scene_digest": "the scene or its size",
+    "estimator": "the estimator",
+    "batch_spp": "the samples a pixel of a batch",
+    "version:mitsuba": "the version of Mitsuba",
+}
+
+
+@dataclass(frozen=True)
+class _Part:
+    name: str  # of the file
+    image: Image
+    seeds: tuple[int, ...]
+
+    def moments(self, layer: str) -> tuple[int, Array, Array]:
+        """Return the number of batches, their mean and the sum of their squared deviations."""
+        count = len(self.seeds)
+        mean, error = (np.asarray(self.image.layers[name], dtype=np.float64) for name in (layer, f"{layer}_se"))
+        return count, mean, error**2 * (count * (count - 1))
+
+
+def merged_references(files: Sequence[tuple[str, Image]]) -> Image:
+    """Return the reference of all batches of several files.
+
+    Parameters
+    ----------
+    files
+        Name and image of each: references as `validation.estimates.images.monte_carlo_reference` makes them, or merged
+        ones. Their order does not matter.
+
+    Raises
+    ------
+    InputError
+        If there are fewer than two files, one of them is no such reference, they are of different scenes, estimators,
+        sizes of batches or versions of Mitsuba, or two of them share a seed.
+    """
+    if len(files) < 2:
+        raise InputError(f"got {len(files)} file to merge; wanted at least two")
+    parts = sorted((_read(name, image) for name, image in files), key=lambda part: part.seeds)
+    for part in parts[1:]:
+        _check_same(parts[0], part)
+    seeds = _all_seeds(parts)
+    layers = {}
+    for layer in LAYERS:
+        count, mean, squares = parts[0].moments(layer)
+        for part in parts[1:]:
+            other = part.moments(layer)
+            mean, squares = pooled((count, mean, squares), other)
+            count += other[0]
+        layers[layer] = mean
+        layers[f"{layer}_se"] = np.sqrt(squares / (count * (count - 1)))
+    samples = int(parts[0].image.attributes["airlight:batch_spp"])
+    attributes: dict[str, Attribute] = dict(parts[0].image.attributes) | {
+        "airlight:spp": samples * len(seeds),
+        "airlight:batches": len(seeds),
+        "airlight:seed": seeds[0],
+        "airlight:seeds": seed_ranges(seeds),
+        "airlight:merged": len(parts),
+    }
+    return Image(layers, parts[0].image.depth, attributes)
+
+
+def _read(name: str, image: Image) -> _Part:
+    """Check that a file is a reference with batches."""
+    header = image.attributes
+    missing = [key for key in ("estimator", "scene_digest", "batch_spp", "batches", "seeds") if not _of(header, key)]
+    missing += [
+        f"layer {layer}{suffix}" for layer in LAYERS for suffix in ("", "_se") if layer + suffix not in image.layers
+    ]
+    if missing:
+        raise InputError(
+            f"{name} is no Monte Carlo reference of `airlight reference`: it lacks {', '.join(missing)}; "
+            "compute it with --estimator single-scatter or volpath"
+        )
+    try:
+        seeds = parse_seed_ranges(_of(header, "seeds"))
+    except ValueError as error:
+        raise InputError(f"{name}: its header names no seeds: {error}; compute it again") from error
+    if str(len(seeds)) != _of(header, "batches") or len(seeds) < 2:
+        raise InputError(
+            f"{name}: its header names {len(seeds)} seeds and {_of(header, 'batches')} batches; compute it again"
+        )
+    return _Part(name, image, seeds)
+
+
+def _of(header: Mapping[str, Attribute], key: str) -> str:
+    return str(header.get(f"airlight:{key}", ""))
+
+
+def _check_same(one: _Part, other: _Part) -> None:
+    for key, meaning in _SAME.items():
+        values = [_of(part.image.attributes, key) for part in (one, other)]
+        if values[0] != values[1]:
+            raise InputError(
+                f"{one.name} and {other.name} differ in {meaning} ({values[0][:24]} and {values[1][:24]}); "
+                "merge references that were made alike"
+            )
+    shapes = [part.image.layers[LAYERS[0]].shape for part in (one, other)]
+    if shapes[0] != shapes[1]:
+        raise InputError(
+            f"{one.name} and {other.name} have images of two sizes, {shapes[0][1::-1]} and {shapes[1][1::-1]}"
+        )
+
+
+def _all_seeds(parts: Sequence[_Part]) -> list[int]:
+    """Return all seeds, ascending; the same batch twice would count as two."""
+    owner: dict[int, str] = {}
+    for part in parts:
+        shared = [seed for seed in part.seeds if seed in owner]
+        if shared:
+            raise InputError(
+                f"{owner[shared[0]]} and {part.name} share the seeds {seed_ranges(shared)}; "
+                "compute one of them again with another --seed"
+            )
+        owner |= dict.fromkeys(part.seeds, part.name)
+    return sorted(owner)

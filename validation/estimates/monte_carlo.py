@@ -1,0 +1,207 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Batches of a Monte Carlo estimator, from the cache where they were traced before.
+
+Every batch is kept as soon as it is finished, so a run that was interrupted or killed goes on from there. Eight batches
+whose seeds begin at a multiple of eight are kept as one block, which takes a quarter of the room. What a run returns
+depends on its seeds and their number alone, never on what was in the cache: blocks and the batches in them are always
+added up in the same order, and who asks for fewer batches than are kept gets those alone (up to seven that are only
+kept within a block are traced again).
+"""
+
+import errno
+import hashlib
+import os
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analytic.errors import InputError
+from reference.monte_carlo.batches import LARGEST_SEED, Batches, merged
+from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
+from reference.monte_carlo.volpath.integrator import volpath_batch
+from reference.scene.read import read_truth
+from reference.storage.cache import cache_folder, cache_key, drop_arrays, is_kept, load_arrays, store_arrays, sweep
+from reference.storage.files import NO_SPACE
+
+Progress = Callable[[int, int, str], None]
+Trace = Callable[[int], Batches]  # from the seed
+
+ESTIMATORS = ("single-scatter", "volpath")
+BLOCK = 8  #: batches in a block
+_REVISIONS = {"volpath": {"revision": 2}}  # raised when the same seed gives other numbers than it did
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a run came to."""
+
+    batches: Batches
+    cached: int  #: batches that were in the cache
+    damaged: int  #: files of the cache that were damaged; their batches have been traced again
+
+
+def monte_carlo_batches(
+    scene,
+    estimator: str,
+    *,
+    batches: int,
+    samples: int,
+    first_seed: int = 0,
+    max_depth: int = 2,
+    counts: NDArray[np.integer] | None = None,
+    enough: Callable[[Batches], bool] | None = None,
+    go_on: Callable[[int], bool] | None = None,
+    progress: Progress | None = None,
+) -> Run:
+    """Return batches of a Mitsuba scene at its own size.
+
+    Parameters
+    ----------
+    scene
+        The `mi.Scene`.
+    estimator
+        'single-scatter' or 'volpath'.
+    batches
+        How many at most, at least 2.
+    samples
+        Samples a pixel in each, at most 256.
+    first_seed
+        Seed of the first batch; the others count up.
+    max_depth
+        Most edges of a path, see `reference.monte_carlo.volpath.integrator.volpath_batch`; volpath only.
+    counts
+        Samples of each pixel in each batch, (layers, pixels), with the mean `samples`, see
+        `reference.monte_carlo.allocation`; volpath only, the same for all pixels by default.
+    enough
+        Asked after every block, whose last seed is one less than a multiple of eight, whether to stop.
+    go_on
+        Asked with the number of finished batches before each one that is traced, from the third on.
+    progress
+        Called with (done, total, estimator) after every batch that was traced.
+
+    Raises
+    ------
+    InputError
+        If a seed would be out of range.
+    KeyboardInterrupt
+        With a word on how many batches are kept.
+    OSError
+        If the disk of the cache is full, with a word on how many batches are kept.
+    """
+    if batches < 2:
+        raise ValueError(f"batches: got {batches}, wanted at least 2 for a standard error")
+    if not 0 <= first_seed <= LARGEST_SEED - batches:
+        raise InputError(
+            f"seed: got {first_seed} for {batches} batches, which count up; wanted 0 to {LARGEST_SEED - batches}"
+        )
+    settings: dict[str, Any] = {"samples": samples} | ({"max_depth": max_depth} if max_depth != 2 else {})
+    settings |= _REVISIONS.get(estimator, {})
+    settings |= {} if counts is None else {"counts": hashlib.sha256(counts.astype("<u4").tobytes()).hexdigest()}
+    folder = cache_key(scene, estimator, settings)
+    sweep(cache_folder() / folder)
+    trace = _tracer(scene, estimator, samples, max_depth, counts)
+    tally: Counter[str] = Counter()
+
+    def kept_or_traced(seed: int) -> Batches | None:
+        batch = _load(folder, range(seed, seed + 1), samples, tally)
+        if batch is None:
+            if go_on is not None and tally["done"] >= 2 and not go_on(tally["done"]):
+                return None
+            batch = trace(seed)
+            _store(folder, batch)
+            if progress is not None:
+                progress(tally["done"] + 1, batches, estimator)
+        tally["done"] += 1
+        return batch
+
+    try:
+        done = None
+        for seeds in _blocks(first_seed, batches):
+            block, whole = _block(folder, seeds, samples, tally=tally, batch_of=kept_or_traced)
+            if block is not None:
+                done = block if done is None else merged(done, block)
+            if not whole or (enough is not None and 2 <= tally["done"] < batches and enough(_all(done))):
+                break
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(f"{_kept(tally)}; run again to go on") from None
+    except OSError as error:
+        if error.errno not in NO_SPACE:
+            raise
+        reason = os.strerror(error.errno or errno.ENOSPC)
+        hint = "make room, or name another folder by AIRLIGHT_CACHE_DIR, and run again to go on"
+        raise OSError(error.errno, f"{reason}; {_kept(tally)}; {hint}", str(cache_folder())) from error
+    return Run(_all(done), tally["cached"], tally["damaged"])
+
+
+def _all(done: Batches | None) -> Batches:
+    assert done is not None, "the first two batches are always traced"
+    return done
+
+
+def _tracer(scene, estimator: str, samples: int, max_depth: int, counts: NDArray[np.integer] | None) -> Trace:
+    truth = read_truth(scene)
+    if estimator == "volpath":
+        return lambda seed: volpath_batch(truth, seed, samples, max_depth=max_depth, counts=counts)
+    if estimator == "single-scatter" and max_depth == 2 and counts is None:
+        return lambda seed: single_scatter_batch(truth, seed, samples)
+    raise ValueError(f"estimator: got {estimator!r} with max_depth {max_depth}, wanted one of {', '.join(ESTIMATORS)}")
+
+
+def _blocks(first_seed: int, batches: int) -> Iterator[range]:
+    """Cut the seeds at the multiples of `BLOCK`."""
+    start, end = first_seed, first_seed + batches
+    while start < end:
+        stop = min(end, (start // BLOCK + 1) * BLOCK)
+        yield range(start, stop)
+        start = stop
+
+
+def _block(
+    folder: str, seeds: range, samples: int, *, tally: Counter[str], batch_of: Callable[[int], Batches | None]
+) -> tuple[Batches | None, bool]:
+    """Return the batches of some seeds added up, and whether they are all there."""
+    full = len(seeds) == BLOCK
+    block = _load(folder, seeds, samples, tally) if full else None
+    if block is not None:
+        tally["done"] += BLOCK
+        return block, True
+    for seed in seeds:
+        batch = batch_of(seed)
+        if batch is None:
+            return block, False
+        block = batch if block is None else merged(block, batch)
+    if full and block is not None:
+        _store(folder, block)
+        for seed in seeds:
+            drop_arrays(_name(folder, range(seed, seed + 1)))
+    return block, True
+
+
+def _name(folder: str, seeds: range) -> str:
+    return f"{folder}/{seeds[0]:06d}" + (f"-{seeds[-1]:06d}" if len(seeds) > 1 else "")
+
+
+def _store(folder: str, batches: Batches) -> None:
+    arrays: dict[str, Any] = {"mean": batches.mean, "totals": batches.totals}
+    # One batch has no spread.
+    arrays |= {"squares": batches.squares} if len(batches.seeds) > 1 else {}
+    store_arrays(_name(folder, range(batches.seeds[0], batches.seeds[-1] + 1)), arrays)
+
+
+def _load(folder: str, seeds: range, samples: int, tally: Counter[str]) -> Batches | None:
+    name = _name(folder, seeds)
+    stored = load_arrays(name)
+    if stored is None:
+        tally["damaged"] += is_kept(name)
+        return None
+    tally["cached"] += len(seeds)
+    squares = stored["squares"] if len(seeds) > 1 else np.zeros_like(stored["mean"])
+    return Batches(tuple(seeds), samples, stored["mean"], squares, stored["totals"])
+
+
+def _kept(tally: Counter[str]) -> str:
+    return f"{tally['done']} finished batches are kept" if tally["done"] else "nothing was finished yet"

@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The truth of a scene, from the cache where it was computed before."""
+
+from collections.abc import Callable
+from dataclasses import Field, fields
+from typing import Any
+
+from reference.quadrature.image import TruthImage, quadrature_image
+from reference.scene.read import read_truth
+from reference.storage.cache import cache_key, load_arrays, store_arrays
+
+Progress = Callable[[int, int, str], None]
+
+
+def truth_image(
+    scene,
+    *,
+    samples: int = 256,
+    shadow_scale: float = 1.0,
+    pixel: str = "centre",
+    progress: Progress | None = None,
+) -> TruthImage:
+    """Return the quadrature truth of a Mitsuba scene at its own size.
+
+    Parameters
+    ----------
+    scene
+        The `mi.Scene`.
+    samples, shadow_scale, pixel, progress
+        See `reference.quadrature.image.quadrature_image`.
+    """
+    # Only what differs from the usual is named, so that images that were kept before are found.
+    settings: dict[str, Any] = {"samples": samples, "shadow_scale": shadow_scale}
+    settings |= {} if pixel == "centre" else {"pixel": pixel}
+    # What a renderer's own shadow rays see also depends on where they start.
+    named = settings if shadow_scale == 1 else settings | {"shadow_start": True}
+    key = cache_key(scene, "quadrature", named)
+    stored = load_arrays(key)
+    if stored is not None and set(stored) == {field.name for field in fields(TruthImage)}:
+        return TruthImage(**{field.name: _as_kept(field, stored[field.name]) for field in fields(TruthImage)})
+    image = quadrature_image(read_truth(scene), **settings, progress=progress)
+    store_arrays(key, {field.name: getattr(image, field.name) for field in fields(TruthImage)})
+    return image
+
+
+def _as_kept(field: Field, value: Any) -> Any:
+    """Return an array, or the number that was stored as an array without dimensions."""
+    return field.type(value) if field.type in (int, float) else value

@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Speed against error: every configuration of a scene is timed and compared with the quadrature truth."""
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+from realtime.errors import InputError
+from realtime.frame.recorded import Frozen
+from realtime.frame.renderer import Frame, render_frame
+from realtime.methods.registry import find_method
+from realtime.scene.features import Plan
+from realtime.scene.read_scene import Scene, read_scene
+from reference.quadrature.image import TruthImage
+from validation.configurations.methods import STANDARD, Configuration, prepared
+from validation.configurations.timing import FrameTimes, time_frame
+from validation.estimates.quadrature import truth_image
+from validation.metrics.errors import Metrics, error_metrics
+from validation.metrics.flip import Flip, flip_hdr
+from validation.scenes.loading import LoadedScene
+
+Progress = Callable[[int, int, str], None]
+
+_DOUBTFUL = 0.3  # of a configuration whose preparation took longer a small frame is tried before the large one [s]
+_LONG = 25.0  # a first frame, with the compilation of its kernels, that took longer is not timed at a larger size [s]
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """What one configuration costs in one scene and how wrong it is."""
+
+    configuration: Configuration
+    frame: Frame | None  #: None where it was refused
+    times: FrameTimes | None
+    error: Metrics | None  #: of the airlight
+    surface_error: Metrics | None
+    flip: Flip | None = None  #: HDR-FLIP of all light, airlight and surface; None where it was not asked for
+    refused: str | None = None  #: why there is no frame
+    left_out: bool = False  #: whether `refused` is about time: the configuration could render this scene
+    note: str | None = None  #: what its times are, where not those of the others
+
+
+def configurations_for(plan: Plan, configurations: Sequence[Configuration] = STANDARD) -> tuple[Configuration, ...]:
+    """Leave out what the scene does not need.
+
+    Variants that differ in their shadows need something that casts one, the paper's way with bounded media needs such
+    media, in clear air.
+    """
+    needless = set() if plan.shadows else {"shadow", "order", "map"}
+    needless |= set() if plan.clear else {"media"}
+    return tuple(chosen for chosen in configurations if not needless & set(dict(chosen.parameters)))
+
+
+def measure(
+    scene: Scene,
+    chosen: Configuration,
+    *,
+    truth: TruthImage,
+    timed: Scene | None = None,
+    seconds: float = 0.6,
+    with_flip: bool = False,
+    slow: float | None = None,
+    limit: float | None = None,
+    probe: Callable[[], Scene] | None = None,
+) -> Measurement:
+    """Render, compare and time one configuration.
+
+    Parameters
+    ----------
+    scene
+        From `realtime.scene.read_scene.read_scene`, at the size of the truth.
+    chosen
+        The configuration.
+    truth
+        The quadrature truth of the same scene.
+    timed
+        The scene at another size to time, where that differs from the size of the truth.
+    seconds
+        Time to spend on each timing.
+    with_flip
+        Also compute HDR-FLIP; where that cannot be had, it holds a note.
+    slow
+        See `validation.configurations.timing.time_frame` [s].
+    limit, probe
+        Leave the configuration out if a frame is expected to take longer than `limit` [s], by one of the same scene at
+        a small size, which `probe` returns. Asked for where preparing took long, and for a method of one's own.
+    """
+    try:
+        begin = time.perf_counter()
+        renderer = prepared(scene, chosen)
+        doubtful = time.perf_counter() - begin > _DOUBTFUL or chosen.own
+        if limit is not None and probe is not None and doubtful:
+            reason = _too_long(probe(), chosen, scene, limit)
+            if reason:
+                return Measurement(chosen, None, None, None, None, refused=reason, left_out=True)
+        begin = time.perf_counter()
+        frame = render_frame(renderer)
+        took = time.perf_counter() - begin
+    except InputError as error:
+        return Measurement(chosen, None, None, None, None, refused=str(error))
+    notes = []
+    if timed is not None and took > _LONG:
+        timed = None
+        notes.append(f"timed at {scene.camera.width} x {scene.camera.height}: larger frames take minutes")
+    if chosen.own and not isinstance(renderer.airlight, Frozen):
+        notes.append("not frozen: its Python runs again for every frame")
+    times = time_frame(renderer if timed is None else prepared(timed, chosen), seconds=seconds, slow=slow)
+    return Measurement(
+        chosen,
+        frame,
+        times,
+        error_metrics(truth.airlight, frame.airlight),
+        error_metrics(truth.surface, frame.surface) if scene.plan.surfaces else None,
+        flip_hdr(truth.airlight + truth.surface, frame.airlight + frame.surface) if with_flip else None,
+        note="; ".join(notes) or None,
+    )
+
+
+def _too_long(probe: Scene, chosen: Configuration, scene: Scene, limit: float) -> str | None:
+    """Say that a frame would take too long, by the second of the same scene at a small size; None if it would not."""
+    small, large = probe.camera, scene.camera
+    renderer = prepared(probe, chosen)
+    render_frame(renderer)
+    begin = time.perf_counter()
+    render_frame(renderer)
+    took = time.perf_counter() - begin
+    expected = took * (large.width * large.height) / (small.width * small.height)
+    if expected <= limit:
+        return None
+    return (
+        f"not measured: by one of {small.width} x {small.height} pixels that took {took:.2g} s, a frame of "
+        f"{large.width} x {large.height} would take {expected:.0f} s, more than the limit of {limit:g} s"
+    )
+
+
+def bench(
+    loaded: LoadedScene, configurations: Sequence[Configuration] = STANDARD, *, progress: Progress | None = None
+) -> Iterator[tuple[Scene, Measurement]]:
+    """Measure the configurations of a scene at its own size, one after the other."""
+    scene = read_scene(loaded.scene)
+    chosen = configurations_for(scene.plan, configurations)
+    truth = truth_image(loaded.scene)
+    for number, one in enumerate(chosen):
+        yield scene, measure(scene, one, truth=truth)
+        if progress is not None:
+            progress(number + 1, len(chosen), loaded.name)
+
+
+def knows_shadows(chosen: Configuration) -> bool:
+    """Return whether a configuration renders volumetric shadows."""
+    return find_method(chosen.method).shadows and dict(chosen.parameters).get("shadow") != "none"

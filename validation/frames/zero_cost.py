@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a scene does not need must cost nothing: ratios of frames that differ in it, from one run.
+
+The two frames are rendered in turns, so that whatever else the machine does hits both alike; the ratio is the median of
+the ratios of the turns.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from realtime.frame.renderer import run_stages, run_surface, run_tiles_and_airlight
+from realtime.scene.read_scene import Scene, read_scene
+from validation.configurations.methods import Configuration, prepared
+from validation.configurations.timing import times_in_turns
+from validation.scenes.loading import load_scene, resize
+
+
+@dataclass(frozen=True)
+class Needless:
+    """What a frame with something needless costs, in that of one without it."""
+
+    what: str
+    ratio: float  #: median over the turns
+    low: float  #: first and third quartile
+    high: float
+    with_ms: float
+    without_ms: float
+    turns: int
+
+    @property
+    def least_ratio(self) -> float:
+        """The ratio less two standard errors of the median of so many turns, as for a normal law."""
+        return self.ratio - 2 * 1.2533 * (self.high - self.low) / 1.349 / self.turns**0.5
+
+
+def needless_costs(*, size: tuple[int, int] = (800, 600), turns: int = 60) -> list[Needless]:
+    """Measure what casters cost where there are none, and where their shadows cannot be seen."""
+    return [no_casters(size=size, turns=turns), unseen_casters(size=size, turns=turns)]
+
+
+def no_casters(*, size: tuple[int, int] = (800, 600), turns: int = 60) -> Needless:
+    """Compare shadow planes with `unshadowed` in a scene without casters, same kernel."""
+    scene = read_scene(load_scene("open-fog", size).scene)
+    works = [_frame(scene, method) for method in ("shadow-planes", "unshadowed")]
+    return _compared("a frame of shadow planes without casters, against unshadowed", works, turns=turns)
+
+
+def unseen_casters(*, size: tuple[int, int] = (800, 600), turns: int = 60) -> Needless:
+    """Compare the airlight of a scene that has casters behind the camera with that of the scene without them.
+
+    The airlight alone, from the planes on: Mitsuba's camera rays and surfaces do cost more in a scene of more shapes,
+    and the light's move is paid for by the triangles of all casters, also those that are then culled.
+    """
+    works = [_airlight(sphere_spot_with(unseen, size)) for unseen in (41, 0)]
+    return _compared("airlight with 41 casters behind the camera, against none", works, turns=turns)
+
+
+def _frame(scene: Scene, method: str) -> Callable[[], Any]:
+    renderer = prepared(scene, Configuration(method, "exact"))
+    ready = renderer.prepare(scene)
+    return lambda: run_stages(renderer, ready)
+
+
+def _airlight(scene: Scene) -> Callable[[], Any]:
+    import drjit as dr
+
+    renderer = prepared(scene, Configuration("shadow-planes", "exact"))
+    distance, by_light = run_surface(renderer)
+    dr.eval(distance, by_light)
+    ready = renderer.prepare(scene)
+    return lambda: dr.eval(run_tiles_and_airlight(renderer, ready, distance, by_light))
+
+
+def _compared(what: str, works: list[Callable[[], Any]], *, turns: int) -> Needless:
+    with_ms, without_ms = times_in_turns(works, seconds=0, least=turns, most=turns, alternate=True).T
+    low, ratio, high = (float(value) for value in np.percentile(with_ms / without_ms, [25, 50, 75]))
+    medians = float(np.median(with_ms)), float(np.median(without_ms))
+    return Needless(what, ratio, low, high, *medians, turns)
+
+
+def sphere_spot_with(unseen: int, size: tuple[int, int]) -> Scene:
+    """Return the scene `sphere-spot` with some rings behind the camera."""
+    import mitsuba as mi
+
+    from validation.scenes.parts import mitsuba_mesh, placed, rotation
+    from validation.scenes.solids import torus
+    from validation.scenes.sphere_spot import sphere_spot
+
+    described = sphere_spot()
+    for number in range(unseen):
+        where = (0.73 * (number % 7) - 2.3, -9.7 - 0.61 * (number // 7), 1.3)
+        ring = placed(torus(0.29, 0.071, (31, 17)), where, rotation((0.3, 1, 0.2), 23.0 * number))
+        described[f"unseen-{number}"] = mitsuba_mesh(f"unseen-{number}", ring, (0.31, 0.37, 0.41))
+    scene = mi.load_dict(described)
+    resize(scene, size)
+    return read_scene(scene)

@@ -1,0 +1,322 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What kernels cost and how wrong they are: nanoseconds a ray beside the error, all kernels and sizes in one run.
+
+Times are of frozen functions after warm-up, on rays that lie ready on the device: from Dr.Jit's kernel history (the
+kernel alone) and from the wall clock (launch and replay included). Errors are of float32 on the set W of
+`validation.kernels.rays.wide_rays`; the same rays, more of them, are timed.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from analytic.cases import Cases
+from analytic.errors import InputError
+from realtime.errors import InputError as RealtimeInputError
+from realtime.frame.recorded import Frozen
+from realtime.kernels.registry import KERNELS
+from validation.configurations.kernel_names import find_kernel, sized, split_name
+from validation.configurations.timing import Timing, time_repeated
+from validation.kernels.errors import relative_error
+from validation.kernels.rays import wide_rays
+from validation.kernels.values import TABLE, Kernel
+
+Progress = Callable[[int, int, str], None]
+
+RAYS = 480_000  # 800 x 600
+ERROR_RAYS = 6000
+LEVELS = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
+RIVALS = ("uniform", "table")
+#: Phase functions with their g, the first with all sizes of all kernels, the others with the default sizes.
+PHASES = (("isotropic", 0.0), ("rayleigh", 0.0), ("hazy", 0.0), ("murky", 0.0), ("hg", 0.8))
+#: Sizes to try, by the name of the parameter.
+SIZES: dict[str, tuple[int, ...]] = {
+    "nodes": (2, 4, 6, 8, 12, 16, 24, 32),
+    "degree": (2, 4, 6, 8, 11, 15, 23, 31),
+    "steps": tuple(2**k for k in range(2, 19)),
+    "size": (32, 64, 128, 256, 512, 1024),
+}
+
+_LONGEST = 0.6  # seconds: work that would take longer is timed on fewer rays, but on enough to fill the device
+_FEWEST = 8  # times fewer at most; what would take longer still is extrapolated, if its cost is linear in its size
+_LINEAR = "steps"  # the parameter of marching, in which cost is linear
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Median and quartiles of repeated measurements [ns a ray]."""
+
+    median: float
+    low: float
+    high: float
+    repetitions: int
+
+
+@dataclass(frozen=True)
+class KernelCost:
+    """What one kernel of one size costs for one phase function, and its relative errors in float32."""
+
+    kernel: str  #: as in `validation.configurations.kernel_names.find_kernel`
+    family: str  #: the kernel without its size
+    size: int | None
+    phase: str
+    g: float
+    rays: int = 0  #: that were timed; 0 where the time is extrapolated from that of fewer steps
+    device: Spread | None = None  #: of the kernel alone
+    wall: Spread | None = None  #: with launch and replay
+    median: float | None = None
+    p99: float | None = None
+    max: float | None = None
+    nonfinite: int = 0
+    refused: str | None = None  #: the kernel's words
+
+    @property
+    def ns(self) -> float | None:
+        """The cost that kernels are compared by [ns a ray]: the device's where it is known."""
+        spread = self.device or self.wall
+        return None if spread is None else spread.median
+
+
+@dataclass(frozen=True)
+class Level:
+    """The cheapest kernel whose error stays at or below a level, and how much more its rivals cost."""
+
+    phase: str
+    statistic: str  #: 'max' or 'p99'
+    level: float
+    cheapest: str | None
+    ns: float | None
+    rivals: dict[str, str | None]  #: family -> its cheapest kernel that reaches the level
+    ratios: dict[str, float | None]  #: family -> cost of that one over the cheapest; None where none reaches it
+
+
+@dataclass(frozen=True)
+class KernelBench:
+    """All that was measured in one run."""
+
+    costs: tuple[KernelCost, ...]
+    levels: tuple[Level, ...]
+
+
+def bench_kernels(
+    names: Sequence[str] | None = None,
+    *,
+    phases: Sequence[tuple[str, float]] = PHASES,
+    rays: int = RAYS,
+    seconds: float = 0.3,
+    progress: Progress | None = None,
+) -> KernelBench:
+    """Measure kernels in all their sizes.
+
+    Parameters
+    ----------
+    names
+        Kernels as in `validation.configurations.kernel_names.find_kernel`; 'name' stands for all its sizes, 'name-N'
+        for one. All of the registry by default.
+    phases
+        Phase functions with their g: the first with all sizes, the others with the default sizes.
+    rays
+        Number of rays that are timed.
+    seconds
+        How long each is timed.
+    progress
+        Called with (done, total, what) before every kernel.
+    """
+    ladders = [_ladder(name) for name in names or KERNELS]
+    total = len(ladders) * len(phases)
+    costs: list[KernelCost] = []
+    for number, (phase, g) in enumerate(phases):
+        truth, timed = wide_rays(ERROR_RAYS, phase, g), wide_rays(rays, phase, g, truth=False)
+        for done, (family, default, sizes) in enumerate(ladders):
+            if progress is not None:
+                progress(number * len(ladders) + done, total, f"{family}, {phase}")
+            before = None
+            for size in sizes if number == 0 else (default,):
+                before = measure(family, size, truth=truth, timed=timed, seconds=seconds, before=before)
+                if before.refused is None or size == default:  # sizes that a kernel does not have are no news
+                    costs.append(before)
+    return KernelBench(tuple(costs), speed_against_error(costs))
+
+
+def measure(
+    family: str,
+    size: int | None,
+    *,
+    truth: Cases,
+    timed: Cases,
+    seconds: float = 0.3,
+    before: KernelCost | None = None,
+) -> KernelCost:
+    """Measure one kernel of one size on rays of one phase function.
+
+    Parameters
+    ----------
+    family, size
+        The kernel and the N of 'name-N'.
+    truth
+        Rays with known J, for the error.
+    timed
+        Rays to time.
+    seconds
+        How long to time.
+    before
+        The same kernel at a smaller size: tells how long this size will take, where cost is linear in it.
+    """
+    name, phase, g = sized(family, size), truth.phase[0], float(truth.g[0])
+    function = find_kernel(name)
+    try:
+        J = np.array(_frozen(function, truth)(), dtype=np.float64)
+        expected = _expected(before, size)
+        rays = _affordable(expected.ns if expected else None, len(timed.x0))
+        if rays == 0 and expected is not None:
+            device, wall = expected.device, expected.wall
+        else:
+            device, wall = _times(_frozen(function, timed, rays), rays, seconds)
+    except (InputError, RealtimeInputError) as reason:
+        return KernelCost(name, family, size, phase, g, refused=str(reason))
+    error = relative_error(J, np.asarray(truth.value), "single")
+    finite = np.isfinite(error)
+    median, p99, largest = np.percentile(error[finite], [50, 99, 100]).tolist() if finite.any() else [None] * 3
+    nonfinite = int(np.sum(~finite))
+    return KernelCost(name, family, size, phase, g, rays, device, wall, median, p99, largest, nonfinite)
+
+
+def speed_against_error(costs: Sequence[KernelCost]) -> tuple[Level, ...]:
+    """Return, for each phase function, statistic and error level, the cheapest kernel and what its rivals cost.
+
+    Kernels that gave values that are not finite reach no level.
+    """
+    found = []
+    for phase in dict.fromkeys(cost.phase for cost in costs):
+        for statistic in ("max", "p99"):
+            for level in LEVELS:
+                good = [cost for cost in costs if cost.phase == phase and _reaches(cost, statistic, level)]
+                best = _cheapest(good)
+                rivals = {name: _cheapest([cost for cost in good if cost.family == name]) for name in RIVALS}
+                found.append(
+                    Level(
+                        phase,
+                        statistic,
+                        level,
+                        best.kernel if best else None,
+                        best.ns if best else None,
+                        {name: rival.kernel if rival else None for name, rival in rivals.items()},
+                        {name: _ratio(rival, best) for name, rival in rivals.items()},
+                    )
+                )
+    return tuple(found)
+
+
+def _reaches(cost: KernelCost, statistic: str, level: float) -> bool:
+    error = getattr(cost, statistic)
+    return cost.ns is not None and error is not None and not cost.nonfinite and error <= level
+
+
+def _cheapest(costs: Sequence[KernelCost]) -> KernelCost | None:
+    return min(costs, key=lambda cost: cost.ns or 0.0, default=None)
+
+
+def _ratio(rival: KernelCost | None, best: KernelCost | None) -> float | None:
+    return rival.ns / best.ns if rival and best and rival.ns and best.ns else None
+
+
+def _ladder(name: str) -> tuple[str, int | None, tuple[int | None, ...]]:
+    """Return the kernel's family, its default size and the sizes to try."""
+    if ":" in name:
+        find_kernel(name)
+        return name, None, (None,)
+    record, size = split_name(name)
+    if size is not None:
+        return record.name, size, (size,)
+    if not record.parameters:
+        return record.name, None, (None,)
+    parameter, default = next(iter(record.parameters.items()))
+    known = SIZES.get(parameter, (default // 4, default // 2, default, 2 * default, 4 * default))
+    return record.name, default, tuple(sorted({size for size in (*known, default) if size > 0}))
+
+
+def _frozen(function: Kernel, cases: Cases, rays: int | None = None) -> Callable[[], Any]:
+    """Return work that evaluates a kernel on rays that lie on the device, frozen after its first call."""
+    import drjit as dr
+    import mitsuba as mi
+
+    from realtime.kernels.table import resident_tables
+    from realtime.rays.ray_light import RayGeometry
+    from realtime.scene.lights import Light
+    from realtime.scene.medium import Medium
+    from realtime.scene.phase import Phase
+
+    part = slice(0, rays)
+    name = cases.phase[0]
+    phase = Phase(
+        name,
+        g=dr.opaque(mi.Float, float(cases.g[0])) if name == "hg" else None,
+        values=mi.Float(np.asarray(TABLE)) if name == "tabulated" else None,
+    )
+    medium = Medium((dr.opaque(mi.Float, float(cases.sigma_t[0])),), dr.opaque(mi.Color3f, 1), phase)
+    light = Light("point", False, dr.opaque(mi.Vector3f, 0), dr.opaque(mi.Color3f, 1))
+    geometry = RayGeometry(mi.Float(cases.foot[part]), mi.Float(cases.height[part]), None, None)
+    x0, x1 = mi.Float(cases.x0[part]), mi.Float(cases.x1[part])
+    dr.eval(geometry.foot, geometry.height, x0, x1)
+    # Once outside: what a kernel uploads must be there before it is recorded.
+    dr.eval(function(geometry, x0, x1, medium, light))
+    resident = resident_tables()
+
+    def evaluate(geometry, x0, x1, medium, light):
+        return function(geometry, x0, x1, medium, light)
+
+    replay = Frozen(evaluate, state_fn=lambda *_, **__: resident)
+
+    def work():
+        J = replay(geometry, x0, x1, medium, light)
+        dr.eval(J)
+        return J
+
+    return work
+
+
+def _expected(before: KernelCost | None, size: int | None) -> KernelCost | None:
+    """Return what a larger size will cost, where that is linear in the size."""
+    if before is None or before.size is None or size is None or before.wall is None or ":" in before.family:
+        return None
+    if next(iter(KERNELS[before.family].parameters), None) != _LINEAR:
+        return None
+    scale = size / before.size
+    device, wall = (
+        None if old is None else Spread(old.median * scale, old.low * scale, old.high * scale, 0)
+        for old in (before.device, before.wall)
+    )
+    return replace(before, device=device, wall=wall)
+
+
+def _affordable(ns: float | None, wanted: int) -> int:
+    """Return on how many rays to time what costs `ns` a ray, 0 if that takes too long on any number."""
+    rays = wanted
+    while ns is not None and 1e-9 * ns * rays > _LONGEST:
+        rays //= 2
+    return rays if rays * _FEWEST >= wanted else 0
+
+
+def _times(work: Callable[[], Any], rays: int, seconds: float) -> tuple[Spread | None, Spread]:
+    """Return the time of the kernels alone, where the device tells it, and of the wall clock [ns a ray]."""
+    import drjit as dr
+
+    wall = time_repeated(work, seconds=seconds)
+    times: list[float] = []
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        dr.kernel_history_clear()
+        for _ in range(max(5, min(wall.repetitions, 50))):
+            work()
+            dr.sync_thread()
+            times.append(sum(entry.get("execution_time", 0.0) for entry in dr.kernel_history((dr.KernelType.JIT,))))
+            dr.kernel_history_clear()
+    scale = 1e6 / rays
+    low, median, high = (float(q) * scale for q in np.percentile(times, [25, 50, 75]))
+    device = Spread(median, low, high, len(times)) if median > 0 else None
+    return device, _scaled(wall, scale)
+
+
+def _scaled(timing: Timing, scale: float) -> Spread:
+    return Spread(timing.median_ms * scale, timing.low_ms * scale, timing.high_ms * scale, timing.repetitions)

@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Kernels on certified cases: the airlight integral of every row of a file."""
+
+import csv
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analytic.cases import Cases
+from reference.storage.files import write_text
+from validation.configurations.kernel_names import find_kernel
+from validation.kernels.values import evaluate_rows
+
+Array = NDArray[np.float64]
+
+_TINY = 1e-37  # below this float32 has no normal numbers: such values are compared in absolute terms
+
+
+def integrate_cases(cases: Cases, kernel: str, precision: str) -> Array:
+    """Return J of every case by a kernel [1/m].
+
+    Parameters
+    ----------
+    cases
+        From `analytic.cases.read_cases`; where it has rays, foot and height are computed from them in `precision`.
+    kernel
+        See `validation.configurations.kernel_names.find_kernel`.
+    precision
+        'single' or 'double'.
+    """
+    function = find_kernel(kernel)
+    results = np.empty(len(cases.x0))
+    for name in dict.fromkeys(cases.phase):
+        rows = np.flatnonzero(np.asarray(cases.phase) == name)
+        results[rows] = evaluate_rows(cases, rows, function, precision)
+    return results
+
+
+def summary(cases: Cases, results: Array) -> dict[str, Any]:
+    """Return quantiles of the relative error against the certified values, where there are any."""
+    found: dict[str, Any] = {"rows": len(results), "compared": 0, "nonfinite": int(np.sum(~np.isfinite(results)))}
+    if cases.value is None:
+        return found
+    error = np.abs(results - cases.value) / np.maximum(np.abs(cases.value), _TINY)
+    finite = np.isfinite(error)
+    if not finite.any():
+        return found
+    p50, p99, largest = np.percentile(error[finite], [50, 99, 100])
+    worst = int(np.flatnonzero(finite)[np.argmax(error[finite])])
+    # Row 1 of the file is its header.
+    return found | {"compared": int(finite.sum()), "p50": p50, "p99": p99, "max": largest, "worst_row": worst + 2}
+
+
+def write_results(cases: Cases, results: Array, target: Path) -> None:
+    """Write the rows of a file with a column `result`, whole or not at all."""
+    kept = [k for k, name in enumerate(cases.header) if name != "result"]
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow([*(cases.header[k] for k in kept), "result"])
+    for row, result in zip(cases.rows, results):
+        writer.writerow([*(row[k] for k in kept), repr(float(result))])
+    write_text(target, buffer.getvalue())

@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Rays that kernels are tried on: quasi-random, exact float32 numbers, with the truth from `analytic`.
+
+Three sets, each the same on every machine:
+
+* `hard_rays` covers every magnitude: optical depth 1e-6 to 60 (of the shortest way camera, segment, light), height over
+  distance 1e-7 to 1, scale 1e-6 to 1e6, |g| up to 0.95, light before and behind the camera, segments from 1e-3 to 1e3
+  distances and endless ones, all phase functions.
+* `slivers` are short segments far from the camera and from the light: what a light volume adds up as differences of
+  J(0, x).
+* `wide_rays` is the set W on which costs are compared: optical depth 1e-4 to 60 at the distance of the light (what is
+  dimmer than exp(-60) float32 flushes to zero on the way), angle to the light 1e-3 to 179.999 degrees, uniform, length
+  1e-3 to 100 distances, from the camera on. With extinction 1 the optical depth is the distance itself: J obeys
+  J(c lengths, sigma_t / c) = J / c.
+"""
+
+import hashlib
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analytic.cases import Cases
+from analytic.panels import airlight_segments
+from analytic.phase import PHASE_NAMES, PhaseFunction
+from reference.storage.cache import GENERATION, load_arrays, store_arrays
+from validation.kernels.values import TABLE
+
+Array = NDArray[np.float64]
+
+COLUMNS = ("tag", "phase", "g", "t", "h", "x0", "x1", "sigma_t", "value")
+
+_SEED = 20101
+_G = np.linspace(-0.95, 0.95, 39).astype(np.float32).astype(np.float64)  # few, since the truth takes one g at a time
+_LARGEST_SOBOL = 1 << 20
+
+
+def hard_rays(count: int = 100_000) -> Cases:
+    """Return rays that cover every magnitude, with tags and the true J."""
+    u = _sobol(count, 10)
+    distance = _log(u[:, 0], 1e-6, 1e6)
+    height = distance * _log(u[:, 1], 1e-7, 1.0)
+    foot = np.where(u[:, 2] < 0.7, 1.0, -1.0) * np.sqrt(np.maximum(distance**2 - height**2, 0.0))
+    start = np.where(u[:, 3] < 0.5, 0.0, distance * _log(u[:, 4], 1e-3, 30.0))
+    length = distance * _log(u[:, 5], 1e-3, 1e3)
+    foot, height, x0 = _rounded(foot), _rounded(height), _rounded(start)
+    x1 = np.where(u[:, 6] < 0.1, np.inf, _rounded(x0 + length))
+    thickness = _log(u[:, 7], 1e-6, 60.0)
+    sigma_t = _rounded(thickness / (x0 + np.hypot(x0 - foot, height)))
+    phase = np.asarray(PHASE_NAMES)[np.minimum((u[:, 8] * len(PHASE_NAMES)).astype(int), len(PHASE_NAMES) - 1)]
+    g = np.where(phase == "hg", _G[np.minimum((u[:, 9] * len(_G)).astype(int), len(_G) - 1)], 0.0)
+    tags = np.select(
+        [
+            (height < 1e-3 * distance) & (x0 < foot) & (foot < x1),
+            np.isinf(x1),
+            foot <= 0,
+            thickness > 5,
+            thickness < 1e-3,
+            length < 1e-2 * distance,
+            x1 < foot,
+        ],
+        ["near_light", "infinite", "behind", "thick", "thin", "sliver", "beyond"],
+        "generic",
+    )
+    return with_truth(table(phase, g, foot=foot, height=height, x0=x0, x1=x1, sigma_t=sigma_t, tags=tags))
+
+
+def slivers(count: int = 8192) -> Cases:
+    """Return short segments far from camera and light, isotropic and Rayleigh in turn, with the true J."""
+    u = _sobol(count, 6)
+    distance = 10 ** (2 * u[:, 0] - 1)
+    angle = np.pi * (0.02 + 0.96 * u[:, 1])
+    foot, height = _rounded(distance * np.cos(angle)), _rounded(distance * np.sin(angle))
+    x0 = _rounded(distance * _log(u[:, 2], 3.0, 100.0))
+    x1 = np.maximum(_rounded(x0 * (1 + _log(u[:, 3], 1e-5, 1e-2))), np.nextafter(np.float32(x0), np.float32(np.inf)))
+    sigma_t = _rounded(_log(u[:, 4], 1e-3, 5.0) / (x0 + np.hypot(x0 - foot, height)))
+    phase = np.where(u[:, 5] < 0.5, "isotropic", "rayleigh")
+    tags = np.full(count, "sliver")
+    zero = np.zeros(count)
+    return with_truth(table(phase, zero, foot=foot, height=height, x0=x0, x1=x1, sigma_t=sigma_t, tags=tags))
+
+
+def wide_rays(count: int, phase: str = "isotropic", g: float = 0.0, *, truth: bool = True) -> Cases:
+    """Return the set W for one phase function, extinction 1; without the true J if only times matter."""
+    u = _sobol(count, 3)
+    distance = _log(u[:, 0], 1e-4, 60.0)
+    angle = np.radians(1e-3 + (180.0 - 2e-3) * u[:, 1])
+    foot, height = _rounded(distance * np.cos(angle)), _rounded(distance * np.sin(angle))
+    x1 = _rounded(distance * _log(u[:, 2], 1e-3, 100.0))
+    names = np.full(count, phase)
+    g_exact = np.full(count, float(np.float32(g)))
+    zero, one = np.zeros(count), np.ones(count)
+    cases = table(names, g_exact, foot=foot, height=height, x0=zero, x1=x1, sigma_t=one, tags=np.full(count, "wide"))
+    return with_truth(cases) if truth else cases
+
+
+def table(phase, g, *, foot: Array, height: Array, x0: Array, x1: Array, sigma_t: Array, tags) -> Cases:
+    """Return columns as cases without values."""
+    names, words = (tuple(str(one) for one in column) for column in (phase, tags))
+    return Cases(names, np.asarray(g), foot, height, x0, x1, sigma_t, None, words, None, None, None, COLUMNS, ())
+
+
+def with_truth(cases: Cases) -> Cases:
+    """Return cases with J to about 1e-12, from the cache where it was computed before."""
+    columns = (cases.g, cases.foot, cases.height, cases.x0, cases.x1, cases.sigma_t)
+    digest = hashlib.sha256(repr((GENERATION, TABLE, cases.phase)).encode())
+    for column in columns:
+        digest.update(np.ascontiguousarray(column).tobytes())
+    key = f"kernel-rays-{digest.hexdigest()[:32]}"
+    stored = load_arrays(key)
+    if stored is None or set(stored) != {"value"} or stored["value"].shape != cases.x0.shape:
+        stored = {"value": _truth(cases)}
+        store_arrays(key, stored)
+    return replace(cases, value=stored["value"])
+
+
+def case_row(cases: Cases, k: int) -> str:
+    """Return case `k` as a line of CSV under `cases.header`, with digits enough to run it again."""
+    if cases.rows:
+        return ",".join(cases.rows[k])
+    numbers = (cases.g, cases.foot, cases.height, cases.x0, cases.x1, cases.sigma_t)
+    value = "" if cases.value is None else repr(float(cases.value[k]))
+    words = [repr(float(column[k])) for column in numbers]
+    return ",".join([cases.tag[k] if cases.tag else "", cases.phase[k], *words, value])
+
+
+def _truth(cases: Cases) -> Array:
+    value = np.empty(len(cases.x0))
+    names = np.asarray(cases.phase)
+    for name, g in sorted(set(zip(cases.phase, cases.g.tolist()))):
+        rows = np.flatnonzero((names == name) & (cases.g == g))
+        phase = PhaseFunction(name, g=g, table=TABLE if name == "tabulated" else None)
+        columns = (cases.foot[rows], cases.height[rows], cases.x0[rows], cases.x1[rows], cases.sigma_t[rows])
+        value[rows], _ = airlight_segments(*columns, phase, rtol=1e-12)
+    return value
+
+
+def _sobol(count: int, dimensions: int) -> Array:
+    from scipy.stats import qmc
+
+    if not 1 <= count <= _LARGEST_SOBOL:
+        raise ValueError(f"count: got {count}, wanted 1 to {_LARGEST_SOBOL} rays")
+    exponent = max(1, int(np.ceil(np.log2(count))))  # a power of two keeps the points balanced
+    return qmc.Sobol(dimensions, rng=np.random.default_rng(_SEED)).random_base2(exponent)[:count]
+
+
+def _log(u: Array, low: float, high: float) -> Array:
+    return low * (high / low) ** u
+
+
+def _rounded(column: Array) -> Array:
+    return np.asarray(column).astype(np.float32).astype(np.float64)

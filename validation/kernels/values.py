@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Values of a kernel on tables of cases."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from analytic.cases import Cases
+from analytic.errors import InputError
+from realtime.errors import InputError as RealtimeInputError
+
+Array = NDArray[np.float64]
+Kernel = Callable[..., Any]
+
+#: The phase function of cases called 'tabulated': float32 numbers whose mean over the sphere is exactly 1.
+TABLE = (0.5, 0.25, 0.25, 0.5, 0.5, 0.75, 1.0, 2.0, 5.0)
+
+
+@dataclass(frozen=True)
+class Values:
+    """What a kernel gave for cases: NaN in the rows of phase functions that it refuses."""
+
+    J: Array  #: (n,) [1/m]
+    refused: dict[str, str]  #: phase function -> the kernel's words
+    accepted: NDArray[np.bool_]  #: (n,) rows that the kernel did not refuse
+
+
+def evaluate_cases(cases: Cases, function: Kernel, precision: str, **options: Any) -> Values:
+    """Return J of every case whose phase function the kernel accepts.
+
+    Parameters
+    ----------
+    cases
+        The cases; see `evaluate_rows`.
+    function
+        A kernel function.
+    precision
+        'single' or 'double'.
+    options
+        See `evaluate_rows`.
+    """
+    names = np.asarray(cases.phase)
+    results, accepted, refused = np.full(len(names), np.nan), np.ones(len(names), dtype=bool), {}
+    for name in dict.fromkeys(cases.phase):
+        rows = np.flatnonzero(names == name)
+        try:
+            results[rows] = evaluate_rows(cases, rows, function, precision, **options)
+        except (InputError, RealtimeInputError) as reason:
+            refused[name] = str(reason)
+            accepted[rows] = False
+    return Values(results, refused, accepted)
+
+
+def evaluate_rows(
+    cases: Cases,
+    rows: NDArray[np.int64],
+    function: Kernel,
+    precision: str,
+    *,
+    table: ArrayLike = TABLE,
+    intensity: float = 1.0,
+) -> Array:
+    """Return J of cases that share a phase function [1/m].
+
+    Parameters
+    ----------
+    cases, rows
+        The cases and which of them; where they have rays, foot and height are computed from them in `precision`.
+    function
+        A kernel function.
+    precision
+        'single' or 'double'.
+    table
+        Values of the phase function 'tabulated', of mean 1.
+    intensity
+        Of the light [W/sr].
+    """
+    import drjit as dr
+
+    from realtime.numerics.array_types import array_types
+    from realtime.rays.ray_light import RayGeometry, ray_geometry
+    from realtime.scene.lights import Light
+    from realtime.scene.medium import Medium
+    from realtime.scene.phase import Phase
+
+    types = array_types(precision)
+    name = cases.phase[rows[0]]
+    phase = Phase(
+        name,
+        g=types.scalar(cases.g[rows]) if name == "hg" else None,
+        values=types.scalar(np.asarray(table)) if name == "tabulated" else None,
+    )
+    medium = Medium((types.scalar(cases.sigma_t[rows]),), types.color(1), phase)
+    if cases.light is None or cases.origin is None or cases.direction is None:
+        light = Light("point", False, types.vector(0), types.color(intensity))
+        geometry = RayGeometry(types.scalar(cases.foot[rows]), types.scalar(cases.height[rows]), None, None)
+    else:
+        light = Light("point", False, types.vector(cases.light[rows].T), types.color(intensity))
+        # A file's directions have unit length to the digits they are written with.
+        given = types.vector(cases.direction[rows].T)
+        scale = dr.rsqrt(dr.squared_norm(given))
+        direction = given * scale
+        low = dr.fma(given, scale, -direction)
+        geometry = ray_geometry(types.vector(cases.origin[rows].T), direction, light, low=low)
+    x0, x1 = types.scalar(cases.x0[rows]), types.scalar(cases.x1[rows])
+    return np.array(function(geometry, x0, x1, medium, light), dtype=np.float64)
+
+
+def take(cases: Cases, rows: NDArray[Any]) -> Cases:
+    """Return some rows of cases."""
+    numbers = np.arange(len(cases.phase))[rows]
+
+    def words(column: Sequence[Any] | None):
+        return None if column is None else tuple(column[k] for k in numbers)
+
+    columns = ("g", "foot", "height", "x0", "x1", "sigma_t", "value", "origin", "direction", "light")
+    arrays = {name: getattr(cases, name) for name in columns}
+    chosen: dict[str, Any] = {name: None if column is None else column[numbers] for name, column in arrays.items()}
+    chosen |= {"phase": words(cases.phase), "tag": words(cases.tag), "rows": words(cases.rows) if cases.rows else ()}
+    return replace(cases, **chosen)

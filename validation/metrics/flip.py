@@ -1,0 +1,210 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""HDR-FLIP: how much two images differ to somebody who flips between them (Andersson et al. 2021).
+
+FLIP is NVIDIA's own code, the package `flip-evaluator`. It can end the process that calls it and it accepts what it has
+no answer for, so it runs in a child process with a time limit, and what it would get wrong is stopped before:
+
+    NaN, infinities, negative values   no FLIP, a note: it takes them in silence
+    a black reference                  no FLIP, a note: it ends the process that asks
+    one channel                        three equal ones: it takes one against three and returns some number
+    one exposure                       given as twice the same: for a single one it returns 0
+
+A missing package, a crash, a time-out or nonsense for an answer is a note too. FLIP is a number beside others, never a
+reason to call a comparison failed.
+
+**Exposures.** HDR-FLIP tone-maps both images at several exposures and takes the worst of each pixel. The range comes
+from the reference alone, so that all tests against it are judged alike, and is passed on explicitly: from where its
+brightest luminance is shown as 0.85, up to where its median is, with the ACES curve (the rule of section 3.2 of the
+paper; the median is of the positive values, for half of an image may lie in the dark). The curve is
+
+    tone(x) = (0.9036 x^2 + 0.018 x) / (0.8748 x^2 + 0.354 x + 0.14),    tone(x) = 0.85 is a quadratic equation in x.
+
+The number depends a little on the operating system (the project's note on precision): compare it to 1e-5, no closer.
+"""
+
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from analytic.errors import InputError
+from validation.metrics.errors import colours, compared, plain
+
+PIXELS_PER_DEGREE = 67.0  #: of visual angle: a screen of 3840 pixels, 0.7 m wide, seen from 0.7 m
+TIMEOUT = 300.0  #: seconds that the child may take; a megapixel takes a few
+SHOWN = 0.85  #: tone-mapped value of the brightest and of the median luminance at the ends of the range
+
+_ACES = ((0.9036, 0.018), (0.8748, 0.354, 0.14))  # of the numerator x^2, x; of the denominator x^2, x, 1
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+
+# The last line tells apart a child that finished from one that something in it ended with status 0.
+_CHILD = """
+import sys, numpy
+try:
+    import flip_evaluator
+except ImportError as error:
+    sys.exit(f"missing: {error}")
+inputs = numpy.load(sys.argv[1])
+parameters = {"ppd": float(inputs["ppd"]), "tonemapper": "aces", "numExposures": int(inputs["count"]),
+              "startExposure": float(inputs["start"]), "stopExposure": float(inputs["stop"])}
+error_map, _, _ = flip_evaluator.evaluate(inputs["reference"], inputs["test"], "HDR", applyMagma=False,
+                                          computeMeanError=False, parameters=parameters)
+numpy.save(sys.argv[2], error_map)
+print("finished")
+"""
+
+
+@dataclass(frozen=True)
+class Flip:
+    """HDR-FLIP of two images, or why there is none.
+
+    Attributes
+    ----------
+    value
+        Mean over the pixels compared, from 0 for equal images to 1; None without an answer.
+    note
+        Why there is no answer; empty with one.
+    start_exposure, stop_exposure, exposures, pixels_per_degree
+        What it was computed with, exposures in stops; None where it was not.
+    error_map
+        Error of every pixel, (height, width).
+    """
+
+    value: float | None
+    note: str = ""
+    start_exposure: float | None = None
+    stop_exposure: float | None = None
+    exposures: int | None = None
+    pixels_per_degree: float | None = None
+    error_map: NDArray[np.float32] | None = field(default=None, compare=False, repr=False)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return all but the map, by name."""
+        names = ("value", "note", "start_exposure", "stop_exposure", "exposures", "pixels_per_degree")
+        return {name: plain(getattr(self, name)) for name in names}
+
+
+def flip_hdr(
+    reference: ArrayLike,
+    test: ArrayLike,
+    *,
+    mask: ArrayLike | None = None,
+    exposure: float | None = None,
+    pixels_per_degree: float = PIXELS_PER_DEGREE,
+    timeout: float = TIMEOUT,
+) -> Flip:
+    """Return HDR-FLIP of two images, through `flip-evaluator` in a child process (see the module).
+
+    Parameters
+    ----------
+    reference, test
+        Radiance [W/(m^2 sr)], (height, width) or (height, width, 1) for grey, or (height, width, 3) in linear sRGB.
+    mask
+        Pixels to average over, (height, width) of truth values; all by default. The others show the reference in both
+        images, black where that cannot be shown, so that they add nothing to their neighbours either.
+    exposure
+        A single exposure [stops] instead of the range of `exposure_range`.
+    pixels_per_degree
+        Of visual angle.
+    timeout
+        Seconds after which the child is ended.
+
+    Raises
+    ------
+    InputError
+        If the sizes differ, the channels are neither one nor three, the mask does not fit or leaves nothing, or a
+        number is out of range.
+    """
+    if exposure is not None and not np.isfinite(exposure):
+        raise InputError(f"exposure: got {exposure}, wanted a number of stops such as -2, or none to choose a range")
+    if not 0 < pixels_per_degree < np.inf or not 0 < timeout < np.inf:
+        raise InputError(f"pixels per degree {pixels_per_degree}, time-out {timeout} s; wanted both above 0")
+    ref, tst, chosen = compared(reference, test, mask)
+    ref, tst = colours(ref), colours(tst)
+    note = _unanswerable(ref[chosen], tst[chosen])
+    if note:
+        return Flip(None, note)
+    drawable = np.where(np.isfinite(ref) & (ref >= 0), ref, 0)
+    ref, tst = (np.where(chosen[..., None], image, drawable) for image in (ref, tst))
+    # A power of two brings any unit into the range of float32; exposures are then counted from there.
+    shift = int(np.frexp(float(ref[chosen].max()))[1])
+    with np.errstate(over="ignore"):
+        one, two = (np.ldexp(image, -shift).astype(np.float32) for image in (ref, tst))
+    if not np.isfinite(two).all():
+        return Flip(None, "the test image is brighter than the reference by more than float32 holds")
+    start, stop = exposure_range(one[chosen]) if exposure is None else (exposure + shift,) * 2
+    count = max(2, int(np.ceil(stop - start)))
+    inputs = {"start": start, "stop": stop, "count": count, "ppd": pixels_per_degree, "reference": one, "test": two}
+    answer = _in_child(inputs, timeout)
+    if isinstance(answer, str):
+        return Flip(None, answer)
+    if answer.shape[:2] != chosen.shape or not ((answer >= 0) & (answer <= 1)).all():
+        return Flip(None, "flip-evaluator returned no map of errors between 0 and 1")
+    error_map = answer.reshape(chosen.shape)
+    mean = float(error_map[chosen].mean(dtype=np.float64))
+    return Flip(mean, "", start - shift, stop - shift, count, pixels_per_degree, error_map)
+
+
+def exposure_range(reference: ArrayLike) -> tuple[float, float]:
+    """Return the first and the last exposure [stops] of HDR-FLIP for a reference (..., 3) (see the module).
+
+    Raises
+    ------
+    InputError
+        If it has no positive luminance.
+    """
+    luminance = np.asarray(reference, dtype=np.float64) @ _LUMINANCE
+    luminance = luminance[luminance > 0]
+    if not luminance.size:
+        raise InputError("a black reference has no range of exposures; give an image with some light in it")
+    (a2, a1), (b2, b1, b0) = _ACES
+    # (a2 - s b2) x^2 + (a1 - s b1) x - s b0 = 0, whose other root is negative.
+    shown = float(np.roots([a2 - SHOWN * b2, a1 - SHOWN * b1, -SHOWN * b0]).max())
+    start, stop = (float(np.log2(shown / level)) for level in (luminance.max(), np.median(luminance)))
+    return start, stop
+
+
+def _unanswerable(ref: NDArray[np.float64], tst: NDArray[np.float64]) -> str:
+    """Say why FLIP has no answer for these pixels; empty if it has one."""
+    for name, pixels in (("reference", ref), ("test image", tst)):
+        for what, wrong in (("NaN or infinite", ~np.isfinite(pixels)), ("negative", pixels < 0)):
+            count = int(wrong.any(axis=-1).sum())
+            if count:
+                return f"{count} pixels of the {name} are {what}: FLIP is not defined for them; mask them"
+    return "" if ref.max() > 0 else "the reference is black: HDR-FLIP has no exposure for it"
+
+
+def _in_child(inputs: dict[str, Any], timeout: float) -> NDArray[np.float32] | str:
+    """Run FLIP in a process of its own; return its map, or what went wrong."""
+    with tempfile.TemporaryDirectory(prefix="airlight-flip-") as folder:
+        given, found = Path(folder, "inputs.npz"), Path(folder, "map.npy")
+        np.savez(given, **inputs)
+        try:
+            # -P: a file of that name in the current folder is not the package.
+            ran = subprocess.run(
+                [sys.executable, "-P", "-c", _CHILD, str(given), str(found)],
+                capture_output=True,
+                text=True,
+                errors="replace",
+                stdin=subprocess.DEVNULL,
+                timeout=timeout,
+            )
+        except subprocess.TimeoutExpired:
+            return f"flip-evaluator did not answer within {timeout:g} s and was ended"
+        except OSError as error:
+            return f"no process for flip-evaluator could be started: {error}"
+        said = (ran.stderr.strip() or ran.stdout.strip()).splitlines()
+        last = said[-1] if said else "it said nothing"
+        if ran.returncode == 1 and last.startswith("missing: "):
+            return f"flip-evaluator is not installed ({last.removeprefix('missing: ')}); pip install flip-evaluator"
+        if ran.returncode or not ran.stdout.strip().endswith("finished"):
+            return f"flip-evaluator died with exit status {ran.returncode}: {last}"
+        try:
+            return np.load(found, allow_pickle=False)
+        except (OSError, ValueError) as error:
+            return f"flip-evaluator left no map that can be read: {error}"

@@ -1,0 +1,177 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What Billeter, Sintorn, Assarsson 2010 conclude from their figures, and whether it holds for ours.
+
+Each sentence is made of what was measured, none is known before.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from validation.configurations.timing import Timing
+from validation.papers.billeter_images import TILES, FigureRow
+from validation.papers.billeter_tessellation import PublishedTable, TableRow
+
+#: Rates closer than this count as equal.
+EQUAL = 1.03
+
+
+def pays_from(rates: Mapping[int, tuple[float, float]]) -> int | None:
+    """Return the smallest map from which on adaptive tessellation is faster at every size; None if at the last it is
+    not.
+
+    Parameters
+    ----------
+    rates
+        By size of the map, frames a second of static and adaptive.
+    """
+    found = None
+    for size in sorted(rates, reverse=True):
+        static, adaptive = rates[size]
+        if adaptive <= EQUAL * static:
+            break
+        found = size
+    return found
+
+
+def conclusions(figures: Sequence[FigureRow], table: Sequence[TableRow]) -> list[str]:
+    """Return the sentences that the rows allow."""
+    return [
+        *_adaptive(table),
+        *_walk(table),
+        *_marching(figures),
+        *_tiles(figures),
+        *_walls(figures),
+        *_map_sizes(figures),
+    ]
+
+
+def _adaptive(table: Sequence[TableRow]) -> Iterator[str]:
+    for published in _views(table):
+        rows = {(row.map, row.evaluation): _rate(row.rebuilt) for row in table if row.published == published}
+        pairs = {size: (rows.get((size, "static")), rows.get((size, "adaptive"))) for size, _ in rows}
+        known = {size: (one, other) for size, (one, other) in pairs.items() if one and other}
+        if not known:
+            yield f"{published.scene}: adaptive tessellation could not be compared with static at any map."
+            continue
+        ratios = ", ".join(f"{other / one:.2f} at {size}" for size, (one, other) in sorted(known.items()))
+        shared = {size: published.fps[size] for size in known if size in published.fps}
+        words = f"{published.scene}: adaptive tessellation is faster than static {_from(pays_from(known))}"
+        words += f" (its frames a second over static's: {ratios})"
+        if not shared:
+            yield words + "; the paper has no figures for these maps."
+            continue
+        same = pays_from(shared) == pays_from({size: known[size] for size in shared})
+        verdict = "the same as published" if same else "the paper's conclusion does not hold here"
+        yield f"{words}, published: {_from(pays_from(shared))}; {verdict}."
+
+
+def _walk(table: Sequence[TableRow]) -> Iterator[str]:
+    for published in _views(table):
+        found = []
+        for size in dict.fromkeys(row.map for row in table if row.published == published):
+            rates = {
+                row.evaluation: _rate(row.rebuilt) for row in table if (row.published, row.map) == (published, size)
+            }
+            meshes = [rate for name in ("static", "adaptive") if (rate := rates.get(name))]
+            if meshes and (walk := rates.get("walk")):
+                found.append(f"{walk / max(meshes):.2f} at {size}")
+        if found:
+            yield f"{published.scene}: frames a second of walk over those of the faster mesh: {', '.join(found)}."
+
+
+def _marching(figures: Sequence[FigureRow]) -> Iterator[str]:
+    whole = [row for row in figures if row.entry.where != TILES]
+    marched = {dict(row.entry.parameters)["steps"]: row for row in whole if row.entry.method == "ray-march"}
+    volume = _fastest([row for row in figures if row.entry.where.startswith("Fig. 7")])
+    if volume is None or volume.error is None or volume.map_error is None or volume.rebuilt is None:
+        return
+    for steps, row in marched.items():
+        if row.rebuilt is None or row.error is None or row.map_error is None:
+            yield f"Fig. 7: marching with {steps} samples was not measured: {row.missing}."
+            continue
+        times = row.rebuilt.median_ms / volume.rebuilt.median_ms
+        words = f"Fig. 7: marching with {steps} samples takes {times:.3g} times as long as the light volume"
+        if row.entry.fps and volume.entry.fps:
+            words += f" (published: {volume.entry.fps / row.entry.fps:.3g})"
+        share = _ratio(volume.map_error.relative_rmse, row.map_error.relative_rmse)
+        words += f"; against the same map the light volume has {share:.2g} of its error"
+        yield words + f", against the truth {_ratio(volume.error.relative_rmse, row.error.relative_rmse):.2g}."
+        if steps == 400:
+            goal = "reached" if times >= 10 and share <= 0.1 else "not reached"
+            yield f"At least 10 times faster than 400 samples on the same map, at most a tenth of their error: {goal}."
+            enough = row.error.relative_rmse <= 1.1 * volume.error.relative_rmse
+            verdict = "holds" if enough else "does not hold"
+            yield f"About 400 samples for equal quality, by the error against the truth: {verdict} here."
+
+
+def _tiles(figures: Sequence[FigureRow]) -> Iterator[str]:
+    by_entry = {(row.entry.method, row.entry.map, row.entry.parameters): row for row in figures}
+    for row in figures:
+        if row.entry.where != TILES:
+            continue
+        values = dict(row.entry.parameters)
+        del values["tolerance"]
+        other = by_entry.get((row.entry.method, row.entry.map, tuple(values.items())))
+        if other is None or row.rebuilt is None or other.rebuilt is None or row.error is None or other.error is None:
+            continue
+        share = row.rebuilt.median_ms / other.rebuilt.median_ms
+        yield (
+            f"{row.entry.scene}, {row.entry.configuration('exact').label}: where airlight between the corners of tiles "
+            f"is interpolated, a frame takes {share:.2f} of the time; relative RMSE against the truth "
+            f"{row.error.relative_rmse:.2g} instead of {other.error.relative_rmse:.2g}."
+        )
+
+
+def _walls(figures: Sequence[FigureRow]) -> Iterator[str]:
+    pairs: dict[tuple[str, int], dict[str, tuple[float, float]]] = {}
+    for row in figures:
+        walls = dict(row.entry.parameters).get("walls") if row.entry.where != TILES else None
+        if walls is not None and row.rebuilt is not None and row.error is not None:
+            measured = row.rebuilt.median_ms, row.error.relative_rmse
+            pairs.setdefault((row.entry.scene, row.entry.map), {})[str(walls)] = measured
+    for (scene, texels), found in pairs.items():
+        if len(found) == 2:
+            (slanted_ms, slanted), (upright_ms, upright) = found["slanted"], found["upright"]
+            yield (
+                f"{scene}, map {texels}: with upright walls a frame takes {upright_ms / slanted_ms:.2f} times as long "
+                f"as with slanted ones, and has {_ratio(upright, slanted):.2g} of their error against the truth."
+            )
+
+
+def _map_sizes(figures: Sequence[FigureRow]) -> Iterator[str]:
+    rows = [row for row in figures if row.entry.where.startswith("Fig. 6")]
+    times: dict[int, tuple[float, float]] = {}
+    for size in sorted({row.entry.map for row in rows}):
+        row = _fastest([row for row in rows if row.entry.map == size])
+        if row is not None and row.rebuilt is not None and row.entry.fps:
+            times[size] = row.rebuilt.median_ms, row.entry.fps
+    if len(times) < 2:
+        return
+    small, large = min(times), max(times)
+    here, published = times[large][0] / times[small][0], times[small][1] / times[large][1]
+    yield f"Fig. 6: from map {small} to {large} a frame takes {here:.3g} times as long, published: {published:.3g}."
+
+
+def _views(table: Sequence[TableRow]) -> list[PublishedTable]:
+    found: list[PublishedTable] = []
+    for row in table:
+        if row.published not in found:
+            found.append(row.published)
+    return found
+
+
+def _fastest(rows: Sequence[FigureRow]) -> FigureRow | None:
+    """Return the row of light volumes that was measured and is the fastest."""
+    timed = [row for row in rows if row.entry.method == "light-volumes" and row.rebuilt is not None]
+    return min(timed, key=lambda row: row.rebuilt.median_ms if row.rebuilt else 0.0) if timed else None
+
+
+def _rate(timing: Timing | None) -> float | None:
+    return None if timing is None else 1000 / timing.median_ms
+
+
+def _ratio(one: float, other: float) -> float:
+    return one / other if other > 0 else float("nan")
+
+
+def _from(size: int | None) -> str:
+    return "at none of these maps" if size is None else f"from {size} on"

@@ -1,0 +1,235 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Table 1 of Billeter, Sintorn, Assarsson 2010 again: static and adaptive tessellation, and what their passes cost.
+
+The published views are the Sponza atrium and the mesh "Yeah Right", each with a light that has one map, the images
+probably those of Fig. 7, 1024 x 1024. Here the hall is `colonnade` with a spot in place of its lamp, which would have
+six maps; the irregular mesh is `tangle`. Figures that cannot be read in the copy of the paper at hand are left out.
+
+The passes, on the wall clock:
+
+- surface: camera rays and lit surface. shadow map: its casting.
+- laplacian, edge map, tessellate, vertices: those of
+`realtime.methods.light_volumes.published.mesh.tessellation_stages`.
+- prepare: all before the airlight, so the shadow map with the mesh or the height field that is made of it.
+- volume: the triangles against the pixels, and the signed sum; without triangles the airlight.
+
+Times of frames are those after the light moved, with everything rebuilt, as published; and beside them those of frames
+that keep what stood still.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from analytic.errors import InputError
+from realtime.errors import InputError as RealtimeError
+from realtime.frame.renderer import Frame, FrameRenderer, run_surface, run_tiles_and_airlight
+from realtime.methods.light_volumes.published.mesh import tessellation_stages
+from realtime.scene.read_scene import Scene, read_scene
+from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map
+from validation.configurations.methods import configuration, prepared
+from validation.configurations.timing import Timing, time_repeated
+from validation.metrics.errors import Metrics, error_metrics
+from validation.papers.billeter_images import LIMIT, SIZE, frame_within, time_rates
+from validation.scenes.colonnade import colonnade
+from validation.scenes.loading import load_scene, resize
+
+MAPS = (1024, 2048, 4096)  #: of the published table [texels]
+#: How the volume is evaluated: static and adaptive as published, the same without triangles, and with upright walls.
+EVALUATIONS: Mapping[str, Mapping[str, str]] = {
+    "static": {"evaluation": "mesh", "tessellation": "static"},
+    "adaptive": {"evaluation": "mesh", "tessellation": "adaptive"},
+    "walk": {"evaluation": "walk", "walls": "slanted"},
+    "upright": {"evaluation": "walk", "walls": "upright"},
+}
+PASSES = ("surface", "shadow map", "laplacian", "edge map", "tessellate", "vertices", "prepare", "volume")
+
+
+@dataclass(frozen=True)
+class PublishedTable:
+    """One view of the table."""
+
+    scene: str  #: which stands for it here
+    what: str
+    fps: Mapping[int, tuple[float, float]]  #: by map, static and adaptive
+    passes: Mapping[tuple[int, str], Mapping[str, float]]  #: by map and tessellation, the passes that are legible [ms]
+
+
+TABLE = (
+    PublishedTable(
+        "colonnade",
+        "Sponza, 66 000 triangles",
+        {1024: (86, 64), 2048: (35, 35), 4096: (10, 18)},
+        {
+            (1024, "static"): {"volume": 9.0},
+            (1024, "adaptive"): {"laplacian": 0.66, "tessellate": 3.11, "volume": 7.51},
+        },
+    ),
+    PublishedTable(
+        "tangle",
+        "Yeah Right, 188 000 triangles",
+        {1024: (32, 29), 2048: (21, 21), 4096: (8, 12)},
+        {
+            (1024, "adaptive"): {"laplacian": 0.74, "edge map": 0.68, "tessellate": 2.59, "volume": 12.27},
+            (4096, "static"): {"volume": 96.35},
+            (4096, "adaptive"): {"laplacian": 10.19, "tessellate": 15.54, "volume": 27.54},
+        },
+    ),
+)
+
+
+@dataclass(frozen=True)
+class TableRow:
+    """A view at a size of the map with one evaluation; without times where `missing` says why."""
+
+    published: PublishedTable
+    map: int  #: [texels]
+    evaluation: str  #: of `EVALUATIONS`
+    size: tuple[int, int]  #: of the frame [pixels]
+    faces: int = 1  #: of the shadow map
+    triangles: int = 0  #: of the light volume; 0 where it has none
+    rebuilt: Timing | None = None
+    static: Timing | None = None
+    relit: Timing | None = None
+    recoloured: Timing | None = None
+    passes: Mapping[str, float] = field(default_factory=dict)  #: [ms]
+    against_static: Metrics | None = None  #: of the airlight against that of the static mesh
+    missing: str | None = None
+
+    @property
+    def published_fps(self) -> float | None:
+        """Frames a second of the paper; None where it has none."""
+        place = {"static": 0, "adaptive": 1}.get(self.evaluation)
+        rates = self.published.fps.get(self.map)
+        return None if place is None or rates is None else rates[place]
+
+
+def table_rows(
+    tables: Sequence[PublishedTable] = TABLE,
+    *,
+    maps: Sequence[int] = MAPS,
+    kernel: str = "exact",
+    size: tuple[int, int] = SIZE,
+    seconds: float = 0.6,
+    limit: float = LIMIT,
+    progress: Callable[[float, str], None] | None = None,
+) -> list[TableRow]:
+    """Measure the table.
+
+    Parameters
+    ----------
+    tables
+        Which views.
+    maps
+        Sizes of the shadow map, ascending [texels].
+    kernel, size, seconds, limit, progress
+        See `validation.papers.billeter_images.figure_rows`. A row whose frame must be expected to take longer than
+        `limit`, by the last size and the number of texels, is not begun.
+    """
+    rows: list[TableRow] = []
+    total = len(tables) * len(maps) * len(EVALUATIONS)
+    for table in tables:
+        scene = read_scene(table_scene(table.scene, size))
+        last: dict[str, TableRow] = {}
+        for texels in maps:
+            frames: dict[str, Frame] = {}
+            for evaluation in EVALUATIONS:
+                if progress is not None:
+                    progress(len(rows) / total, f"Table 1, {table.scene}, map {texels}, {evaluation}")
+                empty = TableRow(table, texels, evaluation, size, 1 if scene.lights[0].kind == "spot" else 6)
+                row = _expected_missing(empty, last.get(evaluation), limit)
+                if row is None:
+                    row = _measured(empty, scene, frames, kernel=kernel, seconds=seconds, limit=limit)
+                rows.append(row)
+                last[evaluation] = row
+    return rows
+
+
+def table_scene(name: str, size: tuple[int, int]) -> Any:
+    """Return the `mi.Scene` of a view: a built-in scene, the hall with a spot in place of its lamp."""
+    if name != "colonnade":
+        return load_scene(name, size).scene
+    import mitsuba as mi
+
+    described = colonnade()
+    lamp = described["lamp"]
+    described["lamp"] = {
+        "type": "spot",
+        "to_world": mi.ScalarTransform4f().look_at(lamp["position"], [-1.13, 0.97, 1.67], [0, 0, 1]),
+        "cutoff_angle": 56.7,
+        "beam_width": 56.7,
+        "intensity": lamp["intensity"],
+    }
+    scene = mi.load_dict(described)
+    resize(scene, size)
+    return scene
+
+
+def _expected_missing(empty: TableRow, last: TableRow | None, limit: float) -> TableRow | None:
+    """Return a row that says why it is not begun, if the last size of the map says so."""
+    if last is None:
+        return None
+    if last.rebuilt is None:
+        return replace(empty, missing=f"not begun after map {last.map}: {last.missing}")
+    expected = 1e-3 * last.rebuilt.median_ms * (empty.map / last.map) ** 2
+    if expected <= limit:
+        return None
+    words = f"a frame may take {expected:.0f} s, by that of map {last.map}: more than the limit of {limit:g} s"
+    return replace(empty, missing=words)
+
+
+def _measured(
+    empty: TableRow, scene: Scene, frames: dict[str, Frame], *, kernel: str, seconds: float, limit: float
+) -> TableRow:
+    """Measure a row; `frames` holds those of the same map by evaluation, and receives this one."""
+    values = dict(EVALUATIONS[empty.evaluation]) | {"map": empty.map}
+    try:
+        renderer = prepared(scene, configuration("light-volumes", kernel, values))
+        frame = frames[empty.evaluation] = frame_within(renderer, limit)
+        passes, triangles = _passes(renderer, empty, seconds)
+        rates = time_rates(renderer, seconds)
+    except (InputError, RealtimeError, MemoryError, TimeoutError) as reason:
+        return replace(empty, missing=str(reason) or "out of memory")
+    against = frames["static"].airlight if "static" in frames and empty.evaluation != "static" else None
+    return replace(
+        empty,
+        triangles=triangles,
+        **rates,
+        passes=passes,
+        against_static=None if against is None else error_metrics(against, frame.airlight),
+    )
+
+
+def _passes(renderer: FrameRenderer, row: TableRow, seconds: float) -> tuple[dict[str, float], int]:
+    """Return what the passes cost [ms], and the triangles of all light volumes."""
+    import drjit as dr
+
+    scene = renderer.scene
+    ready = renderer.prepare(scene)
+    distance, by_light = run_surface(renderer)
+    dr.eval(distance, by_light)
+    works: dict[str, Callable[[], Any]] = {
+        "surface": lambda: dr.eval(run_surface(renderer)),
+        "shadow map": lambda: _shadow_maps(scene, row.map),
+        "prepare": lambda: renderer.prepare(scene),
+        "volume": lambda: dr.eval(run_tiles_and_airlight(renderer, ready, distance, by_light)),
+    }
+    times = {name: time_repeated(work, seconds=seconds, least=3).median_ms for name, work in works.items()}
+    if row.evaluation == "adaptive":
+        times |= _tessellation(scene, row.map)
+    is_mesh = EVALUATIONS[row.evaluation]["evaluation"] == "mesh"
+    triangles = sum(len(mesh.triangles) for mesh in ready) if is_mesh else 0
+    return {name: times[name] for name in PASSES if name in times}, triangles
+
+
+def _shadow_maps(scene: Scene, texels: int) -> list[ShadowMap]:
+    return [cast_shadow_map(scene.geometry, light, texels) for light in scene.lights]
+
+
+def _tessellation(scene: Scene, texels: int) -> dict[str, float]:
+    """Return what the passes of the tessellation cost for all lights [ms], medians of three."""
+    pairs = list(zip(_shadow_maps(scene, texels), scene.lights, strict=True))
+    runs = [[tessellation_stages(one, light)[0] for one, light in pairs] for _ in range(3)]
+    return {name: float(np.median([sum(one[name] for one in run) for run in runs])) for name in runs[0][0]}

@@ -1,0 +1,254 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Tables 1 and 2 of Biri, Arques, Michelin 2006 again: share of time by stage, and frames a second, with the error.
+
+How each stage of Table 1 is measured, on the wall clock, medians, all in turns with the whole frame:
+
+1. silhouettes: `realtime.methods.shadow_planes.silhouettes.silhouette` of the parts whose shadow can be seen, with the
+culling, on the host. 2. the scene with surface shadows: camera rays and lit surface, one frozen function. Its shadows
+come out of stage 5,
+   which counts layers anyway.
+3. the medium's contribution of the scene, unshadowed: the airlight of the method `unshadowed` with the same kernel. The
+   method under test never computes it by itself, each lit segment has its part of it: this is what one evaluation a ray
+   costs, and stage 5 is lessened by it.
+4. sorting: the planes with their bins (the rest of what is prepared on the host) and the tile lists.
+5. shadow planes: the airlight from the tile lists on, less stage 3.
+
+A frame takes less than their sum: the host finds planes while the device casts and shades.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from realtime.frame.incremental import Kept
+from realtime.frame.renderer import (
+    FrameRenderer,
+    render_frame,
+    run_airlight,
+    run_shade,
+    run_stages,
+    run_surface,
+    run_tiles,
+)
+from realtime.methods.shadow_planes.method import PlanePreparation
+from realtime.methods.shadow_planes.silhouettes import silhouette
+from realtime.methods.shadow_planes.tile_boxes import SIDE
+from realtime.methods.shadow_planes.view_culling import bodies_in_view
+from realtime.scene.camera import read_camera
+from realtime.scene.read_scene import Scene, read_scene
+from validation.configurations.methods import TOLERANCE, Configuration, prepared
+from validation.configurations.timing import (
+    Timing,
+    camera_rays,
+    changed_look,
+    first_frame,
+    moved_light,
+    moved_light_alone,
+    time_in_turns,
+)
+from validation.estimates.quadrature import truth_image
+from validation.metrics.errors import Metrics, error_metrics
+from validation.scenes.loading import load_scene
+
+STAGES = ("silhouettes", "scene", "airlight of the scene", "sorting", "shadow planes")
+KERNELS = ("exact", "taylor")
+
+
+@dataclass(frozen=True)
+class Published:
+    """What the paper says of a scene."""
+
+    scene: str
+    where: str
+    size: tuple[int, int]
+    fps: float
+    shares: tuple[float, ...] | None = None  #: of Table 1 [%]
+    note: str = ""
+    cone: int = 0  #: edges of the paper's cone over the spot; 0: no spot
+
+
+PUBLISHED = (
+    Published("sphere-spot", "section 6", (800, 600), 120, cone=32),
+    Published("sphere-spot", "section 6", (1024, 768), 107, cone=32),
+    Published(
+        "two-pens",
+        "Fig. 7a",
+        (800, 600),
+        23,
+        (1, 8.7, 21.7, 9.6, 59),
+        "Table 2 says 23 frames/s, the prose of section 6 more than 35: the table may have 7a and 7b changed over",
+    ),
+    Published("three-media", "Fig. 7b", (800, 600), 35, None, "see Fig. 7a; Table 1 has no column for it"),
+    Published("clutter", "Fig. 7c", (800, 600), 25, (1.7, 14, 33.6, 16, 34.7)),
+    Published("hall", "Fig. 1", (800, 600), 12),
+)
+
+
+@dataclass(frozen=True)
+class TableRow:
+    """A scene at a size with a kernel, measured beside what was published."""
+
+    published: Published
+    kernel: str
+    cone: int  #: edges of the planes that bound the spot; 0: the cone itself
+    tolerance: float  #: of what is interpolated between the corners of tiles; 0: nothing
+    size: tuple[int, int]  #: of the frame that was timed [pixels]
+    triangles: int
+    stages_ms: tuple[float, ...]  #: of Table 1, in the order of `STAGES`
+    rebuilt: Timing  #: a frame after the light moved: all stages
+    static: Timing  #: a frame whose planes are there: camera rays, surface, tile lists, airlight
+    relit: Timing  #: a frame after the light moved, the camera rays of the last one kept
+    recoloured: Timing  #: a frame after only medium or colours changed: planes, tile lists, camera rays are kept
+    rays: Timing  #: the camera rays alone
+    error: Metrics  #: of the airlight at pixel centres, at `error_size`
+    error_size: tuple[int, int]
+
+    @property
+    def shares(self) -> tuple[float, ...]:
+        """Share of each stage in the sum of all, for a frame after the light moved [%]."""
+        total = sum(self.stages_ms)
+        return tuple(100 * stage / total for stage in self.stages_ms)
+
+
+def biri_row(
+    published: Published,
+    kernel: str,
+    *,
+    cone: int = 0,
+    tolerance: float = 0.0,
+    size: tuple[int, int],
+    error_size: tuple[int, int],
+    seconds: float = 0.6,
+) -> TableRow:
+    """Measure one row.
+
+    Parameters
+    ----------
+    published
+        The entry of `PUBLISHED`.
+    kernel
+        Name of the airlight kernel.
+    cone, tolerance
+        Edges of the planes that bound a spot, see `realtime.methods.shadow_planes.method`, and what may be
+        interpolated, see `realtime.tiles.adaptive_sampling`.
+    size
+        Of the frame that is timed [pixels].
+    error_size
+        Of the frame that is compared with the truth [pixels].
+    seconds
+        Time to spend on a timing, about.
+    """
+    changed = {"cone": cone, "tolerance": tolerance}
+    chosen = Configuration("shadow-planes", kernel, tuple((name, value) for name, value in changed.items() if value))
+    small = load_scene(published.scene, error_size).scene
+    airlight = render_frame(prepared(read_scene(small), chosen)).airlight
+    error = error_metrics(truth_image(small).airlight, airlight)
+    loaded = load_scene(published.scene, size).scene
+    scene = read_scene(loaded)
+    renderer = prepared(scene, chosen)
+    kept = first_frame(renderer)
+    works = [
+        moved_light(renderer),
+        lambda: run_stages(renderer, kept.prepared),
+        moved_light_alone(renderer, kept),
+        changed_look(renderer, kept),
+        camera_rays(renderer),
+        *_stages(renderer, kernel, kept),
+    ]
+    rebuilt, static, relit, recoloured, rays, *stages = time_in_turns(works, seconds=8 * seconds)
+    return TableRow(
+        published,
+        kernel,
+        cone,
+        tolerance,
+        size,
+        sum(shape.face_count() for shape in loaded.shapes()),
+        _shared([stage.median_ms for stage in stages]),
+        rebuilt,
+        static,
+        relit,
+        recoloured,
+        rays,
+        error,
+        error_size,
+    )
+
+
+def biri_rows(
+    published: Sequence[Published] = PUBLISHED,
+    kernels: Sequence[str] = KERNELS,
+    *,
+    scale: float = 1.0,
+    seconds: float = 0.6,
+    progress: Callable[[float, str], None] | None = None,
+) -> list[TableRow]:
+    """Measure the rows of both tables.
+
+    Parameters
+    ----------
+    published, kernels
+        What to measure; every entry with every kernel, a spot by its cone itself and by the planes of the paper; with
+        `exact` also interpolated between the corners of tiles, to `validation.configurations.methods.TOLERANCE`.
+    scale
+        Of the width and height of all images, for a quick look; 1 for the published sizes.
+    seconds
+        Time to spend on a timing, about.
+    progress
+        Told the share done and what comes next.
+    """
+    wanted: list[tuple[Published, str, dict[str, Any]]] = []
+    for one in published:
+        for kernel in kernels:
+            wanted += [(one, kernel, {"cone": cone}) for cone in dict.fromkeys((0, one.cone))]
+            wanted += [(one, kernel, {"tolerance": TOLERANCE})] if kernel == "exact" else []
+    rows: list[TableRow] = []
+    for one, kernel, changed in wanted:
+        size = _whole_tiles(scale * one.size[0]), _whole_tiles(scale * one.size[1])
+        half = (max(1, size[0] // 2), max(1, size[1] // 2))
+        if progress is not None:
+            progress(len(rows) / len(wanted), f"{one.scene}, {size[0]} x {size[1]}, {kernel}")
+        # What is interpolated depends on the size of a pixel.
+        error_size = size if "tolerance" in changed else half
+        rows.append(biri_row(one, kernel, **changed, size=size, error_size=error_size, seconds=seconds))
+    return rows
+
+
+def _whole_tiles(length: float) -> int:
+    """Return the side of an image in which tiles can be interpolated: three of them and more [pixels]."""
+    return SIDE * max(3, round(length / SIDE))
+
+
+def _shared(measured: Sequence[float]) -> tuple[float, ...]:
+    """Return what each stage of Table 1 costs [ms], from the times of `_stages`."""
+    silhouettes, surface, unshadowed, host, in_tiles, airlight = measured
+    sorting = max(0.0, host - silhouettes) + in_tiles
+    return silhouettes, surface, unshadowed, sorting, max(0.0, airlight - unshadowed)
+
+
+def _stages(renderer: FrameRenderer, kernel: str, kept: Kept) -> list[Callable[[], Any]]:
+    """Return the work of silhouettes, scene, unshadowed airlight, all that is on the host, tile lists, and airlight."""
+    import drjit as dr
+
+    scene = renderer.scene
+    distance = kept.cast.distance
+    by_light = run_shade(renderer, kept.cast)
+    dr.eval(distance, by_light)
+    plain = prepared(scene, Configuration("unshadowed", kernel))
+    return [
+        lambda: _silhouettes(renderer, scene),
+        lambda: dr.eval(run_surface(renderer)),
+        lambda: dr.eval(run_airlight(plain, (), distance, ())),
+        lambda: renderer.prepare(scene),
+        lambda: run_tiles(renderer, kept.prepared, distance),
+        lambda: dr.eval(run_airlight(renderer, kept.prepared, distance, by_light, kept.tiles)),
+    ]
+
+
+def _silhouettes(renderer: FrameRenderer, scene: Scene) -> None:
+    assert isinstance(renderer.prepare, PlanePreparation)
+    casters, camera = renderer.prepare.standing(scene), read_camera(scene.camera)
+    for light in scene.lights:
+        position = np.array(light.position, dtype=np.float64).ravel()
+        silhouette(casters, position, used=bodies_in_view(casters, camera, position))

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Animations: what moves in the frames of a scene, and how.
+
+One turn over all frames, so that the last leads on to the first:
+
+* `light`: every light circles about a vertical axis, a spot with its direction. Vertical is the axis of coordinates
+  nearest to the camera's up.
+* `objects`: every object turns about the vertical through its own middle.
+* `medium`: the extinction swings between half and one and a half times its value, as 1 + sin(turn) / 2.
+* `colour`: the lights' red, green and blue go round, with the same sum.
+
+Only what moves is made anew (`moved_parts`, `realtime.frame.incremental`); kernels are those of the first frame.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analytic.errors import InputError
+from realtime.methods.shadow_planes.mesh_adjacency import read_casters
+from realtime.scene.animate import (
+    closed_shapes,
+    coloured_light,
+    read_objects,
+    thicker_medium,
+    turned_light,
+    turned_objects,
+)
+from realtime.scene.read_scene import Scene
+from validation.scenes.parts import rotation
+from validation.scenes.record import MOVES, Animation
+
+Array = NDArray[np.float64]
+
+
+def parse_moves(text: str) -> tuple[str, ...]:
+    """Return what moves from 'light,colour'."""
+    moves = tuple(dict.fromkeys(word.strip() for word in text.split(",")))
+    for move in moves:
+        if move not in MOVES:
+            raise InputError(f"--animate: got {move!r}, wanted some of {', '.join(MOVES)}, separated by commas")
+    return moves
+
+
+def moved_parts(animation: Animation) -> dict[str, bool]:
+    """Return what of each frame is elsewhere than in the last, as `realtime.frame.incremental.next_frame` takes it."""
+    return {
+        "camera_moved": False,
+        "geometry_moved": "objects" in animation.moves,
+        "light_moved": "light" in animation.moves,
+    }
+
+
+def animate(scene: Scene, animation: Animation, frames: int) -> Iterator[Scene]:
+    """Yield the scene of every frame, one turn in all; the first is the scene as it was read.
+
+    A scene is good until the next is asked for: objects move in the Mitsuba scene that all of them share.
+    """
+    if frames < 1:
+        raise InputError(f"frames: got {frames}, wanted at least 1")
+    step = _step(scene, animation)
+    for number in range(frames):
+        yield step(number / frames)
+
+
+def _step(scene: Scene, animation: Animation) -> Callable[[float], Scene]:
+    """Return the function that gives the scene after a share of the turn."""
+    up = vertical(scene)
+    about = np.array(animation.about) if animation.about else middle(scene)
+    objects = None
+    if "objects" in animation.moves:
+        names = animation.objects or closed_shapes(read_casters(scene.geometry))
+        if not names:
+            raise InputError("--animate objects: the scene has no closed mesh that could turn; animate the light")
+        objects = read_objects(scene, names)
+
+    def after(share: float) -> Scene:
+        turn = rotation(up.tolist(), 360 * share) if share else np.eye(3)
+        lights, medium = scene.lights, scene.medium
+        if "light" in animation.moves:
+            lights = tuple(turned_light(light, about, turn) for light in lights)
+        if "colour" in animation.moves:
+            lights = tuple(coloured_light(light, share) for light in lights)
+        if "medium" in animation.moves:
+            medium = thicker_medium(medium, 1 + 0.5 * np.sin(2 * np.pi * share))
+        moved = replace(scene, lights=lights, medium=medium)
+        return turned_objects(moved, objects, turn) if objects else moved
+
+    return after
+
+
+def vertical(scene: Scene) -> Array:
+    """Return the axis of coordinates nearest to the camera's up."""
+    up = np.array(scene.camera.up, dtype=np.float64).ravel()
+    axis = np.zeros(3)
+    largest = int(np.argmax(np.abs(up)))
+    axis[largest] = np.sign(up[largest])
+    return axis
+
+
+def middle(scene: Scene) -> Array:
+    """Return the middle of the box of all shapes; without shapes, what the camera looks at beside the first light."""
+    if scene.geometry.shapes():
+        box = scene.geometry.bbox()
+        return 0.5 * (np.array(box.min, dtype=np.float64).ravel() + np.array(box.max, dtype=np.float64).ravel())
+    origin, forward, light = (
+        np.array(vector, dtype=np.float64).ravel()
+        for vector in (scene.camera.origin, scene.camera.forward, scene.lights[0].position)
+    )
+    return origin + forward * (forward @ (light - origin)) / (forward @ forward)

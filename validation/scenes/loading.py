@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Scenes by name or by path, checked before any work is done."""
+
+import difflib
+import os
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from analytic.errors import InputError
+from validation.scenes.record import Animation
+from validation.scenes.registry import SCENES
+
+_LARGEST = 16384
+
+
+@dataclass(frozen=True)
+class LoadedScene:
+    """A Mitsuba scene and where it came from."""
+
+    name: str  #: a built-in name, or the stem of the file
+    scene: Any  #: the `mi.Scene`
+    purpose: str
+    published: str
+    path: Path | None = None
+    animation: Animation = field(default_factory=Animation)
+
+
+def load_scene(name_or_path: str, size: tuple[int, int] | None = None) -> LoadedScene:
+    """Load a built-in scene or a Mitsuba XML file into the active variant.
+
+    Parameters
+    ----------
+    name_or_path
+        A name of `validation.scenes.registry.SCENES`, or the path of a Mitsuba scene file.
+    size
+        Width and height of the image [pixels]; the scene's own by default.
+
+    Raises
+    ------
+    InputError
+        For an unknown name, a missing or malformed file, and a size that no image can have. Whether methods and truth
+        can deal with what is in the scene, `realtime.scene.read_scene.read_scene` and
+        `reference.scene.read.read_truth` say.
+    """
+    import mitsuba as mi
+
+    if name_or_path in SCENES:
+        record = SCENES[name_or_path]
+        built = mi.load_dict(record.build())
+        loaded = LoadedScene(record.name, built, record.purpose, record.published, animation=record.animation)
+    else:
+        path = _existing(name_or_path)
+        loaded = LoadedScene(path.stem, _parse(path), f"The user's own scene, {path.name}.", "", path)
+    if size is not None:
+        resize(loaded.scene, size)
+    return loaded
+
+
+def parse_size(text: str) -> tuple[int, int]:
+    """Return width and height from 'WxH'."""
+    match = re.fullmatch(r"(\d+)[xX](\d+)", text.strip())
+    if not match:
+        raise InputError(f"size: got {text!r}, wanted WIDTHxHEIGHT in pixels, for example 800x600")
+    return int(match[1]), int(match[2])
+
+
+def nearest(word: str, known) -> str:
+    """Return ', did you mean X?' or an empty string."""
+    close = difflib.get_close_matches(word, list(known), n=1, cutoff=0.4)
+    return f"; did you mean {close[0]!r}?" if close else ""
+
+
+def _existing(name_or_path: str) -> Path:
+    path = Path(name_or_path)
+    if path.is_dir():
+        raise InputError(f"scene: {name_or_path} is a folder; wanted the path of a Mitsuba XML file in it")
+    if path.is_file():
+        return path
+    looks_like_path = path.suffix or os.sep in name_or_path
+    if looks_like_path:
+        raise InputError(
+            f"scene: there is no file {name_or_path}; wanted a Mitsuba XML file or one of {', '.join(SCENES)}"
+        )
+    raise InputError(
+        f"scene: got {name_or_path!r}, wanted one of {', '.join(SCENES)} or the path of a Mitsuba XML file"
+        + nearest(name_or_path, SCENES)
+    )
+
+
+def _parse(path: Path):
+    import mitsuba as mi
+
+    try:
+        scene = mi.load_file(str(path))
+    except Exception as error:  # Mitsuba reports every kind of bad input as a RuntimeError, Python plugins as anything
+        reason = re.sub(r"^\[[^\]]*\]\s*", "", " ".join(str(error).split()))
+        raise InputError(f"scene {path}: Mitsuba cannot read it: {reason}") from error
+    if not isinstance(scene, mi.Scene):
+        raise InputError(f"scene {path}: the file holds a single {type(scene).__name__}; wanted a whole <scene>")
+    return scene
+
+
+def resize(scene, size: tuple[int, int]) -> None:
+    """Give the cameras of a Mitsuba scene images of another width and height [pixels]."""
+    import mitsuba as mi
+
+    if not all(1 <= n <= _LARGEST for n in size):
+        raise InputError(f"size: got {size[0]}x{size[1]}, wanted at least 1x1 and at most {_LARGEST} pixels on a side")
+    for sensor in scene.sensors():
+        parameters = mi.traverse(sensor)
+        parameters["film.size"] = list(size)
+        parameters["film.crop_size"] = list(size)
+        if "x_fov" in parameters:
+            # Touching a parameter of the sensor itself makes it derive its projection from the film again.
+            parameters["x_fov"] = parameters["x_fov"]
+        parameters.update()

@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Small scenes with everything in them that the built-in scenes lack, for checks of the checks.
+
+`many-lights`: the built-in scenes have one light each, none of them soft and none behind the camera; their fog is grey
+but for `two-pens`, and forward scattering but for Rayleigh's symmetric law. What only such a scene can show, a formula
+for soft spots or a sum over lights, is shown here.
+
+`sun`: a light at infinity on a box and a ball of coloured fog, each in the light of the other or of what casts shadows.
+"""
+
+from typing import Any
+
+from validation.scenes.parts import camera, fog, point_light
+
+
+def many_lights() -> dict[str, Any]:
+    """Return a ball over a floor in coloured, backward scattering fog under a soft spot, a lamp, and one behind."""
+    import mitsuba as mi
+
+    return {
+        "type": "scene",
+        "fog": fog((0.113, 0.149, 0.187), (0.91, 0.83, 0.74), {"type": "hg", "g": -0.41}),
+        "sensor": camera((0.23, -4.13, 1.37), (0.11, 0.07, 0.83), fov=49.7, size=(48, 36)),
+        "spot": {
+            "type": "spot",
+            "to_world": mi.ScalarTransform4f().look_at([0.73, -0.31, 3.17], [0.13, 0.11, 0.43], [0, 1, 0]),
+            "cutoff_angle": 37.3,
+            "beam_width": 11.9,
+            "intensity": {"type": "rgb", "value": [31.0, 27.0, 29.0]},
+        },
+        "lamp": point_light((-1.37, 1.29, 2.03), (7.3, 8.9, 6.1)),
+        "behind": point_light((0.83, -5.39, 2.11), (13.7, 11.3, 12.9)),
+        "ball": {
+            "type": "sphere",
+            "center": [0.17, 0.13, 0.79],
+            "radius": 0.43,
+            "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.61, 0.53, 0.37]}},
+        },
+        "floor": {
+            "type": "rectangle",
+            "to_world": mi.ScalarTransform4f().scale(7.1),
+            "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.41, 0.43, 0.53]}},
+        },
+    }
+
+
+def sun() -> dict[str, Any]:
+    """Return a slab and a ball that shadow a box and a ball of fog, and a floor, under a directional light."""
+    import mitsuba as mi
+
+    transform = mi.ScalarTransform4f()
+    grey = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.43, 0.47, 0.53]}}
+    clear = {"type": "null"}
+    return {
+        "type": "scene",
+        "sensor": camera((0.31, -4.07, 1.43), (0.07, 0.11, 0.73), fov=41.3, size=(48, 36), in_fog=False),
+        "sun": {
+            "type": "directional",
+            "direction": [0.613, 0.371, -0.697],
+            "irradiance": {"type": "rgb", "value": [19.3, 17.1, 14.7]},
+        },
+        "box": {
+            "type": "cube",
+            "to_world": transform.translate([-0.57, 0.17, 0.67]).rotate([0.1, 0.2, 1], 17).scale([0.37, 0.53, 0.47]),
+            "bsdf": clear,
+            "interior": fog((0.71, 0.97, 1.31), (0.93, 0.84, 0.71), {"type": "hg", "g": 0.43}) | {"id": "in-box"},
+        },
+        "pearl": {
+            "type": "sphere",
+            "center": [0.61, 0.13, 0.59],
+            "radius": 0.49,
+            "bsdf": clear,
+            "interior": fog((1.37, 1.13, 0.83), (0.67, 0.79, 0.91), {"type": "hg", "g": -0.29}) | {"id": "in-ball"},
+        },
+        "slab": {
+            "type": "cube",
+            "to_world": transform.translate([-1.13, -0.11, 1.43]).rotate([0, 0, 1], 31).scale([0.19, 0.23, 0.037]),
+            "bsdf": grey,
+        },
+        "ball": {"type": "sphere", "center": [-0.19, -0.27, 1.31], "radius": 0.17, "bsdf": grey},
+        "floor": {"type": "rectangle", "to_world": transform.scale(7.1), "bsdf": grey},
+    }
+
+
+#: Scenes of this module by name, as in `validation.scenes.registry.SCENES`.
+PROBES = {"many-lights": many_lights, "sun": sun}

@@ -1,0 +1,312 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""Does an image with random errors agree with another one, and how small a disagreement would have been seen?
+
+Each of the two images has a mean per value (a value is one channel of one pixel) and may have a standard error: with
+r +- s_r the reference, t +- s_t the test, d = t - r and s^2 = s_r^2 + s_t^2. Both variances are used, and none is
+raised to a floor: a dim image is tested as sharply as a bright one. The two images must be independent, and so must be
+the errors of two pixels of one image (box filter, seeds of their own); channels of a pixel may depend on one another.
+
+**Values.** z = d / s follows Student's law if the errors are normal and the standard errors come from K batch means.
+For two random images the degrees of freedom are Welch and Satterthwaite's, s^4 / (s_r^4/(K_r - 1) + s_t^4/(K_t - 1));
+the normal law holds if no K is given. P(|Z| >= |z|) is the p-value, uniform in [0, 1] if the images agree.
+
+**Rejected pixels.** The smallest of m independent p-values is below a with probability 1 - (1 - a)^m. Sidak's level
+a = 1 - (1 - A)^(1/m) makes that A (`family_level`): one false alarm in 1/A comparisons of images, however many pixels
+they have. The expected number of rejections is m a, about A. That finds an outlier, but hardly a bias of all pixels.
+
+**Exceedances.** n independent p-values are below a plain level a Binomial(n, a) times. More mean a bias or standard
+errors too small, fewer mean standard errors too large: hence both tails, p = 2 min(P(X <= k), P(X >= k)). Channels are
+not independent, so each has its own test, and the least p is multiplied by their number (Bonferroni). Likewise
+Kolmogorov and Smirnov's test of the p-values against the uniform law.
+
+**Blocks.** sum d / sqrt(sum s^2) over the 8 x 8 pixels of a block, one channel: it shows a bias of local extent up to
+eight times as well as one pixel.
+
+**The image.** One relative bias with its 95 % interval, equivalence and detectable bias: see
+`validation.statistics.relative_bias`. A bias that all pixels share shows here first: with 262 144 pixels 360 times
+better than in any one of them.
+
+Values without variance (s = 0: a pixel without light, one that no path reached, a reference without noise) have no z.
+They are counted and compared in absolute terms, and they do enter the relative bias. So are values where the reference
+is zero, whose relative error does not exist: light where none should be shows there. Pixels that a mask leaves out (the
+light in their footprint) are counted, for a mask can hide what it should not.
+"""
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from analytic.errors import InputError
+from validation.metrics.errors import compared, plain
+from validation.statistics.p_values import binomial_p, bonferroni, satterthwaite, sidak, two_sided_p, uniformity_p
+from validation.statistics.relative_bias import Side, relative_bias
+
+Array = NDArray[np.float64]
+
+BLOCK = 8  #: side of a block [pixels]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One side of a comparison.
+
+    Attributes
+    ----------
+    mean
+        Radiance [W/(m^2 sr)], (height, width) or (height, width, channels).
+    standard_error
+        Standard error of `mean`, of the same shape; None for an image without random error.
+    batches
+        Number of independent batches from whose means the standard error comes; None for one as good as exact.
+    batch_means
+        Mean over the pixels compared of every batch, (batches,) or (batches, channels) [W/(m^2 sr)].
+    """
+
+    mean: ArrayLike
+    standard_error: ArrayLike | None = None
+    batches: int | None = None
+    batch_means: ArrayLike | None = None
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """Agreement of two images with standard errors; every number stays if both radiances are scaled.
+
+    Attributes
+    ----------
+    masked
+        Pixels that the mask leaves out.
+    tested
+        Values with a z.
+    zero_reference, zero_reference_error
+        Values where the reference is zero, and the largest |test| among them over the mean of the reference.
+    zero_variance, zero_variance_error
+        Values without variance, and the largest |test - ref| among them over the mean of the reference.
+    z_mean, z_std
+        Mean and standard deviation of z: 0 and, for K batches, sqrt((K - 1)/(K - 3)) if the images agree and the
+        standard errors are right.
+    rejected, expected_rejections
+        Pixels with a value rejected at Sidak's level, and the number expected if the images agree.
+    exceeding, expected_exceeding, exceeding_p
+        Values below `plain_level`, the number expected, and the p-value of that number, both tails.
+    blocks, rejected_blocks
+        Blocks of 8 x 8 pixels, one channel each, and how many are rejected at Sidak's level for that number.
+    uniformity_p
+        p-value of the test that the p-values are uniform.
+    relative_bias, relative_bias_ci, relative_bias_ci_batches
+        sum(test) / sum(ref) - 1 with its 95 % intervals, from the standard errors and from the batch means.
+    relative_bias_se, relative_bias_freedom, relative_bias_p
+        Its standard error, from those of the pixels, the degrees of freedom of that, and the two-sided p-value.
+    reference_variance_share
+        Share of the reference's errors in the variance of `relative_bias`; the rest is the test image's.
+    largest_share
+        Share of one pixel in the variance of `relative_bias`; above 1 % its interval is doubtful.
+    detectable_bias
+        Smallest relative bias found with 90 % power at the 5 % level, by the wider interval.
+    margin, equivalent
+        The margin given, and whether all intervals lie within it.
+    family_level, plain_level
+        Levels of the tests.
+    """
+
+    masked: int
+    tested: int
+    zero_reference: int
+    zero_reference_error: float
+    zero_variance: int
+    zero_variance_error: float
+    z_mean: float
+    z_std: float
+    rejected: int
+    expected_rejections: float
+    exceeding: int
+    expected_exceeding: float
+    exceeding_p: float
+    blocks: int
+    rejected_blocks: int
+    uniformity_p: float
+    relative_bias: float
+    relative_bias_ci: tuple[float, float]
+    relative_bias_ci_batches: tuple[float, float] | None
+    relative_bias_se: float
+    relative_bias_freedom: float
+    relative_bias_p: float
+    reference_variance_share: float
+    largest_share: float
+    detectable_bias: float
+    margin: float | None
+    equivalent: bool | None
+    family_level: float
+    plain_level: float
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the numbers by name; what is not finite becomes None, which JSON can hold."""
+        return {name: plain(value) for name, value in asdict(self).items()}
+
+
+def compare_statistics(
+    reference: Estimate,
+    test: Estimate,
+    *,
+    mask: ArrayLike | None = None,
+    margin: float | None = None,
+    family_level: float = 0.01,
+    plain_level: float = 0.01,
+) -> Statistics:
+    """Test two images against each other (derivations: see the module).
+
+    Valid for pixels whose beam keeps away from the light: where it holds the light the variance is infinite and no test
+    means anything (the 95 % interval of Pareto's law with exponent 3/2 holds the truth in 80 % of cases), so mask them.
+    Skewed estimates need many batches: with 32, each one log-normal number of logarithmic deviation 1, 6 % of values
+    exceed the 1 % level, as a batch without a rare large value is too low and looks too sure at once. `exceeding_p` and
+    `uniformity_p` show it; the interval of the image keeps its 95 % (tests/validation/statistics/test_rates.py).
+
+    Parameters
+    ----------
+    reference, test
+        Two independent estimates; at least one has a standard error.
+    mask
+        Pixels to compare, (height, width) of truth values; all by default. Pixels that are not finite in either mean
+        are left out too: `error_metrics` counts them. Batch means are then ignored, as they would not be of these
+        pixels.
+    margin
+        Largest relative bias that counts as agreement, such as 0.005.
+    family_level
+        Probability that a comparison of agreeing images rejects any pixel, and likewise any block.
+    plain_level
+        Level at which exceeding values are counted.
+
+    Raises
+    ------
+    InputError
+        If sizes differ, no standard error is given, one is negative or not finite, a number of batches is below 2, the
+        batch means are not of these pixels, or a level or the margin is out of range.
+    """
+    _check_levels(margin, family_level, plain_level)
+    ref, tst, asked = compared(reference.mean, test.mean, mask)
+    if reference.standard_error is None and test.standard_error is None:
+        raise InputError("neither image has a standard error; give one, or compare them by their metrics alone")
+    chosen = asked & (np.isfinite(ref) & np.isfinite(tst)).all(axis=2)
+    whole = bool((chosen == asked).all())
+    # Free of units from here on. A power of two leaves every digit as it is; squares stay in range.
+    largest = max(float(np.abs(image[chosen]).max(initial=0.0)) for image in (ref, tst))
+    scale = float(2.0 ** np.frexp(largest)[1]) if largest > 0 else 1.0
+    one = _side("reference", reference, chosen, scale=scale, with_batches=whole)
+    two = _side("test", test, chosen, scale=scale, with_batches=whole)
+    pooled = relative_bias(one, two, int(chosen.sum()))
+    return Statistics(
+        masked=int((~asked).sum()),
+        **_value_tests(one, two, chosen, family_level, plain_level),
+        **_block_tests(one, two, family_level),
+        relative_bias=pooled.value,
+        relative_bias_ci=pooled.interval,
+        relative_bias_ci_batches=pooled.interval_batches,
+        relative_bias_se=pooled.error,
+        relative_bias_freedom=pooled.freedom,
+        relative_bias_p=pooled.p,
+        reference_variance_share=pooled.reference_share,
+        largest_share=pooled.largest_share,
+        detectable_bias=pooled.detectable,
+        margin=margin,
+        equivalent=None if margin is None else pooled.within(margin),
+        family_level=family_level,
+        plain_level=plain_level,
+    )
+
+
+def _value_tests(
+    one: Side, two: Side, chosen: NDArray[np.bool_], family_level: float, plain_level: float
+) -> dict[str, Any]:
+    """Test every value by itself."""
+    difference, error = two.mean - one.mean, np.hypot(one.error, two.error)
+    random = chosen[:, :, None] & (error > 0)
+    fixed = chosen[:, :, None] & ~random
+    z = difference[random] / error[random]
+    spread = one.spread(one.error**2) + two.spread(two.error**2)
+    p = two_sided_p(z, satterthwaite(error**2, spread)[random])
+    channel = np.nonzero(random)[2]
+    by_channel = [p[channel == c] for c in np.unique(channel)]
+    small = np.zeros(random.shape, dtype=bool)
+    small[random] = p < sidak(family_level, z.size)
+    dark = chosen[:, :, None] & (one.mean == 0)
+    mean = float(one.mean[chosen].mean()) if chosen.any() else 0.0
+    return {
+        "tested": z.size,
+        "zero_reference": int(dark.sum()),
+        "zero_reference_error": _largest(difference[dark], mean),
+        "zero_variance": int(fixed.sum()),
+        "zero_variance_error": _largest(difference[fixed], mean),
+        "z_mean": float(z.mean()) if z.size else float("nan"),
+        "z_std": float(z.std(ddof=1)) if z.size > 1 else float("nan"),
+        "rejected": int(small.any(axis=2).sum()),
+        "expected_rejections": z.size * sidak(family_level, z.size),
+        "exceeding": int((p < plain_level).sum()),
+        "expected_exceeding": z.size * plain_level,
+        "exceeding_p": bonferroni([binomial_p(int((q < plain_level).sum()), q.size, plain_level) for q in by_channel]),
+        "uniformity_p": bonferroni([uniformity_p(q) for q in by_channel]),
+    }
+
+
+def _largest(difference: Array, mean: float) -> float:
+    """Return the largest difference over a mean; NaN if that is not bright."""
+    return float(np.abs(difference).max(initial=0.0)) / mean if mean > 0 else float("nan")
+
+
+def _block_tests(one: Side, two: Side, family_level: float) -> dict[str, int]:
+    """Test the sums over blocks of pixels."""
+    difference = _block_sums(np.where(np.hypot(one.error, two.error) > 0, two.mean - one.mean, 0.0))
+    variance = _block_sums(one.error**2 + two.error**2)
+    spread = _block_sums(one.spread(one.error**2) + two.spread(two.error**2))
+    random = variance > 0
+    z = difference[random] / np.sqrt(variance[random])
+    p = two_sided_p(z, satterthwaite(variance, spread)[random])
+    return {"blocks": z.size, "rejected_blocks": int((p < sidak(family_level, z.size)).sum())}
+
+
+def _block_sums(values: Array) -> Array:
+    """Return the sums over blocks, smaller ones at the far edges: (rows, columns, channels)."""
+    rows, columns = (np.arange(0, size, BLOCK) for size in values.shape[:2])
+    return np.add.reduceat(np.add.reduceat(values, rows, axis=0), columns, axis=1)
+
+
+def _check_levels(margin: float | None, family_level: float, plain_level: float) -> None:
+    for name, level in (("family_level", family_level), ("plain_level", plain_level)):
+        if not 0 < level < 1:
+            raise InputError(f"{name}: got {level}, wanted a probability between 0 and 1, such as 0.01")
+    if margin is not None and not 0 < margin < np.inf:
+        raise InputError(f"margin: got {margin}, wanted a relative bias above 0, such as 0.005")
+
+
+def _side(name: str, estimate: Estimate, chosen: NDArray[np.bool_], *, scale: float, with_batches: bool) -> Side:
+    """Check one estimate and make it regular: float64 of three dimensions, scaled, zero outside the chosen pixels."""
+    shape = np.shape(estimate.mean)
+    inside = chosen[:, :, None]
+    mean = np.asarray(estimate.mean, dtype=np.float64).reshape(*shape[:2], -1)
+    mean = np.where(inside, mean, 0.0) / scale
+    error = np.zeros_like(mean)
+    if estimate.standard_error is not None:
+        given = np.asarray(estimate.standard_error, dtype=np.float64)
+        if given.shape != shape:
+            raise InputError(
+                f"the standard error of the {name} has shape {given.shape}; wanted that of its image, {shape}"
+            )
+        error = np.where(inside, given.reshape(mean.shape), 0.0) / scale
+    wrong = int((~(np.isfinite(error) & (error >= 0))).any(axis=2).sum())
+    if wrong:
+        raise InputError(f"the standard error of the {name} is negative or not finite in {wrong} pixels; mask them")
+    if estimate.batches is not None and estimate.batches < 2:
+        raise InputError(f"batches of the {name}: got {estimate.batches}, wanted at least 2 for a standard error")
+    if estimate.batch_means is None or not with_batches:
+        return Side(mean, error, estimate.batches)
+    means = np.asarray(estimate.batch_means, dtype=np.float64) / scale
+    means = means.reshape(len(means), -1).mean(axis=1)
+    # Means of a mask, or of other pixels, would give an interval for something else; float32 sums agree to 1e-4.
+    pooled = float(mean[chosen].mean())
+    if len(means) < 2 or not np.isclose(means.mean(), pooled, rtol=1e-4, atol=0):
+        raise InputError(
+            f"the {len(means)} batch means of the {name} have the mean {means.mean() * scale:.6g}, the pixels compared "
+            f"{pooled * scale:.6g}; give two or more, taken over the same pixels"
+        )
+    return Side(mean, error, estimate.batches, means)

@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""How far a number may move before that means something: the noise of errors and of times.
+
+**Errors.** Methods and truth draw no random numbers: on one machine, with one set of versions, a second run gives the
+same digits (seen in every pair of reports of 2026-11-21: no error differed). Another processor, another width of its
+vectors, another LLVM or CUDA fuse and order the same float32 operations differently. That moves an error e by
+
+    |e' - e| <= band e + floor
+
+- the floor is what rounding alone makes of a method without any other error: 24 times the rounding unit 2^-24 for
+  averages. In a pixel a thousand times darker than the mean, which is where the denominator of a relative error ends,
+  a rounding of the size of the mean counts a thousand times: the floor of the maximum is 2^-24 / 0.001;
+- the band is for what rounding decides: a ray that just misses an edge, a texel that is just in the light. One pixel
+  of a few thousand then has another error, which moves a maximum more than an average: its band is twice as wide. A
+  bias is a sum in which errors cancel, so that it may be far smaller than what such a pixel adds: its band is that of a
+  tenth of the RMSE at least.
+
+Measured on 2026-11-21 at 64 x 48 pixels. Standard configurations of open-fog, sphere-spot, three-media, two-pens and
+colonnade in code for AVX2, 8 lanes wide, instead of AVX-512, 16 wide: 657 of their numbers changed, beyond the floor
+none by more than 0.2 %. With one thread instead of two as well, 534 numbers of the nine baselines changed; the only one
+beyond 2 % was a bias of 2.3e-4 beside an RMSE of 1.1e-2, by 5 %. Taking rounding away altogether (float64) moves more,
+and says where the floor must end: the 99 % quantile of methods without other errors falls by 1.3e-6, their largest
+error by up to 6e-5.
+
+A count of negative pixels may move by the band and a thousandth of the image (sums that cancel to zero have a random
+sign); a count of pixels that are not finite may not move at all.
+
+**Times.** A timing is a median with its quartiles. Whatever else a machine does only adds time, in bursts that last
+longer than a repetition; so the quartiles say how noisy the moment was, not how far the next run will be. Three rules:
+
+1. *Spread.* The geometric mean of upper over lower quartile, over all timings of a report, says how busy the machine
+   was: 1.01 to 1.05 in seven reports on a quiet machine, 1.7 to 3.1 in five on the same machine when it was shared. A
+   ratio counts from `(1 + tolerance) spread` on, with the larger spread of the two reports. That is the least slowdown
+   that can be seen; on a busy machine little can be, and the comparison says so.
+2. *Drift.* The median ratio over all frames is what all share: the machine, or something that every method uses. A
+   method is slower only if it is slower as measured and beside this. The drift itself is judged by rule 1, once.
+   Between two machines only what is left beside the drift is compared, with four times the tolerance: methods do not
+   profit alike from wider vectors, larger caches or more threads.
+3. *Witnesses.* The stages were timed one after the other, and each is part of others: surface and airlight of the
+   frame, the frame of one after the light moved, that of one after objects moved. Work that grew is seen in them too, a
+   burst is not: every stage that contains it must have grown by half as many milliseconds, and the quartiles must not
+   overlap. Two bursts do meet now and then: with a single witness the square of the ratio is needed, without one the
+   cube, and the square where there are too few repetitions for quartiles. The surface alone is no concern of a method.
+"""
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+ROUNDING = 2.0**-24  #: half of the distance from 1 to the next float32
+ERROR_TOLERANCE = 0.02  #: relative band of an error
+TIME_TOLERANCE = 0.25  #: relative band of a time
+FLOORS = {
+    "relative_rmse": 24 * ROUNDING,
+    "relative_bias": 24 * ROUNDING,
+    "p50": 24 * ROUNDING,
+    "p99": 24 * ROUNDING,
+    "max": ROUNDING / 1e-3,
+    "mean": 24 * ROUNDING,
+    "flip": 1e-4,  # the package's own note says 1e-5 between operating systems
+}
+SHORTEST = 0.05  #: differences below this are launches and the clock, not work [ms]
+
+_FEW = 3  # repetitions without which quartiles say nothing
+_WITNESSES = {
+    "airlight": ("frame", "rebuild", "moved"),
+    "frame": ("sum", "rebuild", "moved"),
+    "rebuild": ("moved",),
+    "moved": (),
+}
+
+Timing = Mapping[str, float]  #: median_ms, low_ms, high_ms, repetitions
+Times = Mapping[str, Timing]  #: by stage
+
+
+def error_band(
+    name: str, old: float, *, tolerance: float = ERROR_TOLERANCE, pixels: int = 0, rmse: float = 0.0
+) -> float:
+    """Return how far an error may move.
+
+    Parameters
+    ----------
+    name
+        A field of `validation.metrics.errors.Metrics` without a unit, 'mean' (relative to itself) or 'flip'.
+    old
+        What it was.
+    tolerance
+        The relative band; that of the maximum is twice as wide.
+    pixels
+        Of the image, for counts.
+    rmse
+        The relative RMSE of the same image, for a bias.
+    """
+    if name == "nonfinite":
+        return 0.0
+    if name == "negative":
+        return tolerance * old + 1e-3 * pixels
+    size = abs(old)
+    if name == "relative_bias":
+        size = max(size, 0.1 * rmse)
+    return tolerance * size * (2 if name == "max" else 1) + FLOORS[name]
+
+
+def spread(times: Iterable[Times]) -> float:
+    """Return the geometric mean of upper over lower quartile of all timings; 1 where none has quartiles."""
+    ratios = [
+        timing["high_ms"] / timing["low_ms"]
+        for stages in times
+        for timing in stages.values()
+        if timing["repetitions"] >= _FEW and timing["median_ms"] >= SHORTEST and timing["low_ms"] > 0
+    ]
+    return float(np.exp(np.mean(np.log(ratios)))) if ratios else 1.0
+
+
+def drift(pairs: Iterable[tuple[Times, Times]]) -> float:
+    """Return the median ratio of new to old frames; 1 where there are none."""
+    ratios = [new["frame"]["median_ms"] / old["frame"]["median_ms"] for old, new in pairs]
+    return math.exp(float(np.median(np.log(ratios)))) if ratios else 1.0
+
+
+def least_ratio(spread_of_both: float, *, same_machine: bool, tolerance: float = TIME_TOLERANCE) -> float:
+    """Return the least ratio of two times that means something."""
+    return (1 + tolerance * (1 if same_machine else 4)) * spread_of_both
+
+
+def slower_stages(old: Times, new: Times, *, least: float, scale: float) -> list[str]:
+    """Return the stages of a frame that got slower.
+
+    Parameters
+    ----------
+    old, new
+        The times of one configuration in two reports.
+    least
+        From `least_ratio`.
+    scale
+        How much slower than before everything else is: at least 1 on the same machine.
+
+    Notes
+    -----
+    What got faster are the stages that get slower from new to old.
+    """
+    before = {stage: timing for stage, timing in old.items() if stage in new}
+    after = {stage: _scaled(new[stage], 1 / scale) for stage in before}
+    return [stage for stage in before if stage in _WITNESSES and _slower(stage, before, after, least)]
+
+
+def _slower(stage: str, old: Times, new: Times, least: float) -> bool:
+    before, after = old[stage], new[stage]
+    growth = after["median_ms"] - before["median_ms"]
+    witnesses = [_median(new, name) - _median(old, name) for name in _WITNESSES[stage] if _known(old, name)]
+    power = max(1, 3 - len(witnesses))
+    if min(before["repetitions"], after["repetitions"]) < _FEW:
+        power = max(2, power)
+    if growth < SHORTEST or after["median_ms"] < least**power * before["median_ms"]:
+        return False
+    return after["low_ms"] > before["high_ms"] and all(one >= 0.5 * growth for one in witnesses)
+
+
+def _known(times: Times, stage: str) -> bool:
+    return stage in times or (stage == "sum" and {"surface", "airlight"} <= set(times))
+
+
+def _median(times: Times, stage: str) -> float:
+    if stage == "sum":
+        return times["surface"]["median_ms"] + times["airlight"]["median_ms"]
+    return times[stage]["median_ms"]
+
+
+def _scaled(timing: Timing, factor: float) -> dict[str, Any]:
+    return {name: value if name == "repetitions" else factor * value for name, value in timing.items()}
