@@ -21,6 +21,8 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+from mpmath import mp, mpf
+
 from analytic.errors import InputError
 from analytic.phase import PhaseFunction
 
@@ -55,8 +57,6 @@ def integrate_certified(
     -----
     Valid for all finite inputs and infinite x1. Takes a tenth of a second to a few seconds.
     """
-    from mpmath import mp, mpf
-
     special = _special(foot, height, x0, x1, sigma_t, digits)
     if special is not None:
         return mpf(special)
@@ -82,8 +82,6 @@ def isotropic_closed_form(foot: float, height: float, x0: float, x1: float, sigm
     Valid for height > 0 or the light on the segment. The difference of the two terms loses digits where a segment is
     short or dim; the precision is raised until `digits` are left.
     """
-    from mpmath import mp, mpf
-
     special = _special(foot, height, x0, x1, sigma_t, digits)
     if special is not None:
         return mpf(special)
@@ -116,8 +114,6 @@ def _special(foot: float, height: float, x0: float, x1: float, sigma_t: float, d
 
 def _by_distance(foot: Any, height: Any, x0: Any, x1: Any, sigma_t: Any, phase: PhaseFunction) -> Any:
     """Integrate the definition over s = x - foot by tanh-sinh."""
-    from mpmath import mp
-
     s0, s1 = x0 - foot, x1 - foot
     scale = height if height > 0 else min(abs(s0), abs(s1))
 
@@ -142,8 +138,6 @@ def _by_distance(foot: Any, height: Any, x0: Any, x1: Any, sigma_t: Any, phase: 
 
 def _by_path(foot: Any, height: Any, x0: Any, x1: Any, sigma_t: Any, phase: PhaseFunction) -> Any:
     """Integrate over w, the logarithm of the path, by Gauss-Legendre."""
-    from mpmath import mp
-
     s0, s1 = x0 - foot, x1 - foot
     if height == 0:
         return _beside_light(foot, s0, s1, sigma_t, phase)
@@ -166,8 +160,6 @@ def _by_path(foot: Any, height: Any, x0: Any, x1: Any, sigma_t: Any, phase: Phas
 
 def _beside_light(foot: Any, s0: Any, s1: Any, sigma_t: Any, phase: PhaseFunction) -> Any:
     """Integrate a ray through the light, the light beside the segment: r = |s|, over the reciprocal u = 1/|s|."""
-    from mpmath import mp
-
     if s1 < 0:  # before the light the path has the length foot all along
         return mp.exp(-sigma_t * foot) * phase.mp(1) * (1 / -s1 - 1 / -s0)
     u0, u1 = mp.zero if mp.isinf(s1) else 1 / s1, 1 / s0
@@ -182,8 +174,6 @@ def _beside_light(foot: Any, s0: Any, s1: Any, sigma_t: Any, phase: PhaseFunctio
 
 def _kinks(phase: PhaseFunction) -> list[Any]:
     """Return the cosines at which the slope of a table jumps, in the current precision."""
-    from mpmath import mpf
-
     last = len(phase.kinks) + 1
     return [mpf(2 * k - last) / last for k in range(1, last)]
 
@@ -193,8 +183,6 @@ def _quadrature(integrand: Callable[[Any], Any], start: Any, end: Any, marks: li
 
     mpmath stops at an absolute error, so the integrand is divided by the integral, as known so far, until that is 1.
     """
-    from mpmath import mp
-
     points = [start, *sorted({m for m in marks if start < m < end}), end]
     size = abs(mp.quad(integrand, points, method=method, maxdegree=3))
     for _ in range(50):
@@ -209,7 +197,6 @@ def _quadrature(integrand: Callable[[Any], Any], start: Any, end: Any, marks: li
 
 def _closed_form(foot: Any, height: Any, x0: Any, x1: Any, sigma_t: Any) -> tuple[Any, Any]:
     """Return the closed form and the size of its larger term, for the loss of digits."""
-    from mpmath import mp
 
     def path_ratio(s: Any) -> Any:
         r = mp.sqrt(height * height + s * s)

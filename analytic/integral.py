@@ -32,6 +32,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.integrate import quad, tanhsinh
 
 from analytic.errors import InputError
 from analytic.phase import PhaseFunction
@@ -116,8 +117,6 @@ def integrate_path(
     foot: float, height: float, x0: float, x1: float, sigma_t: float, phase: PhaseFunction, *, rtol: float = 1e-11
 ) -> Estimate:
     """Integrate J over w, the logarithm of the path (module docstring, form "path"); as `integrate_distance`."""
-    from scipy.integrate import tanhsinh
-
     segment = _prepared(foot, height, x0, x1, sigma_t, phase)
     if isinstance(segment, Estimate):
         return segment
@@ -221,8 +220,6 @@ def _half(e: Any) -> tuple[Any, Any]:
 
 def _pieces(integrand: Callable[[float], float], end: float, marks: Iterable[float], *, rtol: float) -> Estimate:
     """Integrate from 0 to `end` with breaks at those marks that lie between, by Gauss-Kronrod with bisection."""
-    from scipy.integrate import quad
-
     ends = _between(marks, end)
     # full_output keeps QUADPACK from warning: what it could not reach is in the error estimate.
     parts = [

@@ -26,6 +26,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from mpmath import mp, mpf
 from numpy.typing import ArrayLike, NDArray
 
 from analytic.errors import InputError
@@ -110,8 +111,6 @@ class PhaseFunction:
 
     def mp(self, cos_scatter: Any) -> Any:
         """Evaluate one cosine in mpmath at its current precision; g and the table count as exact."""
-        from mpmath import mp, mpf
-
         c = mpf(cos_scatter)
         if self.name == "isotropic":
             return mpf(1)

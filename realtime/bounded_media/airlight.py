@@ -43,6 +43,8 @@ Biri, Arques, Michelin 2006, sections 4.2 and 5.2.
 
 from typing import Any
 
+import drjit as dr
+
 from realtime.bounded_media.directional_airlight import ParallelRay, parallel_airlight, parallel_source
 from realtime.bounded_media.panels import BodySegment, body_integral
 from realtime.bounded_media.ray_segments import MediaRay, Piece, light_leg, other_bodies_near, sum_over_pieces
@@ -73,8 +75,6 @@ def bounded_airlight(ray: MediaRay | ParallelRay, x0, x1):
     -----
     Valid for any segment. Times intensity / (4 pi) it is the radiance.
     """
-    import drjit as dr
-
     if isinstance(ray, ParallelRay):
         return parallel_airlight(ray, x0, x1)
     if ray.light.kind == "spot":
@@ -86,8 +86,6 @@ def bounded_airlight(ray: MediaRay | ParallelRay, x0, x1):
 
 def bounded_source(ray: MediaRay | ParallelRay, x):
     """Return albedo sigma exp(-tau) p at the distance x of the rays, RGB [1/m], 0 where nothing scatters."""
-    import drjit as dr
-
     if isinstance(ray, ParallelRay):
         return parallel_source(ray, x)
     Color = type(ray.medium.albedo)
@@ -105,8 +103,6 @@ def bounded_source(ray: MediaRay | ParallelRay, x):
 
 def ambient_radiance(ray_pieces: tuple[Piece, ...], distance, ambient: float):
     """Return the light of a constant field in the media, albedo ambient (1 - exp(-tau)) a piece, before `distance`."""
-    import drjit as dr
-
     total = type(ray_pieces[0].medium.albedo)(0)
     for piece in ray_pieces:
         length = dr.maximum(dr.minimum(dr.minimum(piece.end, distance), 1e30) - piece.begin, 0)
@@ -126,8 +122,6 @@ def check_form(medium: Medium, form: str) -> None:
 
 def _piece_integral(ray: MediaRay, piece: Piece, x0, x1):
     """Integrate one segment in one piece."""
-    import drjit as dr
-
     if piece.number is None or ray.form != "exact":
         return _integral(ray, piece, x0, x1)
     number = piece.number
@@ -155,8 +149,6 @@ def _piece_integral(ray: MediaRay, piece: Piece, x0, x1):
 
 def _integral(ray: MediaRay, piece: Piece, x0, x1):
     """Integrate one segment in one piece."""
-    import drjit as dr
-
     Float = type(ray.geometry.height)
     x1 = dr.minimum(x1, x0 + _OPTICAL_REACH / least_extinction(piece.medium))
     # A ray through the light itself: its integral is infinite, and so nearly is this.

@@ -19,6 +19,9 @@ between P and P + v lies in the body: min(f_out, 1) - min(f_in, 1).
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+
 from realtime.numerics.array_types import four_numbers, packed
 from realtime.scene.medium import Body
 
@@ -34,8 +37,6 @@ class Seen:
 
 def seen_from(body: Body, point) -> Seen:
     """Return what lines from a point, one for all lanes, need of a body."""
-    import drjit as dr
-
     toward = body.centre - point
     if body.planes is None:
         return Seen(body, toward, None)
@@ -71,9 +72,6 @@ def inverse_crossings(seen: Seen, start, direction, distances, active, *, leaves
         Lists; 1/f_in is 0 or less where the line misses, infinite from inside; 1/f_out may be 0 or less: it never
         leaves.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     if seen.body.planes is None:
         found = [_ball_crossings(seen, start + direction * x) for x in distances]
         return [one for one, _ in found], [other for _, other in found]
@@ -106,8 +104,6 @@ def _ball_crossings(seen: Seen, v):
 
     That is c u^2 - 2 b u + a = 0 with a = |v|^2, b = v . w, c = |w|^2 - radius^2, which is negative inside.
     """
-    import drjit as dr
-
     w = seen.toward
     a, b = dr.dot(v, v), dr.dot(v, w)
     distance = dr.norm(w)
@@ -131,8 +127,6 @@ def share_inside(enter, leave=None):
     enter, leave
         From `inverse_crossings`; `leave` None where the end is known to be inside.
     """
-    import drjit as dr
-
     begin = dr.rcp(dr.maximum(enter, 1))
     end = 1 if leave is None else dr.rcp(dr.maximum(leave, 1))
     return dr.maximum(end - begin, 0)
@@ -140,8 +134,6 @@ def share_inside(enter, leave=None):
 
 def near_line(seen: Seen, direction, length):
     """Return whether the line of a unit direction and a length comes near the body: cheap, and never wrongly no."""
-    import drjit as dr
-
     along = dr.dot(seen.toward, direction)
     nearest = dr.clip(along, 0, length)
     reach = seen.body.radius * 1.001

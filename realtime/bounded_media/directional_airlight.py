@@ -25,6 +25,9 @@ In a medium without bounds nothing arrives: the light would have crossed an endl
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+
 from realtime.bounded_media.body_views import sunny_sides
 from realtime.bounded_media.directional_legs import ParallelSeen, cylinder_bend, parallel_legs, slope_from
 from realtime.bounded_media.ray_segments import Piece, sum_over_pieces
@@ -80,8 +83,6 @@ def parallel_airlight(ray: ParallelRay, x0, x1):
     -----
     Valid for any segment. Times irradiance / (4 pi) it is the radiance.
     """
-    import drjit as dr
-
     Color = type(ray.medium.albedo)
     zero = dr.zeros(Color, dr.width(x0, x1, ray.direction))
     return sum_over_pieces(ray.pieces, [(x0, x1)], lambda *segment: _integral(ray, *segment), zero)
@@ -89,8 +90,6 @@ def parallel_airlight(ray: ParallelRay, x0, x1):
 
 def parallel_source(ray: ParallelRay, x):
     """Return albedo sigma exp(-tau) p at the distance x of the rays, RGB [1/m], 0 where nothing scatters."""
-    import drjit as dr
-
     Color = type(ray.medium.albedo)
     total = dr.zeros(Color, dr.width(x))
     for piece in ray.pieces:
@@ -105,9 +104,6 @@ def parallel_source(ray: ParallelRay, x):
 
 def _integral(ray: ParallelRay, piece: Piece, x0, x1):
     """Integrate one segment in one piece, from bend to bend."""
-    import drjit as dr
-    import mitsuba as mi
-
     linear = all(_has_few_planes(one) for one in ray.seen)
     Float, Color = type(x0), type(ray.medium.albedo)
     reach = piece.begin + _DARK / least_extinction(piece.medium)
@@ -143,8 +139,6 @@ def _has_few_planes(seen: ParallelSeen) -> bool:
 
 def _linear_channels(ray: ParallelRay, piece: Piece, slopes, at, x, end) -> list[Any]:
     """Return the integral from x to end, by channel, where the legs are linear."""
-    import drjit as dr
-
     lengths = [[dr.maximum(dr.fma(one.rate, here - at, one.length), 0) for one in slopes] for here in (x, end)]
     channels = []
     for channel, own in enumerate(piece.medium.sigma_t):
@@ -163,8 +157,6 @@ def _linear_channels(ray: ParallelRay, piece: Piece, slopes, at, x, end) -> list
 
 def _next_bend(ray: ParallelRay, at, x1):
     """Return where the legs bend next beyond `at`, or the end of the segment."""
-    import drjit as dr
-
     end = x1
     for one in ray.seen:
         if one.planes is None:
@@ -203,8 +195,6 @@ def _attenuation(ray: ParallelRay, piece: Piece, xs) -> list[list[Any]]:
 
 def _weight(ray: ParallelRay, piece: Piece):
     """Return albedo sigma p, as a colour [1/m]."""
-    import drjit as dr
-
     down = 0.25 * dr.squared_norm(ray.light.axis + ray.direction)
     up = 0.25 * dr.squared_norm(ray.light.axis - ray.direction)
     phase = evaluate_half(piece.medium.phase, down, up)
@@ -212,8 +202,6 @@ def _weight(ray: ParallelRay, piece: Piece):
 
 
 def _largest_extinction(medium: Medium):
-    import drjit as dr
-
     largest = medium.sigma_t[0]
     for sigma_t in medium.sigma_t[1:]:
         largest = dr.maximum(largest, sigma_t)

@@ -23,6 +23,9 @@ a|^2. That has no bends but where the ray enters and leaves the cylinder |w x a|
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+
 from realtime.numerics.array_types import four_numbers
 from realtime.scene.medium import Body
 
@@ -48,9 +51,6 @@ class ParallelSeen:
 
 def seen_along(body: Body, axis) -> ParallelSeen:
     """Return what the legs to a directional light need of a body; `axis` is one direction for all lanes."""
-    import drjit as dr
-    import mitsuba as mi
-
     if body.planes is None:
         return ParallelSeen(body, axis, None, None)
     *normal, offset = body.planes
@@ -81,9 +81,6 @@ def parallel_legs(seen: ParallelSeen, origin, direction, distances, active=True)
     active
         Lanes to compute; others have 0.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     start = origin - seen.body.centre
     if seen.planes is None:
         return [dr.select(active, _ball_leg(seen, start + direction * x), 0) for x in distances]
@@ -121,9 +118,6 @@ def slope_from(seen: ParallelSeen, origin, direction, x) -> Slope:
     x
         From where; at least a rounding error beyond the last bend, so that each is met once [m].
     """
-    import drjit as dr
-    import mitsuba as mi
-
     start = origin - seen.body.centre
     Float = type(x)
     width = dr.width(start, direction, x)
@@ -170,8 +164,6 @@ def slope_from(seen: ParallelSeen, origin, direction, x) -> Slope:
 
 def cylinder_bend(seen: ParallelSeen, origin, direction, x):
     """Return the next distance beyond `x` at which rays enter or leave the cylinder about a ball, or infinity [m]."""
-    import drjit as dr
-
     w = dr.cross(origin - seen.body.centre, seen.axis)
     v = dr.cross(direction, seen.axis)
     a, b = dr.squared_norm(v), dr.dot(w, v)
@@ -185,8 +177,6 @@ def cylinder_bend(seen: ParallelSeen, origin, direction, x):
 
 
 def _ball_leg(seen: ParallelSeen, w):
-    import drjit as dr
-
     along = dr.dot(w, seen.axis)
     inner = dr.square(seen.body.radius) - dr.squared_norm(dr.cross(w, seen.axis))
     root = dr.sqrt(dr.maximum(inner, 0))
@@ -195,8 +185,6 @@ def _ball_leg(seen: ParallelSeen, w):
 
 def _line(seen: ParallelSeen, number, start, direction):
     """Return phi of a plane at a ray's start, its slope along the ray, and whether the light comes in through it."""
-    import drjit as dr
-
     values = dr.gather(four_numbers(type(seen.planes)), seen.planes, number)
     comes_in = dr.gather(type(seen.planes), seen.comes_in, number) > 0
     g = values.xyz

@@ -22,6 +22,9 @@ no neighbour has less, none of all planes has.
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+
 from realtime.bounded_media.convex_clip import Seen
 from realtime.numerics.array_types import four_numbers, packed
 
@@ -64,9 +67,6 @@ def exit_planes(seen: Seen) -> EntryPlanes | None:
 
 
 def _facing_planes(seen: Seen, side: int) -> EntryPlanes | None:
-    import drjit as dr
-    import mitsuba as mi
-
     body = seen.body
     if body.planes is None:
         return None
@@ -86,8 +86,6 @@ def _facing_planes(seen: Seen, side: int) -> EntryPlanes | None:
 
 def _image_frame(seen: Seen):
     """Return axes in which the body's ball is seen between -1 and 1: (v . across, v . up)/(v . middle)."""
-    import drjit as dr
-
     toward, radius = seen.toward, seen.body.radius
     distance = dr.maximum(dr.norm(toward), 1e-6 * radius)
     # From within the ball there is no such image; any plane will do to begin at.
@@ -101,9 +99,6 @@ def _image_frame(seen: Seen):
 
 def _nearest_planes(seen: Seen, side: int):
     """Return by cell of the image the plane that the line through its middle meets first; `count` if there is none."""
-    import drjit as dr
-    import mitsuba as mi
-
     Float = type(seen.planes)
     Four = four_numbers(Float)
     cell = dr.arange(mi.UInt32, _CELLS * _CELLS)
@@ -130,9 +125,6 @@ def _nearest_planes(seen: Seen, side: int):
 
 def _start(planes: EntryPlanes, v):
     """Return a plane to begin at for lines along v."""
-    import drjit as dr
-    import mitsuba as mi
-
     across, up, middle = planes.frame
     scale = 0.5 * _CELLS / dr.maximum(dr.dot(v, middle), 1e-30)
     places = (dr.clip(dr.fma(dr.dot(v, axis), scale, 0.5 * _CELLS), 0, _CELLS - 1) for axis in (across, up))
@@ -158,8 +150,6 @@ def first_entry(planes: EntryPlanes, start, direction, x, active=True) -> Entry:
     -----
     Valid for points within the body. Where the light itself is, there is no such plane, and 0 for u.
     """
-    import drjit as dr
-    import mitsuba as mi
 
     def step(turn, number, constant, slope, searches):
         def nearer(best, other, line):
@@ -210,8 +200,6 @@ def line_crossings(planes: tuple[EntryPlanes, EntryPlanes], v):
     Where no plane next to the one that is found has less, the line enters by it if it meets its facet: if it is within
     the planes next to it on the other side of the body, too.
     """
-    import drjit as dr
-
     entering, leaving = planes
     still, zero = dr.zeros(type(v)), type(v.x)(0)
     entry = first_entry(entering, v, still, zero)
@@ -223,8 +211,6 @@ def line_crossings(planes: tuple[EntryPlanes, EntryPlanes], v):
 
 
 def _across(planes: EntryPlanes, number, side: int):
-    import drjit as dr
-
     return dr.gather(four_numbers(type(planes.across)), planes.across, number * planes.sides + side).xyz
 
 
@@ -234,8 +220,6 @@ def clear_of(planes: tuple[EntryPlanes, EntryPlanes], start, direction, x0, x1):
     With u the entering plane's and -w the leaving one's, legs that meet the body have u > 1 and u > -w. Both are linear
     along the ray: where u - max(1, -w) is below 0 at both ends with the planes of one point between, no leg does.
     """
-    import drjit as dr
-
     clear = dr.mask_t(x0)(False)
     for x in (0.5 * (x0 + x1), x0, x1):
         enter, leave = (first_entry(one, start, direction, x) for one in planes)
@@ -253,7 +237,6 @@ def next_bend(planes: EntryPlanes, start, direction, entry: Entry):
 
     A bend that lies behind by rounding is returned as it is: whoever walks goes on from where he is.
     """
-    import drjit as dr
 
     def sooner(best, other, line):
         closing = entry.slope - line[1]
@@ -268,9 +251,6 @@ def next_bend(planes: EntryPlanes, start, direction, entry: Entry):
 
 def _over_neighbours(planes: EntryPlanes, number, state, start, direction, function):
     """Go over the neighbours of a plane: state = function(state, number, (constant, slope))."""
-    import drjit as dr
-    import mitsuba as mi
-
     Four = four_numbers(type(start.x))
     place = number * planes.sides
 

@@ -26,6 +26,9 @@ from dataclasses import dataclass
 from functools import reduce
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+
 from realtime.bounded_media.convex_clip import Seen, inverse_crossings
 from realtime.bounded_media.facet_walk import Entry, EntryPlanes, first_entry, next_bend
 from realtime.numerics.array_types import is_single
@@ -65,9 +68,6 @@ class BodySegment:
 
 def body_integral(one: BodySegment, x0, x1):
     """Return albedo sigma_t times the integral from x0 to x1 within the body, RGB [1/m^2]."""
-    import drjit as dr
-    import mitsuba as mi
-
     Float, Color = type(x0), type(one.medium.albedo)
     foot = one.geometry.foot
     # A ray through the light itself: its integral is infinite, and so nearly is this.
@@ -106,17 +106,12 @@ def body_integral(one: BodySegment, x0, x1):
 
 def _walk_from(one: BodySegment, x):
     """Return the plane where legs enter; of a ball nothing needs to be known."""
-    import drjit as dr
-    import mitsuba as mi
-
     if one.planes is None:
         return Entry(dr.zeros(mi.UInt32, dr.width(x)), x * 0, x * 0)
     return first_entry(one.planes, one.start, one.direction, x)
 
 
 def _bend(one: BodySegment, walk: Entry):
-    import drjit as dr
-
     if one.planes is None:
         return type(walk.constant)(dr.inf), walk
     return next_bend(one.planes, one.start, one.direction, walk)
@@ -124,8 +119,6 @@ def _bend(one: BodySegment, walk: Entry):
 
 def _panel_length(one: BodySegment, walk: Entry, *, s, square, h, length):
     """Return the length of a panel: the whole `length`, or an equal part of it [m]."""
-    import drjit as dr
-
     x = s + one.geometry.foot
     u = dr.fma(walk.slope, x, walk.constant)
     slope = dr.abs(walk.slope)
@@ -150,8 +143,6 @@ def _ball_length(one: BodySegment, x):
     The part of the leg in the ball is like the root of it: steep where legs graze the ball. With w from the light to
     the middle of the ball it is radius^2 - |v x w|^2/|v|^2.
     """
-    import drjit as dr
-
     radius, w = one.seen.body.radius, one.seen.toward
     v = dr.fma(one.direction, x, one.start)
     cross, square = dr.cross(v, w), dr.squared_norm(v)
@@ -162,8 +153,6 @@ def _ball_length(one: BodySegment, x):
 
 
 def _largest_tangent(one: BodySegment):
-    import drjit as dr
-
     phase = one.medium.phase
     turn = dr.maximum(1 - dr.abs(phase.g), 0.03) if phase.name == "hg" else _TURN[phase.name]
     if one.light.soft:
@@ -173,8 +162,6 @@ def _largest_tangent(one: BodySegment):
 
 def _panel(one: BodySegment, walk: Entry, *, ends, squares, h) -> list[Any]:
     """Return the integrals of p exp(-tau) / r^2 over a panel, by channel."""
-    import drjit as dr
-
     s0, s1 = ends
     Float = type(s0)
     length = s1 - s0
@@ -203,8 +190,6 @@ def _panel(one: BodySegment, walk: Entry, *, ends, squares, h) -> list[Any]:
 
 def _before_body(one: BodySegment, walk: Entry, x, r):
     """Return what of the leg to a point within the body lies before it [m]."""
-    import drjit as dr
-
     if one.planes is None:
         (u,), _ = inverse_crossings(one.seen, one.start, one.direction, [x], True)
         return r / dr.maximum(u, 1)

@@ -7,6 +7,8 @@ Lines are followed over the facets of bodies (`realtime.bounded_media.facet_walk
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+
 from realtime.bounded_media.body_views import BodySides, body_sides, light_sides
 from realtime.bounded_media.convex_clip import Seen, inverse_crossings, near_line, share_inside
 from realtime.bounded_media.directional_legs import parallel_legs, seen_along
@@ -57,8 +59,6 @@ def sum_over_pieces(pieces: tuple[Piece, ...], segments, integral, zero):
     zero
         The colour of no segment, of the rays' width.
     """
-    import drjit as dr
-
     Color = type(zero)
     total = zero
     for piece in pieces:
@@ -85,8 +85,6 @@ def camera_pieces(medium: Medium, origin, direction, sides: tuple[BodySides, ...
     sides
         The bodies as the camera sees them, if they are known.
     """
-    import drjit as dr
-
     Float = type(direction.x)
     sides = sides or tuple(body_sides(body, origin) for body in medium.bodies)
     passages = [_passage(one, direction) for one in sides]
@@ -141,8 +139,6 @@ def media_ray(
 
 def _passage(sides: BodySides, direction):
     """Return where camera rays enter and leave a body [m], both infinite where they miss it."""
-    import drjit as dr
-
     seen, planes = sides.seen, (sides.entering, sides.leaving)
     nothing = type(direction.x)(dr.inf)
 
@@ -162,8 +158,6 @@ def _passage(sides: BodySides, direction):
 
 def camera_insides(medium: Medium, origin, direction, distance) -> tuple[Any, ...]:
     """Return what of camera rays up to a distance lies in each body [m]; arguments as in `camera_pieces`."""
-    import drjit as dr
-
     insides = []
     for body in medium.bodies:
         ends = _passage(body_sides(body, origin), direction)
@@ -174,8 +168,6 @@ def camera_insides(medium: Medium, origin, direction, distance) -> tuple[Any, ..
 
 def optical_depths(medium: Medium, distance, insides) -> tuple[Any, ...]:
     """Return the optical depth up to a distance, by channel; `insides` is what of it lies in each body [m]."""
-    import drjit as dr
-
     depths = [type(distance)(0) if medium.clear else sigma * distance for sigma in medium.sigma_t]
     for body, inside in zip(medium.bodies, insides, strict=True):
         excess = [own - sigma for own, sigma in zip(body.medium.sigma_t, medium.sigma_t)]
@@ -197,8 +189,6 @@ def path_transmittance(medium: Medium, light: Light, *, depths, point, active):
     active
         Lanes to compute.
     """
-    import drjit as dr
-
     if light.kind == "directional":
         still = dr.zeros(type(point))
         for body in medium.bodies:
@@ -227,8 +217,6 @@ def path_transmittance(medium: Medium, light: Light, *, depths, point, active):
 
 def line_ends(seen: Seen, planes, v):
     """Return 1/f_in and 1/f_out of lines along v, as of `realtime.bounded_media.convex_clip.inverse_crossings`."""
-    import drjit as dr
-
     if seen.body.planes is None:
         (enter,), (leave,) = inverse_crossings(seen, v, dr.zeros(type(v)), [type(v.x)(0)], True)
         return enter, leave
@@ -237,8 +225,6 @@ def line_ends(seen: Seen, planes, v):
 
 def light_leg(ray: MediaRay, piece: Piece, xs, rs) -> list[list[Any]]:
     """Return by body and node what of the leg from the light lies in it [m]."""
-    import drjit as dr
-
     insides = []
     for number, seen in enumerate(ray.seen):
         own = number == piece.number
@@ -252,8 +238,6 @@ def light_leg(ray: MediaRay, piece: Piece, xs, rs) -> list[list[Any]]:
 
 def other_bodies_near(ray: MediaRay, number: int, x0, x1):
     """Return whether legs from the light to points of a segment in a body may meet another body."""
-    import drjit as dr
-
     xs = [x0, x1]
     rs = [distance_to_light(ray.geometry, x) for x in xs]
     meets: Any = False
@@ -286,8 +270,6 @@ def _near_legs(ray: MediaRay, seen: Seen, xs, rs):
     light and the others at (s_0, h) and (s_1, h); q is the distance of the body's centre from the plane. First and last
     node stand for the ends.
     """
-    import drjit as dr
-
     geometry, radius = ray.geometry, seen.body.radius * 1.001
     foot = dr.fma(ray.direction, geometry.foot, ray.start)
     size = dr.norm(foot)

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The view of a frame, from its camera and what was found before the method's turn."""
 
+import drjit as dr
+import mitsuba as mi
+
 from realtime.frame.surface import visible_triangle
 from realtime.methods.shadow_planes.tile_boxes import TILE
 from realtime.methods.view import View
@@ -29,9 +32,6 @@ def frame_view(
     `geometry` may be None where the method casts no rays, and `tile` where sixteen pixels that follow one another are a
     tile.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     direction, low = ray_directions(camera, pixel)
     return View(
         origin=camera.origin,
@@ -56,23 +56,15 @@ def frame_view(
 
 def _rays(camera: Camera, pixel):
     """Return the function from lanes to the directions of their rays."""
-    import drjit as dr
-    import mitsuba as mi
-
     return lambda lane: ray_directions(camera, dr.gather(mi.UInt32, pixel, lane))
 
 
 def _in_square_tiles(camera: Camera, pixel) -> bool:
-    import drjit as dr
-
     return camera.width % 4 == 0 and camera.height % 4 == 0 and dr.width(pixel) > 1
 
 
 def _visible(geometry, point, light):
     """Cast a shadow ray from the light, where nothing can block it at once, to just before the point."""
-    import drjit as dr
-    import mitsuba as mi
-
     if light.kind == "directional":
         # From the point on, where a ray is exact, though not from the surface that it may lie on.
         away = 2e-6 * light.face.depth

@@ -10,13 +10,13 @@ import gc
 from collections.abc import Callable
 from typing import Any
 
+import drjit as dr
+
 
 class Frozen:
     """A function frozen by `drjit.freeze`, during whose calls nothing is collected."""
 
     def __init__(self, function: Callable[..., Any], **options):
-        import drjit as dr
-
         self._recorded = dr.freeze(function, **options)
 
     def __call__(self, *args):

@@ -12,6 +12,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
 from realtime.bounded_media.body_views import media_sides
 from realtime.errors import InputError
 from realtime.frame.frame_view import frame_view
@@ -83,9 +87,6 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
         For a parameter that the method does not have, where a kernel is missing, and for what method or kernel refuse;
         what the kernel of a method that is not frozen refuses comes with the first frame.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     unknown = set(parameters) - set(method.parameters)
     if unknown:
         known = ", ".join(method.parameters) or "none"
@@ -185,8 +186,6 @@ def run_stages(renderer: FrameRenderer, prepared):
 
 def evaluated(cast: Cast, by_light, found):
     """Return distance, surface and airlight, evaluated, from what the stages returned."""
-    import drjit as dr
-
     airlight, lit_surface = found
     surface = by_light[0] if lit_surface is None else lit_surface
     dr.eval(cast.distance, surface, airlight)
@@ -250,8 +249,6 @@ def _nothing(scene: Scene) -> tuple[()]:
 
 
 def _image(renderer: FrameRenderer, values, shape):
-    import numpy as np
-
     lanes = np.array(values)
     lanes = lanes.T if lanes.ndim == 2 else lanes
     image = np.empty_like(lanes)

@@ -13,6 +13,9 @@ surface is black from behind, as in Mitsuba's `diffuse`.
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+
 from realtime.bounded_media.ray_segments import path_transmittance
 from realtime.rays.ray_light import falloff, ray_geometry
 from realtime.scene.lights import Light
@@ -55,8 +58,6 @@ def cast_rays(scene, facets: Facets | None, origin, direction) -> Cast:
     origin, direction
         Rays in any precision; they are cast in float32.
     """
-    import drjit as dr
-
     Float = type(origin.x)
     hit = scene.ray_intersect_preliminary(_ray(origin, direction), coherent=True)
     valid = hit.is_valid()
@@ -68,9 +69,6 @@ def cast_rays(scene, facets: Facets | None, origin, direction) -> Cast:
 
 def visible_surface(cast: Cast, facets: Facets | None, origin, direction, *, color) -> VisibleSurface:
     """Return the surfaces that camera rays meet, arguments as for `cast_rays`; `color` is the type of an albedo."""
-    import drjit as dr
-    import mitsuba as mi
-
     Vector = type(direction)
     distance = cast.distance
     valid = dr.isfinite(distance)
@@ -103,9 +101,6 @@ def visible_triangle(scene, origin, direction):
     seen
         Whether a triangle is hit.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     hit = scene.ray_intersect_preliminary(_ray(origin, direction), coherent=True)
     mesh = mi.MeshPtr(hit.shape)
     seen = hit.is_valid() & hit.shape.is_mesh()
@@ -118,8 +113,6 @@ def visible_triangle(scene, origin, direction):
 
 
 def _ray(origin, direction):
-    import mitsuba as mi
-
     return mi.Ray3f(mi.Point3f(origin), mi.Vector3f(direction))
 
 
@@ -140,9 +133,6 @@ def lit_surface(scene, surface: VisibleSurface, *, medium: Medium, light: Light,
     shadows
         Whether to cast shadow rays; a method that finds out otherwise what is lit leaves them to that.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     if light.kind == "directional":
         return _sunlit(scene, surface, medium=medium, light=light, depths=depths, shadows=shadows)
     to_light = light.position - surface.point
@@ -162,9 +152,6 @@ def lit_surface(scene, surface: VisibleSurface, *, medium: Medium, light: Light,
 
 def _sunlit(scene, surface: VisibleSurface, *, medium: Medium, light: Light, depths, shadows: bool):
     """Return what `lit_surface` does for a directional light, through bounded media."""
-    import drjit as dr
-    import mitsuba as mi
-
     cosine = -dr.dot(surface.normal, light.axis)
     lit = surface.seen & (cosine > 0)
     if shadows:
@@ -176,8 +163,6 @@ def _sunlit(scene, surface: VisibleSurface, *, medium: Medium, light: Light, dep
 
 def _profile(light: Light, point, away):
     """Return the relative intensity of the light in the unit direction `away`, from the light to a point."""
-    import drjit as dr
-
     if light.kind == "point":
         return type(away.x)(1)
     inside = dr.dot(light.axis, away) > light.cos_cutoff

@@ -10,6 +10,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+import drjit as dr
+
 from realtime.bounded_media.ray_segments import camera_insides, optical_depths
 from realtime.frame.recorded import Frozen
 from realtime.frame.surface import Cast, cast_rays, lit_surface, visible_surface
@@ -66,14 +68,10 @@ def surface_stages(scene: Scene, *, lights_surfaces: bool) -> tuple[Callable[...
 
 
 def _nothing_met(geometry, facets, pixel, camera, medium, lights):
-    import drjit as dr
-
     cast = Cast(dr.full(type(camera.origin.x), dr.inf, dr.width(pixel)))
     return cast, no_surface(geometry, facets, pixel, camera, medium, lights, cast)
 
 
 def no_surface(geometry, facets, pixel, camera, medium, lights, cast):
     """Return what `shade` returns where there are no surfaces."""
-    import drjit as dr
-
     return tuple(dr.zeros(type(medium.albedo), dr.width(pixel)) for _ in lights)

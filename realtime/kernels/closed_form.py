@@ -33,6 +33,8 @@ the error that they leave there; a test on the change from one level to the next
 fraction all terms that make Im w agree in sign, so Im S keeps its relative accuracy where it is tiny.
 """
 
+import drjit as dr
+
 from realtime.errors import InputError
 from realtime.numerics.array_types import is_single, smallest
 from realtime.rays.ray_light import RayGeometry
@@ -85,8 +87,6 @@ def closed_form(geometry: RayGeometry, x0, x1, medium: Medium, light: Light):
     Graphics Forum 28(2); Pegoraro, Schott, Parker 2009, *An analytical approach to single scattering for anisotropic
     media and light distributions*, Graphics Interface, for polynomials in the cosine.
     """
-    import drjit as dr
-
     if medium.phase.name not in _POLYNOMIALS:
         raise InputError(
             f"kernel closed-form: phase function {medium.phase.name!r} is no polynomial in the cosine; use the kernel "
@@ -111,8 +111,6 @@ def closed_form(geometry: RayGeometry, x0, x1, medium: Medium, light: Light):
 
 def _tail(foot, h, x, sigma_t, polynomial):
     """Return exp(-sigma_t foot) int_E^inf exp(-a E') p u dE' for the E of the point at `x`."""
-    import drjit as dr
-
     s = x - foot
     r = dr.sqrt(dr.fma(s, s, h * h))
     e = dr.select(s >= 0, (s + r) / h, h / (r - s))
@@ -146,8 +144,6 @@ def scaled_e1(e, a):
     float64, just inside the circle at large e, and by about one rounding in the median; the real part by as little of
     |S|.
     """
-    import drjit as dr
-
     radius, terms, levels = _REGIONS[4 if is_single(type(a)) else 8]
     x, y = a * e, -a
     inside = dr.fma(x, x, y * y) < radius * radius
@@ -159,8 +155,6 @@ def scaled_e1(e, a):
 
 def _series(x, y, argument, terms: int):
     """Return S(x + i y), where `argument` = -arg z is known better than z: it is atan(1/e), at a = 0 too."""
-    import drjit as dr
-
     Float = type(x)
     magnitude = dr.maximum(dr.maximum(dr.abs(x), dr.abs(y)), smallest(Float))
     ratio_x, ratio_y = x / magnitude, y / magnitude
@@ -182,8 +176,6 @@ def _series(x, y, argument, terms: int):
 
 def _fraction(x, y, levels: int):
     """Return S(x + i y) by the continued fraction, from level `levels` up."""
-    import drjit as dr
-
     Float = type(x)
 
     def step(k, real, imaginary):

@@ -27,6 +27,9 @@ below 1e-10; the isotropic case has no lobe, and pairs of nodes about the centre
 
 from functools import reduce
 
+import drjit as dr
+import mitsuba as mi
+
 from realtime.kernels.panels import panels_mean
 from realtime.kernels.quadrature import path_interval, quadrature
 from realtime.kernels.short_segments import FEW, MORE, extent, serves, short_segment
@@ -61,8 +64,6 @@ def exact(geometry: RayGeometry, x0, x1, medium: Medium, light: Light):
     A tabulated phase function is integrated across its kinks: about 1e-4 for a coarse table. Where a spot's intensity
     falls off between beam and cut-off, the segment is cut into three; those that are empty cost nothing.
     """
-    import drjit as dr
-
     if is_single(type(geometry.height)):
         # The extinctions share their nodes.
         values = _in_single(geometry, (x0, x1), medium.sigma_t, medium.phase, light)
@@ -75,8 +76,6 @@ def exact(geometry: RayGeometry, x0, x1, medium: Medium, light: Light):
 
 def _in_single(geometry: RayGeometry, segment, extinctions, phase: Phase, light: Light):
     """Return one value per extinction."""
-    import drjit as dr
-
     if light.soft:
         return _over_stretches(geometry, segment, extinctions, phase, light)
     x0, x1 = segment
@@ -113,8 +112,6 @@ def _over_stretches(geometry: RayGeometry, segment, extinctions, phase: Phase, l
 
 
 def _stretch(geometry: RayGeometry, x0, x1, extinctions, phase: Phase, light: Light):
-    import drjit as dr
-
     Float = type(geometry.height)
     scale, tail = _lobe_scales(phase, Float)
     h, e0, e1, difference = path_interval(geometry, x0, x1, reduce(dr.minimum, extinctions), tail=tail)
@@ -135,9 +132,6 @@ def _stretch(geometry: RayGeometry, x0, x1, extinctions, phase: Phase, light: Li
 
 def _double_mean(phase: Phase, start, scale, width, decays, weight):
     """Do what `panels_mean` does, in float64 and for one extinction: a loop over as many panels for all."""
-    import drjit as dr
-    import mitsuba as mi
-
     Float = type(width)
     f0, c0 = start
     (decay,) = decays
@@ -170,8 +164,6 @@ def _double_mean(phase: Phase, start, scale, width, decays, weight):
 
 def _lobe_scales(phase: Phase, Float):
     """Return the E where a forward lobe ends, at most 1, and the E where a backward lobe begins, at least 1."""
-    import drjit as dr
-
     if phase.name == "hg":
         forward, backward = dr.maximum(Float(phase.g), 0), dr.maximum(-Float(phase.g), 0)
         return (1 - forward) / (1 + forward), (1 + backward) / (1 - backward)

@@ -8,6 +8,9 @@
 Both are of order 2 in the number of steps once the steps resolve the integrand.
 """
 
+import drjit as dr
+import mitsuba as mi
+
 from realtime.errors import InputError
 from realtime.numerics.array_types import smallest
 from realtime.rays.ray_light import RayGeometry, distance_to_light, falloff
@@ -33,8 +36,6 @@ def uniform(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, step
     Valid where a step is shorter than the distance to the light, everywhere on the ray. An endless ray is cut after 20
     optical depths; through a vacuum it has no step length, and the result means nothing.
     """
-    import drjit as dr
-
     _check(steps)
     thinnest = dr.maximum(least_extinction(medium), smallest(type(x1)))
     x1 = dr.select(dr.isinf(x1), x0 + _REACH / thinnest, x1)
@@ -66,8 +67,6 @@ def equiangular(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, 
     ----------
     Kulla, Fajardo 2012, *Importance sampling techniques for path tracing in participating media*, section 4.
     """
-    import drjit as dr
-
     _check(steps)
     foot, h = geometry.foot, geometry.height
     theta0 = dr.atan2(x0 - foot, h)
@@ -88,8 +87,6 @@ def _check(steps: int) -> None:
 
 def _integrand(geometry: RayGeometry, medium: Medium, light: Light, sigma_t, point):
     """Return exp(-sigma_t (x + r)) p times the falloff of a spot, at `point` = (x, r)."""
-    import drjit as dr
-
     x, r = point
     value = dr.exp(-sigma_t * (x + r)) * evaluate(medium.phase, (geometry.foot - x) / r)
     return value * falloff(geometry, light, x) if light.soft else value
@@ -97,9 +94,6 @@ def _integrand(geometry: RayGeometry, medium: Medium, light: Light, sigma_t, poi
 
 def _midpoints(term, begin, width, steps: int):
     """Sum the midpoint rule in one loop, so that the kernel does not grow with the number of steps."""
-    import drjit as dr
-    import mitsuba as mi
-
     Float = type(width)
     _, total = dr.while_loop(
         state=(mi.UInt32(0), dr.zeros(Float, dr.width(width))),

@@ -37,6 +37,9 @@ from collections.abc import Callable
 from functools import reduce
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+
 from realtime.numerics.fast_exp import LOG2_E, exp2_bounded, sinh_bounded
 from realtime.numerics.gauss_legendre import unit_nodes
 from realtime.scene.phase import Phase, evaluate_half
@@ -75,9 +78,6 @@ def panels_mean(phase: Phase, start, scale, width, decays, weight: Callable[[Any
     -----
     Valid for any decay. The values are 0 where e^-80 is.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     Float = type(width)
     f, c = start
     largest = reduce(dr.maximum, decays)
@@ -113,16 +113,11 @@ def panels_mean(phase: Phase, start, scale, width, decays, weight: Callable[[Any
 
 
 def _kept(depth):
-    import drjit as dr
-
     return exp2_bounded(dr.maximum(depth, -_DEEPEST))
 
 
 def panel_count(phase: Phase, width, depth, *, soft: bool = False):
     """Return the number of panels m of segments of some width in v, and depth T; 0 where the width is 0."""
-    import drjit as dr
-    import mitsuba as mi
-
     Float = type(width)
     if phase.name == "hg":
         widest = dr.select(Float(phase.g) >= 0, Float(_FORWARD), Float(_BACKWARD))
@@ -140,8 +135,6 @@ def density(phase: Phase, f, c, scale):
     Henyey and Greenstein's function is (1 - g)(1 + g)/b^(3/2) with b (1 + E^2) = (1 - g)^2 + (1 + g)^2 E^2, whatever
     the sign of g: all that is left of it are a reciprocal and a square root.
     """
-    import drjit as dr
-
     if phase.name == "isotropic":
         return dr.rcp(c)
     if phase.name == "rayleigh":
@@ -159,8 +152,6 @@ def density(phase: Phase, f, c, scale):
 
 def _offset(u):
     """Return sinh u and cosh u - 1."""
-    import drjit as dr
-
     half = sinh_bounded(0.5 * u)
     double = 2 * half
     return double * dr.sqrt(dr.fma(half, half, 1)), double * half

@@ -42,6 +42,8 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
+import drjit as dr
+
 from realtime.errors import InputError
 from realtime.kernels.polynomial_piece import Piece, integrand, offset, piece_of, place, with_limits
 from realtime.rays.ray_light import RayGeometry, stretches
@@ -147,8 +149,6 @@ def _per_extinction(fit: RayPolynomial, function):
 
 def _part(piece: Piece, x_begin, x_end):
     """Integrate a piece's polynomial from x_begin, or from its near end if None, to x_end."""
-    import drjit as dr
-
     end = dr.clip(x_end, piece.x0, piece.x1)
     u1 = dr.minimum(offset(piece, piece.near, end), piece.width)
     begin, u0, length = piece.x0, 0.0, u1

@@ -13,6 +13,8 @@ sums of positive terms. The far end is brought to where extinction or 1/(1 + E^2
 from dataclasses import dataclass, replace
 from typing import Any
 
+import drjit as dr
+
 from realtime.numerics.array_types import is_single, smallest
 from realtime.numerics.fast_exp import exp_bounded
 from realtime.rays.ray_light import RayGeometry, falloff
@@ -53,8 +55,6 @@ class Piece:
 
 def piece_of(geometry: RayGeometry, x0, x1, sigma_t, phase: Phase) -> Piece:
     """Return the range of [x0, x1] in u, without a polynomial."""
-    import drjit as dr
-
     foot = geometry.foot
     Float = type(geometry.height)
     single = is_single(Float)
@@ -89,15 +89,11 @@ def piece_of(geometry: RayGeometry, x0, x1, sigma_t, phase: Phase) -> Piece:
 
 
 def _path_over_height(s, r, h):
-    import drjit as dr
-
     return dr.select(s >= 0, (s + r) / h, h / (r - s))
 
 
 def place(piece: Piece, x) -> Place:
     """Return where a point lies, one beyond the reach of the piece at its reach."""
-    import drjit as dr
-
     s, h = dr.select(dr.isinf(x), 0, x - piece.foot), piece.height
     r = dr.sqrt(dr.fma(s, s, h * h))
     limit = piece.near.sinh + piece.reach
@@ -111,8 +107,6 @@ def offset(piece: Piece, begin: Place, x):
     Since dq = (1 + ds/dr) dx, E - E0 = (x - x0)(E0 + E)/(r0 + r), and by the addition theorem of sinh w - w0 =
     asinh(F C0 - F0 C) = asinh((F - F0)(F0 + F)/(F C0 + F0 C)).
     """
-    import drjit as dr
-
     end = place(piece, x)
     beyond = end.sinh >= piece.near.sinh + piece.reach
     total = begin.sinh + end.sinh
@@ -122,8 +116,6 @@ def offset(piece: Piece, begin: Place, x):
 
 def integrand(piece: Piece, u, geometry: RayGeometry, medium: Medium, light: Light):
     """Return f(u)."""
-    import drjit as dr
-
     start, cosh_start = piece.near.sinh, piece.near.cosh
     if light.soft:
         sinh, cosh = dr.sincosh(u)  # accurate for small u too: the place in the cone depends on it
@@ -147,7 +139,5 @@ def integrand(piece: Piece, u, geometry: RayGeometry, medium: Medium, light: Lig
 
 def with_limits(piece: Piece, x0, x1, value):
     """Put in what holds where the formulas are 0/0: segments of no length, and the light on the segment."""
-    import drjit as dr
-
     on_light = piece.through_light & (x0 <= piece.foot) & (piece.foot <= x1)
     return dr.select(x1 == x0, 0, dr.select(on_light, dr.inf, value))

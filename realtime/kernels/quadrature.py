@@ -27,6 +27,9 @@ a spot falls off between beam and cut-off, it is split at the cone of the beam, 
 
 from functools import lru_cache
 
+import drjit as dr
+import numpy as np
+
 from realtime.errors import InputError
 from realtime.numerics.array_types import is_single, smallest
 from realtime.numerics.fast_exp import exp_bounded
@@ -63,8 +66,6 @@ def sum_panels(geometry: RayGeometry, panels, medium: Medium, light: Light, node
 
 
 def _panels(geometry: RayGeometry, x0, x1, medium: Medium, light: Light):
-    import drjit as dr
-
     if medium.phase.name != "isotropic" and not light.soft:
         split = dr.clip(geometry.foot, x0, x1)
         return [(x0, split), (split, x1)]
@@ -74,8 +75,6 @@ def _panels(geometry: RayGeometry, x0, x1, medium: Medium, light: Light):
 @lru_cache
 def _positive_nodes(nodes: int) -> tuple[tuple[float, float], ...]:
     """Return the positive half of the Gauss-Legendre nodes of [-1, 1] with their weights."""
-    import numpy as np
-
     if nodes < 2 or nodes % 2:
         raise InputError(f"nodes: got {nodes}, wanted a positive even number of quadrature nodes")
     xi, weight = np.polynomial.legendre.leggauss(nodes)
@@ -83,8 +82,6 @@ def _positive_nodes(nodes: int) -> tuple[tuple[float, float], ...]:
 
 
 def _panel(geometry: RayGeometry, x0, x1, sigma_t, medium: Medium, light: Light, nodes: int):
-    import drjit as dr
-
     h, e0, e1, difference = path_interval(geometry, x0, x1, sigma_t)
     c0, c1 = dr.sqrt(dr.fma(e0, e0, 1)), dr.sqrt(dr.fma(e1, e1, 1))
     half = 0.5 * dr.asinh(difference * ((e0 + e1) / dr.fma(e1, c0, e0 * c1)))
@@ -112,8 +109,6 @@ def path_interval(geometry: RayGeometry, x0, x1, sigma_t, *, tail=1.0):
     The far end is brought to where extinction or p/(1 + E^2) have left nothing behind it. `tail` is the E from which on
     p/(1 + E^2) falls like 1/E^2: 1, or where a backward lobe ends.
     """
-    import drjit as dr
-
     foot, h = geometry.foot, geometry.height
     Float = type(h)
     single = is_single(Float)
@@ -134,16 +129,12 @@ def path_interval(geometry: RayGeometry, x0, x1, sigma_t, *, tail=1.0):
 
 
 def _path_over_height(s, r, h):
-    import drjit as dr
-
     behind = s >= 0
     return dr.select(behind, s + r, h) / dr.select(behind, h, r - s)
 
 
 def _pairs(geometry: RayGeometry, ray, panel, *, phase, light: Light, nodes):
     """Sum the pairs of nodes of one panel; `ray` is foot, height, extinction and `panel` half width, E_c, C_c."""
-    import drjit as dr
-
     foot, h, sigma_t = ray
     half, e_mid, c_mid = panel
     plain = phase.name == "isotropic" and not light.soft

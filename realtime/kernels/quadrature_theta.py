@@ -8,6 +8,8 @@ The integrand is bounded, and smooth where the segment ends before theta nears p
 has an essential singularity. `realtime.kernels.quadrature` avoids it.
 """
 
+import drjit as dr
+
 from realtime.errors import InputError
 from realtime.numerics.gauss_legendre import unit_nodes
 from realtime.rays.ray_light import RayGeometry, distance_to_light, falloff
@@ -31,8 +33,6 @@ def quadrature_theta(geometry: RayGeometry, x0, x1, medium: Medium, light: Light
     Valid for rays that do not meet the light (height above 0). The difference of the angles is taken as one arc
     tangent, so that short segments do not cancel.
     """
-    import drjit as dr
-
     if not isinstance(nodes, int) or nodes < 1:
         raise InputError(f"nodes: got {nodes!r}, wanted a whole number of at least 1")
     split = dr.clip(geometry.foot, x0, x1)
@@ -45,8 +45,6 @@ def quadrature_theta(geometry: RayGeometry, x0, x1, medium: Medium, light: Light
 
 
 def _panel(geometry: RayGeometry, x0, x1, sigma_t, medium: Medium, light: Light, nodes: int):
-    import drjit as dr
-
     foot, h = geometry.foot, geometry.height
     s0, s1 = x0 - foot, dr.select(dr.isinf(x1), 0, x1 - foot)
     theta0 = dr.atan2(s0, h)

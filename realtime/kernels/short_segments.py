@@ -20,6 +20,8 @@ from dataclasses import dataclass
 from functools import reduce
 from typing import Any
 
+import drjit as dr
+
 from realtime.numerics.fast_exp import exp_bounded
 from realtime.numerics.gauss_legendre import unit_nodes
 from realtime.rays.ray_light import RayGeometry
@@ -49,8 +51,6 @@ class Extent:
 
 def extent(geometry: RayGeometry, x0, x1, extinctions) -> Extent:
     """Return how long segments are."""
-    import drjit as dr
-
     s0, length, height_squared = x0 - geometry.foot, x1 - x0, dr.square(geometry.height)
     s1 = s0 + length
     nearest = dr.clip(0, s0, s1)
@@ -63,8 +63,6 @@ def serves(rule: Rule, found: Extent, phase: Phase):
 
     Length and depth each spoil part of it: by themselves they may reach their limits, together an ellipse.
     """
-    import drjit as dr
-
     of_length, of_depth = 1 / rule.lengths[phase.name] ** 2, 1 / rule.depth**2
     return dr.fma(found.square, of_length, dr.square(found.depth) * of_depth) < 1
 
@@ -87,8 +85,6 @@ def short_segment(geometry: RayGeometry, x0, x1, phase: Phase, extinctions, *, r
     -----
     Valid where the rule `serves`.
     """
-    import drjit as dr
-
     s0, length, height_squared = x0 - geometry.foot, x1 - x0, dr.square(geometry.height)
     totals = [type(length)(0) for _ in extinctions]
     for fraction, share in unit_nodes(rule.nodes):
@@ -107,8 +103,6 @@ def short_segment(geometry: RayGeometry, x0, x1, phase: Phase, extinctions, *, r
 
 def _half_angle(s, r, inverse, height_squared):
     """Return sin^2 and cos^2 of half the scattering angle, (r +- s)/(2 r), the smaller one without cancellation."""
-    import drjit as dr
-
     small = 0.5 * height_squared * inverse * dr.rcp(r + dr.abs(s))
     large = 1 - small
     behind = s > 0

@@ -34,6 +34,9 @@ the four corners of each cell side by side, one fetch a read.
 
 from functools import lru_cache
 
+import drjit as dr
+import numpy as np
+
 from realtime.errors import InputError
 from realtime.numerics.array_types import four_numbers
 from realtime.rays.ray_light import RayGeometry
@@ -108,8 +111,6 @@ def upload_table(Float, form: str, size: int):
     So call the kernel once (or this) before anything that holds the kernel is frozen, and freeze with
     ``state_fn=lambda *_, **__: resident``, where ``resident = resident_tables()``.
     """
-    import drjit as dr
-
     if Float is float:
         raise InputError(
             "kernel table: the scalar backend has no arrays to hold a table; use an LLVM or CUDA variant, or another "
@@ -137,8 +138,6 @@ _UPLOADED: dict = {}  # (type, form, size) -> array
 
 
 def _sun(geometry: RayGeometry, ends, sigma_t, records, size: int):
-    import drjit as dr
-
     foot, h = geometry.foot, geometry.height
     Float = type(h)
     u = dr.minimum(sigma_t * h / _LARGEST_U, 1)
@@ -153,8 +152,6 @@ def _sun(geometry: RayGeometry, ends, sigma_t, records, size: int):
 
 
 def _tail(geometry: RayGeometry, ends, sigma_t, records, size: int):
-    import drjit as dr
-
     foot, h = geometry.foot, geometry.height
     Float, UInt32 = type(h), dr.uint32_array_t(type(h))
     tiny = dr.smallest(Float)
@@ -178,8 +175,6 @@ def _tail(geometry: RayGeometry, ends, sigma_t, records, size: int):
 
 def _read(records, position, size: int, offset):
     """Interpolate bilinearly at `position` in [0, 1]^2 in the table that begins at cell `offset`."""
-    import drjit as dr
-
     Float = type(records)
     UInt32 = dr.uint32_array_t(Float)
     cell, weight = [], []
@@ -196,8 +191,6 @@ def _read(records, position, size: int, offset):
 @lru_cache
 def table_records(form: str, size: int):
     """Return the corners of the cells of a table in float64, shape (cells, 4); for 'tail' the tails, then the heads."""
-    import numpy as np
-
     grid = np.linspace(0, 1, size)
     if form == "sun":
         return _corners(_sun_values(_LARGEST_U * grid, 0.5 * np.pi * grid))
@@ -207,16 +200,12 @@ def table_records(form: str, size: int):
 
 
 def _corners(values):
-    import numpy as np
-
     corners = (values[:-1, :-1], values[:-1, 1:], values[1:, :-1], values[1:, 1:])
     return np.stack(corners, axis=-1).reshape(-1, 4)
 
 
 def _sun_values(u, v):
     """F(u, v) = K(u, 0) - exp(-u tan v) cos v K(u / cos v, sin v), shape (len(u), len(v))."""
-    import numpy as np
-
     whole = _tail_integral(u, 0.0)
     columns = [np.zeros_like(u)]
     for angle in v[1:-1]:
@@ -228,8 +217,6 @@ def _sun_values(u, v):
 
 def _tail_values(alpha, s):
     """(1 + alpha) K(alpha, s), shape (len(s), len(alpha)); the last alpha is infinite, where the value is 1."""
-    import numpy as np
-
     values = np.ones((len(s), len(alpha)))
     for row, sine in zip(values, s):
         row[:-1] = (1 + alpha[:-1]) * _tail_integral(alpha[:-1], sine)
@@ -240,8 +227,6 @@ def _tail_integral(alpha, s: float):
     """K(alpha, s) by the trapezoidal rule in log y, whose integrand decays like exp(-|log y|) and has no pole within
     pi/2 of the real axis: with steps of 1/4 the error is exp(-4 pi^2), below rounding.
     """
-    import numpy as np
-
     y = np.exp(0.25 * np.arange(-160, 161))
     return np.exp(-np.multiply.outer(alpha, y)) @ (0.25 * y / (1 + 2 * s * y + y * y))
 
@@ -251,8 +236,6 @@ def _head_values(alpha, e):
 
     As many nodes resolve exp(-alpha y) up to alpha of about 2000 to rounding.
     """
-    import numpy as np
-
     xi, weight = np.polynomial.legendre.leggauss(256)
     y = 0.5 * (1 + xi)
     rational = 0.5 * weight / (1 + np.multiply.outer(e, y) ** 2)

@@ -23,6 +23,9 @@ The difference of powers is written (theta1 - theta0) sum_k theta1^k theta0^(n-k
 tangent, so that short segments and rays that pass the light do not cancel.
 """
 
+import drjit as dr
+import numpy as np
+
 from realtime.errors import InputError
 from realtime.numerics.array_types import largest
 from realtime.rays.ray_light import RayGeometry, falloff
@@ -51,8 +54,6 @@ def taylor(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, degre
     Valid near theta = 0 only: the error is large where the segment ends more than about 1 rad from the foot or where
     sigma_t h is large; far behind the camera exp(-sigma_t foot) overflows. That is the published method's own limit.
     """
-    import drjit as dr
-
     if degree < 0:
         raise InputError(f"degree: got {degree}, wanted 0 or more")
     foot, h = geometry.foot, geometry.height
@@ -74,8 +75,6 @@ def taylor(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, degre
 
 def _integrated(geometry: RayGeometry, ends, angles, coefficients):
     """Integrate the polynomial between two angles in closed form."""
-    import drjit as dr
-
     (s0, s1), (theta0, theta1) = ends, angles
     h = geometry.height
     bounded = dr.atan2(h * (s1 - s0), dr.fma(s0, s1, h * h))
@@ -90,9 +89,6 @@ def _integrated(geometry: RayGeometry, ends, angles, coefficients):
 
 def _weighted(geometry: RayGeometry, light: Light, angles, coefficients):
     """Integrate polynomial times falloff by eight Gauss-Legendre nodes: the paper's int I(theta) theta^n dtheta."""
-    import drjit as dr
-    import numpy as np
-
     theta0, theta1 = angles
     half, middle = 0.5 * (theta1 - theta0), 0.5 * (theta1 + theta0)
     total = type(half)(0)
@@ -143,8 +139,6 @@ def _phase_series(phase: Phase, degree: int, Float):
 
 def _henyey_greenstein_series(g, sine, degree: int):
     """Return the series of (1 - g^2) b^(-3/2), b = 1 + g^2 + 2 g sin theta, from b y' = -(3/2) b' y."""
-    import drjit as dr
-
     b = [1 + g * g] + [2 * g * s for s in sine[1:]]
     y = [(1 - g) * (1 + g) * dr.rsqrt(b[0]) / b[0]]
     for n in range(1, degree + 1):

@@ -23,6 +23,8 @@ Three choices let the kernel be compared with others:
 * The rest, the difference of powers without cancellation among it, is code of `taylor`.
 """
 
+import drjit as dr
+
 from realtime.errors import InputError
 from realtime.kernels.taylor import _extinction_series, _integrated, _phase_series, _product, _weighted
 from realtime.numerics.array_types import largest
@@ -58,8 +60,6 @@ def taylor_printed(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, 
     ----------
     Biri, Arques, Michelin 2006, *Real time rendering of atmospheric scattering and volumetric shadows*, annex.
     """
-    import drjit as dr
-
     name = medium.phase.name
     if name not in PRINTED_PHASES:
         raise InputError(

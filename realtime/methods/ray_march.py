@@ -14,6 +14,9 @@ steps.
 
 from collections.abc import Callable
 
+import drjit as dr
+import mitsuba as mi
+
 from realtime.bounded_media.airlight import bounded_source
 from realtime.bounded_media.directional_airlight import ParallelRay
 from realtime.bounded_media.ray_segments import MediaRay
@@ -62,8 +65,6 @@ def ray_march(
     Billeter, Sintorn, Assarsson 2010, section 2 (the marcher that they compare with). Kulla, Fajardo 2012, *Importance
     sampling techniques for path tracing in participating media*, section 4 (the equi-angular variable).
     """
-    import drjit as dr
-
     _check(steps, spacing, shadow, view)
     total = type(view.medium.albedo)(0)
     in_media = rays_in_media(view) if view.plan.bounded else ()
@@ -126,8 +127,6 @@ def _visibility(view: View, number: int, shadow: str):
 
 def _within(media: MediaRay | ParallelRay, x0, x1):
     """Return the part of a segment from the first to the last body."""
-    import drjit as dr
-
     first, last = x1, x0
     for piece in media.pieces:
         first = dr.minimum(first, piece.begin)
@@ -139,9 +138,6 @@ def _march(
     view: View, light: Light, geometry: RayGeometry, segment, *, steps: int, spacing: str, lit, media: MediaRay | None
 ):
     """Sum the steps of every ray in one loop, so that the kernel does not grow with their number."""
-    import drjit as dr
-    import mitsuba as mi
-
     x0, x1 = segment
     Float = type(geometry.height)
     foot, height, medium = geometry.foot, geometry.height, view.medium
@@ -177,9 +173,6 @@ def _march(
 
 def _march_parallel(view: View, media: ParallelRay, segment, *, steps: int, lit):
     """Sum equal steps of every ray under a directional light; see `_march`."""
-    import drjit as dr
-    import mitsuba as mi
-
     x0, x1 = segment
     Float = type(view.distance)
     # Rays that miss all bodies march on the spot: a map has no place for points at infinity.

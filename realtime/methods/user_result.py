@@ -3,6 +3,10 @@
 
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
 from realtime.errors import InputError
 from realtime.methods.view import View
 
@@ -27,8 +31,6 @@ def checked_radiance(found: Any, view: View, name: str):
     InputError
         For a result of another type or shape.
     """
-    import drjit as dr
-
     Color, Float = type(view.medium.albedo), type(view.distance)
     width = dr.width(view.pixel)
     channels = _dr_channels(found, name) if dr.is_array_v(found) else _channels(found, width, name)
@@ -41,8 +43,6 @@ def checked_radiance(found: Any, view: View, name: str):
 
 def check_finite(airlight, *, name: str) -> None:
     """Refuse an image of radiance, (height, width, 3), with values that are not finite."""
-    import numpy as np
-
     wrong = ~np.isfinite(airlight).all(axis=2)
     if wrong.any():
         row, column = np.argwhere(wrong)[0]
@@ -54,8 +54,6 @@ def check_finite(airlight, *, name: str) -> None:
 
 def _dr_channels(found: Any, name: str) -> tuple[Any, ...]:
     """Return the three channels of a Dr.Jit array."""
-    import drjit as dr
-
     kind = type(found)
     if dr.is_float_v(kind) and not dr.is_special_v(kind) and not dr.is_tensor_v(kind):
         if dr.depth_v(kind) == 1:
@@ -67,9 +65,6 @@ def _dr_channels(found: Any, name: str) -> tuple[Any, ...]:
 
 def _channels(found: Any, width: int, name: str) -> tuple[Any, ...]:
     """Return the three channels of an array of another kind, or of a number."""
-    import mitsuba as mi
-    import numpy as np
-
     try:
         values = np.asarray(found)
         right = values.dtype.kind in "fiu"

@@ -5,6 +5,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+
 from realtime.bounded_media.body_views import MediaSides
 from realtime.bounded_media.directional_airlight import ParallelRay, parallel_ray
 from realtime.bounded_media.ray_segments import MediaRay, camera_pieces, media_ray
@@ -46,8 +48,6 @@ class View:
 
 def radiance(medium: Medium, light: Light, integral):
     """Return the radiance albedo sigma_t I J / (4 pi) of an airlight integral J (Biri 2006 eq. 1, DESIGN section 2)."""
-    import drjit as dr
-
     sigma_t = medium.sigma_t[0] if len(medium.sigma_t) == 1 else type(medium.albedo)(*medium.sigma_t)
     return medium.albedo * light.intensity * (sigma_t * (integral * (0.25 * dr.inv_pi)))
 
@@ -71,6 +71,4 @@ def rays_in_media(view: View, form: str = "exact") -> tuple[MediaRay | ParallelR
 
 def bounded_radiance(light: Light, scattered):
     """Return the radiance of what `realtime.bounded_media.airlight.bounded_airlight` returns [W/(m^2 sr)]."""
-    import drjit as dr
-
     return light.intensity * (scattered * (0.25 * dr.inv_pi))

@@ -4,6 +4,9 @@
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+
 from realtime.errors import InputError
 
 PRECISIONS = ("single", "double")
@@ -32,8 +35,6 @@ def array_types(precision: str = "single") -> ArrayTypes:
     InputError
         If the precision has another name.
     """
-    import mitsuba as mi
-
     if precision == "single":
         return ArrayTypes(mi.Float, mi.Vector3f, mi.Color3f)
     if precision == "double":
@@ -48,8 +49,6 @@ def types_of(Float) -> ArrayTypes:
 
 def is_single(Float) -> bool:
     """Return whether a number type is float32; Python's float, the number of the scalar backend, is not."""
-    import drjit as dr
-
     return dr.is_array_v(Float) and dr.itemsize_v(Float) == 4
 
 
@@ -60,23 +59,16 @@ def bytes_of(Float) -> int:
 
 def two_numbers(Float):
     """Return the type of two numbers of a type, which a gather reads at once."""
-    import mitsuba as mi
-
     return mi.Vector2f if is_single(Float) else mi.Vector2d
 
 
 def four_numbers(Float):
     """Return the type of four numbers of a type, which a gather reads at once."""
-    import mitsuba as mi
-
     return mi.Vector4f if is_single(Float) else mi.Vector4d
 
 
 def packed(numbers):
     """Return an array with the four numbers of every lane side by side, for gathers that read them at once."""
-    import drjit as dr
-    import mitsuba as mi
-
     width = dr.width(numbers)
     array = dr.zeros(type(numbers.x), 4 * width)
     dr.scatter(array, numbers, dr.arange(mi.UInt32, width))

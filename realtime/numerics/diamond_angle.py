@@ -5,6 +5,7 @@ x/(|x| + |y|) and its like, continued round the square |x| + |y| = 1: 0 to 4 for
 y axis, monotone in the angle and exact to rounding.
 """
 
+import drjit as dr
 import numpy as np
 
 TURN = 4.0  #: a full turn
@@ -12,8 +13,6 @@ TURN = 4.0  #: a full turn
 
 def diamond_angle(x, y):
     """Return the azimuth of (x, y), Dr.Jit arrays, in [0, 4) in diamond angles; 0 for the origin."""
-    import drjit as dr
-
     return _diamond_angle(x, y, dr.select)
 
 

@@ -10,11 +10,11 @@ References
 Ogita, Rump, Oishi 2005, *Accurate sum and dot product*, SIAM Journal on Scientific Computing 26.
 """
 
+import drjit as dr
+
 
 def two_product(a, b):
     """Return the rounded product and its rounding error (Dekker)."""
-    import drjit as dr
-
     product = a * b
     return product, dr.fma(a, type(a)(b), -product)
 
@@ -43,8 +43,6 @@ def difference_of_products(a, b, c, d):
     Jeannerod, Louvet, Muller 2013, *Further analysis of Kahan's algorithm for the accurate computation of 2x2
     determinants*, Mathematics of Computation 82.
     """
-    import drjit as dr
-
     w = c * d
     error = dr.fma(-c, d, w)
     return dr.fma(a, b, -w) + error

@@ -6,6 +6,8 @@ take 3.0 ms for 480 000 lanes on two AVX-512 cores, 24 of these 1.9 ms. The quad
 here.
 """
 
+import drjit as dr
+
 from realtime.numerics.array_types import is_single
 
 #: Coefficients of 2^f on [-1/2, 1/2], highest power first: a Remez fit of degree 6 with relative error below 1.5e-8;
@@ -36,8 +38,6 @@ def exp_bounded(x):
     Valid for x <= 88; below -87 the result stays at 1.2e-38 instead of falling to zero. Relative error below 2e-7.
     NaN stays NaN.
     """
-    import drjit as dr
-
     Float = type(x)
     if not is_single(Float) or dr.backend_v(Float) != dr.JitBackend.LLVM:
         return dr.exp(x)
@@ -55,8 +55,6 @@ def exp2_bounded(x):
     -----
     Valid for |x| <= 125, unchecked: beyond, the result means nothing. Relative error below 2e-7.
     """
-    import drjit as dr
-
     Float = type(x)
     if not is_single(Float) or dr.backend_v(Float) != dr.JitBackend.LLVM:
         return dr.exp2(x)
@@ -71,8 +69,6 @@ def sinh_bounded(y):
     -----
     Valid for |y| <= 1.65. Relative error below 2e-7.
     """
-    import drjit as dr
-
     square = dr.square(y)
     value = type(y)(_SINH[0])
     for coefficient in _SINH[1:]:
@@ -82,8 +78,6 @@ def sinh_bounded(y):
 
 def _scaled_power(f, n):
     """Return 2^(n + f) for n a whole number and |f| <= 1/2."""
-    import drjit as dr
-
     Float = type(f)
     value = Float(_EXP2[0])
     for coefficient in _EXP2[1:]:

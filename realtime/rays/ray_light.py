@@ -16,6 +16,8 @@ the cross product to twice the digits (`realtime.rays.spot_cone`); a point light
 from dataclasses import dataclass, replace
 from typing import Any
 
+import drjit as dr
+
 from realtime.numerics.error_free import difference_of_products, two_sum
 from realtime.rays.spot_cone import axis_distance, axis_geometry, cone_interval
 from realtime.scene.lights import Light
@@ -56,8 +58,6 @@ def ray_geometry(origin, direction, light: Light, *, low=None) -> RayGeometry:
     -----
     Valid for any ray and a light that has a place. A ray through the light has height 0.
     """
-    import drjit as dr
-
     v, v_low = two_sum(light.position, -origin)
     d = direction
     if light.kind == "spot":
@@ -75,8 +75,6 @@ def ray_geometry(origin, direction, light: Light, *, low=None) -> RayGeometry:
 
 def _spot_geometry(away, direction, direction_low, light: Light) -> RayGeometry:
     """Return the geometry of rays and a spot; `away` is the vector to the light with its low part."""
-    import drjit as dr
-
     ray = axis_geometry(away, direction, direction_low, light)
     foot = dr.dot(away[0], direction)
     enter, leave = (foot + s for s in cone_interval(ray, light.cone))
@@ -89,8 +87,6 @@ def _spot_geometry(away, direction, direction_low, light: Light) -> RayGeometry:
 
 def distance_to_light(geometry: RayGeometry, x):
     """Return r(x) = sqrt(height^2 + (x - foot)^2), the distance from the light to the point at `x` [m]."""
-    import drjit as dr
-
     s = x - geometry.foot
     return dr.sqrt(dr.fma(s, s, geometry.height * geometry.height))
 
@@ -118,8 +114,6 @@ def stretches(geometry: RayGeometry, light: Light, x0, x1):
 
     A ray that misses the beam is cut where it is closest to the axis: the closer it passes, the more like a kink.
     """
-    import drjit as dr
-
     if not light.soft:
         return [(x0, x1)]
     inner0, inner1 = _clip(geometry.beam_enter, geometry.beam_leave, x0, x1)
@@ -131,8 +125,6 @@ def stretches(geometry: RayGeometry, light: Light, x0, x1):
 
 
 def _clip(enter, leave, x0, x1):
-    import drjit as dr
-
     begin = dr.clip(enter, x0, x1)
     return begin, dr.maximum(dr.clip(leave, x0, x1), begin)
 
@@ -143,8 +135,6 @@ def falloff(geometry: RayGeometry, light: Light, x):
     One inside the beam, zero outside the cut-off; between the two, (cutoff - angle) / (cutoff - beam). The angle is
     that of the distances from the axis and along it: near the axis a cosine alone has lost it.
     """
-    import drjit as dr
-
     s = x - geometry.foot
     t = dr.fma(geometry.slant, s, -geometry.slide)
     away = dr.sqrt(dr.fma(t, t, dr.square(geometry.gap)))

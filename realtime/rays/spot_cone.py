@@ -44,6 +44,8 @@ nothing. For A >= 0 there is one root on each, and the solution is a half line: 
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+
 from realtime.numerics.error_free import settled, two_cross, two_dot, two_product
 from realtime.scene.lights import Cone, Light
 
@@ -65,8 +67,6 @@ class AxisGeometry:
 
 def axis_geometry(away, direction, direction_low, light: Light) -> AxisGeometry:
     """Return rays as a spot's axis sees them; `away` is the vector to the light with its low part."""
-    import drjit as dr
-
     v, v_low = away
     w, w_low = two_cross(v, direction)
     w_low += dr.cross(v_low, direction)
@@ -85,8 +85,6 @@ def axis_geometry(away, direction, direction_low, light: Light) -> AxisGeometry:
 
 def cone_interval(ray: AxisGeometry, cone: Cone):
     """Return the signed distances from the foot at which rays enter and leave a cone [m], see `cone_roots`."""
-    import drjit as dr
-
     limit, limit_low = two_product(ray.square, cone.square_sin)
     across, across_low = two_product(ray.across, ray.across)
     low = dr.fma(ray.square_low, cone.square_sin, dr.fma(ray.square, cone.square_sin_low, limit_low))
@@ -110,8 +108,6 @@ def cone_roots(ray: AxisGeometry, discriminant, cone: Cone):
     Valid for half angles below 90 degrees. Half lines end at infinity. A ray through the light is in the cone on one
     side of it, or nowhere.
     """
-    import drjit as dr
-
     # Of a ray through the light all that is left are signs, and `_TINY` times them.
     b = ray.axial * ray.offset
     c = (ray.offset - cone.cos * ray.height) * (ray.offset + cone.cos * ray.height)
@@ -143,8 +139,6 @@ def axis_distance(ray: AxisGeometry) -> dict[str, Any]:
     With n^2 = (offset/h)^2 + (across/h)^2 = 1 - axial^2 this is the sum of squares above for slant = n, slide =
     axial offset / n, gap = |across| / n.
     """
-    import drjit as dr
-
     size = dr.sqrt(dr.fma(ray.offset, ray.offset, dr.square(ray.across)))
     # Of a ray through the light only the sine is left, which loses digits only near the axis.
     sine = dr.sqrt(dr.maximum(dr.fma(-ray.axial, ray.axial, 1), 0))

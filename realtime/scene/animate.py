@@ -10,6 +10,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
@@ -65,8 +67,6 @@ def coloured_light(light: Light, share: float) -> Light:
 
 def thicker_medium(medium: Medium, factor: float) -> Medium:
     """Return a medium, with the bodies of others in it, with its extinction times a factor; the albedo stays."""
-    import drjit as dr
-
     if not 0 <= factor < np.inf:
         raise InputError(f"factor of the extinction: got {factor!r}, wanted a finite value of 0 or more")
     sigma = tuple(dr.opaque(type(value), factor * float(value[0])) for value in medium.sigma_t)
@@ -90,8 +90,6 @@ def read_objects(scene: Scene, names: Sequence[str]) -> Objects:
     InputError
         For a shape that is not there, or whose vertices Mitsuba does not let move.
     """
-    import mitsuba as mi
-
     parameters = mi.traverse(scene.geometry)
     vertices = {}
     for name in names:
@@ -109,9 +107,6 @@ def replace_positions(parameters, positions: Mapping[str, Array]) -> Mapping[str
     Dr.Jit reads NumPy's memory where it lies, and a frozen function is recorded anew where the alignment of an array
     is another: what it is given are arrays of Dr.Jit's own.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     rounded = {}
     for name, vertices in positions.items():
         key = f"{name}.vertex_positions"
@@ -160,8 +155,6 @@ def closed_shapes(casters: Casters) -> tuple[str, ...]:
 
 def _like(old, values):
     """Return an opaque array of the type of an old one."""
-    import drjit as dr
-
     new = type(old)(*(float(value) for value in values))
     dr.make_opaque(new)
     return new

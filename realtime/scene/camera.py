@@ -20,6 +20,9 @@ scales nothing but rounding.
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+import numpy as np
+
 from realtime.numerics.error_free import two_product, two_sum
 
 
@@ -52,8 +55,6 @@ class HostCamera:
 
 def read_camera(camera: Camera) -> HostCamera:
     """Bring a camera to the host, which waits for the device."""
-    import numpy as np
-
     pairs = (camera.forward, camera.forward_low), (camera.left, camera.left_low), (camera.up, camera.up_low)
     vectors = (sum(np.array(part, dtype=np.float64).ravel() for part in pair) for pair in pairs)
     return HostCamera(camera.width, camera.height, np.array(camera.origin, dtype=np.float64).ravel(), *vectors)
@@ -65,8 +66,6 @@ def tiled_pixels(width: int, height: int, tile: int = 4):
     A packet of 16 lanes then covers 4 x 4 pixels, which Embree's coherent traversal rewards; 16 packets cover 16 x 16
     pixels, and 16 of those 64 x 64 (`realtime.methods.shadow_planes.tile_lists`).
     """
-    import numpy as np
-
     row, column = np.divmod(np.arange(width * height, dtype=np.uint32), width)
     keys: list[np.ndarray] = [column, row]
     for side in (tile, 4 * tile, 16 * tile):
@@ -91,8 +90,6 @@ def ray_directions(camera: Camera, pixel):
     low
         What rounding took from their aim: `direction + low` is right to twice the digits, but for a common factor.
     """
-    import drjit as dr
-
     Float = type(camera.origin.x)
     row = pixel // camera.width
     column = pixel - row * camera.width

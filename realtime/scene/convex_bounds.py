@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import linprog, nnls
 
 from realtime.errors import InputError
 from realtime.methods.shadow_planes.mesh_adjacency import mesh_triangles
@@ -162,8 +163,6 @@ def overlap(one: Bounds, other: Bounds) -> bool:
     if one.is_ball or other.is_ball:
         ball, mesh = (one, other) if one.is_ball else (other, one)
         return _distance_to_hull(mesh, ball.centre) < ball.radius - margin
-    from scipy.optimize import linprog
-
     # The largest ball in both: maximise t under n . x + t <= offset.
     planes = np.concatenate([one.normals, other.normals])
     found = linprog(
@@ -181,8 +180,6 @@ def _distance_to_hull(bounds: Bounds, point: Array) -> float:
     min |sum_i l_i v_i - point| with l_i >= 0 and sum l_i = 1 is a problem of non-negative least squares; a heavy last
     row holds the sum.
     """
-    from scipy.optimize import nnls
-
     if holds(bounds, point):
         return 0.0
     weight = 1e4 * bounds.radius

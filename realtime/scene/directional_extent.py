@@ -11,6 +11,7 @@ about the others. Seen along the light their rectangle is wanted at the angle at
 from itertools import combinations
 from typing import Any
 
+import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
@@ -67,8 +68,6 @@ def directional_fields(axis: Array, balls: Array, back: float, types: ArrayTypes
     -----
     Valid for any axis. All but the axis is rounded to float32 in any precision, so that its map is the same in all.
     """
-    import drjit as dr
-
     high, low = with_low(axis, types)
     middle = _middle(balls)
     across, up, corner = _least_rectangle(axis, balls[:, :3] - middle, balls[:, 3])

@@ -9,6 +9,8 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from realtime.numerics.array_types import ArrayTypes, is_single
 
 
@@ -67,8 +69,6 @@ def spot_fields(axis, cutoff: float, beam: float, types: ArrayTypes) -> dict[str
     types
         Of the arrays.
     """
-    import numpy as np
-
     axis = np.asarray(axis, dtype=np.float64)
     high, low = with_low(axis, types)
     fields = {
@@ -84,8 +84,6 @@ def spot_fields(axis, cutoff: float, beam: float, types: ArrayTypes) -> dict[str
 
 def with_low(values, types: ArrayTypes):
     """Return float64 values as they are in a precision, and what rounding takes from them, in float64."""
-    import numpy as np
-
     values = np.asarray(values, dtype=np.float64)
     high = values.astype(np.float32 if is_single(types.scalar) else np.float64).astype(np.float64)
     return high, values - high

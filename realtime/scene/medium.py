@@ -5,6 +5,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+
 from realtime.scene.phase import Phase
 
 
@@ -41,8 +43,6 @@ def per_extinction(medium: Medium, function: Callable[[Any], Any]):
 
 def least_extinction(medium: Medium):
     """Return the smallest extinction of the channels [1/m]."""
-    import drjit as dr
-
     least = medium.sigma_t[0]
     for sigma_t in medium.sigma_t[1:]:
         least = dr.minimum(least, sigma_t)
@@ -51,6 +51,4 @@ def least_extinction(medium: Medium):
 
 def transmittance(medium: Medium, distance):
     """Return exp(-sigma_t distance) [1], one value or a colour as in `per_extinction`."""
-    import drjit as dr
-
     return per_extinction(medium, lambda sigma_t: dr.exp(-sigma_t * distance))

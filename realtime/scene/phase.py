@@ -8,6 +8,9 @@ Nishita 1987), 1 + 9((1+cos)/2)^8 and 1 + 50((1+cos)/2)^32, have the means 2 and
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+
 NAMES = ("isotropic", "rayleigh", "hazy", "murky", "hg", "tabulated")
 
 
@@ -27,8 +30,6 @@ def evaluate(phase: Phase, cos_scatter):
     -----
     Valid for -1 <= cos_scatter <= 1.
     """
-    import drjit as dr
-
     c = cos_scatter
     if phase.name == "isotropic":
         return type(c)(1)
@@ -51,8 +52,6 @@ def evaluate_half(phase: Phase, down, up):
 
     A lobe narrower than the rounding of the cosine, 1e-7, is a matter of `down` alone: with it nothing cancels.
     """
-    import drjit as dr
-
     if phase.name == "isotropic":
         return type(up)(1)
     if phase.name == "rayleigh":
@@ -75,9 +74,6 @@ def _power(base, doublings: int):
 
 
 def _interpolate(values, c):
-    import drjit as dr
-    import mitsuba as mi
-
     last = dr.width(values) - 1
     position = dr.clip((c + 1) * (0.5 * last), 0, last)
     index = dr.minimum(mi.UInt32(position), last - 1)

@@ -7,6 +7,10 @@ All bodies lie in one medium, the camera's own or, for a camera inside a body, t
 
 from dataclasses import replace
 
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
 from realtime.errors import InputError
 from realtime.numerics.array_types import ArrayTypes
 from realtime.scene.convex_bounds import Bounds, holds, mean_distance, overlap, plane_neighbours, read_bounds
@@ -29,8 +33,6 @@ def sort_shapes(scene):
     InputError
         For a shape that is transparent or bounds a medium in a way that no method can render, with its name.
     """
-    import mitsuba as mi
-
     opaque, boundaries = [], []
     for shape in scene.shapes():
         bsdf, name = shape.bsdf(), shape.id()
@@ -55,8 +57,6 @@ def sort_shapes(scene):
 
 def opaque_scene(scene, opaque):
     """Return the scene itself where all shapes are opaque, else a scene of those that are, under their names."""
-    import mitsuba as mi
-
     if len(opaque) == len(scene.shapes()):
         return scene
     # A key of Mitsuba's dictionaries becomes the shape's name, and holds no dots.
@@ -99,8 +99,6 @@ def read_medium(sensor, boundaries, types: ArrayTypes) -> Medium:
 
 def _surrounding(sensor, boundaries, bounds: list[Bounds]):
     """Return the Mitsuba medium around all bodies, or None; refuse a camera or a boundary that says otherwise."""
-    import numpy as np
-
     camera = np.array(sensor.world_transform().matrix, dtype=np.float64).reshape(4, 4)[:3, 3]
     around = sensor.get_medium()
     for shape, one in zip(boundaries, bounds):
@@ -129,9 +127,6 @@ def _check_disjoint(bounds: list[Bounds]) -> None:
 
 def convex_body(medium: Medium, bounds: Bounds, types: ArrayTypes) -> Body:
     """Return a medium within bounds."""
-    import drjit as dr
-    import mitsuba as mi
-
     centre = types.vector(*(float(c) for c in bounds.centre))
     radius, distance = (dr.opaque(types.scalar, value) for value in (bounds.radius, mean_distance(bounds)))
     dr.make_opaque(centre)
@@ -146,8 +141,6 @@ def convex_body(medium: Medium, bounds: Bounds, types: ArrayTypes) -> Body:
 
 
 def _clear(types: ArrayTypes) -> Medium:
-    import drjit as dr
-
     albedo = types.color(0.0)
     dr.make_opaque(albedo)
     return Medium((dr.opaque(types.scalar, 0.0),), albedo, Phase("isotropic"), clear=True)
@@ -155,8 +148,6 @@ def _clear(types: ArrayTypes) -> Medium:
 
 def _in_channels(medium: Medium, channels: int) -> Medium:
     """Return a grey medium with its extinction repeated: media of one scene have equally many."""
-    import drjit as dr
-
     if len(medium.sigma_t) == channels:
         return medium
     (grey,) = medium.sigma_t
@@ -165,10 +156,6 @@ def _in_channels(medium: Medium, channels: int) -> Medium:
 
 
 def _homogeneous(medium, types: ArrayTypes) -> Medium:
-    import drjit as dr
-    import mitsuba as mi
-    import numpy as np
-
     if not medium.is_homogeneous():
         raise InputError(f"the medium is a {medium.class_name()}; wanted a medium of type 'homogeneous'")
     sigma_s, _, sigma_t = medium.get_scattering_coefficients(dr.zeros(mi.MediumInteraction3f))
@@ -188,10 +175,6 @@ def _homogeneous(medium, types: ArrayTypes) -> Medium:
 
 
 def _read_phase(phase, types: ArrayTypes) -> Phase:
-    import drjit as dr
-    import mitsuba as mi
-    import numpy as np
-
     name = _PHASES.get(phase.class_name())
     if name is None:
         raise InputError(

@@ -9,6 +9,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
 from realtime.errors import InputError
 from realtime.numerics.array_types import ArrayTypes, array_types, is_single
 from realtime.scene.camera import Camera
@@ -65,10 +69,6 @@ def read_scene(scene, precision: str = "single") -> Scene:
 
 
 def _read_camera(scene, types: ArrayTypes):
-    import drjit as dr
-    import mitsuba as mi
-    import numpy as np
-
     sensors = scene.sensors()
     if not sensors:
         raise InputError("the scene has no camera; wanted a sensor of type 'perspective'")
@@ -93,10 +93,6 @@ def _read_camera(scene, types: ArrayTypes):
 
 
 def _read_light(emitter, types: ArrayTypes) -> Light:
-    import drjit as dr
-    import mitsuba as mi
-    import numpy as np
-
     kind = {"PointLight": "point", "SpotLight": "spot"}.get(emitter.class_name())
     if kind is None:
         raise InputError(
@@ -123,10 +119,6 @@ def _read_light(emitter, types: ArrayTypes) -> Light:
 
 
 def _read_directional(emitter, medium: Medium, opaque, types: ArrayTypes) -> Light:
-    import drjit as dr
-    import mitsuba as mi
-    import numpy as np
-
     if not (medium.bodies and medium.clear):
         raise InputError(
             "the scene has a directional light and a medium without bounds, which lets nothing of it through from "
@@ -147,8 +139,6 @@ def _read_directional(emitter, medium: Medium, opaque, types: ArrayTypes) -> Lig
 
 def _read_colour(value, name: str, unit: str):
     """Return three values of 0 or more."""
-    import numpy as np
-
     colour = np.array(value, dtype=np.float64).reshape(-1)
     colour = np.broadcast_to(colour, 3) if colour.size == 1 else colour
     if not np.all(np.isfinite(colour)) or np.any(colour < 0):
@@ -168,8 +158,6 @@ def _read_angles(parameters) -> tuple[float, float]:
 
 
 def _make_plan(opaque, medium: Medium, lights: tuple[Light, ...]) -> Plan:
-    import mitsuba as mi
-
     notes = []
     for shape in opaque:
         flags = shape.bsdf().flags()

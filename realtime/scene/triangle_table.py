@@ -10,6 +10,9 @@ from dataclasses import dataclass
 from itertools import accumulate
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+
 from realtime.numerics.array_types import ArrayTypes, four_numbers
 
 _CORNERS = (0, 0), (1, 0), (0, 1)  # barycentric coordinates u, v
@@ -28,9 +31,6 @@ class Facets:
 
 def read_facets(scene, types: ArrayTypes) -> Facets | None:
     """Return the triangles of a Mitsuba scene; None where a shape is no mesh of one diffuse colour."""
-    import drjit as dr
-    import mitsuba as mi
-
     shapes = scene.shapes()
     if not shapes or not all(_is_plain(shape) for shape in shapes):
         return None
@@ -50,9 +50,6 @@ def read_facets(scene, types: ArrayTypes) -> Facets | None:
 
 def facet_number(facets: Facets, hit, active):
     """Return the number of the triangle of a preliminary intersection."""
-    import drjit as dr
-    import mitsuba as mi
-
     shape = dr.reinterpret_array(mi.UInt32, hit.shape)
     return dr.gather(mi.UInt32, facets.first, shape, active) + hit.prim_index
 
@@ -62,8 +59,6 @@ def facet_at(facets: Facets, number, uv, active):
 
     `uv`, barycentric coordinates, is only read where normals are interpolated.
     """
-    import drjit as dr
-
     Four = four_numbers(type(facets.normals))
     red, green, blue, _ = dr.gather(Four, facets.albedos, number, active)
     if not facets.smooth:
@@ -78,8 +73,6 @@ def facet_at(facets: Facets, number, uv, active):
 
 
 def _is_plain(shape) -> bool:
-    import mitsuba as mi
-
     if not shape.is_mesh() or shape.face_count() == 0:
         return False
     # A texture, a normal map or another kind of surface has parameters of other names.
@@ -89,9 +82,6 @@ def _is_plain(shape) -> bool:
 
 def _is_smooth(shape) -> bool:
     """Return whether normals differ over a triangle of a shape."""
-    import drjit as dr
-    import mitsuba as mi
-
     if not shape.has_vertex_normals():
         return False
     flat = mi.Bool(True)
@@ -104,9 +94,6 @@ def _is_smooth(shape) -> bool:
 
 def _of_shape(shape, types: ArrayTypes, smooth: bool):
     """Return normals and albedos of the triangles of a shape, as Mitsuba has them."""
-    import drjit as dr
-    import mitsuba as mi
-
     Float, Four = types.scalar, four_numbers(types.scalar)
     two_sided = float(mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.BackSide))
     middle = _interaction(shape, 1 / 3, 1 / 3)
@@ -126,9 +113,6 @@ def _of_shape(shape, types: ArrayTypes, smooth: bool):
 
 def _interaction(shape, u: float, v: float):
     """Return Mitsuba's interactions with all triangles of a shape, at their barycentric coordinates u, v."""
-    import drjit as dr
-    import mitsuba as mi
-
     count = shape.face_count()
     hit = dr.zeros(mi.PreliminaryIntersection3f, count)
     hit.t = dr.full(mi.Float, 1, count)
@@ -139,9 +123,6 @@ def _interaction(shape, u: float, v: float):
 
 def _joined(types: ArrayTypes, parts, counts):
     """Return rows of shapes one after the other; a row that all triangles of a shape share counts for each."""
-    import drjit as dr
-    import mitsuba as mi
-
     table = dr.empty(types.scalar, 4 * sum(counts))
     place = 0
     for part, count in zip(parts, counts):

@@ -19,6 +19,9 @@ closely meets the same surface whatever the precision of the method, and one map
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+
 from realtime.errors import InputError
 from realtime.numerics.array_types import bytes_of
 from realtime.scene.lights import Light
@@ -74,9 +77,6 @@ def cast_shadow_map(scene, light: Light, size: int) -> ShadowMap:
     InputError
         If `size` is not a power of two from 4 to 8192.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     check_size(size)
     Double = mi.Float64
     frame = None if light.kind == "point" else _frame(light)
@@ -99,9 +99,6 @@ def _tiled_corners(faces: int, side: int):
 
     The last squares reach beyond the face.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     across = -(-side // 4)
     lane = dr.arange(mi.UInt32, faces * across * across * 16)
     square, within = lane // 16, lane % 16
@@ -124,9 +121,6 @@ def cast_map_rays(scene, light: Light, place, active=True):
     active
         Lanes to cast rays in.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     face, u, v = place
     Float = type(light.position.x)
     start = mi.Point3f(light.position)
@@ -148,9 +142,6 @@ def cast_map_rays(scene, light: Light, place, active=True):
 
 def lit_in_map(shadow_map: ShadowMap, light: Light, point):
     """Return whether the light reaches a point by the nearest value of its shadow map."""
-    import drjit as dr
-    import mitsuba as mi
-
     Float = type(point.x)
     d = point - light.position
     depth = None
@@ -172,8 +163,6 @@ def lit_in_map(shadow_map: ShadowMap, light: Light, point):
 
 def face_products(frame, face, vector):
     """Return the scalar products of a vector with the across, up and axis of a face; `frame` is that of the map."""
-    import drjit as dr
-
     if frame:
         return tuple(dr.dot(vector, one) for one in frame)
     x, y, z = vector.x, vector.y, vector.z
@@ -184,8 +173,6 @@ def face_products(frame, face, vector):
 
 def face_coordinates(frame, face, vector):
     """Return (a, b, c) of a vector a across + b up + c axis of a face."""
-    import drjit as dr
-
     a, b, c = face_products(frame, face, vector)
     if frame:
         inverse = dr.rcp(dr.squared_norm(frame[0]))
@@ -195,17 +182,12 @@ def face_coordinates(frame, face, vector):
 
 def parallel_coordinates(frame, vector):
     """Return (u, v, c) of a vector u across + v up + c axis of the face of a directional light."""
-    import drjit as dr
-
     a, b, c = face_products(frame, None, vector)
     return a * dr.rcp(dr.squared_norm(frame[0])), b * dr.rcp(dr.squared_norm(frame[1])), c
 
 
 def _frame(light: Light):
     """Return two vectors across a light's axis and the axis, in float64; of a spot they have the length tan(cutoff)."""
-    import drjit as dr
-    import mitsuba as mi
-
     axis = mi.Vector3d(light.axis) + mi.Vector3d(light.axis_low)
     if light.kind == "directional":
         return mi.Vector3d(light.face.across), mi.Vector3d(light.face.up), axis
@@ -222,8 +204,6 @@ def cube_direction(Vector, face, u, v):
 
     Face 2k looks along +axis k, face 2k + 1 along -axis k; u and v go along the next two axes.
     """
-    import drjit as dr
-
     sign = dr.select((face & 1) == 0, type(u)(1), type(u)(-1))
     axis = face >> 1
     return dr.select(axis == 0, Vector(sign, u, v), dr.select(axis == 1, Vector(v, sign, u), Vector(u, v, sign)))
@@ -231,9 +211,6 @@ def cube_direction(Vector, face, u, v):
 
 def cube_coordinates(d):
     """Return the face of a cube that a direction goes through, and u and v there."""
-    import drjit as dr
-    import mitsuba as mi
-
     size = dr.abs(d)
     x_major = (size.x >= size.y) & (size.x >= size.z)
     y_major = ~x_major & (size.y >= size.z)

@@ -24,6 +24,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
 from realtime.errors import InputError
 from realtime.methods.shadow_planes.tile_boxes import SIDE, TILE
 from realtime.numerics.array_types import four_numbers
@@ -67,10 +71,6 @@ def tile_corners(pixel, camera: Camera, tolerance: float, *, by_rays: bool, ligh
         For a tolerance that is no share, a method that draws all pixels together, more lights than a number has bits,
         and an image whose sides are no multiples of four or less than three tiles.
     """
-    import drjit as dr
-    import mitsuba as mi
-    import numpy as np
-
     if not 0 <= tolerance < 1:
         raise InputError(f"tolerance: got {tolerance!r}, wanted a share of the airlight from 0 up to 1")
     if not tolerance:
@@ -126,9 +126,6 @@ def between_corners(corners: Corners, pixel, distance, sample: Callable[..., Any
     -----
     Valid in a function that may evaluate arrays; `sample` may not.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     Float = type(distance)
     tiles = dr.width(distance) // TILE
     tile = dr.arange(mi.UInt32, tiles)
@@ -172,9 +169,6 @@ def between_corners(corners: Corners, pixel, distance, sample: Callable[..., Any
 
 def _bits(reached):
     """Return by light, as one bit each, whether it reaches the surface."""
-    import drjit as dr
-    import mitsuba as mi
-
     bits = mi.UInt32(0)
     for number, one in enumerate(reached):
         bits |= dr.select(one, mi.UInt32(1 << number), 0)
@@ -186,8 +180,6 @@ def _bilinear(values) -> list[Any]:
 
     `values` are f at the corners of the tile, and x and y go from 0 to 1 over it.
     """
-    import drjit as dr
-
     tables = []
     for base, across, down, diagonal in zip(*values):
         Float = type(base)
@@ -200,8 +192,6 @@ def _bilinear(values) -> list[Any]:
 
 def _second_difference(corners: Corners, color):
     """Return the larger of the second differences along rows and columns, by channel."""
-    import drjit as dr
-
     found = type(color)(0)
     for three in (corners.row, corners.column):
         before, here, behind = (dr.gather(type(color), color, one) for one in three)
@@ -211,8 +201,6 @@ def _second_difference(corners: Corners, color):
 
 def _depths_alike(distance, four):
     """Return whether the pixels of a tile and its four corners are about equally far away."""
-    import drjit as dr
-
     tile, *others = four
     places = [tile * TILE + k for k in range(TILE)] + [other * TILE for other in others]
     least = largest = dr.gather(type(distance), distance, places[0])

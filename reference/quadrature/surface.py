@@ -13,6 +13,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
@@ -33,9 +35,6 @@ class SurfaceHits:
 
 def surface_hits(truth: TruthScene) -> SurfaceHits:
     """Cast the pixel-centre rays from the pinhole."""
-    import drjit as dr
-    import mitsuba as mi
-
     ray = mi.Ray3f(mi.Point3f(*(float(c) for c in truth.origin)), dr.normalize(mi.Vector3f(truth.direction.T)))
     interaction = truth.occluders.ray_intersect(ray, mi.RayFlags.All, coherent=True)
     valid = np.array(interaction.is_valid(), dtype=bool)
@@ -62,8 +61,6 @@ def lit_surface(
     shadow_scale
         See `reference.quadrature.image`.
     """
-    import mitsuba as mi
-
     interaction = hits.interaction
     total = np.zeros((len(hits.distance), 3))
     if not truth.occluders.shapes():
@@ -99,8 +96,6 @@ def lit_surface(
 
 def _lit_from_infinity(truth: TruthScene, interaction: Any, light: DirectionalLight) -> tuple[NDArray[np.bool_], Array]:
     """Return which surfaces a directional light reaches, by shadow rays, and what they reflect in clear air."""
-    import mitsuba as mi
-
     towards, arriving = light.emitter.sample_direction(interaction, mi.Point2f(0.5))
     facing = interaction.is_valid()
     hidden = truth.occluders.ray_test(interaction.spawn_ray(towards.d), facing)

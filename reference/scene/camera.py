@@ -6,6 +6,7 @@ Mitsuba's own `sample_ray` gives them in float32, and from the near clip plane o
 holds them against `sample_ray`.
 """
 
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
@@ -28,8 +29,6 @@ def film_directions(sensor, positions: Array, size: tuple[int, int]) -> Array:
     -----
     Valid for positions outside of the film too.
     """
-    import mitsuba as mi
-
     width, height = size
     half_width = np.tan(0.5 * np.deg2rad(float(mi.traverse(sensor)["x_fov"][0])))
     pixel = 2 * half_width / width

@@ -13,8 +13,10 @@ plane worth the name; their neighbours bound the body without them.
 from dataclasses import dataclass
 from typing import Any
 
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import linprog, nnls
 
 from analytic.errors import InputError
 
@@ -54,8 +56,6 @@ def read_bounds(shape: Any) -> Bounds:
     InputError
         For a shape that is neither a sphere nor a closed convex mesh whose normals point outwards, by its name.
     """
-    import mitsuba as mi
-
     parameters = mi.traverse(shape)
     if shape.class_name() == "Sphere":
         return _read_ball(shape, np.array(parameters["to_world"].matrix, dtype=np.float64).reshape(4, 4))
@@ -210,8 +210,6 @@ def overlap(one: Bounds, other: Bounds) -> bool:
     if isinstance(other, Ball):
         return overlap(other, one)
     # The largest ball in what both have in common: maximise its radius t under n . x + t <= offset.
-    from scipy.optimize import linprog
-
     planes = np.concatenate([one.normal, other.normal])
     result = linprog(
         [0.0, 0.0, 0.0, -1.0],
@@ -225,8 +223,6 @@ def overlap(one: Bounds, other: Bounds) -> bool:
 
 def _distance(body: Polyhedron, point: Array) -> float:
     """Return the distance from a point to a polyhedron, 0 inside (Lawson and Hanson 1974, chapter 23: LDP by NNLS)."""
-    from scipy.optimize import nnls
-
     room = body.offset - body.normal @ point
     if np.all(room >= 0):
         return 0.0

@@ -18,6 +18,8 @@ scattering angle is that between the light's way, -u, and the way to the camera,
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
@@ -78,9 +80,6 @@ def endless_medium(emitter) -> str:
 
 def read_directional(emitter) -> DirectionalLight:
     """Read a directional emitter: its direction from the transform, its irradiance by asking at a point."""
-    import drjit as dr
-    import mitsuba as mi
-
     matrix = np.array(emitter.world_transform().matrix, dtype=np.float64).reshape(4, 4)
     _, arriving = emitter.sample_direction(dr.zeros(mi.Interaction3f), mi.Point2f(0.5))
     irradiance = np.array(arriving, dtype=np.float64).reshape(-1)

@@ -9,6 +9,8 @@ way round.
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
@@ -110,8 +112,6 @@ def read_truth(scene) -> TruthScene:
 
 def _sorted_shapes(scene) -> tuple[list[Any], list[Any]]:
     """Return the opaque shapes and those that bound a medium; what is neither takes no part."""
-    import mitsuba as mi
-
     opaque, boundaries = [], []
     for shape in scene.shapes():
         inside, outside = shape.interior_medium(), shape.exterior_medium()
@@ -134,8 +134,6 @@ def _sorted_shapes(scene) -> tuple[list[Any], list[Any]]:
 
 def scene_of(shapes: list[Any], whole):
     """Return a scene of some of the shapes of another one, `whole`: that itself where they are all of its shapes."""
-    import mitsuba as mi
-
     if len(shapes) == len(whole.shapes()):
         return whole
     # The keys become the names of the shapes, in the whole scene too: they keep those they have, if these are keys.
@@ -189,8 +187,6 @@ def _read_bounded(shape) -> BoundedMedium:
 
 
 def _read_medium(medium, name: str) -> TruthMedium:
-    import mitsuba as mi
-
     if not medium.is_homogeneous():
         raise InputError(f"{name} is a {medium.class_name()}; wanted a medium of type 'homogeneous'")
     parameters = mi.traverse(medium)
@@ -199,8 +195,6 @@ def _read_medium(medium, name: str) -> TruthMedium:
 
 
 def _read_phase(phase) -> PhaseFunction:
-    import mitsuba as mi
-
     parameters = mi.traverse(phase)
     name = phase.class_name()
     if name == "IsotropicPhaseFunction":
@@ -215,9 +209,6 @@ def _read_phase(phase) -> PhaseFunction:
 
 
 def _read_light(emitter) -> TruthLight:
-    import drjit as dr
-    import mitsuba as mi
-
     name = emitter.class_name()
     if name not in ("PointLight", "SpotLight"):
         raise InputError(

@@ -7,6 +7,10 @@ light arrives too bright by the factor exp(sigma_t r epsilon). In single precisi
 2^-24, 8.94e-4. Later versions of Mitsuba have another rule, so it is measured, never assumed.
 """
 
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
 
 def measure_shadow_epsilon() -> float:
     r"""Measure the relative shortening of shadow rays in the active Mitsuba variant.
@@ -20,10 +24,6 @@ def measure_shadow_epsilon() -> float:
     ----------
     Mitsuba 3.9, ``Interaction.spawn_ray_to``; ``ShadowEpsilon`` in ``include/mitsuba/core/math.h``.
     """
-    import drjit as dr
-    import mitsuba as mi
-    import numpy as np
-
     # A point of the medium has no surface normal, so its position is not offset and only the shortening is left.
     # One power of two times an axis: position, direction and length are exact, and so is the quotient.
     interaction = dr.zeros(mi.Interaction3f)

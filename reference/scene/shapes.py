@@ -9,6 +9,8 @@ shadow.
 from dataclasses import dataclass, field
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
@@ -78,8 +80,6 @@ def _is_rectangle(shape) -> bool:
 
 
 def _shape_triangles(shape) -> Array:
-    import mitsuba as mi
-
     if _is_rectangle(shape):
         corners = np.array([[-1.0, -1, 0, 1], [1, -1, 0, 1], [1, 1, 0, 1], [-1, 1, 0, 1]])
         return (corners @ _matrix(shape).T)[:, :3][np.array([[0, 1, 2], [0, 2, 3]])]
@@ -94,8 +94,6 @@ def _ball(shape) -> Ball:
 
 
 def _matrix(shape) -> Array:
-    import mitsuba as mi
-
     return np.array(mi.traverse(shape)["to_world"].matrix, dtype=np.float64).reshape(4, 4)
 
 
@@ -119,9 +117,6 @@ def exact_distance(truth: TruthScene, interaction: Any, distance: Array, shapes:
     distance stays what it was. So it does on balls that a ray misses in float64, which happens where it touches them,
     and on other shapes.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     hit = np.isfinite(distance)
     shape_of_hit = np.array(dr.reinterpret_array(mi.UInt32, interaction.shape))
     primitive = np.array(interaction.prim_index, dtype=np.int64)

@@ -20,6 +20,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+import mitsuba as mi
 import numpy as np
 
 from reference.storage.files import write_bytes
@@ -44,8 +45,6 @@ def cache_folder() -> Path:
 
 def scene_digest(scene) -> str:
     """Return a digest of a Mitsuba scene: of every parameter of every plugin in it."""
-    import mitsuba as mi
-
     digest = hashlib.sha256()
     parameters = mi.traverse(scene)
     for words in _kinds(scene):

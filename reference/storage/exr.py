@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import OpenEXR
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
@@ -94,8 +95,6 @@ def write_exr(path: str | os.PathLike[str], image: Image) -> None:
     OSError
         If the disk is full; the file is as it was.
     """
-    import OpenEXR
-
     channels = _channels(image)
     header: dict[str, Any] = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     for key, value in image.attributes.items():
@@ -117,8 +116,6 @@ def read_exr(path: str | os.PathLike[str]) -> Image:
         If the file is missing, broken, no EXR, multi-part, tiled, deep or subsampled, or shows a part of its frame.
     """
     _check_kind(path)
-    import OpenEXR
-
     try:
         with _quiet(), OpenEXR.File(str(path), separate_channels=True) as file:
             header = dict(file.header())  # the binding empties its own when the file is closed

@@ -12,6 +12,8 @@ over s on the ray.
 
 from collections.abc import Callable
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
@@ -85,9 +87,6 @@ def _single_leg(rays: ParallelRays, corners: Array) -> Leg:
 
 
 def _shadow_rays(rays: ParallelRays, corners: Array) -> Callable:
-    import drjit as dr
-    import mitsuba as mi
-
     size = float(np.abs(corners).max() + np.abs(rays.origin).max() + np.max(rays.last, initial=0.0))
     towards_all = rays.to_light
     axis = towards_all[0] if len(towards_all) else np.array([0.0, 0.0, 1.0])

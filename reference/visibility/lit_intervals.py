@@ -22,6 +22,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
@@ -192,9 +194,6 @@ def _visible(scene, shadow: Callable[[Index, Array], Any]) -> Visible:
 
 
 def _shadow_rays(position: Array, rays: tuple[Array, Array, Array]) -> Callable:
-    import drjit as dr
-    import mitsuba as mi
-
     direction, normal, height = mi.Vector3d(rays[0].T), mi.Vector3d(rays[1].T), mi.Float64(rays[2])
     start = mi.Point3f(*(float(c) for c in position))
     dr.make_opaque(direction, normal, height, start)
@@ -211,8 +210,6 @@ def _shadow_rays(position: Array, rays: tuple[Array, Array, Array]) -> Callable:
 
 def _first_hits(scene, legs: Legs) -> Callable:
     """Return a function (ray numbers, angles) -> (lit or not, `Legs.depth` of what is met, number of the shape)."""
-    import drjit as dr
-    import mitsuba as mi
 
     def hits(ray: Index, theta: Array) -> tuple[Bools, Array, Index]:
         shadow_ray = legs.shadow(ray, theta)

@@ -16,6 +16,7 @@ comparison, for the exact test from the moved start contradicts it then.
 from collections.abc import Iterator
 from typing import Any
 
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
@@ -46,8 +47,6 @@ def reached_by_shadow_rays(interaction: Any, light: Array, reached: Bools, *, sc
     shapes
         The same as numbers, from `reference.scene.shapes.read_shapes`.
     """
-    import mitsuba as mi
-
     ray = interaction.spawn_ray_to(mi.Point3f(*(float(c) for c in light)))
     valid = np.array(interaction.is_valid(), dtype=bool)
     cast = ~np.array(scene.ray_test(ray, interaction.is_valid()), dtype=bool)

@@ -23,6 +23,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from mpmath import mp, mpf
+
 from analytic.certified import integrate_certified
 from analytic.phase import PhaseFunction
 from validation.certified.intervals import (
@@ -86,8 +88,6 @@ class SpotPhase(PhaseFunction):
 
     def mp(self, cos_scatter: Any) -> Any:
         """Evaluate one cosine in mpmath at its current precision."""
-        from mpmath import mp, mpf
-
         c = mpf(cos_scatter)
         cos_axis = -c * self.axial + mp.sqrt(1 - c * c) * self.across
         beam, cutoff = (mp.radians(mpf(angle)) for angle in self.angles)
@@ -101,8 +101,6 @@ def directions(scene: FogScene) -> tuple[tuple[float, ...], ...]:
     ((7/2 - column) w, (7/2 - row) w, 1), w = 2 tan(fov/2)/8: its x axis points left. The rounded numbers count as
     exact.
     """
-    from mpmath import mp, mpf
-
     with mp.workdps(_GEOMETRY):
         width = 2 * mp.tan(mp.radians(mpf(scene.fov)) / 2) / SIZE
         rows = [vector(row[:3]) for row in scene.camera[:3]]
@@ -137,8 +135,6 @@ def certify_pixel(scene: FogScene, direction: Sequence[float]) -> CertifiedPixel
     Valid for cameras and lights outside of all occluders, and rays that do not meet a light. Takes about a third of a
     second for each light and colour of the extinction.
     """
-    from mpmath import mp
-
     with mp.workdps(_GEOMETRY):
         origin, d = vector([row[3] for row in scene.camera[:3]]), unit(vector(direction))
         end = ray_end(origin, d, scene.occluders)
@@ -156,8 +152,6 @@ def certify_pixel(scene: FogScene, direction: Sequence[float]) -> CertifiedPixel
 
 def _integrals(scene: FogScene, light: FogLight, ray: tuple[Vector, Vector], parts: list) -> list[Number]:
     """Return the sum of J over the lit parts of a ray for each colour [1/m]."""
-    from mpmath import mp
-
     origin, d = ray
     towards = minus(vector(light.position), origin)
     foot, across = dot(towards, d), cross(towards, d)
@@ -198,15 +192,11 @@ def _joined(parts: list) -> list[tuple[Number, Number]]:
 
 
 def _word(value: Number) -> str:
-    from mpmath import mp
-
     return "inf" if mp.isinf(value) else mp.nstr(value, _DISTANCE, strip_zeros=True)
 
 
 def _rounded(value: Number) -> tuple[str, str]:
     """Return a radiance in 12 digits and the bound of its error: half a unit of the last digit, and 1e-14 of it."""
-    from mpmath import mp, mpf
-
     if value == 0:
         return "0", "0"
     exponent = int(mp.floor(mp.log10(value)))

@@ -32,6 +32,8 @@ from collections.abc import Sequence
 from itertools import combinations, pairwise, product
 from typing import Any
 
+from mpmath import mp, mpf
+
 from validation.certified.model import FogBall, FogBox, FogLight, FogScreen
 
 Number = Any  # mpmath.mpf
@@ -43,8 +45,6 @@ _SAME = 1e-25  # distances closer than this are one [m]: they come with 40 digit
 
 def vector(values: Sequence[float]) -> Vector:
     """Return a vector of mpmath numbers; floats count as exact."""
-    from mpmath import mpf
-
     x, y, z = (mpf(value) for value in values)
     return x, y, z
 
@@ -75,16 +75,12 @@ def cross(one: Vector, other: Vector) -> Vector:
 
 def unit(one: Vector) -> Vector:
     """Return the vector of length 1."""
-    from mpmath import mp
-
     length = mp.sqrt(dot(one, one))
     return one[0] / length, one[1] / length, one[2] / length
 
 
 def ray_end(origin: Vector, direction: Vector, occluders: Sequence[Occluder]) -> Number:
     """Return the distance at which a ray enters the first occluder [m], infinite if it meets none."""
-    from mpmath import mp
-
     crossed = [_crossed(shape, origin, direction, mp.inf) for shape in occluders]
     return min((part[0] for part in crossed if part is not None), default=mp.inf)
 
@@ -114,8 +110,6 @@ def lit_parts(
     Valid for cameras and lights outside of all occluders, and cut-off angles below 90 degrees. The result has nearly
     the working precision, half of it where a ray all but touches a cone.
     """
-    from mpmath import mp
-
     place = vector(light.position)
     start = minus(origin, place)
     cuts = [x for shape in occluders for x in _shadow_crossings(shape, place, start, direction)]
@@ -140,8 +134,6 @@ def lit_parts(
 
 def spot_cones(light: FogLight) -> list[tuple[Vector, Number]]:
     """Return axis and cosine of the half angle of a spot's cut-off and, if it is narrower, of its beam."""
-    from mpmath import mp, mpf
-
     if light.matrix is None:
         return []
     axis = unit(vector([row[2] for row in light.matrix[:3]]))
@@ -154,8 +146,6 @@ def _crossed(shape: Occluder, start: Vector, step: Vector, longest: Number) -> t
 
     None unless it enters between 0 and `longest`: both ends of the segment are outside of the shape.
     """
-    from mpmath import mp
-
     if isinstance(shape, FogBall):
         towards = minus(start, vector(shape.centre))
         half, length = dot(towards, step), dot(step, step)
@@ -193,8 +183,6 @@ def _coordinates(edges: Sequence[Vector], point: Vector) -> list[Number]:
 
 def _shadow_crossings(shape: Occluder, place: Vector, start: Vector, direction: Vector) -> list[Number]:
     """Return where a ray crosses the cone or the planes that bound a shadow; `start` is its origin from the light."""
-    from mpmath import mpf
-
     if isinstance(shape, FogBall):
         v = minus(vector(shape.centre), place)
         return _cone_crossings(start, direction, v, dot(v, v) - mpf(shape.radius) ** 2)
@@ -223,8 +211,6 @@ def _edges(shape: FogBox | FogScreen, place: Vector) -> list[tuple[Vector, Vecto
 
 def _cone_crossings(start: Vector, direction: Vector, v: Vector, square: Number) -> list[Number]:
     """Return the real roots x of (u . v)^2 = square |u|^2 with u = start + x direction."""
-    from mpmath import mp
-
     sv, dv = dot(start, v), dot(direction, v)
     a = dv * dv - square * dot(direction, direction)
     b = sv * dv - square * dot(start, direction)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import mitsuba as mi
 import numpy as np
 
 Point = tuple[float, ...]  # of 3 numbers
@@ -101,7 +102,6 @@ def mitsuba_dict(scene: FogScene) -> dict[str, Any]:
 
 def load_fog(scene: dict[str, Any]) -> Any:
     """Return the `mi.Scene` of a dictionary of `mitsuba_dict`, its matrices made transforms; entries may be changed."""
-    import mitsuba as mi
 
     def converted(value: Any) -> Any:
         if not isinstance(value, dict):

@@ -10,6 +10,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
@@ -92,8 +94,6 @@ def times_in_turns(
     array
         The times after two turns of warm-up [ms], (turns, works).
     """
-    import drjit as dr
-
     for _ in range(2):  # the first call compiles and records, the second is the first replay
         for work in works:
             work()
@@ -116,8 +116,6 @@ def timed_frame(renderer: FrameRenderer, scene: Scene, kept: Kept | None, **move
     """Render the next frame, as `realtime.frame.incremental.next_frame`; return stages, what is kept, and the time
     [ms].
     """
-    import drjit as dr
-
     begin = time.perf_counter()
     stages, kept = next_frame(renderer, scene, kept, **moved)
     dr.sync_thread()
@@ -141,8 +139,6 @@ def changed_look(renderer: FrameRenderer, kept: Kept) -> Callable[[], Any]:
 
 def camera_rays(renderer: FrameRenderer) -> Callable[[], Any]:
     """Return the camera rays of a frame alone, cast and not shaded: no frame that casts them takes less."""
-    import drjit as dr
-
     scene = renderer.scene
 
     @Frozen
@@ -190,8 +186,6 @@ def time_frame(renderer: FrameRenderer, *, seconds: float = 0.6, slow: float | N
         If the airlight takes longer than this, whole frames are run stage by stage and the seven are added up from
         them: up to five frames in place of some forty; `SLOW` by default [s].
     """
-    import drjit as dr
-
     scene = renderer.scene
     kept = first_frame(renderer)
     prepared, distance = kept.prepared, kept.cast.distance
@@ -235,8 +229,6 @@ def time_frame(renderer: FrameRenderer, *, seconds: float = 0.6, slow: float | N
 
 def _slow_frame(renderer: FrameRenderer, *, turns: int) -> FrameTimes:
     """Time the stages of some frames."""
-    import drjit as dr
-
     scene = renderer.scene
     objects = _objects(scene)
     steps = []
@@ -283,8 +275,6 @@ def _slow_frame(renderer: FrameRenderer, *, turns: int) -> FrameTimes:
 
 def _objects(scene: Scene) -> Objects | None:
     """Read all meshes of a scene whose vertices can be moved; None where there are none."""
-    import mitsuba as mi
-
     if not scene.geometry.shapes():
         return None
     keys = list(mi.traverse(scene.geometry).keys())

@@ -15,6 +15,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import reduce
 
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
@@ -140,8 +141,6 @@ def thin_fog(size: tuple[int, int]):
 
     In thin fog free flights seldom end before the lamp: volpath wastes most of its paths.
     """
-    import mitsuba as mi
-
     description = open_fog()
     lamp = np.array(description["lamp"]["position"])
     distance = float(np.linalg.norm(lamp - np.array(description["sensor"]["to_world"].matrix)[:3, 3]))

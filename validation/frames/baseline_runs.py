@@ -5,6 +5,8 @@ import time
 from collections.abc import Callable, Mapping
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 
 from realtime.errors import InputError
@@ -58,8 +60,6 @@ def measure_baseline(
     dict
         A `validation.frames.baseline_files.Baseline` without revision and reason.
     """
-    import mitsuba as mi
-
     loaded = load_scene(name, SIZE)
     scene = read_scene(loaded.scene)
     truth = truth_image(loaded.scene)
@@ -124,8 +124,6 @@ def _frame_ratio(renderer: FrameRenderer, yardstick: FrameRenderer, enough: floa
 
 def _processor_time(work: Callable[[], Any]) -> float:
     """Return what a piece of work takes of the processors, all threads together [s]."""
-    import drjit as dr
-
     begin = time.process_time()
     work()
     dr.sync_thread()

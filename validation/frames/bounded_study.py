@@ -16,10 +16,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import mitsuba as mi
 import numpy as np
 
 from analytic.errors import InputError
+from realtime.frame.renderer import render_frame
+from realtime.scene.read_scene import read_scene
+from validation.configurations.methods import configuration, prepared
+from validation.estimates.quadrature import truth_image
 from validation.metrics.errors import error_metrics
+from validation.scenes.parts import camera
 
 SIZES = (0.05, 0.17, 0.43, 0.83)  #: radius over the distance from the lamp to the centre
 OPTICAL_DEPTHS = (0.03, 0.31, 1.1, 3.1, 9.7)  #: of the diameter
@@ -91,8 +97,6 @@ def constant_distance_study(
 
 def ball_in_clear_air(size: float, optical_depth: float, image: tuple[int, int]) -> dict[str, Any]:
     """Return a ball of fog that fills the view's height, and a lamp at radius/size from its centre."""
-    from validation.scenes.parts import camera
-
     lamp = _LAMP / np.linalg.norm(_LAMP) * (_RADIUS / size)
     medium = {
         "type": "homogeneous",
@@ -110,11 +114,6 @@ def ball_in_clear_air(size: float, optical_depth: float, image: tuple[int, int])
 
 
 def _judged(size: float, depth: float, image: tuple[int, int], against: str) -> ConstantDistance:
-    import mitsuba as mi
-
-    from realtime.scene.read_scene import read_scene
-    from validation.estimates.quadrature import truth_image
-
     loaded = mi.load_dict(ball_in_clear_air(size, depth, image))
     scene = read_scene(loaded, "double")
     exact = truth_image(loaded).airlight if against == "truth" else _airlight(scene, "exact")
@@ -134,7 +133,4 @@ def _judged(size: float, depth: float, image: tuple[int, int], against: str) -> 
 
 
 def _airlight(scene, media: str):
-    from realtime.frame.renderer import render_frame
-    from validation.configurations.methods import configuration, prepared
-
     return render_frame(prepared(scene, configuration("shadow-planes", "exact", {"media": media}))).airlight

@@ -13,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import mitsuba as mi
 import numpy as np
 
 from realtime.frame.renderer import render_frame
@@ -68,8 +69,6 @@ def plane_stability(*, size: tuple[int, int] = SIZE, progress: Progress | None =
     progress
         Called with (done, total, what) before every case.
     """
-    import mitsuba as mi
-
     found = []
     cases = hard_cases()
     for number, (name, build) in enumerate(cases.items()):

@@ -9,6 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 
 from realtime.frame.renderer import run_stages, run_surface, run_tiles_and_airlight
@@ -16,6 +18,9 @@ from realtime.scene.read_scene import Scene, read_scene
 from validation.configurations.methods import Configuration, prepared
 from validation.configurations.timing import times_in_turns
 from validation.scenes.loading import load_scene, resize
+from validation.scenes.parts import mitsuba_mesh, placed, rotation
+from validation.scenes.solids import torus
+from validation.scenes.sphere_spot import sphere_spot
 
 
 @dataclass(frozen=True)
@@ -65,8 +70,6 @@ def _frame(scene: Scene, method: str) -> Callable[[], Any]:
 
 
 def _airlight(scene: Scene) -> Callable[[], Any]:
-    import drjit as dr
-
     renderer = prepared(scene, Configuration("shadow-planes", "exact"))
     distance, by_light = run_surface(renderer)
     dr.eval(distance, by_light)
@@ -83,12 +86,6 @@ def _compared(what: str, works: list[Callable[[], Any]], *, turns: int) -> Needl
 
 def sphere_spot_with(unseen: int, size: tuple[int, int]) -> Scene:
     """Return the scene `sphere-spot` with some rings behind the camera."""
-    import mitsuba as mi
-
-    from validation.scenes.parts import mitsuba_mesh, placed, rotation
-    from validation.scenes.solids import torus
-    from validation.scenes.sphere_spot import sphere_spot
-
     described = sphere_spot()
     for number in range(unseen):
         where = (0.73 * (number % 7) - 2.3, -9.7 - 0.61 * (number // 7), 1.3)

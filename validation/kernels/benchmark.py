@@ -10,6 +10,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 
 from analytic.cases import Cases
@@ -17,6 +19,11 @@ from analytic.errors import InputError
 from realtime.errors import InputError as RealtimeInputError
 from realtime.frame.recorded import Frozen
 from realtime.kernels.registry import KERNELS
+from realtime.kernels.table import resident_tables
+from realtime.rays.ray_light import RayGeometry
+from realtime.scene.lights import Light
+from realtime.scene.medium import Medium
+from realtime.scene.phase import Phase
 from validation.configurations.kernel_names import find_kernel, sized, split_name
 from validation.configurations.timing import Timing, time_repeated
 from validation.kernels.errors import relative_error
@@ -239,15 +246,6 @@ def _ladder(name: str) -> tuple[str, int | None, tuple[int | None, ...]]:
 
 def _frozen(function: Kernel, cases: Cases, rays: int | None = None) -> Callable[[], Any]:
     """Return work that evaluates a kernel on rays that lie on the device, frozen after its first call."""
-    import drjit as dr
-    import mitsuba as mi
-
-    from realtime.kernels.table import resident_tables
-    from realtime.rays.ray_light import RayGeometry
-    from realtime.scene.lights import Light
-    from realtime.scene.medium import Medium
-    from realtime.scene.phase import Phase
-
     part = slice(0, rays)
     name = cases.phase[0]
     phase = Phase(
@@ -301,8 +299,6 @@ def _affordable(ns: float | None, wanted: int) -> int:
 
 def _times(work: Callable[[], Any], rays: int, seconds: float) -> tuple[Spread | None, Spread]:
     """Return the time of the kernels alone, where the device tells it, and of the wall clock [ns a ray]."""
-    import drjit as dr
-
     wall = time_repeated(work, seconds=seconds)
     times: list[float] = []
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):

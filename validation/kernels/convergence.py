@@ -26,6 +26,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import brentq
 
 from analytic.cases import Cases
 from analytic.errors import InputError
@@ -142,8 +143,6 @@ def gauss_rate(singular: complex, low: float, high: float) -> float:
 
 def _end_of_rate(singular: complex, rate: float, begin: float = 0.0) -> float:
     """Return the end of a range from `begin` on that has this rate: below 0 for a singularity there, else above."""
-    from scipy.optimize import brentq
-
     side = -1.0 if singular.real < 0 else 1.0
     return brentq(lambda end: gauss_rate(singular, begin, end) - rate, begin + 0.01 * side, begin + 30 * side)
 

@@ -19,6 +19,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import qmc
 
 from analytic.cases import Cases
 from analytic.panels import airlight_segments
@@ -136,8 +137,6 @@ def _truth(cases: Cases) -> Array:
 
 
 def _sobol(count: int, dimensions: int) -> Array:
-    from scipy.stats import qmc
-
     if not 1 <= count <= _LARGEST_SOBOL:
         raise ValueError(f"count: got {count}, wanted 1 to {_LARGEST_SOBOL} rays")
     exponent = max(1, int(np.ceil(np.log2(count))))  # a power of two keeps the points balanced

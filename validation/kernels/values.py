@@ -5,12 +5,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import drjit as dr
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analytic.cases import Cases
 from analytic.errors import InputError
 from realtime.errors import InputError as RealtimeInputError
+from realtime.numerics.array_types import array_types
+from realtime.rays.ray_light import RayGeometry, ray_geometry
+from realtime.scene.lights import Light
+from realtime.scene.medium import Medium
+from realtime.scene.phase import Phase
 
 Array = NDArray[np.float64]
 Kernel = Callable[..., Any]
@@ -78,14 +84,6 @@ def evaluate_rows(
     intensity
         Of the light [W/sr].
     """
-    import drjit as dr
-
-    from realtime.numerics.array_types import array_types
-    from realtime.rays.ray_light import RayGeometry, ray_geometry
-    from realtime.scene.lights import Light
-    from realtime.scene.medium import Medium
-    from realtime.scene.phase import Phase
-
     types = array_types(precision)
     name = cases.phase[rows[0]]
     phase = Phase(

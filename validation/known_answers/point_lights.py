@@ -35,6 +35,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import quad
 
 from analytic.geometry import foot_and_height
 from reference.quadrature.image import quadrature_image, ray_values
@@ -167,8 +168,6 @@ def fluence() -> KnownAnswer:
     With psi the angle from the direction of the source, phi = 2 pi int L sin(psi) dpsi. L grows as 1/psi towards the
     source; in psi = pi t^2 the integrand is smooth enough for 96 Gauss-Legendre nodes.
     """
-    from scipy.integrate import quad
-
     nodes, weights = np.polynomial.legendre.leggauss(96)
     t = 0.5 * (nodes + 1)
     psi = math.pi * t**2

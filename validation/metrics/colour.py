@@ -22,6 +22,7 @@ IC_TC_P: ITU-R BT.2100-2. White at 203 cd/m^2: ITU-R BT.2408-7. Both through col
 from dataclasses import asdict, dataclass
 from typing import Any
 
+import colour
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -141,30 +142,22 @@ def auto_exposure(reference: ArrayLike) -> float:
 
 def ciede2000(one: Array, two: Array) -> Array:
     """Return the CIEDE2000 difference of colours in CIE L*a*b*, (..., 3)."""
-    import colour
-
     return np.asarray(colour.delta_E(one, two, method="CIE 2000"))
 
 
 def delta_e_itp(one: Array, two: Array) -> Array:
     """Return Delta E ITP of colours in IC_TC_P, (..., 3): 720 sqrt(dI^2 + (dT/2)^2 + dP^2), BT.2124 annex 1."""
-    import colour
-
     return np.asarray(colour.delta_E(one, two, method="ITP"))
 
 
 def _lab(linear: Array) -> Array:
     """Return CIE L*a*b* of linear sRGB."""
-    import colour
-
     space = colour.RGB_COLOURSPACES["sRGB"]
     return colour.XYZ_to_Lab(linear @ space.matrix_RGB_to_XYZ.T, space.whitepoint)
 
 
 def _ictcp(luminance: Array) -> Array:
     """Return IC_TC_P, by PQ, of linear light with the primaries of sRGB [cd/m^2]."""
-    import colour
-
     # Both spaces have the white D65, so no chromatic adaptation.
     wide = colour.matrix_RGB_to_RGB("sRGB", "ITU-R BT.2020", chromatic_adaptation_transform=None)
     # The matrices are rounded to four digits, which can leave a colour of the gamut's edge below zero by 1e-4 of it.

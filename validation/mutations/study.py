@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtr
 
 from validation.estimates.agreement import layer_mean, widest_interval
 from validation.mutations.catalogue import MUTATIONS
@@ -201,8 +202,6 @@ def _chance(bias: float, interval: tuple[float, float], margin: float) -> float:
     The noise is normal with the standard error s, the half width H = 1.96 s: agreement needs |b + noise| < m - H, which
     happens with the probability Phi((m - H - b)/s) - Phi((-m + H - b)/s), never where H > m.
     """
-    from scipy.special import ndtr
-
     half = 0.5 * (interval[1] - interval[0])
     error, room = half / 1.96, margin - half
     if error <= 0:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import reduce
 from typing import Any
 
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
@@ -55,8 +56,6 @@ class Stage:
 
 def loaded_stage(name: str, size: tuple[int, int]):
     """Load a built-in scene or a probe of `validation.scenes.probes`, as a `mi.Scene` of a size [pixels]."""
-    import mitsuba as mi
-
     if name not in PROBES:
         return load_scene(name, size).scene
     scene = mi.load_dict(PROBES[name]())

@@ -21,6 +21,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 
 from analytic.errors import InputError
@@ -151,8 +153,6 @@ def table_scene(name: str, size: tuple[int, int]) -> Any:
     """Return the `mi.Scene` of a view: a built-in scene, the hall with a spot in place of its lamp."""
     if name != "colonnade":
         return load_scene(name, size).scene
-    import mitsuba as mi
-
     described = colonnade()
     lamp = described["lamp"]
     described["lamp"] = {
@@ -204,8 +204,6 @@ def _measured(
 
 def _passes(renderer: FrameRenderer, row: TableRow, seconds: float) -> tuple[dict[str, float], int]:
     """Return what the passes cost [ms], and the triangles of all light volumes."""
-    import drjit as dr
-
     scene = renderer.scene
     ready = renderer.prepare(scene)
     distance, by_light = run_surface(renderer)

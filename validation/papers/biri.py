@@ -20,6 +20,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
 import numpy as np
 
 from realtime.frame.incremental import Kept
@@ -229,8 +230,6 @@ def _shared(measured: Sequence[float]) -> tuple[float, ...]:
 
 def _stages(renderer: FrameRenderer, kernel: str, kept: Kept) -> list[Callable[[], Any]]:
     """Return the work of silhouettes, scene, unshadowed airlight, all that is on the host, tile lists, and airlight."""
-    import drjit as dr
-
     scene = renderer.scene
     distance = kept.cast.distance
     by_light = run_shade(renderer, kept.cast)

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import mitsuba as mi
+
 from analytic.errors import InputError
 from validation.scenes.record import Animation
 from validation.scenes.registry import SCENES
@@ -44,8 +46,6 @@ def load_scene(name_or_path: str, size: tuple[int, int] | None = None) -> Loaded
         can deal with what is in the scene, `realtime.scene.read_scene.read_scene` and
         `reference.scene.read.read_truth` say.
     """
-    import mitsuba as mi
-
     if name_or_path in SCENES:
         record = SCENES[name_or_path]
         built = mi.load_dict(record.build())
@@ -90,8 +90,6 @@ def _existing(name_or_path: str) -> Path:
 
 
 def _parse(path: Path):
-    import mitsuba as mi
-
     try:
         scene = mi.load_file(str(path))
     except Exception as error:  # Mitsuba reports every kind of bad input as a RuntimeError, Python plugins as anything
@@ -104,8 +102,6 @@ def _parse(path: Path):
 
 def resize(scene, size: tuple[int, int]) -> None:
     """Give the cameras of a Mitsuba scene images of another width and height [pixels]."""
-    import mitsuba as mi
-
     if not all(1 <= n <= _LARGEST for n in size):
         raise InputError(f"size: got {size[0]}x{size[1]}, wanted at least 1x1 and at most {_LARGEST} pixels on a side")
     for sensor in scene.sensors():

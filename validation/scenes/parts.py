@@ -4,6 +4,7 @@
 from collections.abc import Sequence
 from typing import Any
 
+import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -108,8 +109,6 @@ def medium_boundary(name: str, mesh: Mesh, medium: dict[str, Any]):
 
 
 def _mesh(name: str, mesh: Mesh, plugins: dict[str, dict[str, Any]]):
-    import mitsuba as mi
-
     properties = mi.Properties()
     for key, plugin in plugins.items():
         properties[key] = mi.load_dict(plugin)
@@ -155,8 +154,6 @@ def camera(
     in_fog: bool = True,
 ) -> dict[str, Any]:
     """Return a perspective sensor, in the medium 'fog' or in none; `fov` is the horizontal field of view [degrees]."""
-    import mitsuba as mi
-
     medium = {"medium": {"type": "ref", "id": "fog"}} if in_fog else {}
     return medium | {
         "type": "perspective",

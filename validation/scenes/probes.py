@@ -10,13 +10,13 @@ for soft spots or a sum over lights, is shown here.
 
 from typing import Any
 
+import mitsuba as mi
+
 from validation.scenes.parts import camera, fog, point_light
 
 
 def many_lights() -> dict[str, Any]:
     """Return a ball over a floor in coloured, backward scattering fog under a soft spot, a lamp, and one behind."""
-    import mitsuba as mi
-
     return {
         "type": "scene",
         "fog": fog((0.113, 0.149, 0.187), (0.91, 0.83, 0.74), {"type": "hg", "g": -0.41}),
@@ -46,8 +46,6 @@ def many_lights() -> dict[str, Any]:
 
 def sun() -> dict[str, Any]:
     """Return a slab and a ball that shadow a box and a ball of fog, and a floor, under a directional light."""
-    import mitsuba as mi
-
     transform = mi.ScalarTransform4f()
     grey = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.43, 0.47, 0.53]}}
     clear = {"type": "null"}

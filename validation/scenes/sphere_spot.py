@@ -3,6 +3,7 @@
 
 from typing import Any
 
+import mitsuba as mi
 import numpy as np
 
 from validation.scenes.parts import camera, fog, grid, lathe, mitsuba_mesh, placed
@@ -14,8 +15,6 @@ _RADIUS = 0.47
 
 def sphere_spot() -> dict[str, Any]:
     """Return a sphere of 32 x 17 facets, its axis towards the light, so that the silhouette is one ring of 32 edges."""
-    import mitsuba as mi
-
     return {
         "type": "scene",
         "fog": fog(0.237, (0.91, 0.89, 0.83)),

@@ -8,6 +8,7 @@ holes. The tubes here are our own.
 from dataclasses import dataclass
 from typing import Any
 
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
@@ -50,8 +51,6 @@ _WAVES = (
 
 def tangle() -> dict[str, Any]:
     """Return eight closed tubes, 188 080 triangles, and a floor of two, in the cone of a spot light behind them."""
-    import mitsuba as mi
-
     return {
         "type": "scene",
         "fog": fog(0.263, (0.92, 0.94, 0.95)),

@@ -44,6 +44,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import binom
 
 from analytic.errors import InputError
 from validation.statistics.comparison import Estimate, Statistics, compare_statistics
@@ -245,8 +246,6 @@ def spread_to_detect(bias: float, experiment: Experiment) -> float:
 
 def share_interval(probability: float, trials: int, level: float) -> tuple[float, float]:
     """Return between which shares an event of that probability falls with probability 1 - level."""
-    from scipy.stats import binom
-
     low, high = binom.interval(1 - level, trials, probability)
     return float(low) / trials, float(high) / trials
 

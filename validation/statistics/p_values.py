@@ -5,6 +5,8 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import ndtr, ndtri, stdtr, stdtrit
+from scipy.stats import binom, kstest, nct
 
 Array = NDArray[np.float64]
 
@@ -32,8 +34,6 @@ def satterthwaite(variance: ArrayLike, spread: ArrayLike) -> Array:
 
 def two_sided_p(z: Array, freedom: Array) -> Array:
     """Return P(|Z| >= |z|) of Student's law; of the normal law where the degrees of freedom are infinite."""
-    from scipy.special import ndtr, stdtr
-
     tail = -np.abs(z)
     finite = np.isfinite(freedom)
     return 2 * np.where(finite, stdtr(np.where(finite, freedom, 1.0), tail), ndtr(tail))
@@ -41,8 +41,6 @@ def two_sided_p(z: Array, freedom: Array) -> Array:
 
 def student_quantile(probability: float, freedom: float) -> float:
     """Return a quantile of Student's law, of the normal law for infinite degrees of freedom."""
-    from scipy.special import ndtri, stdtrit
-
     return float(stdtrit(freedom, probability) if np.isfinite(freedom) else ndtri(probability))
 
 
@@ -53,9 +51,6 @@ def power(effect: float, freedom: float, level: float = 0.05) -> float:
     with `freedom` degrees of freedom, and a shifted normal law for infinitely many. Both tails count, so an effect of
     zero is found with the probability of the level.
     """
-    from scipy.special import ndtr
-    from scipy.stats import nct
-
     critical = student_quantile(1 - level / 2, freedom)
     if np.isfinite(freedom):
         return float(nct.sf(critical, freedom, effect) + nct.cdf(-critical, freedom, effect))
@@ -72,16 +67,12 @@ def sidak(level: float, tests: int) -> float:
 
 def binomial_p(successes: int, trials: int, probability: float) -> float:
     """Return min(1, 2 min(P(X <= k), P(X >= k))) of the binomial law: too few count as well as too many."""
-    from scipy.stats import binom
-
     lower, upper = binom.cdf(successes, trials, probability), binom.sf(successes - 1, trials, probability)
     return float(min(1.0, 2 * min(lower, upper)))
 
 
 def uniformity_p(p: Array) -> float:
     """Return the p-value of Kolmogorov and Smirnov's test that p-values are uniform in [0, 1]."""
-    from scipy.stats import kstest
-
     return float(kstest(p, "uniform").pvalue)
 
 

@@ -16,6 +16,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+
 from realtime.errors import InputError
 from realtime.memory import check_memory
 from realtime.methods.epipolar.min_max_tree import SliceHeights, slice_heights
@@ -169,8 +172,6 @@ def _memory_of_slices(scene: Scene, light: Light, size: int, slices: int, sample
 
 
 def _epipolar_map(scene: Scene, light: Light, size: int) -> EpipolarMap:
-    import drjit as dr
-
     shadow_map = cast_shadow_map(scene.geometry, light, size)
     heights = inverse_depth(shadow_map)
     dr.eval(heights)
@@ -186,8 +187,6 @@ def _ray_airlight(view: View, number: int, kernel) -> RayAirlight:
 
 def _lit_integral(airlight: RayAirlight, heights: SliceHeights, number, active=True):
     """Return the integral over the lit pieces of rays, each in a slice; 0 where not `active`."""
-    import drjit as dr
-
     x0, x1 = airlight.segment
     zero = dr.zeros(integral_type(airlight.view), dr.width(airlight.view.distance))
     ends = x0, dr.select(active, x1, x0)
@@ -196,16 +195,11 @@ def _lit_integral(airlight: RayAirlight, heights: SliceHeights, number, active=T
 
 def _nearest(slices: Slices, point):
     """Return the slice that is nearest to each image point."""
-    import drjit as dr
-    import mitsuba as mi
-
     return neighbour(slices, mi.Int32(dr.floor(slice_coordinate(slices, *point) + 0.5)))
 
 
 def _depth_image(slices: Slices, point, distance):
     """Return the distances row by row, in whatever order the pixels come."""
-    import drjit as dr
-
     image = dr.empty(type(distance), slices.width * slices.height)
     dr.scatter(image, distance, pixel_number(slices, *point))
     dr.eval(image)
@@ -214,9 +208,6 @@ def _depth_image(slices: Slices, point, distance):
 
 def _sampled_shares(view: View, number: int, kernel, samples: Samples, heights: SliceHeights):
     """Return by sample, of those that are marked, the share of its airlight that is lit."""
-    import drjit as dr
-    import mitsuba as mi
-
     marked, count = marked_samples(samples)
     camera = view.camera
     shares = dr.empty(integral_type(view), dr.width(marked))
@@ -249,8 +240,6 @@ def _yardstick(airlight: RayAirlight):
     integrand there. The bisector of the angle meets the ray at x = (x0 r1 + x1 r0) / (r0 + r1). What one node is wrong
     by is in the samples and in the pixels alike.
     """
-    import drjit as dr
-
     x0, x1 = airlight.segment
     if airlight.media:
         return airlight.integral(x0, x1)
@@ -271,8 +260,6 @@ def _yardstick(airlight: RayAirlight):
 
 def _interpolated(airlight: RayAirlight, samples: Samples, shares, heights: SliceHeights, point):
     """Return the integral of every pixel: the share of the samples around it, or its own where they do not fit."""
-    import drjit as dr
-
     share, found = between_samples(samples, shares, point, airlight.view.distance)
     own = _lit_integral(airlight, heights, _nearest(samples.slices, point), ~found)
     return dr.select(found, share * _yardstick(airlight), own)

@@ -16,6 +16,9 @@ volume, and a shadow ends where that says and not at the end of a texel.
 from dataclasses import dataclass, replace
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+
 from realtime.methods.epipolar.slices import Slices
 from realtime.numerics.array_types import two_numbers
 from realtime.scene.lights import Light
@@ -64,9 +67,6 @@ def slice_heights(shadow_map: ShadowMap, heights, slices: Slices, light: Light) 
     ----------
     Chen, Baran, Durand, Jarosz 2011, *Real-time volumetric shadows using 1D min-max mipmaps*.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     edges = 1 if light.kind == "spot" else 2
     chord = _chord(slices, light, shadow_map.size) if light.kind == "spot" else None
     Float = type(heights)
@@ -86,8 +86,6 @@ def slice_heights(shadow_map: ShadowMap, heights, slices: Slices, light: Light) 
 
 def line_point(heights: SliceHeights, number, q):
     """Return (k_x, k_y) at `q`, counted in leaves, of slices."""
-    import drjit as dr
-
     q = q * (1.0 / heights.size)
     if heights.chord is None:
         kx = 1 - q
@@ -98,9 +96,6 @@ def line_point(heights: SliceHeights, number, q):
 
 def _tree(heights: SliceHeights, one, other):
     """Return the trees over leaves that have `one` and `other` at their ends."""
-    import drjit as dr
-    import mitsuba as mi
-
     count, leaves = heights.slices.count, heights.leaves
     Pair = two_numbers(type(one))
     # Written only: reading from what is being written would copy it at every level.
@@ -122,9 +117,6 @@ def _tree(heights: SliceHeights, one, other):
 
 def _height(shadow_map: ShadowMap, heights, direction):
     """Return s of the surface in a direction k: it is hit at k / s [1/m times |k|]."""
-    import drjit as dr
-    import mitsuba as mi
-
     size = shadow_map.size
     if shadow_map.frame:
         a, b, depth = face_coordinates(shadow_map.frame, mi.UInt32(0), direction)
@@ -148,8 +140,6 @@ def _chord(slices: Slices, light: Light, size: int):
     A direction at the angle phi has the cosine p cos phi + q sin phi = R cos(phi - middle) with the axis, (p, q) the
     axis in the slice. The chord is a texel wider on both sides, for the rays of pixels beside the slice.
     """
-    import drjit as dr
-
     p, q = dr.dot(light.axis, slices.towards), dr.dot(light.axis, slices.across)
     middle = dr.atan2(q, p)
     middle += dr.select(middle < -0.5 * dr.pi, 2 * dr.pi, 0)
@@ -163,9 +153,6 @@ def _chord(slices: Slices, light: Light, size: int):
 
 def node_pair(heights: SliceHeights, number, place, level):
     """Return the pair of the node of a level that begins at a leaf."""
-    import drjit as dr
-    import mitsuba as mi
-
     heap = (mi.UInt32(heights.leaves) + place) >> level
     pair = dr.gather(two_numbers(type(heights.tree)), heights.tree, number * (2 * heights.leaves) + heap)
     return pair.x, pair.y

@@ -12,6 +12,9 @@ nearness and by how well their depths agree with its own. Where none agrees it h
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+
 from realtime.methods.epipolar.slices import Slices, neighbour, pixel_number, slice_coordinate
 from realtime.numerics.array_types import four_numbers
 
@@ -48,9 +51,6 @@ def mark_samples(slices: Slices, depth, *, count: int, step: int) -> Samples:
     step
         One in so many is computed: a power of two up to 32.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     words = count // WORD
     index = dr.arange(mi.UInt32, slices.count * words)
     word = index // slices.count
@@ -85,9 +85,6 @@ def marked_samples(samples: Samples):
     They come word by word, and slice by slice within a word: what is next to each other in the list then is so in the
     image too.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     slices = samples.slices.count
     number = dr.popcnt(samples.bits)
     place = dr.prefix_sum(number)
@@ -111,9 +108,6 @@ def spread(width: int):
 
     A list fills only the first part of its room. Threads take contiguous parts of it, and one would get all the work.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     row = width // (_PACKET * _HANDS) + 1
     lane = dr.arange(mi.UInt32, row * _PACKET * _HANDS)
     packet = lane // _PACKET
@@ -122,8 +116,6 @@ def spread(width: int):
 
 def sample_ray(samples: Samples, sample):
     """Return image point, slice and depth of samples by their numbers among all."""
-    import mitsuba as mi
-
     number = sample // samples.count
     ends = _ends(samples.slices, number)
     k = mi.Int32(sample - number * samples.count)
@@ -154,9 +146,6 @@ def between_samples(samples: Samples, values, point, depth):
     found
         Whether enough of the samples agree in their depth.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     place = slice_coordinate(samples.slices, *point)
     low = dr.floor(place)
     total, weights = type(values)(0), type(depth)(0)
@@ -170,9 +159,6 @@ def between_samples(samples: Samples, values, point, depth):
 
 def _on_slice(samples: Samples, values, number, point, depth):
     """Return values and weights of the two samples of a slice on either side of a point."""
-    import drjit as dr
-    import mitsuba as mi
-
     ends = _ends(samples.slices, number)
     i, j = ends.z - ends.x, ends.w - ends.y
     length = dr.maximum(i * i + j * j, 1e-10)
@@ -195,9 +181,6 @@ def _on_slice(samples: Samples, values, number, point, depth):
 
 def _marked_about(samples: Samples, number, k):
     """Return the last marked sample up to k and the first after it."""
-    import drjit as dr
-    import mitsuba as mi
-
     word, behind = k // WORD, (k + 1) // WORD
     slices = samples.slices.count
     bits = dr.gather(mi.UInt32, samples.bits, word * slices + number)
@@ -208,30 +191,22 @@ def _marked_about(samples: Samples, number, k):
 
 
 def _ends(slices: Slices, number):
-    import drjit as dr
-
     return dr.gather(four_numbers(type(slices.ends)), slices.ends, number)
 
 
 def _sample_point(samples: Samples, ends, k):
-    import drjit as dr
-
     t = type(ends.x)(k) * (1.0 / (samples.count - 1))
     return dr.fma(t, ends.z - ends.x, ends.x), dr.fma(t, ends.w - ends.y, ends.y)
 
 
 def _sample_depth(samples: Samples, ends, k):
     """Return the depth of the pixel that a sample lies in."""
-    import drjit as dr
-
     pixel = pixel_number(samples.slices, *_sample_point(samples, ends, k))
     return dr.gather(type(samples.depth), samples.depth, pixel)
 
 
 def _difference(one, other):
     """Return the relative difference of two depths, by their inverses: they may be infinite."""
-    import drjit as dr
-
     a, b = dr.rcp(one), dr.rcp(other)
     return dr.abs(a - b) / dr.maximum(dr.maximum(a, b), 1e-20)
 
@@ -241,14 +216,10 @@ def _apart(one, other):
 
 
 def _agreement(one, other):
-    import drjit as dr
-
     close = dr.minimum(AGREES / dr.maximum(_difference(one, other), 1e-6), 1)
     return dr.square(dr.square(close))
 
 
 def _first(value):
     """Return a value, or the first channel of a colour."""
-    import drjit as dr
-
     return value if dr.depth_v(type(value)) == 1 else value.x

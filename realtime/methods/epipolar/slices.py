@@ -20,6 +20,9 @@ the light grows from 0 to less than pi.
 from dataclasses import dataclass, replace
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+
 from realtime.numerics.array_types import four_numbers
 from realtime.scene.camera import Camera
 from realtime.scene.lights import Light
@@ -61,9 +64,6 @@ def image_slices(camera: Camera, light: Light, count: int) -> Slices:
     single scattering*. Yusov 2013, *Practical implementation of light scattering effects using epipolar sampling and
     1D min/max binary trees*.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     Float = type(camera.origin.x)
     v = light.position - camera.origin
     distance = dr.norm(v)
@@ -90,8 +90,6 @@ def image_slices(camera: Camera, light: Light, count: int) -> Slices:
 
 def image_point(camera: Camera, direction):
     """Return (i, j) of rays [pixels]."""
-    import drjit as dr
-
     depth = dr.rcp(dr.dot(direction, camera.forward))
     i = dr.dot(direction, camera.left) / dr.squared_norm(camera.left)
     j = dr.dot(direction, camera.up) / dr.squared_norm(camera.up)
@@ -100,9 +98,6 @@ def image_point(camera: Camera, direction):
 
 def pixel_number(slices: Slices, i, j):
     """Return the number, row times width plus column, of the pixel that holds an image point, or of the nearest."""
-    import drjit as dr
-    import mitsuba as mi
-
     column = dr.clip(0.5 * slices.width - i, 0, slices.width - 1)
     row = dr.clip(0.5 * slices.height - j, 0, slices.height - 1)
     return mi.UInt32(row) * slices.width + mi.UInt32(column)
@@ -113,8 +108,6 @@ def slice_coordinate(slices: Slices, i, j):
 
     Beyond the first and the last it goes on to -1/2 and count - 1/2, where all four sides face away round the circle.
     """
-    import drjit as dr
-
     x, y = 0.5 * slices.width, 0.5 * slices.height
     di, dj = _towards_epipole(slices.epipole, i, j)
     # Away from E, to whichever side comes first.
@@ -133,9 +126,6 @@ def slice_coordinate(slices: Slices, i, j):
 
 def neighbour(slices: Slices, number):
     """Return the slice of a whole number that may lie beyond the first or the last."""
-    import drjit as dr
-    import mitsuba as mi
-
     last = slices.count - 1
     round_ = dr.select(number < 0, number + slices.count, dr.select(number > last, number - slices.count, number))
     return mi.UInt32(dr.clip(dr.select(slices.closed, round_, number), 0, last))
@@ -151,8 +141,6 @@ def _border(width: int, height: int, epipole):
 
     The border is gone round from the lower left corner, (i, j) = (W/2, -H/2).
     """
-    import drjit as dr
-
     x, y = 0.5 * width, 0.5 * height
     left, top = _towards_epipole(epipole, x, y)
     right, bottom = _towards_epipole(epipole, -x, -y)
@@ -174,8 +162,6 @@ def _border(width: int, height: int, epipole):
 
 def _at_border(slices: Slices, place):
     """Return (i, j) at a place along the sides that face away."""
-    import drjit as dr
-
     x, y = 0.5 * slices.width, 0.5 * slices.height
     points = (
         lambda r: (x, r - y),
@@ -193,8 +179,6 @@ def _at_border(slices: Slices, place):
 
 def _entry(slices: Slices, i, j):
     """Return where the half line from E to a point of the border enters the image: E itself if that is inside."""
-    import drjit as dr
-
     x, y = 0.5 * slices.width, 0.5 * slices.height
     di, dj = _towards_epipole(slices.epipole, i, j)
     to_i = dr.select(di > 0, x - i, x + i) / dr.abs(di)
@@ -207,7 +191,6 @@ def _entry(slices: Slices, i, j):
 
 def _at_right_angles(vector, axis, camera: Camera):
     """Return the unit vector across `axis` on the side of `vector`; any across it where the two are parallel."""
-    import drjit as dr
 
     def across(one):
         normal = dr.cross(axis, one)

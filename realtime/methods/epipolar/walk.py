@@ -22,6 +22,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+
 from realtime.methods.epipolar.min_max_tree import SliceHeights, line_point, node_pair
 from realtime.rays.ray_light import RayGeometry
 
@@ -59,9 +62,6 @@ def sum_lit_pieces(
     zero
         The value of no piece, one for each ray.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     x0, x1 = segment
     width = dr.width(zero)
     x0 = x0 + dr.zeros(type(x1), width)
@@ -106,9 +106,6 @@ def sum_lit_pieces(
 
 def _step(heights: SliceHeights, number, ray, segment, stop, walk: _Walk) -> _Walk:
     """Look at one node: go over it, or down into it."""
-    import drjit as dr
-    import mitsuba as mi
-
     _, height, square = ray
     end, last = stop
     Float = type(height)
@@ -150,8 +147,6 @@ def _step(heights: SliceHeights, number, ray, segment, stop, walk: _Walk) -> _Wa
 
 def _line(ray, kx, ky):
     """Return G."""
-    import drjit as dr
-
     foot, height, _ = ray
     return dr.fma(height, kx, foot * ky)
 
@@ -163,8 +158,6 @@ def _line_value(heights: SliceHeights, number, ray, q):
 
 def _position(heights: SliceHeights, number, ray, x):
     """Return where the point at x lies along k(q), in leaves."""
-    import drjit as dr
-
     foot, height, square = ray
     finite = dr.isfinite(x)
     at = dr.select(finite, x, 1)

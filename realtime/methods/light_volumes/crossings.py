@@ -23,6 +23,9 @@ are farther; two may lie at the same distance, so it counts anew how many it has
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+
 from realtime.methods.light_volumes.pyramid import unpacked
 from realtime.methods.light_volumes.ray_lines import distance_at
 from realtime.methods.light_volumes.texel_crossings import Passage, may_cross, passage, texel_crossings
@@ -58,9 +61,6 @@ def nearest_crossings(heights, face, line: Line, source, after, active):
     active
         Rays to look for.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     leaves, first, last, larger = source
     Float = type(after)
     width = dr.width(after)
@@ -112,9 +112,6 @@ def nearest_crossings(heights, face, line: Line, source, after, active):
 
 def _chunk_bits(line: Line, slope, leaves, k, last):
     """Return 16 bits for each leaf of a chunk: which of its texels the tile may cross and the ray passes."""
-    import drjit as dr
-    import mitsuba as mi
-
     bits = mi.UInt64(0)
     for place in range(CHUNK):
         node = unpacked(dr.gather(mi.UInt32, leaves.entries, k + place))
@@ -125,8 +122,6 @@ def _chunk_bits(line: Line, slope, leaves, k, last):
 
 def _with_crossings(line: Line, over: Passage, found: Crossings, after) -> Crossings:
     """Add the crossings of a texel; few rays have two, in a branch of their own."""
-    import drjit as dr
-
     here = texel_crossings(line, over)
     found = _with_crossing(found, here.crosses, distance_at(line.ray, here.t), after)
 
@@ -139,16 +134,12 @@ def _with_crossings(line: Line, over: Passage, found: Crossings, after) -> Cross
 
 def _with_crossing(found: Crossings, crosses, x, after) -> Crossings:
     """Add a crossing at distance `x` where there is one."""
-    import drjit as dr
-
     queue, out = _inserted(found.queue, dr.select(crosses & (x > after), x, dr.inf))
     return Crossings(queue, found.lost | (out < dr.inf), found.odd ^ (crosses & (x <= after)))
 
 
 def _square_crossings(heights, face, line: Line, square, found: Crossings, after) -> Crossings:
     """Add the crossings in a square of texels, one after the other."""
-    import drjit as dr
-
     column, row, side = square
     ray, Float = line.ray, type(after)
     in_u, out_u = borders(Float(column), ray.u[0], ray.per_u, Float(side))
@@ -176,8 +167,6 @@ def _square_crossings(heights, face, line: Line, square, found: Crossings, after
 
 def _inserted(queue, x):
     """Return the queue with a distance in its place, and the farthest of all, which it has no room for."""
-    import drjit as dr
-
     places = []
     for place in queue:
         places.append(dr.minimum(place, x))

@@ -17,6 +17,9 @@ from itertools import combinations
 from operator import or_
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+
 FACE_BITS = 3  #: of the number of a face in an order of faces
 NO_FACE = (1 << FACE_BITS) - 1  #: stands behind the last
 
@@ -38,9 +41,6 @@ def faces_passed(directions, middle, end, away) -> Any:
     away
         The camera less the light [m].
     """
-    import drjit as dr
-    import mitsuba as mi
-
     # A combination is as long as its part along the middle, at least: a unit vector takes larger weights by that much.
     shortest = reduce(dr.minimum, [dr.dot(d, middle) for d in directions])
     length = dr.minimum(end / dr.maximum(shortest, 1e-6), _FAR) * (1 + 1e-5)
@@ -75,9 +75,6 @@ def faces_in_order(passed, begins) -> Any:
     begins
         Where a ray of the tile comes into each of the six faces, infinite where it does not [m].
     """
-    import drjit as dr
-    import mitsuba as mi
-
     there = [(passed >> face & 1) != 0 for face in range(6)]
     order = mi.UInt32(NO_FACE) << (FACE_BITS * dr.popcnt(passed))
     for face, begin in enumerate(begins):

@@ -32,6 +32,9 @@ from functools import reduce
 from itertools import pairwise
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+
 from realtime.numerics.array_types import four_numbers, two_numbers
 from realtime.shadow_maps.shadow_map import ShadowMap
 
@@ -80,9 +83,6 @@ def level_start(level: int) -> int:
 
 def inverse_depth(shadow_map: ShadowMap):
     """Return the inverse planar depth [1/m], or the height for parallel rays [m], at every corner of the texels."""
-    import drjit as dr
-    import mitsuba as mi
-
     size, distance = shadow_map.size, shadow_map.distance
     Float = type(distance)
     index = dr.arange(mi.UInt32, dr.width(distance))
@@ -94,8 +94,6 @@ def inverse_depth(shadow_map: ShadowMap):
 
 def height_at(frame, depth, place, distance):
     """Return the height at (u, v) of a face whose map has a distance there [1/m]; `depth` as in `LightHeights`."""
-    import drjit as dr
-
     if depth is not None:
         return dr.maximum(depth - distance, 0)
     u, v = place
@@ -105,9 +103,6 @@ def height_at(frame, depth, place, distance):
 
 def light_heights(shadow_map: ShadowMap) -> LightHeights:
     """Return the height field of a shadow map, with its pyramid of bounds."""
-    import drjit as dr
-    import mitsuba as mi
-
     size = shadow_map.size
     depth = shadow_map.depth
     height = inverse_depth(shadow_map)
@@ -132,9 +127,6 @@ def light_heights(shadow_map: ShadowMap) -> LightHeights:
 
 def node_bounds(heights: LightHeights, face, level, i, j, active=True):
     """Return the least and largest height over the node in column `i` and row `j` of a level of the pyramid [1/m]."""
-    import drjit as dr
-    import mitsuba as mi
-
     before = 0x55555555 & ((mi.UInt32(1) << (2 * level)) - 1)
     node = face * heights.nodes + before + (j << level) + i
     pair = dr.gather(two_numbers(type(heights.bounds)), heights.bounds, node, active)
@@ -143,17 +135,12 @@ def node_bounds(heights: LightHeights, face, level, i, j, active=True):
 
 def texel_heights(heights: LightHeights, face, i, j, active=True):
     """Return the heights s00, s10, s01 and s11 of the texel in column `i` and row `j` of a face [1/m]."""
-    import drjit as dr
-
     texel = (face * heights.size + j) * heights.size + i
     return dr.gather(four_numbers(type(heights.texels)), heights.texels, texel, active)
 
 
 def texel_walls(heights: LightHeights, face, i, j, active=True):
     """Return the walls of the texel in column `i` and row `j` of a face."""
-    import drjit as dr
-    import mitsuba as mi
-
     return dr.gather(mi.UInt32, heights.walls, (face * heights.size + j) * heights.size + i, active)
 
 
@@ -169,9 +156,6 @@ class Leaf:
 
 def leaf_sides(heights: LightHeights, face, i, j, active=True) -> Leaf:
     """Return how the texels of the leaf in column `i` and row `j` are sorted."""
-    import drjit as dr
-    import mitsuba as mi
-
     leaf = (((face << heights.finest) + j) << heights.finest) + i
     gap = dr.gather(two_numbers(type(heights.gaps)), heights.gaps, leaf, active)
     sides = dr.gather(mi.UInt32, heights.sides, leaf, active)
@@ -180,9 +164,6 @@ def leaf_sides(heights: LightHeights, face, i, j, active=True) -> Leaf:
 
 def _write_leaves(heights: LightHeights, corners, bounds):
     """Write the bounds of the leaves from the heights at all corners; return their gaps and sides."""
-    import drjit as dr
-    import mitsuba as mi
-
     side = 1 << heights.finest
     leaf = dr.arange(mi.UInt32, heights.faces * side * side)
     row = leaf // side
@@ -217,9 +198,6 @@ def _of_texels(rows, smaller):
 
 def _write_level(heights: LightHeights, bounds, level: int) -> None:
     """Write the bounds of the nodes of a level, from those of the next one."""
-    import drjit as dr
-    import mitsuba as mi
-
     side = 1 << level
     index = dr.arange(mi.UInt32, heights.faces * side * side)
     row = index // side

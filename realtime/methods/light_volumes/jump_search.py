@@ -16,6 +16,9 @@ Hanrahan 2003), for volumes; the map itself stays as it was.
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+
 from realtime.methods.light_volumes.height_field import LEAF, LightHeights, height_at
 from realtime.methods.light_volumes.texel_walls import BOTTOM, LEFT, PLACES, RIGHT, TOP, walled_heights
 from realtime.scene.lights import Light
@@ -39,9 +42,6 @@ def with_walls(heights: LightHeights, scene, light: Light) -> LightHeights:
     light
         The light.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     walls = dr.zeros(mi.UInt32, heights.faces * heights.size**2)
     leaf, side = _jumping_sides(heights)
     texels = _trace(heights, scene, light, (leaf, side), walls) if dr.width(leaf) else leaf
@@ -60,8 +60,6 @@ class _Edge:
 
 def _edge_of(heights: LightHeights, leaf, side) -> _Edge:
     """Return a side by the number of its leaf and its own in there."""
-    import drjit as dr
-
     nodes = 1 << heights.finest
     row = leaf // nodes
     face = row // nodes
@@ -74,9 +72,6 @@ def _edge_of(heights: LightHeights, leaf, side) -> _Edge:
 
 def _jumping_sides(heights: LightHeights):
     """Return the sides over which heights differ enough, by their leaves' numbers and their own."""
-    import drjit as dr
-    import mitsuba as mi
-
     per_face = 4**heights.finest
     leaf = dr.arange(mi.UInt32, heights.faces * per_face)
     node = leaf + (leaf // per_face + 1) * (heights.nodes - per_face)
@@ -97,9 +92,6 @@ def _jumping_sides(heights: LightHeights):
 
 def _ends(heights: LightHeights, edge: _Edge):
     """Return the heights at both ends of sides."""
-    import drjit as dr
-    import mitsuba as mi
-
     size = heights.size
     i, j = dr.minimum(edge.i, size - 1), dr.minimum(edge.j, size - 1)
     texel = (edge.face * size + j) * size + i
@@ -111,9 +103,6 @@ def _ends(heights: LightHeights, edge: _Edge):
 
 def _trace(heights: LightHeights, scene, light: Light, sides, walls):
     """Find the walls on sides and write them to both texels of each; return the numbers of these texels."""
-    import drjit as dr
-    import mitsuba as mi
-
     edge = _edge_of(heights, *sides)
     one, other = _ends(heights, edge)
     Double, size = mi.Float64, heights.size

@@ -25,6 +25,8 @@ over the pixels that it
 from collections.abc import Callable, Mapping
 from typing import Any
 
+import drjit as dr
+
 from realtime.errors import InputError
 from realtime.memory import check_memory
 from realtime.methods.light_airlight import RayAirlight, integral_type, ray_airlight
@@ -140,8 +142,6 @@ def _leaves(view: View, number: int) -> Leaves:
 
 def _walk(heights: LightHeights, leaves: Leaves, airlight: RayAirlight):
     """Return the airlight of one light along the rays [W/(m^2 sr)], and whether it reaches their ends."""
-    import drjit as dr
-
     view = airlight.view
     zero = dr.zeros(integral_type(view), dr.width(view.distance))
     away = view.origin - airlight.light.position

@@ -8,6 +8,9 @@ parent's four children, or what follows the parent.
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+
 from realtime.methods.light_volumes.height_field import LightHeights, node_bounds
 from realtime.methods.light_volumes.tile_beams import BeamPlanes, may_meet, over_square
 from realtime.numerics.array_types import is_single
@@ -43,8 +46,6 @@ def unpacked(entry) -> Node:
 
 def descend(heights: LightHeights, planes: BeamPlanes, face, leaf, count, write, active):
     """Count and write the nodes of level `leaf` that beams may meet."""
-    import drjit as dr
-    import mitsuba as mi
 
     def body(node: Node, count, going):
         met, box = meets(heights, planes, face, node, going)
@@ -79,8 +80,6 @@ def descend(heights: LightHeights, planes: BeamPlanes, face, leaf, count, write,
 
 def meets(heights: LightHeights, planes: BeamPlanes, face, node: Node, active):
     """Return whether a beam may meet the height field over a node, and what it was found from."""
-    import drjit as dr
-
     low, high = node_bounds(heights, face, node.level, node.i, node.j, active)
     half = _half(type(low), node.level)
     u = dr.fma(dr.fma(2.0, type(low)(node.i), 1.0), half, -1.0)
@@ -91,9 +90,6 @@ def meets(heights: LightHeights, planes: BeamPlanes, face, node: Node, active):
 
 def _half(Float, level):
     """Return half the side of a node, where a face goes from -1 to 1: 2^-level."""
-    import drjit as dr
-    import mitsuba as mi
-
     if is_single(Float):
         return dr.reinterpret_array(Float, (127 - level) << 23)
     return 1 / Float(mi.UInt32(1) << level)

@@ -20,6 +20,9 @@ signs. The line t goes over the part of it beyond the nearest height of the face
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+
 from realtime.methods.light_volumes.height_field import LightHeights, node_bounds
 from realtime.shadow_maps.shadow_map import face_coordinates, parallel_coordinates
 
@@ -47,8 +50,6 @@ class FaceRay:
 
 def in_face(heights: LightHeights, face, away, direction, segment):
     """Return the part of a segment of rays that lies in a face, x0 >= x1 where none does; see `face_ray`."""
-    import drjit as dr
-
     a0, b0, c0 = face_coordinates(heights.frame, face, away)
     da, db, dc = face_coordinates(heights.frame, face, direction)
     begin, end = segment
@@ -84,8 +85,6 @@ def face_ray(heights: LightHeights, face, away, direction, segment) -> FaceRay:
     segment
         The distances (x0, x1) of the part in the face; `x1` may be infinite.
     """
-    import mitsuba as mi
-
     a0, b0, c0 = face_coordinates(heights.frame, face, away)
     da, db, dc = face_coordinates(heights.frame, face, direction)
     begin, end = segment
@@ -113,8 +112,6 @@ def _face_ray(begin, end, walks, ends, *, parallel: bool = False) -> FaceRay:
 
 def _cut(begin, end, start, slope):
     """Cut a segment down to where start + x slope >= 0."""
-    import drjit as dr
-
     at = -start / slope
     begin = dr.select(slope > 0, dr.maximum(begin, at), begin)
     end = dr.select(slope < 0, dr.minimum(end, at), end)
@@ -123,8 +120,6 @@ def _cut(begin, end, start, slope):
 
 def _coordinates(size: int, x, origin, direction, nearest):
     """Return u, v [texels], s and y of the point at x."""
-    import drjit as dr
-
     finite = dr.isfinite(x)
     at = dr.select(finite, x, 0)
     a, b, c = (dr.select(finite, dr.fma(at, d, o), d) for o, d in zip(origin, direction))
@@ -138,8 +133,6 @@ def _coordinates(size: int, x, origin, direction, nearest):
 
 def _parallel_coordinates(size: int, x, origin, direction, walks):
     """Return u, v [texels], s and x of the point at x, or of any point where the line does not walk."""
-    import drjit as dr
-
     at = dr.select(walks, x, 0)
     a, b, s = (dr.fma(at, d, o) for o, d in zip(origin, direction))
     half = 0.5 * size
@@ -149,15 +142,11 @@ def _parallel_coordinates(size: int, x, origin, direction, walks):
 
 
 def _inverse(length):
-    import drjit as dr
-
     return dr.select(dr.abs(length) < 1 / _STEEP, _STEEP, 1 / length)
 
 
 def at_line(pair, t):
     """Return a coordinate of the line at t."""
-    import drjit as dr
-
     return dr.fma(t, pair[1], dr.fma(-t, pair[0], pair[0]))
 
 

@@ -10,6 +10,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+
 from realtime.methods.light_volumes.height_field import texel_heights, texel_walls
 from realtime.methods.light_volumes.ray_lines import at_line
 from realtime.methods.light_volumes.texel_lines import Line, borders
@@ -55,8 +58,6 @@ class TexelCrossings:
 
 def passage(heights, face, line: Line, texel) -> Passage:
     """Return the passage of a ray over a texel."""
-    import drjit as dr
-
     ray = line.ray
     Float = type(ray.begin)
     place = column, row = Float(texel[0]), Float(texel[1])
@@ -80,8 +81,6 @@ def passage(heights, face, line: Line, texel) -> Passage:
 
 def may_cross(line: Line, over: Passage):
     """Return whether a ray crosses the height field in a texel; a line that ends beside a wall may do so."""
-    import drjit as dr
-
     from_light, to_light = over.lit
     bends = (_on_diagonal(line, over)[1] > 0) != from_light
     if over.walls is not None:
@@ -96,8 +95,6 @@ def texel_crossings(line: Line, over: Passage) -> TexelCrossings:
     border to the part, over it, at the wall, over the other part, or from that to the border. If it ends there, the
     sign of D at its end may be that of rounding, as a surface is the height field: the first two changes count.
     """
-    import drjit as dr
-
     (begin, end), (from_light, to_light) = over.t, over.lit
     middle, before = _on_diagonal(line, over)
     if over.walls is None:
@@ -130,15 +127,11 @@ def _zeros(t, first, second):
 
 def _zero_between(t, excess):
     """Return where D is 0 between two t."""
-    import drjit as dr
-
     return dr.fma(excess[0] / (excess[0] - excess[1]), t[1] - t[0], t[0])
 
 
 def _on_diagonal(line: Line, over: Passage):
     """Return where the line crosses the diagonal of a texel, and D there; its end where it does not."""
-    import drjit as dr
-
     ray, (column, row), (begin, end), four = line.ray, over.place, over.t, over.four
     middle = ((ray.u[0] - column) - (ray.v[0] - row)) * ray.per_diagonal
     bends = (middle > begin) & (middle < end)
@@ -152,8 +145,6 @@ def _on_wall(line: Line, over: Passage):
 
     Where the line enters, before and behind the wall, and where it leaves.
     """
-    import drjit as dr
-
     ray, (begin, end) = line.ray, over.t
     parts = parts_of(over.four, over.walls, type(ray.begin))
     x, y = ([at_line(pair, t) - low for t in over.t] for pair, low in zip((ray.u, ray.v), over.place))
@@ -173,8 +164,6 @@ def _on_wall(line: Line, over: Passage):
 
 def _as_seen(line: Line, four):
     """Return the heights of a texel's corners near or far in u, then near or far in v, as the line goes."""
-    import drjit as dr
-
     s00, s10, s01, s11 = four
     low = dr.select(line.right, s00, s10), dr.select(line.right, s10, s00)
     high = dr.select(line.right, s01, s11), dr.select(line.right, s11, s01)
@@ -185,9 +174,6 @@ def _as_seen(line: Line, four):
 
 def _wall_on_border(line: Line, walls, on_u, behind: bool) -> Side | None:
     """Return the wall on the border where a line enters a texel, or leaves it, as the line goes."""
-    import drjit as dr
-    import mitsuba as mi
-
     if walls is None:
         return None
     across, upward = (line.right, line.up) if not behind else (~line.right, ~line.up)
@@ -199,8 +185,6 @@ def _wall_on_border(line: Line, walls, on_u, behind: bool) -> Side | None:
 
 def _excess_on_border(line: Line, texel, t, on_u, pair, wall: Side | None):
     """Return D on the border of a texel, from the heights of its nearer and its farther corner."""
-    import drjit as dr
-
     ray, (base, other) = line.ray, pair
     along = dr.select(on_u, ray.v[0], ray.u[0]), dr.select(on_u, ray.v[1], ray.u[1])
     x = at_line(along, t) - dr.select(on_u, texel[1], texel[0])

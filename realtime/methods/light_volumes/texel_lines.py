@@ -6,6 +6,9 @@
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+
 from realtime.methods.light_volumes.height_field import LightHeights, texel_heights, texel_walls
 from realtime.methods.light_volumes.ray_lines import FaceRay, at_line
 from realtime.methods.light_volumes.texel_walls import height_in, parts_of
@@ -29,9 +32,6 @@ class Line:
 
 def line_of(heights: LightHeights, face, ray: FaceRay) -> Line:
     """Return the line of a ray; D at its ends is that of the texel whose own borders are on either side of them."""
-    import drjit as dr
-    import mitsuba as mi
-
     right, up = ray.per_u > 0, ray.per_v > 0
     excess, cells, slack = [], [], type(ray.begin)(0)
     for t in (0, 1):
@@ -55,8 +55,6 @@ def _height_in(heights, texel, four, x, y):
     That is the range of the heights, as the surface may do anything between the samples. Beside a wall it is half of
     it: then it is a question of which of two surfaces the point lies on.
     """
-    import drjit as dr
-
     s00, s10, s01, s11 = four
     below = x >= y
     along, upward = dr.select(below, s10 - s00, s11 - s01), dr.select(below, s11 - s10, s01 - s00)
@@ -71,9 +69,6 @@ def _height_in(heights, texel, four, x, y):
 
 def cell_at(pair, per, t, low, side):
     """Return the column (or row) of a strip of texels whose own borders are on either side of t."""
-    import drjit as dr
-    import mitsuba as mi
-
     first, last = mi.Int32(low), mi.Int32(low + side) - 1
     cell = dr.clip(mi.Int32(dr.floor(at_line(pair, t))), first, last)
     # Rounding may have put it one too far, or not far enough.
@@ -84,16 +79,12 @@ def cell_at(pair, per, t, low, side):
 
 def borders(low, start, per, across=1.0):
     """Return the t at which a line enters and leaves a strip of texels."""
-    import drjit as dr
-
     one, other = (low - start) * per, (low + across - start) * per
     return dr.minimum(one, other), dr.maximum(one, other)
 
 
 def slope_of(line: Line, size: int):
     """Return what `texels_on` needs to know of a line: dv/du, and the least and largest step over a column."""
-    import drjit as dr
-
     ray = line.ray
     slope = dr.clip((ray.v[1] - ray.v[0]) * ray.per_u, -_STEEPEST, _STEEPEST)
     margin = _MARGIN * size
@@ -103,9 +94,6 @@ def slope_of(line: Line, size: int):
 
 def texels_on(line: Line, slope, node):
     """Return bit 4 row + column of each texel of a leaf near the line of a ray."""
-    import drjit as dr
-    import mitsuba as mi
-
     ray = line.ray
     Float = type(ray.begin)
     per_column, below, above = slope

@@ -24,6 +24,9 @@ says the border.
 from dataclasses import dataclass, replace
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+
 from realtime.methods.light_volumes.height_field import LightHeights, level_start, texel_heights
 
 PLACES = 64  #: on a side, where a wall may stand: what is smaller costs rays, and outlines between two sides are bent
@@ -43,8 +46,6 @@ class Side:
 
 def side_of(walls, side, Float) -> Side:
     """Return the wall on one side of a texel with the numbers `walls`; `side` may depend on the lane."""
-    import drjit as dr
-
     number = (walls >> (8 * side)) & 0xFF
     return Side(number != 0, dr.fma(Float(number), 1 / PLACES, -0.5 / PLACES))
 
@@ -62,8 +63,6 @@ def parts_of(four, walls, Float) -> Parts:
     """Return the parts of a texel with four heights and the walls of a number, see
     `realtime.methods.light_volumes.jump_search`.
     """
-    import drjit as dr
-
     s00, s10, s01, s11 = four
     bottom, top, left, right = sides = _sides_of(walls, Float)
     cut = _cuts_corner(sides)
@@ -102,8 +101,6 @@ def _cuts_corner(sides: list[Side]):
 
 def _cut_line(bottom: Side, top: Side, left: Side, right: Side) -> Numbers:
     """Return the line through the walls of two sides that meet, below 0 at the corner between them."""
-    import drjit as dr
-
     Float = type(bottom.place)
     x, y = dr.select(bottom.stands, bottom.place, top.place), dr.select(left.stands, left.place, right.place)
     corner_x, corner_y = dr.select(right.stands, Float(1), 0), dr.select(top.stands, Float(1), 0)
@@ -113,23 +110,17 @@ def _cut_line(bottom: Side, top: Side, left: Side, right: Side) -> Numbers:
 
 
 def _select(condition, one: Numbers, other: Numbers) -> Numbers:
-    import drjit as dr
-
     a, b, c = (dr.select(condition, *pair) for pair in zip(one, other))
     return a, b, c
 
 
 def value_at(numbers: Numbers, x, y):
     """Return c0 + cx x + cy y."""
-    import drjit as dr
-
     return dr.fma(numbers[1], x, dr.fma(numbers[2], y, numbers[0]))
 
 
 def height_at(parts: Parts, second, x, y):
     """Return the height at a point by the plane of the second part, or of the first."""
-    import drjit as dr
-
     return dr.select(second, value_at(parts.second, x, y), value_at(parts.first, x, y))
 
 
@@ -150,9 +141,6 @@ def walled_heights(heights: LightHeights, walls, texels) -> LightHeights:
     texels
         Those that may have walls; some may be there more than once.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     bounds, gaps = heights.bounds + 0, heights.gaps + 0
     if dr.width(texels):
         size = heights.size
@@ -165,9 +153,6 @@ def walled_heights(heights: LightHeights, walls, texels) -> LightHeights:
 
 def _widen(heights: LightHeights, arrays, texel, walls) -> None:
     """Widen bounds and gaps to hold the planes over texels with a corner cut off."""
-    import drjit as dr
-    import mitsuba as mi
-
     (bounds, gaps), mode = arrays, dr.ReduceMode.Direct  # few: no copies of the arrays for each thread
     face, i, j = texel
     four = texel_heights(heights, face, i, j)

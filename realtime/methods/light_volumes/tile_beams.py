@@ -24,6 +24,9 @@ from functools import reduce
 from operator import add
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+
 _SLACK = 2e-6  # of the terms of a sum: float32 rounding, with room to spare
 
 
@@ -71,8 +74,6 @@ def make_beam(directions, end, light, axis=None) -> Beam:
     axis
         Direction of a directional light.
     """
-    import drjit as dr
-
     middle = dr.normalize(sum(directions[1:], directions[0]))
     across = directions[-1] - directions[0]
     across -= middle * dr.dot(across, middle)
@@ -91,8 +92,6 @@ def make_beam(directions, end, light, axis=None) -> Beam:
 
 def _pair_about(corners, axis):
     """Return the normals of the planes through an axis on either side of the corners, and whether there are such."""
-    import drjit as dr
-
     Vector = type(axis)
     left, right = Vector(0), Vector(0)
     on_left, on_right = dr.mask_t(axis.x)(False), dr.mask_t(axis.x)(False)
@@ -108,8 +107,6 @@ def _pair_about(corners, axis):
 
 def _rectangle(directions, middle, across, up):
     """Return the corners of the rectangle about directions on the plane before the middle, and its side planes."""
-    import drjit as dr
-
     place = [(dr.dot(d, across), dr.dot(d, up), dr.dot(d, middle)) for d in directions]
     a, b = [x / z for x, _, z in place], [y / z for _, y, z in place]
     margin = 1e-6  # of the directions' rounding
@@ -121,8 +118,6 @@ def _rectangle(directions, middle, across, up):
 
 def beam_planes(beam: Beam, products) -> BeamPlanes:
     """Return the planes of a beam on a face; `products` gives the scalar products of a vector with its base."""
-    import drjit as dr
-
     if beam.parallel:
         return _parallel_planes(beam, products)
     coefficients = [(*products(normal), dr.dot(normal, beam.light)) for normal in beam.normals]
@@ -149,8 +144,6 @@ def _with_lines(planes, slack, start) -> BeamPlanes:
 
 def _line(plane, slack, others, slacks):
     """Return the line on the map in which a plane and one of two others add up, and its rounding error."""
-    import drjit as dr
-
     first = others[0][3] * plane[3] < 0
     other = [dr.select(first, a, b) for a, b in zip(*others)]
     share, own = dr.abs(plane[3]), dr.abs(other[3])
@@ -164,8 +157,6 @@ def _line(plane, slack, others, slacks):
 
 def _parallel_planes(beam: Beam, products) -> BeamPlanes:
     """Return what `beam_planes` does where the rays of the light are parallel."""
-    import drjit as dr
-
     length = dr.norm(beam.light)
     planes, slack = [], []
     for normal in beam.normals:
@@ -182,8 +173,6 @@ def _parallel_planes(beam: Beam, products) -> BeamPlanes:
 
 def over_square(planes: BeamPlanes, centre, half):
     """Return for every plane gu u + gv v + g0 where it is largest over the square about `centre`, `half` a side."""
-    import drjit as dr
-
     u, v = centre
     return [
         dr.fma(gu, u, dr.fma(gv, v, dr.fma(dr.abs(gu) + dr.abs(gv), half, g0 + slack)))
@@ -193,8 +182,6 @@ def over_square(planes: BeamPlanes, centre, half):
 
 def may_meet(planes: BeamPlanes, values, low, high):
     """Return whether a beam may meet the box from height `low` to `high`; `values` from `over_square`."""
-    import drjit as dr
-
     low, high = dr.fma(-1e-5, high, low), dr.fma(1e-5, high, high)
     met = dr.mask_t(low)(True)
     for k, (value, gs) in enumerate(zip(values, planes.s)):
@@ -204,9 +191,6 @@ def may_meet(planes: BeamPlanes, values, low, high):
 
 def parts_within(planes: BeamPlanes, values, half, low, high):
     """Return bit 4 row + column of each of the 4 x 4 parts of a square that is not beyond a plane through the light."""
-    import drjit as dr
-    import mitsuba as mi
-
     low, high = dr.fma(-1e-5, high, low), dr.fma(1e-5, high, high)
     sides = []
     for k in _NARROW:

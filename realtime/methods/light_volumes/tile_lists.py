@@ -14,6 +14,9 @@ from dataclasses import dataclass
 from functools import partial, reduce
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+
 from realtime.methods.light_volumes.cube_faces import faces_in_order, faces_passed
 from realtime.methods.light_volumes.height_field import LightHeights, leaf_sides
 from realtime.methods.light_volumes.pyramid import Box, Node, descend, meets, packed, unpacked
@@ -58,9 +61,6 @@ def tile_leaves(heights: LightHeights, rays, distance, *, light, square: bool) -
     square
         Whether every tile is a square of 4 x 4 pixels: then its corners bound it.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     Float, Vector = type(distance), type(light)
     count = dr.width(distance)
     tiles = -(-count // TILE)
@@ -86,9 +86,6 @@ def tile_leaves(heights: LightHeights, rays, distance, *, light, square: bool) -
 
 def _block_lists(heights: LightHeights, beam: Beam, face):
     """Return the leaves that beams may meet, `_BLOCK_ROOM` places each, and how many; more than these are not there."""
-    import drjit as dr
-    import mitsuba as mi
-
     lane = dr.arange(mi.UInt32, dr.width(face))
     entries = dr.empty(mi.UInt32, dr.width(face) * _BLOCK_ROOM)
     planes = beam_planes(beam, partial(face_products, heights.frame, face))
@@ -101,9 +98,6 @@ def _block_lists(heights: LightHeights, beam: Beam, face):
 
 def _tile_lists(heights: LightHeights, beam: Beam, passed, entries, found) -> Leaves:
     """Return the leaves that beams may meet, drawn from the lists of their blocks, and which of their texels."""
-    import drjit as dr
-    import mitsuba as mi
-
     tiles = dr.width(beam.end)
     tile = dr.arange(mi.UInt32, tiles)
     faces = heights.faces
@@ -171,7 +165,6 @@ def _tile_lists(heights: LightHeights, beam: Beam, passed, entries, found) -> Le
 
 def _is_lit(heights: LightHeights, face, beam: Beam, active):
     """Return whether all of a face is lit that beams pass which meet nothing there: whether their middle rays are."""
-    import drjit as dr
 
     def looked_up(middle, end):
         begin, end = in_face(heights, face, -beam.light, middle, (type(end)(0), end))
@@ -188,7 +181,6 @@ def _is_lit(heights: LightHeights, face, beam: Beam, active):
 
 def _writer(target, first, room):
     """Return the function that writes a node to its place in a list, if there is room, and counts it."""
-    import drjit as dr
 
     def write(node: Node, box: Box, count, active):
         def store(entry, place):
@@ -205,7 +197,6 @@ def _writer(target, first, room):
 
 def _leaf_writer(heights: LightHeights, planes: BeamPlanes, face, targets, first, room):
     """Return the function that writes a leaf, if any of its texels matters and there is room, and counts it."""
-    import drjit as dr
 
     def write(node: Node, box: Box, count, active):
         def store(node, box, count):
@@ -222,8 +213,6 @@ def _leaf_writer(heights: LightHeights, planes: BeamPlanes, face, targets, first
 
 def _texels_met(heights: LightHeights, planes: BeamPlanes, face, node: Node, box: Box):
     """Return bit 4 row + column of each texel of a leaf that the beam may meet; 1 for larger nodes."""
-    import drjit as dr
-
     fine = node.level == heights.finest
     leaf = leaf_sides(heights, face, node.i, node.j, fine)
     met = leaf.both

@@ -14,6 +14,9 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+
 from realtime.methods.light_volumes.crossings import Crossings, nearest_crossings
 from realtime.methods.light_volumes.cube_faces import FACE_BITS, NO_FACE
 from realtime.methods.light_volumes.height_field import LightHeights
@@ -60,9 +63,6 @@ def sum_lit_pieces(
         Whether the light reaches what is at the end of the segment: a hard shadow by the shadow map, with the range of
         the heights over a texel as its bias.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     width = dr.width(direction, zero)
 
     def of_face(to_come, run, total, reached):
@@ -130,8 +130,6 @@ def _face_sum(heights, face, ray: FaceRay, source, run: _Run, total, integral):
     reached
         Whether the ray is lit where it leaves the face.
     """
-    import drjit as dr
-
     line = line_of(heights, face, ray)
     # All is lit before the line begins, and after it ends early.
     lit = ~ray.walks | (line.excess[0] > 0)
@@ -159,9 +157,6 @@ def _add_pieces(found: Crossings, ray: FaceRay, after, lit, active, integral, ru
     there is one already: of a ray that passes the faces in another order than its tile, or where two faces are at odds
     about a point on their border, by rounding.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     queue, more = found.queue, found.lost
     goes_on = active & run.held & lit & (run.end == after)
     held = run.held & ~goes_on

@@ -8,6 +8,8 @@ places of the queue are compared at every operation, without branches: a dozen i
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+
 
 @dataclass
 class Queue:
@@ -19,8 +21,6 @@ class Queue:
 
 def filled(quotient: float, places: int, Float, width: int) -> Queue:
     """Return a queue that holds one quotient in all places, without gain."""
-    import drjit as dr
-
     return Queue(
         [dr.full(Float, quotient, width) for _ in range(places)], [dr.zeros(Float, width) for _ in range(places)]
     )
@@ -36,8 +36,6 @@ def pushed(queue: Queue, quotient, gain, active):
     quotient, gain
         The crossing that was taken out; an infinite quotient where `active` is false.
     """
-    import drjit as dr
-
     # What is nearer than all comes out at once.
     carried, carried_gain = dr.select(active, quotient, dr.inf), dr.select(active, gain, 0)
     quotients, gains = [], []
@@ -51,8 +49,6 @@ def pushed(queue: Queue, quotient, gain, active):
 
 def inserted(queue: Queue, quotient, gain, active) -> Queue:
     """Put a crossing into the queue; crossings of one quotient become one, and the farthest of too many is lost."""
-    import drjit as dr
-
     carried = quotient, gain
     quotients, gains = [], []
     for place in range(len(queue.quotient)):
@@ -69,8 +65,6 @@ def inserted(queue: Queue, quotient, gain, active) -> Queue:
 
 def popped(queue: Queue, active):
     """Take the nearest crossing out; see `pushed`."""
-    import drjit as dr
-
     zero = dr.zeros(type(queue.quotient[0]), 1)
     moved = Queue([*queue.quotient[1:], zero], [*queue.gain[1:], zero])
     return dr.select(active, moved, queue), queue.quotient[0], queue.gain[0]

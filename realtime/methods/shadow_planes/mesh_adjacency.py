@@ -15,8 +15,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from realtime.errors import InputError
 
@@ -61,8 +65,6 @@ def read_casters(scene) -> Casters:
     InputError
         For a shape that has no triangles, with its name.
     """
-    import mitsuba as mi
-
     meshes = []
     for shape in scene.shapes():
         if shape.bsdf() is not None and mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.Null):
@@ -121,9 +123,6 @@ def with_positions(casters: Casters, positions: Mapping[str, Array]) -> Casters:
 
 def mesh_triangles(mesh) -> tuple[Array, NDArray[np.int64]]:
     """Return the vertices [m] and the triangles of a Mitsuba mesh, (vertices, 3) and (triangles, 3)."""
-    import drjit as dr
-    import mitsuba as mi
-
     # Asked for one by one: `mi.traverse` shows the transform of a rectangle or a cube, not its vertices.
     position = mesh.vertex_position(dr.arange(mi.UInt32, mesh.vertex_count()))
     face = mesh.face_indices(dr.arange(mi.UInt32, mesh.face_count()))
@@ -251,9 +250,6 @@ def _paired_edges(triangles: NDArray[Any]):
 
 def _bodies(triangles, edges, entries):
     """Return the connected part of every triangle, and by part whether it is closed."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     left, right, same_way = entries
     count = len(triangles)
     if not count:

@@ -25,6 +25,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
 from realtime.bounded_media.airlight import FORMS, ambient_radiance, check_form
 from realtime.bounded_media.directional_airlight import ParallelRay
 from realtime.bounded_media.ray_segments import MediaRay
@@ -96,8 +100,6 @@ def plane_finder(
 
     All that is on the device is read here, and nothing else done: until then the device stands still.
     """
-    import numpy as np
-
     position = np.array(light.position, dtype=np.float64).ravel()
     ring = None
     if cone and light.kind == "spot":
@@ -174,8 +176,6 @@ def shadow_planes(
     Biri, Arques, Michelin 2006, *Real time rendering of atmospheric scattering and volumetric shadows*, Journal of
     WSCG 14.
     """
-    import drjit as dr
-
     total = type(view.medium.albedo)(0)
     lit = []
     in_media: tuple[MediaRay | ParallelRay, ...] = ()
@@ -222,8 +222,6 @@ def shadow_plane_tiles(view: View, *, order: str, **_) -> tuple[Lists, ...]:
 
 def tile_planes(view: View, index: PlaneIndex, *, order: str) -> Lists:
     """Return the planes that concern each tile of the image."""
-    import drjit as dr
-    import mitsuba as mi
 
     def rays(lane):
         pixel = dr.gather(mi.UInt32, view.pixel, lane)
@@ -234,8 +232,6 @@ def tile_planes(view: View, index: PlaneIndex, *, order: str) -> Lists:
 
 def _segments(index: PlaneIndex, lists: Lists, rays: RayPlanes, airlight: RayAirlight, *, differences: bool):
     """Sum the lit segments of one light."""
-    import drjit as dr
-
     view = airlight.view
 
     def integral(a, b):

@@ -35,6 +35,7 @@ added.
 from dataclasses import dataclass, replace
 from typing import Any
 
+import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
@@ -152,8 +153,6 @@ def seen_rays(aim: Aim, camera: Camera, pixel, distance, light: Light) -> SeenRa
     light
         A point or spot light; the `Aim` of a spot has its cones.
     """
-    import drjit as dr
-
     c, r, w = _aimed(aim, camera, pixel)
     across_square = dr.fma(w.x, w.x, dr.square(w.y))
     scale = dr.rsqrt(dr.fma(w.z, w.z, across_square))
@@ -167,8 +166,6 @@ def seen_rays(aim: Aim, camera: Camera, pixel, distance, light: Light) -> SeenRa
 
 def seen_ways(aim: Aim, camera: Camera, pixel):
     """Return the unit directions of rays in the frame, three arrays."""
-    import drjit as dr
-
     _, _, w = _aimed(aim, camera, pixel)
     return tuple(w * dr.rsqrt(dr.squared_norm(w)))
 
@@ -183,8 +180,6 @@ def _aimed(aim: Aim, camera: Camera, pixel):
 
 def _in_cone(aim: Aim, place, way, geometry: RayGeometry, *, light: Light, distance) -> RayGeometry:
     """Add to a geometry what only a spot has."""
-    import drjit as dr
-
     x, y, z, scale = way
     a = aim.axis
     square = dr.fma(x, x, dr.square(y))
@@ -215,8 +210,6 @@ def _in_cone(aim: Aim, place, way, geometry: RayGeometry, *, light: Light, dista
 
 
 def _at(affine: Affine, column, row):
-    import drjit as dr
-
     return dr.fma(affine.column, column, dr.fma(affine.row, row, affine.base))
 
 

@@ -28,6 +28,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
@@ -242,9 +244,6 @@ def index_planes(
     aim
         Axes of the frame -> where the pixels of the camera aim in it.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     axes, distance = light_frame(light, camera)
     layers = layers_between(casters, light, axes, distance, used=used)
     planes = shadow_planes(casters, silhouette(casters, light, used=used), light, axes)

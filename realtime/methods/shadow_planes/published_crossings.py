@@ -14,6 +14,9 @@ would have drawn on. Its rays look for each next crossing in the whole of that l
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+
 from realtime.methods.shadow_planes.plane_table import PlaneIndex
 from realtime.methods.shadow_planes.sweep import RayPlanes, read_plane
 from realtime.methods.shadow_planes.tile_lists import Lists
@@ -27,8 +30,6 @@ class Buffer:
 
     def stored(self, value):
         """Return what the buffer keeps of a radiance."""
-        import drjit as dr
-
         return dr.round(dr.clip(value, 0, self.white) * (255 / self.white)) * (self.white / 255)
 
 
@@ -70,9 +71,6 @@ def sum_crossings(
     lit
         Whether the light reaches the visible surface.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     at_plane, at_surface = gammas
     ray_end = index.distance / distance
     width = dr.width(ray.x)
@@ -111,8 +109,6 @@ def sum_crossings(
 
 def _next(index: PlaneIndex, lists: Lists, ray: RayPlanes, ray_end, draw: _Draw, order: str) -> _Draw:
     """Read one plane: the next of the list, or the next crossing of a list without order."""
-    import drjit as dr
-
     found, key = _sought(index, lists, ray, ray_end, draw, order)
     place = dr.select(ray.sorted, draw.place, found)
     quotient, crossed, gain, number = read_plane(index, lists, ray, place, place < ray.source.count)
@@ -145,9 +141,6 @@ def _sought(index: PlaneIndex, lists: Lists, ray: RayPlanes, ray_end, draw: _Dra
     in which `realtime.methods.shadow_planes.tile_lists` puts lists, but that the ray's own crossings tell it, not
     those of the middle ray. Behind the last crossing the place is the end of the list. Lists in order are not read.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     Float, width = type(ray.x), dr.width(ray.x)
     count = dr.select(ray.sorted, 0, ray.source.count)
 
@@ -170,9 +163,6 @@ def _sought(index: PlaneIndex, lists: Lists, ray: RayPlanes, ray_end, draw: _Dra
 
 def _layers_at_end(index: PlaneIndex, lists: Lists, ray: RayPlanes, ray_end):
     """Return the layers over the visible surface."""
-    import drjit as dr
-    import mitsuba as mi
-
     Float, width = type(ray.x), dr.width(ray.x)
 
     def body(place, layers):

@@ -14,6 +14,9 @@ Beyond the last row Gamma keeps its value there. Surfaces interpolate Gamma betw
 
 import math
 
+import drjit as dr
+import mitsuba as mi
+
 from realtime.kernels.registry import gamma
 from realtime.methods.shadow_planes.plane_table import PlaneIndex
 from realtime.methods.view import View, radiance
@@ -25,8 +28,6 @@ RATIO = 1.5
 
 def gamma_at(view: View, light: Light, point, *, kernel):
     """Return the radiance of Gamma from the camera to points [W/(m^2 sr)]."""
-    import drjit as dr
-
     offset = point - view.origin
     distance = dr.norm(offset)
     geometry = ray_geometry(view.origin, offset / distance, light)
@@ -35,9 +36,6 @@ def gamma_at(view: View, light: Light, point, *, kernel):
 
 def mesh_gamma(view: View, index: PlaneIndex, light: Light, *, kernel, rows: int):
     """Return the function (plane, ray, x) that interpolates Gamma on the meshes of the planes."""
-    import drjit as dr
-    import mitsuba as mi
-
     Float, Vector = type(view.distance), type(view.direction)
     planes = dr.width(index.ends) // 6
     lane = dr.arange(mi.UInt32, planes * 2 * rows)
@@ -84,8 +82,6 @@ def surface_gamma(view: View, light: Light, *, kernel, otherwise):
     otherwise
         Gamma where no triangle is seen.
     """
-    import drjit as dr
-
     corners, weights, seen = view.visible_triangle()
     total = sum(
         dr.select(seen, weight, 0) * gamma_at(view, light, corner, kernel=kernel)

@@ -24,6 +24,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+
 from realtime.methods.shadow_planes.crossing_queue import filled, inserted, popped, pushed
 from realtime.methods.shadow_planes.plane_table import FULL, GAIN_SHIFT, GAIN_ZERO, NUMBER, PlaneIndex
 from realtime.methods.shadow_planes.tile_lists import Lists, Source, entry_at
@@ -48,9 +51,6 @@ class RayPlanes:
 
 def ray_planes(lists: Lists, x, y, z, *, tile) -> RayPlanes:
     """Return camera rays, directions in the frame of a light, with the planes of their tiles; see `View.tile`."""
-    import drjit as dr
-    import mitsuba as mi
-
     source = dr.gather(Source, lists.source, tile)
     return RayPlanes(x, y, z, diamond_angle(x, y), source, dr.gather(mi.Bool, lists.sorted, tile))
 
@@ -67,9 +67,6 @@ def read_plane(index: PlaneIndex, lists: Lists, ray: RayPlanes, k, active):
     active
         Lanes to read for.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     entry, counts = entry_at(lists.entries, ray.source, k, active)
     number = entry & NUMBER
     Float = type(ray.x)
@@ -113,8 +110,6 @@ def sum_lit_segments(index: PlaneIndex, lists: Lists, ray: RayPlanes, segment, i
     lit
         Whether the light reaches the end of the segment.
     """
-    import drjit as dr
-
     x0, x1 = segment
     ray_end = index.distance / x1
 
@@ -167,9 +162,6 @@ class _Passed:
 
 def _start(passing: _Passing) -> _Passed:
     """Return what every ray has passed at the camera."""
-    import drjit as dr
-    import mitsuba as mi
-
     Float, width = type(passing.ray_end), dr.width(passing.ray.x)
     return _Passed(
         layers=dr.zeros(Float, width) + passing.index.layers,
@@ -187,8 +179,6 @@ def _gone_over(passing: _Passing, passed: _Passed, quotient, gain, *, crosses, d
 
     The segment that ended before is added where it is `due`, or another one ends.
     """
-    import drjit as dr
-
     layers = passed.layers + dr.select(crosses, gain, 0)
     opens = crosses & (passed.layers > 0) & (layers <= 0)
     closes = crosses & (passed.layers <= 0) & (layers > 0)
@@ -211,9 +201,6 @@ def _gone_over(passing: _Passing, passed: _Passed, quotient, gain, *, crosses, d
 
 def _read(passing: _Passing, place, reads):
     """Return the quotient of a plane and its gain, and whether the ray crosses it before its end."""
-    import drjit as dr
-    import mitsuba as mi
-
     Float = type(passing.ray_end)
 
     def read(place, reads):
@@ -235,9 +222,6 @@ def _walked(passing: _Passing, active, *, places: int):
     lost
         Whether the order was wrong, or wrong by more than the queue could mend.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     Float, width = type(passing.ray_end), dr.width(passing.ray.x)
     count = passing.ray.source.count
     end = dr.select(active & (count > 0), count + places, 0)
@@ -266,8 +250,6 @@ def _walked(passing: _Passing, active, *, places: int):
 
 def _ended(passing: _Passing, passed: _Passed, active):
     """Return the total with the segment that waits, and with one that is lit to the end of the ray."""
-    import drjit as dr
-
     lit = passed.layers <= 0
 
     def body(total, waits, lit):
@@ -288,9 +270,6 @@ def _collected(passing: _Passing):
 
     Returns what `sum_lit_segments` does.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     Float, width = type(passing.ray_end), dr.width(passing.ray.x)
     count = passing.ray.source.count
 

@@ -12,6 +12,9 @@ from dataclasses import dataclass
 from functools import reduce
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+
 from realtime.methods.shadow_planes.plane_table import NUMBER, TURN, PlaneIndex
 from realtime.numerics.array_types import four_numbers, two_numbers
 from realtime.numerics.diamond_angle import diamond_angle
@@ -52,9 +55,6 @@ def tile_boxes(index: PlaneIndex, rays: Callable[[Any], tuple[Any, Any, Any]], d
         Whether every tile is a square of 4 x 4 pixels: then its corners bound it, but for the curvature of the sphere
         of directions.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     count = dr.width(distance)
     tiles = -(-count // TILE)
     tile = dr.arange(mi.UInt32, tiles)
@@ -78,9 +78,6 @@ def tile_boxes(index: PlaneIndex, rays: Callable[[Any], tuple[Any, Any, Any]], d
 
 def block_boxes(tile: Box) -> Box:
     """Return the boxes of the blocks of tiles."""
-    import drjit as dr
-    import mitsuba as mi
-
     count = dr.width(tile.x)
     block = dr.arange(mi.UInt32, -(-count // TILE))
 
@@ -108,8 +105,6 @@ def _box(low, high, ray_end) -> Box:
 
 def _azimuths(centre, half):
     """Return the azimuth of the centres and how far the corners are from it; a full turn where that is unclear."""
-    import drjit as dr
-
     (x, y), (x_half, y_half) = centre, half
     azimuth = diamond_angle(x, y)
     widest = type(x)(0)
@@ -124,8 +119,6 @@ def _azimuths(centre, half):
 
 def touches(index: PlaneIndex, box: Box, entry, active):
     """Return whether a ray of the box could cross a plane, whether all that reach it do, and D/x at the centre."""
-    import drjit as dr
-
     Float = type(box.x)
     number = entry & NUMBER
     a, b, p, q = dr.gather(four_numbers(Float), index.lines, number, active)

@@ -12,6 +12,9 @@ its middle ray crosses them, or in that of the paper.
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+
 from realtime.methods.shadow_planes.plane_table import BINS, FIRST, FULL, NUMBER, TURN, PlaneIndex
 from realtime.methods.shadow_planes.tile_boxes import TILE, Box, block_boxes, tile_boxes, touches
 from realtime.numerics.array_types import four_numbers
@@ -31,9 +34,6 @@ class Source:
 
 def entry_at(entries, source: Source, k, active):
     """Return the k-th entry of a source and whether it counts there."""
-    import drjit as dr
-    import mitsuba as mi
-
     place = source.first + k
     active = active & (k < source.count)
     entry = dr.gather(mi.UInt32, entries, place, active)
@@ -52,9 +52,6 @@ def tile_lists(index: PlaneIndex, rays, distance, *, order: str, square: bool) -
     order
         See `listed`.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     tiles = tile_boxes(index, rays, distance, square=square)
     dr.eval(tiles)
     blocks = block_boxes(tiles)
@@ -73,9 +70,6 @@ def tile_lists(index: PlaneIndex, rays, distance, *, order: str, square: bool) -
 
 def bin_source(index: PlaneIndex, box: Box) -> Source:
     """Return where the bins of a box's azimuths are."""
-    import drjit as dr
-    import mitsuba as mi
-
     everything = box.azimuth_half > TURN / 2
     low, high = box.azimuth - box.azimuth_half, box.azimuth + box.azimuth_half
     turned = dr.select(low < 0, TURN, 0)
@@ -119,9 +113,6 @@ def listed(
     lanes
         How many lanes share the work of a box; only without an order.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     count = _visit(index, box, entries, source, None, lanes=lanes)
     dr.eval(count)
     # Keys are compared four at a time: lists that are put in order begin at every fourth place.
@@ -177,9 +168,6 @@ class _Unsorted:
 
 def _of_box(values, lanes: int, number: int):
     """Return for every box the value of one of the lanes that share it."""
-    import drjit as dr
-    import mitsuba as mi
-
     if lanes == 1:
         return values
     return dr.gather(type(values), values, dr.arange(mi.UInt32, dr.width(values) // lanes) * lanes + number)
@@ -187,9 +175,6 @@ def _of_box(values, lanes: int, number: int):
 
 def _visit(index: PlaneIndex, box: Box, entries, source: Source, write, *, lanes: int = 1):
     """Count, and write if wanted, the planes of a source that touch the boxes; by lane, if several share a box."""
-    import drjit as dr
-    import mitsuba as mi
-
     width = dr.width(box.x) * lanes
     if lanes > 1:
         # Each takes a run of the places, in their order: the list is the same as one lane would write.
@@ -218,9 +203,6 @@ def _visit(index: PlaneIndex, box: Box, entries, source: Source, write, *, lanes
 
 def _write_sorted(pool, unsorted: _Unsorted, source: Source, behind: int, total) -> None:
     """Write every list in order: the rank of an entry is the number of entries of its list that come before it."""
-    import drjit as dr
-    import mitsuba as mi
-
     Four = four_numbers(type(unsorted.key))
 
     def placed(place):

@@ -16,6 +16,9 @@ distance (volpath's does not, DESIGN section 6.1).
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+
 from analytic.errors import InputError
 
 _SHORT_OF_POINT = 1e-5  # relative: a hundred roundings of single precision
@@ -65,8 +68,6 @@ def read_surroundings(scene) -> tuple[Surroundings, list[Any]]:
 
 
 def _is_null(shape) -> bool:
-    import mitsuba as mi
-
     flags = int(shape.bsdf().flags())
     null = bool(flags & int(mi.BSDFFlags.Null))
     if null and flags & int(mi.BSDFFlags.All) & ~int(mi.BSDFFlags.Null):
@@ -85,24 +86,17 @@ def require_homogeneous(medium) -> None:
 
 def coefficients(medium, active) -> tuple[Any, Any]:
     """Return scattering and extinction of media by pointer [1/m]; 0 for a vacuum, the null pointer."""
-    import drjit as dr
-    import mitsuba as mi
-
     sigma_s, _, sigma_t = medium.get_scattering_coefficients(dr.zeros(mi.MediumInteraction3f), active)
     return sigma_s, sigma_t
 
 
 def is_boundary(interaction, active):
     """Return where surface interactions are with the boundary of a medium rather than a surface."""
-    import mitsuba as mi
-
     return active & mi.has_flag(interaction.bsdf().flags(), mi.BSDFFlags.Null)
 
 
 def step_beyond(point):
     """Return how far beyond a boundary at `point` a ray goes on [m]."""
-    import drjit as dr
-
     return _BEYOND * (1 + dr.max(dr.abs(point)))
 
 
@@ -112,9 +106,6 @@ def medium_at(around: Surroundings, position, known_position, known_medium, acti
     The way to the other point is followed, through surfaces too, to the first boundary, which names the medium on its
     near side; where there is none both points lie in the same medium.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     way = known_position - position
     distance = dr.norm(way)
     direction = way / dr.maximum(distance, 1e-30)
@@ -150,9 +141,6 @@ def transmittance(around: Surroundings, start, direction, distance, *, media: Le
     active
         Mask.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     reach = distance * (1 - _SHORT_OF_POINT)
     if not around.bounded:
         whole = dr.exp(-media.end_sigma_t * distance)

@@ -11,6 +11,9 @@ technique is stratified by itself. As each has a finite density from below, 1/(2
 from collections.abc import Sequence
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+
 from reference.monte_carlo.single_scatter.distance_sampling import free_flight, free_flight_pdf, free_flights
 
 
@@ -31,9 +34,6 @@ def sample_stretch(u, length, sigma_t: Sequence[Any]) -> tuple[Any, Any]:
     y, density
         Distance [m] and density of the mixture there [1/m], in single precision.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     length = mi.Float64(length)
     flights = [free_flights(length, mi.Float64(rate)) for rate in sigma_t]
     share = 0.5 / len(flights)

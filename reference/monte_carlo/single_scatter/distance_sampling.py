@@ -38,6 +38,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+
 _MEAN_FREE_PATHS = 60.0  # free flights are cut there: 1e-26 of them are longer, and the other technique goes on
 # By how much samples may fall beside a spot's cone [rad]: above double precision's rounding, and so little that it does
 # not matter that hardly any sample ever does. (A strip that 1 batch in 100 feels is a bias in all the others.)
@@ -80,8 +83,6 @@ def closest_approach(origin, direction, position) -> Approach:
     -----
     Valid for any ray; one that meets the light gets a height of 1e-30 and a normal near zero.
     """
-    import drjit as dr
-
     offset = origin - position
     foot = -dr.dot(offset, direction)
     perpendicular = offset + direction * foot
@@ -112,9 +113,6 @@ def cone_ends(approach: Approach, direction, *, axis, cutoff: float) -> tuple[An
     Valid for cones up to a half space; wider ones are answered by the whole line. The ends lie outside the cone by a
     hair: they bound where samples are drawn, and what the light sends there is the emitter's own answer.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     infinity = dr.inf
     if cutoff > 0.5 * math.pi:
         return mi.Float64(-infinity), mi.Float64(infinity)
@@ -133,8 +131,6 @@ def cone_ends(approach: Approach, direction, *, axis, cutoff: float) -> tuple[An
 
 def equi_angular_range(span: Span):
     """Return the angle that the light sees the span under [rad]."""
-    import drjit as dr
-
     finite = span.length < dr.inf
     return dr.select(finite, _angle(dr.select(finite, span.length, 1), span), dr.atan2(span.height, span.start))
 
@@ -152,8 +148,6 @@ def equi_angular_pdf(y, span: Span):
 
 def _distance(angle, span: Span):
     """Return how far from the start of the span the point is that the light sees at an angle from it [m]."""
-    import drjit as dr
-
     s0, h = span.start, span.height
     sine, cosine = dr.sincos(angle)
     beyond = h * cosine - s0 * sine  # r0 cos(theta): above 0, and 0 at the far end of an endless ray
@@ -163,8 +157,6 @@ def _distance(angle, span: Span):
 
 def _angle(y, span: Span):
     """Return the angle at the light between the start of the span and the point at y, the inverse of `_distance`."""
-    import drjit as dr
-
     s0, h = span.start, span.height
     return dr.atan2(h * y, h * h + s0 * (s0 + y))
 
@@ -185,8 +177,6 @@ def free_flights(length, sigma_t) -> FreeFlight:
     -----
     Valid for sigma_t > 0, and for sigma_t = 0 where the length is finite.
     """
-    import drjit as dr
-
     cut = dr.minimum(length, _MEAN_FREE_PATHS / sigma_t)
     depth = dr.maximum(sigma_t * cut, _LEAST_DEPTH)
     return FreeFlight(cut, depth / cut, dr.tanh(0.5 * depth))
@@ -194,8 +184,6 @@ def free_flights(length, sigma_t) -> FreeFlight:
 
 def free_flight(u, flight: FreeFlight):
     """Return free-flight distances y from the start of the span [m], for u in [0, 1)."""
-    import drjit as dr
-
     t = flight.tanh
     return dr.minimum(2 * dr.atanh(u * t / (1 + t * (1 - u))) / flight.rate, flight.cut)
 
@@ -207,8 +195,6 @@ def free_flight_pdf(y, flight: FreeFlight):
 
 def _flight_cdf_and_pdf(y, flight: FreeFlight) -> tuple[Any, Any]:
     """Return the distribution function (whose absolute error is a rounding over rate cut) and the density."""
-    import drjit as dr
-
     inside = y <= flight.cut
     survival = dr.exp(-flight.rate * y)
     scale = (1 + flight.tanh) / (2 * flight.tanh)
@@ -226,8 +212,6 @@ class Mixture:
 
 def mixture_of(span: Span, sigma_t: Sequence[Any]) -> Mixture:
     """Return the mixture of both techniques; one extinction for all channels, or one for each [1/m]."""
-    import mitsuba as mi
-
     flights = tuple(free_flights(span.length, mi.Float64(rate)) for rate in sigma_t)
     return Mixture(span, equi_angular_range(span), flights)
 
@@ -275,9 +259,6 @@ def sample_distance(u, mixture: Mixture) -> tuple[Any, Any, Any]:
     those, Newton's method in the angle delta, with d(y)/d(delta) = r^2/h, and a bisection where it leaves the bracket.
     All this is in double precision: in single, the angle has no digits left for what lies far beyond a close light.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     span, u = mixture.span, mi.Float64(u)
     low = high = u * mixture.range
     for flight in mixture.flights:

@@ -18,6 +18,9 @@ over the channels, so that no channel's variance can become infinite.
 from dataclasses import dataclass, replace
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+
 from reference.monte_carlo.single_scatter.boundary_walk import (
     Leg,
     coefficients,
@@ -62,9 +65,6 @@ class _Stretch:
 
 def double_ray(origin, direction) -> Ray:
     """Return rays given in double precision; their directions need not have unit length."""
-    import drjit as dr
-    import mitsuba as mi
-
     direction = dr.normalize(direction)
     return Ray(mi.Point3f(origin), dr.normalize(mi.Vector3f(direction)), origin, direction)
 
@@ -85,9 +85,6 @@ def ray_light(task: Task, sampler, ray: Ray, medium, active) -> tuple[Any, Any]:
     active
         Mask.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     if medium is None:
         medium = dr.zeros(mi.MediumPtr)
     elif isinstance(medium, mi.Medium):
@@ -107,8 +104,6 @@ def ray_light(task: Task, sampler, ray: Ray, medium, active) -> tuple[Any, Any]:
 
 def _through_media(task: Task, sampler, ray: Ray, medium, active) -> tuple[Any, Any]:
     """Follow camera rays from boundary to boundary, and add up what each stretch sends."""
-    import drjit as dr
-    import mitsuba as mi
 
     def walk(walking, sampler, done, start, depth, medium, airlight, surface):
         """Add the stretch to the next thing on the way, `done` being where the ray goes on, `start` the boundary."""
@@ -146,9 +141,6 @@ def _through_media(task: Task, sampler, ray: Ray, medium, active) -> tuple[Any, 
 
 def _airlight(task: Task, sampler, ray: Ray, stretch: _Stretch, active):
     """Estimate what all lights send from a stretch of the ray."""
-    import drjit as dr
-    import mitsuba as mi
-
     total = dr.zeros(mi.Spectrum, dr.width(active))
     active = active & (dr.max(stretch.sigma_s) > 0)
     for number in range(len(task.lights)):
@@ -160,9 +152,6 @@ def _airlight(task: Task, sampler, ray: Ray, stretch: _Stretch, active):
 
 def _light_airlight(task: Task, number: int, sampler, ray: Ray, stretch: _Stretch, active):
     """Estimate what one light sends from a stretch of the ray: a loop over the cells of the unit interval."""
-    import drjit as dr
-    import mitsuba as mi
-
     light = task.lights[number]
     approach = closest_approach(ray.origin_double, ray.direction_double, light.position)
     height, normal = mi.Float(approach.height), mi.Vector3f(approach.normal)
@@ -195,9 +184,6 @@ def _light_airlight(task: Task, number: int, sampler, ray: Ray, stretch: _Stretc
 
 def _directional_airlight(task: Task, emitter, sampler, ray: Ray, stretch: _Stretch, active):
     """Estimate what a light at infinity sends from a stretch of the ray, likewise."""
-    import drjit as dr
-    import mitsuba as mi
-
     length = stretch.end - stretch.start
     active = active & (length > 0) & (length < dr.inf)
     length = dr.select(active, length, 1)
@@ -222,9 +208,6 @@ def _arriving(task: Task, emitter, interaction, active) -> tuple[Any, Any]:
 
     The emitter names a point of the light's way that lies beyond everything: the leg begins there, in clear air.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     sample, irradiance = emitter.sample_direction(interaction, mi.Point2f(0.5), active)
     media = Leg(dr.zeros(mi.MediumPtr), dr.zeros(mi.Spectrum, dr.width(active)))
     leg = transmittance(task.around, sample.p, -sample.d, sample.dist, media=media, active=active)
@@ -238,9 +221,6 @@ def _cell(number, shift, count: int) -> tuple[Any, Any]:
     the edge of a shadow lies anywhere in its cell from batch to batch; in cells that stay, an edge close to the end of
     one would be felt so rarely that no spread between batches could tell.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     if count == 1:
         return mi.Float(0), mi.Float(1)
     place = mi.Float(number) + shift
@@ -250,9 +230,6 @@ def _cell(number, shift, count: int) -> tuple[Any, Any]:
 
 def _point_on(ray: Ray, position):
     """Return a point of a medium on camera rays."""
-    import drjit as dr
-    import mitsuba as mi
-
     point = dr.zeros(mi.MediumInteraction3f)
     point.p = position
     point.wi = -ray.direction
@@ -262,8 +239,6 @@ def _point_on(ray: Ray, position):
 
 def _scattered(task: Task, number: int, ray: Ray, stretch: _Stretch, from_light, r, active):
     """Return sigma_s p/(4 pi) I V T of points at a distance r from a light, in a unit direction from there."""
-    import mitsuba as mi
-
     light = task.lights[number]
     position = mi.Point3f(light.position)
     point = _point_on(ray, position + from_light * r)
@@ -276,9 +251,6 @@ def _scattered(task: Task, number: int, ray: Ray, stretch: _Stretch, from_light,
 
 def _surface(task: Task, hit, stretch: _Stretch, active):
     """Return what all lights send by way of the surface at the end of a stretch."""
-    import drjit as dr
-    import mitsuba as mi
-
     total = dr.zeros(mi.Spectrum, dr.width(active))
     camera_leg = stretch.depth + stretch.sigma_t * dr.select(active, stretch.end - stretch.start, 0)
     for light, medium in zip(task.lights, stretch.at_lights):
@@ -300,7 +272,5 @@ def _surface(task: Task, hit, stretch: _Stretch, active):
 
 def _intensity(light: Light, interaction, active):
     """Return the radiant intensity towards a point [W/sr]: the emitter's irradiance there times squared distance."""
-    import mitsuba as mi
-
     sample, irradiance = light.emitter.sample_direction(interaction, mi.Point2f(0.5), active)
     return irradiance * sample.dist * sample.dist

@@ -15,6 +15,8 @@ the variant's precision. Sums over at most 256 samples are single, over batches 
 
 import functools
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 
 from analytic.errors import InputError
@@ -35,8 +37,6 @@ def register() -> str:
     A film's rays begin at the near clip plane, so what lies before it is missing from an image by `mi.render`
     (DESIGN section 6.3); `single_scatter_batch` has no such plane.
     """
-    import mitsuba as mi
-
     mi.register_integrator(PLUGIN, _integrator_class(mi.variant()))
     return PLUGIN
 
@@ -44,8 +44,6 @@ def register() -> str:
 @functools.cache
 def _integrator_class(variant: str):
     """Return the integrator's class of a variant, the current one; each variant has its own base class."""
-    import drjit as dr
-    import mitsuba as mi
 
     class SingleScatterIntegrator(mi.SamplingIntegrator):
         """Exactly one scattering of point, spot and directional lights (see
@@ -88,9 +86,6 @@ def single_scatter_batch(truth: TruthScene, seed: int, samples: int) -> Batches:
     Batches
         Airlight and surface of every pixel [W/(m^2 sr)]. The surface needs no sampling, so all batches agree on it.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     check_samples(samples)
     medium = truth.scene.sensors()[0].get_medium()
     task = read_task(truth.scene, medium, samples)

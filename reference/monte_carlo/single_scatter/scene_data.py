@@ -9,6 +9,8 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 
 from analytic.errors import InputError
@@ -59,8 +61,6 @@ def read_task(scene, medium, samples: int) -> Task:
     InputError
         For an emitter, a medium or a material that it has no answer for.
     """
-    import mitsuba as mi
-
     directional = tuple(one for one in scene.emitters() if is_directional(one))
     lights = tuple(_read_light(emitter) for emitter in scene.emitters() if not is_directional(emitter))
     around, media = read_surroundings(scene)
@@ -75,8 +75,6 @@ def read_task(scene, medium, samples: int) -> Task:
 
 def _refuse_endless(scene, medium, emitter) -> None:
     """Refuse a medium without bounds: what camera rays start in where nothing bounds it, or the exterior of a bound."""
-    import mitsuba as mi
-
     inside = [shape.interior_medium() for shape in scene.shapes()]
     around = [shape.exterior_medium() for shape in scene.shapes()]
     if isinstance(medium, mi.Medium) and medium not in inside:
@@ -87,16 +85,11 @@ def _refuse_endless(scene, medium, emitter) -> None:
 
 
 def _is_grey(medium) -> bool:
-    import mitsuba as mi
-
     _, sigma_t = coefficients(mi.MediumPtr(medium), mi.Bool(True))
     return len({float(np.ravel(channel)[0]) for channel in sigma_t}) == 1
 
 
 def _read_light(emitter) -> Light:
-    import drjit as dr
-    import mitsuba as mi
-
     name = emitter.class_name()
     if name not in ("PointLight", "SpotLight"):
         raise InputError(

@@ -20,6 +20,8 @@ from contextlib import contextmanager
 from itertools import pairwise
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
@@ -57,8 +59,6 @@ def volpath_batch(
     Batches of one seed but another `max_depth` are not independent: their airlight paths begin alike, so that the
     difference of the two has less spread than either.
     """
-    import mitsuba as mi
-
     check_samples(samples)
     if max_depth < 2:
         raise ValueError(f"max_depth: got {max_depth}, wanted at least 2, one scattering")
@@ -80,8 +80,6 @@ def volpath_batch(
 @contextmanager
 def _black_surfaces(scene) -> Iterator[None]:
     """Make every surface black for a while."""
-    import mitsuba as mi
-
     black = mi.load_dict({"type": "diffuse", "reflectance": 0.0})
     own = [(shape, shape.bsdf()) for shape in scene.shapes()]
     try:
@@ -118,9 +116,6 @@ def _parts(counts: Counts) -> list[slice]:
 
 
 def _trace_pixels(truth: TruthScene, integrator, medium, pixels: slice, seed: int, counts: Counts) -> Array:
-    import drjit as dr
-    import mitsuba as mi
-
     direction = mi.Vector3f(truth.direction[pixels].T)
     pixel = mi.UInt32(np.repeat(np.arange(len(counts), dtype=np.uint32), counts))
     sampler = mi.load_dict({"type": "independent"})
@@ -136,8 +131,6 @@ def _trace_pixels(truth: TruthScene, integrator, medium, pixels: slice, seed: in
 @contextmanager
 def _grey_media(truth: TruthScene, channel: int, scattering: bool) -> Iterator[Any]:
     """Give all media the extinction of one channel for a while; yield the medium in which camera rays begin."""
-    import mitsuba as mi
-
     if not truth.media:
         yield _grey_medium(truth.medium, float(truth.medium.sigma_t[channel]), scattering)
         return
@@ -161,8 +154,6 @@ def _grey_media(truth: TruthScene, channel: int, scattering: bool) -> Iterator[A
 
 def _set_values(plugin: Any, sigma_t: float, albedo: Array) -> None:
     """Set the extinction, before the medium's scale, and the albedo."""
-    import mitsuba as mi
-
     parameters = mi.traverse(plugin)
     for key, value in zip(_VALUES, (np.full(3, sigma_t), albedo), strict=True):
         kind = type(parameters[key])
@@ -172,8 +163,6 @@ def _set_values(plugin: Any, sigma_t: float, albedo: Array) -> None:
 
 
 def _grey_medium(medium: TruthMedium, sigma_t: float, scattering: bool):
-    import mitsuba as mi
-
     return mi.load_dict(
         {
             "type": "homogeneous",

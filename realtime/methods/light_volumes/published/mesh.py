@@ -19,6 +19,8 @@ from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
 
+import numpy as np
+
 from realtime.errors import InputError
 from realtime.methods.light_volumes.height_field import inverse_depth
 from realtime.methods.light_volumes.published.tessellation import divide, edges, triangles
@@ -100,8 +102,6 @@ def tessellation_stages(
 
 
 def _heights(shadow_map: ShadowMap):
-    import numpy as np
-
     side = shadow_map.size + 1
     height = np.array(inverse_depth(shadow_map)).reshape(shadow_map.faces, side, side)
     if not np.all(np.isfinite(height)):
@@ -111,8 +111,6 @@ def _heights(shadow_map: ShadowMap):
 
 def _static_mesh(shadow_map: ShadowMap, light: Light, height) -> VolumeMesh:
     """Return the mesh of two triangles for each texel."""
-    import numpy as np
-
     faces, size = shadow_map.faces, shadow_map.size
     number, kept = _numbering(faces, size, np.ones(height.size, bool))
     cells = 2 * faces * size * size
@@ -130,8 +128,6 @@ def _static_mesh(shadow_map: ShadowMap, light: Light, height) -> VolumeMesh:
 
 def _adaptive_mesh(shadow_map: ShadowMap, light: Light, height, corners) -> VolumeMesh:
     """Return the mesh of triangles between corners of texels: those that are used become its vertices."""
-    import numpy as np
-
     faces, size = shadow_map.faces, shadow_map.size
     used = np.zeros(height.size, bool)
     used[corners] = True
@@ -147,8 +143,6 @@ def _adaptive_mesh(shadow_map: ShadowMap, light: Light, height, corners) -> Volu
 
 def _numbering(faces: int, size: int, used):
     """Return the numbers of the vertices at all corners, and the corners that they are taken from."""
-    import numpy as np
-
     if faces == 6:
         twin, original = _welds(size)
         used[original[used[twin]]] = True
@@ -162,8 +156,6 @@ def _numbering(faces: int, size: int, used):
 
 def _sides(size: int, number, *, apex: int):
     """Return the triangles between the vertices on the border of a spot's face and the light."""
-    import numpy as np
-
     ring = number[_border(size)]
     ring = ring[ring >= 0]
     return np.stack([np.roll(ring, -1), ring, np.full(len(ring), apex, np.int32)], axis=1)
@@ -171,8 +163,6 @@ def _sides(size: int, number, *, apex: int):
 
 def _vertices(shadow_map: ShadowMap, light: Light, height, kept):
     """Return the homogeneous coordinates of corners of texels, in ascending order, and of a spot's light."""
-    import numpy as np
-
     side = shadow_map.size + 1
     place = np.array(light.position, dtype=float).ravel()
     result = np.empty((len(kept) + (1 if shadow_map.frame else 0), 4))
@@ -194,8 +184,6 @@ def _vertices(shadow_map: ShadowMap, light: Light, height, kept):
 
 def _directions(frame, face: int, u, v) -> list[Any]:
     """Return the coordinates of axis + u across + v up of a face."""
-    import numpy as np
-
     if frame:
         across, up, axis = (np.array(one, dtype=float).ravel() for one in frame)
         return [axis[one] + u * across[one] + v * up[one] for one in range(3)]
@@ -205,8 +193,6 @@ def _directions(frame, face: int, u, v) -> list[Any]:
 
 def _border(size: int):
     """Return the corners on the border of a face, counter-clockwise in (u, v)."""
-    import numpy as np
-
     along = np.arange(size)
     side = size + 1
     return np.concatenate([along, along * side + size, size * side + size - along, (size - along) * side])
@@ -214,8 +200,6 @@ def _border(size: int):
 
 def _welds(size: int):
     """Return the corners of a cube's faces that are the same as an earlier one, and that one."""
-    import numpy as np
-
     face = np.repeat(np.arange(6), 4 * size)
     border = np.tile(_border(size), 6)
     row, column = np.divmod(border, size + 1)

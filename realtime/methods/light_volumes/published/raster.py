@@ -36,6 +36,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
 from realtime.methods.light_volumes.published.mesh import VolumeMesh
 from realtime.scene.camera import Camera
 
@@ -80,9 +84,6 @@ def signed_crossings(mesh: VolumeMesh, camera: Camera, *, batch: int = BATCH) ->
     is inside and normals point out; all that can go wrong is which, with a camera on the mesh. The yielded arrays are
     not evaluated: what the caller does with them becomes one kernel with the expansion of the spans.
     """
-    import mitsuba as mi
-    import numpy as np
-
     screen = _project(mesh.vertices, camera)
     for begin in range(0, len(mesh.triangles), batch):
         corners = mi.UInt32(np.ascontiguousarray(mesh.triangles[begin : begin + batch], dtype=np.uint32).ravel())
@@ -95,7 +96,6 @@ def signed_crossings(mesh: VolumeMesh, camera: Camera, *, batch: int = BATCH) ->
 
 def _camera_basis(camera: Camera):
     """Return origin and (forward, left, up) as columns, in float64."""
-    import numpy as np
 
     def read(vector):
         return np.array(vector, dtype=np.float64).ravel()
@@ -107,18 +107,11 @@ def _camera_basis(camera: Camera):
 
 def _opaque(values):
     """Return a vector of which no kernel knows the value, so that none is compiled anew when it changes."""
-    import drjit as dr
-    import mitsuba as mi
-
     return mi.Vector3d(*(dr.opaque(mi.Float64, float(one)) for one in values))
 
 
 def _project(vertices, camera: Camera):
     """Return (a, b, z, w) of all vertices, one after the other, in float64."""
-    import drjit as dr
-    import mitsuba as mi
-    import numpy as np
-
     origin, basis = _camera_basis(camera)
     depth, left, up = np.linalg.inv(basis)
     to_column, to_row = 0.5 * (camera.width - 1) * depth - left, 0.5 * (camera.height - 1) * depth - up
@@ -135,18 +128,12 @@ def _project(vertices, camera: Camera):
 
 def _corners(screen, corners, triangle):
     """Return the corners (a, b, z, w) of triangles."""
-    import drjit as dr
-    import mitsuba as mi
-
     number = [dr.gather(mi.UInt32, corners, 3 * triangle + k) for k in range(3)]
     return [dr.gather(mi.Vector4d, screen, one) for one in number]
 
 
 def _rows(screen, corners, camera: Camera):
     """Return the triangles that may cover pixels, the first row of each, and how many rows it may cover."""
-    import drjit as dr
-    import mitsuba as mi
-
     vertices = _corners(screen, corners, dr.arange(mi.UInt32, dr.width(corners) // 3))
     depth = [v.z for v in vertices]
     column0, column1 = _pixel_range([v.x for v in vertices], depth, camera.width)
@@ -163,9 +150,6 @@ def _pixel_range(values, depth, size: int):
     `values` over `depth` are coordinates in the image. A slack of 1e-6 pixel is far above rounding: what is left out
     here covers no pixel by the exact rule either.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     low, high = mi.Float64(dr.inf), mi.Float64(-dr.inf)
     for value, z in zip(values, depth):
         at = value / z
@@ -183,10 +167,6 @@ def _pixel_range(values, depth, size: int):
 
 def _expand(count, limit: int):
     """Yield (number, rank) for all ranks below count[number], number by number, at most about `limit` at a time."""
-    import drjit as dr
-    import mitsuba as mi
-    import numpy as np
-
     if dr.width(count) == 0:
         return
     used = dr.compress(count > 0)
@@ -207,10 +187,6 @@ def _expand(count, limit: int):
 
 def _spans(screen, corners, camera: Camera, found, owner, rank) -> _Spans:
     """Return the pixels that triangles cover in rows, by the rule of the module."""
-    import drjit as dr
-    import mitsuba as mi
-    import numpy as np
-
     triangle, first = (dr.gather(mi.UInt32, values, owner) for values in found)
     row = first + rank
     down, up = _row_segment(_corners(screen, corners, triangle), mi.Float64(row))
@@ -232,9 +208,6 @@ def _spans(screen, corners, camera: Camera, found, owner, rank) -> _Spans:
 
 def _row_segment(vertices, row):
     """Return where triangles cross the plane of a row: on the edges that go down and up the image; z = 0 if nowhere."""
-    import drjit as dr
-    import mitsuba as mi
-
     side = [dr.fma(-row, v.z, v.y) for v in vertices]
     below = [f > 0 for f in side]
     # The vertex that is alone on its side of the row is at the end of both edges.
@@ -262,9 +235,6 @@ def _row_segment(vertices, row):
 
 def _first_right_of(point, other, width: int):
     """Return the first column right of or at one end of a segment in the plane of a row, from 0 to `width`."""
-    import drjit as dr
-    import mitsuba as mi
-
     # An end behind the camera is as far to the side as the segment passes z = 0.
     edge = dr.select(other.x * -point.z + point.x * other.z >= 0, mi.Float64(dr.inf), -dr.inf)
     return mi.Int32(dr.clip(dr.ceil(dr.select(point.z > 0, point.x / point.z, edge)), 0, width))
@@ -272,8 +242,6 @@ def _first_right_of(point, other, width: int):
 
 def _inverse_depth(left, right, column):
     """Return w/z where the segment between two points of a row passes a column."""
-    import drjit as dr
-
     # Between left and right both are 0 or more; rounding must not take them below.
     of_left = dr.maximum(dr.fma(-column, right.z, right.x), 0)
     of_right = dr.maximum(dr.fma(column, left.z, -left.x), 0)
@@ -285,9 +253,6 @@ def _inverse_depth(left, right, column):
 
 def _crossings(spans: _Spans, camera: Camera, span, step) -> Crossings:
     """Return the crossings of pixels: the span of each, and how many pixels come before it there."""
-    import drjit as dr
-    import mitsuba as mi
-
     pixel = dr.gather(mi.UInt32, spans.pixel, span) + step
     first, change, sign = (dr.gather(mi.Float64, one, span) for one in (spans.inverse, spans.step, spans.sign))
     inverse = dr.maximum(dr.fma(mi.Float64(step), change, first), 0)

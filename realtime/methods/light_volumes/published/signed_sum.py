@@ -10,6 +10,9 @@ from collections.abc import Iterable
 from dataclasses import fields
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
+
 from realtime.kernels.registry import airlight_integral
 from realtime.methods.light_volumes.published.mesh import VolumeMesh
 from realtime.methods.light_volumes.published.raster import BATCH, Crossings, signed_crossings
@@ -55,9 +58,6 @@ def crossing_sum(
     point next to the light is lit and 0 where it is not. No other term contains the airlight about the light, and
     crossings at the surface cost nothing. Terms have the precision of the rays and are added up in float64.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     Float = type(distance)
     grey = len(medium.sigma_t) == 1
     total = dr.zeros(mi.Float64 if grey else mi.Color3d, dr.width(distance))
@@ -117,9 +117,6 @@ def mesh_airlight(view: View, light: Light, mesh: VolumeMesh, *, kernel, batch: 
     ----------
     Billeter, Sintorn, Assarsson 2010, eq. 3.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
     lane = dr.zeros(mi.UInt32, view.camera.width * view.camera.height)
     dr.scatter(lane, dr.arange(mi.UInt32, dr.width(view.pixel)), view.pixel)

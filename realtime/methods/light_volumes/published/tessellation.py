@@ -33,6 +33,8 @@ are arrays (faces, N + 1, N + 1) at the corners of the texels; one face is a squ
 from itertools import pairwise
 from typing import Any
 
+import numpy as np
+
 from realtime.errors import InputError
 
 #: The corners and the middles of the sides of a quad, counter-clockwise, as (column, row) in halves of a side.
@@ -71,8 +73,6 @@ def edges(height, threshold: float) -> list[Any]:
     InputError
         If `threshold` is not a positive number.
     """
-    import numpy as np
-
     if not 0 < threshold < np.inf:
         raise InputError(f"threshold: got {threshold!r}, wanted a positive number, for instance 0.001")
     size = height.shape[1] - 1
@@ -115,8 +115,6 @@ def divide(edge: list[Any]) -> list[Any]:
 
 def _across(flags):
     """Return the flags of the nodes across the lower, right, upper and left sides; beyond a square they are unset."""
-    import numpy as np
-
     lower, right, upper, left = (np.zeros_like(flags) for _ in range(4))
     lower[:, 1:], upper[:, :-1] = flags[:, :-1], flags[:, 1:]
     left[:, :, 1:], right[:, :, :-1] = flags[:, :, :-1], flags[:, :, 1:]
@@ -134,8 +132,6 @@ def _across(flags):
 
 def quads(divided: list[Any]):
     """Yield the quads of the mesh level by level: their level, flat numbers and sides that are divided."""
-    import numpy as np
-
     faces = len(divided[0])
     exists = np.ones((faces, 1, 1), bool)
     for level, flags in enumerate(divided):
@@ -154,8 +150,6 @@ def triangles(divided: list[Any]):
 
     They are counter-clockwise in (column, row). No corner lies inside a side of a triangle.
     """
-    import numpy as np
-
     size = 2 ** len(divided)
     parts = []
     for level, numbers, sides in quads(divided):
@@ -178,8 +172,6 @@ def tessellated_heights(height, divided: list[Any]):
     divided
         Which nodes are divided (see `divide`).
     """
-    import numpy as np
-
     size = 2 ** len(divided)
     flat = np.array(height, dtype=float).ravel()
     result = flat.copy()
@@ -201,8 +193,6 @@ def tessellated_heights(height, divided: list[Any]):
 
 def _first_corner(numbers, level: int, size: int):
     """Return the number of the corner (0, 0) of each node, and the texels on a side of a node."""
-    import numpy as np
-
     step = size >> level
     face, rest = np.divmod(numbers, 4**level)
     row, column = np.divmod(rest, 2**level)
@@ -216,8 +206,6 @@ def _ring_offset(k: int, step: int, size: int) -> int:
 
 def _weights(fan, step: int, size: int):
     """Return the weights of the ring at all corners of the texels of a quad, and their numbers from its first."""
-    import numpy as np
-
     row, column = (part.ravel() for part in np.mgrid[: step + 1, : step + 1])
     point = np.stack([column * 2 / step, row * 2 / step, np.ones(len(row))])
     weights = np.zeros((len(row), 8))
