@@ -101,6 +101,21 @@ def test_only_one_place_sets_the_mitsuba_variant():
     assert setters == {"reports/machine/environment.py"}
 
 
+def test_no_test_sets_a_variant_that_another_runs_in():
+    """The fixture `variant` chooses it, once for all tests of a process; the scalar one is put back or runs apart."""
+    from reports.environment import VARIANTS
+
+    setters = {
+        (path.name, argument.value)
+        for path in (ROOT / "tests").rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "set_variant"
+        for argument in node.args
+        if isinstance(argument, ast.Constant)
+    }
+    assert not {(name, given) for name, given in setters if given in VARIANTS}
+
+
 def test_importing_everything_sets_no_variant():
     names = [".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__") for path in MODULES]
     code = f"import importlib\nfor name in {names!r}: importlib.import_module(name)\n"

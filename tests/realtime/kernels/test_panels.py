@@ -191,11 +191,8 @@ def test_every_panel_is_narrow_enough_for_its_sine(variant):
     st.floats(-5, 1.5),
     st.sampled_from([*PHASES, ("hg", 0.9)]),
 )
-def test_float32_is_float64_up_to_rounding(height, cos, start, length, thickness, phase):
+def test_float32_is_float64_up_to_rounding(variant, height, cos, start, length, thickness, phase):
     """Largest error stated for float32: 3e-5."""
-    import mitsuba as mi
-
-    mi.set_variant("llvm_ad_rgb")
     height, foot = 10**height, cos / np.sqrt(1 - cos**2) * 10**height
     sigma_t = 10**thickness / (start + np.hypot(start - foot, height))
     rays = [np.float64(np.float32(one)) for one in (foot, height, start, start + 10**length, sigma_t)]

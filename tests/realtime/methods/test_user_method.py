@@ -133,7 +133,7 @@ def test_parameters_arrive(render):
     [
         ("nothing", "returned a NoneType; wanted the radiance of every pixel"),
         ("words", "returned a str; wanted"),
-        ("truth", "returned a drjit.llvm.ad.Bool; wanted"),
+        ("truth", ".ad.Bool; wanted"),
         ("turned", "returned an array of shape (3, 192) for 192 pixels"),
         ("short", "returned 2 values for 192 pixels"),
         ("dark", "of 1 of 192 pixels is not finite, first in column 15 of row 11: nan, nan, nan"),
