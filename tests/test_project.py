@@ -103,7 +103,7 @@ def test_only_one_place_sets_the_mitsuba_variant():
 
 def test_no_test_sets_a_variant_that_another_runs_in():
     """The fixture `variant` chooses it, once for all tests of a process; the scalar one is put back or runs apart."""
-    from reports.environment import VARIANTS
+    from reports.machine.environment import VARIANTS
 
     setters = {
         (path.name, argument.value)

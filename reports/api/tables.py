@@ -138,8 +138,9 @@ class BenchTable:
         return block(self._title(), *parts)
 
     def _title(self) -> str:
-        machine = self.environment
-        return f"{machine['processor']}, {machine['threads']} threads, {machine['variant']}"
+        from reports.machine.environment import machine_in_words
+
+        return machine_in_words(self.environment)
 
     def __repr__(self) -> str:
         scenes = ", ".join(dict.fromkeys(row["scene"] for row in self.rows))

@@ -9,8 +9,9 @@ import difflib
 import os
 import shutil
 import sys
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from reports import __version__
 from reports.machine.gpu import cuda_status, optix_status
@@ -219,6 +220,12 @@ def describe_environment() -> dict[str, object]:
     if llvm is not None:
         found["llvm"] = f"{llvm.label}, {llvm.path}"
     return found
+
+
+def machine_in_words(environment: Mapping[str, Any]) -> str:
+    """Return what stands beside times in tables, from `describe_environment`: the GPU first, where there is one."""
+    device = f"{environment['device']}, " if environment.get("device") else ""
+    return f"{device}{environment['processor']}, {environment['threads']} threads, {environment['variant']}"
 
 
 def _has_fma() -> bool:

@@ -124,11 +124,9 @@ def _agreement_row(name: str, one: dict[str, Any]) -> tuple[str, ...]:
 
 def print_heading() -> None:
     """Print the date and the machine, the first line of tables in Markdown."""
-    from reports.machine.environment import describe_environment
+    from reports.machine.environment import describe_environment, machine_in_words
 
-    machine = describe_environment()
-    day = time.strftime("%Y-%m-%d")
-    print(f"{day}, {machine['processor']}, {machine['threads']} threads, {machine['variant']}.")
+    print(f"{time.strftime('%Y-%m-%d')}, {machine_in_words(describe_environment())}.")
 
 
 def print_markdown(headers: Sequence[str], rows: Sequence[Sequence[str]], title: str) -> None:

@@ -14,6 +14,7 @@ from reports.machine.environment import (
     MissingError,
     activate,
     describe_environment,
+    machine_in_words,
     missing_packages,
     prepare,
     versions,
@@ -280,3 +281,22 @@ def test_versions_and_description_are_json_ready(variant):
     described = json.loads(json.dumps(describe_environment()))
     assert described["versions"] == found
     assert described["variant"] == variant
+
+
+def test_times_on_a_gpu_stand_beside_its_name():
+    machine = {"processor": "P", "threads": 2, "variant": "llvm_ad_rgb"}
+    assert machine_in_words(machine) == "P, 2 threads, llvm_ad_rgb"
+    on_gpu = machine | {"variant": "cuda_ad_rgb", "device": "A GPU, compute capability 9.0"}
+    assert machine_in_words(on_gpu) == "A GPU, compute capability 9.0, P, 2 threads, cuda_ad_rgb"
+
+
+def test_the_headings_of_tables_name_the_gpu(monkeypatch, capsys):
+    from reports.api.tables import BenchTable
+    from reports.machine import environment as module
+    from reports.tables.bench import print_heading
+
+    machine = {"processor": "P", "threads": 2, "variant": "cuda_ad_rgb", "device": "A GPU"}
+    monkeypatch.setattr(module, "describe_environment", lambda: machine)
+    print_heading()
+    assert capsys.readouterr().out.endswith(", A GPU, P, 2 threads, cuda_ad_rgb.\n")
+    assert BenchTable(rows=(), environment=machine)._title().startswith("A GPU, ")
