@@ -25,7 +25,7 @@ if TYPE_CHECKING:  # for editors, which complete names from here; `_API` says th
     from realtime.frame.renderer import frame_renderer as frame_renderer
     from realtime.frame.renderer import render_frame as render_frame
     from realtime.kernels.registry import KERNELS as KERNELS
-    from realtime.methods.method import Method as Method
+    from realtime.methods.interface.method import Method as Method
     from realtime.methods.registry import METHODS as METHODS
     from realtime.methods.registry import find_method as find_method
     from realtime.scene.read_scene import read_scene as read_scene
@@ -70,7 +70,7 @@ _API = {
     "versions": "reports.machine.environment",
     "SCENES": "validation.scenes.registry",
     "METHODS": "realtime.methods.registry",
-    "Method": "realtime.methods.method",
+    "Method": "realtime.methods.interface.method",
     "find_method": "realtime.methods.registry",
     "KERNELS": "realtime.kernels.registry",
     "configuration": "validation.configurations.methods",

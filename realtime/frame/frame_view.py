@@ -5,12 +5,12 @@ import drjit as dr
 import mitsuba as mi
 
 from realtime.frame.surface import visible_triangle
-from realtime.methods.shadow_planes.tile_boxes import TILE
-from realtime.methods.view import View
+from realtime.methods.interface.view import View
 from realtime.scene.camera import Camera, ray_directions
 from realtime.scene.features import Plan
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium
+from realtime.tiles.layout import TILE
 
 
 def frame_view(

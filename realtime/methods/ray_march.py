@@ -22,7 +22,7 @@ from realtime.bounded_media.directional_airlight import ParallelRay
 from realtime.bounded_media.ray_segments import MediaRay
 from realtime.errors import InputError
 from realtime.memory import check_memory
-from realtime.methods.view import View, bounded_radiance, radiance, rays_in_media
+from realtime.methods.interface.view import View, bounded_radiance, radiance, rays_in_media
 from realtime.rays.ray_light import RayGeometry, clip_to_cone, distance_to_light, falloff, ray_geometry
 from realtime.scene.lights import Light
 from realtime.scene.medium import least_extinction, per_extinction

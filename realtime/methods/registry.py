@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Real-time methods: the in-scattered radiance of every pixel of a view.
 
-A method is a function ``method(view, *, kernel, **parameters)``, see `realtime.methods.view`. `METHODS` is the
-registry: add a `Method` to it and every command and report knows it. `find_method` also finds a user's own, which is
-not in it.
+A method is a function ``method(view, *, kernel, **parameters)``, see `realtime.methods.interface.view`. `METHODS` is
+the registry: add a `Method` to it and every command and report knows it. `find_method` also finds a user's own, which
+is not in it.
 """
 
 import difflib
@@ -11,13 +11,13 @@ from types import MappingProxyType
 
 from realtime.errors import InputError
 from realtime.methods.epipolar.method import min_max, prepare_min_max
+from realtime.methods.interface.method import Method
 from realtime.methods.light_volumes.method import (
     finds_lit_surfaces,
     light_volume_tiles,
     light_volumes,
     prepare_light_volumes,
 )
-from realtime.methods.method import Method
 from realtime.methods.ray_march import prepare_maps, ray_march
 from realtime.methods.shadow_planes.method import prepare_shadow_planes, shadow_plane_tiles, shadow_planes
 from realtime.methods.unshadowed import unshadowed

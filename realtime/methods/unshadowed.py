@@ -3,7 +3,7 @@
 
 from realtime.bounded_media.airlight import bounded_airlight
 from realtime.kernels.registry import airlight_integral
-from realtime.methods.view import View, bounded_radiance, radiance, rays_in_media
+from realtime.methods.interface.view import View, bounded_radiance, radiance, rays_in_media
 from realtime.rays.ray_light import ray_geometry
 
 

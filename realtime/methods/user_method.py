@@ -23,7 +23,7 @@ from types import MappingProxyType, ModuleType
 from typing import Any
 
 from realtime.errors import InputError
-from realtime.methods.method import Method
+from realtime.methods.interface.method import Method
 from realtime.methods.user_result import check_finite, checked_radiance
 
 _WANTED = "wanted 'module:function' or 'path/to/file.py:function'"

@@ -8,7 +8,7 @@ import mitsuba as mi
 import numpy as np
 
 from realtime.errors import InputError
-from realtime.methods.view import View
+from realtime.methods.interface.view import View
 
 _WANTED = "wanted the radiance of every pixel, an RGB colour or one number: a Dr.Jit array, or NumPy's (pixels, 3)"
 

@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realtime.errors import InputError
-from realtime.methods.shadow_planes.mesh_adjacency import Casters
 from realtime.numerics.array_types import types_of
 from realtime.scene.directional_extent import directional_fields, face_balls
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium
+from realtime.scene.mesh_adjacency import Casters
 from realtime.scene.read_scene import Scene
 from realtime.scene.triangle_table import read_facets
 

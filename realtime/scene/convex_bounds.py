@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog, nnls
 
 from realtime.errors import InputError
-from realtime.methods.shadow_planes.mesh_adjacency import mesh_triangles
+from realtime.scene.mesh_adjacency import mesh_triangles
 
 Array = NDArray[np.float64]
 

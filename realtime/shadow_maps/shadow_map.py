@@ -6,7 +6,7 @@ v up, with |across| = |up| = 1 for a cube face and tan(cutoff) for a spot, whose
 size^2 texels; a map holds at each of their (size + 1)^2 *corners* the distance *along the ray* from the light to the
 first surface [m], infinite where there is none. So the outermost values lie on the edges of the face, where the faces
 of a cube meet with the same values. The planar depth, along the axis, is the distance over the length of axis + u
-across + v up (`realtime.methods.light_volumes.height_field`).
+across + v up (`realtime.shadow_maps.inverse_depth_field`).
 
 The face of a directional light is a rectangle across it that just covers the media, and |across|, |up| are half its
 sides [m]. It lies where the media end; the ray of (u, v) starts at position + u across + v up - depth axis, before all

@@ -29,9 +29,9 @@ import mitsuba as mi
 import numpy as np
 
 from realtime.errors import InputError
-from realtime.methods.shadow_planes.tile_boxes import SIDE, TILE
 from realtime.numerics.array_types import four_numbers
 from realtime.scene.camera import Camera
+from realtime.tiles.layout import SIDE, TILE
 
 _DEPTHS = 1.1  # largest to least distance in a tile
 _LIGHTS = 32  # one bit each

@@ -3,9 +3,9 @@
 
 import numpy as np
 
-from realtime.methods.shadow_planes.mesh_adjacency import make_casters
 from realtime.methods.shadow_planes.plane_table import index_planes, light_frame
 from realtime.numerics.diamond_angle import host_diamond_angle
+from realtime.scene.mesh_adjacency import make_casters
 from tests.helpers.casters import ALL
 
 LIGHT = np.array([1.23, -0.87, 1.61])
@@ -134,7 +134,7 @@ def rays_of(index, lists, ways):
     import mitsuba as mi
 
     from realtime.methods.shadow_planes.sweep import ray_planes
-    from realtime.methods.shadow_planes.tile_boxes import TILE
+    from realtime.tiles.layout import TILE
 
     Float = type(index.distance)
     tile = dr.arange(mi.UInt32, len(ways)) // TILE

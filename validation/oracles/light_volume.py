@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The slow twin of light volumes: the same height field met by the same rays, in float64, one line after the other.
 
-`realtime.shadow_maps.shadow_map` says what a shadow map holds and `realtime.methods.light_volumes.height_field` what
+`realtime.shadow_maps.shadow_map` says what a shadow map holds and `realtime.shadow_maps.inverse_depth_field` what
 height field it makes: linear in s = 1 / planar depth over the halves of the texels of a face, lit where the s of a
 point is above it. Of these two the twin takes the distances as they are; the rest is done again here, in other
 variables than those of the methods.
@@ -43,9 +43,9 @@ from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from analytic.geometry import foot_and_height
-from realtime.methods.light_volumes.height_field import light_heights
 from realtime.methods.light_volumes.jump_search import with_walls
 from realtime.scene.read_scene import Scene
+from realtime.shadow_maps.inverse_depth_field import light_heights
 from realtime.shadow_maps.shadow_map import ShadowMap
 from reference.quadrature.surface import surface_hits
 from reference.quadrature.unbounded import Rays, sum_intervals

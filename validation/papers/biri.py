@@ -35,10 +35,10 @@ from realtime.frame.renderer import (
 )
 from realtime.methods.shadow_planes.method import PlanePreparation
 from realtime.methods.shadow_planes.silhouettes import silhouette
-from realtime.methods.shadow_planes.tile_boxes import SIDE
 from realtime.methods.shadow_planes.view_culling import bodies_in_view
 from realtime.scene.camera import read_camera
 from realtime.scene.read_scene import Scene, read_scene
+from realtime.tiles.layout import SIDE
 from validation.configurations.methods import TOLERANCE, Configuration, prepared
 from validation.configurations.timing import (
     Timing,

@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
-from realtime.methods.shadow_planes.mesh_adjacency import read_casters
 from realtime.scene.animate import (
     closed_shapes,
     coloured_light,
@@ -28,6 +27,7 @@ from realtime.scene.animate import (
     turned_light,
     turned_objects,
 )
+from realtime.scene.mesh_adjacency import read_casters
 from realtime.scene.read_scene import Scene
 from validation.scenes.parts import rotation
 from validation.scenes.record import MOVES, Animation

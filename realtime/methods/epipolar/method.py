@@ -42,9 +42,8 @@ from realtime.methods.epipolar.slices import (
     slice_coordinate,
 )
 from realtime.methods.epipolar.walk import sum_lit_pieces
-from realtime.methods.light_airlight import RayAirlight, integral_type, ray_airlight
-from realtime.methods.light_volumes.height_field import inverse_depth
-from realtime.methods.view import View, rays_in_media
+from realtime.methods.interface.light_airlight import RayAirlight, integral_type, ray_airlight
+from realtime.methods.interface.view import View, rays_in_media
 from realtime.numerics.array_types import bytes_of
 from realtime.rays.ray_light import distance_to_light
 from realtime.scene.camera import Camera
@@ -53,6 +52,7 @@ from realtime.scene.lights import Light
 from realtime.scene.medium import transmittance
 from realtime.scene.phase import evaluate
 from realtime.scene.read_scene import Scene
+from realtime.shadow_maps.inverse_depth_field import inverse_depth
 from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, check_size, map_memory
 
 SAMPLINGS = ("slices", "pixels")

@@ -5,7 +5,7 @@ In the plane of a slice (`realtime.methods.epipolar.slices`) the light is at the
 directions from the light are taken along a polygonal line k(q): of a point light the corners (1, 0), (0, 1), (-1, 0),
 so that it is seen all round; of a spot the chord between the two ends of its cone in the slice. A point is P = k / s;
 with k linear along an edge of the line, (q, s) are projective coordinates and a camera ray is straight in them
-(`realtime.methods.light_volumes.height_field` has the same with one dimension more).
+(`realtime.shadow_maps.inverse_depth_field` has the same with one dimension more).
 
 The map of a slice holds S = D s of the surfaces at equal steps in q, read from the height field of the shadow map. A
 leaf lies between two of them, and a node of 2^l leaves holds the least and the greatest S over it. Published is one
@@ -57,7 +57,7 @@ def slice_heights(shadow_map: ShadowMap, heights, slices: Slices, light: Light) 
         Of the light.
     heights
         Its inverse planar depths at the corners of the texels
-        (`realtime.methods.light_volumes.height_field.inverse_depth`) [1/m].
+        (`realtime.shadow_maps.inverse_depth_field.inverse_depth`) [1/m].
     slices
         The slices of the image.
     light

@@ -19,9 +19,9 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.methods.light_volumes.height_field import LEAF, LightHeights, height_at
 from realtime.methods.light_volumes.texel_walls import BOTTOM, LEFT, PLACES, RIGHT, TOP, walled_heights
 from realtime.scene.lights import Light
+from realtime.shadow_maps.inverse_depth_field import LEAF, LightHeights, height_at
 from realtime.shadow_maps.shadow_map import cast_map_rays
 
 _HALVINGS = PLACES.bit_length() - 1

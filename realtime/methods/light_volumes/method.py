@@ -7,7 +7,7 @@ and leaves that volume at crossings with its boundary; with Gamma(x) the airligh
 
     L = sum_n s_n Gamma(min(x_n, x_visible)),   s_n = +1 where it leaves the light, -1 where it enters it,
 
-in any order. The boundary is the height field of `realtime.methods.light_volumes.height_field`, and `evaluation` says
+in any order. The boundary is the height field of `realtime.shadow_maps.inverse_depth_field`, and `evaluation` says
 how it is crossed:
 
 * `walk`: each ray looks at the texels on its line (`realtime.methods.light_volumes.walk`) that a beam of rays about it
@@ -29,17 +29,17 @@ import drjit as dr
 
 from realtime.errors import InputError
 from realtime.memory import check_memory
-from realtime.methods.light_airlight import RayAirlight, integral_type, ray_airlight
-from realtime.methods.light_volumes.height_field import LightHeights, level_start, light_heights
+from realtime.methods.interface.light_airlight import RayAirlight, integral_type, ray_airlight
+from realtime.methods.interface.view import View, rays_in_media
 from realtime.methods.light_volumes.jump_search import with_walls
 from realtime.methods.light_volumes.published.mesh import THRESHOLD, memory_needed, volume_mesh
 from realtime.methods.light_volumes.published.signed_sum import mesh_airlight
 from realtime.methods.light_volumes.tile_lists import Leaves, tile_leaves
 from realtime.methods.light_volumes.walk import sum_lit_pieces
-from realtime.methods.view import View, rays_in_media
 from realtime.numerics.array_types import bytes_of
 from realtime.scene.lights import Light
 from realtime.scene.read_scene import Scene
+from realtime.shadow_maps.inverse_depth_field import LightHeights, level_start, light_heights
 from realtime.shadow_maps.shadow_map import cast_shadow_map, check_size, map_memory
 
 EVALUATIONS = ("walk", "mesh")

@@ -11,9 +11,9 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.methods.light_volumes.height_field import LightHeights, node_bounds
 from realtime.methods.light_volumes.tile_beams import BeamPlanes, may_meet, over_square
 from realtime.numerics.array_types import is_single
+from realtime.shadow_maps.inverse_depth_field import LightHeights, node_bounds
 
 
 @dataclass

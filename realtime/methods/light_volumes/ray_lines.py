@@ -23,7 +23,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.methods.light_volumes.height_field import LightHeights, node_bounds
+from realtime.shadow_maps.inverse_depth_field import LightHeights, node_bounds
 from realtime.shadow_maps.shadow_map import face_coordinates, parallel_coordinates
 
 _NEARER = 1 - 1e-4  # of the nearest height, with room for rounding

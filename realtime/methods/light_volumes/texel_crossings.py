@@ -13,7 +13,6 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.methods.light_volumes.height_field import texel_heights, texel_walls
 from realtime.methods.light_volumes.ray_lines import at_line
 from realtime.methods.light_volumes.texel_lines import Line, borders
 from realtime.methods.light_volumes.texel_walls import (
@@ -27,6 +26,7 @@ from realtime.methods.light_volumes.texel_walls import (
     side_of,
     value_at,
 )
+from realtime.shadow_maps.inverse_depth_field import texel_heights, texel_walls
 
 
 @dataclass

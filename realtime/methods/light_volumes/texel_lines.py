@@ -9,9 +9,9 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.methods.light_volumes.height_field import LightHeights, texel_heights, texel_walls
 from realtime.methods.light_volumes.ray_lines import FaceRay, at_line
 from realtime.methods.light_volumes.texel_walls import height_in, parts_of
+from realtime.shadow_maps.inverse_depth_field import LightHeights, texel_heights, texel_walls
 
 _ROUNDING = 1e-5  # of a height of the map, with room
 _STEEPEST = 1e6  # rows a column; what is steeper goes over all rows of its column

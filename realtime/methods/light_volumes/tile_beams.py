@@ -5,7 +5,7 @@ A beam starts at the camera and is bounded by four planes through it, w . (P - c
 every ray has met a surface. Two of the four go through camera *and light*: between them the beam lies as the light sees
 it. The other two go across them. Where the light, or the point opposite it, is seen within the beam there are no such
 planes, and the sides of a rectangle about the rays serve instead. In the projective coordinates (u, v, s) of a light's
-face (`realtime.methods.light_volumes.height_field`) a plane is
+face (`realtime.shadow_maps.inverse_depth_field`) a plane is
 
     gu u + gv v + g0 + gs s >= 0,   (gu, gv, g0) = w . (across, up, axis),   gs = w . (light - camera),
 

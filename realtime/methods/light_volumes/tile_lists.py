@@ -5,7 +5,7 @@ A tile is sixteen rays that follow one another (4 x 4 pixels), a block sixteen t
 `realtime.methods.light_volumes.tile_beams`) misses the box of a node of the pyramid of heights, no ray of it meets the
 height field there: all of the node that they pass is lit, or all is dark. Blocks walk the pyramid from its top down to
 leaves, the last level, and tiles choose from those of their block. Of a leaf they list only the texels that the beam
-passes, and of those below or above the gap in the leaf's heights (see `realtime.methods.light_volumes.height_field`)
+passes, and of those below or above the gap in the leaf's heights (see `realtime.shadow_maps.inverse_depth_field`)
 only what it may meet. Lists have a fixed length: a tile whose leaves do not fit takes nodes of twice the size, without
 telling texels apart, and the whole face if need be.
 """
@@ -18,14 +18,14 @@ import drjit as dr
 import mitsuba as mi
 
 from realtime.methods.light_volumes.cube_faces import faces_in_order, faces_passed
-from realtime.methods.light_volumes.height_field import LightHeights, leaf_sides
 from realtime.methods.light_volumes.pyramid import Box, Node, descend, meets, packed, unpacked
 from realtime.methods.light_volumes.ray_lines import face_ray, in_face
 from realtime.methods.light_volumes.texel_lines import line_of
 from realtime.methods.light_volumes.tile_beams import Beam, BeamPlanes, beam_planes, make_beam, may_meet, parts_within
+from realtime.shadow_maps.inverse_depth_field import LightHeights, leaf_sides
 from realtime.shadow_maps.shadow_map import face_products
+from realtime.tiles.layout import TILE
 
-TILE = 16  #: rays in a tile, and tiles in a block
 CHUNK = 4  #: leaves that a ray looks at together
 LARGER = 1 << 31  #: added to the first place of a list of nodes that are no leaves
 LIT = 1 << 30  #: added to that of an empty list where all is lit that the tile's rays pass of the face

@@ -19,10 +19,10 @@ import mitsuba as mi
 
 from realtime.methods.light_volumes.crossings import Crossings, nearest_crossings
 from realtime.methods.light_volumes.cube_faces import FACE_BITS, NO_FACE
-from realtime.methods.light_volumes.height_field import LightHeights
 from realtime.methods.light_volumes.ray_lines import FaceRay, face_ray, in_face
 from realtime.methods.light_volumes.texel_lines import line_of
 from realtime.methods.light_volumes.tile_lists import LARGER, LIT, Leaves
+from realtime.shadow_maps.inverse_depth_field import LightHeights
 
 
 def sum_lit_pieces(
@@ -53,7 +53,7 @@ def sum_lit_pieces(
     zero
         The value of no piece, one for each ray.
     tile
-        The tile of every ray, see `realtime.methods.view.View`.
+        The tile of every ray, see `realtime.methods.interface.view.View`.
 
     Returns
     -------

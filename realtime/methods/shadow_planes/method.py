@@ -33,8 +33,8 @@ from realtime.bounded_media.airlight import FORMS, ambient_radiance, check_form
 from realtime.bounded_media.directional_airlight import ParallelRay
 from realtime.bounded_media.ray_segments import MediaRay
 from realtime.errors import InputError
-from realtime.methods.light_airlight import RayAirlight, integral_type, ray_airlight
-from realtime.methods.shadow_planes.mesh_adjacency import Casters, read_casters, with_positions
+from realtime.methods.interface.light_airlight import RayAirlight, integral_type, ray_airlight
+from realtime.methods.interface.view import View, rays_in_media
 from realtime.methods.shadow_planes.pixel_rays import aim_at, read_spot, seen_rays, seen_ways
 from realtime.methods.shadow_planes.plane_table import PlaneIndex, index_planes
 from realtime.methods.shadow_planes.published_crossings import Buffer, sum_crossings
@@ -43,11 +43,11 @@ from realtime.methods.shadow_planes.spot_pyramid import cone_ring
 from realtime.methods.shadow_planes.sweep import RayPlanes, ray_planes, sum_lit_segments
 from realtime.methods.shadow_planes.tile_lists import Lists, tile_lists
 from realtime.methods.shadow_planes.view_culling import bodies_in_view
-from realtime.methods.view import View, rays_in_media
 from realtime.numerics.array_types import ArrayTypes, types_of
 from realtime.scene.camera import HostCamera, read_camera
 from realtime.scene.features import check_places
 from realtime.scene.lights import Light
+from realtime.scene.mesh_adjacency import Casters, read_casters, with_positions
 from realtime.scene.read_scene import Scene
 
 ORDERS = ("exact", "paper", "none")

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from realtime.methods.shadow_planes.mesh_adjacency import Casters, read_casters, with_positions
 from realtime.methods.shadow_planes.plane_table import light_frame, shadow_planes
 from realtime.methods.shadow_planes.silhouettes import silhouette
 from realtime.methods.shadow_planes.view_culling import bodies_in_view
 from realtime.scene.camera import HostCamera, read_camera
 from realtime.scene.features import check_places
+from realtime.scene.mesh_adjacency import Casters, read_casters, with_positions
 from realtime.scene.read_scene import Scene
 
 

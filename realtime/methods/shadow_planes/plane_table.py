@@ -33,11 +33,11 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.methods.shadow_planes.mesh_adjacency import Casters
 from realtime.methods.shadow_planes.silhouettes import Silhouette, silhouette
 from realtime.methods.shadow_planes.spot_pyramid import NEARNESS, is_outside, ring_edges
 from realtime.numerics.array_types import is_single
 from realtime.numerics.diamond_angle import TURN, host_diamond_angle
+from realtime.scene.mesh_adjacency import Casters
 
 Array = NDArray[np.float64]
 

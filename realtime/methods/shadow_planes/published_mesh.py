@@ -18,8 +18,8 @@ import drjit as dr
 import mitsuba as mi
 
 from realtime.kernels.registry import gamma
+from realtime.methods.interface.view import View, radiance
 from realtime.methods.shadow_planes.plane_table import PlaneIndex
-from realtime.methods.view import View, radiance
 from realtime.rays.ray_light import ray_geometry
 from realtime.scene.lights import Light
 

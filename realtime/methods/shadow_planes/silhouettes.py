@@ -28,7 +28,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.methods.shadow_planes.mesh_adjacency import Casters
+from realtime.scene.mesh_adjacency import Casters
 
 Array = NDArray[np.float64]
 

@@ -18,9 +18,7 @@ import mitsuba as mi
 from realtime.methods.shadow_planes.plane_table import NUMBER, TURN, PlaneIndex
 from realtime.numerics.array_types import four_numbers, two_numbers
 from realtime.numerics.diamond_angle import diamond_angle
-
-TILE = 16  #: rays in a tile, and tiles in a block
-SIDE = 4  #: of a tile [pixels], where it is a square
+from realtime.tiles.layout import SIDE, TILE
 
 _SLACK = 1e-5  # of the terms of a sum: float32 rounding, with room to spare
 

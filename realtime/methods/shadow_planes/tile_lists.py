@@ -16,8 +16,9 @@ import drjit as dr
 import mitsuba as mi
 
 from realtime.methods.shadow_planes.plane_table import BINS, FIRST, FULL, NUMBER, TURN, PlaneIndex
-from realtime.methods.shadow_planes.tile_boxes import TILE, Box, block_boxes, tile_boxes, touches
+from realtime.methods.shadow_planes.tile_boxes import Box, block_boxes, tile_boxes, touches
 from realtime.numerics.array_types import four_numbers
+from realtime.tiles.layout import TILE
 
 ROOM = 32  #: entries for each tile and, fourfold, for each block, on average
 LEAST = 1 << 18  #: entries for all tiles, and for all blocks: tiles of small images see more

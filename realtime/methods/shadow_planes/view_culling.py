@@ -10,8 +10,8 @@ does the same for bounded media).
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.methods.shadow_planes.mesh_adjacency import Casters
 from realtime.scene.camera import HostCamera
+from realtime.scene.mesh_adjacency import Casters
 
 Array = NDArray[np.float64]
 

@@ -41,8 +41,8 @@ def ball() -> Scene:
 
 def frames(scene: Scene, steps, share: float = 0.1):
     """Yield the scene after each step, and what moved."""
-    from realtime.methods.shadow_planes.mesh_adjacency import read_casters
     from realtime.scene.animate import closed_shapes
+    from realtime.scene.mesh_adjacency import read_casters
 
     objects = read_objects(scene, closed_shapes(read_casters(scene.geometry))) if "objects" in steps else None
     turn = np.eye(3)

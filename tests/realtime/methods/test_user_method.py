@@ -16,7 +16,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 from realtime.errors import InputError
-from realtime.methods.method import Method
+from realtime.methods.interface.method import Method
 from realtime.methods.registry import METHODS
 
 NUMBER = 3

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from realtime.errors import InputError
-from realtime.methods.shadow_planes.mesh_adjacency import read_casters, with_positions
 from realtime.scene.animate import (
     closed_shapes,
     coloured_light,
@@ -14,6 +13,7 @@ from realtime.scene.animate import (
     turned_light,
     turned_objects,
 )
+from realtime.scene.mesh_adjacency import read_casters, with_positions
 from tests.helpers.scenes import spot, tiny_scene
 from validation.scenes.parts import rotation
 

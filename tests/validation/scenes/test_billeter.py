@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from realtime.methods.shadow_planes.mesh_adjacency import make_casters
+from realtime.scene.mesh_adjacency import make_casters
 from tests.helpers.meshes import areas, volume
 from validation.scenes.omni_box import SCENE as OMNI_BOX
 from validation.scenes.omni_box import _bars, _room, _standing

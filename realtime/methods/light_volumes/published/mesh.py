@@ -3,7 +3,7 @@
 
 Billeter, Sintorn, Assarsson 2010, section 4, after McCool 2000. Each corner (u, v) of a texel, or of a larger quad of
 an adaptive tessellation, is a vertex at light + k / s, k = axis + u across + v up, with s the inverse planar depth
-(`realtime.methods.light_volumes.height_field`). In homogeneous coordinates that is
+(`realtime.shadow_maps.inverse_depth_field`). In homogeneous coordinates that is
 
     (light s + k, s),
 
@@ -22,9 +22,9 @@ from typing import Any
 import numpy as np
 
 from realtime.errors import InputError
-from realtime.methods.light_volumes.height_field import inverse_depth
 from realtime.methods.light_volumes.published.tessellation import divide, edges, triangles
 from realtime.scene.lights import Light
+from realtime.shadow_maps.inverse_depth_field import inverse_depth
 from realtime.shadow_maps.shadow_map import ShadowMap
 
 #: Departure of an adaptive mesh from the shadow map that is allowed by default, relative to the depth.

@@ -14,9 +14,9 @@ import drjit as dr
 import mitsuba as mi
 
 from realtime.kernels.registry import airlight_integral
+from realtime.methods.interface.view import View, radiance
 from realtime.methods.light_volumes.published.mesh import VolumeMesh
 from realtime.methods.light_volumes.published.raster import BATCH, Crossings, signed_crossings
-from realtime.methods.view import View, radiance
 from realtime.rays.ray_light import RayGeometry, ray_geometry
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium

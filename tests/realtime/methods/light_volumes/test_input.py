@@ -73,9 +73,9 @@ def test_memory_is_counted_before_it_is_taken(variant, monkeypatch, evaluation):
 def test_memory_that_is_needed_is_what_the_arrays_hold(variant):
     """Of a map of 8192 texels by proportion: nothing grows faster."""
     import realtime.methods.light_volumes.method
-    from realtime.methods.light_volumes.height_field import light_heights
     from realtime.methods.light_volumes.jump_search import with_walls
     from realtime.scene.read_scene import read_scene
+    from realtime.shadow_maps.inverse_depth_field import light_heights
     from realtime.shadow_maps.shadow_map import cast_shadow_map
 
     scene = read_scene(loaded_scene())

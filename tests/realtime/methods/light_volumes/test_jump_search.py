@@ -15,10 +15,10 @@ FLAT = {"ball": None, "lamp": lamp(*LAMP)}
 
 def walled(loaded, size, precision="single"):
     """Return the heights of a scene's first light with walls, and the walls' places by face, row, column and side."""
-    from realtime.methods.light_volumes.height_field import light_heights
     from realtime.methods.light_volumes.jump_search import with_walls
     from realtime.methods.light_volumes.texel_walls import PLACES
     from realtime.scene.read_scene import read_scene
+    from realtime.shadow_maps.inverse_depth_field import light_heights
     from realtime.shadow_maps.shadow_map import cast_shadow_map
 
     scene = read_scene(loaded, precision)

@@ -150,7 +150,7 @@ def with_heights(shadow_map, heights):
     """Return a map that has these inverse depths at its corners."""
     import mitsuba as mi
 
-    from realtime.methods.light_volumes.height_field import inverse_depth
+    from realtime.shadow_maps.inverse_depth_field import inverse_depth
 
     length = np.array(inverse_depth(replace(shadow_map, distance=mi.Float64(np.ones(len(heights))))))
     with np.errstate(divide="ignore"):
@@ -163,8 +163,8 @@ def with_heights(shadow_map, heights):
 def test_any_map(variant, kind, data):
     """Whatever the heights: three routes to the same volume."""
     from realtime.frame.renderer import image_frame, run_stages
-    from realtime.methods.light_volumes.height_field import light_heights
     from realtime.methods.light_volumes.published.mesh import volume_mesh
+    from realtime.shadow_maps.inverse_depth_field import light_heights
     from reference.scene.read import read_truth
     from validation.oracles.light_volume import twin_airlight
 
@@ -201,8 +201,8 @@ def test_any_walls_in_any_map(variant, kind, data):
     import mitsuba as mi
 
     from realtime.frame.renderer import image_frame, run_stages
-    from realtime.methods.light_volumes.height_field import light_heights
     from realtime.methods.light_volumes.texel_walls import walled_heights
+    from realtime.shadow_maps.inverse_depth_field import light_heights
     from reference.scene.read import read_truth
     from validation.oracles.light_volume import twin_airlight
 

@@ -32,10 +32,11 @@ def test_what_is_lit_across_faces_is_one_piece(variant):
     import mitsuba as mi
 
     from realtime.methods.light_volumes.cube_faces import NO_FACE
-    from realtime.methods.light_volumes.height_field import light_heights
-    from realtime.methods.light_volumes.tile_lists import TILE, tile_leaves
+    from realtime.methods.light_volumes.tile_lists import tile_leaves
     from realtime.methods.light_volumes.walk import sum_lit_pieces
+    from realtime.shadow_maps.inverse_depth_field import light_heights
     from realtime.shadow_maps.shadow_map import cast_shadow_map
+    from realtime.tiles.layout import TILE
 
     speck = {"type": "sphere", "center": [0.3, 0.2, -90.0], "radius": 1e-3}  # falls between the rays of the map
     scene = read_scene(mi.load_dict(tiny_scene(ball=speck, floor=None, size=(64, 48))))

@@ -4,7 +4,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from realtime.methods.shadow_planes.mesh_adjacency import make_casters
 from realtime.methods.shadow_planes.plane_table import (
     BINS,
     FIRST,
@@ -18,6 +17,7 @@ from realtime.methods.shadow_planes.plane_table import (
 )
 from realtime.methods.shadow_planes.silhouettes import silhouette
 from realtime.numerics.diamond_angle import host_diamond_angle
+from realtime.scene.mesh_adjacency import make_casters
 from tests.helpers.casters import ALL
 from tests.helpers.planes import CAMERA, LIGHT, bundles, casters_of, crossings, index_of, plane_table
 

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from realtime.methods.shadow_planes.mesh_adjacency import make_casters
+from realtime.scene.mesh_adjacency import make_casters
 from tests.helpers.casters import closed_sphere
 from tests.helpers.planes import CAMERA, LIGHT, bundles, crossings, index_of
 from tests.helpers.scenes import tiny_scene

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from realtime.methods.shadow_planes.mesh_adjacency import make_casters
 from realtime.methods.shadow_planes.silhouettes import layers, silhouette
+from realtime.scene.mesh_adjacency import make_casters
 from tests.helpers.casters import ALL, SOUND, closed_box, closed_sphere, flat_roof
 
 LIGHTS = {"aside": (2.9, -1.7, 2.3), "near": (0.31, 0.47, 0.71), "inside": (0.11, -0.05, 0.17)}

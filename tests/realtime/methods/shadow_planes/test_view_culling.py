@@ -2,8 +2,8 @@
 import numpy as np
 import pytest
 
-from realtime.methods.shadow_planes.mesh_adjacency import make_casters
 from realtime.methods.shadow_planes.view_culling import bodies_in_view, view_planes
+from realtime.scene.mesh_adjacency import make_casters
 from tests.helpers.scenes import tiny_scene
 
 

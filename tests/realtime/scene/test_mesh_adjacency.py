@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from realtime.errors import InputError
-from realtime.methods.shadow_planes.mesh_adjacency import make_casters, moved, read_casters
+from realtime.scene.mesh_adjacency import make_casters, moved, read_casters
 from tests.helpers.casters import ALL, AWKWARD, SOUND, boxes_sharing_an_edge, closed_box, closed_sphere, open_grid
 from tests.helpers.scenes import tiny_scene
 

@@ -8,7 +8,7 @@ from realtime.bounded_media.airlight import bounded_airlight
 from realtime.bounded_media.directional_airlight import ParallelRay
 from realtime.bounded_media.ray_segments import MediaRay
 from realtime.kernels.registry import airlight_integral, gamma
-from realtime.methods.view import View, bounded_radiance, radiance
+from realtime.methods.interface.view import View, bounded_radiance, radiance
 from realtime.rays.ray_light import clip_to_cone, ray_geometry
 from realtime.scene.lights import Light
 

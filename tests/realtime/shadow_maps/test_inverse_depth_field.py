@@ -8,8 +8,8 @@ from tests.helpers.scenes import spot, tiny_scene
 def heights_of(size: int, kind: str):
     import mitsuba as mi
 
-    from realtime.methods.light_volumes.height_field import light_heights
     from realtime.scene.read_scene import read_scene
+    from realtime.shadow_maps.inverse_depth_field import light_heights
     from realtime.shadow_maps.shadow_map import cast_shadow_map
 
     scene = read_scene(mi.load_dict(tiny_scene(**({"lamp": spot()} if kind == "spot" else {}))))
@@ -36,7 +36,7 @@ def test_heights_are_inverse_planar_depths(variant, kind):
 
 @pytest.mark.parametrize(("size", "kind", "finest"), [(16, "point", 2), (64, "spot", 4), (4, "spot", 0)])
 def test_bounds_are_those_of_the_texels(variant, size, kind, finest):
-    from realtime.methods.light_volumes.height_field import level_start
+    from realtime.shadow_maps.inverse_depth_field import level_start
 
     _, heights = heights_of(size, kind)
     texels = np.array(heights.texels).reshape(heights.faces, size, size, 4)
