@@ -10,8 +10,7 @@ Read in this order:
 - `baseline_files.py`: baselines as files, their comparison and their revisions;
 - `map_size.py`: error against the size of the shadow map, and the flicker of a light that moves;
 - `plane_stability.py`: hard cases for sums over shadow planes;
-- `zero_cost.py`: checks that what a scene does not need costs nothing;
-- `bounded_study.py`: how wrong the constant R of Biri 2006 is.
+- `zero_cost.py`: checks that what a scene does not need costs nothing.
 
 May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.kernels`, `realtime.methods`, `realtime.scene`,
 `reference.quadrature`, `reference.scene`, `reference.storage`, `validation.configurations`, `validation.estimates`,
