@@ -28,13 +28,6 @@ ALLOWED = {
     "reports": {"analytic", "realtime", "reference", "validation"},
     "airlight": set(FOLDERS),
 }
-# Within the side of truth, the volpath estimator and the integrals share none of their derivations.
-UNRELATED = [
-    (
-        "reference/monte_carlo/volpath/integrator.py",
-        {"reference.quadrature", "analytic"},
-    )
-]
 
 
 def _python(*arguments: str, **options) -> subprocess.CompletedProcess:
@@ -75,13 +68,6 @@ def test_the_walk_over_imports_finds_what_is_forbidden():
     source = "def f():\n    from analytic import phase\n    import numpy\n    import validation.scenes.loading\n"
     assert _forbidden("realtime", source) == ["analytic.phase", "validation.scenes.loading"]
     assert _forbidden("reference", source) == ["validation.scenes.loading"]
-
-
-@pytest.mark.parametrize(("path", "others"), UNRELATED, ids=lambda value: value if isinstance(value, str) else "")
-def test_estimators_of_the_truth_share_no_derivation(path, others):
-    # errors are words, no derivation
-    imported = [name for name in _imports(ast.parse((ROOT / path).read_text())) if "errors" not in name]
-    assert not [name for name in imported if any(name == other or name.startswith(f"{other}.") for other in others)]
 
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(ROOT)))

@@ -8,7 +8,7 @@ from dataclasses import asdict, is_dataclass
 from typing import Any
 
 from realtime.scene.features import describe
-from reference.quadrature.image import TruthImage
+from reference.quadrature.ray_values import TruthImage
 from validation.comparison.engine_images import ImageMeasurement
 from validation.frames.benchmark import Measurement, knows_shadows
 from validation.frames.scene_study import SceneStudy

@@ -14,7 +14,7 @@ from realtime.frame.renderer import FrameRenderer, render_frame, run_stages
 from realtime.kernels.registry import KERNELS
 from realtime.scene.features import Plan
 from realtime.scene.read_scene import Scene, read_scene
-from reference.quadrature.image import TruthImage
+from reference.quadrature.ray_values import TruthImage
 from validation.configurations.methods import STANDARD, Configuration, prepared
 from validation.estimates.quadrature import truth_image
 from validation.frames.baseline_files import ERRORS, SCHEMA, SIZE, SLOWER, Baseline

@@ -11,7 +11,7 @@ from realtime.frame.renderer import Frame, render_frame
 from realtime.methods.registry import find_method
 from realtime.scene.features import Plan
 from realtime.scene.read_scene import Scene, read_scene
-from reference.quadrature.image import TruthImage
+from reference.quadrature.ray_values import TruthImage
 from validation.configurations.methods import STANDARD, Configuration, prepared
 from validation.configurations.timing import FrameTimes, time_frame
 from validation.estimates.quadrature import truth_image

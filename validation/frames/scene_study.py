@@ -11,7 +11,7 @@ from functools import cached_property
 from typing import Any
 
 from realtime.scene.read_scene import Scene, read_scene
-from reference.quadrature.image import TruthImage
+from reference.quadrature.ray_values import TruthImage
 from reference.storage.cache import scene_digest
 from validation.configurations.methods import QUICK, Configuration
 from validation.estimates.agreement import Agreement, agreements

@@ -23,7 +23,7 @@ def brute_force(truth, n, regular=False):
     Regular points would all be wrong the same way where an edge runs along the rows; close to a light they are better,
     where a random one may come too close.
     """
-    from reference.quadrature.image import ray_values
+    from reference.quadrature.ray_values import ray_values
     from reference.scene.camera import film_directions
 
     row, column = np.divmod(np.arange(truth.width * truth.height), truth.width)
@@ -49,8 +49,8 @@ def test_directions_through_the_middles_are_those_of_the_image(variant):
 
 def test_smooth_fog_is_the_integral_over_the_pixel(variant):
     """Gauss's product rule with 12 x 12 points, converged for what is smooth: the light is out of view."""
-    from reference.quadrature.image import ray_values
     from reference.quadrature.pixel_area import area_image
+    from reference.quadrature.ray_values import ray_values
     from reference.scene.camera import film_directions
 
     lamp = {"type": "point", "position": [3.9, 0.7, 3.9], "intensity": {"type": "rgb", "value": [5.0, 4.0, 3.0]}}

@@ -238,7 +238,7 @@ def test_nothing_half_written_stays_behind(monkeypatch):
 
 def test_fields_of_a_truth_image_are_what_the_cache_keeps(variant):
     """A field added to one and not to the other would make every look-up fail."""
-    from reference.quadrature.image import TruthImage
+    from reference.quadrature.ray_values import TruthImage
     from validation.estimates.quadrature import truth_image
 
     scene = load()

@@ -167,7 +167,7 @@ def test_wrong_geometry_is_found_and_left_in_doubt(variant):
 
 
 def test_doubt_widens_the_bound(variant, monkeypatch):
-    import reference.quadrature.image as quadrature
+    import reference.quadrature.ray_values as quadrature
 
     truth, *_ = setup(box_scene())
     plain = quadrature.ray_values(truth)
