@@ -42,7 +42,7 @@ class Effort:
     scenes: tuple[str, ...] = ()  #: studied unless others are named
     batches: int = 2048  #: of these comparisons at most
     multiple: tuple[int, int] = (8, 4)  #: batches, and samples a pixel in each, for the share of multiple scattering
-    patience: float = 10.0  #: seconds after which an estimator that has not decided is stopped
+    patience: float | None = None  #: seconds after which an estimator that has not decided is stopped; None: never
     slow: float = 0.15  #: where the airlight takes longer, whole frames are timed stage by stage [s]
     limit: float = 20.0  #: a frame that would take longer is not measured, and the report says so [s]
     flip: str = "none"  #: of which configurations HDR-FLIP is computed: 'none', one of each 'kinds' (`QUICK`), 'all'

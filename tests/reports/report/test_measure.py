@@ -35,6 +35,7 @@ SCENE = """<scene version="3.0.0">
     <shape type="rectangle"><transform name="to_world"><scale value="6.3"/></transform></shape>
 </scene>
 """
+# Numbers of samples and no times: what two runs find must not hang on how busy the machine is.
 TINY = Effort(
     "tiny",
     (20, 15),
@@ -44,6 +45,7 @@ TINY = Effort(
     {"single-scatter": 4, "volpath": 4},
     0.01,
     multiple=(4, 1),
+    limit=1e6,
 )
 MARCH = Configuration("ray-march", None, (("steps", 50),))
 CHOSEN = (Configuration("unshadowed", "taylor"), Configuration("unshadowed", "quadrature"), MARCH)
