@@ -166,9 +166,9 @@ def test_a_mark_that_names_nothing_is_an_error(extension):
 
 def test_links_to_source_lead_to_the_page_of_the_module(extension):
     generated = extension("generated")
-    text = ["See [`lit_balls.py`](../reference/lit_balls.py) and [it](../CONTRIBUTING.md)."]
+    text = ["See [`spheres.py`](../reference/visibility/spheres.py) and [it](../CONTRIBUTING.md)."]
     generated._replace(None, "page", text)
-    assert text == ["See {py:mod}`lit_balls.py <reference.visibility.spheres>` and [it](contributing.md)."]
+    assert text == ["See {py:mod}`spheres.py <reference.visibility.spheres>` and [it](contributing.md)."]
 
 
 def test_formulas_are_mathml_and_slips_are_named(extension):

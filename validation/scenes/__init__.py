@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The built-in scenes, their animations, and the loading of scenes by name or by file.
+
+A scene is a Mitsuba dictionary that a function builds from arbitrary, never round numbers. The registry lists the
+scenes for commands, reports and tests.
+
+Read in this order:
+
+- `record.py`: the entry of a scene in the registry, and what moves in its animation;
+- `registry.py`: the scenes by name;
+- `parts.py`: meshes, materials, cameras and media that scenes are made of;
+- `solids.py`: closed meshes of standard shapes, and walls with openings;
+- `open_fog.py`: a lamp in fog, without a shadow;
+- `sphere_spot.py`: one sphere in the cone of a spot light;
+- `two_pens.py`, `three_media.py`, `clutter.py`, `hall.py`: after Biri 2006;
+- `colonnade.py`, `omni_box.py`, `tangle.py`: after Billeter 2010;
+- `windows.py`: a directional light through the windows of a room;
+- `probes.py`: small scenes for what the built-in ones lack, used by checks of the checks;
+- `loading.py`: a scene by its name or from a Mitsuba XML file;
+- `animation.py`: the scenes of the frames of an animation.
+
+May import: `analytic`, `realtime.scene`.
+"""
