@@ -30,7 +30,7 @@ def plain(value: Any) -> Any:
 
 def scene_facts(study: SceneStudy) -> dict[str, Any]:
     """Return what a scene is, before anything is measured in it."""
-    loaded, effort, plan = study.loaded, study.effort, study.scene.plan
+    loaded, effort, features = study.loaded, study.effort, study.scene.features
     return {
         "name": loaded.name,
         "purpose": loaded.purpose,
@@ -38,8 +38,8 @@ def scene_facts(study: SceneStudy) -> dict[str, Any]:
         "path": str(loaded.path) if loaded.path else None,
         "size": list(effort.image),
         "timed": list(effort.timed),
-        "plan": describe(plan),
-        "notes": list(plan.notes),
+        "plan": describe(features),
+        "notes": list(features.notes),
     }
 
 
