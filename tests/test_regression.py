@@ -33,7 +33,7 @@ def test_a_fault_of_a_thousandth_is_found(monkeypatch, variant):
         "find_kernel",
         lambda name: lambda *args, **known: 1.001 * find(name)(*args, **known),
     )
-    monkeypatch.setattr(baseline_runs, "baseline_configurations", lambda name, plan: (YARDSTICK,))
+    monkeypatch.setattr(baseline_runs, "baseline_configurations", lambda name, features: (YARDSTICK,))
     moves = compare_baseline(read_baseline("open-fog"), measure_baseline("open-fog", times=False))
     moved = {one.what: one for one in moves if one.label == YARDSTICK.label}
     assert moved["airlight relative_bias"].new == pytest.approx(1e-3, rel=1e-3)

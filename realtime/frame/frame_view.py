@@ -7,7 +7,7 @@ import mitsuba as mi
 from realtime.frame.surface import visible_triangle
 from realtime.methods.interface.view import View
 from realtime.scene.camera import Camera, ray_directions
-from realtime.scene.features import Plan
+from realtime.scene.features import SceneFeatures
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium
 from realtime.tiles.layout import TILE
@@ -18,7 +18,7 @@ def frame_view(
     pixel,
     distance,
     *,
-    plan: Plan,
+    features: SceneFeatures,
     geometry,
     medium: Medium,
     lights: tuple[Light, ...],
@@ -40,7 +40,7 @@ def frame_view(
         distance=distance,
         lights=lights,
         medium=medium,
-        plan=plan,
+        features=features,
         visible=lambda point, light: _visible(geometry, point, light),
         camera=camera,
         pixel=pixel,

@@ -67,7 +67,7 @@ def ray_march(
     """
     _check(steps, spacing, shadow, view)
     total = type(view.medium.albedo)(0)
-    in_media = rays_in_media(view) if view.plan.bounded else ()
+    in_media = rays_in_media(view) if view.features.bounded else ()
     for number, light in enumerate(view.lights):
         x0, x1 = type(view.distance)(0), view.distance
         media = in_media[number] if in_media else None
@@ -111,14 +111,14 @@ def _check(steps: int, spacing: str, shadow: str, view: View) -> None:
             raise InputError(f"{name}: got {value!r}, wanted one of {', '.join(allowed)}")
     if not isinstance(steps, int) or steps < 1:
         raise InputError(f"steps: got {steps!r}, wanted a whole number of at least 1")
-    if spacing == "uniform" and view.plan.vacuum and not view.medium.clear:
+    if spacing == "uniform" and view.features.vacuum and not view.medium.clear:
         raise InputError("spacing=uniform: an endless ray through a vacuum has no step length; use spacing=equiangular")
 
 
 def _visibility(view: View, number: int, shadow: str):
     """Return the function that says whether the light of a number reaches a point."""
     light = view.lights[number]
-    if shadow == "none" or not view.plan.shadows:
+    if shadow == "none" or not view.features.shadows:
         return lambda point: True
     if shadow == "map":
         return lambda point: lit_in_map(view.prepared[number], light, point)

@@ -28,7 +28,7 @@ def unshadowed(view: View, *, kernel):
     """
     total = type(view.medium.albedo)(0)
     start = type(view.distance)(0)
-    if view.plan.bounded:
+    if view.features.bounded:
         rays = rays_in_media(view)
         return sum(bounded_radiance(ray.light, bounded_airlight(ray, start, view.distance)) for ray in rays)
     for light in view.lights:

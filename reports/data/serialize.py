@@ -31,7 +31,7 @@ def plain(value: Any) -> Any:
 
 def scene_facts(study: SceneStudy) -> dict[str, Any]:
     """Return what a scene is, before anything is measured in it."""
-    loaded, effort, plan = study.loaded, study.effort, study.scene.plan
+    loaded, effort, features = study.loaded, study.effort, study.scene.features
     baseline = None if loaded.path else read_baseline(loaded.name)
     return {
         "name": loaded.name,
@@ -41,8 +41,8 @@ def scene_facts(study: SceneStudy) -> dict[str, Any]:
         "baseline": baseline["revision"] if baseline else None,
         "size": list(effort.image),
         "timed": list(effort.timed),
-        "plan": describe(plan),
-        "notes": list(plan.notes),
+        "plan": describe(features),
+        "notes": list(features.notes),
     }
 
 

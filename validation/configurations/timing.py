@@ -15,7 +15,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.frame.incremental import Kept, next_frame
+from realtime.frame.incremental import FrameCache, next_frame
 from realtime.frame.recorded import Frozen
 from realtime.frame.renderer import (
     FrameRenderer,
@@ -112,7 +112,7 @@ def times_in_turns(
     return np.array(times)
 
 
-def timed_frame(renderer: FrameRenderer, scene: Scene, kept: Kept | None, **moved: bool):
+def timed_frame(renderer: FrameRenderer, scene: Scene, kept: FrameCache | None, **moved: bool):
     """Render the next frame, as `realtime.frame.incremental.next_frame`; return stages, what is kept, and the time
     [ms].
     """
@@ -127,12 +127,12 @@ def moved_light(renderer: FrameRenderer) -> Callable[[], Any]:
     return _step(renderer, None, light_moved=True)
 
 
-def moved_light_alone(renderer: FrameRenderer, kept: Kept) -> Callable[[], Any]:
+def moved_light_alone(renderer: FrameRenderer, kept: FrameCache) -> Callable[[], Any]:
     """Return a frame after the light moved, camera and geometry as they stood: camera rays are kept."""
     return _step(renderer, kept, light_moved=True)
 
 
-def changed_look(renderer: FrameRenderer, kept: Kept) -> Callable[[], Any]:
+def changed_look(renderer: FrameRenderer, kept: FrameCache) -> Callable[[], Any]:
     """Return a frame after the medium or colours of lights changed: only surface and airlight are computed."""
     return _step(renderer, kept, light_moved=False)
 
@@ -148,12 +148,12 @@ def camera_rays(renderer: FrameRenderer) -> Callable[[], Any]:
     return lambda: dr.eval(cast(scene.geometry, scene.facets, renderer.pixel, scene.camera))
 
 
-def _step(renderer: FrameRenderer, kept: Kept | None, *, light_moved: bool) -> Callable[[], Any]:
+def _step(renderer: FrameRenderer, kept: FrameCache | None, *, light_moved: bool) -> Callable[[], Any]:
     moved = {"camera_moved": kept is None, "geometry_moved": False, "light_moved": light_moved}
     return lambda: next_frame(renderer, renderer.scene, kept, **moved)
 
 
-def first_frame(renderer: FrameRenderer) -> Kept:
+def first_frame(renderer: FrameRenderer) -> FrameCache:
     """Render the frame of the renderer's scene and return what it leaves."""
     return next_frame(renderer, renderer.scene, None, camera_moved=True, geometry_moved=True, light_moved=True)[1]
 

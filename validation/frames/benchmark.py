@@ -9,7 +9,7 @@ from realtime.errors import InputError
 from realtime.frame.recorded import Frozen
 from realtime.frame.renderer import Frame, render_frame
 from realtime.methods.registry import find_method
-from realtime.scene.features import Plan
+from realtime.scene.features import SceneFeatures
 from realtime.scene.read_scene import Scene, read_scene
 from reference.quadrature.ray_values import TruthImage
 from validation.configurations.methods import STANDARD, Configuration, prepared
@@ -40,14 +40,16 @@ class Measurement:
     note: str | None = None  #: what its times are, where not those of the others
 
 
-def configurations_for(plan: Plan, configurations: Sequence[Configuration] = STANDARD) -> tuple[Configuration, ...]:
+def configurations_for(
+    features: SceneFeatures, configurations: Sequence[Configuration] = STANDARD
+) -> tuple[Configuration, ...]:
     """Leave out what the scene does not need.
 
     Variants that differ in their shadows need something that casts one, the paper's way with bounded media needs such
     media, in clear air.
     """
-    needless = set() if plan.shadows else {"shadow", "order", "map"}
-    needless |= set() if plan.clear else {"media"}
+    needless = set() if features.shadows else {"shadow", "order", "map"}
+    needless |= set() if features.clear else {"media"}
     return tuple(chosen for chosen in configurations if not needless & set(dict(chosen.parameters)))
 
 
@@ -110,7 +112,7 @@ def measure(
         frame,
         times,
         error_metrics(truth.airlight, frame.airlight),
-        error_metrics(truth.surface, frame.surface) if scene.plan.surfaces else None,
+        error_metrics(truth.surface, frame.surface) if scene.features.surfaces else None,
         flip_hdr(truth.airlight + truth.surface, frame.airlight + frame.surface) if with_flip else None,
         note="; ".join(notes) or None,
     )
@@ -138,7 +140,7 @@ def bench(
 ) -> Iterator[tuple[Scene, Measurement]]:
     """Measure the configurations of a scene at its own size, one after the other."""
     scene = read_scene(loaded.scene)
-    chosen = configurations_for(scene.plan, configurations)
+    chosen = configurations_for(scene.features, configurations)
     truth = truth_image(loaded.scene)
     for number, one in enumerate(chosen):
         yield scene, measure(scene, one, truth=truth)

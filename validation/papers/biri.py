@@ -23,7 +23,7 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from realtime.frame.incremental import Kept
+from realtime.frame.incremental import FrameCache
 from realtime.frame.renderer import (
     FrameRenderer,
     render_frame,
@@ -228,7 +228,7 @@ def _shared(measured: Sequence[float]) -> tuple[float, ...]:
     return silhouettes, surface, unshadowed, sorting, max(0.0, airlight - unshadowed)
 
 
-def _stages(renderer: FrameRenderer, kernel: str, kept: Kept) -> list[Callable[[], Any]]:
+def _stages(renderer: FrameRenderer, kernel: str, kept: FrameCache) -> list[Callable[[], Any]]:
     """Return the work of silhouettes, scene, unshadowed airlight, all that is on the host, tile lists, and airlight."""
     scene = renderer.scene
     distance = kept.cast.distance

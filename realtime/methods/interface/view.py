@@ -12,7 +12,7 @@ from realtime.bounded_media.directional_airlight import ParallelRay, parallel_ra
 from realtime.bounded_media.ray_segments import MediaRay, camera_pieces, media_ray
 from realtime.rays.ray_light import ray_geometry
 from realtime.scene.camera import Camera
-from realtime.scene.features import Plan
+from realtime.scene.features import SceneFeatures
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium
 
@@ -31,7 +31,7 @@ class View:
     distance: Any  #: to the visible surface, infinite where there is none [m]
     lights: tuple[Light, ...]
     medium: Medium
-    plan: Plan  #: what the scene needs; a method leaves out the rest
+    features: SceneFeatures  #: what the scene needs; a method leaves out the rest
     visible: Callable[[Any, Light], Any]  #: (point, light) -> whether the light reaches the point
     camera: Camera
     pixel: Any  #: pixel number of every ray: row times width plus column

@@ -105,13 +105,13 @@ def light_volumes(
     """
     total = type(view.medium.albedo)(0)
     lit = []
-    in_media = rays_in_media(view) if view.plan.bounded else ()
+    in_media = rays_in_media(view) if view.features.bounded else ()
     for number, light in enumerate(view.lights):
-        if evaluation == "mesh" and view.plan.shadows:
+        if evaluation == "mesh" and view.features.shadows:
             total += mesh_airlight(view, light, view.prepared[number], kernel=kernel)
             continue
         airlight = ray_airlight(view, light, kernel, in_media[number] if in_media else None)
-        if view.plan.shadows:
+        if view.features.shadows:
             leaves = view.tiles[number] if view.tiles else _leaves(view, number)
             value, reached = _walk(view.prepared[number], leaves, airlight)
         else:
@@ -162,12 +162,12 @@ def prepare_light_volumes(
         machine has.
     """
     _check(map, evaluation, tessellation, threshold, surface, walls)
-    if evaluation == "mesh" and scene.plan.bounded:
+    if evaluation == "mesh" and scene.features.bounded:
         raise InputError(
             "evaluation=mesh: the scene has a medium with bounds, wanted one medium that fills all space; use "
             "evaluation=walk"
         )
-    if scene.plan.shadows:
+    if scene.features.shadows:
         needed = sum(_memory_of(light, map, evaluation) for light in scene.lights)
         check_memory(f"map: {map} texels for {len(scene.lights)} light(s)", needed, "use a smaller map")
 

@@ -89,7 +89,7 @@ def prepare_shadow_planes(scene: Scene, **settings) -> PlanePreparation:
         For a parameter out of range, casters without triangles and directional lights.
     """
     _check(**settings)
-    check_places(scene.plan, "shadow-planes")
+    check_places(scene.features, "shadow-planes")
     return PlanePreparation(read_casters(scene.geometry), settings["cone"])
 
 
@@ -179,14 +179,14 @@ def shadow_planes(
     total = type(view.medium.albedo)(0)
     lit = []
     in_media: tuple[MediaRay | ParallelRay, ...] = ()
-    if view.plan.bounded:
+    if view.features.bounded:
         check_form(view.medium, media)
         _check_bounded(evaluation)
         in_media = rays_in_media(view, media)
     for number, light in enumerate(view.lights):
-        if cone and light.kind == "spot" and not light.soft and view.plan.shadows:
+        if cone and light.kind == "spot" and not light.soft and view.features.shadows:
             light = replace(light, kind="point")  # planes bound it
-        if not view.plan.shadows:
+        if not view.features.shadows:
             airlight = ray_airlight(view, light, kernel, in_media[number] if in_media else None)
             total += airlight.radiance(airlight.integral(type(view.distance)(0), view.distance))
             lit.append(True)

@@ -268,11 +268,11 @@ def test_scenes_without_bodies_plan_none(variant):
 
     scene = mi.load_dict(tiny_scene())
     read = read_scene(scene)
-    assert not read.plan.bounded
+    assert not read.features.bounded
     assert read.geometry is scene
     bounded = read_scene(mi.load_dict(clear_scene(ball=ball())))
-    assert bounded.plan.bounded
-    assert not bounded.plan.surfaces
+    assert bounded.features.bounded
+    assert not bounded.features.surfaces
     assert len(bounded.geometry.shapes()) == 0
 
 

@@ -59,7 +59,7 @@ def wrong_ready(view): return 1
 wrong_ready.prepare = 5
 def full(view, *, kernel): return 2
 record = Method("theirs", full, "", "", uses_kernel=False)
-lights = Method("lights", full, "", "", uses_kernel=False, lights_surfaces=lambda settings: True)
+lights = Method("lights", full, "", "", uses_kernel=False, provides_visibility=lambda settings: True)
 """
 
 

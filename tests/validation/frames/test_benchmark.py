@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from realtime.scene.features import Plan
+from realtime.scene.features import SceneFeatures
 from tests.helpers.scenes import tiny_scene
 from validation.configurations.methods import STANDARD, Configuration, configuration
 from validation.frames.benchmark import bench, configurations_for, knows_shadows, measure
@@ -13,7 +13,7 @@ from validation.scenes.loading import LoadedScene
 
 MARCH = Configuration("ray-march", None, (("steps", 200),))
 UNSHADOWED = Configuration("unshadowed", "quadrature")
-PLAN = Plan(
+FEATURES = SceneFeatures(
     shadows=True,
     surfaces=True,
     extinctions=1,
@@ -115,11 +115,11 @@ def test_bench_measures_one_after_the_other_and_tells(loaded):
 
 
 def test_variants_of_shadows_are_left_out_where_nothing_casts_one():
-    assert configurations_for(replace(PLAN, bounded=True, clear=True)) == STANDARD
-    unbounded = configurations_for(PLAN)
+    assert configurations_for(replace(FEATURES, bounded=True, clear=True)) == STANDARD
+    unbounded = configurations_for(FEATURES)
     (left_out,) = (one for one in STANDARD if one not in unbounded)
     assert dict(left_out.parameters) == {"media": "paper"}
-    left = configurations_for(replace(PLAN, shadows=False))
+    left = configurations_for(replace(FEATURES, shadows=False))
     assert 0 < len(left) < len(STANDARD)
     assert all(not {"shadow", "map"} & set(dict(one.parameters)) for one in left)
     assert {one.method for one in left} == {one.method for one in STANDARD}

@@ -190,7 +190,7 @@ def test_one_frame_serves_a_light_that_moves(variant):
 def test_a_plan_counts_the_light(variant):
     from realtime.scene.features import describe
 
-    assert describe(read(shaded()).plan)["lights"] == "1 directional"
+    assert describe(read(shaded()).features)["lights"] == "1 directional"
 
 
 def test_the_map_needs_the_memory_of_one_face(variant):
