@@ -12,7 +12,7 @@ def method(label, rmse, median, *, refused=None):
     """What a report says of a configuration, by hand."""
     if refused:
         return {"label": label, "refused": refused, "error": None, "times": None}
-    times = {name: timing(median) for name in ("frame", "surface", "airlight", "rebuild")}
+    times = {name: timing(median) for name in ("frame", "surface", "airlight", "light_moved")}
     return {"label": label, "refused": None, "error": {"relative_rmse": rmse}, "times": times}
 
 
