@@ -41,7 +41,7 @@ def surface_stages(scene: Scene, *, lights_surfaces: bool) -> tuple[Callable[...
     if not scene.plan.surfaces:
         return _nothing_met, no_surface, False
     # A map of a light at infinity shows the media alone, but not all that is lit.
-    asked = [light.kind == "directional" or not lights_surfaces for light in scene.lights]
+    asked = [not (light.w and lights_surfaces) for light in scene.lights]
 
     def cast_all(geometry, facets, pixel, camera, medium) -> Cast:
         direction, _ = ray_directions(camera, pixel)
