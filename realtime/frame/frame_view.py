@@ -41,7 +41,7 @@ def frame_view(
         lights=lights,
         medium=medium,
         features=features,
-        visible=lambda point, light: _visible(geometry, point, light),
+        visible=lambda point, light: ~geometry.ray_test(light.shadow_ray(point)),
         camera=camera,
         pixel=pixel,
         rays=_rays(camera, pixel),
@@ -61,16 +61,3 @@ def _rays(camera: Camera, pixel):
 
 def _in_square_tiles(camera: Camera, pixel) -> bool:
     return camera.width % 4 == 0 and camera.height % 4 == 0 and dr.width(pixel) > 1
-
-
-def _visible(geometry, point, light):
-    """Cast a shadow ray from the light, where nothing can block it at once, to just before the point."""
-    if light.kind == "directional":
-        # From the point on, where a ray is exact, though not from the surface that it may lie on.
-        away = 2e-6 * light.face.depth
-        return ~geometry.ray_test(mi.Ray3f(mi.Point3f(point - light.axis * away), mi.Vector3f(-light.axis)))
-    start = mi.Point3f(light.position)
-    direction = mi.Vector3f(point) - mi.Vector3f(start)
-    length = dr.norm(direction)
-    # Twenty units in the last place before the point: on a surface the point itself must not block the light.
-    return ~geometry.ray_test(mi.Ray3f(start, direction / length, length * (1 - 2e-6), 0.0, []))

@@ -41,7 +41,7 @@ def surface_stages(scene: Scene, *, provides_visibility: bool) -> tuple[Callable
     if not scene.features.surfaces:
         return _nothing_met, no_surface, False
     # A map of a light at infinity shows the media alone, but not all that is lit.
-    asked = [light.kind == "directional" or not provides_visibility for light in scene.lights]
+    asked = [not (light.w and provides_visibility) for light in scene.lights]
 
     def cast_all(geometry, facets, pixel, camera, medium) -> Cast:
         direction, _ = ray_directions(camera, pixel)

@@ -111,13 +111,11 @@ def _read_light(emitter, types: ArrayTypes) -> Light:
         "position": types.vector(*(float(c) for c in position)),
         "intensity": types.color(*(float(c) for c in intensity)),
     }
-    soft = False
     if kind == "spot":
         cutoff, beam = _read_angles(parameters)
-        soft = beam < cutoff
         arrays |= spot_fields(matrix[:3, 2] / np.linalg.norm(matrix[:3, 2]), cutoff, beam, types)
     dr.make_opaque(*arrays.values())
-    return Light(kind, soft, **arrays)
+    return Light(**arrays)
 
 
 def _read_directional(emitter, medium: Medium, opaque, types: ArrayTypes) -> Light:
@@ -136,7 +134,7 @@ def _read_directional(emitter, medium: Medium, opaque, types: ArrayTypes) -> Lig
     balls = media_balls(medium.bodies)
     arrays |= directional_fields(axis, balls, distance_before(balls, opaque), types)
     dr.make_opaque(*arrays.values())
-    return Light("directional", False, **arrays)
+    return Light(**arrays)
 
 
 def _read_colour(value, name: str, unit: str):

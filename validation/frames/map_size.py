@@ -238,8 +238,8 @@ def _frames(scene: Scene, about: tuple[float, float, float] | None, turn: int, f
 
 def _truth_of(known: TruthScene, moved: Scene) -> Array:
     """Return the true airlight with the lights where they moved to."""
-    near = [light for light in moved.lights if light.kind != "directional"]
-    far = [light for light in moved.lights if light.kind == "directional"]
+    near = [light for light in moved.lights if light.w]
+    far = [light for light in moved.lights if not light.w]
     lights = tuple(_truth_light(one, other) for one, other in zip(known.lights, near, strict=True))
     directional = tuple(replace(one, direction=_axis(other)) for one, other in zip(known.directional, far, strict=True))
     return quadrature_image(replace(known, lights=lights, directional=directional)).airlight

@@ -52,8 +52,8 @@ from realtime.scene.lights import Light
 from realtime.scene.medium import transmittance
 from realtime.scene.phase import evaluate
 from realtime.scene.read_scene import Scene
-from realtime.shadow_maps.inverse_depth_field import inverse_depth
-from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, check_size, map_memory
+from realtime.shadow_maps.projection import light_faces
+from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, check_size, inverse_depth, map_memory
 
 SAMPLINGS = ("slices", "pixels")
 
@@ -166,7 +166,7 @@ def _whole_words(samples: int, camera: Camera) -> int:
 def _memory_of_slices(scene: Scene, light: Light, size: int, slices: int, samples: int) -> int:
     """Return about how much the slices of a light take [bytes]: per leaf its value, two bounds, four of the tree."""
     number = bytes_of(type(light.position.x))
-    leaves = size if light.kind == "spot" else 2 * size
+    leaves = size if light_faces(light) == 1 else 2 * size
     lanes = _whole_words(samples, scene.camera)
     return (slices or _usual_slices(scene.camera)) * (number * 7 * leaves + lanes * (4 + 3 * number))
 

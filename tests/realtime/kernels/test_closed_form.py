@@ -136,7 +136,7 @@ def test_refuses_what_has_no_closed_form(variant):
         evaluate(closed_form, [ONE | {"phase": "hg", "g": 0.3}], "single")
 
     def with_soft_spot(geometry, x0, x1, medium, light):
-        return closed_form(geometry, x0, x1, medium, Light("spot", True, None, None))
+        return closed_form(geometry, x0, x1, medium, Light(None, None, cone=1, beam=1))
 
     with pytest.raises(InputError, match="kernel closed-form: a spot that falls off"):
         evaluate(with_soft_spot, [ONE], "single")

@@ -56,7 +56,7 @@ def test_limits(variant, name):
     types = array_types("double")
     medium = Medium((types.scalar(sigma_t),), types.color(1), Phase(name, g=0.6 if name == "hg" else None))
     geometry = RayGeometry(types.scalar(foot), types.scalar(height), None, None)
-    value = np.array(exact(geometry, types.scalar(x0), types.scalar(x1), medium, Light("point", False, None, None)))
+    value = np.array(exact(geometry, types.scalar(x0), types.scalar(x1), medium, Light(None, None)))
     phase = PhaseFunction(name, g=0.6 if name == "hg" else 0.0)
     expected, _ = airlight_segments(foot, height, x0, x1, sigma_t, phase)
     assert value[0] == 0
@@ -97,7 +97,7 @@ def test_wide_rays(variant, name, g):
         phase = Phase(name, g=types.scalar(g) if name == "hg" else None)
         geometry = RayGeometry(types.scalar(foot), types.scalar(height), None, None)
         medium = Medium((types.scalar(sigma_t),), types.color(1), phase)
-        light = Light("point", False, None, None)
+        light = Light(None, None)
         value = np.array(exact(geometry, types.scalar(0), types.scalar(x1), medium, light), dtype=np.float64)
         error = np.abs(value - expected) / np.maximum(expected, 1e-37)
         assert error.max() < bound, (precision, foot[error.argmax()], height[error.argmax()], x1[error.argmax()])
@@ -120,7 +120,7 @@ def test_endless_rays_through_a_vacuum_with_sharp_lobes(variant, g):
         types = array_types(precision)
         medium = Medium((types.scalar(0.0),), types.color(1), Phase("hg", g=types.scalar(g)))
         geometry = RayGeometry(types.scalar(foot), types.scalar(height), None, None)
-        light = Light("point", False, None, None)
+        light = Light(None, None)
         value = np.array(exact(geometry, types.scalar(0), types.scalar(np.inf), medium, light), dtype=np.float64)
         expected, _ = airlight_segments(foot, height, 0.0, np.inf, 0.0, PhaseFunction("hg", g=g))
         assert value == pytest.approx(expected, rel=bound)
@@ -138,7 +138,7 @@ def test_rays_that_meet_the_light_are_infinite(variant):
     for name in ("isotropic", "rayleigh"):
         medium = Medium((types.scalar(0.5),), types.color(1), Phase(name))
         geometry = RayGeometry(types.scalar([1.0, 0.0, 2.0, 3.0]), types.scalar(0.0), None, None)
-        light = Light("point", False, None, None)
+        light = Light(None, None)
         value = np.array(exact(geometry, types.scalar(0.0), types.scalar(2.0), medium, light))
         assert np.isinf(value[:3]).all()  # on it, camera at the light, surface at the light
         assert np.isfinite(value[3])
@@ -156,7 +156,7 @@ def test_gamma_is_the_integral_from_the_camera(variant):
     types = array_types("double")
     medium = Medium((types.scalar(0.5),), types.color(1), Phase("rayleigh"))
     geometry = RayGeometry(types.scalar(1.1), types.scalar(0.4), None, None)
-    light = Light("point", False, None, None)
+    light = Light(None, None)
     ends = types.scalar(0.7), types.scalar(2.3)
     difference = [float(gamma(exact, geometry, x, medium=medium, light=light)[0]) for x in ends]
     direct = airlight_integral(exact, geometry, *ends, medium=medium, light=light)

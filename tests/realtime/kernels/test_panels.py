@@ -40,7 +40,7 @@ def kernel_values(rays, name, g, *, precision="single"):
     types = array_types(precision)
     foot, height, x0, x1, sigma_t = (types.scalar(np.atleast_1d(column)) for column in rays)
     medium = Medium((sigma_t,), types.color(1), phase_of(name, g, types))
-    value = exact(RayGeometry(foot, height), x0, x1, medium, Light("point", False, None, None))
+    value = exact(RayGeometry(foot, height), x0, x1, medium, Light(None, None))
     return np.array(value, dtype=np.float64)
 
 
@@ -214,7 +214,7 @@ def test_the_colours_of_a_medium_are_those_of_grey_ones(variant, name, g, extinc
     foot, height, x0, x1, _ = many_rays(2000, 9)
     medium = Medium(tuple(types.scalar(one) for one in extinctions), types.color(1), phase_of(name, g, types))
     rays = RayGeometry(types.scalar(foot), types.scalar(height))
-    light = Light("point", False, None, None)
+    light = Light(None, None)
     colour = np.array(exact(rays, types.scalar(x0), types.scalar(x1), medium, light), dtype=np.float64)
     for channel, sigma_t in zip(colour, extinctions):
         depth = sigma_t * (x0 + np.hypot(x0 - foot, height))
@@ -228,7 +228,7 @@ def soft_spot(types, cutoff, beam):
     from realtime.scene.lights import Light, spot_fields
 
     fields = spot_fields([0, 0, -1.0], np.radians(cutoff), np.radians(beam), types)
-    return Light("spot", True, types.vector(0), types.color(1), **fields)
+    return Light(types.vector(0), types.color(1), **fields)
 
 
 @pytest.mark.parametrize(("cutoff", "beam"), [(40, 0.0), (20, 0.4), (60, 50), (80, 5)])

@@ -38,7 +38,7 @@ def arguments(columns, phase="isotropic", precision="double", *, g=None, values=
     phase = Phase(phase, g=None if g is None else types.scalar(g), values=None if values is None else values(types))
     medium = Medium((c["sigma_t"],), types.color(1), phase)
     geometry = RayGeometry(c["foot"], c["height"], None, None)
-    return geometry, c["x0"], c["x1"], medium, light or Light("point", False, None, None)
+    return geometry, c["x0"], c["x1"], medium, light or Light(None, None)
 
 
 def numbers(value):
@@ -206,8 +206,6 @@ def soft_spot(precision):
     types = array_types(precision)
     cutoff, beam = np.deg2rad(50.0), np.deg2rad(20.0)
     light = Light(
-        "spot",
-        True,
         types.vector(0.1, 0.2, 2.0),
         types.color(1),
         **spot_fields((0, 0, -1), cutoff, beam, types),
@@ -220,13 +218,12 @@ def soft_spot(precision):
 def test_soft_spot(variant, phase):
     from scipy.integrate import quad
 
-    from realtime.rays.ray_light import clip_to_cone
     from realtime.scene.medium import Medium
     from realtime.scene.phase import Phase
 
     types, geometry, light = soft_spot("double")
     medium = Medium((types.scalar(0.4),), types.color(1), Phase(phase))
-    x0, x1 = clip_to_cone(geometry, types.scalar(0, 0), types.scalar(9, 9))
+    x0, x1 = geometry.lit_segment(types.scalar(0, 0), types.scalar(9, 9))
     value = numbers(polynomial(geometry, x0, x1, medium, light, degree=23))
     fit = polynomial_coefficients(geometry, x0, x1, medium, light, degree=23)
     np.testing.assert_allclose(numbers(evaluate(fit, x1)), value, rtol=1e-13)

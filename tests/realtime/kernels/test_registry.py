@@ -26,7 +26,7 @@ def evaluate(kernel, rows, precision, **parameters):
     name = rows[0]["phase"]
     medium = Medium((column["sigma_t"],), types.color(1), Phase(name, g=column["g"] if name == "hg" else None))
     geometry = RayGeometry(column["t"], column["h"], None, None)
-    light = Light("point", False, None, None)
+    light = Light(None, None)
     return np.array(kernel(geometry, column["x0"], column["x1"], medium, light, **parameters), dtype=np.float64)
 
 

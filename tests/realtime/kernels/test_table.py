@@ -165,7 +165,7 @@ def test_refuses_what_it_cannot_do(variant):
         evaluate(table, [ONE | {"phase": "rayleigh"}], "single")
 
     def with_soft_spot(geometry, x0, x1, medium, light):
-        return table(geometry, x0, x1, medium, Light("spot", True, None, None))
+        return table(geometry, x0, x1, medium, Light(None, None, cone=1, beam=1))
 
     with pytest.raises(InputError, match="kernel table: a spot that falls off"):
         evaluate(with_soft_spot, [ONE], "single")
@@ -185,7 +185,7 @@ def test_frozen_and_in_colour(variant, form, precision):
     from realtime.scene.phase import Phase
 
     types = array_types(precision)
-    light = Light("point", False, None, None)
+    light = Light(None, None)
 
     def kernel(t, h, x0, x1, medium):
         return table(RayGeometry(t, h, None, None), x0, x1, medium, light, form=form, size=31)

@@ -112,8 +112,7 @@ def test_slices_leave_at_equal_steps_and_reach_every_pixel(variant, place):
 
 def height_maps(scene, size=32, count=24):
     from realtime.methods.epipolar.min_max_tree import slice_heights
-    from realtime.shadow_maps.inverse_depth_field import inverse_depth
-    from realtime.shadow_maps.shadow_map import cast_shadow_map
+    from realtime.shadow_maps.shadow_map import cast_shadow_map, inverse_depth
 
     light = scene.lights[0]
     shadow_map = cast_shadow_map(scene.geometry, light, size)

@@ -18,11 +18,11 @@ def walled(loaded, size, precision="single"):
     from realtime.methods.light_volumes.jump_search import with_walls
     from realtime.methods.light_volumes.texel_walls import PLACES
     from realtime.scene.read_scene import read_scene
-    from realtime.shadow_maps.inverse_depth_field import light_heights
+    from realtime.shadow_maps.inverse_depth_field import inverse_depth_field
     from realtime.shadow_maps.shadow_map import cast_shadow_map
 
     scene = read_scene(loaded, precision)
-    heights = light_heights(cast_shadow_map(scene.geometry, scene.lights[0], size))
+    heights = inverse_depth_field(cast_shadow_map(scene.geometry, scene.lights[0], size))
     found = with_walls(heights, scene.geometry, scene.lights[0])
     number = np.array(found.walls).reshape(heights.faces, size, size, 1) >> np.arange(0, 32, 8, dtype=np.uint32) & 0xFF
     return found, np.where(number > 0, (number - 0.5) / PLACES, np.nan)

@@ -150,7 +150,7 @@ def with_heights(shadow_map, heights):
     """Return a map that has these inverse depths at its corners."""
     import mitsuba as mi
 
-    from realtime.shadow_maps.inverse_depth_field import inverse_depth
+    from realtime.shadow_maps.shadow_map import inverse_depth
 
     length = np.array(inverse_depth(replace(shadow_map, distance=mi.Float64(np.ones(len(heights))))))
     with np.errstate(divide="ignore"):
@@ -164,7 +164,7 @@ def test_any_map(variant, kind, data):
     """Whatever the heights: three routes to the same volume."""
     from realtime.frame.renderer import image_frame, run_stages
     from realtime.methods.light_volumes.published.mesh import volume_mesh
-    from realtime.shadow_maps.inverse_depth_field import light_heights
+    from realtime.shadow_maps.inverse_depth_field import inverse_depth_field
     from reference.scene.read import read_truth
     from validation.oracles.light_volume import twin_airlight
 
@@ -173,7 +173,7 @@ def test_any_map(variant, kind, data):
     count = int(np.max(vertex)) + 1
     heights = data.draw(st.lists(st.sampled_from(HEIGHTS), min_size=count, max_size=count))
     found = with_heights(shadow_map, np.array(heights)[vertex])
-    walked = image_frame(walk, run_stages(walk, (light_heights(found),)))
+    walked = image_frame(walk, run_stages(walk, (inverse_depth_field(found),)))
     drawn = image_frame(mesh, run_stages(mesh, (volume_mesh(found, walk.scene.lights[0]),)))
     wanted = twin_airlight(read_truth(loaded), [found], distance=walked.distance)
     # As in the frames above; what is lit may be next to nothing, so the scale is the light's.
@@ -202,7 +202,7 @@ def test_any_walls_in_any_map(variant, kind, data):
 
     from realtime.frame.renderer import image_frame, run_stages
     from realtime.methods.light_volumes.texel_walls import walled_heights
-    from realtime.shadow_maps.inverse_depth_field import light_heights
+    from realtime.shadow_maps.inverse_depth_field import inverse_depth_field
     from reference.scene.read import read_truth
     from validation.oracles.light_volume import twin_airlight
 
@@ -213,7 +213,7 @@ def test_any_walls_in_any_map(variant, kind, data):
     heights = (rng.choice(HEIGHTS[1:], vertex.max() + 1) * rng.uniform(0.9, 1.1, vertex.max() + 1))[vertex]
     found = with_heights(shadow_map, heights)
     walls = any_walls(rng, found.faces, data.draw(st.sampled_from([0.0, 0.2, 0.5, 1.0])))
-    field = walled_heights(light_heights(found), mi.UInt32(walls), mi.UInt32(np.flatnonzero(walls)))
+    field = walled_heights(inverse_depth_field(found), mi.UInt32(walls), mi.UInt32(np.flatnonzero(walls)))
     walked = image_frame(walk, run_stages(walk, (field,)))
     wanted = twin_airlight(read_truth(loaded), [found], distance=walked.distance, walls=[walls])
     scale = np.max(np.array(walk.scene.lights[0].intensity))
