@@ -36,6 +36,7 @@ def command_that_raises(monkeypatch):
     return arrange
 
 
+@pytest.mark.claim("exit-status")
 @pytest.mark.parametrize(
     ("error", "status", "words"),
     [
@@ -75,6 +76,7 @@ def test_a_library_missing_at_import_is_named(command_that_raises, capfd, monkey
         cli.run(["scenes"])
 
 
+@pytest.mark.claim("exit-status")
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -97,6 +99,7 @@ def test_no_command_shows_the_help(capfd):
     assert "doctor" in capfd.readouterr().out
 
 
+@pytest.mark.claim("documented-commands")
 @pytest.mark.parametrize("command", [None, *(entry.callback.__name__ for entry in cli.app.registered_commands)])
 def test_every_command_has_help(command, capfd):
     name = {"run_tests": "test"}.get(command, command)
@@ -109,6 +112,7 @@ def test_version(capfd):
     assert capfd.readouterr().out == f"airlight {__version__}\n"
 
 
+@pytest.mark.claim("variant")
 def test_variant_reaches_activate(monkeypatch):
     monkeypatch.setenv("AIRLIGHT_VARIANT", "")
     assert cli.run(["--variant", "llvm_ad_rgb", "scenes"]) == 0
