@@ -165,8 +165,9 @@ def _place(stated: str) -> str:
 def _full_run(record: Mapping[str, Any] | None) -> str:
     if record is None:
         return "No full run has been recorded.\n"
+    keys = ("name", "passed", "failed", "skipped")
     rows = [
-        f"| {part['name']} | {part['passed']} | {part['failed']} | {part['skipped']} | {duration(part['seconds'])} |"
+        f"| {' | '.join(str(part[key]) for key in keys)} | {duration(part['seconds'])} | {part['remark']} |"
         for part in record["parts"]
     ]
     commit = f"{record['commit']}{', with changes that were not committed' if record['changed'] else ''}"
@@ -174,8 +175,8 @@ def _full_run(record: Mapping[str, Any] | None) -> str:
         [
             f"{record['date']}, {record['machine']}, commit {commit}: {duration(record['seconds'])}.",
             "",
-            "| part | passed | failed | skipped | time |",
-            "| --- | ---: | ---: | ---: | ---: |",
+            "| part | passed | failed | skipped | time | remark |",
+            "| --- | ---: | ---: | ---: | ---: | --- |",
             *rows,
             "",
         ]

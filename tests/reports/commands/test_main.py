@@ -141,21 +141,32 @@ def test_tests_without_a_checkout_say_so(tmp_path, monkeypatch, capfd):
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
-        (["-x"], ["-m", "not statistical and not slow", "-x"]),
-        (["--all", "-x"], ["-x"]),
+        (["-x"], ["-n", "2", "--dist", "worksteal", "-m", "not statistical and not slow", "-x"]),
+        (["--workers", "0"], ["-m", "not statistical and not slow"]),
+        (["--all", "--workers", "0", "-x"], ["-x"]),
         (
-            ["--all", "--workers", "2", "tests/test_x.py", "-k", "wheel"],
-            ["-n", "2", "tests/test_x.py", "-k", "wheel"],
+            ["--all", "--workers", "3", "tests/test_x.py", "-k", "wheel"],
+            ["-n", "3", "--dist", "worksteal", "tests/test_x.py", "-k", "wheel"],
         ),
     ],
 )
 def test_tests_run_pytest_with_what_is_left(arguments, expected, monkeypatch, tmp_path):
+    monkeypatch.setattr("reports.machine.environment.threads", lambda: 8)
     asked = {}
     monkeypatch.setattr(os, "execv", lambda program, command: asked.update(command=command))
     monkeypatch.chdir(tmp_path)
     assert cli.run(["test", *arguments]) == 0
     assert asked["command"] == [sys.executable, "-m", "pytest", *expected]
     assert Path.cwd() == ROOT
+
+
+def test_one_core_has_no_workers(monkeypatch, tmp_path):
+    monkeypatch.setattr("reports.machine.environment.threads", lambda: 1)
+    asked = {}
+    monkeypatch.setattr(os, "execv", lambda program, command: asked.update(command=command))
+    monkeypatch.chdir(tmp_path)
+    assert cli.run(["test"]) == 0
+    assert asked["command"] == [sys.executable, "-m", "pytest", "-m", "not statistical and not slow"]
 
 
 def test_every_public_name_can_be_imported(variant):

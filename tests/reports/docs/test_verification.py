@@ -99,7 +99,7 @@ def test_the_page_shows_claims_and_the_last_full_run():
         "commit": "0c99b83",
         "changed": True,
         "seconds": 187.2,
-        "parts": [{"name": "unit", "passed": 4141, "failed": 1, "skipped": 2, "seconds": 61.0}],
+        "parts": [{"name": "unit", "passed": 4141, "failed": 1, "skipped": 2, "seconds": 61.0, "remark": "so"}],
     }
     assert page(empty, [claim], [mark], record).splitlines() == [
         "before",
@@ -118,9 +118,9 @@ def test_the_page_shows_claims_and_the_last_full_run():
         "2026-11-22 17:00:00 +0000, a processor, 2 threads, commit 0c99b83, with changes that were not committed: "
         "3 min 07 s.",
         "",
-        "| part | passed | failed | skipped | time |",
-        "| --- | ---: | ---: | ---: | ---: |",
-        "| unit | 4141 | 1 | 2 | 1 min 01 s |",
+        "| part | passed | failed | skipped | time | remark |",
+        "| --- | ---: | ---: | ---: | ---: | --- |",
+        "| unit | 4141 | 1 | 2 | 1 min 01 s | so |",
         "<!-- full run: end -->",
     ]
     assert "No full run has been recorded." in page(empty, [claim], [mark], None)
