@@ -58,6 +58,7 @@ def _forbidden(owner: str, source: str) -> list[str]:
     return sorted(name for name in ours if name.split(".")[0] not in ALLOWED[owner] | {owner})
 
 
+@pytest.mark.claim("methods-share-nothing-with-the-truth")
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(ROOT)))
 def test_who_may_import_whom(path):
     owner = path.relative_to(ROOT).parts[0].removesuffix(".py")
@@ -110,6 +111,7 @@ def test_importing_everything_sets_no_variant():
     assert ran.returncode == 0, ran.stderr
 
 
+@pytest.mark.claim("help-is-light")
 def test_the_front_door_and_help_import_nothing_heavy():
     heavy = ("mitsuba", "drjit", "numpy", "scipy", "mpmath", "matplotlib", "colour", "OpenEXR", "jinja2")
     code = (
@@ -136,6 +138,7 @@ def _project() -> dict:
     return tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 
 
+@pytest.mark.claim("locked-dependencies")
 def test_the_lock_pins_what_the_project_asks_for_and_all_that_it_needs():
     locked = _locked()
     project = _project()

@@ -96,6 +96,7 @@ def rho(width, start, singularity):
     return max(abs(z + np.sqrt(z * z - 1 + 0j)), abs(z - np.sqrt(z * z - 1 + 0j)))
 
 
+@pytest.mark.claim("declared-orders")
 @pytest.mark.parametrize("g", [0.0, 0.6, 0.9, -0.8])
 def test_rate_of_convergence_is_the_declared_one(variant, g):
     """Errors of Gamma inside the range, in a vacuum, fall as rho^-N/(N + 1): a simple pole, integrated (g = 0).

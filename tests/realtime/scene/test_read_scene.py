@@ -28,6 +28,7 @@ def test_reads_what_the_scene_holds(variant):
     assert np.array(cone.axis).ravel() == pytest.approx(towards / np.linalg.norm(towards), abs=1e-6)
 
 
+@pytest.mark.claim("not-needed-costs-nothing")
 def test_plan_names_only_what_is_needed(variant):
     features = read(ball=None, floor=None).features
     assert not features.shadows
@@ -53,6 +54,7 @@ def test_vacuum_and_black_media_are_read(variant):
     assert read(fog=tiny_scene()["fog"] | {"sigma_t": 0.0}).features.vacuum
 
 
+@pytest.mark.claim("scenes-refused-by-name")
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
@@ -79,6 +81,7 @@ def test_camera_outside_the_medium_is_refused(variant):
         read(sensor=sensor)
 
 
+@pytest.mark.claim("glossy-surfaces-noted")
 def test_glossy_surfaces_are_noted(variant):
     notes = read(ball={"type": "sphere", "bsdf": {"type": "roughplastic"}}).features.notes
     assert len(notes) == 1

@@ -172,6 +172,7 @@ def test_truncated_file_counts_as_none(share):
     assert load_arrays("cut") is None
 
 
+@pytest.mark.claim("damaged-cache")
 @pytest.mark.parametrize("damage", ["flipped bit", "text", "a lone array", "pickle"])
 def test_damaged_file_counts_as_none(damage, tmp_path):
     store_arrays("damaged", {"a": np.arange(1000.0)})

@@ -86,6 +86,7 @@ def test_other_size_is_timed_without_changing_what_is_compared(loaded, measured,
     assert found.times.airlight.median_ms > 2 * measured[MARCH].times.airlight.median_ms
 
 
+@pytest.mark.claim("refusals-stand-in-the-report")
 def test_refusal_is_kept_and_not_raised(variant):
     """What a method cannot do is a line of the table; one bad configuration must not end a report."""
     import mitsuba as mi

@@ -186,6 +186,7 @@ def before_triangles(shadow_map, away):
     return lit, known
 
 
+@pytest.mark.claim("error-by-size-of-the-map")
 @pytest.mark.parametrize("what", ["point", "soft spot", "coloured extinction"])
 def test_errors_fall_with_the_map_size(variant, what):
     """An edge is misplaced by a texel at most, so the error halves with it, give or take where edges fall in texels."""

@@ -26,6 +26,7 @@ SMALL = {"size": (24, 24), "seconds": 0.0}
 ENDLESS = 1e9  # seconds that a frame may take: what is measured must not hang on how busy the machine is
 
 
+@pytest.mark.claim("published-figures")
 def test_published_figures_are_those_of_the_paper():
     rates = {(one.where, one.map): one.fps for one in FIGURES if one.fps}
     assert rates == {
@@ -158,6 +159,7 @@ def table_row(size: int, evaluation: str, milliseconds: float) -> TableRow:
     return TableRow(TABLE[0], size, evaluation, (8, 8), light_moved=timing(milliseconds))
 
 
+@pytest.mark.claim("conclusions-follow")
 def test_conclusion_about_adaptive_is_that_of_the_measurement():
     times = {1024: (100, 100), 2048: (200, 150), 4096: (800, 300)}
     rows = [
@@ -185,6 +187,7 @@ def figure_row(entry: FigureEntry, milliseconds: float, error: float, map_error:
     return FigureRow(entry, (8, 8), timing(milliseconds), timing(milliseconds), **errors)
 
 
+@pytest.mark.claim("conclusions-follow")
 @pytest.mark.parametrize(("milliseconds", "map_error", "reached"), [(10.0, 1e-4, True), (11.0, 1e-4, False)])
 def test_conclusions_about_marching(milliseconds, map_error, reached):
     found = {(one.where, dict(one.parameters).get("evaluation")): one for one in FIGURES if not one.upright}
@@ -200,6 +203,7 @@ def test_conclusions_about_marching(milliseconds, map_error, reached):
     assert equal.endswith("holds here.")
 
 
+@pytest.mark.claim("conclusions-follow")
 def test_conclusions_about_walls():
     found = {dict(one.parameters).get("walls"): one for one in FIGURES if one.where == "Fig. 6b"}
     rows = [figure_row(found["slanted"], 20.0, 0.05, 1e-5), figure_row(found["upright"], 23.0, 0.002, 1e-5)]
