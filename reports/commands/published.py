@@ -98,7 +98,7 @@ def _wanted_scenes(scenes: str | None, papers: Sequence[str]) -> list[str]:
 def _biri(wanted: Sequence[str], kernels: Sequence[str], *, scale: float, needless: bool, tell) -> tuple | None:
     """Measure the tables of Biri 2006; return the functions that make data of them and print."""
     from reports.papers.biri import print_biri, rows_data
-    from validation.frames.zero_cost import needless_costs
+    from validation.frames.zero_cost import zero_costs
     from validation.papers.biri import PUBLISHED, biri_rows
 
     chosen = [one for one in PUBLISHED if one.scene in wanted]
@@ -107,7 +107,7 @@ def _biri(wanted: Sequence[str], kernels: Sequence[str], *, scale: float, needle
     rows = biri_rows(chosen, kernels, scale=scale, progress=tell)
     if needless:
         tell(0.99, "what is not needed")
-    costs = needless_costs(size=(round(800 * scale), round(600 * scale))) if needless else []
+    costs = zero_costs(size=(round(800 * scale), round(600 * scale))) if needless else []
     return lambda: rows_data(rows, costs), lambda markdown: print_biri(rows, costs, markdown=markdown)
 
 

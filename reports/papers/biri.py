@@ -29,7 +29,7 @@ def print_biri(rows: Sequence, costs: Sequence, *, markdown: bool = False) -> No
     rows
         From `validation.papers.biri.biri_rows`.
     costs
-        From `validation.frames.zero_cost.needless_costs`, or none.
+        From `validation.frames.zero_cost.zero_costs`, or none.
     markdown
         Print Markdown, with the date and the machine.
     """

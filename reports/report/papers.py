@@ -57,7 +57,7 @@ def published_part(
 
 def _biri(effort: Effort, scenes: Sequence[str], keeper: Keeper, results: list[Kept], tell: Tell) -> Any:
     """Return Tables 1 and 2 of Biri 2006, each entry kept for itself."""
-    from validation.frames.zero_cost import needless_costs
+    from validation.frames.zero_cost import zero_costs
     from validation.papers.biri import PUBLISHED, biri_rows
 
     entries = [one for one in PUBLISHED if one.scene in scenes]
@@ -80,7 +80,7 @@ def _biri(effort: Effort, scenes: Sequence[str], keeper: Keeper, results: list[K
     if "billeter" in effort.papers:  # the effort that leaves nothing out
         tell(1.0, "what is not needed")
         place = slot(keeper, "needless", identity={}, fingerprint={})
-        results.append(kept_result(place, lambda: ({"costs": plain(needless_costs())}, {})))
+        results.append(kept_result(place, lambda: ({"costs": plain(zero_costs())}, {})))
         needless = results[-1].data["costs"]
     return {"stages": stages, "rows": rows, "needless": needless}
 

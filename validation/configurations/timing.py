@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Timing: medians after warm-up, with their spread.
 
-A frame is timed from the call to the arrays being ready on the device (`drjit.sync_thread`), kernels compiled and
-recorded before. The wall clock is used on purpose: launch and replay are part of what a user waits for.
+A timing runs from the call until the arrays are ready on the device (`drjit.sync_thread`), after kernels have been
+compiled and recorded. It uses the wall clock on purpose: a user also waits for launch and replay.
 """
 
 import time
@@ -32,10 +32,10 @@ from realtime.scene.animate import Objects, read_objects, turned_objects
 from realtime.scene.camera import ray_directions
 from realtime.scene.read_scene import Scene
 
-#: Of a frame that takes longer than this the stages are timed once, in one more frame: its spread matters little, and
-#: some thirty such frames, as others have, would take minutes [s].
+#: A frame that takes longer is timed stage by stage, in few frames [s]. Its spread matters little, and the usual thirty
+#: or more frames would take minutes.
 SLOW = 8.0
-_TURNS = 1.5  # about so long is spent on frames that are timed stage by stage, one to five of them [s]
+_TURNS = 1.5  # approximate time for the one to five frames that are timed stage by stage [s]
 
 
 @dataclass(frozen=True)
@@ -49,12 +49,12 @@ class Timing:
 
 
 def time_repeated(work: Callable[[], Any], *, seconds: float = 0.6, least: int = 5, most: int = 200) -> Timing:
-    """Time a piece of work again and again.
+    """Time a piece of work repeatedly.
 
     Parameters
     ----------
     work
-        Called with nothing; must leave its results evaluated.
+        A function without arguments that evaluates its results.
     seconds
         Stop after about this long, but not before `least` repetitions.
     least, most
@@ -67,7 +67,7 @@ def time_repeated(work: Callable[[], Any], *, seconds: float = 0.6, least: int =
 def time_in_turns(
     works: Sequence[Callable[[], Any]], *, seconds: float = 3.0, least: int = 5, most: int = 200
 ) -> list[Timing]:
-    """Time several pieces of work in turns; parameters as in `times_in_turns`."""
+    """Time several pieces of work in turns, with the parameters of `times_in_turns`, and return a timing for each."""
     times = times_in_turns(works, seconds=seconds, least=least, most=most)
     quartiles = np.percentile(times, [25, 50, 75], axis=0).T
     return [Timing(float(median), float(low), float(high), len(times)) for low, median, high in quartiles]
@@ -76,18 +76,18 @@ def time_in_turns(
 def times_in_turns(
     works: Sequence[Callable[[], Any]], *, seconds: float, least: int, most: int, alternate: bool = False
 ) -> NDArray[np.float64]:
-    """Time several pieces of work in turns, so that whatever else the machine does hits all of them alike.
+    """Time several pieces of work in turns, so that other load on the machine affects all of them alike.
 
     Parameters
     ----------
     works
-        Each called with nothing; must leave its results evaluated.
+        Functions without arguments that evaluate their results.
     seconds
         Stop after about this long, but not before `least` turns.
     least, most
         Bounds of the number of turns.
     alternate
-        Whether every other turn goes backwards: what comes second may find the caches warm.
+        Whether every other turn runs backwards, since the second piece may find warm caches.
 
     Returns
     -------

@@ -12,8 +12,13 @@ Read in this order:
 - `solids.py`: closed meshes of standard shapes, and walls with openings;
 - `open_fog.py`: a lamp in fog, without a shadow;
 - `sphere_spot.py`: one sphere in the cone of a spot light;
-- `two_pens.py`, `three_media.py`, `clutter.py`, `hall.py`: after Biri 2006;
-- `colonnade.py`, `omni_box.py`, `tangle.py`: after Billeter 2010;
+- `two_pens.py`: two smooth objects whose shadows cross;
+- `three_media.py`: three bounded media of coloured fog;
+- `clutter.py`: many small objects about a lamp;
+- `hall.py`: a great hall lit through a wheel window;
+- `colonnade.py`: a hall of fluted columns;
+- `omni_box.py`: a lamp amid bars and posts;
+- `tangle.py`: uneven tubes before a spot light;
 - `windows.py`: a directional light through the windows of a room;
 - `probes.py`: small scenes for what the built-in ones lack, used by checks of the checks;
 - `loading.py`: a scene by its name or from a Mitsuba XML file;

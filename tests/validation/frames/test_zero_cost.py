@@ -6,7 +6,7 @@ import pytest
 
 from realtime.frame.renderer import run_stages
 from validation.configurations.methods import Configuration, prepared
-from validation.frames.zero_cost import needless_costs, sphere_spot_with
+from validation.frames.zero_cost import sphere_spot_with, zero_costs
 
 
 def kernels(renderer):
@@ -48,5 +48,5 @@ def test_unseen_casters_leave_no_plane(variant):
 @pytest.mark.slow
 def test_what_is_not_needed_costs_nothing(variant):
     """Within 3 %; two standard errors of the median of 150 turns are what the machine's other work can add to it."""
-    for cost in needless_costs(size=(400, 300), turns=150):
+    for cost in zero_costs(size=(400, 300), turns=150):
         assert cost.least_ratio < 1.03, cost
