@@ -28,13 +28,6 @@ ALLOWED = {
     "reports": {"analytic", "realtime", "reference", "validation"},
     "airlight": set(FOLDERS),
 }
-# Within the side of truth, the volpath estimator and the integrals share none of their derivations.
-UNRELATED = [
-    (
-        "reference/monte_carlo/volpath/integrator.py",
-        {"reference.quadrature", "analytic"},
-    )
-]
 
 
 def _python(*arguments: str, **options) -> subprocess.CompletedProcess:
@@ -65,6 +58,7 @@ def _forbidden(owner: str, source: str) -> list[str]:
     return sorted(name for name in ours if name.split(".")[0] not in ALLOWED[owner] | {owner})
 
 
+@pytest.mark.claim("methods-share-nothing-with-the-truth")
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(ROOT)))
 def test_who_may_import_whom(path):
     owner = path.relative_to(ROOT).parts[0].removesuffix(".py")
@@ -75,13 +69,6 @@ def test_the_walk_over_imports_finds_what_is_forbidden():
     source = "def f():\n    from analytic import phase\n    import numpy\n    import validation.scenes.loading\n"
     assert _forbidden("realtime", source) == ["analytic.phase", "validation.scenes.loading"]
     assert _forbidden("reference", source) == ["validation.scenes.loading"]
-
-
-@pytest.mark.parametrize(("path", "others"), UNRELATED, ids=lambda value: value if isinstance(value, str) else "")
-def test_estimators_of_the_truth_share_no_derivation(path, others):
-    # errors are words, no derivation
-    imported = [name for name in _imports(ast.parse((ROOT / path).read_text())) if "errors" not in name]
-    assert not [name for name in imported if any(name == other or name.startswith(f"{other}.") for other in others)]
 
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(ROOT)))
@@ -124,6 +111,7 @@ def test_importing_everything_sets_no_variant():
     assert ran.returncode == 0, ran.stderr
 
 
+@pytest.mark.claim("help-is-light")
 def test_the_front_door_and_help_import_nothing_heavy():
     heavy = ("mitsuba", "drjit", "numpy", "scipy", "mpmath", "matplotlib", "colour", "OpenEXR", "jinja2")
     code = (
@@ -150,6 +138,7 @@ def _project() -> dict:
     return tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 
 
+@pytest.mark.claim("locked-dependencies")
 def test_the_lock_pins_what_the_project_asks_for_and_all_that_it_needs():
     locked = _locked()
     project = _project()

@@ -7,7 +7,7 @@ import mitsuba as mi
 from realtime.frame.surface import visible_triangle
 from realtime.methods.interface.view import View
 from realtime.scene.camera import Camera, ray_directions
-from realtime.scene.features import Plan
+from realtime.scene.features import SceneFeatures
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium
 from realtime.tiles.layout import TILE
@@ -18,7 +18,7 @@ def frame_view(
     pixel,
     distance,
     *,
-    plan: Plan,
+    features: SceneFeatures,
     geometry,
     medium: Medium,
     lights: tuple[Light, ...],
@@ -40,8 +40,8 @@ def frame_view(
         distance=distance,
         lights=lights,
         medium=medium,
-        plan=plan,
-        visible=lambda point, light: _visible(geometry, point, light),
+        features=features,
+        visible=lambda point, light: ~geometry.ray_test(light.shadow_ray(point)),
         camera=camera,
         pixel=pixel,
         rays=_rays(camera, pixel),
@@ -61,16 +61,3 @@ def _rays(camera: Camera, pixel):
 
 def _in_square_tiles(camera: Camera, pixel) -> bool:
     return camera.width % 4 == 0 and camera.height % 4 == 0 and dr.width(pixel) > 1
-
-
-def _visible(geometry, point, light):
-    """Cast a shadow ray from the light, where nothing can block it at once, to just before the point."""
-    if light.kind == "directional":
-        # From the point on, where a ray is exact, though not from the surface that it may lie on.
-        away = 2e-6 * light.face.depth
-        return ~geometry.ray_test(mi.Ray3f(mi.Point3f(point - light.axis * away), mi.Vector3f(-light.axis)))
-    start = mi.Point3f(light.position)
-    direction = mi.Vector3f(point) - mi.Vector3f(start)
-    length = dr.norm(direction)
-    # Twenty units in the last place before the point: on a surface the point itself must not block the light.
-    return ~geometry.ray_test(mi.Ray3f(start, direction / length, length * (1 - 2e-6), 0.0, []))

@@ -21,7 +21,7 @@ from realtime.scene.read_scene import Scene
 
 
 @dataclass(frozen=True)
-class Kept:
+class FrameCache:
     """What a frame leaves to the next one, by what it depends on."""
 
     cast: Any  #: camera and geometry
@@ -32,12 +32,12 @@ class Kept:
 def next_frame(
     renderer: FrameRenderer,
     scene: Scene,
-    kept: Kept | None,
+    kept: FrameCache | None,
     *,
     camera_moved: bool,
     geometry_moved: bool,
     light_moved: bool,
-) -> tuple[tuple[Any, Any, Any], Kept]:
+) -> tuple[tuple[Any, Any, Any], FrameCache]:
     """Render a scene after the one that left something.
 
     Parameters
@@ -65,7 +65,7 @@ def next_frame(
     tile_again = cast_again or light_moved or kept is None
     moved = {"camera": camera_moved, "geometry": geometry_moved, "light": light_moved, "look": True}
     prepare_again = kept is None or any(moved[what] for what in renderer.method.prepared_from)
-    kept = kept or Kept(None, None, None)
+    kept = kept or FrameCache(None, None, None)
     finish = _started(renderer.prepare, scene) if prepare_again else None
     if cast_again:
         cast, by_light = run_cast_and_shade(renderer)
@@ -75,7 +75,7 @@ def next_frame(
     prepared = finish() if finish else kept.prepared
     tiles = run_tiles(renderer, prepared, cast.distance) if tile_again else kept.tiles
     stages = evaluated(cast, by_light, run_airlight(renderer, prepared, cast.distance, by_light, tiles))
-    return stages, Kept(cast, prepared, tiles)
+    return stages, FrameCache(cast, prepared, tiles)
 
 
 def _started(prepare: Callable[[Scene], Any], scene: Scene) -> Callable[[], Any]:

@@ -96,42 +96,42 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
     settings = dict(method.parameters) | parameters
     tolerance = settings.pop("tolerance") if method.tiled else 0.0
     by_rays = method.tiled is not None and method.tiled(settings)
-    plan, camera = scene.plan, scene.camera
-    lights_surfaces = method.lights_surfaces(settings)
+    features, camera = scene.features, scene.camera
+    provides_visibility = method.provides_visibility(settings)
     pixel = mi.UInt32(tiled_pixels(camera.width, camera.height))
     corners = tile_corners(pixel, camera, tolerance, by_rays=by_rays, lights=len(scene.lights))
-    surface, shade, shade_casts_rays = surface_stages(scene, lights_surfaces=lights_surfaces)
+    surface, shade, shade_casts_rays = surface_stages(scene, provides_visibility=provides_visibility)
 
     def sort_tiles(pixel, camera, medium, lights, prepared, distance):
         assert method.tiles is not None
         shown = {"geometry": None, "medium": medium, "lights": lights, "prepared": prepared}
-        return method.tiles(frame_view(camera, pixel, distance, plan=plan, **shown), **settings)
+        return method.tiles(frame_view(camera, pixel, distance, features=features, **shown), **settings)
 
     def run_method(geometry, pixel, camera, medium, lights, prepared, tiles, distance, by_light, corners=None):
         shown = {"geometry": geometry, "medium": medium, "lights": lights, "prepared": prepared, "tiles": tiles}
 
         def sample(pixel, distance, tile=None):
-            view = frame_view(camera, pixel, distance, plan=plan, tile=tile, **shown)
+            view = frame_view(camera, pixel, distance, features=features, tile=tile, **shown)
             found = method.function(view, kernel=kernel, **settings)
-            return found if lights_surfaces else (found, ())
+            return found if provides_visibility else (found, ())
 
         if corners is None:
             airlight, lit = sample(pixel, distance)
         else:
-            if plan.bounded:
+            if features.bounded:
                 shown["sides"] = media_sides(medium, lights, camera.origin)
             how = {"width": camera.width, "tolerance": tolerance}
             airlight, lit = between_corners(corners, pixel, distance, sample, **how)
-        if not lights_surfaces:
+        if not provides_visibility:
             return airlight, None
         return airlight, sum(dr.select(reached, color, 0) for reached, color in zip(lit, by_light))
 
     # Asked of every scene: it checks the parameters also where nothing casts a shadow.
     prepare = method.prepare(scene, **settings) if method.prepare else _nothing
-    if not plan.shadows:
+    if not features.shadows:
         prepare = _nothing
     casts_rays = method.casts_rays(settings)
-    tiles = sort_tiles if method.tiles and plan.shadows else None
+    tiles = sort_tiles if method.tiles and features.shadows else None
     airlight = run_method
     if method.frozen(settings):
         # Trace one pixel without launching anything: what the method refuses must not be raised while a frozen function

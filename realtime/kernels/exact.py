@@ -35,7 +35,7 @@ from realtime.kernels.quadrature import path_interval, quadrature
 from realtime.kernels.short_segments import FEW, MORE, extent, serves, short_segment
 from realtime.numerics.array_types import is_single
 from realtime.numerics.gauss_legendre import unit_nodes
-from realtime.rays.ray_light import RayGeometry, falloff, stretches
+from realtime.rays.ray_light import RayGeometry, falloff, smooth_subsegments
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium, per_extinction
 from realtime.scene.phase import Phase, evaluate_half
@@ -77,7 +77,7 @@ def exact(geometry: RayGeometry, x0, x1, medium: Medium, light: Light):
 def _in_single(geometry: RayGeometry, segment, extinctions, phase: Phase, light: Light):
     """Return one value per extinction."""
     if light.soft:
-        return _over_stretches(geometry, segment, extinctions, phase, light)
+        return _over_subsegments(geometry, segment, extinctions, phase, light)
     x0, x1 = segment
     found = extent(geometry, x0, x1, extinctions)
 
@@ -86,7 +86,7 @@ def _in_single(geometry: RayGeometry, segment, extinctions, phase: Phase, light:
             args=(x0, x1),
             cond=serves(MORE, found, phase),
             true_fn=lambda x0, x1: short_segment(geometry, x0, x1, phase, extinctions, rule=MORE),
-            false_fn=lambda x0, x1: _stretch(geometry, x0, x1, extinctions, phase, light),
+            false_fn=lambda x0, x1: _subsegment(geometry, x0, x1, extinctions, phase, light),
         )
 
     return dr.if_stmt(
@@ -102,16 +102,18 @@ def _in_double(geometry: RayGeometry, segment, sigma_t, medium: Medium, light: L
         x0, x1 = segment
         grey = Medium((sigma_t,), medium.albedo, medium.phase)
         return quadrature(geometry, x0, x1, grey, light, nodes=_ISOTROPIC_DOUBLE)
-    return _over_stretches(geometry, segment, (sigma_t,), medium.phase, light)[0]
+    return _over_subsegments(geometry, segment, (sigma_t,), medium.phase, light)[0]
 
 
-def _over_stretches(geometry: RayGeometry, segment, extinctions, phase: Phase, light: Light):
+def _over_subsegments(geometry: RayGeometry, segment, extinctions, phase: Phase, light: Light):
     """Return one value per extinction."""
-    parts = [_stretch(geometry, a, b, extinctions, phase, light) for a, b in stretches(geometry, light, *segment)]
+    parts = [
+        _subsegment(geometry, a, b, extinctions, phase, light) for a, b in smooth_subsegments(geometry, light, *segment)
+    ]
     return [sum(values) for values in zip(*parts)]
 
 
-def _stretch(geometry: RayGeometry, x0, x1, extinctions, phase: Phase, light: Light):
+def _subsegment(geometry: RayGeometry, x0, x1, extinctions, phase: Phase, light: Light):
     Float = type(geometry.height)
     scale, tail = _lobe_scales(phase, Float)
     h, e0, e1, difference = path_interval(geometry, x0, x1, reduce(dr.minimum, extinctions), tail=tail)

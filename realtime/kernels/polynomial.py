@@ -46,7 +46,7 @@ import drjit as dr
 
 from realtime.errors import InputError
 from realtime.kernels.polynomial_piece import Piece, integrand, offset, piece_of, place, with_limits
-from realtime.rays.ray_light import RayGeometry, stretches
+from realtime.rays.ray_light import RayGeometry, smooth_subsegments
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium, per_extinction
 
@@ -84,7 +84,7 @@ def polynomial(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, d
 
     def integral(sigma_t):
         total = 0
-        for begin, end in stretches(geometry, light, x0, x1):
+        for begin, end in smooth_subsegments(geometry, light, x0, x1):
             piece = piece_of(geometry, begin, end, sigma_t, medium.phase)
             weighted = sum(
                 w * integrand(piece, (0.5 + 0.5 * y) * piece.width, geometry, medium, light) for y, w in nodes
@@ -114,7 +114,7 @@ def polynomial_coefficients(
         values = [integrand(piece, (0.5 + 0.5 * y) * piece.width, geometry, medium, light) for y, _ in nodes]
         return replace(piece, coefficients=_antiderivative(values))
 
-    ends = stretches(geometry, light, x0, x1)
+    ends = smooth_subsegments(geometry, light, x0, x1)
     pieces = tuple(tuple(fitted(begin, end, sigma_t) for begin, end in ends) for sigma_t in medium.sigma_t)
     return RayPolynomial(pieces, type(medium.albedo))
 

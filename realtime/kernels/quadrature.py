@@ -33,7 +33,7 @@ import numpy as np
 from realtime.errors import InputError
 from realtime.numerics.array_types import is_single, smallest
 from realtime.numerics.fast_exp import exp_bounded
-from realtime.rays.ray_light import RayGeometry, falloff, stretches
+from realtime.rays.ray_light import RayGeometry, falloff, smooth_subsegments
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium, per_extinction
 from realtime.scene.phase import evaluate
@@ -69,7 +69,7 @@ def _panels(geometry: RayGeometry, x0, x1, medium: Medium, light: Light):
     if medium.phase.name != "isotropic" and not light.soft:
         split = dr.clip(geometry.foot, x0, x1)
         return [(x0, split), (split, x1)]
-    return stretches(geometry, light, x0, x1)
+    return smooth_subsegments(geometry, light, x0, x1)
 
 
 @lru_cache

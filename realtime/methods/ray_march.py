@@ -17,13 +17,11 @@ from collections.abc import Callable
 import drjit as dr
 import mitsuba as mi
 
-from realtime.bounded_media.airlight import bounded_source
-from realtime.bounded_media.directional_airlight import ParallelRay
-from realtime.bounded_media.ray_segments import MediaRay
+from realtime.bounded_media.airlight import LitRay
 from realtime.errors import InputError
 from realtime.memory import check_memory
 from realtime.methods.interface.view import View, bounded_radiance, radiance, rays_in_media
-from realtime.rays.ray_light import RayGeometry, clip_to_cone, distance_to_light, falloff, ray_geometry
+from realtime.rays.ray_light import RayGeometry, distance_to_light, falloff, ray_geometry
 from realtime.scene.lights import Light
 from realtime.scene.medium import least_extinction, per_extinction
 from realtime.scene.phase import evaluate
@@ -67,18 +65,17 @@ def ray_march(
     """
     _check(steps, spacing, shadow, view)
     total = type(view.medium.albedo)(0)
-    in_media = rays_in_media(view) if view.plan.bounded else ()
+    in_media = rays_in_media(view) if view.features.bounded else ()
     for number, light in enumerate(view.lights):
         x0, x1 = type(view.distance)(0), view.distance
         media = in_media[number] if in_media else None
-        if isinstance(media, ParallelRay):
+        if media and not light.w:
             lit = _visibility(view, number, shadow)
             integral = _march_parallel(view, media, _within(media, x0, x1), steps=steps, lit=lit)
             total += bounded_radiance(light, integral)
             continue
         geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
-        if light.kind == "spot":
-            x0, x1 = clip_to_cone(geometry, x0, x1)
+        x0, x1 = geometry.lit_segment(x0, x1)
         if spacing == "uniform" and not view.medium.clear:
             x1 = dr.minimum(x1, x0 + _OPTICAL_REACH / least_extinction(view.medium))
         if media and view.medium.clear:
@@ -111,21 +108,21 @@ def _check(steps: int, spacing: str, shadow: str, view: View) -> None:
             raise InputError(f"{name}: got {value!r}, wanted one of {', '.join(allowed)}")
     if not isinstance(steps, int) or steps < 1:
         raise InputError(f"steps: got {steps!r}, wanted a whole number of at least 1")
-    if spacing == "uniform" and view.plan.vacuum and not view.medium.clear:
+    if spacing == "uniform" and view.features.vacuum and not view.medium.clear:
         raise InputError("spacing=uniform: an endless ray through a vacuum has no step length; use spacing=equiangular")
 
 
 def _visibility(view: View, number: int, shadow: str):
     """Return the function that says whether the light of a number reaches a point."""
     light = view.lights[number]
-    if shadow == "none" or not view.plan.shadows:
+    if shadow == "none" or not view.features.shadows:
         return lambda point: True
     if shadow == "map":
         return lambda point: lit_in_map(view.prepared[number], light, point)
     return lambda point: view.visible(point, light)
 
 
-def _within(media: MediaRay | ParallelRay, x0, x1):
+def _within(media: LitRay, x0, x1):
     """Return the part of a segment from the first to the last body."""
     first, last = x1, x0
     for piece in media.pieces:
@@ -135,7 +132,7 @@ def _within(media: MediaRay | ParallelRay, x0, x1):
 
 
 def _march(
-    view: View, light: Light, geometry: RayGeometry, segment, *, steps: int, spacing: str, lit, media: MediaRay | None
+    view: View, light: Light, geometry: RayGeometry, segment, *, steps: int, spacing: str, lit, media: LitRay | None
 ):
     """Sum the steps of every ray in one loop, so that the kernel does not grow with their number."""
     x0, x1 = segment
@@ -153,7 +150,7 @@ def _march(
         weight = dr.rcp(dr.square(r)) if spacing == "uniform" else dr.rcp(height)
         point = view.origin + view.direction * x
         if media:
-            term = weight * bounded_source(media, x)
+            term = weight * media.source(x)
             return index + 1, total + dr.select((width > 0) & lit(point), term, 0)
         weight *= evaluate(medium.phase, (foot - x) / r)
         if light.soft:
@@ -171,7 +168,7 @@ def _march(
     return total * width
 
 
-def _march_parallel(view: View, media: ParallelRay, segment, *, steps: int, lit):
+def _march_parallel(view: View, media: LitRay, segment, *, steps: int, lit):
     """Sum equal steps of every ray under a directional light; see `_march`."""
     x0, x1 = segment
     Float = type(view.distance)
@@ -182,7 +179,7 @@ def _march_parallel(view: View, media: ParallelRay, segment, *, steps: int, lit)
     def step(index, total):
         x = dr.fma(Float(index) + 0.5, width, x0)
         reached = (width > 0) & lit(view.origin + view.direction * x)
-        return index + 1, total + dr.select(reached, bounded_source(media, x), 0)
+        return index + 1, total + dr.select(reached, media.source(x), 0)
 
     _, total = dr.while_loop(
         state=(mi.UInt32(0), type(view.medium.albedo)(0) + dr.zeros(Float, dr.width(width))),

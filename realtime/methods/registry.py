@@ -54,7 +54,7 @@ METHODS: dict[str, Method] = {
         prepared_from=frozenset({"camera", "geometry", "light"}),
         tiles=shadow_plane_tiles,
         casts_rays=lambda settings: settings["evaluation"] == "vertex",  # to know the triangle of a surface
-        lights_surfaces=lambda settings: True,
+        provides_visibility=lambda settings: True,
         tiled=lambda settings: settings["evaluation"] == "pixel",
         parameters=MappingProxyType(
             {
@@ -79,7 +79,7 @@ METHODS: dict[str, Method] = {
         prepare=prepare_light_volumes,
         prepared_from=frozenset({"geometry", "light"}),
         tiles=light_volume_tiles,
-        lights_surfaces=finds_lit_surfaces,
+        provides_visibility=finds_lit_surfaces,
         tiled=lambda settings: settings["evaluation"] == "walk",
         frozen=lambda settings: settings["evaluation"] == "walk",  # the crossings of a mesh are counted on the way
         parameters=MappingProxyType(

@@ -48,7 +48,7 @@ def own_method(name: str) -> Method:
     if isinstance(found, Method):
         return replace(
             found,
-            function=_guarded(found.function, name, lights_surfaces=found.lights_surfaces),
+            function=_guarded(found.function, name, provides_visibility=found.provides_visibility),
             check=found.check or partial(check_finite, name=name),
         )
     if isinstance(found, type) or not callable(found):
@@ -172,7 +172,7 @@ def _guarded(
     name: str,
     *,
     takes_kernel: bool = True,
-    lights_surfaces: Callable[[Mapping[str, Any]], bool] = lambda settings: False,
+    provides_visibility: Callable[[Mapping[str, Any]], bool] = lambda settings: False,
 ) -> Callable[..., Any]:
     """Return the function with its errors named and its result checked."""
 
@@ -180,7 +180,7 @@ def _guarded(
         given = {"kernel": kernel} if takes_kernel else {}
         with _own_errors(f"method {name}", _file(function)):
             found = function(view, **given, **parameters)
-        if not lights_surfaces(parameters):
+        if not provides_visibility(parameters):
             return checked_radiance(found, view, name)
         if not isinstance(found, tuple) or len(found) != 2:
             raise InputError(f"method {name}: returned a {type(found).__name__}; wanted (radiance, lit by light)")

@@ -184,7 +184,7 @@ class Rendering(LayeredImage):
                 f"{number(frame.median_ms)} ms, quartiles {number(frame.low_ms)}..{number(frame.high_ms)}"
             )
             found["of it airlight"] = f"{number(self.times.airlight.median_ms)} ms"
-            found["after the light moved"] = f"{number(self.times.rebuild.median_ms)} ms"
+            found["after the light moved"] = f"{number(self.times.light_moved.median_ms)} ms"
         return found | ({"notes": " ".join(self.notes)} if self.notes else {})
 
     @property

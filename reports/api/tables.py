@@ -83,10 +83,11 @@ class BenchTable:
     """Speed against error: a row for each configuration in each scene.
 
     A row has `scene`, `width`, `height`, `label`, `method`, `kernel`; medians `frame_ms` with its quartiles
-    `frame_low_ms` and `frame_high_ms`, `airlight_ms`, `surface_ms`, `rebuild_ms` (after the light moved), `moved_ms`
-    (after objects moved), `relit_ms` (after the light moved, camera rays kept), `recoloured_ms` (after only medium or
-    colours changed) [ms]; of the airlight `relative_rmse`, `relative_bias`, `p50`, `p99`, `max`, `nonfinite` and
-    `negative`; `refused`, why the method cannot render the scene, and `note`. What there is none of is None.
+    `frame_low_ms` and `frame_high_ms`, `airlight_ms`, `surface_ms`, `light_moved_ms`, `objects_moved_ms`
+    (after these moved), `light_moved_camera_kept_ms` (after the light moved, camera rays kept), `colours_changed_ms`
+    (after only medium or colours changed) [ms]; of the airlight `relative_rmse`, `relative_bias`, `p50`, `p99`, `max`,
+    `nonfinite` and `negative`; `refused`, why the method cannot render the scene, and `note`. What there is
+    none of is None.
     """
 
     rows: tuple[Mapping[str, Any], ...]
@@ -130,7 +131,7 @@ class BenchTable:
     def _repr_html_(self) -> str:
         from reports.api.html import block, paragraph, table
 
-        headers = ("method", "frame ms", "frames/s", "airlight ms", "rebuilt ms", "rel. RMSE", "rel. bias", "p99")
+        headers = ("method", "frame ms", "frames/s", "airlight ms", "light moved ms", "rel. RMSE", "rel. bias", "p99")
         parts = []
         for scene in dict.fromkeys((row["scene"], row["width"], row["height"]) for row in self.rows):
             found = [row for row in self.rows if (row["scene"], row["width"], row["height"]) == scene]
@@ -198,5 +199,5 @@ def _bench_row(row: Mapping[str, Any]) -> list[str]:
     if row["refused"]:
         return [row["label"], f"refused: {row['refused']}", *[""] * 6]
     rate = 1000 / row["frame_ms"] if row["frame_ms"] else math.inf
-    times = [number(row["frame_ms"]), number(rate), number(row["airlight_ms"]), number(row["rebuild_ms"])]
+    times = [number(row["frame_ms"]), number(rate), number(row["airlight_ms"]), number(row["light_moved_ms"])]
     return [row["label"], *times, *(number(row[name], 2) for name in ("relative_rmse", "relative_bias", "p99"))]

@@ -8,8 +8,9 @@ from dataclasses import asdict, is_dataclass
 from typing import Any
 
 from realtime.scene.features import describe
-from reference.quadrature.image import TruthImage
+from reference.quadrature.ray_values import TruthImage
 from validation.comparison.engine_images import ImageMeasurement
+from validation.frames.baseline_files import read_baseline
 from validation.frames.benchmark import Measurement, knows_shadows
 from validation.frames.scene_study import SceneStudy
 from validation.metrics.errors import plain as plain_value
@@ -30,16 +31,18 @@ def plain(value: Any) -> Any:
 
 def scene_facts(study: SceneStudy) -> dict[str, Any]:
     """Return what a scene is, before anything is measured in it."""
-    loaded, effort, plan = study.loaded, study.effort, study.scene.plan
+    loaded, effort, features = study.loaded, study.effort, study.scene.features
+    baseline = None if loaded.path else read_baseline(loaded.name)
     return {
         "name": loaded.name,
         "purpose": loaded.purpose,
         "published": loaded.published,
         "path": str(loaded.path) if loaded.path else None,
+        "baseline": baseline["revision"] if baseline else None,
         "size": list(effort.image),
         "timed": list(effort.timed),
-        "plan": describe(plan),
-        "notes": list(plan.notes),
+        "plan": describe(features),
+        "notes": list(features.notes),
     }
 
 

@@ -22,9 +22,12 @@ _HEADER = (
     "frame_ms_low",
     "frame_ms_high",
     "repetitions",
-    "moved_ms",
-    "moved_ms_low",
-    "moved_ms_high",
+    "light_moved_ms",
+    "light_moved_ms_low",
+    "light_moved_ms_high",
+    "objects_moved_ms",
+    "objects_moved_ms_low",
+    "objects_moved_ms_high",
     "relative_rmse",
     "relative_bias",
     "p99",
@@ -52,8 +55,8 @@ def compute(folder: Path | str, *, report: Path | str) -> None:
             error, times = one["error"] or {}, one["times"] or {}
             errors = [error.get(name) for name in ("relative_rmse", "relative_bias", "p99", "nonfinite")]
             what = (scene["name"], *scene["size"], one["label"], one.get("layer", "airlight"))
-            frame, moved = times.get("frame") or {}, times.get("moved") or {}
-            shown = (*_spread(frame), frame.get("repetitions"), *_spread(moved))
+            frame, light, objects = (times.get(name) or {} for name in ("frame", "light_moved", "objects_moved"))
+            shown = (*_spread(frame), frame.get("repetitions"), *_spread(light), *_spread(objects))
             rows.append((*what, *shown, *errors, bound, one["refused"]))
     settings = {name: data["settings"].get(name) for name in ("image", "timed")}
     write_data(target, NAME, _HEADER, rows, **report_origin(report, data), settings=settings)
@@ -66,8 +69,8 @@ def plot(folder: Path | str, *, output: Path | str | None = None, **options: Any
 
 def _tabular(rows: list[dict[str, str]]) -> str:
     headers = (
-        ("method", "frame", "light moved", "rel. RMSE", "rel. bias", "99\\,\\%"),
-        ("", "[ms]", "[ms]", "[1]", "[1]", "[1]"),
+        ("method", "frame", "light moved", "objects moved", "rel. RMSE", "rel. bias", "99\\,\\%"),
+        ("", "[ms]", "[ms]", "[ms]", "[1]", "[1]", "[1]"),
     )
     body: list[tuple[str, ...] | str] = []
     for scene in dict.fromkeys(row["scene"] for row in rows):
@@ -80,7 +83,7 @@ def _tabular(rows: list[dict[str, str]]) -> str:
         "Needs \\usepackage{booktabs}. Times: medians with the distances to the quartiles, kernels compiled before.",
         "Errors of the airlight against the quadrature truth; 99 %: quantile of |error| / max(truth, mean / 1000).",
     )
-    return table("lrrrrr", headers, body, comment=comment)
+    return table("lrrrrrr", headers, body, comment=comment)
 
 
 def _spread(timing: dict[str, Any]) -> tuple[float | None, ...]:
@@ -88,13 +91,13 @@ def _spread(timing: dict[str, Any]) -> tuple[float | None, ...]:
 
 
 def _cells(row: dict[str, str]) -> tuple[str, ...]:
-    frame, moved = (
+    times = [
         with_quartiles(*(value(row, f"{name}{end}") for end in ("", "_low", "_high")))
-        for name in ("frame_ms", "moved_ms")
-    )
+        for name in ("frame_ms", "light_moved_ms", "objects_moved_ms")
+    ]
     if row["refused"]:
-        return (escape(row["label"]), r"\multicolumn{5}{l}{refused}")
+        return (escape(row["label"]), r"\multicolumn{6}{l}{refused}")
     name = escape(row["label"]) + ("" if row["layer"] == "airlight" else f" ({escape(row['layer'])})")
     bad = value(row, "nonfinite")
     name += f", {bad:.0f} pixels not finite" if bad else ""
-    return (name, frame, moved, *(number(value(row, key), 2) for key in ("relative_rmse", "relative_bias", "p99")))
+    return (name, *times, *(number(value(row, key), 2) for key in ("relative_rmse", "relative_bias", "p99")))

@@ -91,9 +91,9 @@ def billeter_entries(data: dict[str, Any]) -> list[tuple]:
 
 def _figures(row: dict[str, Any], size: list[int], fps: float | None, error: dict[str, Any] | None) -> tuple:
     """Return size, published and measured frames a second, error, and why nothing was measured."""
-    rebuilt = row["rebuilt"]
+    light_moved = row["light_moved"]
     # The third quartile of the time is the first of the rate.
-    rates = [1000 / rebuilt[name] for name in ("median_ms", "high_ms", "low_ms")] if rebuilt else [None] * 3
+    rates = [1000 / light_moved[name] for name in ("median_ms", "high_ms", "low_ms")] if light_moved else [None] * 3
     relative = error["relative_rmse"] if error else None
     return (*row["size"], *size, fps, *rates, relative, row.get("missing"))
 

@@ -60,7 +60,7 @@ def compute(
             shown.add(one["scene"])
             named = (one["scene"], one["where"], _PAPER, *one["size"])
             rows += [(*named, stage, share, *[None] * 4) for stage, share in zip(found["stages"], one["shares"])]
-        frame = tuple(row["rebuilt"][name] for name in ("median_ms", "low_ms", "high_ms"))
+        frame = tuple(row["light_moved"][name] for name in ("median_ms", "low_ms", "high_ms"))
         named = (one["scene"], one["where"], biri_variant(row), *row["size"])
         parts = zip(found["stages"], row["shares"], row["stages_ms"])
         rows += [(*named, stage, share, ms, *frame) for stage, share, ms in parts]

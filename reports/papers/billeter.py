@@ -79,7 +79,7 @@ def _print_figures(rows: Sequence, show) -> None:
     cells = []
     for row in rows:
         name, fps = f"{row.entry.where}, {_image(row)}", row.entry.fps
-        if row.rebuilt is None:
+        if row.light_moved is None:
             cells.append((name, number(fps), *["-"] * 9))
             continue
         errors = [number(value, 2) for one in (row.error, row.map_error) for value in (one.relative_rmse, one.p99)]
@@ -97,7 +97,7 @@ def _print_rates(rows: Sequence, show) -> None:
     )
     cells = []
     for row in rows:
-        if row.rebuilt is None:
+        if row.light_moved is None:
             cells.append((_view(row), "-", number(row.published_fps), *["-"] * 6))
             continue
         against = "-" if row.against_static is None else number(row.against_static.relative_rmse, 2)

@@ -89,7 +89,7 @@ def scene_report(
     multiple = parts.result(
         "multiple", lambda: (plain(study_multiple(study)), {}), asked={"multiple": study.effort.multiple}
     )
-    chosen = configurations_for(study.scene.plan, configurations)
+    chosen = configurations_for(study.scene.features, configurations)
     stems = file_stems([*(one.label for one in chosen), *(one.label for one in images)])
     methods = parts.methods(chosen, stems, factor, lambda share, what: tell(0.55 + 0.4 * share, what))
     judged = [parts.image(one, stem, factor) for one, stem in zip(images, stems[len(chosen) :])]
@@ -242,7 +242,7 @@ def _measured(study: SceneStudy, measured: Measurement, factor: float) -> Comput
 
 def _judged(study: SceneStudy, shown: EngineImage, factor: float) -> Computed:
     truth = study.truth
-    measured = measure_image(shown, truth, surfaces=study.scene.plan.surfaces)
+    measured = measure_image(shown, truth, surfaces=study.scene.features.surfaces)
     if study.effort.flip != "none":
         measured = replace(measured, flip=image_flip(measured, truth))
     expected = truth.airlight if measured.layer == "airlight" else truth.airlight + truth.surface

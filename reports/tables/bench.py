@@ -14,7 +14,7 @@ _HEADERS = (
     "frames/s",
     "airlight ms",
     "airlight/s",
-    "rebuilt ms",
+    "light moved ms",
     "rel. RMSE",
     "rel. bias",
     "p99",
@@ -69,7 +69,7 @@ def _row(one: dict[str, Any]) -> tuple[str, ...]:
         rate(frame["median_ms"]),
         number(airlight),
         rate(airlight),
-        number(one["times"]["rebuild"]["median_ms"]),
+        number(one["times"]["light_moved"]["median_ms"]),
         number(error["relative_rmse"], 2),
         number(error["relative_bias"], 2),
         number(error["p99"], 2),
@@ -90,13 +90,14 @@ RATES = (
 def rate_cells(row: Any, published: float | None) -> tuple[str, ...]:
     """Return the cells of `RATES`.
 
-    `row` has the timings `rebuilt`, `relit` and `recoloured`; `published` is None where nothing comparable was.
+    `row` has the timings `light_moved`, `light_moved_camera_kept` and `colours_changed`; `published` is
+    None where nothing comparable was.
     """
-    rebuilt = row.rebuilt
-    of_published = f"{1000 / rebuilt.median_ms / published:.2g} x" if published else "-"
-    quartiles = f"{number(rebuilt.low_ms)}..{number(rebuilt.high_ms)}"
-    kept = rate(row.relit.median_ms), rate(row.recoloured.median_ms)
-    return rate(rebuilt.median_ms), of_published, *kept, quartiles
+    light_moved = row.light_moved
+    of_published = f"{1000 / light_moved.median_ms / published:.2g} x" if published else "-"
+    quartiles = f"{number(light_moved.low_ms)}..{number(light_moved.high_ms)}"
+    kept = rate(row.light_moved_camera_kept.median_ms), rate(row.colours_changed.median_ms)
+    return rate(light_moved.median_ms), of_published, *kept, quartiles
 
 
 def rate(milliseconds: float) -> str:

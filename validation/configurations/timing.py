@@ -15,7 +15,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.frame.incremental import Kept, next_frame
+from realtime.frame.incremental import FrameCache, next_frame
 from realtime.frame.recorded import Frozen
 from realtime.frame.renderer import (
     FrameRenderer,
@@ -112,7 +112,7 @@ def times_in_turns(
     return np.array(times)
 
 
-def timed_frame(renderer: FrameRenderer, scene: Scene, kept: Kept | None, **moved: bool):
+def timed_frame(renderer: FrameRenderer, scene: Scene, kept: FrameCache | None, **moved: bool):
     """Render the next frame, as `realtime.frame.incremental.next_frame`; return stages, what is kept, and the time
     [ms].
     """
@@ -127,12 +127,12 @@ def moved_light(renderer: FrameRenderer) -> Callable[[], Any]:
     return _step(renderer, None, light_moved=True)
 
 
-def moved_light_alone(renderer: FrameRenderer, kept: Kept) -> Callable[[], Any]:
+def moved_light_alone(renderer: FrameRenderer, kept: FrameCache) -> Callable[[], Any]:
     """Return a frame after the light moved, camera and geometry as they stood: camera rays are kept."""
     return _step(renderer, kept, light_moved=True)
 
 
-def changed_look(renderer: FrameRenderer, kept: Kept) -> Callable[[], Any]:
+def changed_look(renderer: FrameRenderer, kept: FrameCache) -> Callable[[], Any]:
     """Return a frame after the medium or colours of lights changed: only surface and airlight are computed."""
     return _step(renderer, kept, light_moved=False)
 
@@ -148,12 +148,12 @@ def camera_rays(renderer: FrameRenderer) -> Callable[[], Any]:
     return lambda: dr.eval(cast(scene.geometry, scene.facets, renderer.pixel, scene.camera))
 
 
-def _step(renderer: FrameRenderer, kept: Kept | None, *, light_moved: bool) -> Callable[[], Any]:
+def _step(renderer: FrameRenderer, kept: FrameCache | None, *, light_moved: bool) -> Callable[[], Any]:
     moved = {"camera_moved": kept is None, "geometry_moved": False, "light_moved": light_moved}
     return lambda: next_frame(renderer, renderer.scene, kept, **moved)
 
 
-def first_frame(renderer: FrameRenderer) -> Kept:
+def first_frame(renderer: FrameRenderer) -> FrameCache:
     """Render the frame of the renderer's scene and return what it leaves."""
     return next_frame(renderer, renderer.scene, None, camera_moved=True, geometry_moved=True, light_moved=True)[1]
 
@@ -165,12 +165,10 @@ class FrameTimes:
     frame: Timing  #: camera rays, lit surface, tiles and airlight; shadow maps or planes are there
     surface: Timing  #: camera rays and lit surface
     airlight: Timing  #: tiles and airlight: the kernel with its ray set-up, or the marching
-    rebuild: Timing  #: a frame after the light moved: shadow maps or silhouettes and planes, all stages
-    moved: Timing  #: a frame after the objects moved too: acceleration structure, adjacent planes, all of the above
-    relit: Timing  #: a frame after the light alone moved: that of `rebuild` with the camera rays of the last frame
-    recoloured: (
-        Timing  #: a frame after nothing moved, medium or colours changed: surface and airlight from what is there
-    )
+    light_moved: Timing  #: a frame after the light moved: shadow maps or silhouettes and planes, all stages
+    objects_moved: Timing  #: a frame after the objects moved too: acceleration structure, adjacent planes, all stages
+    light_moved_camera_kept: Timing  #: a frame after the light moved, with the camera rays of the last frame
+    colours_changed: Timing  #: a frame after only medium or colours changed: surface and airlight from what is there
 
 
 def time_frame(renderer: FrameRenderer, *, seconds: float = 0.6, slow: float | None = None) -> FrameTimes:
@@ -208,7 +206,7 @@ def time_frame(renderer: FrameRenderer, *, seconds: float = 0.6, slow: float | N
 
     objects = _objects(scene)
 
-    def moved():
+    def objects_moved():
         # Where they stand: the work is that of any other place.
         there = turned_objects(scene, objects, np.eye(3)) if objects else scene
         next_frame(renderer, there, None, camera_moved=False, geometry_moved=True, light_moved=True)
@@ -220,10 +218,10 @@ def time_frame(renderer: FrameRenderer, *, seconds: float = 0.6, slow: float | N
         frame=time_repeated(lambda: run_stages(renderer, prepared), seconds=seconds),
         surface=time_repeated(surface, seconds=seconds),
         airlight=time_repeated(airlight, seconds=seconds),
-        rebuild=few(moved_light(renderer)),
-        moved=few(moved),
-        relit=few(moved_light_alone(renderer, kept)),
-        recoloured=few(changed_look(renderer, kept)),
+        light_moved=few(moved_light(renderer)),
+        objects_moved=few(objects_moved),
+        light_moved_camera_kept=few(moved_light_alone(renderer, kept)),
+        colours_changed=few(changed_look(renderer, kept)),
     )
 
 
@@ -261,15 +259,15 @@ def _slow_frame(renderer: FrameRenderer, *, turns: int) -> FrameTimes:
         return Timing(median, low, high, turns)
 
     airlight = in_tiles + rest
-    rebuild = prepare + surface + airlight
+    light_moved = prepare + surface + airlight
     return FrameTimes(
         frame=timing(surface + airlight),
         surface=timing(surface),
         airlight=timing(airlight),
-        rebuild=timing(rebuild),
-        moved=timing(move + rebuild),
-        relit=timing(shade + airlight + prepare * bool(needed & {"light", "look"})),
-        recoloured=timing(shade + rest + prepare * ("look" in needed)),
+        light_moved=timing(light_moved),
+        objects_moved=timing(move + light_moved),
+        light_moved_camera_kept=timing(shade + airlight + prepare * bool(needed & {"light", "look"})),
+        colours_changed=timing(shade + rest + prepare * ("look" in needed)),
     )
 
 

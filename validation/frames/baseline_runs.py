@@ -12,9 +12,9 @@ import numpy as np
 from realtime.errors import InputError
 from realtime.frame.renderer import FrameRenderer, render_frame, run_stages
 from realtime.kernels.registry import KERNELS
-from realtime.scene.features import Plan
+from realtime.scene.features import SceneFeatures
 from realtime.scene.read_scene import Scene, read_scene
-from reference.quadrature.image import TruthImage
+from reference.quadrature.ray_values import TruthImage
 from validation.configurations.methods import STANDARD, Configuration, prepared
 from validation.estimates.quadrature import truth_image
 from validation.frames.baseline_files import ERRORS, SCHEMA, SIZE, SLOWER, Baseline
@@ -33,10 +33,10 @@ _LEAST = 7  # turns, each of one frame and one frame of the yardstick
 _TRIES = (0.4, 1.0, 2.0)  # durations of the timings; the longer ones follow only if the frame seems too slow [s]
 
 
-def baseline_configurations(name: str, plan: Plan) -> tuple[Configuration, ...]:
+def baseline_configurations(name: str, features: SceneFeatures) -> tuple[Configuration, ...]:
     """Return what the baseline of a scene holds."""
     kernels = [Configuration("unshadowed", kernel) for kernel in KERNELS] if name == FOG else []
-    return tuple(dict.fromkeys((*configurations_for(plan, STANDARD), *kernels)))
+    return tuple(dict.fromkeys((*configurations_for(features, STANDARD), *kernels)))
 
 
 def measure_baseline(
@@ -65,7 +65,7 @@ def measure_baseline(
     truth = truth_image(loaded.scene)
     timed = times and "llvm" in mi.variant()
     yardstick = prepared(scene, YARDSTICK) if timed else None
-    chosen = baseline_configurations(name, scene.plan)
+    chosen = baseline_configurations(name, scene.features)
     before = kept["configurations"] if kept else {}
     entries = {}
     for number, configuration in enumerate(chosen):
@@ -95,7 +95,7 @@ def _entry(
     numbers = error_metrics(truth.airlight, frame.airlight).to_json()
     numbers["mean"] = float(np.mean(np.asarray(frame.airlight, dtype=np.float64)))
     entry: dict[str, Any] = {"airlight": _kept({name: numbers[name] for name in ERRORS})}
-    if scene.plan.surfaces:
+    if scene.features.surfaces:
         surface = error_metrics(truth.surface, frame.surface).to_json()
         entry["surface"] = _kept({name: surface[name] for name in _SURFACE})
     if yardstick is not None and chosen != YARDSTICK:

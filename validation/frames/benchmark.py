@@ -9,9 +9,9 @@ from realtime.errors import InputError
 from realtime.frame.recorded import Frozen
 from realtime.frame.renderer import Frame, render_frame
 from realtime.methods.registry import find_method
-from realtime.scene.features import Plan
+from realtime.scene.features import SceneFeatures
 from realtime.scene.read_scene import Scene, read_scene
-from reference.quadrature.image import TruthImage
+from reference.quadrature.ray_values import TruthImage
 from validation.configurations.methods import STANDARD, Configuration, prepared
 from validation.configurations.timing import FrameTimes, time_frame
 from validation.estimates.quadrature import truth_image
@@ -40,14 +40,16 @@ class Measurement:
     note: str | None = None  #: how its times differ from those of other configurations
 
 
-def configurations_for(plan: Plan, configurations: Sequence[Configuration] = STANDARD) -> tuple[Configuration, ...]:
+def configurations_for(
+    features: SceneFeatures, configurations: Sequence[Configuration] = STANDARD
+) -> tuple[Configuration, ...]:
     """Return the configurations that differ in this scene from the ones before them.
 
     Variants of the shadows are left out if nothing casts a shadow. The published treatment of bounded media is left out
     if the scene has none, or if they do not lie in clear air.
     """
-    without_effect = set() if plan.shadows else {"shadow", "order", "map"}
-    without_effect |= set() if plan.clear else {"media"}
+    without_effect = set() if features.shadows else {"shadow", "order", "map"}
+    without_effect |= set() if features.clear else {"media"}
     return tuple(chosen for chosen in configurations if not without_effect & set(dict(chosen.parameters)))
 
 
@@ -110,7 +112,7 @@ def measure(
         frame,
         times,
         error_metrics(truth.airlight, frame.airlight),
-        error_metrics(truth.surface, frame.surface) if scene.plan.surfaces else None,
+        error_metrics(truth.surface, frame.surface) if scene.features.surfaces else None,
         flip_hdr(truth.airlight + truth.surface, frame.airlight + frame.surface) if with_flip else None,
         note="; ".join(notes) or None,
     )
@@ -138,7 +140,7 @@ def bench(
 ) -> Iterator[tuple[Scene, Measurement]]:
     """Yield the measurements of a scene's configurations at its own size, one after the other."""
     scene = read_scene(loaded.scene)
-    chosen = configurations_for(scene.plan, configurations)
+    chosen = configurations_for(scene.features, configurations)
     truth = truth_image(loaded.scene)
     for number, configuration in enumerate(chosen):
         yield scene, measure(scene, configuration, truth=truth)

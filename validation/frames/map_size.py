@@ -239,8 +239,8 @@ def _frames(scene: Scene, about: tuple[float, float, float] | None, turn: int, f
 
 def _truth_of(known: TruthScene, moved: Scene) -> Array:
     """Return the true airlight, (height, width, 3), with the lights at the places of a moved scene."""
-    near = [light for light in moved.lights if light.kind != "directional"]
-    far = [light for light in moved.lights if light.kind == "directional"]
+    near = [light for light in moved.lights if light.w]
+    far = [light for light in moved.lights if not light.w]
     lights = tuple(_truth_light(light, there) for light, there in zip(known.lights, near, strict=True))
     turned = zip(known.directional, far, strict=True)
     directional = tuple(replace(light, direction=_axis(there)) for light, there in turned)

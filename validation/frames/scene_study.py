@@ -11,7 +11,7 @@ from functools import cached_property
 from typing import Any
 
 from realtime.scene.read_scene import Scene, read_scene
-from reference.quadrature.image import TruthImage
+from reference.quadrature.ray_values import TruthImage
 from reference.storage.cache import scene_digest
 from validation.configurations.methods import QUICK, Configuration
 from validation.estimates.agreement import Agreement, agreements
@@ -42,7 +42,7 @@ class Effort:
     scenes: tuple[str, ...] = ()  #: scenes that are studied by default
     batches: int = 2048  #: largest number of batches in these comparisons
     multiple: tuple[int, int] = (8, 4)  #: batches, and samples per pixel in each, for the share of multiple scattering
-    patience: float = 10.0  #: an estimator that has not decided after this time is stopped [s]
+    patience: float | None = None  #: an estimator that has not decided after this time is stopped [s]; None: never
     slow: float = 0.15  #: if the airlight takes longer, whole frames are timed stage by stage [s]
     limit: float = 20.0  #: frames that would take longer are not measured, and the report says so [s]
     flip: str = "none"  #: which configurations get HDR-FLIP: 'none', 'kinds' (those of `QUICK`) or 'all'

@@ -52,8 +52,8 @@ from realtime.scene.lights import Light
 from realtime.scene.medium import transmittance
 from realtime.scene.phase import evaluate
 from realtime.scene.read_scene import Scene
-from realtime.shadow_maps.inverse_depth_field import inverse_depth
-from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, check_size, map_memory
+from realtime.shadow_maps.projection import light_faces
+from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, check_size, inverse_depth, map_memory
 
 SAMPLINGS = ("slices", "pixels")
 
@@ -107,7 +107,7 @@ def min_max(
     total = type(view.medium.albedo)(0)
     for number, light in enumerate(view.lights):
         airlight = _ray_airlight(view, number, kernel)
-        if not view.plan.shadows:
+        if not view.features.shadows:
             total += airlight.radiance(airlight.integral(*airlight.segment))
             continue
         found: EpipolarMap = view.prepared[number]
@@ -136,7 +136,7 @@ def prepare_min_max(
         For parameters out of range, directional lights, and more memory than the machine has.
     """
     check_size(map)
-    check_places(scene.plan, "min-max")
+    check_places(scene.features, "min-max")
     if sampling not in SAMPLINGS:
         raise InputError(f"sampling: got {sampling!r}, wanted one of {', '.join(SAMPLINGS)}")
     for name, value in (("slices", slices), ("samples", samples)):
@@ -145,7 +145,7 @@ def prepare_min_max(
     if step not in STEPS:
         raise InputError(f"step: got {step!r}, wanted one of {', '.join(str(one) for one in STEPS)}")
 
-    if scene.plan.shadows:
+    if scene.features.shadows:
         held = sum(2 * map_memory(light, map) for light in scene.lights)
         drawn = max((_memory_of_slices(scene, light, map, slices, samples) for light in scene.lights), default=0)
         what = f"map: {map} texels, slices: {slices or _usual_slices(scene.camera)}"
@@ -166,7 +166,7 @@ def _whole_words(samples: int, camera: Camera) -> int:
 def _memory_of_slices(scene: Scene, light: Light, size: int, slices: int, samples: int) -> int:
     """Return about how much the slices of a light take [bytes]: per leaf its value, two bounds, four of the tree."""
     number = bytes_of(type(light.position.x))
-    leaves = size if light.kind == "spot" else 2 * size
+    leaves = size if light_faces(light) == 1 else 2 * size
     lanes = _whole_words(samples, scene.camera)
     return (slices or _usual_slices(scene.camera)) * (number * 7 * leaves + lanes * (4 + 3 * number))
 
@@ -181,7 +181,7 @@ def _epipolar_map(scene: Scene, light: Light, size: int) -> EpipolarMap:
 def _ray_airlight(view: View, number: int, kernel) -> RayAirlight:
     """Return the airlight of one light along the rays of a view."""
     light = view.lights[number]
-    media = rays_in_media(replace(view, lights=(light,)))[0] if view.plan.bounded else None
+    media = rays_in_media(replace(view, lights=(light,)))[0] if view.features.bounded else None
     return ray_airlight(view, light, kernel, media)
 
 
@@ -223,7 +223,7 @@ def _sampled_shares(view: View, number: int, kernel, samples: Samples, heights: 
         return lane
 
     lane = spread(dr.width(marked))
-    if view.plan.bounded:
+    if view.features.bounded:
         # The planes of bodies are written to a table first, which no branch may do: empty room repeats the last sample.
         computed(dr.minimum(lane, dr.maximum(count, 1) - 1))
     else:

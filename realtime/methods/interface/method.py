@@ -24,7 +24,7 @@ class Method:
     tiles: Callable[..., tuple[Any, ...] | None] | None = (
         None  #: (view, **parameters) -> `view.tiles`, from camera, geometry and lights, without their colours and media
     )
-    lights_surfaces: Callable[[Mapping[str, Any]], bool] = lambda settings: (
+    provides_visibility: Callable[[Mapping[str, Any]], bool] = lambda settings: (
         False
     )  #: parameters -> whether it returns, after the radiance, by light whether it reaches the surface
     casts_rays: Callable[[Mapping[str, Any]], bool] = lambda settings: False  #: parameters -> whether it casts rays

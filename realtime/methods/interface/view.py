@@ -7,12 +7,11 @@ from typing import Any
 
 import drjit as dr
 
+from realtime.bounded_media.airlight import LitRay, lit_ray
 from realtime.bounded_media.body_views import MediaSides
-from realtime.bounded_media.directional_airlight import ParallelRay, parallel_ray
-from realtime.bounded_media.ray_segments import MediaRay, camera_pieces, media_ray
-from realtime.rays.ray_light import ray_geometry
+from realtime.bounded_media.ray_segments import camera_pieces
 from realtime.scene.camera import Camera
-from realtime.scene.features import Plan
+from realtime.scene.features import SceneFeatures
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium
 
@@ -31,7 +30,7 @@ class View:
     distance: Any  #: to the visible surface, infinite where there is none [m]
     lights: tuple[Light, ...]
     medium: Medium
-    plan: Plan  #: what the scene needs; a method leaves out the rest
+    features: SceneFeatures  #: what the scene needs; a method leaves out the rest
     visible: Callable[[Any, Light], Any]  #: (point, light) -> whether the light reaches the point
     camera: Camera
     pixel: Any  #: pixel number of every ray: row times width plus column
@@ -52,23 +51,19 @@ def radiance(medium: Medium, light: Light, integral):
     return medium.albedo * light.intensity * (sigma_t * (integral * (0.25 * dr.inv_pi)))
 
 
-def rays_in_media(view: View, form: str = "exact") -> tuple[MediaRay | ParallelRay, ...]:
+def rays_in_media(view: View, form: str = "exact") -> tuple[LitRay, ...]:
     """Return the rays of a view in bounded media, by light; `form` is one of
     `realtime.bounded_media.airlight.FORMS`.
     """
     pieces = camera_pieces(view.medium, view.origin, view.direction, view.sides.camera if view.sides else None)
-    rays: list[MediaRay | ParallelRay] = []
-    for number, light in enumerate(view.lights):
-        place = {"origin": view.origin, "direction": view.direction, "pieces": pieces, "form": form}
-        place["sides"] = view.sides.lights[number] if view.sides else None
-        if light.kind == "directional":
-            rays.append(parallel_ray(view.medium, light, **place))
-            continue
-        geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
-        rays.append(media_ray(view.medium, light, geometry, **place))
-    return tuple(rays)
+    place = {"origin": view.origin, "direction": view.direction, "low": view.direction_low}
+    sides = view.sides.lights if view.sides else [None] * len(view.lights)
+    return tuple(
+        lit_ray(view.medium, light, **place, pieces=pieces, form=form, sides=one)
+        for light, one in zip(view.lights, sides, strict=True)
+    )
 
 
 def bounded_radiance(light: Light, scattered):
-    """Return the radiance of what `realtime.bounded_media.airlight.bounded_airlight` returns [W/(m^2 sr)]."""
+    """Return the radiance of what `airlight` of a ray in bounded media returns [W/(m^2 sr)]."""
     return light.intensity * (scattered * (0.25 * dr.inv_pi))

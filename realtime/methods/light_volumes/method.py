@@ -39,7 +39,8 @@ from realtime.methods.light_volumes.walk import sum_lit_pieces
 from realtime.numerics.array_types import bytes_of
 from realtime.scene.lights import Light
 from realtime.scene.read_scene import Scene
-from realtime.shadow_maps.inverse_depth_field import LightHeights, level_start, light_heights
+from realtime.shadow_maps.inverse_depth_field import InverseDepthField, inverse_depth_field, level_start
+from realtime.shadow_maps.projection import light_faces, light_projection
 from realtime.shadow_maps.shadow_map import cast_shadow_map, check_size, map_memory
 
 EVALUATIONS = ("walk", "mesh")
@@ -105,20 +106,20 @@ def light_volumes(
     """
     total = type(view.medium.albedo)(0)
     lit = []
-    in_media = rays_in_media(view) if view.plan.bounded else ()
+    in_media = rays_in_media(view) if view.features.bounded else ()
     for number, light in enumerate(view.lights):
-        if evaluation == "mesh" and view.plan.shadows:
+        if evaluation == "mesh" and view.features.shadows:
             total += mesh_airlight(view, light, view.prepared[number], kernel=kernel)
             continue
         airlight = ray_airlight(view, light, kernel, in_media[number] if in_media else None)
-        if view.plan.shadows:
+        if view.features.shadows:
             leaves = view.tiles[number] if view.tiles else _leaves(view, number)
             value, reached = _walk(view.prepared[number], leaves, airlight)
         else:
             value, reached = airlight.radiance(airlight.integral(*airlight.segment)), True
         total += value
         # A surface may be beside the map of a directional light, whose shadows on surfaces come from rays.
-        lit.append(True if light.kind == "directional" else reached)
+        lit.append(reached if light.w else True)
     return (total, tuple(lit)) if finds_lit_surfaces({"evaluation": evaluation, "surface": surface}) else total
 
 
@@ -140,7 +141,7 @@ def _leaves(view: View, number: int) -> Leaves:
     return tile_leaves(view.prepared[number], lambda lane: view.rays(lane)[0], view.distance, **place)
 
 
-def _walk(heights: LightHeights, leaves: Leaves, airlight: RayAirlight):
+def _walk(heights: InverseDepthField, leaves: Leaves, airlight: RayAirlight):
     """Return the airlight of one light along the rays [W/(m^2 sr)], and whether it reaches their ends."""
     view = airlight.view
     zero = dr.zeros(integral_type(view), dr.width(view.distance))
@@ -162,19 +163,19 @@ def prepare_light_volumes(
         machine has.
     """
     _check(map, evaluation, tessellation, threshold, surface, walls)
-    if evaluation == "mesh" and scene.plan.bounded:
+    if evaluation == "mesh" and scene.features.bounded:
         raise InputError(
             "evaluation=mesh: the scene has a medium with bounds, wanted one medium that fills all space; use "
             "evaluation=walk"
         )
-    if scene.plan.shadows:
+    if scene.features.shadows:
         needed = sum(_memory_of(light, map, evaluation) for light in scene.lights)
         check_memory(f"map: {map} texels for {len(scene.lights)} light(s)", needed, "use a smaller map")
 
     def volume(scene: Scene, light: Light):
         shadow_map = cast_shadow_map(scene.geometry, light, map)
         if evaluation == "walk":
-            heights = light_heights(shadow_map)
+            heights = inverse_depth_field(shadow_map)
             return with_walls(heights, scene.geometry, light) if walls == "upright" else heights
         return volume_mesh(shadow_map, light, tessellation=tessellation, threshold=threshold)
 
@@ -204,13 +205,13 @@ def _check(map: int, evaluation: str, tessellation: str, threshold: float, surfa
 def _memory_of(light: Light, size: int, evaluation: str) -> int:
     """Return about how much the volume of a light takes, an upper bound where it is adaptive [bytes]."""
     number = bytes_of(type(light.position.x))
-    faces = 6 if light.kind == "point" else 1
+    faces = light_faces(light)
     corners = map_memory(light, size)
     if evaluation == "mesh":
         # Drawing it takes four doubles for each vertex as it is, and four for it in the image.
         return corners + memory_needed(faces, size) + faces * (size + 1) ** 2 * 8 * 8
     # Distances and heights at the corners, four heights and walls a texel, two bounds a node, a gap and sides a leaf.
-    heights = LightHeights(size, None, None, None)
+    heights = InverseDepthField(size, light_projection(light), None, None)
     leaves = 4**heights.finest
     numbers = 4 * size**2 + 2 * level_start(heights.finest + 1) + 2 * leaves
     return 2 * corners + faces * (number * numbers + 4 * leaves + 4 * size**2)

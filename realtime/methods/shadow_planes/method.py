@@ -22,16 +22,14 @@ difference of the two Gammas instead, as the paper does.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from realtime.bounded_media.airlight import FORMS, ambient_radiance, check_form
-from realtime.bounded_media.directional_airlight import ParallelRay
-from realtime.bounded_media.ray_segments import MediaRay
+from realtime.bounded_media.airlight import FORMS, LitRay, ambient_radiance, check_form
 from realtime.errors import InputError
 from realtime.methods.interface.light_airlight import RayAirlight, integral_type, ray_airlight
 from realtime.methods.interface.view import View, rays_in_media
@@ -89,7 +87,7 @@ def prepare_shadow_planes(scene: Scene, **settings) -> PlanePreparation:
         For a parameter out of range, casters without triangles and directional lights.
     """
     _check(**settings)
-    check_places(scene.plan, "shadow-planes")
+    check_places(scene.features, "shadow-planes")
     return PlanePreparation(read_casters(scene.geometry), settings["cone"])
 
 
@@ -102,7 +100,7 @@ def plane_finder(
     """
     position = np.array(light.position, dtype=np.float64).ravel()
     ring = None
-    if cone and light.kind == "spot":
+    if cone and light.cone is not None:
         ring = cone_ring(np.array(light.axis, dtype=np.float64).ravel(), float(light.cos_cutoff[0]), cone)
     seen = None if ring is not None else read_spot(light)
 
@@ -178,15 +176,15 @@ def shadow_planes(
     """
     total = type(view.medium.albedo)(0)
     lit = []
-    in_media: tuple[MediaRay | ParallelRay, ...] = ()
-    if view.plan.bounded:
+    in_media: tuple[LitRay, ...] = ()
+    if view.features.bounded:
         check_form(view.medium, media)
         _check_bounded(evaluation)
         in_media = rays_in_media(view, media)
     for number, light in enumerate(view.lights):
-        if cone and light.kind == "spot" and not light.soft and view.plan.shadows:
-            light = replace(light, kind="point")  # planes bound it
-        if not view.plan.shadows:
+        if cone and light.cone is not None and not light.soft and view.features.shadows:
+            light = light.without_cone()  # planes bound it
+        if not view.features.shadows:
             airlight = ray_airlight(view, light, kernel, in_media[number] if in_media else None)
             total += airlight.radiance(airlight.integral(type(view.distance)(0), view.distance))
             lit.append(True)

@@ -30,7 +30,7 @@ def segments(name, light, phase, *, sigma_t, precision="double"):
     medium = Medium(
         (types.scalar(sigma_t),), types.color(1.0), Phase(kind, g=types.scalar(g) if kind == "hg" else None)
     )
-    lamp = Light("point", False, types.vector(*(float(c) for c in light)), types.color(1.0))
+    lamp = Light(types.vector(*(float(c) for c in light)), types.color(1.0))
     v0, d = types.vector(*start.T), types.vector(*direction.T)
     from realtime.bounded_media.facet_walk import entry_planes
 

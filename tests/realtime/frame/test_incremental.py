@@ -97,6 +97,7 @@ CASES = [
 ]
 
 
+@pytest.mark.claim("kept-frames", tolerance="none: equal bit by bit")
 @pytest.mark.parametrize(("scene", "method", "parameters", "steps"), CASES)
 def test_images_are_those_of_frames_made_afresh(variant, scene, method, parameters, steps):
     renderer, afresh = (made(scene := scene() if callable(scene) else scene, method, **parameters) for _ in range(2))
@@ -125,6 +126,7 @@ def counting(renderer: FrameRenderer, counts: Counter) -> FrameRenderer:
     return replace(renderer, **{name: counted(name) for name in ("prepare", "surface", "shade", "tiles", "airlight")})
 
 
+@pytest.mark.claim("kept-frames")
 @pytest.mark.parametrize(
     ("method", "moved", "ran"),
     [
@@ -165,6 +167,7 @@ def test_what_a_method_of_ones_own_prepares_is_made_anew_unless_it_says_otherwis
     np.testing.assert_allclose(host(renderer, stages)["airlight"], 2 * 0.31, rtol=1e-6)
 
 
+@pytest.mark.claim("frames-are-replayed")
 @pytest.mark.parametrize("tolerance", [0.0, 0.1])
 def test_frames_replay_whatever_moves(variant, tolerance):
     """No stage is recorded again, but for the camera rays, once, where part of Mitsuba's scene is another."""

@@ -39,7 +39,7 @@ def arguments(columns, phase="isotropic", precision="double", *, g=None, values=
     phase = Phase(phase, g=None if g is None else types.scalar(g), values=None if values is None else values(types))
     medium = Medium((c["sigma_t"],), types.color(1), phase)
     geometry = RayGeometry(c["foot"], c["height"], None, None)
-    return geometry, c["x0"], c["x1"], medium, light or Light("point", False, None, None)
+    return geometry, c["x0"], c["x1"], medium, light or Light(None, None)
 
 
 def numbers(value):
@@ -97,6 +97,7 @@ def rho(width, start, singularity):
     return max(abs(z + np.sqrt(z * z - 1 + 0j)), abs(z - np.sqrt(z * z - 1 + 0j)))
 
 
+@pytest.mark.claim("declared-orders")
 @pytest.mark.parametrize("g", [0.0, 0.6, 0.9, -0.8])
 def test_rate_of_convergence_is_the_declared_one(variant, g):
     """Errors of Gamma inside the range, in a vacuum, fall as rho^-N/(N + 1): a simple pole, integrated (g = 0).
@@ -207,8 +208,6 @@ def soft_spot(precision):
     types = array_types(precision)
     cutoff, beam = np.deg2rad(50.0), np.deg2rad(20.0)
     light = Light(
-        "spot",
-        True,
         types.vector(0.1, 0.2, 2.0),
         types.color(1),
         **spot_fields((0, 0, -1), cutoff, beam, types),
@@ -221,13 +220,12 @@ def soft_spot(precision):
 def test_soft_spot(variant, phase):
     from scipy.integrate import quad
 
-    from realtime.rays.ray_light import clip_to_cone
     from realtime.scene.medium import Medium
     from realtime.scene.phase import Phase
 
     types, geometry, light = soft_spot("double")
     medium = Medium((types.scalar(0.4),), types.color(1), Phase(phase))
-    x0, x1 = clip_to_cone(geometry, types.scalar(0, 0), types.scalar(9, 9))
+    x0, x1 = geometry.lit_segment(types.scalar(0, 0), types.scalar(9, 9))
     value = numbers(polynomial(geometry, x0, x1, medium, light, degree=23))
     fit = polynomial_coefficients(geometry, x0, x1, medium, light, degree=23)
     np.testing.assert_allclose(numbers(evaluate(fit, x1)), value, rtol=1e-13)

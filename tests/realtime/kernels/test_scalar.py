@@ -17,7 +17,7 @@ from realtime.scene.lights import Light
 from realtime.scene.medium import Medium
 from realtime.scene.phase import Phase
 
-cases, light, found = read_cases(sys.argv[1]), Light("point", False, None, None), {}
+cases, light, found = read_cases(sys.argv[1]), Light(None, None), {}
 for name, kernel in KERNELS.items():
     found[name] = []
     for k in range(0, 300, 11):

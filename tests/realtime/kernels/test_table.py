@@ -64,6 +64,7 @@ def test_last_column_of_the_published_table():
     assert found == pytest.approx(ci * np.sin(u) + (np.pi / 2 - si) * np.cos(u), rel=1e-12)
 
 
+@pytest.mark.claim("table-edge")
 @pytest.mark.parametrize("precision", ["single", "double"])
 def test_tail_form_on_certified_cases(variant, cases, precision):
     error = relative_error(cases, precision, form="tail")
@@ -74,6 +75,7 @@ def test_tail_form_on_certified_cases(variant, cases, precision):
     assert error[sliver].max() < (0.2 if precision == "single" else 3e-3)
 
 
+@pytest.mark.claim("declared-orders")
 def test_tail_form_converges_as_declared(variant, cases):
     """Like log(size)/size^2: alpha log alpha = 2 b^2 log b has an unbounded second derivative at b = 0."""
     sizes = np.array([16, 32, 64, 128, 256])
@@ -99,6 +101,7 @@ def test_published_form_is_exact_in_vacuum(variant, cases):
     assert relative_error(cases, "double")[cases[1] == "vacuum"].max() < 1e-12
 
 
+@pytest.mark.claim("table-edge")
 def test_published_form_reads_the_edge_beyond_its_table(variant):
     """Beyond u = 10 the value is that of u = 10 times the true prefactor: far too large or small, by what that says."""
     from realtime.kernels.table import table
@@ -157,6 +160,7 @@ def test_refuses_bad_parameters(variant, parameters, message):
         evaluate(table, [ONE], "single", **parameters)
 
 
+@pytest.mark.claim("refused-phase-functions")
 def test_refuses_what_it_cannot_do(variant):
     from realtime.kernels.table import table
     from realtime.scene.lights import Light
@@ -165,7 +169,7 @@ def test_refuses_what_it_cannot_do(variant):
         evaluate(table, [ONE | {"phase": "rayleigh"}], "single")
 
     def with_soft_spot(geometry, x0, x1, medium, light):
-        return table(geometry, x0, x1, medium, Light("spot", True, None, None))
+        return table(geometry, x0, x1, medium, Light(None, None, cone=1, beam=1))
 
     with pytest.raises(InputError, match="kernel table: a spot that falls off"):
         evaluate(with_soft_spot, [ONE], "single")
@@ -185,7 +189,7 @@ def test_frozen_and_in_colour(variant, form, precision):
     from realtime.scene.phase import Phase
 
     types = array_types(precision)
-    light = Light("point", False, None, None)
+    light = Light(None, None)
 
     def kernel(t, h, x0, x1, medium):
         return table(RayGeometry(t, h, None, None), x0, x1, medium, light, form=form, size=31)

@@ -59,7 +59,7 @@ def wrong_ready(view): return 1
 wrong_ready.prepare = 5
 def full(view, *, kernel): return 2
 record = Method("theirs", full, "", "", uses_kernel=False)
-lights = Method("lights", full, "", "", uses_kernel=False, lights_surfaces=lambda settings: True)
+lights = Method("lights", full, "", "", uses_kernel=False, provides_visibility=lambda settings: True)
 """
 
 
@@ -96,6 +96,7 @@ def test_a_built_in_name_gives_the_record_itself():
     assert all(find_method(name) is record for name, record in METHODS.items())
 
 
+@pytest.mark.claim("own-method-parameters")
 def test_the_signature_decides(own):
     found = find_method(f"{own}:calls")
     assert found.uses_kernel
@@ -107,6 +108,7 @@ def test_the_signature_decides(own):
     assert (found.summary, found.source) == ("Divide by zero.", own)
 
 
+@pytest.mark.claim("own-method-results")
 @pytest.mark.parametrize(
     ("name", "wanted"),
     [
@@ -123,11 +125,13 @@ def test_what_is_returned_becomes_an_image(render, name, wanted):
     np.testing.assert_array_equal(render(name), np.broadcast_to(wanted, (12, 16, 3)))
 
 
+@pytest.mark.claim("own-method-parameters")
 def test_parameters_arrive(render):
     assert render("grey", gain=0.75)[0, 0, 0] == 0.75
     assert render("ready", size=5)[3, 4, 1] == 5
 
 
+@pytest.mark.claim("own-method-results")
 @pytest.mark.parametrize(
     ("name", "message"),
     [
@@ -147,6 +151,7 @@ def test_a_wrong_result_is_refused_with_the_name_and_what_came(render, own, name
     assert f"method {own}:{name}: " in str(caught.value)
 
 
+@pytest.mark.claim("own-method-faults")
 def test_an_exception_names_file_and_line(render, own):
     lines = SOURCE.splitlines()
     for name, text, kind in (
@@ -164,6 +169,7 @@ def test_its_own_refusal_stays_as_it_is(render):
         render("refuses")
 
 
+@pytest.mark.claim("own-method-parameters")
 @pytest.mark.parametrize(
     ("name", "message"),
     [
@@ -198,6 +204,7 @@ def test_what_is_not_there_is_refused(name, message):
         find_method(name)
 
 
+@pytest.mark.claim("own-method-faults")
 def test_faults_in_the_file_are_told_with_their_line(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "broken_for_tests.py").write_text("def f(view):\n    return (\n")
@@ -226,6 +233,7 @@ def test_a_file_that_was_changed_is_read_again(own, tmp_path):
     assert find_method(f"{own}:calls").parameters["steps"] == 77
 
 
+@pytest.mark.claim("own-method-frozen")
 def test_only_a_method_that_says_so_is_frozen(own, variant):
     import mitsuba as mi
 

@@ -64,6 +64,7 @@ def test_a_linear_function_is_computed_at_corners_and_along_two_sides(variant):
     assert np.array_equal(computed == 0, inner)
 
 
+@pytest.mark.claim("between-corners")
 @settings(deadline=None, max_examples=60)
 @given(seed=st.integers(0, 2**32 - 1), tolerance=st.sampled_from([1e-3, 5e-3, 0.03]))
 def test_smooth_functions_and_kinks_err_by_the_tolerance_at_most(variant, seed, tolerance):
@@ -85,6 +86,7 @@ def test_smooth_functions_and_kinks_err_by_the_tolerance_at_most(variant, seed, 
     assert np.all(found[computed > 0] == wanted.astype(np.float32)[computed > 0])
 
 
+@pytest.mark.claim("between-corners")
 def test_edges_of_surfaces_and_of_shadows_are_computed(variant):
     """Behind the same airlight: a step in depth, a thin pole between the corners, an edge of the light."""
     columns = np.arange(48)
@@ -96,6 +98,7 @@ def test_edges_of_surfaces_and_of_shadows_are_computed(variant):
     assert {*np.flatnonzero(computed[1] > 0).tolist()} == wanted
 
 
+@pytest.mark.claim("between-corners")
 @pytest.mark.parametrize(
     ("method", "parameters"),
     [("shadow-planes", {}), ("light-volumes", {"map": 64}), ("ray-march", {"steps": 24, "shadow": "ray"})],

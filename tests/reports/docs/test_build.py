@@ -55,6 +55,7 @@ def built(tmp_path_factory):
     return folder
 
 
+@pytest.mark.claim("docs-without-a-network")
 @pytest.mark.slow
 def test_pages_hold_everything_and_load_nothing_from_a_network(built):
     from realtime.kernels.registry import KERNELS
@@ -202,6 +203,7 @@ def test_docstrings_are_shown_as_they_stand(extension):
 # --- what the pages say ----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.claim("errata-of-biri", tolerance="1e-7 relative")
 def test_the_derived_coefficients_of_the_errata_are_those_of_the_program():
     from analytic.phase import PhaseFunction
     from analytic.series import taylor_coefficients
@@ -225,6 +227,7 @@ def _value(formula, a):
     return eval(words, {"a": a})
 
 
+@pytest.mark.claim("kernel-of-the-page")
 def test_the_kernel_of_the_page_on_adding_one(variant, tmp_path, monkeypatch):
     """The snippet is what it says: `equiangular` with twelve steps."""
     import numpy as np

@@ -2,12 +2,15 @@
 import re
 from pathlib import Path
 
+import pytest
+
 from realtime.methods.light_volumes import method as light_volumes
 from realtime.methods.registry import METHODS
 
 DOCUMENT = Path(__file__).resolve().parents[3] / "docs" / "light-volumes.md"
 
 
+@pytest.mark.claim("parameters-of-light-volumes")
 def test_every_parameter_is_explained_with_its_values_and_its_default_first():
     section = DOCUMENT.read_text(encoding="utf-8").split("## The parameters")[1].split("`--kernel`")[0]
     rows = re.findall(r"^\| `(\w+)` \| ([^|]*) \|", section, flags=re.MULTILINE)

@@ -30,7 +30,9 @@ def method(label, error, *, layer="airlight", files=None):
         "method": label.split(" ")[0],
         "refused": None,
         "layer": layer,
-        "times": {"frame": timing(12.5), "moved": timing(25.0)} if layer == "airlight" else None,
+        "times": {"frame": timing(12.5), "light_moved": timing(20.0), "objects_moved": timing(25.0)}
+        if layer == "airlight"
+        else None,
         "error": metrics,
         "files": files or {},
     }
@@ -54,7 +56,7 @@ def published():
         "triangles": 34_549,
         "stages_ms": [1.0, 2.0, 3.0, 4.0, 10.0],
         "shares": [5.0, 10.0, 15.0, 20.0, 50.0],
-        "rebuilt": timing(20.0),
+        "light_moved": timing(20.0),
         "static": timing(10.0),
         "error": {"relative_rmse": 8e-7},
     }
@@ -66,14 +68,14 @@ def published():
         "parameters": [["evaluation", "mesh"]],
         "fps": 230,
     }
-    image = {"entry": entry, "size": [512, 512], "rebuilt": timing(50.0), "error": {"relative_rmse": 0.04}}
+    image = {"entry": entry, "size": [512, 512], "light_moved": timing(50.0), "error": {"relative_rmse": 0.04}}
     view = {
         "published": {"what": "Sponza", "fps": 86, "passes": {}},
         "scene": "colonnade",
         "map": 1024,
         "evaluation": "static",
         "size": [1024, 1024],
-        "rebuilt": None,
+        "light_moved": None,
         "missing": "a frame takes 40 s",
     }
     stages = ["silhouettes", "scene", "airlight of the scene", "sorting", "shadow planes"]
@@ -147,13 +149,14 @@ def test_methods_table_has_units_quartiles_and_what_was_refused(report, tmp_path
     figure_methods_table.plot(tmp_path)
     text = (tmp_path / "methods-table.tex").read_text(encoding="utf-8")
     assert r"\textit{a\_scene}, 32 $\times$ 24, truth known to $4.0\times10^{-11}$" in text
-    assert r"march (steps=8) & $12.5_{-1.2}^{+2.5}$ & $25.0_{-2.5}^{+5.0}$ & $0.020$ & $-0.020$ & $0.060$ \\" in text
-    assert r"engine (total) & -- & -- & $0.10$" in text
-    assert r"refused\_one & \multicolumn{5}{l}{refused} \\" in text
+    times = r"$12.5_{-1.2}^{+2.5}$ & $20.0_{-2.0}^{+4.0}$ & $25.0_{-2.5}^{+5.0}$"
+    assert rf"march (steps=8) & {times} & $0.020$ & $-0.020$ & $0.060$ \\" in text
+    assert r"engine (total) & -- & -- & -- & $0.10$" in text
+    assert r"refused\_one & \multicolumn{6}{l}{refused} \\" in text
     assert "[ms]" in text
     for line in text.splitlines():  # as many cells as columns
         if line.endswith(r"\\") and "multicolumn" not in line:
-            assert line.count("&") == 5
+            assert line.count("&") == 6
 
 
 def test_stages_come_from_the_report_and_add_up(report, tmp_path):

@@ -27,6 +27,7 @@ def test_numbers(value, text):
     assert number(value) == text
 
 
+@pytest.mark.claim("latex-tables")
 def test_a_median_has_the_digits_of_its_quartiles():
     assert with_quartiles(12.347, 12.123, 12.903) == "$12.35_{-0.22}^{+0.56}$"
     assert with_quartiles(144.4, 139.2, 153.7) == "$144.4_{-5.2}^{+9.3}$"
@@ -38,6 +39,7 @@ def test_what_means_something_to_latex_is_escaped():
     assert escape(r"a_b & 50 % of {$x^2$} \n") == (r"a\_b \& 50 \% of \{\$x\textasciicircum{}2\$\} \textbackslash{}n")
 
 
+@pytest.mark.claim("latex-tables")
 def test_tables_have_the_rules_of_booktabs():
     text = table("lr", (("name", "[ms]"),), ["group", ("a", "$1$"), "other", ("b", "$2$")], comment=("why",))
     assert text.splitlines() == [

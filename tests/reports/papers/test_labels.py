@@ -54,7 +54,10 @@ def test_reports_from_before_frames_kept_anything_are_still_shown(folder):
     """Version 2 of the data gained three timings; a report without them has a dash."""
     old = {
         **BIRI,
-        "rows": [{k: v for k, v in row.items() if k not in ("relit", "recoloured", "rays")} for row in BIRI["rows"]],
+        "rows": [
+            {k: v for k, v in row.items() if k not in ("light_moved_camera_kept", "colours_changed", "rays")}
+            for row in BIRI["rows"]
+        ],
     }
     page = shown({"biri": old, "billeter": None}, folder)
     assert set(widths(table_of(page, "Table 2 of Biri"))) == {12}

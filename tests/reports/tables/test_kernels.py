@@ -70,6 +70,7 @@ def test_command_prints_json_with_the_bar(variant, few_laws, capsys):
     assert [one["name"] for one in data["kernels"][0]["sets"]] == [*data["certified"], "generated"]
 
 
+@pytest.mark.claim("exact-keeps-its-bar")
 def test_command_fails_where_the_claim_is_broken(variant, few_laws, monkeypatch, capsys):
     from realtime.kernels.registry import KERNELS
 

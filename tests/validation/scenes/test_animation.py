@@ -75,6 +75,7 @@ def test_nothing_closed_cannot_turn(variant):
         next(animate(scene, Animation(("objects",)), 3))
 
 
+@pytest.mark.claim("frames-are-replayed")
 @pytest.mark.parametrize(
     ("name", "moves"),
     [("sphere-spot", ("light",)), ("clutter", ("light", "colour")), ("open-fog", ("light", "medium", "colour"))],

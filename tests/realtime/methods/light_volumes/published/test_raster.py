@@ -60,6 +60,7 @@ points = st.tuples(coordinates, coordinates, coordinates)
 whole = st.integers(-4, 4)
 
 
+@pytest.mark.claim("signs-add-up", tolerance="none: whole numbers")
 @settings(max_examples=60, deadline=None)
 @given(corners=st.lists(points, min_size=4, max_size=4), eye=points)
 def test_signs_add_up_for_tetrahedra(variant, corners, eye):
@@ -69,6 +70,7 @@ def test_signs_add_up_for_tetrahedra(variant, corners, eye):
     check_signs(tetrahedron(corners), make_camera(eye))
 
 
+@pytest.mark.claim("signs-add-up", tolerance="none: whole numbers")
 @settings(max_examples=60, deadline=None)
 @given(corners=st.lists(st.tuples(whole, whole, whole), min_size=4, max_size=4))
 def test_signs_add_up_where_edges_pass_through_pixel_centres(variant, corners):
@@ -78,6 +80,7 @@ def test_signs_add_up_where_edges_pass_through_pixel_centres(variant, corners):
         check_signs(tetrahedron(corners), simple_camera())
 
 
+@pytest.mark.claim("signs-add-up", tolerance="none: whole numbers")
 @settings(max_examples=60, deadline=None)
 @given(
     inverse=st.lists(st.sampled_from((0.0, 0.05, 0.2, 0.21, 0.5, 4.0)), min_size=36, max_size=36),
@@ -101,6 +104,7 @@ def test_a_camera_in_the_light_and_one_outside(variant):
     assert len(beyond[1]) == WIDTH * HEIGHT
 
 
+@pytest.mark.claim("signs-add-up")
 def test_every_pixel_of_a_shared_edge_belongs_to_one_triangle(variant):
     """A square of two triangles with all edges and the diagonal through pixel centres, as rasterizers are tested."""
     square = np.array([(-3, -2, 1, 1), (2, -2, 1, 1), (2, 3, 1, 1), (-3, 3, 1, 1)], dtype=float)

@@ -43,7 +43,7 @@ def test_sum_over_a_convex_volume_is_one_integral(variant, kind, order):
     assert np.any((end > begin) & (end == 3.1))
     cone = spot_fields(np.array([0.1, 0.2, -1.0]) / np.sqrt(1.05), 0.45, 0.45, array_types("double"))
     arrays = {"position": mi.Vector3d(0.1, 0.2, 1.9), "intensity": mi.Color3d(1)}
-    light = Light(kind, False, **arrays, **(cone if kind == "spot" else {}))
+    light = Light(**arrays, **(cone if kind == "spot" else {}))
     medium = Medium((mi.Float64(0.4),), mi.Color3d(1), Phase("isotropic"))
     geometry = ray_geometry(camera.origin, direction, light, low=low)
     settings: dict[str, Any] = {"medium": medium, "light": light}
@@ -68,7 +68,7 @@ def view_of(scene):
     pixel = mi.UInt32(tiled_pixels(camera.width, camera.height))
     direction = ray_directions(camera, pixel)[0]
     distance = cast_rays(scene.geometry, None, camera.origin, direction).distance
-    parts = {"plan": scene.plan, "geometry": scene.geometry, "medium": scene.medium, "lights": scene.lights}
+    parts = {"features": scene.features, "geometry": scene.geometry, "medium": scene.medium, "lights": scene.lights}
     return frame_view(camera, pixel, distance, **parts, prepared=())
 
 
@@ -117,7 +117,7 @@ def test_light_that_the_rays_pass_closely_leaves_nothing_where_it_is_hidden(vari
     found = {}
     for Float, Vector, Color in ((mi.Float, mi.Vector3f, mi.Color3f), (mi.Float64, mi.Vector3d, mi.Color3d)):
         medium = Medium((Float(0.4),), Color(1), Phase("isotropic"))
-        light = Light("point", False, Vector(0), Color(1))
+        light = Light(Vector(0), Color(1))
         geometry = RayGeometry(Float([2.0]), Float([1e-5]), None, None)
         x = mi.Float64([0.5, 1.5, 2.5, 3.5, 9.0, 9.0])
         sign = mi.Float64([-1, 1, -1, 1, -1, 1])
@@ -141,7 +141,7 @@ def test_no_crossings_no_light(variant):
 
     settings: dict[str, Any] = {
         "medium": Medium((mi.Float(0.4),), mi.Color3f(1), Phase("isotropic")),
-        "light": Light("point", False, mi.Vector3f(0), mi.Color3f(1)),
+        "light": Light(mi.Vector3f(0), mi.Color3f(1)),
         "geometry": RayGeometry(mi.Float([2.0, 3.0]), mi.Float([1.0, 1.0]), None, None),
     }
     assert np.array_equal(crossing_sum([], kernel=exact, distance=mi.Float([5.0, 6.0]), **settings), [0, 0])
