@@ -19,7 +19,8 @@ from typing import Any
 
 import numpy as np
 
-from reference.storage.cache import cache_folder, load_arrays, store_arrays, sweep
+from reference.storage.cache import cache_folder, load_arrays, peek_array, store_arrays, sweep
+from reference.storage.cache_size import make_room
 
 #: Raise this when the meaning of what is kept changes, but not its source.
 GENERATION = 1
@@ -34,7 +35,7 @@ Computed = tuple[dict[str, Any], Mapping[str, bytes]]  # data and files
 
 
 @dataclass(frozen=True)
-class Keeper:
+class ResultCache:
     """What all results of one run have in common."""
 
     fingerprint: Mapping[str, str]  #: of source and versions
@@ -43,7 +44,17 @@ class Keeper:
 
 
 @dataclass(frozen=True)
-class Kept:
+class CacheEntry:
+    """Where a result belongs, and what it must have been made from."""
+
+    key: str
+    fingerprint: str
+    made_by: str  #: digest of source and versions alone, without the scene
+    fresh: bool = False
+
+
+@dataclass(frozen=True)
+class CachedResult:
     """A result, and whether it was there already."""
 
     data: dict[str, Any]
@@ -53,7 +64,7 @@ class Kept:
     cached: bool
 
 
-def keeper(machine: Mapping[str, str], *, more: Sequence[Path] = (), fresh: bool = False) -> Keeper:
+def result_cache(machine: Mapping[str, str], *, more: Sequence[Path] = (), fresh: bool = False) -> ResultCache:
     """Return what all results of a run have in common.
 
     Parameters
@@ -69,7 +80,7 @@ def keeper(machine: Mapping[str, str], *, more: Sequence[Path] = (), fresh: bool
 
     versions = {name: version(name) for name in _PACKAGES}
     source = source_digest([*own_sources(), *more])
-    return Keeper({"source": source, "generation": str(GENERATION)} | versions, dict(machine), fresh)
+    return ResultCache({"source": source, "generation": str(GENERATION)} | versions, dict(machine), fresh)
 
 
 def own_sources() -> list[Path]:
@@ -80,27 +91,20 @@ def own_sources() -> list[Path]:
 def source_digest(paths: Sequence[Path]) -> str:
     """Return a digest of the bytes of some files; where they lie does not matter, their names do."""
     digest = hashlib.sha256()
-    for path in sorted(paths, key=lambda one: (one.parent.name, one.name, str(one))):
+    for path in sorted(paths, key=lambda path: (path.parent.name, path.name, str(path))):
         content = path.read_bytes()
         digest.update(f"{path.parent.name}/{path.name} {len(content)}|".encode() + content)
     return digest.hexdigest()[:32]
 
 
-@dataclass(frozen=True)
-class Slot:
-    """Where a result belongs, and what it must have been made from."""
-
-    key: str
-    fingerprint: str
-    fresh: bool = False
-
-
-def slot(keeper: Keeper, kind: str, *, identity: Mapping[str, Any], fingerprint: Mapping[str, Any]) -> Slot:
+def cache_entry(
+    cache: ResultCache, kind: str, *, identity: Mapping[str, Any], fingerprint: Mapping[str, Any] | None = None
+) -> CacheEntry:
     """Return where a result belongs.
 
     Parameters
     ----------
-    keeper
+    cache
         Of the run.
     kind
         What it is, one word.
@@ -109,42 +113,63 @@ def slot(keeper: Keeper, kind: str, *, identity: Mapping[str, Any], fingerprint:
     fingerprint
         What else its numbers depend on: the content of the scene.
     """
-    key = f"{_FOLDER}/{kind}-{_digest({**identity, 'machine': keeper.machine})}"
-    return Slot(key, _digest({**keeper.fingerprint, **fingerprint}), keeper.fresh)
+    key = f"{_FOLDER}/{kind}-{_digest({**identity, 'machine': cache.machine})}"
+    whole = _digest({**cache.fingerprint, **(fingerprint or {})})
+    return CacheEntry(key, whole, _digest(cache.fingerprint), cache.fresh)
 
 
-def find_kept(place: Slot) -> Kept | None:
-    """Return what is kept there; None where there is nothing, or it was made from something else, or is damaged."""
-    arrays = None if place.fresh else load_arrays(place.key)
+def load_result(entry: CacheEntry) -> CachedResult | None:
+    """Return the result kept there; None where there is none, or it was made from something else, or is damaged."""
+    arrays = None if entry.fresh else load_arrays(entry.key)
     if arrays is None or "about" not in arrays:
         return None
     about = json.loads(arrays.pop("about").tobytes())
-    if about["fingerprint"] != place.fingerprint:
+    if about["fingerprint"] != entry.fingerprint:
         return None
     files = {name.removeprefix(_FILE): content.tobytes() for name, content in arrays.items()}
-    return Kept(about["data"], files, about["measured"], about["seconds"], True)
+    return CachedResult(about["data"], files, about["measured"], about["seconds"], True)
 
 
-def keep(place: Slot, computed: Computed, seconds: float) -> Kept:
+def store_result(entry: CacheEntry, computed: Computed, seconds: float) -> CachedResult:
     """Keep what was computed in so many seconds, in place of what was there."""
     data, files = computed
-    about = {"data": data, "measured": now(), "seconds": round(seconds, 3), "fingerprint": place.fingerprint}
+    about = {"data": data, "measured": now(), "seconds": round(seconds, 3)}
+    about |= {"fingerprint": entry.fingerprint, "made_by": entry.made_by}
     text = json.dumps(about, allow_nan=False)
     arrays = {_FILE + name: _bytes_array(content) for name, content in files.items()}
-    store_arrays(place.key, {"about": _bytes_array(text.encode())} | arrays)
+    make_room()
+    store_arrays(entry.key, {"about": _bytes_array(text.encode())} | arrays)
     # What comes from the disk went through JSON: so does what does not, or two reports would differ in their types.
     about = json.loads(text)
-    return Kept(about["data"], dict(files), about["measured"], about["seconds"], False)
+    return CachedResult(about["data"], dict(files), about["measured"], about["seconds"], False)
 
 
-def kept_result(place: Slot, compute: Callable[[], Computed]) -> Kept:
-    """Return what is kept, or compute and keep it."""
-    found = find_kept(place)
-    if found is not None:
-        return found
+def cached_result(entry: CacheEntry, compute: Callable[[], Computed]) -> CachedResult:
+    """Return the result that is kept, or compute and keep it."""
+    kept = load_result(entry)
+    if kept is not None:
+        return kept
     start = time.monotonic()
     computed = compute()
-    return keep(place, computed, time.monotonic() - start)
+    return store_result(entry, computed, time.monotonic() - start)
+
+
+def expected_seconds(entry: CacheEntry) -> float | None:
+    """Return how long a result will take: none where it is kept, else as long as the last time on this machine.
+
+    Returns
+    -------
+    float or None
+        None where the machine never computed it [s].
+    """
+    about = peek_array(entry.key, "about")
+    if about is None:
+        return None
+    try:
+        kept = json.loads(about.tobytes())
+        return 0.0 if kept["made_by"] == entry.made_by and not entry.fresh else float(kept["seconds"])
+    except (ValueError, KeyError, TypeError, AttributeError):  # damaged
+        return None
 
 
 def now() -> str:
