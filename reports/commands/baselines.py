@@ -51,10 +51,10 @@ def baselines(
     kept = {name: read_baseline(name) for name in names}
     activate()
     found = {}
-    with progress_bar("baselines") as tell:
+    with progress_bar("baselines") as progress:
         for number, name in enumerate(names):
-            told = part_of(tell, number / len(names), (number + 1) / len(names))
-            found[name] = measure_baseline(name, kept=kept[name], times=times, progress=told)
+            step = part_of(progress, number / len(names), (number + 1) / len(names))
+            found[name] = measure_baseline(name, kept=kept[name], times=times, progress=step)
     moves = {name: compare_baseline(kept[name], found[name]) for name in names}
     stray = [] if scenes else stray_baselines(SCENES)
     if update:

@@ -63,10 +63,10 @@ def bench(
     for name in names:  # refuse what cannot be used before an hour of work, not after
         read_scene(load_scene(name, pixels).scene)
     found = []
-    with progress_bar("bench") as tell:
+    with progress_bar("bench") as progress:
         for number, name in enumerate(names):
-            told = part_of(tell, number / len(names), (number + 1) / len(names))
-            found.append(_bench_scene(name, pixels, chosen, margin=margin if truth else None, tell=told))
+            step = part_of(progress, number / len(names), (number + 1) / len(names))
+            found.append(_bench_scene(name, pixels, chosen, margin=margin if truth else None, progress=step))
     if json:
         from reports.machine.environment import describe_environment
 
@@ -77,7 +77,7 @@ def bench(
         raise typer.Exit(1)
 
 
-def _bench_scene(name: str, pixels, chosen, *, margin: float | None, tell) -> dict:
+def _bench_scene(name: str, pixels, chosen, *, margin: float | None, progress) -> dict:
     from reports.data.serialize import measurement_data, plain
     from reports.machine.progress import counted, part_of
     from validation.estimates.agreement import agreements
@@ -88,8 +88,8 @@ def _bench_scene(name: str, pixels, chosen, *, margin: float | None, tell) -> di
     loaded = load_scene(name, pixels)
     share = 1.0 if margin is None else 0.6
     rows, camera = [], None
-    tell(0.0, f"{loaded.name}: the truth")
-    for scene, measured in run(loaded, chosen, progress=counted(part_of(tell, 0.0, share))):
+    progress(0.0, f"{loaded.name}: the truth")
+    for scene, measured in run(loaded, chosen, progress=counted(part_of(progress, 0.0, share))):
         rows.append(measurement_data(measured))
         camera = scene.camera
     agreed = {}
@@ -100,7 +100,7 @@ def _bench_scene(name: str, pixels, chosen, *, margin: float | None, tell) -> di
                 load_scene(name, (160, 120)).scene,
                 margins,
                 batches=_BATCHES,
-                progress=part_of(tell, share, 1.0),
+                progress=part_of(progress, share, 1.0),
             )
         )
     size = [camera.width, camera.height] if camera else None
@@ -120,8 +120,8 @@ def _bench_kernels(names: list[str] | None, *, json: bool, markdown: bool) -> No
 
     wanted = [split_name(name)[0].name for name in names] if names else list(KERNELS)
     activate()
-    with progress_bar("bench") as tell:
-        found = bench_kernels(names, progress=counted(tell))
+    with progress_bar("bench") as progress:
+        found = bench_kernels(names, progress=counted(progress))
         rates = [convergence(name) for name in declared() if name in wanted]
     if json:
         from reports.data.serialize import plain
@@ -152,9 +152,9 @@ def _bench_estimators(scenes: list[str] | None, *, size: str | None, json: bool)
     if not scenes:
         loaded = {"open-fog, optical depth 0.2": thin_fog(pixels)} | loaded
     found = {}
-    with progress_bar("bench") as tell:
+    with progress_bar("bench") as progress:
         for number, (name, scene) in enumerate(loaded.items()):
-            tell(number / len(loaded), name)
+            progress(number / len(loaded), name)
             found[name] = scene_efficiency(scene)
     if json:
         from reports.data.serialize import plain

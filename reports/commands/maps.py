@@ -52,7 +52,7 @@ def maps(
     for one in loaded:  # refuse what cannot be used, or does not fit into the memory, before any work, not after
         prepared(read_scene(one.scene), largest)
     found = []
-    with progress_bar("maps") as tell:
+    with progress_bar("maps") as progress:
         for number, one in enumerate(loaded):
             studies: list[Any] = [partial(map_errors, one.scene, method)]
             if flicker:
@@ -60,8 +60,8 @@ def maps(
                 studies.append(partial(map_flicker, one.scene, method, **moves))
             results = []
             for study in studies:
-                told = part_of(tell, number / len(loaded), (number + 1) / len(loaded), before=f"{one.name}, ")
-                results.append(study(kernel=kernel, parameters=parameters, sizes=texels, progress=counted(told)))
+                part = part_of(progress, number / len(loaded), (number + 1) / len(loaded), before=f"{one.name}, ")
+                results.append(study(kernel=kernel, parameters=parameters, sizes=texels, progress=counted(part)))
             found.append((one.name, results[0], results[1] if flicker else None))
     if json:
         scenes_data = [{"name": name} | map_data(errors, moving) for name, errors, moving in found]

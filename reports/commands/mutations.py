@@ -35,8 +35,8 @@ def mutations(
 
     chosen, pixels = chosen_mutations(names), parse_size(size)
     activate()
-    with progress_bar("mutations") as tell:
-        found = study_mutations(chosen, size=pixels, margin=margin, progress=tell)
+    with progress_bar("mutations") as progress:
+        found = study_mutations(chosen, size=pixels, margin=margin, progress=progress)
     if json:
         from reports.data.serialize import plain
 

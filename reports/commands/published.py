@@ -58,13 +58,13 @@ def published(
     sizes = parse_map_sizes("--maps", maps)
     activate()
     data: dict[str, Any] = {"environment": describe_environment()} if json else {}
-    with progress_bar("published") as tell:
+    with progress_bar("published") as progress:
         measured = []
         for one in papers:
             if one == "biri":
-                found = _biri(wanted, names, scale=scale, needless=needless, tell=tell)
+                found = _biri(wanted, names, scale=scale, needless=needless, progress=progress)
             else:
-                found = _billeter(wanted, names[0], scale=scale, maps=sizes, limit=limit, tell=tell)
+                found = _billeter(wanted, names[0], scale=scale, maps=sizes, limit=limit, progress=progress)
             if found is not None:
                 measured.append(found)
     for as_data, show in measured:
@@ -95,7 +95,7 @@ def _wanted_scenes(scenes: str | None, papers: Sequence[str]) -> list[str]:
     return wanted
 
 
-def _biri(wanted: Sequence[str], kernels: Sequence[str], *, scale: float, needless: bool, tell) -> tuple | None:
+def _biri(wanted: Sequence[str], kernels: Sequence[str], *, scale: float, needless: bool, progress) -> tuple | None:
     """Measure the tables of Biri 2006; return the functions that make data of them and print."""
     from reports.papers.biri import print_biri, rows_data
     from validation.frames.zero_cost import zero_costs
@@ -104,15 +104,15 @@ def _biri(wanted: Sequence[str], kernels: Sequence[str], *, scale: float, needle
     chosen = [one for one in PUBLISHED if one.scene in wanted]
     if not chosen:
         return None
-    rows = biri_rows(chosen, kernels, scale=scale, progress=tell)
+    rows = biri_rows(chosen, kernels, scale=scale, progress=progress)
     if needless:
-        tell(0.99, "what is not needed")
+        progress(0.99, "what is not needed")
     costs = zero_costs(size=(round(800 * scale), round(600 * scale))) if needless else []
     return lambda: rows_data(rows, costs), lambda markdown: print_biri(rows, costs, markdown=markdown)
 
 
 def _billeter(
-    wanted: Sequence[str], kernel: str, *, scale: float, maps: Sequence[int], limit: float, tell: Callable
+    wanted: Sequence[str], kernel: str, *, scale: float, maps: Sequence[int], limit: float, progress: Callable
 ) -> tuple | None:
     """Measure the figures and the table of Billeter 2010; return the functions that make data of both and print."""
     from reports.papers.billeter import billeter_data, print_billeter
@@ -127,10 +127,10 @@ def _billeter(
     size = (max(1, round(scale * SIZE[0])), max(1, round(scale * SIZE[1])))
 
     def first(done: float, what: str) -> None:
-        tell(share * done, what)
+        progress(share * done, what)
 
     def second(done: float, what: str) -> None:
-        tell(share + (1 - share) * done, what)
+        progress(share + (1 - share) * done, what)
 
     figures = figure_rows(images, kernel=kernel, size=size, limit=limit, progress=first)
     table = table_rows(views, maps=maps, kernel=kernel, size=size, limit=limit, progress=second)

@@ -154,8 +154,10 @@ def _render_frames(loaded, scene, chosen, *, frames: int, animate: str | None, o
     if animate is not None:
         animation = replace(animation, moves=parse_moves(animate))
     renderer = _prepared(scene, chosen)
-    with progress_bar(f"{loaded.name}: {frames} frames") as tell:
-        found = write_frames(loaded.name, renderer, chosen, animation, frames=frames, outputs=outputs, tell=tell)
+    with progress_bar(f"{loaded.name}: {frames} frames") as progress:
+        found = write_frames(
+            loaded.name, renderer, chosen, animation, frames=frames, outputs=outputs, progress=progress
+        )
     size = [scene.camera.width, scene.camera.height]
     return {"scene": loaded.name, "method": chosen.label, "size": size} | found
 

@@ -29,10 +29,10 @@ def stability(
 
     names = None if kernels is None else [name.strip() for name in kernels.split(",") if name.strip()]
     activate()
-    with progress_bar("stability") as tell:
-        found = run(names, count=rays, progress=lambda done, total, what: tell(0.9 * done / total, what))
+    with progress_bar("stability") as progress:
+        found = run(names, count=rays, progress=lambda done, total, what: progress(0.9 * done / total, what))
         wanted = names is None or "exact" in names
-        planes = plane_stability(progress=lambda n, m, what: tell(0.9 + 0.1 * n / m, what)) if wanted else []
+        planes = plane_stability(progress=lambda n, m, what: progress(0.9 + 0.1 * n / m, what)) if wanted else []
     broken_planes = broken(planes)
     certified = [path.name for path in certified_files()]
     if json:

@@ -51,8 +51,8 @@ def measured_papers(quick: bool, progress: Callable[[float, str], None] | None) 
     biri = rows_data(biri_rows(scale=scale, seconds=seconds, progress=part_of(progress, 0.0, 0.3)), [])
     figures = figure_rows(size=size, seconds=seconds, limit=_LIMIT, progress=part_of(progress, 0.3, 0.6))
     maps = MAPS[:1] if quick else MAPS
-    told = part_of(progress, 0.6, 1.0)
-    views = table_rows(maps=maps, size=size, seconds=seconds, limit=_LIMIT, progress=told)
+    step = part_of(progress, 0.6, 1.0)
+    views = table_rows(maps=maps, size=size, seconds=seconds, limit=_LIMIT, progress=step)
     return {"biri": biri, "billeter": billeter_data(figures, views)}
 
 
