@@ -8,7 +8,9 @@ import pytest
 from mpmath import exp, mpf, workdps
 
 import analytic.certified as module
-from analytic import InputError, PhaseFunction, integrate_certified, isotropic_closed_form
+from analytic.certified import integrate_certified, isotropic_closed_form
+from analytic.errors import InputError
+from analytic.phase import PhaseFunction
 
 ISOTROPIC = PhaseFunction("isotropic")
 

@@ -4,7 +4,7 @@
 import pytest
 from flint import arb, ctx
 
-from analytic import integrate_certified
+from analytic.certified import integrate_certified
 from analytic.phase import PhaseFunction
 from tests.data.airlight_integral import FILES, digits, enclosure, read, value
 

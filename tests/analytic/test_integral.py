@@ -6,14 +6,10 @@ import math
 import numpy as np
 import pytest
 
-from analytic import (
-    InputError,
-    PhaseFunction,
-    integrate_angle,
-    integrate_distance,
-    integrate_path,
-    read_cases,
-)
+from analytic.cases import read_cases
+from analytic.errors import InputError
+from analytic.integral import integrate_angle, integrate_distance, integrate_path
+from analytic.phase import PhaseFunction
 
 FORMS = [integrate_distance, integrate_angle, integrate_path]
 ISOTROPIC = PhaseFunction("isotropic")

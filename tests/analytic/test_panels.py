@@ -8,7 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from analytic import InputError, PhaseFunction, airlight_segments, integrate_cases, integrate_distance, read_cases
+from analytic.cases import integrate_cases, read_cases
+from analytic.errors import InputError
+from analytic.integral import integrate_distance
+from analytic.panels import airlight_segments
+from analytic.phase import PhaseFunction
 
 ISOTROPIC = PhaseFunction("isotropic")
 PHASES = [

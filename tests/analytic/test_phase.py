@@ -4,7 +4,8 @@
 import numpy as np
 import pytest
 
-from analytic import InputError, PhaseFunction
+from analytic.errors import InputError
+from analytic.phase import PhaseFunction
 
 SMOOTH = [
     PhaseFunction("isotropic"),

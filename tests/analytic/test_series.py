@@ -4,7 +4,9 @@
 import numpy as np
 import pytest
 
-from analytic import InputError, PhaseFunction, taylor_coefficients
+from analytic.errors import InputError
+from analytic.phase import PhaseFunction
+from analytic.series import taylor_coefficients
 
 PHASES = [
     PhaseFunction("isotropic"),

@@ -4,7 +4,8 @@ import csv
 import numpy as np
 import pytest
 
-from analytic import PhaseFunction, airlight_segments
+from analytic.panels import airlight_segments
+from analytic.phase import PhaseFunction
 from realtime.errors import InputError
 from realtime.kernels.polynomial import _nodes, polynomial
 from tests.helpers.ray_polynomial import _antiderivative, evaluate, evaluate_segment, polynomial_coefficients

@@ -2,7 +2,8 @@
 import numpy as np
 import pytest
 
-from analytic import PhaseFunction, taylor_coefficients
+from analytic.phase import PhaseFunction
+from analytic.series import taylor_coefficients
 from realtime.errors import InputError
 from realtime.kernels.taylor import taylor
 from realtime.kernels.taylor_printed import PRINTED_PHASES, printed_coefficients, taylor_printed
