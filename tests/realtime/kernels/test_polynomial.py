@@ -7,14 +7,8 @@ import pytest
 from analytic.panels import airlight_segments
 from analytic.phase import PhaseFunction
 from realtime.errors import InputError
-from realtime.kernels.polynomial import (
-    _antiderivative,
-    _nodes,
-    evaluate,
-    evaluate_segment,
-    polynomial,
-    polynomial_coefficients,
-)
+from realtime.kernels.polynomial import _nodes, polynomial
+from tests.helpers.ray_polynomial import _antiderivative, evaluate, evaluate_segment, polynomial_coefficients
 
 PHASES = ("isotropic", "rayleigh", "hazy", "murky", "hg")
 RAY = {"foot": 1.3, "height": 0.7, "x0": 0.0, "x1": 2.9, "sigma_t": 0.43}
