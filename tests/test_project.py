@@ -148,6 +148,66 @@ def test_no_test_sets_a_variant_that_another_runs_in():
     assert not {(name, given) for name, given in setters if given in VARIANTS}
 
 
+def _asserts(node: ast.AST, helpers: set[str]) -> bool:
+    for inner in ast.walk(node):
+        if isinstance(inner, ast.Assert):
+            return True
+        if isinstance(inner, ast.Call):
+            name = ast.unparse(inner.func)
+            if name.startswith(("pytest.raises", "pytest.warns", "np.testing.assert_")) or name in helpers:
+                return True
+    return False
+
+
+def faults_of_tests(trees: dict[str, ast.Module]) -> list[str]:
+    """Name tests without an assertion, tests that end by a return, and skips without a condition or a reason."""
+    functions = [(name, node) for name, tree in trees.items() for node in ast.walk(tree)]
+    functions = [(name, node) for name, node in functions if isinstance(node, ast.FunctionDef)]
+    helpers: set[str] = set()
+    while more := {node.name for _, node in functions if _asserts(node, helpers)} - helpers:
+        helpers |= more
+    faults = []
+    for name, node in functions:
+        if node.name.startswith("test_"):
+            faults += [] if _asserts(node, helpers) else [f"{name}: {node.name} asserts nothing"]
+            returns = [inner for inner in ast.walk(node) if isinstance(inner, ast.Return) and inner.value is None]
+            faults += [f"{name}: {node.name} returns; `assume` or `pytest.skip` would say so"] if returns else []
+        for statement in node.body:
+            call = statement.value if isinstance(statement, ast.Expr) else None
+            if isinstance(call, ast.Call) and ast.unparse(call.func) == "pytest.skip":
+                faults.append(f"{name}: {node.name} is skipped without a condition")
+    for name, tree in trees.items():
+        for call in (node for node in ast.walk(tree) if isinstance(node, ast.Call)):
+            what, given = ast.unparse(call.func), {word.arg for word in call.keywords}
+            if what == "pytest.mark.skip" or (what == "pytest.skip" and not call.args):
+                faults.append(f"{name}: {what} without a condition or a reason")
+            if what in ("pytest.mark.skipif", "pytest.mark.xfail", "pytest.importorskip") and "reason" not in given:
+                faults.append(f"{name}: {what} without a reason")
+    return faults
+
+
+def test_tests_can_fail_and_say_why_they_are_skipped():
+    paths = sorted((ROOT / "tests").rglob("*.py"))
+    assert faults_of_tests({str(path.relative_to(ROOT)): ast.parse(path.read_text()) for path in paths}) == []
+
+
+def test_faults_of_tests_are_found():
+    source = (
+        "def check(x):\n    assert x\n"
+        "def test_good():\n    check(1)\n"
+        "def test_empty():\n    print(1)\n"
+        "def test_early(x):\n    if x: return\n    assert x\n"
+        "def test_never():\n    pytest.skip('later')\n    assert 0\n"
+        "@pytest.mark.skipif(True)\ndef test_silent():\n    assert 0\n"
+    )
+    assert faults_of_tests({"a": ast.parse(source)}) == [
+        "a: test_empty asserts nothing",
+        "a: test_early returns; `assume` or `pytest.skip` would say so",
+        "a: test_never is skipped without a condition",
+        "a: pytest.mark.skipif without a reason",
+    ]
+
+
 def test_importing_everything_sets_no_variant():
     names = [".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__") for path in MODULES]
     code = f"import importlib\nfor name in {names!r}: importlib.import_module(name)\n"
