@@ -7,7 +7,7 @@ from typing import Any
 from reports.data.serialize import mutations_data, plain
 from reports.machine.progress import counted, part_of
 from reports.papers.billeter import billeter_data
-from reports.papers.biri import rows_data
+from reports.papers.biri import biri_data
 from validation.frames.result_cache import Computed, Keeper, Kept, kept_result, slot
 from validation.frames.scene_study import Effort
 
@@ -70,7 +70,7 @@ def _biri(effort: Effort, scenes: Sequence[str], keeper: Keeper, results: list[K
 
         def compute(one=one, share=share, width=width) -> Computed:
             told = part_of(tell, share, share + width, before="Biri 2006, ")
-            return rows_data(biri_rows([one], kernels, seconds=seconds, progress=told), []), {}
+            return biri_data(biri_rows([one], kernels, seconds=seconds, progress=told), []), {}
 
         identity = {"scene": one.scene, "size": one.size, "kernels": kernels, "seconds": seconds}
         results.append(kept_result(slot(keeper, "biri", identity=identity, fingerprint={}), compute))
