@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import copy
 
-from reports.data.claims import claims, confirmed, unstudied, verdict
+from reports.data.claims import claims, confirmed, unstudied
+from reports.tables.agreement import verdict
 
 
 def timing(median):
