@@ -1,19 +1,23 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The ground truth: images of single scattering, each with its own error.
 
-Three estimators share no derivation. `quadrature` sums certified integrals over exact lit intervals in float64.
-`single-scatter` samples the same integral as a Mitsuba integrator of our own. `volpath` is Mitsuba's volumetric path
-tracer, which others wrote. The last two run in batches; the spread of the batches gives the standard error.
+Three estimators lead to it. `quadrature` finds the lit intervals of every camera ray by exact geometry or by ray
+casting and sums airlight integrals over them in float64. `monte_carlo.single_scatter` samples the same integral as an
+integrator of Mitsuba. `monte_carlo.volpath` runs Mitsuba's volumetric path tracer, which nobody here wrote.
+
+None of the three imports another. What two of them share is the reading of the scene (`scene`: coefficients, lights,
+the rays through pixel centres, as Mitsuba gives them), the class of errors for the user, and between the two that
+sample the means over batches. Reading a scene is no derivation; all that is derived from these facts, from the planes
+of directional lights to the crossings of bounds, belongs to one estimator alone. `tests/test_independence.py` follows
+all imports to their end and holds this list.
 
 Read in this order:
 
-- `storage/`: files written whole or not at all, layered EXR images, and the cache of finished references;
-- `scene/`: a Mitsuba scene as NumPy arrays in float64: camera rays, lights, shapes, bounds of media;
-- `visibility/`: the lit intervals of camera rays, by exact geometry or by cast rays, and their random checks;
-- `quadrature/`: the estimator `quadrature`: integrals over the lit intervals, with a bound in every pixel;
-- `monte_carlo/`: batches and their allocation, with the estimators `single_scatter/` and `volpath/`.
-
-`quadrature/`, `single_scatter/` and `volpath/` import nothing of one another.
+- `storage`: files written whole, layered OpenEXR images, and the cache of finished references;
+- `scene`: a Mitsuba scene read as numbers;
+- `visibility`: which parts of camera rays a light reaches;
+- `quadrature`: the first estimator;
+- `monte_carlo`: the other two, and batches of samples.
 
 May import: `analytic`.
 """

@@ -57,7 +57,6 @@ from realtime.numerics.gauss_legendre import unit_nodes
 from realtime.rays.ray_light import distance_to_light, falloff, ray_geometry, smooth_subsegments
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium, least_extinction
-from realtime.scene.phase import evaluate
 
 FORMS = ("exact", "paper")
 _NODES, _NODES_PAPER = 24, 6
@@ -223,7 +222,7 @@ def _node_count(ray: MediaRay, piece: Piece, *, single: bool) -> int:
 def _scattered(ray: MediaRay, piece: Piece, transmittance: list[Any], x, r):
     """Return albedo sigma p and the spot's profile times a transmittance, as a colour."""
     Color = type(ray.medium.albedo)
-    weight = evaluate(piece.medium.phase, (ray.geometry.foot - x) / r)
+    weight = piece.medium.phase.evaluate((ray.geometry.foot - x) / r)
     if ray.light.soft:
         weight = weight * falloff(ray.geometry, ray.light, x)
     channels = [sigma * weight * value for sigma, value in zip(piece.medium.sigma_t, transmittance)]

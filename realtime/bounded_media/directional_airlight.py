@@ -35,7 +35,6 @@ from realtime.numerics.fast_exp import exp_bounded
 from realtime.numerics.gauss_legendre import unit_nodes
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium, least_extinction
-from realtime.scene.phase import evaluate_half
 
 _FEW_PLANES = 12  # whose bends are worth the search for them
 _NODES, _NODES_DOUBLE = 10, 24
@@ -179,7 +178,7 @@ def _weight(ray: ParallelRay, piece: Piece):
     """Return albedo sigma p, as a colour [1/m]."""
     down = 0.25 * dr.squared_norm(ray.light.axis + ray.direction)
     up = 0.25 * dr.squared_norm(ray.light.axis - ray.direction)
-    phase = evaluate_half(piece.medium.phase, down, up)
+    phase = piece.medium.phase.evaluate_half(down, up)
     return piece.medium.albedo * type(ray.medium.albedo)(*(sigma * phase for sigma in piece.medium.sigma_t))
 
 

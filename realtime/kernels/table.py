@@ -89,7 +89,7 @@ def table(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, form: 
         raise InputError(f"form: got {form!r}, wanted one of {', '.join(FORMS)}")
     if not isinstance(size, int) or not 2 <= size <= _LARGEST_SIZE:
         raise InputError(f"size: got {size!r}, wanted a whole number from 2 to {_LARGEST_SIZE}")
-    if medium.phase.name != "isotropic":
+    if not medium.phase.constant:
         raise InputError(
             f"kernel table: phase function {medium.phase.name!r} is not tabulated; use the kernel 'quadrature' or an "
             "isotropic medium"

@@ -24,7 +24,6 @@ from realtime.methods.interface.view import View, bounded_radiance, radiance, ra
 from realtime.rays.ray_light import RayGeometry, distance_to_light, falloff, ray_geometry
 from realtime.scene.lights import Light
 from realtime.scene.medium import least_extinction, per_extinction
-from realtime.scene.phase import evaluate
 from realtime.scene.read_scene import Scene
 from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, check_size, lit_in_map, map_memory
 
@@ -152,7 +151,7 @@ def _march(
         if media:
             term = weight * media.source(x)
             return index + 1, total + dr.select((width > 0) & lit(point), term, 0)
-        weight *= evaluate(medium.phase, (foot - x) / r)
+        weight *= medium.phase.evaluate((foot - x) / r)
         if light.soft:
             weight *= falloff(geometry, light, x)
         term = per_extinction(medium, lambda sigma_t: weight * dr.exp(-sigma_t * (x + r)))

@@ -154,8 +154,8 @@ def telling(progress: Progress, title: str) -> Iterator[Callable[[float, str], N
     if progress is True:
         from reports.machine.progress import progress_bar
 
-        with progress_bar(title) as tell:
-            yield tell
+        with progress_bar(title) as callback:
+            yield callback
     elif callable(progress):
         yield progress
     else:

@@ -21,7 +21,7 @@ from numpy.typing import DTypeLike, NDArray
 from analytic.errors import InputError
 from reference.storage.exr import TOTAL, Image
 from reference.storage.exr import layer as image_layer
-from reports.tables.terminal import number
+from reports.tables.table import number
 from validation.configurations.timing import FrameTimes
 
 Array = NDArray[np.floating]

@@ -157,16 +157,16 @@ def bench(
     loaded = [opened(one, size) for one in several(scenes)]
     read = [read_scene(one.scene) for one in loaded]  # refuse what cannot be used before the work begins
     rows = []
-    with telling(progress, "bench") as tell:
+    with telling(progress, "bench") as callback:
         for number, (one, scene) in enumerate(zip(loaded, read)):
-            tell(number / len(loaded), f"{one.name}: the truth")
+            callback(number / len(loaded), f"{one.name}: the truth")
             truth = truth_image(one.scene)
             useful = configurations_for(scene.features, chosen)
             for place, each in enumerate(useful):
-                tell((number + place / len(useful)) / len(loaded), f"{one.name}: {each.label}")
+                callback((number + place / len(useful)) / len(loaded), f"{one.name}: {each.label}")
                 measured = measure(scene, each, truth=truth, seconds=seconds, with_flip=flip)
                 rows.append({"scene": one.name, **_size(scene), **_numbers(measured)})
-        tell(1.0, "done")
+        callback(1.0, "done")
     return BenchTable(rows=tuple(rows), environment=describe_environment())
 
 

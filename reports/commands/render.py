@@ -154,23 +154,23 @@ def _render_frames(loaded, scene, chosen, *, frames: int, animate: str | None, o
     if animate is not None:
         animation = replace(animation, moves=parse_moves(animate))
     renderer = _prepared(scene, chosen)
-    with progress_bar(f"{loaded.name}: {frames} frames") as tell:
-        found = write_frames(loaded.name, renderer, chosen, animation, frames=frames, outputs=outputs, tell=tell)
+    with progress_bar(f"{loaded.name}: {frames} frames") as progress:
+        found = write_frames(
+            loaded.name, renderer, chosen, animation, frames=frames, outputs=outputs, progress=progress
+        )
     size = [scene.camera.width, scene.camera.height]
     return {"scene": loaded.name, "method": chosen.label, "size": size} | found
 
 
 def _print_times(times: dict[str, Any], variant: str, *, json: bool) -> None:
-    from reports.tables.bench import rate
+    from reports.tables.methods import rate_words
     from reports.tables.terminal import print_json
 
     if json:
         print_json(times | {"device": variant})
         return
     stages = ", ".join(f"{stage['name']} {stage['ms']:.3g} ms" for stage in times["stages"])
-    print(
-        f"{times['scene']}, {times['method']}: {times['frame_ms']:.3g} ms a frame ({rate(times['frame_ms'])} frames/s)"
-    )
+    print(f"{times['scene']}, {times['method']}: {times['frame_ms']:.3g} ms a frame ({rate_words(times['frame_ms'])})")
     print(
         f"  {stages}; {times['light_moved_ms']:.3g} ms after the light moved, {times['objects_moved_ms']:.3g} ms after "
         "objects moved"
@@ -183,7 +183,7 @@ def _print_times(times: dict[str, Any], variant: str, *, json: bool) -> None:
 
 
 def _print_frames(found: dict[str, Any], variant: str, *, json: bool) -> None:
-    from reports.tables.bench import rate
+    from reports.tables.methods import rate_words
     from reports.tables.terminal import print_json
 
     if json:
@@ -193,6 +193,6 @@ def _print_frames(found: dict[str, Any], variant: str, *, json: bool) -> None:
     print(f"{found['scene']}, {found['method']}: {found['frames']} frames, {' and '.join(found['moves'])} moving")
     print(f"  {found['files'][0]} to {found['files'][-1]}")
     print(
-        f"  {found['frame_ms']:.3g} ms a frame ({rate(found['frame_ms'])} frames/s): {move:.3g} ms to move, "
+        f"  {found['frame_ms']:.3g} ms a frame ({rate_words(found['frame_ms'])}): {move:.3g} ms to move, "
         f"{rendered:.3g} ms to render, keeping what stood still; {variant}"
     )

@@ -32,7 +32,7 @@ def numbered(path: Path, number: int, frames: int) -> Path:
 
 
 def write_frames(
-    name: str, renderer, chosen, animation, *, frames: int, outputs: dict[str, Path | None], tell: Progress
+    name: str, renderer, chosen, animation, *, frames: int, outputs: dict[str, Path | None], progress: Progress
 ) -> dict[str, Any]:
     """Render the frames of an animation, write them and return what they cost.
 
@@ -46,7 +46,7 @@ def write_frames(
         How many.
     outputs
         The paths that were asked for, as 'exr' and 'png'; frames get their number before the suffix.
-    tell
+    progress
         Told the share done and what was written last.
 
     Raises
@@ -74,7 +74,7 @@ def write_frames(
             numbers = {kind: path and numbered(path, number, frames) for kind, path in outputs.items()}
             factor = write_frame(name, chosen, frame, outputs=numbers, factor=factor)
             done = number
-            tell(number / frames, f"frame {number} of {frames}")
+            progress(number / frames, f"frame {number} of {frames}")
             start = time.perf_counter()
     except KeyboardInterrupt:
         raise Interrupted(_kept(outputs, done, frames)) from None

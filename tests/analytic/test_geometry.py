@@ -7,16 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from analytic.errors import InputError
-from analytic.geometry import (
-    foot_and_height,
-    path_length,
-    theta_of_w,
-    theta_of_x,
-    w_of_theta,
-    w_of_x,
-    x_of_theta,
-    x_of_w,
-)
+from analytic.geometry import foot_and_height, path_length
+from tests.helpers.changes_of_variables import theta_of_w, theta_of_x, w_of_theta, w_of_x, x_of_theta, x_of_w
 
 EPSILON = np.finfo(float).eps
 

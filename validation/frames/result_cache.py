@@ -19,7 +19,8 @@ from typing import Any
 
 import numpy as np
 
-from reference.storage.cache import cache_folder, load_arrays, store_arrays, sweep
+from reference.storage.cache import cache_folder, load_arrays, peek_array, store_arrays, sweep
+from reference.storage.cache_size import make_room
 
 #: Raise this number when kept results change their meaning without a change of the source code.
 GENERATION = 1
@@ -34,7 +35,7 @@ Computed = tuple[dict[str, Any], Mapping[str, bytes]]  # data and files
 
 
 @dataclass(frozen=True)
-class Keeper:
+class ResultCache:
     """What all results of one run have in common."""
 
     fingerprint: Mapping[str, str]  #: of the source code and the versions
@@ -43,8 +44,18 @@ class Keeper:
 
 
 @dataclass(frozen=True)
-class Kept:
-    """A result, and whether it came from the disk."""
+class CacheEntry:
+    """Where a result belongs, and what it must have been made from."""
+
+    key: str
+    fingerprint: str
+    made_by: str  #: digest of source and versions alone, without the scene
+    fresh: bool = False
+
+
+@dataclass(frozen=True)
+class CachedResult:
+    """A result, and whether it was there already."""
 
     data: dict[str, Any]
     files: Mapping[str, bytes] = field(repr=False)
@@ -53,8 +64,8 @@ class Kept:
     cached: bool
 
 
-def keeper(machine: Mapping[str, str], *, more: Sequence[Path] = (), fresh: bool = False) -> Keeper:
-    """Return the common part of the fingerprints of a run.
+def result_cache(machine: Mapping[str, str], *, more: Sequence[Path] = (), fresh: bool = False) -> ResultCache:
+    """Return what all results of a run have in common.
 
     Parameters
     ----------
@@ -69,7 +80,7 @@ def keeper(machine: Mapping[str, str], *, more: Sequence[Path] = (), fresh: bool
 
     versions = {name: version(name) for name in _PACKAGES}
     source = source_digest([*own_sources(), *more])
-    return Keeper({"source": source, "generation": str(GENERATION)} | versions, dict(machine), fresh)
+    return ResultCache({"source": source, "generation": str(GENERATION)} | versions, dict(machine), fresh)
 
 
 def own_sources() -> list[Path]:
@@ -86,22 +97,15 @@ def source_digest(paths: Sequence[Path]) -> str:
     return digest.hexdigest()[:32]
 
 
-@dataclass(frozen=True)
-class Slot:
-    """The place of a result in the cache, and the fingerprint that makes it valid."""
-
-    key: str
-    fingerprint: str
-    fresh: bool = False
-
-
-def slot(keeper: Keeper, kind: str, *, identity: Mapping[str, Any], fingerprint: Mapping[str, Any]) -> Slot:
-    """Return the place of a result in the cache.
+def cache_entry(
+    cache: ResultCache, kind: str, *, identity: Mapping[str, Any], fingerprint: Mapping[str, Any] | None = None
+) -> CacheEntry:
+    """Return where a result belongs.
 
     Parameters
     ----------
-    keeper
-        Common part of the run.
+    cache
+        Of the run.
     kind
         One word, such as 'method' or 'truth'.
     identity
@@ -109,42 +113,63 @@ def slot(keeper: Keeper, kind: str, *, identity: Mapping[str, Any], fingerprint:
     fingerprint
         What else the numbers depend on, such as the content of the scene.
     """
-    key = f"{_FOLDER}/{kind}-{_digest({**identity, 'machine': keeper.machine})}"
-    return Slot(key, _digest({**keeper.fingerprint, **fingerprint}), keeper.fresh)
+    key = f"{_FOLDER}/{kind}-{_digest({**identity, 'machine': cache.machine})}"
+    whole = _digest({**cache.fingerprint, **(fingerprint or {})})
+    return CacheEntry(key, whole, _digest(cache.fingerprint), cache.fresh)
 
 
-def find_kept(place: Slot) -> Kept | None:
-    """Return the kept result, or None if there is none, its fingerprint differs or its file is damaged."""
-    arrays = None if place.fresh else load_arrays(place.key)
+def load_result(entry: CacheEntry) -> CachedResult | None:
+    """Return the result kept there; None where there is none, or it was made from something else, or is damaged."""
+    arrays = None if entry.fresh else load_arrays(entry.key)
     if arrays is None or "about" not in arrays:
         return None
     about = json.loads(arrays.pop("about").tobytes())
-    if about["fingerprint"] != place.fingerprint:
+    if about["fingerprint"] != entry.fingerprint:
         return None
     files = {name.removeprefix(_FILE): content.tobytes() for name, content in arrays.items()}
-    return Kept(about["data"], files, about["measured"], about["seconds"], True)
+    return CachedResult(about["data"], files, about["measured"], about["seconds"], True)
 
 
-def keep(place: Slot, computed: Computed, seconds: float) -> Kept:
-    """Store a result that took `seconds` [s] to compute, in place of an older one, and return it."""
+def store_result(entry: CacheEntry, computed: Computed, seconds: float) -> CachedResult:
+    """Keep what was computed in so many seconds, in place of what was there."""
     data, files = computed
-    about = {"data": data, "measured": now(), "seconds": round(seconds, 3), "fingerprint": place.fingerprint}
+    about = {"data": data, "measured": now(), "seconds": round(seconds, 3)}
+    about |= {"fingerprint": entry.fingerprint, "made_by": entry.made_by}
     text = json.dumps(about, allow_nan=False)
     arrays = {_FILE + name: _bytes_array(content) for name, content in files.items()}
-    store_arrays(place.key, {"about": _bytes_array(text.encode())} | arrays)
-    # A result from the disk went through JSON. A new one must too, or two reports would differ in their types.
+    make_room()
+    store_arrays(entry.key, {"about": _bytes_array(text.encode())} | arrays)
+    # What comes from the disk went through JSON: so does what does not, or two reports would differ in their types.
     about = json.loads(text)
-    return Kept(about["data"], dict(files), about["measured"], about["seconds"], False)
+    return CachedResult(about["data"], dict(files), about["measured"], about["seconds"], False)
 
 
-def kept_result(place: Slot, compute: Callable[[], Computed]) -> Kept:
-    """Return the kept result, or compute and store it."""
-    kept = find_kept(place)
+def cached_result(entry: CacheEntry, compute: Callable[[], Computed]) -> CachedResult:
+    """Return the result that is kept, or compute and keep it."""
+    kept = load_result(entry)
     if kept is not None:
         return kept
     start = time.monotonic()
     computed = compute()
-    return keep(place, computed, time.monotonic() - start)
+    return store_result(entry, computed, time.monotonic() - start)
+
+
+def expected_seconds(entry: CacheEntry) -> float | None:
+    """Return how long a result will take: none where it is kept, else as long as the last time on this machine.
+
+    Returns
+    -------
+    float or None
+        None where the machine never computed it [s].
+    """
+    about = peek_array(entry.key, "about")
+    if about is None:
+        return None
+    try:
+        kept = json.loads(about.tobytes())
+        return 0.0 if kept["made_by"] == entry.made_by and not entry.fresh else float(kept["seconds"])
+    except (ValueError, KeyError, TypeError, AttributeError):  # damaged
+        return None
 
 
 def now() -> str:

@@ -12,7 +12,7 @@ from typing import Any
 
 from realtime.scene.read_scene import Scene, read_scene
 from reference.quadrature.ray_values import TruthImage
-from reference.storage.cache import scene_digest
+from reference.storage.scene_digest import scene_digest
 from validation.configurations.methods import QUICK, Configuration
 from validation.estimates.agreement import Agreement, agreements
 from validation.estimates.multiple_scattering import MultipleScattering, multiple_scattering_share
@@ -50,6 +50,10 @@ class Effort:
     rays: int = 0  #: number of generated rays for the stability of kernels; 0 leaves it out
     papers: tuple[str, ...] = ()  #: papers whose tables are measured again: 'biri', 'billeter'
     paper_kernels: tuple[str, ...] = ("exact",)  #: kernels of these tables
+
+    def at(self, size: tuple[int, int] | None) -> "Effort":
+        """Return the effort with images and timed frames of another size [pixels]; itself for None."""
+        return self if size is None else replace(self, image=size, timed=size)
 
 
 def _by_estimator(single_scatter: Any, volpath: Any) -> Mapping[str, Any]:
@@ -157,21 +161,8 @@ class SceneStudy:
         return load_scene(str(self.loaded.path or self.loaded.name), size)
 
 
-def open_study(name_or_path: str, effort: Effort, *, size: tuple[int, int] | None = None) -> SceneStudy:
-    """Load a scene for a study.
-
-    Parameters
-    ----------
-    name_or_path
-        A built-in scene or the path of a Mitsuba XML file.
-    effort
-        How much work to do.
-    size
-        Size of images and timed frames in place of those of the effort, for comparisons with images from elsewhere
-        [pixels].
-    """
-    if size is not None:
-        effort = replace(effort, image=size, timed=size)
+def open_study(name_or_path: str, effort: Effort) -> SceneStudy:
+    """Load a scene to study: a built-in one, or the path of a Mitsuba XML file."""
     return SceneStudy(load_scene(name_or_path, effort.image), effort)
 
 

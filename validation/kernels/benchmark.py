@@ -23,7 +23,7 @@ from realtime.kernels.table import resident_tables
 from realtime.rays.ray_light import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium
-from realtime.scene.phase import Phase
+from realtime.scene.phase import named_phase
 from validation.configurations.kernel_names import find_kernel, sized, split_name
 from validation.configurations.timing import Timing, time_repeated
 from validation.kernels.errors import relative_error
@@ -248,7 +248,7 @@ def _frozen(function: Kernel, cases: Cases, rays: int | None = None) -> Callable
     """Return work that evaluates a kernel on rays that lie on the device, frozen after its first call."""
     part = slice(0, rays)
     name = cases.phase[0]
-    phase = Phase(
+    phase = named_phase(
         name,
         g=dr.opaque(mi.Float, float(cases.g[0])) if name == "hg" else None,
         values=mi.Float(np.asarray(TABLE)) if name == "tabulated" else None,

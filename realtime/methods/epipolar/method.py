@@ -50,7 +50,6 @@ from realtime.scene.camera import Camera
 from realtime.scene.features import check_places
 from realtime.scene.lights import Light
 from realtime.scene.medium import transmittance
-from realtime.scene.phase import evaluate
 from realtime.scene.read_scene import Scene
 from realtime.shadow_maps.projection import light_faces
 from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, check_size, inverse_depth, map_memory
@@ -254,7 +253,7 @@ def _yardstick(airlight: RayAirlight):
     r0, r1 = distance_to_light(geometry, x0), distance_to_light(geometry, end)
     x = dr.select(endless, x0 + r0, (x0 * r1 + end * r0) / (r0 + r1))
     r = distance_to_light(geometry, x)
-    weight = dr.atan2(across, along) / height * evaluate(medium.phase, (foot - x) / r)
+    weight = dr.atan2(across, along) / height * medium.phase.evaluate((foot - x) / r)
     return dr.select(x1 > x0, transmittance(medium, x + r) * weight, 0)
 
 

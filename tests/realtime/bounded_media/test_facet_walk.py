@@ -28,11 +28,11 @@ def seen_body(name, light, precision="double"):
     from realtime.bounded_media.convex_clip import seen_from
     from realtime.numerics.array_types import array_types
     from realtime.scene.medium import Medium
-    from realtime.scene.phase import Phase
+    from realtime.scene.phase import named_phase
     from realtime.scene.read_media import convex_body
 
     types = array_types(precision)
-    medium = Medium((types.scalar(1.0),), types.color(1.0), Phase("isotropic"))
+    medium = Medium((types.scalar(1.0),), types.color(1.0), named_phase("isotropic"))
     body = convex_body(medium, bounds_of(name), types)
     return seen_from(body, types.vector(*(float(c) for c in light))), types
 

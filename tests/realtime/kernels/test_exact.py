@@ -55,7 +55,7 @@ def test_limits(variant, name):
     from realtime.rays.ray_light import RayGeometry
     from realtime.scene.lights import Light
     from realtime.scene.medium import Medium
-    from realtime.scene.phase import Phase
+    from realtime.scene.phase import named_phase
 
     foot = np.array([1.0, 1.0, 1.5, -0.7, 2.5, 0.3])
     height = np.array([0.5, 0.5, 0.25, 0.0, 0.0, 2.0])
@@ -63,7 +63,7 @@ def test_limits(variant, name):
     x1 = np.array([0.75, 3.0, np.inf, 2.0, 2.0, np.inf])
     sigma_t = np.array([0.4, 0.0, 0.7, 0.3, 0.3, 0.0])
     types = array_types("double")
-    medium = Medium((types.scalar(sigma_t),), types.color(1), Phase(name, g=0.6 if name == "hg" else None))
+    medium = Medium((types.scalar(sigma_t),), types.color(1), named_phase(name, g=0.6 if name == "hg" else None))
     geometry = RayGeometry(types.scalar(foot), types.scalar(height), None, None)
     value = np.array(exact(geometry, types.scalar(x0), types.scalar(x1), medium, Light(None, None)))
     phase = PhaseFunction(name, g=0.6 if name == "hg" else 0.0)
@@ -97,13 +97,13 @@ def test_wide_rays(variant, name, g):
     from realtime.rays.ray_light import RayGeometry
     from realtime.scene.lights import Light
     from realtime.scene.medium import Medium
-    from realtime.scene.phase import Phase
+    from realtime.scene.phase import named_phase
 
     foot, height, x1, sigma_t = wide_rays(5000)
     expected, _ = airlight_segments(foot, height, 0.0, x1, sigma_t, PhaseFunction(name, g=g))
     for precision, bound in (("single", 3e-5), ("double", 1e-10)):
         types = array_types(precision)
-        phase = Phase(name, g=types.scalar(g) if name == "hg" else None)
+        phase = named_phase(name, g=types.scalar(g) if name == "hg" else None)
         geometry = RayGeometry(types.scalar(foot), types.scalar(height), None, None)
         medium = Medium((types.scalar(sigma_t),), types.color(1), phase)
         light = Light(None, None)
@@ -122,12 +122,12 @@ def test_endless_rays_through_a_vacuum_with_sharp_lobes(variant, g):
     from realtime.rays.ray_light import RayGeometry
     from realtime.scene.lights import Light
     from realtime.scene.medium import Medium
-    from realtime.scene.phase import Phase
+    from realtime.scene.phase import named_phase
 
     foot, height = np.array([1.5, -2.0, 0.01, 3.0]), np.array([0.7, 0.3, 1e-3, 2.0])
     for precision, bound in (("single", 5e-6), ("double", 1e-10)):
         types = array_types(precision)
-        medium = Medium((types.scalar(0.0),), types.color(1), Phase("hg", g=types.scalar(g)))
+        medium = Medium((types.scalar(0.0),), types.color(1), named_phase("hg", g=types.scalar(g)))
         geometry = RayGeometry(types.scalar(foot), types.scalar(height), None, None)
         light = Light(None, None)
         value = np.array(exact(geometry, types.scalar(0), types.scalar(np.inf), medium, light), dtype=np.float64)
@@ -142,11 +142,11 @@ def test_rays_that_meet_the_light_are_infinite(variant):
     from realtime.rays.ray_light import RayGeometry
     from realtime.scene.lights import Light
     from realtime.scene.medium import Medium
-    from realtime.scene.phase import Phase
+    from realtime.scene.phase import named_phase
 
     types = array_types()
     for name in ("isotropic", "rayleigh"):
-        medium = Medium((types.scalar(0.5),), types.color(1), Phase(name))
+        medium = Medium((types.scalar(0.5),), types.color(1), named_phase(name))
         geometry = RayGeometry(types.scalar([1.0, 0.0, 2.0, 3.0]), types.scalar(0.0), None, None)
         light = Light(None, None)
         value = np.array(exact(geometry, types.scalar(0.0), types.scalar(2.0), medium, light))
@@ -161,10 +161,10 @@ def test_gamma_is_the_integral_from_the_camera(variant):
     from realtime.rays.ray_light import RayGeometry
     from realtime.scene.lights import Light
     from realtime.scene.medium import Medium
-    from realtime.scene.phase import Phase
+    from realtime.scene.phase import named_phase
 
     types = array_types("double")
-    medium = Medium((types.scalar(0.5),), types.color(1), Phase("rayleigh"))
+    medium = Medium((types.scalar(0.5),), types.color(1), named_phase("rayleigh"))
     geometry = RayGeometry(types.scalar(1.1), types.scalar(0.4), None, None)
     light = Light(None, None)
     ends = types.scalar(0.7), types.scalar(2.3)

@@ -24,9 +24,9 @@ PHASES = [
 
 
 def phase_of(name, g, types):
-    from realtime.scene.phase import Phase
+    from realtime.scene.phase import named_phase
 
-    return Phase(name, g=types.scalar(g) if name == "hg" else None)
+    return named_phase(name, g=types.scalar(g) if name == "hg" else None)
 
 
 def kernel_values(rays, name, g, *, precision="single"):
@@ -62,7 +62,7 @@ def rule_and_truth(rays, name, g):
     """Return J/[what all nodes share] by the rule for float32, but in float64, and by 25 times as many nodes."""
     import drjit as dr
 
-    from realtime.kernels.exact import _double_mean, _lobe_scales
+    from realtime.kernels.exact import _double_mean
     from realtime.kernels.panels import panels_mean
     from realtime.kernels.quadrature import path_interval
     from realtime.numerics.array_types import array_types
@@ -71,7 +71,7 @@ def rule_and_truth(rays, name, g):
     types = array_types("double")
     foot, height, x0, x1, sigma_t = (types.scalar(column) for column in rays)
     phase = phase_of(name, g, types)
-    scale, tail = _lobe_scales(phase, types.scalar)
+    scale, tail = phase.lobe_scales(types.scalar)
     h, e0, e1, _ = path_interval(RayGeometry(foot, height), x0, x1, sigma_t, tail=tail)
     # Cut where float32 cuts: this is about nodes.
     e1 = dr.minimum(e1, e0 + dr.minimum(20 / (sigma_t * h), 1e7 * (tail + e0)))
@@ -95,14 +95,14 @@ def test_what_the_rule_leaves_without_rounding(variant, name, g):
 def test_segments_as_wide_and_as_deep_as_their_panels_may_be(variant, name, g, panels):
     import drjit as dr
 
-    from realtime.kernels.exact import _double_mean, _lobe_scales
+    from realtime.kernels.exact import _double_mean
     from realtime.kernels.panels import panel_count, panels_mean
     from realtime.numerics.array_types import array_types
 
     rng = np.random.default_rng(panels)
     types = array_types("double")
     phase = phase_of(name, g, types)
-    scale, _ = _lobe_scales(phase, types.scalar)
+    scale, _ = phase.lobe_scales(types.scalar)
     widths = np.linspace(0.1, 10, 9901)
     widest = widths[counts(name, g, widths, np.zeros(9901)) <= panels].max()
     depths = np.linspace(1, 40, 3901)

@@ -7,14 +7,8 @@ import pytest
 from analytic.panels import airlight_segments
 from analytic.phase import PhaseFunction
 from realtime.errors import InputError
-from realtime.kernels.polynomial import (
-    _antiderivative,
-    _nodes,
-    evaluate,
-    evaluate_segment,
-    polynomial,
-    polynomial_coefficients,
-)
+from realtime.kernels.polynomial import _nodes, polynomial
+from tests.helpers.ray_polynomial import _antiderivative, evaluate, evaluate_segment, polynomial_coefficients
 
 PHASES = ("isotropic", "rayleigh", "hazy", "murky", "hg")
 RAY = {"foot": 1.3, "height": 0.7, "x0": 0.0, "x1": 2.9, "sigma_t": 0.43}
@@ -32,11 +26,13 @@ def arguments(columns, phase="isotropic", precision="double", *, g=None, values=
     from realtime.rays.ray_light import RayGeometry
     from realtime.scene.lights import Light
     from realtime.scene.medium import Medium
-    from realtime.scene.phase import Phase
+    from realtime.scene.phase import named_phase
 
     types = array_types(precision)
     c = {key: types.scalar(np.atleast_1d(columns[key]).astype(np.float64)) for key in RAY}
-    phase = Phase(phase, g=None if g is None else types.scalar(g), values=None if values is None else values(types))
+    phase = named_phase(
+        phase, g=None if g is None else types.scalar(g), values=None if values is None else values(types)
+    )
     medium = Medium((c["sigma_t"],), types.color(1), phase)
     geometry = RayGeometry(c["foot"], c["height"], None, None)
     return geometry, c["x0"], c["x1"], medium, light or Light(None, None)
@@ -221,10 +217,10 @@ def test_soft_spot(variant, phase):
     from scipy.integrate import quad
 
     from realtime.scene.medium import Medium
-    from realtime.scene.phase import Phase
+    from realtime.scene.phase import named_phase
 
     types, geometry, light = soft_spot("double")
-    medium = Medium((types.scalar(0.4),), types.color(1), Phase(phase))
+    medium = Medium((types.scalar(0.4),), types.color(1), named_phase(phase))
     x0, x1 = geometry.lit_segment(types.scalar(0, 0), types.scalar(9, 9))
     value = numbers(polynomial(geometry, x0, x1, medium, light, degree=23))
     fit = polynomial_coefficients(geometry, x0, x1, medium, light, degree=23)
@@ -261,15 +257,15 @@ def test_tabulated_phase_function(variant):
 
 def test_a_colour_is_three_grey_media(variant):
     from realtime.scene.medium import Medium
-    from realtime.scene.phase import Phase
+    from realtime.scene.phase import named_phase
 
     geometry, x0, x1, grey, light = arguments(RAY)
     extinctions = [type(x0)(v) for v in (0.0, 0.5, 3.0)]
-    medium = Medium(tuple(extinctions), grey.albedo, Phase("rayleigh"))
+    medium = Medium(tuple(extinctions), grey.albedo, named_phase("rayleigh"))
     colour = numbers(polynomial(geometry, x0, x1, medium, light))
     gamma = numbers(evaluate(polynomial_coefficients(geometry, x0, x1, medium, light), x1))
     for channel, sigma_t in enumerate(extinctions):
-        single = Medium((sigma_t,), grey.albedo, Phase("rayleigh"))
+        single = Medium((sigma_t,), grey.albedo, named_phase("rayleigh"))
         expected = numbers(polynomial(geometry, x0, x1, single, light))
         np.testing.assert_array_equal(colour[channel], expected)
         np.testing.assert_allclose(gamma[channel], expected, rtol=1e-13)

@@ -19,12 +19,12 @@ def evaluate(kernel, rows, precision, **parameters):
     from realtime.rays.ray_light import RayGeometry
     from realtime.scene.lights import Light
     from realtime.scene.medium import Medium
-    from realtime.scene.phase import Phase
+    from realtime.scene.phase import named_phase
 
     types = array_types(precision)
     column = {key: types.scalar([float(row[key]) for row in rows]) for key in ("g", "t", "h", "x0", "x1", "sigma_t")}
     name = rows[0]["phase"]
-    medium = Medium((column["sigma_t"],), types.color(1), Phase(name, g=column["g"] if name == "hg" else None))
+    medium = Medium((column["sigma_t"],), types.color(1), named_phase(name, g=column["g"] if name == "hg" else None))
     geometry = RayGeometry(column["t"], column["h"], None, None)
     light = Light(None, None)
     return np.array(kernel(geometry, column["x0"], column["x1"], medium, light, **parameters), dtype=np.float64)

@@ -186,7 +186,7 @@ def test_frozen_and_in_colour(variant, form, precision):
     from realtime.rays.ray_light import RayGeometry
     from realtime.scene.lights import Light
     from realtime.scene.medium import Medium
-    from realtime.scene.phase import Phase
+    from realtime.scene.phase import Isotropic
 
     types = array_types(precision)
     light = Light(None, None)
@@ -195,7 +195,7 @@ def test_frozen_and_in_colour(variant, form, precision):
         return table(RayGeometry(t, h, None, None), x0, x1, medium, light, form=form, size=31)
 
     def arguments(count, extinctions):
-        medium = Medium(tuple(dr.opaque(types.scalar, s) for s in extinctions), types.color(1), Phase("isotropic"))
+        medium = Medium(tuple(dr.opaque(types.scalar, s) for s in extinctions), types.color(1), Isotropic())
         # Not from NumPy, whose memory can be unaligned, which records anew.
         columns = [dr.linspace(types.scalar, low, low + 1, count) for low in (1.1, 0.3, 0.2, 2.5)]
         dr.eval(columns)
@@ -209,7 +209,7 @@ def test_frozen_and_in_colour(variant, form, precision):
         found = np.array(frozen(*given))
         assert found.shape == (3, count)
         for row, sigma_t in zip(found, extinctions):
-            alone = np.array(kernel(*given[:-1], Medium((types.scalar(sigma_t),), types.color(1), Phase("isotropic"))))
+            alone = np.array(kernel(*given[:-1], Medium((types.scalar(sigma_t),), types.color(1), Isotropic())))
             # Recorded code may fuse differently: roundings, of reads of which half cancels.
             assert row == pytest.approx(alone, rel=1e-5 if precision == "single" else 1e-13)
     assert frozen.n_recordings == 1

@@ -64,7 +64,7 @@ def test_reading_a_scene_renames_none_of_its_shapes(variant):
     import mitsuba as mi
 
     from reference.scene.read import read_truth
-    from reference.storage.cache import scene_digest
+    from reference.storage.scene_digest import scene_digest
 
     ball = body({"type": "sphere", "center": [0.2, 0.1, 0.9], "radius": 0.4}, 0.7, (0.5, 0.5, 0.5))
     scene = mi.load_dict(clear_scene(size=(4, 3), mist=ball, floor=tiny_scene()["floor"]))

@@ -109,9 +109,10 @@ def test_certificate_of_both_routes_is_clean(variant):
 @pytest.mark.claim("shadow-ray-certificate")
 def test_slivers_that_random_samples_meet_are_mended(variant):
     """From rays that are taken to be lit from end to end, random samples alone find the shadows of a row of posts."""
-    from reference.visibility.lit_intervals import _bisect, visibility_test
+    from reference.visibility.lit_intervals import _bisect
     from reference.visibility.random_checks import Rounding, Toggles, certified_cast
     from reference.visibility.triangles import geometric_intervals
+    from tests.helpers.visibility import visibility_test
 
     posts = {f"post{i}": box((-0.9 + 0.31 * i, 0.1, 0.9), (0.03, 0.03, 3.0)) for i in range(6)}
     truth, light, rays, ends = setup(tiny_scene(ball=None, size=(24, 18), **posts))
@@ -145,9 +146,10 @@ def test_intervals_stay_sorted_and_apart_after_mending(variant):
 def test_wrong_geometry_is_found_and_left_in_doubt(variant):
     """Intervals from which one box is missing contradict the shadow rays, and the test of all triangles."""
     from reference.scene.shapes import Shapes, read_shapes
-    from reference.visibility.lit_intervals import point_leg, visibility_test
+    from reference.visibility.lit_intervals import point_leg
     from reference.visibility.random_checks import certified_geometry
     from reference.visibility.triangles import geometric_intervals
+    from tests.helpers.visibility import visibility_test
 
     truth, light, rays, ends = setup(box_scene())
     shapes = read_shapes(truth.occluders)

@@ -109,9 +109,10 @@ def test_random_shadow_rays_contradict_nothing(variant, place):
 
     from reference.scene.read import read_truth
     from reference.scene.shapes import read_shapes
-    from reference.visibility.lit_intervals import lit_intervals, point_leg, visibility_test
+    from reference.visibility.lit_intervals import lit_intervals, point_leg
     from reference.visibility.random_checks import certified_geometry
     from reference.visibility.triangles import EXACT_EDGE, geometric_intervals
+    from tests.helpers.visibility import visibility_test
 
     shells = {
         "light": {"type": "sphere", "center": [0.8, 0.8, 1.7], "radius": 0.6},

@@ -3,7 +3,8 @@ import copy
 
 import pytest
 
-from reports.data.claims import claims, confirmed, unstudied, verdict
+from reports.data.claims import claims, confirmed, unstudied
+from reports.tables.agreement import verdict
 
 
 def timing(median):

@@ -143,7 +143,7 @@ def test_no_number_of_a_scene_is_round(variant, name):
 
 
 def test_scenes_are_the_same_at_every_call(variant):
-    from reference.storage.cache import scene_digest
+    from reference.storage.scene_digest import scene_digest
     from validation.scenes.loading import load_scene
 
     for name in SCENES:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The statistical tests judged by images with a known truth; see `validation.statistics.calibration` for what they
+"""The statistical tests judged by images with a known truth; see `tests.helpers.calibration` for what they
 should do.
 
 Every share may leave the interval that holds it with probability 1 - 1e-4 by its binomial law. Seeds are fixed.
@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from validation.statistics.calibration import (
+from tests.helpers.calibration import (
     Experiment,
     PowerCheck,
     calibrate,

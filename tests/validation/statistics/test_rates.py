@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from tests.helpers.calibration import share_interval
 from tests.helpers.estimates import BATCHES, SIZE, monte_carlo, normal
-from validation.statistics.calibration import share_interval
 from validation.statistics.comparison import Estimate, compare_statistics
 
 pytestmark = pytest.mark.statistical

@@ -45,6 +45,21 @@ def _mixture(case):
     return mixture_of(_span(case), [mi.Float64(rate) for rate in SPANS[case][3]])
 
 
+def equi_angular_pdf(y, span):
+    """Return the density of `equi_angular` at y [1/m]."""
+    from reference.monte_carlo.single_scatter.distance_sampling import equi_angular_range
+
+    s = span.start + y
+    return span.height / (equi_angular_range(span) * (span.height * span.height + s * s))
+
+
+def mixture_cdf(y, mixture):
+    """Return the probability that `sample_distance` stays below y."""
+    from reference.monte_carlo.single_scatter.distance_sampling import _terms
+
+    return sum(cdf for cdf, _ in _terms(y, mixture))
+
+
 def _technique(case, name):
     """Return a sampler of u and a density of y of one technique."""
     import mitsuba as mi
@@ -52,7 +67,7 @@ def _technique(case, name):
     from reference.monte_carlo.single_scatter import distance_sampling as ds
 
     if name == "equi-angular":
-        return lambda u: ds.equi_angular(u, _span(case)), lambda y: ds.equi_angular_pdf(y, _span(case))
+        return lambda u: ds.equi_angular(u, _span(case)), lambda y: equi_angular_pdf(y, _span(case))
     if name == "free-flight":
         flight = ds.free_flights(_span(case).length, mi.Float64(SPANS[case][3][-1]))
         return lambda u: ds.free_flight(u, flight), lambda y: ds.free_flight_pdf(y, flight)
@@ -155,7 +170,7 @@ def test_weights_of_both_techniques_add_up(variant, case):
     """Rationale: the balance heuristic's weights sum to 1, and each is its technique's share of the density."""
     import mitsuba as mi
 
-    from reference.monte_carlo.single_scatter.distance_sampling import equi_angular_pdf, mixture_pdfs, sample_distance
+    from reference.monte_carlo.single_scatter.distance_sampling import mixture_pdfs, sample_distance
 
     mixture = _mixture(case)
     y, _, density = (np.array(a, dtype=np.float64) for a in sample_distance(mi.Float64(np.arange(1, 64) / 64), mixture))
@@ -175,7 +190,7 @@ def test_mixture_is_inverted(variant):
     """
     import mitsuba as mi
 
-    from reference.monte_carlo.single_scatter.distance_sampling import Span, mixture_cdf, mixture_of, sample_distance
+    from reference.monte_carlo.single_scatter.distance_sampling import Span, mixture_of, sample_distance
 
     rng = np.random.default_rng(5)
     n = 20000

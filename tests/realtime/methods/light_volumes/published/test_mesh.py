@@ -133,7 +133,8 @@ def test_parity_tells_lit_from_unlit(variant, kind, tessellation, floor):
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_fine_threshold_gives_the_same_surface(variant, kind):
     from realtime.methods.light_volumes.published.mesh import _heights
-    from realtime.methods.light_volumes.published.tessellation import divide, edges, tessellated_heights
+    from realtime.methods.light_volumes.published.tessellation import divide, edges
+    from tests.helpers.tessellated_heights import tessellated_heights
 
     shadow_map, _ = map_of(kind, 64)
     height = _heights(shadow_map)

@@ -23,7 +23,7 @@ def test_sum_over_a_convex_volume_is_one_integral(variant, kind, order):
     from realtime.scene.camera import ray_directions, tiled_pixels
     from realtime.scene.lights import Light, spot_fields
     from realtime.scene.medium import Medium
-    from realtime.scene.phase import Phase
+    from realtime.scene.phase import named_phase
 
     corners = np.array([(0.1, 0.2, 1.9), (1.1, -0.8, -0.9), (-1.2, -0.7, -1.1), (0.1, 1.3, -0.8)])
     camera = make_camera((1.9, -2.3, 0.4), size=(32, 24))
@@ -44,7 +44,7 @@ def test_sum_over_a_convex_volume_is_one_integral(variant, kind, order):
     cone = spot_fields(np.array([0.1, 0.2, -1.0]) / np.sqrt(1.05), 0.45, 0.45, array_types("double"))
     arrays = {"position": mi.Vector3d(0.1, 0.2, 1.9), "intensity": mi.Color3d(1)}
     light = Light(**arrays, **(cone if kind == "spot" else {}))
-    medium = Medium((mi.Float64(0.4),), mi.Color3d(1), Phase("isotropic"))
+    medium = Medium((mi.Float64(0.4),), mi.Color3d(1), named_phase("isotropic"))
     geometry = ray_geometry(camera.origin, direction, light, low=low)
     settings: dict[str, Any] = {"medium": medium, "light": light}
     wanted = airlight_integral(exact, geometry, mi.Float64(begin), mi.Float64(np.maximum(begin, end)), **settings)
@@ -112,11 +112,11 @@ def test_light_that_the_rays_pass_closely_leaves_nothing_where_it_is_hidden(vari
     from realtime.rays.ray_light import RayGeometry
     from realtime.scene.lights import Light
     from realtime.scene.medium import Medium
-    from realtime.scene.phase import Phase
+    from realtime.scene.phase import named_phase
 
     found = {}
     for Float, Vector, Color in ((mi.Float, mi.Vector3f, mi.Color3f), (mi.Float64, mi.Vector3d, mi.Color3d)):
-        medium = Medium((Float(0.4),), Color(1), Phase("isotropic"))
+        medium = Medium((Float(0.4),), Color(1), named_phase("isotropic"))
         light = Light(Vector(0), Color(1))
         geometry = RayGeometry(Float([2.0]), Float([1e-5]), None, None)
         x = mi.Float64([0.5, 1.5, 2.5, 3.5, 9.0, 9.0])
@@ -137,10 +137,10 @@ def test_no_crossings_no_light(variant):
     from realtime.rays.ray_light import RayGeometry
     from realtime.scene.lights import Light
     from realtime.scene.medium import Medium
-    from realtime.scene.phase import Phase
+    from realtime.scene.phase import named_phase
 
     settings: dict[str, Any] = {
-        "medium": Medium((mi.Float(0.4),), mi.Color3f(1), Phase("isotropic")),
+        "medium": Medium((mi.Float(0.4),), mi.Color3f(1), named_phase("isotropic")),
         "light": Light(mi.Vector3f(0), mi.Color3f(1)),
         "geometry": RayGeometry(mi.Float([2.0, 3.0]), mi.Float([1.0, 1.0]), None, None),
     }

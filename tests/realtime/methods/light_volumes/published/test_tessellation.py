@@ -5,15 +5,8 @@ import numpy as np
 import pytest
 
 from realtime.errors import InputError
-from realtime.methods.light_volumes.published.tessellation import (
-    RING,
-    configuration,
-    divide,
-    edges,
-    quads,
-    tessellated_heights,
-    triangles,
-)
+from realtime.methods.light_volumes.published.tessellation import RING, configuration, divide, edges, quads, triangles
+from tests.helpers.tessellated_heights import tessellated_heights
 
 
 def directed_edges(found):

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from validation.frames.bounded_study import constant_distance_study
+from tests.helpers.bounded_study import constant_distance_study
 
 
 def test_a_thin_medium_does_not_care_for_r(variant):
