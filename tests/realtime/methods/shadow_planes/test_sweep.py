@@ -14,12 +14,12 @@ def walked(index, lists, ways, end, *, begin=0.0):
     """The sum over lit segments of 1 - exp(-x), and whether the light reaches the end."""
     import drjit as dr
 
-    from realtime.methods.shadow_planes.sweep import sum_lit_segments
+    from realtime.methods.shadow_planes.sweep import sum_lit_intervals
 
     Float = type(index.distance)
     rays = rays_of(index, lists, ways)
     segment = Float(np.full(len(ways), begin)), Float(np.asarray(end, dtype=np.float64))
-    total, lit = sum_lit_segments(
+    total, lit = sum_lit_intervals(
         index, lists, rays, segment, lambda a, b: dr.exp(-a) - dr.exp(-b), dr.zeros(Float, len(ways))
     )
     return np.array(total, dtype=np.float64), np.array(lit)
