@@ -41,12 +41,13 @@ def insert(queue: Crossings, key, gain=None, *, larger_is_nearer: bool):
         Of the crossing that is left without a place, the farthest of all.
     """
     nearer, farther = (dr.maximum, dr.minimum) if larger_is_nearer else (dr.minimum, dr.maximum)
-    keys, gains = [], []
+    keys, gains, new = [], [], key
     for place, held in enumerate(queue.key):
-        before = key > held if larger_is_nearer else key < held
         keys.append(nearer(held, key))
         key = farther(held, key)
         if queue.gain:
+            # Asked of the new key, not of the one that it displaced: equal keys must not pass one another.
+            before = new > held if larger_is_nearer else new < held
             gains.append(dr.select(before, gain, queue.gain[place]))
             gain = dr.select(before, queue.gain[place], gain)
     return Crossings(keys, gains), key, gain

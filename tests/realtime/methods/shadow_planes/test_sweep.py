@@ -115,3 +115,27 @@ def test_empty_segments_are_nothing(variant):
     lists, _ = drawn_lists(index, ways, np.full(len(ways), 2.0))
     total, _ = walked(index, lists, ways, np.full(len(ways), 2.0), begin=2.0)
     assert np.all(total == 0)
+
+
+@pytest.mark.parametrize("in_order", [True, False])
+def test_more_planes_at_one_place_than_a_ray_collects_at_once(variant, in_order):
+    """Every plane twelve times over: the same segments, with a queue of eight and by going over the list again."""
+    import mitsuba as mi
+
+    from realtime.methods.shadow_planes.tile_lists import Source
+
+    index = index_of(casters_of("torus", "open cylinder"))
+    ways = bundles(320, spread=0.01)
+    end = np.full(len(ways), np.inf)
+    lists, _ = drawn_lists(index, ways, end)
+    entries = np.array(lists.entries)
+    first, count = np.array(lists.source.first), np.array(lists.source.count)
+    every = [np.repeat(entries[begin : begin + length], 12) for begin, length in zip(first, count)]
+    start = np.concatenate([[0], np.cumsum(12 * count)[:-1]])
+    source = Source(mi.UInt32(start), mi.UInt32(12 * count), mi.UInt32(start + 12 * count))
+    lists = replace(
+        lists, entries=mi.UInt32(np.concatenate(every)), source=source, sorted=mi.Bool(np.full(len(count), in_order))
+    )
+    assert count.max() > 3
+    expected = lit_lengths(index, ways, end, weight=weight)
+    assert_same(walked(index, lists, ways, end), expected, tolerance=1e-4)
