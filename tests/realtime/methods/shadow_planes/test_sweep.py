@@ -119,9 +119,10 @@ def test_empty_segments_are_nothing(variant):
 
 @pytest.mark.parametrize("in_order", [True, False])
 def test_more_planes_at_one_place_than_a_ray_collects_at_once(variant, in_order):
-    """Every plane twelve times over: the same segments, with a queue of eight and by going over the list again."""
+    """Beside every plane ten that add a layer there and ten that take it away again: the same segments."""
     import mitsuba as mi
 
+    from realtime.methods.shadow_planes.plane_table import GAIN_SHIFT, GAIN_ZERO
     from realtime.methods.shadow_planes.tile_lists import Source
 
     index = index_of(casters_of("torus", "open cylinder"))
@@ -130,9 +131,12 @@ def test_more_planes_at_one_place_than_a_ray_collects_at_once(variant, in_order)
     lists, _ = drawn_lists(index, ways, end)
     entries = np.array(lists.entries)
     first, count = np.array(lists.source.first), np.array(lists.source.count)
-    every = [np.repeat(entries[begin : begin + length], 12) for begin, length in zip(first, count)]
-    start = np.concatenate([[0], np.cumsum(12 * count)[:-1]])
-    source = Source(mi.UInt32(start), mi.UInt32(12 * count), mi.UInt32(start + 12 * count))
+    added = np.repeat([1, -1], 10)[None, :] + GAIN_ZERO << GAIN_SHIFT
+    more = (entries & ~np.uint32(63 << GAIN_SHIFT))[:, None] | added.astype(np.uint32)
+    entries = np.concatenate([more, entries[:, None]], axis=1)
+    every = [entries[begin : begin + length].ravel() for begin, length in zip(first, count)]
+    start = np.concatenate([[0], np.cumsum(21 * count)[:-1]])
+    source = Source(mi.UInt32(start), mi.UInt32(21 * count), mi.UInt32(start + 21 * count))
     lists = replace(
         lists, entries=mi.UInt32(np.concatenate(every)), source=source, sorted=mi.Bool(np.full(len(count), in_order))
     )
