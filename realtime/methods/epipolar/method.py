@@ -41,7 +41,7 @@ from realtime.methods.epipolar.slices import (
     pixel_number,
     slice_coordinate,
 )
-from realtime.methods.epipolar.walk import sum_lit_pieces
+from realtime.methods.epipolar.walk import sum_lit_intervals
 from realtime.methods.interface.light_airlight import RayAirlight, integral_type, ray_airlight
 from realtime.methods.interface.view import View, rays_in_media
 from realtime.numerics.array_types import bytes_of
@@ -189,7 +189,7 @@ def _lit_integral(airlight: RayAirlight, heights: SliceHeights, number, active=T
     x0, x1 = airlight.segment
     zero = dr.zeros(integral_type(airlight.view), dr.width(airlight.view.distance))
     ends = x0, dr.select(active, x1, x0)
-    return sum_lit_pieces(heights, number, airlight.geometry, ends, airlight.integral, zero)
+    return sum_lit_intervals(heights, number, airlight.geometry, ends, airlight.integral, zero)
 
 
 def _nearest(slices: Slices, point):

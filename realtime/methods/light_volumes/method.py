@@ -35,7 +35,7 @@ from realtime.methods.light_volumes.jump_search import with_walls
 from realtime.methods.light_volumes.published.mesh import THRESHOLD, memory_needed, volume_mesh
 from realtime.methods.light_volumes.published.signed_sum import mesh_airlight
 from realtime.methods.light_volumes.tile_lists import Leaves, tile_leaves
-from realtime.methods.light_volumes.walk import sum_lit_pieces
+from realtime.methods.light_volumes.walk import sum_lit_intervals
 from realtime.numerics.array_types import bytes_of
 from realtime.scene.lights import Light
 from realtime.scene.read_scene import Scene
@@ -147,7 +147,7 @@ def _walk(heights: InverseDepthField, leaves: Leaves, airlight: RayAirlight):
     zero = dr.zeros(integral_type(view), dr.width(view.distance))
     away = view.origin - airlight.light.position
     place = {"away": away, "direction": view.direction, "segment": airlight.segment, "tile": view.tile}
-    value, reached = sum_lit_pieces(heights, leaves, **place, integral=airlight.integral, zero=zero)
+    value, reached = sum_lit_intervals(heights, leaves, **place, integral=airlight.integral, zero=zero)
     return airlight.radiance(value), reached
 
 

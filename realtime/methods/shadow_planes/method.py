@@ -38,7 +38,7 @@ from realtime.methods.shadow_planes.plane_table import PlaneIndex, index_planes
 from realtime.methods.shadow_planes.published_crossings import Buffer, sum_crossings
 from realtime.methods.shadow_planes.published_mesh import mesh_gamma, surface_gamma
 from realtime.methods.shadow_planes.spot_pyramid import cone_ring
-from realtime.methods.shadow_planes.sweep import RayPlanes, ray_planes, sum_lit_segments
+from realtime.methods.shadow_planes.sweep import RayPlanes, ray_planes, sum_lit_intervals
 from realtime.methods.shadow_planes.tile_lists import Lists, tile_lists
 from realtime.methods.shadow_planes.view_culling import bodies_in_view
 from realtime.numerics.array_types import ArrayTypes, types_of
@@ -236,7 +236,7 @@ def _segments(index: PlaneIndex, lists: Lists, rays: RayPlanes, airlight: RayAir
         return airlight.gamma(b) - airlight.gamma(a) if differences else airlight.integral(a, b)
 
     zero = dr.zeros(integral_type(view), dr.width(view.distance))
-    value, reached = sum_lit_segments(index, lists, rays, airlight.segment, integral, zero)
+    value, reached = sum_lit_intervals(index, lists, rays, airlight.segment, integral, zero)
     return airlight.radiance(value), reached
 
 

@@ -182,7 +182,7 @@ def test_lit_pieces_are_those_of_many_points(variant, kind):
     """A ray of the slice looked at point by point in float64: where is it, and what does the map hold there?"""
     import mitsuba as mi
 
-    from realtime.methods.epipolar.walk import sum_lit_pieces
+    from realtime.methods.epipolar.walk import sum_lit_intervals
     from realtime.rays.ray_light import RayGeometry
 
     scene = read((0.4, 1.9, 1.9), kind=kind)
@@ -226,7 +226,7 @@ def test_lit_pieces_are_those_of_many_points(variant, kind):
     geometry = RayGeometry(mi.Float(-distance * np.cos(angle)), mi.Float(distance * np.sin(angle)), None, None)
     zero = mi.Float(np.zeros(count))
     segment = mi.Float(begin), mi.Float(x1)
-    found = np.array(sum_lit_pieces(heights, mi.UInt32(number), geometry, segment, lambda a, b: b - a, zero))
+    found = np.array(sum_lit_intervals(heights, mi.UInt32(number), geometry, segment, lambda a, b: b - a, zero))
     assert np.mean((total > 0) & (total < inside_all - 1e-2)) > 0.1  # some rays are lit in part
     # The points are 9e-4 m apart at most; few rays have more than two pieces, of two ends each.
     assert found == pytest.approx(total, abs=4e-3)
