@@ -27,7 +27,7 @@ def methods(json: Json = False) -> None:
                 "what": record.summary,
                 "kernel": "yes" if record.uses_kernel else "no",
                 "shadows": "yes" if record.shadows else "no",
-                "parameters": ", ".join(f"{name}={value}" for name, value in record.parameters.items()),
+                "parameters": ", ".join(f"{name}={value}" for name, value in record.defaults.items()),
                 "source": record.source,
             }
             for record in METHODS.values()

@@ -243,7 +243,7 @@ def time_rates(renderer: FrameRenderer, seconds: float) -> dict[str, Any]:
     kept = first_frame(renderer)
     works = {
         "rebuilt": moved_light(renderer),
-        "static": lambda: run_stages(renderer, kept.prepared),
+        "static": lambda: run_stages(renderer, kept.state),
         "relit": moved_light_alone(renderer, kept),
         "recoloured": changed_look(renderer, kept),
     }
