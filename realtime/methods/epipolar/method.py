@@ -10,6 +10,10 @@ Three things differ from what is published, all to the good of the method: each 
 not marched; a leaf of the tree is linear and not constant, see `realtime.methods.epipolar.min_max_tree`; and what is
 interpolated is not the airlight but its quotient by a simple estimate, see `_yardstick`: the published scenes are lit
 by the sun, and near a point light the airlight itself goes as 1 / distance.
+
+The sampling is no wrapper around other methods, as `realtime.tiles.adaptive_sampling` is. Slices are cut for one light
+and hold its tree, by which samples and pixels alike are walked, and samples lie between the centres of pixels, where
+lists of tiles, which bound the sixteen rays of a tile alone, miss what concerns them.
 """
 
 from collections.abc import Callable
