@@ -173,24 +173,6 @@ def test_rays_of_the_truth_are_sampled_and_checked_as_often_as_stated(variant):
     assert image.checked % 32 == 0  # for each camera ray that looks into the light
 
 
-@pytest.mark.claim("parameters-of-shadow-planes")
-def test_the_parameters_of_shadow_planes_are_explained():
-    from realtime.bounded_media.airlight import FORMS
-    from realtime.methods.registry import METHODS
-    from realtime.methods.shadow_planes import method as shadow_planes
-
-    section = DOCUMENTS["docs/shadow-planes.md"].split("## The parameters")[1].split("**The three orders.**")[0]
-    rows = re.findall(r"^\| `(\w+)` \| ([^|]*) \|", section, flags=re.MULTILINE)
-    explained = {name: values.replace("`", "") for name, values in rows}
-    defaults = METHODS["shadow-planes"].parameters
-    assert set(explained) == set(defaults)
-    words = {"order": "ORDERS", "evaluation": "EVALUATIONS", "sum": "SUMS", "buffer": "BUFFERS"}
-    for name, default in defaults.items():
-        allowed = FORMS if name == "media" else getattr(shadow_planes, words[name]) if name in words else [str(default)]
-        assert explained[name].split(", ") == list(allowed), name
-        assert explained[name].split(", ")[0] == str(default), name
-
-
 def test_scenes_and_names_of_the_api_are_those_of_the_program():
     import airlight
     from validation.scenes.registry import SCENES

@@ -7,6 +7,6 @@ Read in this order:
 - `methods.py`: a configuration is a method with a kernel and parameters; the standard ones of commands and reports;
 - `timing.py`: medians of frames and of their stages.
 
-May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.kernels`, `realtime.methods`, `realtime.scene`,
-`validation.scenes`.
+May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.kernels`, `realtime.methods`,
+`realtime.parameters`, `realtime.scene`, `validation.scenes`.
 """

@@ -10,11 +10,9 @@ from analytic.errors import InputError
 from realtime.errors import InputError as MethodError
 from realtime.frame.renderer import FrameRenderer, frame_renderer
 from realtime.methods.registry import find_method
+from realtime.parameters import read_parameters
 from realtime.scene.read_scene import Scene
 from validation.configurations.kernel_names import find_kernel
-from validation.scenes.loading import nearest
-
-_TRUE, _FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
 
 
 @dataclass(frozen=True)
@@ -92,8 +90,8 @@ def configuration(
     Raises
     ------
     InputError
-        For an unknown method, kernel or parameter (the nearest is named), a value of the wrong type, and a method of
-        one's own that cannot be loaded.
+        For an unknown method, kernel or parameter (the nearest is named), a value of the wrong type or outside its
+        range, values that contradict one another, and a method of one's own that cannot be loaded.
     """
     method = method if isinstance(method, str) else _function_name(method)
     try:
@@ -105,8 +103,11 @@ def configuration(
     if record.uses_kernel:
         kernel = kernel or "exact"
         find_kernel(kernel)
-    values = [(name, _converted(record, name, value)) for name, value in (parameters or {}).items()]
-    return Configuration(method, kernel, tuple(values))
+    try:
+        chosen = read_parameters(method, record.parameters, parameters or {})
+    except MethodError as error:
+        raise InputError(str(error)) from error
+    return Configuration(method, kernel, tuple((name, getattr(chosen, name)) for name in parameters or {}))
 
 
 def chosen_configurations(methods: Sequence[str]) -> tuple[Configuration, ...]:
@@ -152,31 +153,3 @@ def _function_name(function: Callable[..., Any]) -> str:
             f"method: got {function!r}, wanted a name or a function at the top of a module: give it a name there"
         )
     return name
-
-
-def _converted(record, name: str, value: Any) -> int | float | str:
-    if name not in record.parameters:
-        known = ", ".join(record.parameters) or "none"
-        raise InputError(
-            f"method {record.name}: got a parameter {name!r}, wanted one of: {known}" + nearest(name, record.parameters)
-        )
-    default = record.parameters[name]
-    if isinstance(default, bool):
-        word = str(value).strip().lower()
-        if word not in _TRUE + _FALSE:
-            raise InputError(f"method {record.name}: {name} got {value!r}, wanted true or false")
-        return word in _TRUE
-    if isinstance(default, float):
-        try:
-            return float(value)
-        except (TypeError, ValueError):
-            raise InputError(f"method {record.name}: {name} got {value!r}, wanted a number") from None
-    if isinstance(default, int):
-        try:
-            # int() would cut off what stands behind the point, and take True for 1.
-            if isinstance(value, float | bool):
-                raise TypeError
-            return int(value)
-        except (TypeError, ValueError):
-            raise InputError(f"method {record.name}: {name} got {value!r}, wanted a whole number") from None
-    return str(value)

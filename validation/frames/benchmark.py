@@ -104,7 +104,7 @@ def measure(
     if timed is not None and took > _LONG:
         timed = None
         notes.append(f"timed at {scene.camera.width} x {scene.camera.height}: larger frames take minutes")
-    if chosen.own and not isinstance(renderer.airlight, Frozen):
+    if chosen.own and not isinstance(renderer.render, Frozen):
         notes.append("not frozen: its Python runs again for every frame")
     times = time_frame(renderer if timed is None else prepared(timed, chosen), seconds=seconds, slow=slow)
     return Measurement(

@@ -13,7 +13,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from realtime.frame.renderer import run_stages, run_surface, run_tiles_and_airlight
+from realtime.frame.renderer import run_cast_and_shade, run_method, run_stages
 from realtime.scene.read_scene import Scene, read_scene
 from validation.configurations.methods import Configuration, prepared
 from validation.configurations.timing import times_in_turns
@@ -71,10 +71,10 @@ def _frame(scene: Scene, method: str) -> Callable[[], Any]:
 
 def _airlight(scene: Scene) -> Callable[[], Any]:
     renderer = prepared(scene, Configuration("shadow-planes", "exact"))
-    distance, by_light = run_surface(renderer)
-    dr.eval(distance, by_light)
+    cast, by_light = run_cast_and_shade(renderer)
+    dr.eval(cast, by_light)
     ready = renderer.prepare(scene)
-    return lambda: dr.eval(run_tiles_and_airlight(renderer, ready, distance, by_light))
+    return lambda: dr.eval(run_method(renderer, ready, cast, by_light))
 
 
 def _compared(what: str, works: list[Callable[[], Any]], *, turns: int) -> ZeroCost:

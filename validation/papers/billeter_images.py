@@ -248,7 +248,7 @@ def time_rates(renderer: FrameRenderer, seconds: float) -> dict[str, Any]:
     kept = first_frame(renderer)
     works = {
         "light_moved": moved_light(renderer),
-        "static": lambda: run_stages(renderer, kept.prepared),
+        "static": lambda: run_stages(renderer, kept.state),
         "light_moved_camera_kept": moved_light_alone(renderer, kept),
         "colours_changed": changed_look(renderer, kept),
     }

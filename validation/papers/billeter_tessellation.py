@@ -28,7 +28,7 @@ import numpy as np
 
 from analytic.errors import InputError
 from realtime.errors import InputError as RealtimeError
-from realtime.frame.renderer import Frame, FrameRenderer, run_surface, run_tiles_and_airlight
+from realtime.frame.renderer import Frame, FrameRenderer, run_cast_and_shade, run_method
 from realtime.methods.light_volumes.published.mesh import tessellation_stages
 from realtime.scene.read_scene import Scene, read_scene
 from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map
@@ -207,13 +207,13 @@ def _passes(renderer: FrameRenderer, row: TableRow, seconds: float) -> tuple[dic
     """Return the times of the passes [ms], and the number of triangles of all light volumes."""
     scene = renderer.scene
     ready = renderer.prepare(scene)
-    distance, by_light = run_surface(renderer)
-    dr.eval(distance, by_light)
+    cast, by_light = run_cast_and_shade(renderer)
+    dr.eval(cast, by_light)
     works: dict[str, Callable[[], Any]] = {
-        "surface": lambda: dr.eval(run_surface(renderer)),
+        "surface": lambda: dr.eval(run_cast_and_shade(renderer)),
         "shadow map": lambda: _shadow_maps(scene, row.map),
         "prepare": lambda: renderer.prepare(scene),
-        "volume": lambda: dr.eval(run_tiles_and_airlight(renderer, ready, distance, by_light)),
+        "volume": lambda: dr.eval(run_method(renderer, ready, cast, by_light)),
     }
     times = {name: time_repeated(work, seconds=seconds, least=3).median_ms for name, work in works.items()}
     if row.evaluation == "adaptive":

@@ -28,11 +28,11 @@ from realtime.frame.incremental import FrameCache
 from realtime.frame.renderer import (
     FrameRenderer,
     render_frame,
-    run_airlight,
+    run_cast_and_shade,
+    run_cull,
+    run_method,
     run_shade,
     run_stages,
-    run_surface,
-    run_tiles,
 )
 from realtime.methods.shadow_planes.method import PlanePreparation
 from realtime.methods.shadow_planes.silhouettes import silhouette
@@ -152,7 +152,7 @@ def biri_row(
     kept = first_frame(renderer)
     works = [
         moved_light(renderer),
-        lambda: run_stages(renderer, kept.prepared),
+        lambda: run_stages(renderer, kept.state),
         moved_light_alone(renderer, kept),
         changed_look(renderer, kept),
         camera_rays(renderer),
@@ -233,17 +233,17 @@ def _shared(measured: Sequence[float]) -> tuple[float, ...]:
 def _stages(renderer: FrameRenderer, kernel: str, kept: FrameCache) -> list[Callable[[], Any]]:
     """Return the work of silhouettes, scene, unshadowed airlight, all on the host, tile lists, and airlight."""
     scene = renderer.scene
-    distance = kept.cast.distance
-    by_light = run_shade(renderer, kept.cast)
-    dr.eval(distance, by_light)
+    cast = kept.cast
+    by_light = run_shade(renderer, cast)
+    dr.eval(cast, by_light)
     plain = prepared(scene, Configuration("unshadowed", kernel))
     return [
         lambda: _silhouettes(renderer, scene),
-        lambda: dr.eval(run_surface(renderer)),
-        lambda: dr.eval(run_airlight(plain, (), distance, ())),
+        lambda: dr.eval(run_cast_and_shade(renderer)),
+        lambda: dr.eval(run_method(plain, (), cast, (), ())),
         lambda: renderer.prepare(scene),
-        lambda: run_tiles(renderer, kept.prepared, distance),
-        lambda: dr.eval(run_airlight(renderer, kept.prepared, distance, by_light, kept.tiles)),
+        lambda: run_cull(renderer, kept.state, cast.distance),
+        lambda: dr.eval(run_method(renderer, kept.state, cast, by_light, kept.lists)),
     ]
 
 

@@ -153,7 +153,7 @@ def test_frames_replay_without_new_kernels(variant):
             dr.kernel_history_clear()
             run_stages(dataclasses.replace(renderer, scene=dataclasses.replace(scene, lights=(moved,))), ())
             counts.append(len([k for k in dr.kernel_history() if k["type"] == dr.KernelType.JIT]))
-            recordings.append(renderer.airlight.n_recordings)
+            recordings.append(renderer.render.n_recordings)
     assert counts[1:] == [2, 2, 2]  # surface, airlight
     assert recordings[1:] == [recordings[0]] * 3
 

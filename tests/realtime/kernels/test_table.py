@@ -2,6 +2,7 @@
 import csv
 import subprocess
 import sys
+from functools import partial
 
 import numpy as np
 import pytest
@@ -181,7 +182,8 @@ def test_frozen_and_in_colour(variant, form, precision):
     """Recorded once, right after another medium and another number of rays; three extinctions give three values."""
     import drjit as dr
 
-    from realtime.kernels.table import resident_tables, table
+    from realtime.kernels.preparation import prepare_kernel, with_tables
+    from realtime.kernels.table import table
     from realtime.numerics.array_types import array_types
     from realtime.rays.ray_light import RayGeometry
     from realtime.scene.lights import Light
@@ -191,8 +193,10 @@ def test_frozen_and_in_colour(variant, form, precision):
     types = array_types(precision)
     light = Light(None, None)
 
-    def kernel(t, h, x0, x1, medium):
-        return table(RayGeometry(t, h, None, None), x0, x1, medium, light, form=form, size=31)
+    sized = partial(table, form=form, size=31)
+
+    def kernel(t, h, x0, x1, medium, tables):
+        return with_tables(sized, tables)(RayGeometry(t, h, None, None), x0, x1, medium, light)
 
     def arguments(count, extinctions):
         medium = Medium(tuple(dr.opaque(types.scalar, s) for s in extinctions), types.color(1), Isotropic())
@@ -201,15 +205,15 @@ def test_frozen_and_in_colour(variant, form, precision):
         dr.eval(columns)
         return (*columns, medium)
 
-    kernel(*arguments(1, (0.1, 0.2, 0.3)))
-    resident = resident_tables()
-    frozen = dr.freeze(kernel, state_fn=lambda *_, **__: resident)
+    tables = prepare_kernel(sized, types.scalar)
+    frozen = dr.freeze(kernel)
     for count, extinctions in ((7, (0.11, 0.4, 0.9)), (7, (0.2, 0.5, 0.7)), (12, (0.3, 0.1, 1.3))):
         given = arguments(count, extinctions)
-        found = np.array(frozen(*given))
+        found = np.array(frozen(*given, tables))
         assert found.shape == (3, count)
         for row, sigma_t in zip(found, extinctions):
-            alone = np.array(kernel(*given[:-1], Medium((types.scalar(sigma_t),), types.color(1), Isotropic())))
+            grey = Medium((types.scalar(sigma_t),), types.color(1), Isotropic())
+            alone = np.array(kernel(*given[:-1], grey, None))  # uploads a table of its own
             # Recorded code may fuse differently: roundings, of reads of which half cancels.
             assert row == pytest.approx(alone, rel=1e-5 if precision == "single" else 1e-13)
     assert frozen.n_recordings == 1
@@ -225,7 +229,7 @@ import mitsuba as mi
 from realtime.kernels.table import upload_table
 @dr.freeze
 def function(x):
-    upload_table(type(x), "sun", 17)
+    upload_table(type(x), form="sun", size=17)
     return x + 1
 try:
     function(dr.opaque(mi.Float, 1, 3))
@@ -233,4 +237,6 @@ except RuntimeError as error:
     print(error.__cause__)
 """
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False)
-    assert "table is not on the device; call realtime.kernels.table.upload_table before" in found.stdout, found.stderr
+    assert "table is not on the device; call realtime.kernels.preparation.prepare_kernel before" in found.stdout, (
+        found.stderr
+    )

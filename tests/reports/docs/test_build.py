@@ -128,7 +128,7 @@ def test_every_method_kernel_and_scene_has_its_place(extension):
         assert f"<!-- generated: method {name} -->" in page(name), name
         text = fill(page(name))
         assert f"[`{name}`]({name}.md)" in fill("<!-- generated: methods -->")
-        for parameter, default in record.parameters.items():
+        for parameter, default in record.defaults.items():
             said = f"{default:g}" if isinstance(default, float) else str(default)
             assert re.search(rf"`{parameter}` \| `?{said}\b|`{parameter}={said}`", text), (name, parameter)
     for name in KERNELS:

@@ -69,7 +69,7 @@ def view_of(scene):
     direction = ray_directions(camera, pixel)[0]
     distance = cast_rays(scene.geometry, None, camera.origin, direction).distance
     parts = {"features": scene.features, "geometry": scene.geometry, "medium": scene.medium, "lights": scene.lights}
-    return frame_view(camera, pixel, distance, **parts, prepared=())
+    return frame_view(camera, pixel, distance, **parts)
 
 
 @pytest.mark.parametrize("kind", ["point", "spot"])
