@@ -111,7 +111,13 @@ def configuration(
 
 
 def chosen_configurations(methods: Sequence[str]) -> tuple[Configuration, ...]:
-    """Return the standard configurations of some methods; a method without any has its defaults."""
+    """Return the standard configurations of some methods; a method without any has its defaults.
+
+    Raises
+    ------
+    InputError
+        As `configuration`.
+    """
     chosen: list[Configuration] = []
     for method in methods:
         default = configuration(method)
@@ -137,7 +143,13 @@ def parse_settings(settings: Sequence[str]) -> dict[str, str]:
 
 
 def prepared(scene: Scene, chosen: Configuration) -> FrameRenderer:
-    """Return the frame renderer of a configuration for a scene."""
+    """Return the frame renderer of a configuration for a scene.
+
+    Raises
+    ------
+    realtime.errors.InputError
+        If the method refuses the scene or a parameter.
+    """
     kernel = find_kernel(chosen.kernel) if chosen.kernel else None
     return frame_renderer(scene, find_method(chosen.method), kernel=kernel, **dict(chosen.parameters))
 

@@ -111,7 +111,7 @@ def times_in_turns(
 
 
 def timed_frame(renderer: FrameRenderer, scene: Scene, cache: FrameCache | None, **moved: bool):
-    """Render the next frame, as `realtime.frame.incremental.next_frame`; return stages, cache, and time [ms]."""
+    """Render the next frame by `realtime.frame.incremental.next_frame`, and also return its time [ms] as the last."""
     begin = time.perf_counter()
     stages, cache = next_frame(renderer, scene, cache, **moved)
     dr.sync_thread()
@@ -119,22 +119,22 @@ def timed_frame(renderer: FrameRenderer, scene: Scene, cache: FrameCache | None,
 
 
 def moved_light(renderer: FrameRenderer) -> Callable[[], Any]:
-    """Return a frame after the light moved, the camera rays cast again: all but the acceleration structure is anew."""
+    """Return the work of a frame after the light moved: all stages run again, camera rays too, in the same geometry."""
     return _step(renderer, None, light_moved=True)
 
 
 def moved_light_alone(renderer: FrameRenderer, cache: FrameCache) -> Callable[[], Any]:
-    """Return a frame after the light moved, camera and geometry as they stood: camera rays are kept."""
+    """Return the work of a frame after the light alone moved, which reuses the camera rays of the cache."""
     return _step(renderer, cache, light_moved=True)
 
 
 def changed_look(renderer: FrameRenderer, cache: FrameCache) -> Callable[[], Any]:
-    """Return a frame after the medium or colours of lights changed: only surface and airlight are computed."""
+    """Return the work of a frame after only the medium or colours changed: surface and airlight are computed."""
     return _step(renderer, cache, light_moved=False)
 
 
 def camera_rays(renderer: FrameRenderer) -> Callable[[], Any]:
-    """Return the camera rays of a frame alone, cast and not shaded: no frame that casts them takes less."""
+    """Return the work of casting the camera rays without shading, the least time of a frame that casts them."""
     scene = renderer.scene
 
     @Frozen
@@ -150,13 +150,13 @@ def _step(renderer: FrameRenderer, cache: FrameCache | None, *, light_moved: boo
 
 
 def first_frame(renderer: FrameRenderer) -> FrameCache:
-    """Render the frame of the renderer's scene and return what it leaves."""
+    """Render the frame of the renderer's scene and return its cache for the next frame."""
     return next_frame(renderer, renderer.scene, None, camera_moved=True, geometry_moved=True, light_moved=True)[1]
 
 
 @dataclass(frozen=True)
 class FrameTimes:
-    """What a frame costs [ms]."""
+    """The times of a frame and of its stages [ms]."""
 
     frame: Timing  #: camera rays, lit surface, tiles and airlight; shadow maps or planes are there
     surface: Timing  #: camera rays and lit surface

@@ -162,7 +162,7 @@ class SceneStudy:
 
 
 def open_study(name_or_path: str, effort: Effort) -> SceneStudy:
-    """Load a scene to study: a built-in one, or the path of a Mitsuba XML file."""
+    """Load a scene for a study, by its built-in name or by the path of a Mitsuba XML file."""
     return SceneStudy(load_scene(name_or_path, effort.image), effort)
 
 

@@ -37,7 +37,15 @@ def pays_from(rates: Mapping[int, tuple[float, float]]) -> int | None:
 
 
 def conclusions(figures: Sequence[FigureRow], table: Sequence[TableRow]) -> list[str]:
-    """Return sentences on the paper's conclusions, as far as the rows allow them."""
+    """Return sentences on the paper's conclusions, as far as the rows allow them.
+
+    Parameters
+    ----------
+    figures
+        Rows of Figures 6 and 7.
+    table
+        Rows of Table 1.
+    """
     return [
         *_adaptive(table),
         *_walk(table),

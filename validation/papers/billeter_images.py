@@ -244,7 +244,7 @@ def frame_within(renderer: FrameRenderer, limit: float) -> Frame:
 
 
 def time_rates(renderer: FrameRenderer, seconds: float) -> dict[str, Any]:
-    """Time frames after the light moved and with less than that, in turns; the fields of a row by name."""
+    """Time frames in turns for about 3 `seconds` [s] and return the timings by the name of their field in a row."""
     kept = first_frame(renderer)
     works = {
         "light_moved": moved_light(renderer),

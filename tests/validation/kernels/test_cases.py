@@ -24,7 +24,7 @@ def cases(request, data_folder):
 @pytest.mark.parametrize("precision", ["single", "double"])
 def test_quadrature_kernel_meets_its_claims_on_certified_cases(variant, cases, precision):
     error = relative_error(cases, integrate_cases(cases, "quadrature", precision))
-    # Sixteen nodes: 1e-3 everywhere, mostly to rounding (3 units of float32 in the median) (DESIGN section 7).
+    # Sixteen nodes: 1e-3 everywhere, mostly to rounding (3 units of float32 in the median).
     assert np.median(error) < 5e-7
     assert np.percentile(error, 99) < 3e-5
     assert error.max() < 2e-3
