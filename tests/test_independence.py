@@ -74,6 +74,7 @@ def sources():
     return {name: text for name, text in texts.items() if set(imported_names(text)) or len(ast.parse(text).body) > 1}
 
 
+@pytest.mark.claim("no-shared-derivation")
 @pytest.mark.parametrize("pair", list(combinations(ESTIMATORS, 2)), ids=" and ".join)
 def test_two_estimators_share_nothing_but_what_is_listed(sources, pair):
     first, second = (reached(sources, ESTIMATORS[name]) for name in pair)

@@ -33,7 +33,7 @@ from functools import lru_cache
 
 from realtime.errors import InputError
 from realtime.kernels.polynomial_piece import integrand, piece_of, with_limits
-from realtime.rays.ray_light import RayGeometry, stretches
+from realtime.rays.ray_light import RayGeometry, smooth_subsegments
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium, per_extinction
 
@@ -63,7 +63,7 @@ def polynomial(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, d
 
     def integral(sigma_t):
         total = 0
-        for begin, end in stretches(geometry, light, x0, x1):
+        for begin, end in smooth_subsegments(geometry, light, x0, x1):
             piece = piece_of(geometry, begin, end, sigma_t, medium.phase)
             weighted = sum(
                 w * integrand(piece, (0.5 + 0.5 * y) * piece.width, geometry, medium, light) for y, w in nodes

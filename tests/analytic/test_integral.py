@@ -15,6 +15,7 @@ FORMS = [integrate_distance, integrate_angle, integrate_path]
 ISOTROPIC = PhaseFunction("isotropic")
 
 
+@pytest.mark.claim("integral-certified", "integral-three-forms", tolerance="the estimate, 2e-11 relative at most")
 @pytest.mark.parametrize("form", FORMS)
 def test_certified_values(data_folder, form):
     cases = read_cases(data_folder / "airlight_integral.csv")
@@ -59,6 +60,7 @@ def test_a_vacuum_without_end(form):
     assert abs(result.value - expected) <= result.error <= 1e-10 * expected
 
 
+@pytest.mark.claim("integral-three-forms")
 def test_the_forms_agree_where_no_table_reaches():
     rng = np.random.default_rng(17)
     phases = [

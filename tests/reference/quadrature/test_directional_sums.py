@@ -30,6 +30,7 @@ CASES = {
 }
 
 
+@pytest.mark.claim("directional-truth", tolerance="2e-8 relative, 2e-5 along an axis: the steps' own")
 @pytest.mark.parametrize("case", CASES)
 def test_airlight_is_the_sum_over_small_steps(variant, case):
     """Rationale: nothing is shared with the estimator but the rays: own chords, own rule, no kinks looked for.
@@ -48,6 +49,7 @@ def test_airlight_is_the_sum_over_small_steps(variant, case):
     assert np.all(bound[lit] > 0)
 
 
+@pytest.mark.claim("directional-truth", tolerance="1e-12 relative")
 @pytest.mark.parametrize("way", ["across", "with the ray", "against it"])
 def test_ray_through_a_box_in_closed_form(variant, way):
     """Light that falls on the box's upper face, along the ray's own direction, and against it.
@@ -81,6 +83,7 @@ def test_ray_through_a_box_in_closed_form(variant, way):
     assert np.all(found.bound < 1e-6 * found.airlight)
 
 
+@pytest.mark.claim("directional-truth", tolerance="2e-9 relative")
 def test_panels_give_the_closed_form(variant):
     """Two ways to integrate the same pieces, of a polyhedron: Kronrod's rule and the exponential."""
     import mitsuba as mi

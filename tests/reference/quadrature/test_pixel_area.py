@@ -47,6 +47,7 @@ def test_directions_through_the_middles_are_those_of_the_image(variant):
     assert found == pytest.approx(truth.direction, abs=1e-15)
 
 
+@pytest.mark.claim("pixel-area", tolerance="1e-4 relative, the tolerance asked for")
 def test_smooth_fog_is_the_integral_over_the_pixel(variant):
     """Gauss's product rule with 12 x 12 points, converged for what is smooth: the light is out of view."""
     from reference.quadrature.pixel_area import area_image
@@ -69,6 +70,7 @@ def test_smooth_fog_is_the_integral_over_the_pixel(variant):
     assert np.all(error < 1e-4 * expected)
 
 
+@pytest.mark.claim("pixel-area", tolerance="2e-3 relative beside the bound")
 @pytest.mark.parametrize("scene", [tiny_scene, box_scene], ids=["ball", "boxes"])
 def test_edges_against_brute_force(variant, scene):
     from reference.quadrature.image import quadrature_image
@@ -91,6 +93,7 @@ def test_edges_against_brute_force(variant, scene):
     assert np.abs(centre.airlight - airlight)[~near].max() > 5 * error.max()  # the centre is another thing
 
 
+@pytest.mark.claim("pixel-area")
 @pytest.mark.slow
 def test_smaller_tolerance_comes_closer(variant):
     from reference.quadrature.pixel_area import area_image

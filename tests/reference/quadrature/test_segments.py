@@ -124,7 +124,7 @@ def test_the_digest_of_a_scene_tells_its_media_apart(variant):
     """A cached truth must not stand in for that of another medium inside, or of other surroundings."""
     import mitsuba as mi
 
-    from reference.storage.cache import scene_digest
+    from reference.storage.scene_digest import scene_digest
 
     def digest(**changes):
         return scene_digest(mi.load_dict(clear_scene(size=(3, 2), **(shapes() | changes))))

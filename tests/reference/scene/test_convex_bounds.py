@@ -77,6 +77,7 @@ def prism(outline):
     return vertices, sides + fan
 
 
+@pytest.mark.claim("media-refused")
 def test_refused_meshes(variant):
     square, faces = prism([(0, 0), (1, 0), (1, 1), (0, 1)])
     assert isinstance(read_bounds(mesh(square, faces)), Polyhedron)
@@ -110,6 +111,7 @@ def glass(shape):
 AMBIENT = {"type": "homogeneous", "sigma_t": 0.2, "albedo": 0.5}
 
 
+@pytest.mark.claim("media-refused")
 @pytest.mark.parametrize(
     ("changes", "message"),
     [

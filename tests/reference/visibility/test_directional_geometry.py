@@ -60,6 +60,7 @@ def hits_balls(point, towards, balls):
     return hit
 
 
+@pytest.mark.claim("directional-truth")
 @pytest.mark.parametrize("towards", [(0.3, -0.5, 0.7), (0.0, 0.0, 1.0), (-0.9, 0.02, 0.0)])
 def test_random_points_by_the_definition(towards):
     """Triangles and balls all around the camera, one ball around it: points far from an edge are lit or not."""
@@ -79,6 +80,7 @@ def test_random_points_by_the_definition(towards):
     assert not np.any((lit == hidden)[gap > 1e-9])
 
 
+@pytest.mark.claim("directional-truth", tolerance="1e-13")
 def test_one_triangle_in_closed_form():
     """Light, triangle and ray in one plane: z - y cot for the corners, the crossing where it goes through the ray."""
     from reference.scene.directional_light import DirectionalLight

@@ -46,7 +46,7 @@ def test_flip_is_computed_where_it_is_asked_for_and_there_is_a_frame(monkeypatch
 
 
 def test_images_from_elsewhere_set_the_size_of_everything(variant):
-    studied = open_study("open-fog", replace(TINY, timed=(32, 24)), size=(20, 10))
+    studied = open_study("open-fog", replace(TINY, timed=(32, 24)).at((20, 10)))
     assert studied.effort.image == studied.effort.timed == (20, 10)
     assert (studied.scene.camera.width, studied.scene.camera.height) == (20, 10)
     assert studied.timed is None

@@ -118,6 +118,7 @@ def _p_value(case, name, *, sample=None, density=None, seed=0):
     return chi2.sf(np.sum((observed - expected) ** 2 / expected), len(expected) - 1)
 
 
+@pytest.mark.claim("sampled-distances", tolerance="chi-square, family level 1e-4")
 @pytest.mark.parametrize("name", ["equi-angular", "free-flight", "mixture"])
 def test_samples_follow_the_density(variant, name):
     """Rationale: chi-square tests of 13 spans, Sidak's level for all of them together is 1e-4 with fixed seeds."""
@@ -153,6 +154,7 @@ def test_broken_densities_are_rejected(variant, case):
     assert _p_value(case, "mixture", sample=lambda u: 0.98 * sample(u)) < 1e-4
 
 
+@pytest.mark.claim("sampled-distances", tolerance="1e-8")
 @pytest.mark.parametrize("case", SPANS)
 @pytest.mark.parametrize("name", ["equi-angular", "free-flight", "mixture"])
 def test_densities_integrate_to_one(variant, case, name):
@@ -162,6 +164,7 @@ def test_densities_integrate_to_one(variant, case, name):
     assert total == pytest.approx(1, abs=1e-8)
 
 
+@pytest.mark.claim("sampled-distances")
 @pytest.mark.parametrize("case", SPANS)
 def test_weights_of_both_techniques_add_up(variant, case):
     """Rationale: the balance heuristic's weights sum to 1, and each is its technique's share of the density."""
