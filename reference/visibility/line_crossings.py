@@ -57,8 +57,8 @@ def crossed_facets(bounds: Polyhedron, origin: Array, direction: Array) -> tuple
 def sphere_crossings(along: Array, power: Array | float) -> tuple[Array, Array]:
     """Return where lines enter and leave a sphere, the roots of t^2 - 2 along t + power, +-inf where they miss it [m].
 
-    along = d . (centre - origin), and power = |centre - origin|^2 - radius^2 is the power of the origin. The smaller root
-    in size is taken from the product of both, which is the power, so that nothing cancels.
+    along = d . (centre - origin), and power = |centre - origin|^2 - radius^2 is the power of the origin. The smaller
+    root in size is taken from the product of both, which is the power, so that nothing cancels.
     """
     inner = along * along - power
     root = np.sqrt(np.maximum(inner, 0.0))
