@@ -3,3 +3,4 @@
 
 TILE = 16  #: rays in a tile, and tiles in a block
 SIDE = 4  #: of a tile [pixels], where it is a square
+CORNERS = (0, SIDE - 1, TILE - SIDE, TILE - 1)  #: the rays at the corners of a square
