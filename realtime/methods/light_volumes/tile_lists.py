@@ -24,7 +24,7 @@ from realtime.methods.light_volumes.texel_lines import line_of
 from realtime.methods.light_volumes.tile_beams import Beam, BeamPlanes, beam_planes, make_beam, may_meet, parts_within
 from realtime.shadow_maps.inverse_depth_field import LightHeights, leaf_sides
 from realtime.shadow_maps.shadow_map import face_products
-from realtime.tiles.candidate_lists import bounding, draw, farthest, members
+from realtime.tiles.candidate_lists import bounding, farthest, members, over_lists
 from realtime.tiles.layout import TILE
 
 CHUNK = 4  #: leaves that a ray looks at together
@@ -114,7 +114,7 @@ def _tile_lists(heights: LightHeights, beam: Beam, passed, entries, of_block) ->
             met, box = meets(heights, planes, face, node, k < listed)
             return write(node, box, count, met)
 
-        count = draw(listed, look, total + 0)
+        count = over_lists(listed, look, total + 0)
 
         def of_level(level, count, again):
             count = dr.select(again, total, count)

@@ -16,7 +16,7 @@ import mitsuba as mi
 from realtime.methods.shadow_planes.plane_table import BINS, FIRST, FULL, NUMBER, TURN, PlaneIndex
 from realtime.methods.shadow_planes.tile_boxes import Box, block_boxes, tile_boxes, touches
 from realtime.numerics.array_types import four_numbers
-from realtime.tiles.candidate_lists import draw
+from realtime.tiles.candidate_lists import over_lists
 from realtime.tiles.layout import TILE
 
 ROOM = 32  #: entries for each tile and, fourfold, for each block, on average
@@ -188,7 +188,7 @@ def _visit(index: PlaneIndex, box: Box, entries, source: Source, write, *, lanes
             write(drawn, marked, quotient, hit)
         return drawn + dr.select(hit, mi.UInt32(1), mi.UInt32(0))
 
-    return draw(source.count, look, dr.zeros(mi.UInt32, width))
+    return over_lists(source.count, look, dr.zeros(mi.UInt32, width))
 
 
 def _write_sorted(pool, unsorted: _Unsorted, source: Source, behind: int, total) -> None:

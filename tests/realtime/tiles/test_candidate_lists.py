@@ -32,7 +32,7 @@ def test_what_stays_is_counted_and_written_as_far_as_there_is_room(variant, leng
     import drjit as dr
     import mitsuba as mi
 
-    from realtime.tiles.candidate_lists import draw
+    from realtime.tiles.candidate_lists import over_lists
 
     box = dr.arange(mi.UInt32, BOXES)
     target = dr.full(mi.UInt32, 99, BOXES * LONGEST)
@@ -45,7 +45,7 @@ def test_what_stays_is_counted_and_written_as_far_as_there_is_room(variant, leng
         dr.scatter(target, k, box * LONGEST + drawn, hit & (drawn < opaque))
         return drawn + dr.select(hit, mi.UInt32(1), 0)
 
-    drawn = draw(mi.UInt32(length), look, dr.zeros(mi.UInt32, BOXES))
+    drawn = over_lists(mi.UInt32(length), look, dr.zeros(mi.UInt32, BOXES))
     dr.eval(drawn, target)
     written = np.array(target).reshape(BOXES, LONGEST)
     for k in range(BOXES):
