@@ -32,7 +32,9 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.tiles.layout import CORNERS, TILE
+from realtime.tiles.layout import SIDE, TILE
+
+_CORNERS = (0, SIDE - 1, TILE - SIDE, TILE - 1)  # the rays at the corners of a square
 
 
 def members(count: int) -> list[Any]:
@@ -43,7 +45,7 @@ def members(count: int) -> list[Any]:
 
 def bounding(lanes: list[Any], *, square: bool) -> list[Any]:
     """Return those of a tile's rays that bound it: all, or the corners of a square of pixels."""
-    return [lanes[k] for k in CORNERS] if square else lanes
+    return [lanes[k] for k in _CORNERS] if square else lanes
 
 
 def farthest(distance, lanes: list[Any]):

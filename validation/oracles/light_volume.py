@@ -45,12 +45,12 @@ from analytic.errors import InputError
 from analytic.geometry import foot_and_height
 from realtime.methods.light_volumes.jump_search import with_walls
 from realtime.scene.read_scene import Scene
-from realtime.shadow_maps.inverse_depth_field import light_heights
+from realtime.shadow_maps.inverse_depth_field import inverse_depth_field
 from realtime.shadow_maps.shadow_map import ShadowMap
 from reference.quadrature.surface import surface_hits
 from reference.quadrature.unbounded import Rays, sum_intervals
 from reference.scene.read import TruthLight, TruthScene
-from reference.scene.shapes import exact_distance
+from reference.visibility.exact_distance import exact_distance
 from reference.visibility.intervals import LitIntervals
 from reference.visibility.spot_cone import cone_interval, perpendicular
 from validation.oracles.height_field import Array, HeightField, Index, Path, by_ray, height_field, zero_angle
@@ -62,7 +62,7 @@ _CHUNK = 1 << 20  # crossings of rays and lines looked at together: 8 MB an arra
 def traced_walls(scene: Scene, shadow_maps: Sequence[ShadowMap]) -> list[NDArray[np.uint32]]:
     """Return by light the walls that its rays find between the samples of its map, for `twin_airlight`."""
     pairs = zip(shadow_maps, scene.lights, strict=True)
-    return [np.array(with_walls(light_heights(one), scene.geometry, light).walls) for one, light in pairs]
+    return [np.array(with_walls(inverse_depth_field(one), scene.geometry, light).walls) for one, light in pairs]
 
 
 def twin_airlight(

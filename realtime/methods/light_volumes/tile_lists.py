@@ -22,8 +22,7 @@ from realtime.methods.light_volumes.pyramid import Box, Node, descend, meets, pa
 from realtime.methods.light_volumes.ray_lines import face_ray, in_face
 from realtime.methods.light_volumes.texel_lines import line_of
 from realtime.methods.light_volumes.tile_beams import Beam, BeamPlanes, beam_planes, make_beam, may_meet, parts_within
-from realtime.shadow_maps.inverse_depth_field import LightHeights, leaf_sides
-from realtime.shadow_maps.shadow_map import face_products
+from realtime.shadow_maps.inverse_depth_field import InverseDepthField, leaf_sides
 from realtime.tiles.candidate_lists import bounding, farthest, members, over_lists
 from realtime.tiles.layout import TILE
 
@@ -45,7 +44,7 @@ class Leaves:
     faces: Any  #: by tile, the faces that its rays may pass, see `faces_in_order`; `first`, `last` are of these alone
 
 
-def tile_leaves(heights: LightHeights, rays, distance, *, light, square: bool) -> Leaves:
+def tile_leaves(heights: InverseDepthField, rays, distance, *, light, square: bool) -> Leaves:
     """Return the leaves that concern each tile.
 
     Parameters
@@ -72,17 +71,18 @@ def tile_leaves(heights: LightHeights, rays, distance, *, light, square: bool) -
     face, block = lane // blocks, lane % blocks  # neighbours look at one face
     of_block = [dr.minimum(block * TILE + k, tiles - 1) for k in range(TILE)]
     about = [dr.gather(type(light), direction, tile) for direction in directions for tile in of_block]
-    lists = _block_lists(heights, make_beam(about, farthest(ends, of_block), light, heights.axis), face)
-    beam = make_beam(directions, ends, light, heights.axis)
+    axis = heights.projection.parallel_axis
+    lists = _block_lists(heights, make_beam(about, farthest(ends, of_block), light, axis), face)
+    beam = make_beam(directions, ends, light, axis)
     faces = mi.UInt32(1) if heights.faces == 1 else faces_passed(directions, beam.middle, ends, -light)
     return _tile_lists(heights, beam, faces, *lists)
 
 
-def _block_lists(heights: LightHeights, beam: Beam, face):
+def _block_lists(heights: InverseDepthField, beam: Beam, face):
     """Return the leaves that beams may meet, `_BLOCK_ROOM` places each, and how many; more than these are not there."""
     lane = dr.arange(mi.UInt32, dr.width(face))
     entries = dr.empty(mi.UInt32, dr.width(face) * _BLOCK_ROOM)
-    planes = beam_planes(beam, partial(face_products, heights.frame, face))
+    planes = beam_planes(beam, partial(heights.projection.products, face))
     write = _writer(entries, lane * _BLOCK_ROOM, _BLOCK_ROOM)
     zero = dr.zeros(mi.UInt32, dr.width(face))
     count = descend(heights, planes, face, mi.UInt32(heights.finest), zero, write, True)
@@ -90,7 +90,7 @@ def _block_lists(heights: LightHeights, beam: Beam, face):
     return entries, count
 
 
-def _tile_lists(heights: LightHeights, beam: Beam, passed, entries, of_block) -> Leaves:
+def _tile_lists(heights: InverseDepthField, beam: Beam, passed, entries, of_block) -> Leaves:
     """Return the leaves that beams may meet, drawn from the lists of their blocks, and which of their texels."""
     tiles = dr.width(beam.end)
     tile = dr.arange(mi.UInt32, tiles)
@@ -101,7 +101,7 @@ def _tile_lists(heights: LightHeights, beam: Beam, passed, entries, of_block) ->
 
     def of_face(to_come, total):
         face = mi.UInt32(dr.tzcnt(to_come))
-        planes = beam_planes(beam, partial(face_products, heights.frame, face))
+        planes = beam_planes(beam, partial(heights.projection.products, face))
         room = _TILE_ROOM - (faces - 1 - face)  # a place is left for every face to come
         write = _leaf_writer(heights, planes, face, (leaves, texels), tile * _TILE_ROOM, room)
         source = face * blocks + tile // TILE
@@ -152,7 +152,7 @@ def _tile_lists(heights: LightHeights, beam: Beam, passed, entries, of_block) ->
     return Leaves(leaves, texels, first, last, passed)
 
 
-def _is_lit(heights: LightHeights, face, beam: Beam, active):
+def _is_lit(heights: InverseDepthField, face, beam: Beam, active):
     """Return whether all of a face is lit that beams pass which meet nothing there: whether their middle rays are."""
 
     def looked_up(middle, end):
@@ -184,7 +184,7 @@ def _writer(target, first, room):
     return write
 
 
-def _leaf_writer(heights: LightHeights, planes: BeamPlanes, face, targets, first, room):
+def _leaf_writer(heights: InverseDepthField, planes: BeamPlanes, face, targets, first, room):
     """Return the function that writes a leaf, if any of its texels matters and there is room, and counts it."""
 
     def write(node: Node, box: Box, count, active):
@@ -200,7 +200,7 @@ def _leaf_writer(heights: LightHeights, planes: BeamPlanes, face, targets, first
     return write
 
 
-def _texels_met(heights: LightHeights, planes: BeamPlanes, face, node: Node, box: Box):
+def _texels_met(heights: InverseDepthField, planes: BeamPlanes, face, node: Node, box: Box):
     """Return bit 4 row + column of each texel of a leaf that the beam may meet; 1 for larger nodes."""
     fine = node.level == heights.finest
     leaf = leaf_sides(heights, face, node.i, node.j, fine)

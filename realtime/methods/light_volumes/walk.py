@@ -23,11 +23,11 @@ from realtime.methods.light_volumes.cube_faces import FACE_BITS, NO_FACE
 from realtime.methods.light_volumes.ray_lines import FaceRay, face_ray, in_face
 from realtime.methods.light_volumes.texel_lines import line_of
 from realtime.methods.light_volumes.tile_lists import LARGER, LIT, Leaves
-from realtime.shadow_maps.inverse_depth_field import LightHeights
+from realtime.shadow_maps.inverse_depth_field import InverseDepthField
 
 
 def sum_lit_intervals(
-    heights: LightHeights,
+    heights: InverseDepthField,
     leaves: Leaves,
     *,
     away,

@@ -121,13 +121,13 @@ def test_lists_of_nodes_cover_what_is_looked_at_in_any_room(variant, monkeypatch
     from realtime.methods.light_volumes import tile_lists
     from realtime.scene.camera import ray_directions, tiled_pixels
     from realtime.scene.read_scene import read_scene
-    from realtime.shadow_maps.inverse_depth_field import LEAF, light_heights
+    from realtime.shadow_maps.inverse_depth_field import LEAF, inverse_depth_field
     from realtime.shadow_maps.shadow_map import cast_shadow_map
     from tests.helpers.light_frames import loaded_scene
 
     scene = read_scene(loaded_scene("fence"))
     light, camera, size = scene.lights[0], scene.camera, 64
-    heights = light_heights(cast_shadow_map(scene.geometry, light, size))
+    heights = inverse_depth_field(cast_shadow_map(scene.geometry, light, size))
     pixel = mi.UInt32(tiled_pixels(camera.width, camera.height))
     distance = dr.full(mi.Float, 4.3, len(pixel))
 
