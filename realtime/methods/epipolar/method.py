@@ -18,7 +18,6 @@ lists of tiles, which bound the sixteen rays of a tile alone, miss what concerns
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -48,7 +47,7 @@ from realtime.methods.epipolar.walk import sum_lit_intervals
 from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.light_airlight import RayAirlight, integral_type, ray_airlight
 from realtime.methods.interface.view import View, rays_in_media
-from realtime.numerics.array_types import bytes_of
+from realtime.numerics.array_types import PerMetre, bytes_of
 from realtime.parameters import Parameters, parameter
 from realtime.rays.ray_light import distance_to_light
 from realtime.scene.camera import Camera
@@ -99,7 +98,7 @@ class EpipolarMap:
     """What the method needs beyond the view, for one light."""
 
     shadow_map: ShadowMap
-    heights: Any  #: inverse planar depths at the corners of its texels [1/m]
+    heights: PerMetre  #: inverse planar depths at the corners of its texels [1/m]
 
 
 def min_max(view: View, state: tuple[EpipolarMap, ...], lists, *, kernel, parameters: MinMaxParameters) -> Layers:
