@@ -105,23 +105,23 @@ def _step(heights: SliceHeights, number, ray, segment, stop, walk: _Walk) -> _Wa
     end, last = stop
     Float = type(height)
     after = walk.place + (mi.UInt32(1) << walk.level)
-    one, other = node_pair(heights, number, walk.place, walk.level)
+    s0, s1 = node_pair(heights, number, walk.place, walk.level)
     kx0, ky0 = line_point(heights, number, Float(walk.place))
     kx1, ky1 = line_point(heights, number, Float(after))
     g0, g1 = _line(ray, kx0, ky0), _line(ray, kx1, ky1)
     # The ray may end within the node.
     g_end = dr.select(Float(after) > end, _line_value(heights, number, ray, end), g1)
-    all_lit = dr.minimum(g0, g_end) >= height * dr.maximum(one, other)
-    all_dark = dr.maximum(g0, g_end) < height * dr.minimum(one, other)
+    all_lit = dr.minimum(g0, g_end) >= height * dr.maximum(s0, s1)
+    all_dark = dr.maximum(g0, g_end) < height * dr.minimum(s0, s1)
     whole, leaf = all_lit | all_dark, walk.level == 0
     # Within a leaf, from end to end.
-    d0, d1 = dr.abs(g0 - height * one), g1 - height * other
+    d0, d1 = dr.abs(g0 - height * s0), g1 - height * s1
     lit = dr.select(whole, all_lit, d1 >= 0)
     passed = whole | leaf
     lit = dr.select(passed, lit, walk.lit)
     # Where a whole node differs from what was before it, by rounding, the change is at its beginning.
     ky = dr.select(whole, ky0, ky0 * dr.abs(d1) + ky1 * d0)
-    divisor = dr.select(whole, g0, height * (one * dr.abs(d1) + other * d0))
+    divisor = dr.select(whole, g0, height * (s0 * dr.abs(d1) + s1 * d0))
     x = dr.select(divisor > 0, square * ky / divisor, dr.inf)
     x = dr.clip(x, segment[0], segment[1])
     over = passed & (after > last)
@@ -155,7 +155,7 @@ def _position(heights: SliceHeights, number, ray, x):
         q = dr.select(px >= 0, py / (px + py), 2 - py / (py - px))
         q = dr.select(px + py == 0, 0, q)
     else:
-        x0, y0, x1, y1 = (dr.gather(type(x), one, number) for one in heights.chord)
+        x0, y0, x1, y1 = (dr.gather(type(x), place, number) for place in heights.chord)
         before, beyond = x0 * py - y0 * px, px * y1 - py * x1
         # Outside the wedge of the chord one of them is negative.
         before, beyond = dr.maximum(before, 0), dr.maximum(beyond, 0)
