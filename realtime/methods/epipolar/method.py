@@ -47,7 +47,6 @@ from realtime.methods.interface.view import View, rays_in_media
 from realtime.numerics.array_types import bytes_of
 from realtime.rays.ray_light import distance_to_light
 from realtime.scene.camera import Camera
-from realtime.scene.features import check_places
 from realtime.scene.lights import Light
 from realtime.scene.medium import transmittance
 from realtime.scene.read_scene import Scene
@@ -95,8 +94,8 @@ def min_max(
 
     Notes
     -----
-    Valid for point and spot lights anywhere; the epipole may lie in the image, where the pixels next to the light are
-    the least accurate. Shadows are those of the map, sampled once more along the slices.
+    Valid for lights anywhere; the epipole may lie in the image, where the pixels next to the light are the least
+    accurate. Shadows are those of the map, sampled once more along the slices.
 
     References
     ----------
@@ -132,10 +131,9 @@ def prepare_min_max(
     Raises
     ------
     InputError
-        For parameters out of range, directional lights, and more memory than the machine has.
+        For parameters out of range, and more memory than the machine has.
     """
     check_size(map)
-    check_places(scene.plan, "min-max")
     if sampling not in SAMPLINGS:
         raise InputError(f"sampling: got {sampling!r}, wanted one of {', '.join(SAMPLINGS)}")
     for name, value in (("slices", slices), ("samples", samples)):

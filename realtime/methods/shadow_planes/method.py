@@ -43,8 +43,7 @@ from realtime.methods.shadow_planes.tile_lists import Lists, tile_lists
 from realtime.methods.shadow_planes.view_culling import bodies_in_view
 from realtime.numerics.array_types import ArrayTypes, types_of
 from realtime.scene.camera import HostCamera, read_camera
-from realtime.scene.features import check_places
-from realtime.scene.lights import Light
+from realtime.scene.lights import Light, host_position
 from realtime.scene.mesh_adjacency import Casters, read_casters, with_positions
 from realtime.scene.read_scene import Scene
 
@@ -84,10 +83,9 @@ def prepare_shadow_planes(scene: Scene, **settings) -> PlanePreparation:
     Raises
     ------
     InputError
-        For a parameter out of range, casters without triangles and directional lights.
+        For a parameter out of range and casters without triangles.
     """
     _check(**settings)
-    check_places(scene.plan, "shadow-planes")
     return PlanePreparation(read_casters(scene.geometry), settings["cone"])
 
 
@@ -98,7 +96,7 @@ def plane_finder(
 
     All that is on the device is read here, and nothing else done: until then the device stands still.
     """
-    position = np.array(light.position, dtype=np.float64).ravel()
+    position = host_position(light)
     ring = None
     if cone and light.cone is not None:
         ring = cone_ring(np.array(light.axis, dtype=np.float64).ravel(), float(light.cos_cutoff[0]), cone)
@@ -165,7 +163,7 @@ def shadow_planes(
 
     Notes
     -----
-    Valid for casters that are triangle meshes, closed or not. Shadows are those of the
+    Valid for all lights and casters that are triangle meshes, closed or not. Shadows are those of the
     triangles, exact to rounding, with order=exact. Bounded media have nodes of their own, the kernel is not asked;
     they are for evaluation=pixel.
 
@@ -203,7 +201,8 @@ def shadow_planes(
                 index, lists, rays, view.distance, (at_plane, at_surface), order=order, buffer=levels
             )
         total += value
-        lit.append(reached)
+        # Frames cast rays for the shadows of a light at infinity on surfaces.
+        lit.append(reached if light.w else True)
     if ambient and in_media:
         total += ambient_radiance(in_media[0].pieces, view.distance, ambient)
     elif ambient:
