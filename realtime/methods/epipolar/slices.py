@@ -43,7 +43,7 @@ class Slices:
     closed: Any  #: whether they are all four: after the last slice comes the first; one entry
     towards: Any  #: e1, one entry
     distance: Any  #: D [m], one entry; w = 0: 1
-    away: Any  #: from the position of the light to the camera [m], one entry
+    away: Any  #: w = 0: from the position that stands for the light's to the camera [m], one entry
     w: int  #: last coordinate of the light's homogeneous position
     across: Any  #: e2
     ends: Any  #: i and j where a slice enters, or of E, and where it leaves: four numbers a slice [pixels]
@@ -87,7 +87,7 @@ def image_slices(camera: Camera, light: Light, count: int) -> Slices:
         closed,
         towards,
         distance,
-        away=camera.origin - light.position,
+        away=None if light.w else camera.origin - light.position,
         w=light.w,
         across=None,
         ends=None,
