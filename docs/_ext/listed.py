@@ -4,14 +4,21 @@
 import ast
 import inspect
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+from reports.tables.drawing import markdown
+from reports.tables.lists import kernel_list, method_list
+from reports.tables.table import Name, Row, Table
+
 ROOT = Path(__file__).resolve().parents[2]
 #: Pages of methods that are called otherwise than the method.
 PAGES: dict[str, str] = {}
+#: What the help of parameters leads to.
+LINKS = {"between the corners of tiles": "methods.md#between-the-corners-of-tiles"}
 
 
 def table(headers: Sequence[str], rows: Sequence[Sequence[str]], words: int = 1) -> str:
@@ -61,45 +68,44 @@ def _cell(words: str) -> str:
 
 def methods() -> str:
     """Return the methods with links to their pages."""
-    from realtime.methods.registry import METHODS
+    shown = method_list().only("name", "what", "kernel", "shadows", "source")
+    return markdown(_named(shown, lambda name: f"{PAGES.get(name, name)}.md"))
 
-    rows = [
-        (
-            f"[`{record.name}`]({PAGES.get(record.name, record.name)}.md)",
-            record.summary,
-            "yes" if record.uses_kernel else "no",
-            "yes" if record.shadows else "no",
-            record.source,
-        )
-        for record in METHODS.values()
-    ]
-    return table(("method", "what it does", "calls a kernel", "knows shadows", "source"), rows, 5)
+
+def _named(shown: Table, address: Callable[[str], str] = lambda name: "") -> Table:
+    """Return a table whose names are code, with links where they have an address."""
+    rows = (Row(row.values | {"name": Name(row.values["name"], address(row.values["name"]))}) for row in shown.rows)
+    return replace(shown, rows=tuple(rows))
 
 
 def parameters(method: str) -> str:
-    """Return the defaults of a method's parameters in a sentence."""
+    """Return a table of a method's parameters: values, the default first, and what they do."""
+    from dataclasses import fields
+
     from realtime.methods.registry import METHODS
 
-    values = METHODS[method].parameters
-    if not values:
-        return "The method has no parameters."
-    return "Defaults: " + ", ".join(f"`{name}={value}`" for name, value in values.items()) + "."
+    rows = [(f"`{item.name}`", *_parameter(item)) for item in fields(METHODS[method].parameters)]
+    return table(("`--set`", "values", "what it does"), rows, 3) if rows else "The method has no parameters."
+
+
+def _parameter(item: Any) -> tuple[str, str]:
+    """Return the values of a parameter, its default first, and what it does."""
+    from realtime.parameters import limits_of, wanted_values
+
+    limits = limits_of(item)
+    if isinstance(item.default, str):
+        values = ", ".join(f"`{choice}`" for choice in dict.fromkeys((item.default, *limits.choices)))
+    else:
+        values = f"{item.default}; {wanted_values(item)}"
+    what = _cell(limits.help)
+    for words, link in LINKS.items():
+        what = what.replace(words, f"[{words}]({link})")
+    return _cell(values), what
 
 
 def kernels() -> str:
     """Return the kernels."""
-    from realtime.kernels.registry import KERNELS
-
-    rows = [
-        (
-            f"`{record.name}`",
-            record.summary,
-            ", ".join(f"`{name}={value}`" for name, value in record.parameters.items()),
-            record.source,
-        )
-        for record in KERNELS.values()
-    ]
-    return table(("kernel", "what it does", "size", "source"), rows, 4)
+    return markdown(_named(kernel_list()))
 
 
 def keys() -> str:

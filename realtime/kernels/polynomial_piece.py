@@ -48,7 +48,6 @@ class Piece:
     reach: Any  #: (E - E0)/m beyond which nothing is left
     width: Any  #: U
     factor: Any  #: (2 m/h) exp(-sigma_t (x0 + r0)) [1/m]
-    coefficients: tuple[Any, ...] = ()  #: A_1, A_2, ... over U/2, see the module
 
 
 def piece_of(geometry: RayGeometry, x0, x1, sigma_t, phase: Phase) -> Piece:

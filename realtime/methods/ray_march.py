@@ -13,6 +13,7 @@ steps.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import drjit as dr
 import mitsuba as mi
@@ -20,56 +21,68 @@ import mitsuba as mi
 from realtime.bounded_media.airlight import LitRay
 from realtime.errors import InputError
 from realtime.memory import check_memory
+from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.view import View, bounded_radiance, radiance, rays_in_media
+from realtime.parameters import Parameters, parameter
 from realtime.rays.ray_light import RayGeometry, distance_to_light, falloff, ray_geometry
 from realtime.scene.lights import Light
 from realtime.scene.medium import least_extinction, per_extinction
 from realtime.scene.read_scene import Scene
-from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, check_size, lit_in_map, map_memory
+from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, lit_in_map, map_memory, map_size
+from realtime.tiles.adaptive_sampling import tolerance
 
-SPACINGS = ("equiangular", "uniform")
-SHADOWS = ("ray", "map", "none")
 _OPTICAL_REACH = 20.0
 
 
-def ray_march(
-    view: View, *, kernel=None, steps: int = 100, spacing: str = "equiangular", shadow: str = "ray", map: int = 512
-):
+@dataclass(frozen=True)
+class RayMarchParameters(Parameters):
+    """The parameters of ray marching."""
+
+    steps: int = parameter(100, "steps of every ray and light", least=1)
+    spacing: str = parameter(
+        "equiangular", "in the angle at the light, or in the distance", choices=("equiangular", "uniform")
+    )
+    shadow: str = parameter(
+        "ray", "a shadow ray a step, a look-up in a shadow map, or no shadows", choices=("ray", "map", "none")
+    )
+    map: int = map_size(512, "texels on a side of a face of the map, with `shadow=map`")
+    tolerance: float = tolerance()
+
+
+def ray_march(view: View, state, lists, *, kernel, parameters: RayMarchParameters) -> Layers:
     """Return the airlight of every ray by marching [W/(m^2 sr)].
 
     Parameters
     ----------
     view
         The frame.
-    kernel
+    state
+        From `prepare_maps`.
+    lists, kernel
         Not used: each step evaluates the integrand itself.
-    steps
-        Steps a ray and light, at least 1.
-    spacing
-        'equiangular' or 'uniform'.
-    shadow
-        'ray' (a shadow ray a step), 'map' (a shadow-map look-up a step) or 'none'.
-    map
-        Resolution of the shadow map where `shadow` is 'map' [texels].
+    parameters
+        Values of the parameters.
 
     Raises
     ------
     InputError
-        For an unknown spacing or shadow, less than one step, or uniform steps on an endless ray through a vacuum.
+        For uniform steps on an endless ray through a vacuum.
 
     References
     ----------
     Billeter, Sintorn, Assarsson 2010, section 2 (the marcher that they compare with). Kulla, Fajardo 2012, *Importance
     sampling techniques for path tracing in participating media*, section 4 (the equi-angular variable).
     """
-    _check(steps, spacing, shadow, view)
+    steps, spacing = parameters.steps, parameters.spacing
+    if spacing == "uniform" and view.features.vacuum and not view.medium.clear:
+        raise InputError("spacing=uniform: an endless ray through a vacuum has no step length; use spacing=equiangular")
     total = type(view.medium.albedo)(0)
-    in_media = rays_in_media(view) if view.plan.bounded else ()
+    in_media = rays_in_media(view) if view.features.bounded else ()
     for number, light in enumerate(view.lights):
         x0, x1 = type(view.distance)(0), view.distance
         media = in_media[number] if in_media else None
         if media and not light.w:
-            lit = _visibility(view, number, shadow)
+            lit = _visibility(view, state, number, parameters.shadow)
             integral = _march_parallel(view, media, _within(media, x0, x1), steps=steps, lit=lit)
             total += bounded_radiance(light, integral)
             continue
@@ -79,45 +92,35 @@ def ray_march(
             x1 = dr.minimum(x1, x0 + _OPTICAL_REACH / least_extinction(view.medium))
         if media and view.medium.clear:
             x0, x1 = _within(media, x0, x1)
-        lit = _visibility(view, number, shadow)
+        lit = _visibility(view, state, number, parameters.shadow)
         integral = _march(view, light, geometry, (x0, x1), steps=steps, spacing=spacing, lit=lit, media=media)
         total += bounded_radiance(light, integral) if media else radiance(view.medium, light, integral)
-    return total
+    return Layers(total)
 
 
-def prepare_maps(scene: Scene, *, shadow: str, map: int, **_) -> Callable[[Scene], tuple[ShadowMap, ...]]:
+def prepare_maps(scene: Scene, parameters: RayMarchParameters) -> Callable[[Scene], tuple[ShadowMap, ...]]:
     """Return the function that casts a shadow map for every light of a frame, if they are asked for.
 
     Raises
     ------
     InputError
-        If `map` is no size of a shadow map, or needs more memory than the machine has.
+        If the maps need more memory than the machine has.
     """
-    check_size(map)
-    if shadow != "map":
+    map = parameters.map
+    if parameters.shadow != "map":
         return lambda scene: ()
     needed = sum(map_memory(light, map) for light in scene.lights)
     check_memory(f"map: {map} texels for {len(scene.lights)} light(s)", needed, "use a smaller map")
     return lambda scene: tuple(cast_shadow_map(scene.geometry, light, map) for light in scene.lights)
 
 
-def _check(steps: int, spacing: str, shadow: str, view: View) -> None:
-    for name, value, allowed in (("spacing", spacing, SPACINGS), ("shadow", shadow, SHADOWS)):
-        if value not in allowed:
-            raise InputError(f"{name}: got {value!r}, wanted one of {', '.join(allowed)}")
-    if not isinstance(steps, int) or steps < 1:
-        raise InputError(f"steps: got {steps!r}, wanted a whole number of at least 1")
-    if spacing == "uniform" and view.plan.vacuum and not view.medium.clear:
-        raise InputError("spacing=uniform: an endless ray through a vacuum has no step length; use spacing=equiangular")
-
-
-def _visibility(view: View, number: int, shadow: str):
+def _visibility(view: View, maps, number: int, shadow: str):
     """Return the function that says whether the light of a number reaches a point."""
     light = view.lights[number]
-    if shadow == "none" or not view.plan.shadows:
+    if shadow == "none" or not view.features.shadows:
         return lambda point: True
     if shadow == "map":
-        return lambda point: lit_in_map(view.prepared[number], light, point)
+        return lambda point: lit_in_map(maps[number], light, point)
     return lambda point: view.visible(point, light)
 
 

@@ -21,6 +21,7 @@ import mitsuba as mi
 
 from realtime.errors import InputError
 from realtime.numerics.array_types import bytes_of
+from realtime.parameters import parameter
 from realtime.scene.lights import Light
 from realtime.shadow_maps.projection import Projection, cube_coordinates, light_faces, light_projection, map_ray
 
@@ -49,6 +50,11 @@ def check_size(size) -> None:
     """
     if not isinstance(size, int) or size < 4 or size > 8192 or size & (size - 1):
         raise InputError(f"map: got {size!r}, wanted a power of two from 4 to 8192")
+
+
+def map_size(default: int, help: str) -> Any:
+    """Return the field of a parameter that is the resolution of a shadow map [texels]."""
+    return parameter(default, help, check=check_size, wanted="a power of two from 4 to 8192")
 
 
 def map_memory(light: Light, size: int) -> int:

@@ -26,9 +26,10 @@ from reference.quadrature.adaptive_panels import Panels, first_panels, sum_panel
 from reference.quadrature.pieces import Pieces, Setup, cut_pieces
 from reference.quadrature.segments import Segments, leg_kinks
 from reference.quadrature.unbounded import Rays, lit_stretches, sums_of
-from reference.scene.convex_bodies import Ball, ball_crossings, crossed_facets
+from reference.scene.convex_bounds import Ball
 from reference.scene.read import BoundedMedium, TruthLight, TruthScene
 from reference.visibility.intervals import LitIntervals
+from reference.visibility.line_crossings import ball_crossings, crossed_facets
 from reference.visibility.spot_cone import falloff
 
 Array = NDArray[np.float64]

@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 
 from reference.quadrature.directional_sums import sum_directional
 from reference.quadrature.segments import camera_segments, scattering_range
-from reference.scene.directional_light import DirectionalLight, ParallelRays, parallel_rays
+from reference.scene.directional_light import DirectionalLight
 from reference.scene.read import TruthScene
 from reference.visibility.directional_casting import directional_intervals, edge_scale
 from reference.visibility.intervals import LitIntervals
+from reference.visibility.parallel_rays import ParallelRays, parallel_rays
 
 Array = NDArray[np.float64]
 

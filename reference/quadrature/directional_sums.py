@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The airlight of a light at infinity in bodies of media, added up for every ray, with an error bound.
 
-With the names of `reference.scene.directional_light` the single scattering of a piece [x0, x1] of a ray in a medium m
+With the names of `reference.visibility.parallel_rays` the single scattering of a piece [x0, x1] of a ray in a medium m
 is
 
     L = albedo_m sigma_m E p_m(c) / (4 pi)  int exp(-tau_camera(x) - tau_leg(x)) dx,
@@ -35,10 +35,12 @@ from reference.quadrature.adaptive_panels import Panels, first_panels, sum_panel
 from reference.quadrature.pieces import Crossed, Pieces, cut_pieces
 from reference.quadrature.segments import Segments, polygon_corners
 from reference.quadrature.unbounded import sums_of
-from reference.scene.convex_bodies import Ball, Polyhedron, crossed_facets, half_chord
-from reference.scene.directional_light import DirectionalLight, ParallelRays
+from reference.scene.convex_bounds import Ball, Polyhedron
+from reference.scene.directional_light import DirectionalLight
 from reference.scene.read import TruthScene
 from reference.visibility.intervals import LitIntervals
+from reference.visibility.line_crossings import crossed_facets, half_chord
+from reference.visibility.parallel_rays import ParallelRays
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -32,7 +32,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.quadrature.image import Progress, RayValues, TruthImage, image_of, ray_values
+from reference.quadrature.ray_values import Progress, RayValues, TruthImage, image_of, ray_values
 from reference.quadrature.unbounded import sums_of
 from reference.scene.camera import film_directions, pixel_centres
 from reference.scene.read import TruthScene

@@ -23,8 +23,9 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.scene.convex_bodies import Ball, Bounds, Polyhedron, crossings
+from reference.scene.convex_bounds import Ball, Bounds, Polyhedron
 from reference.scene.read import TruthScene
+from reference.visibility.line_crossings import crossings
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

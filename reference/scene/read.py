@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from analytic.errors import InputError
 from analytic.phase import PhaseFunction
 from reference.scene.camera import camera_matrix, film_directions, pixel_centres
-from reference.scene.convex_bodies import Bounds, holds, overlap, read_bounds
+from reference.scene.convex_bounds import Bounds, holds, overlap, read_bounds
 from reference.scene.directional_light import DirectionalLight, endless_medium, is_directional, read_directional
 
 Array = NDArray[np.float64]

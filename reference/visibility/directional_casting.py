@@ -17,12 +17,12 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.scene.directional_light import ParallelRays
 from reference.scene.read import TruthScene
 from reference.scene.shapes import Shapes
 from reference.visibility.directional_geometry import parallel_intervals
 from reference.visibility.intervals import LitIntervals
 from reference.visibility.lit_intervals import Legs, found_intervals
+from reference.visibility.parallel_rays import ParallelRays
 from reference.visibility.random_checks import ROUNDING, Leg
 
 Array = NDArray[np.float64]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lit intervals of camera rays by exact geometry for a light at infinity: the twin of `lit_geometry` and `lit_balls`.
 
-In the plane of a ray and the direction to the light (`reference.scene.directional_light`) what lies at (z, y), y >= 0,
+In the plane of a ray and the direction to the light (`reference.visibility.parallel_rays`) what lies at (z, y), y >= 0,
 is on the leg of the point x = z - y c/s of the ray, and what lies at y < 0 is on none.
 
 **Triangles** cut the plane in segments. The map is linear: a segment, clipped to y >= 0, hides from the light what lies
@@ -22,10 +22,10 @@ the third is the distance from the line, x s at the end of a ray.
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.scene.convex_bodies import half_chord
-from reference.scene.directional_light import ParallelRays
 from reference.scene.shapes import Shapes
 from reference.visibility.intervals import LitIntervals
+from reference.visibility.line_crossings import half_chord
+from reference.visibility.parallel_rays import ParallelRays
 from reference.visibility.spheres import Shadows
 from reference.visibility.triangles import (
     EXACT_EDGE,

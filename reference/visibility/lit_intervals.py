@@ -177,15 +177,6 @@ def _cast_intervals(scene, legs: Legs, ends: tuple[Array, Array], samples: int) 
     return certified_cast(Toggles.joined(chunks), Rounding(visible, _bisect), ends=ends, checks=checks)
 
 
-def visibility_test(scene, position: Array, rays: tuple[Array, Array, Array]) -> Visible:
-    """Return a function (ray numbers, angles) -> whether the light at `position` reaches those points.
-
-    The shadow rays start at the light, where nothing is close, and stop twenty float32 roundings before the point: a
-    point on a surface must not be blocked by that surface.
-    """
-    return _visible(scene, _shadow_rays(position, rays))
-
-
 def _visible(scene, shadow: Callable[[Index, Array], Any]) -> Visible:
     def visible(ray: Index, theta: Array) -> Bools:
         return ~np.array(scene.ray_test(shadow(ray, theta)), dtype=bool)

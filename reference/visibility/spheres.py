@@ -32,7 +32,7 @@ disk, which lies between the two angles of the first case, if it meets the disk 
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.scene.convex_bodies import half_chord
+from reference.visibility.line_crossings import half_chord
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

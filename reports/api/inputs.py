@@ -154,8 +154,8 @@ def telling(progress: Progress, title: str) -> Iterator[Callable[[float, str], N
     if progress is True:
         from reports.machine.progress import progress_bar
 
-        with progress_bar(title) as tell:
-            yield tell
+        with progress_bar(title) as callback:
+            yield callback
     elif callable(progress):
         yield progress
     else:
@@ -217,5 +217,5 @@ def _described(loaded: OpenScene) -> tuple[dict[str, str], tuple[str, ...]]:
     from realtime.scene.features import describe
     from realtime.scene.read_scene import read_scene
 
-    plan = read_scene(loaded.scene).plan
-    return describe(plan), plan.notes
+    features = read_scene(loaded.scene).features
+    return describe(features), features.notes

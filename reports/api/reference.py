@@ -76,25 +76,25 @@ def reference(
         named = [name for name, value in given.items() if value is not None]
         if named:
             raise InputError(f"{named[0]}: is for 'single-scatter' and 'volpath'; leave it out, or take one of these")
-        with telling(progress, "quadrature") as tell:
-            return _quadrature(opened(scene, size), pixel, tell)
+        with telling(progress, "quadrature") as callback:
+            return _quadrature(opened(scene, size), pixel, callback)
     if pixel != "centre":
         raise InputError(
             f"pixel: got {pixel!r}, but {estimator} traces pixel centres; leave it out or take 'quadrature'"
         )
     budget = _budget(given, target)
-    with telling(progress, estimator) as tell:
-        return _sampled(opened(scene, size), estimator, budget, seed=seed, tell=tell)
+    with telling(progress, estimator) as callback:
+        return _sampled(opened(scene, size), estimator, budget, seed=seed, callback=callback)
 
 
-def _quadrature(loaded: OpenScene, pixel: str, tell: Callable[[float, str], None]) -> "Reference":
+def _quadrature(loaded: OpenScene, pixel: str, callback: Callable[[float, str], None]) -> "Reference":
     import numpy as np
 
     from reports.api.results import Reference, sealed
     from validation.estimates.images import whole_truth
     from validation.estimates.quadrature import truth_image
 
-    truth = truth_image(loaded.scene, pixel=pixel, progress=lambda done, total, what: tell(done / total, what))
+    truth = truth_image(loaded.scene, pixel=pixel, progress=lambda done, total, what: callback(done / total, what))
     finite = np.isfinite(truth.airlight)
     mean = float(truth.airlight[finite].mean()) if finite.any() else 0.0
     counts = ("transitions", "checked", "disagreements", "refined", "left")
@@ -108,12 +108,12 @@ def _quadrature(loaded: OpenScene, pixel: str, tell: Callable[[float, str], None
 
 
 def _sampled(
-    loaded: OpenScene, estimator: str, budget: "Budget", *, seed: int, tell: Callable[[float, str], None]
+    loaded: OpenScene, estimator: str, budget: "Budget", *, seed: int, callback: Callable[[float, str], None]
 ) -> "Reference":
     from reports.api.results import Reference, sealed
     from validation.estimates.images import monte_carlo_reference
 
-    found = monte_carlo_reference(loaded, estimator, budget=budget, seed=seed, progress=tell)
+    found = monte_carlo_reference(loaded, estimator, budget=budget, seed=seed, progress=callback)
     attributes = {name.removeprefix("airlight:"): value for name, value in found.image.attributes.items()}
     details: dict[str, Any] = {name: attributes[name] for name in ("spp", "batches", "seeds")}
     details |= {"cached": found.cached, "masked": found.masked, "reached": found.reached}

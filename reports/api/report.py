@@ -76,7 +76,7 @@ def report(
     chosen = usual if methods is None else chosen_methods(methods)
     names, shown = _scenes_and_images(scenes, images, effort)
     try:
-        with telling(progress, "report") as tell:
+        with telling(progress, "report") as callback:
             data = write_report(
                 target,
                 scenes=names,
@@ -85,7 +85,7 @@ def report(
                 images=shown,
                 command=f"airlight.report({os.fspath(folder)!r}, ..)",
                 fresh=fresh,
-                progress=tell,
+                progress=callback,
             )
     except Interrupted as stop:
         raise KeyboardInterrupt(str(stop)) from None

@@ -157,16 +157,16 @@ def bench(
     loaded = [opened(one, size) for one in several(scenes)]
     read = [read_scene(one.scene) for one in loaded]  # refuse what cannot be used before the work begins
     rows = []
-    with telling(progress, "bench") as tell:
+    with telling(progress, "bench") as callback:
         for number, (one, scene) in enumerate(zip(loaded, read)):
-            tell(number / len(loaded), f"{one.name}: the truth")
+            callback(number / len(loaded), f"{one.name}: the truth")
             truth = truth_image(one.scene)
-            useful = configurations_for(scene.plan, chosen)
+            useful = configurations_for(scene.features, chosen)
             for place, each in enumerate(useful):
-                tell((number + place / len(useful)) / len(loaded), f"{one.name}: {each.label}")
+                callback((number + place / len(useful)) / len(loaded), f"{one.name}: {each.label}")
                 measured = measure(scene, each, truth=truth, seconds=seconds, with_flip=flip)
                 rows.append({"scene": one.name, **_size(scene), **_numbers(measured)})
-        tell(1.0, "done")
+        callback(1.0, "done")
     return BenchTable(rows=tuple(rows), environment=describe_environment())
 
 
@@ -204,7 +204,7 @@ def _numbers(measured: "Measurement") -> dict[str, Any]:
     row["frame_ms"] = times and times.frame.median_ms
     row["frame_low_ms"] = times and times.frame.low_ms
     row["frame_high_ms"] = times and times.frame.high_ms
-    for stage in ("airlight", "surface", "rebuild", "moved", "relit", "recoloured"):
+    for stage in ("airlight", "surface", "light_moved", "objects_moved", "light_moved_camera_kept", "colours_changed"):
         row[f"{stage}_ms"] = times and getattr(times, stage).median_ms
     for name in ("relative_rmse", "relative_bias", "p50", "p99", "max", "nonfinite", "negative"):
         row[name] = error and plain(getattr(error, name))

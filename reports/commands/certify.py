@@ -19,7 +19,7 @@ def certify(
     from validation.certified.generate import certified_data, to_json
 
     ensure_writable(output)
-    with progress_bar("certify") as tell:
-        data = certified_data(progress=tell)
+    with progress_bar("certify") as progress:
+        data = certified_data(progress=progress)
     write_text(output, to_json(data))
     print(f"{output}: {len(data['scenes'])} scenes, {sum(len(one['pixels']) for one in data['scenes'])} rays")

@@ -96,5 +96,5 @@ def _with_scene(scene: str, file: Path, **options):
 
     read_exr(file)  # what cannot be read is refused before Mitsuba starts
     activate()
-    with progress_bar("the truth") as tell:
-        return compare_scene(scene, file, progress=tell, **options)
+    with progress_bar("the truth") as progress:
+        return compare_scene(scene, file, progress=progress, **options)

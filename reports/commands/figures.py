@@ -84,11 +84,11 @@ def figures(
             "--scene and --methods choose images of the figure strip, which is not asked for: leave them out"
         )
     folder = ensure_folder(output or "airlight-figures")
-    with progress_bar("figures") as tell:
+    with progress_bar("figures") as progress:
         for number, name in enumerate(chosen):
-            tell(number / len(chosen), name)
-            told = part_of(tell, number / len(chosen), (number + 1) / len(chosen), before=f"{name}: ")
-            _compute(name, folder, given | {"progress": told})
+            progress(number / len(chosen), name)
+            step = part_of(progress, number / len(chosen), (number + 1) / len(chosen), before=f"{name}: ")
+            _compute(name, folder, given | {"progress": step})
             _module(name).plot(folder, **drawing)
             _print_files(name, folder)
 

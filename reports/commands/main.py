@@ -18,6 +18,7 @@ import typer
 from reports import __version__
 from reports.commands.baselines import baselines
 from reports.commands.bench import bench
+from reports.commands.cache import cache
 from reports.commands.certify import certify
 from reports.commands.compare import compare
 from reports.commands.describe import describe
@@ -64,6 +65,7 @@ _COMMANDS = (
     certify,
     figures,
     docs,
+    cache,
 )
 
 app = typer.Typer(

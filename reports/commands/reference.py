@@ -85,11 +85,11 @@ def reference(
     activate()
     loaded = load_scene(scene, parse_size(size) if size else None)
     found = None
-    with progress_bar(f"{loaded.name}: {estimator}") as tell:
+    with progress_bar(f"{loaded.name}: {estimator}") as progress:
         if budget is None:
-            image = quadrature_reference(loaded, pixel=pixel.value, progress=tell)
+            image = quadrature_reference(loaded, pixel=pixel.value, progress=progress)
         else:
-            found = _sample(loaded, estimator, budget, seed=seed, tell=tell)
+            found = _sample(loaded, estimator, budget, seed=seed, progress=progress)
             image = found.image
     write_exr(output, stamped(image))
     summary: dict[str, Any] = {"scene": loaded.name, "output": str(output), "estimator": str(estimator)}
@@ -114,13 +114,13 @@ def _check_options(estimator: Estimator, budgets: dict[str, Any], pixel: Pixel) 
 
 
 def _sample(
-    loaded: "LoadedScene", estimator: Estimator, budget: "Budget", *, seed: int, tell: "Progress"
+    loaded: "LoadedScene", estimator: Estimator, budget: "Budget", *, seed: int, progress: "Progress"
 ) -> "MonteCarloReference":
     from reports.machine.progress import Interrupted
     from validation.estimates.images import monte_carlo_reference
 
     try:
-        return monte_carlo_reference(loaded, estimator.value, budget=budget, seed=seed, progress=tell)
+        return monte_carlo_reference(loaded, estimator.value, budget=budget, seed=seed, progress=progress)
     except KeyboardInterrupt as stop:
         if not stop.args:
             raise
@@ -142,8 +142,8 @@ def _sampling(found: "MonteCarloReference") -> dict[str, Any]:
 
 
 def _print_summary(summary: dict[str, Any], *, json: bool) -> None:
-    from reports.data.serialize import plain
     from reports.tables.terminal import print_json
+    from validation.metrics.errors import plain
 
     if json:
         print_json(plain(summary))

@@ -129,7 +129,7 @@ def _measured(
     activate()
     for name in names:
         read_scene(load_scene(name, (8, 6)).scene)
-    with progress_bar("report") as tell:
+    with progress_bar("report") as progress:
         return write_report(
             target,
             scenes=names,
@@ -138,7 +138,7 @@ def _measured(
             images=shown,
             command=shlex.join(["airlight", *sys.argv[1:]]),
             fresh=fresh,
-            progress=tell,
+            progress=progress,
         )
 
 

@@ -59,7 +59,7 @@ def build_docs(source: Path, output: Path) -> str:
             f"`{sys.executable} -m pip install 'airlight[docs]'`, in a checkout `pip install -r requirements.lock`"
         )
     ensure_folder(output)
-    with tempfile.TemporaryDirectory() as kept, progress_bar("docs") as tell:
+    with tempfile.TemporaryDirectory() as kept, progress_bar("docs") as progress:
         complaints = Path(kept) / "complaints.txt"
         command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "--no-color", "-b", "html"]
         command += ["-d", str(Path(kept) / "doctrees"), str(source), str(output)]
@@ -74,6 +74,6 @@ def build_docs(source: Path, output: Path) -> str:
                 found = _PROGRESS.search(line)
                 if found:
                     begin, length = _PARTS[found[1]]
-                    tell(begin + length * int(found[2]) / 100, found[3])
+                    progress(begin + length * int(found[2]) / 100, found[3])
         status = process.returncode
         return complaints.read_text(encoding="utf-8").strip() or f"Sphinx ended with {status}" if status else ""

@@ -2,9 +2,11 @@
 """What the documentation takes from a report: its numbers without the long tables, and small pictures.
 
 The documentation is built from `docs/data/report.json` and the PNG files beside it, schema "airlight-docs/1":
-`report` (when, by which command, on which machine), `claims`, `scenes` (each with `counts`, `truth`, `multiple` and
-`methods`), `pictures` (by method: whose frame it is), `kernels` (costs and errors of `airlight bench --kernels`, or
-null).
+`report` (when, by which command, on which machine), `claims`, `scenes` (each with `baseline`, `counts`, `truth`,
+`multiple` and `methods`), `pictures` (by method: whose frame it is), `kernels` (costs and errors of `airlight bench
+--kernels`, or null).
+
+Stale numbers fail a test: `stale_scenes` compares what a scene's numbers were measured with and what is measured now.
 """
 
 import io
@@ -98,6 +100,7 @@ def _kept_scene(scene: dict[str, Any]) -> dict[str, Any]:
     return {
         "name": scene["name"],
         "size": scene["size"],
+        "baseline": scene.get("baseline"),
         "plan": scene["plan"],
         "counts": counts(scene["name"]),
         "truth": scene["truth"],
@@ -107,9 +110,41 @@ def _kept_scene(scene: dict[str, Any]) -> dict[str, Any]:
 
 
 def _kept_method(one: dict[str, Any]) -> dict[str, Any]:
-    times = {name: one["times"][name] for name in ("frame", "airlight", "rebuild")} if one["times"] else None
+    times = {name: one["times"][name] for name in ("frame", "airlight", "light_moved")} if one["times"] else None
     error = {name: one["error"][name] for name in _ERRORS} if one["error"] else None
     return {name: one[name] for name in _METHOD} | {"times": times, "error": error}
+
+
+def stale_scenes(found: dict[str, Any]) -> list[str]:
+    """Return what is older than the accuracy baselines, a line for each scene; empty where nothing is.
+
+    The images of the documentation are larger than those of the baselines, so errors cannot be compared one by one.
+    But whatever moves an error gives the baseline of its scene a new revision, and a report notes the revision with
+    which it was measured. Which configurations there are, and which of them a scene refuses, must agree as well.
+
+    Parameters
+    ----------
+    found
+        The content of `docs/data/report.json`.
+    """
+    from validation.configurations.methods import STANDARD
+    from validation.frames.baseline_files import read_baseline
+
+    stale = []
+    standard = {one.label for one in STANDARD}
+    for scene in found["scenes"]:
+        name, baseline = scene["name"], read_baseline(scene["name"])
+        if baseline is None:
+            stale.append(f"{name}: there is no such scene any more")
+            continue
+        if scene.get("baseline") != baseline["revision"]:
+            measured, now = scene.get("baseline"), baseline["revision"]
+            stale.append(f"{name}: measured with revision {measured} of its baseline, now it is {now}")
+        kept = {label: entry.get("refused") for label, entry in baseline["configurations"].items() if label in standard}
+        shown = {one["label"]: one["refused"] for one in scene["methods"]}
+        stale += [f"{name}: {label} is not what it was" for label in kept if kept[label] != shown.get(label, "absent")]
+        stale += [f"{name}: {label} is gone" for label in shown if label not in kept]
+    return stale
 
 
 def counts(name: str) -> dict[str, int]:

@@ -58,18 +58,18 @@ def compute(
     from validation.kernels.convergence import convergence, declared
 
     target = ensure_folder(folder)
-    tell = progress or (lambda share, what: None)
+    step = progress or (lambda share, what: None)
     promises = declared()
     rows: list[tuple] = []
     for number, (name, promise) in enumerate(promises.items()):
-        tell(0.4 * number / len(promises), name)
+        step(0.4 * number / len(promises), name)
         found = convergence(name)
         law = (promise.kind, promise.value, found.measured, promise.power)
         rows += [(promise.kind, name, size, error, *law) for size, error in zip(found.sizes, found.errors)]
     image, batches = ((32, 24), 16) if quick else ((64, 48), 64)
     for number, estimator in enumerate(ESTIMATORS):
-        told = counted(part_of(tell, 0.4 + 0.3 * number, 0.7 + 0.3 * number))
-        rows += _estimator_rows(scene, image, estimator, batches, told)
+        part = counted(part_of(step, 0.4 + 0.3 * number, 0.7 + 0.3 * number))
+        rows += _estimator_rows(scene, image, estimator, batches, part)
     write_data(target, NAME, _HEADER, rows, scene=scene, image=image, batches=batches, samples=_SAMPLES)
 
 

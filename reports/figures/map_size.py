@@ -60,8 +60,8 @@ def compute(
     loaded = load_scene(scene, image)
     rows: list[tuple] = []
     for number, (method, parameters) in enumerate(METHODS):
-        tell = counted(part_of(progress, number / len(METHODS), (number + 1) / len(METHODS)))
-        found = map_errors(loaded.scene, method, parameters=parameters, sizes=chosen, progress=tell)
+        step = counted(part_of(progress, number / len(METHODS), (number + 1) / len(METHODS)))
+        found = map_errors(loaded.scene, method, parameters=parameters, sizes=chosen, progress=step)
         order = (found.slope.order, found.slope.standard_error)
         name = found.configuration.label
         for size, error in zip(found.sizes, found.metrics):

@@ -59,8 +59,8 @@ def compute(
     outer[[0, -1]] = -np.inf, np.inf
     rows: list[tuple] = []
     for number, (estimator, samples) in enumerate(ESTIMATORS.items()):
-        tell = counted(part_of(progress, number / len(ESTIMATORS), (number + 1) / len(ESTIMATORS)))
-        z = _z(loaded, estimator, samples, tell)
+        step = counted(part_of(progress, number / len(ESTIMATORS), (number + 1) / len(ESTIMATORS)))
+        z = _z(loaded, estimator, samples, step)
         counts = np.histogram(z, outer)[0]
         laws = (len(z) * np.diff(law) for law in (t.cdf(outer, _BATCHES - 1), norm.cdf(outer)))
         shared = (len(z), _BATCHES, float(z.mean()), float(z.std()))

@@ -8,7 +8,13 @@ from typing import Any
 
 from reports.machine.progress import Interrupted, Progress
 
-STAGES = ("surface", "shade", "tiles", "airlight")  #: the functions of a frame that are frozen, of a `FrameRenderer`
+STAGES = (
+    "surface",
+    "shade",
+    "cull",
+    "render",
+    "passes",
+)  #: the functions of a frame that are frozen, of a `FrameRenderer`
 
 
 def check_ending(option: str, path: Path, ending: str, *, instead: str = "") -> None:
@@ -32,7 +38,7 @@ def numbered(path: Path, number: int, frames: int) -> Path:
 
 
 def write_frames(
-    name: str, renderer, chosen, animation, *, frames: int, outputs: dict[str, Path | None], tell: Progress
+    name: str, renderer, chosen, animation, *, frames: int, outputs: dict[str, Path | None], progress: Progress
 ) -> dict[str, Any]:
     """Render the frames of an animation, write them and return what they cost.
 
@@ -46,7 +52,7 @@ def write_frames(
         How many.
     outputs
         The paths that were asked for, as 'exr' and 'png'; frames get their number before the suffix.
-    tell
+    progress
         Told the share done and what was written last.
 
     Raises
@@ -74,7 +80,7 @@ def write_frames(
             numbers = {kind: path and numbered(path, number, frames) for kind, path in outputs.items()}
             factor = write_frame(name, chosen, frame, outputs=numbers, factor=factor)
             done = number
-            tell(number / frames, f"frame {number} of {frames}")
+            progress(number / frames, f"frame {number} of {frames}")
             start = time.perf_counter()
     except KeyboardInterrupt:
         raise Interrupted(_kept(outputs, done, frames)) from None

@@ -156,7 +156,7 @@ _PHASES = {
 
 
 def _bounds(bounds: Any) -> dict[str, Any]:
-    from reference.scene.convex_bodies import Ball
+    from reference.scene.convex_bounds import Ball
 
     if isinstance(bounds, Ball):
         return {"kind": "ball", "centre": _numbers(bounds.centre), "radius": _number(bounds.radius)}

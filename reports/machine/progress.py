@@ -30,72 +30,85 @@ def progress_bar(title: str) -> Iterator[Progress]:
         yield _plain_lines(title)
 
 
-def part_of(tell: Progress | None, first: float, last: float, *, before: str = "") -> Progress:
-    """Return what a part of some work tells its share to: `tell` hears of shares from `first` to `last` of all of it.
+def part_of(progress: Progress | None, first: float, last: float, *, before: str = "") -> Progress:
+    """Return the callback for a part of some work, whose share is one of the whole.
 
     Parameters
     ----------
-    tell
-        Told the share of all the work and what comes next; nobody is without it.
+    progress
+        Callback of the whole work, or None.
     first, last
         What share of the work is done when the part begins and when it ends.
     before
         Put before what comes next.
     """
-    if tell is None:
+    if progress is None:
         return lambda share, what: None
     # Not first + share (last - first): both ends are met to the last digit.
-    return lambda share, what: tell((1 - share) * first + share * last, before + what)
+    return lambda share, what: progress((1 - share) * first + share * last, before + what)
 
 
-def counted(tell: Progress | None) -> Steps:
-    """Return what work that counts its steps, (done, total, what), tells them to: `tell` hears of shares."""
-    if tell is None:
+def counted(progress: Progress | None) -> Steps:
+    """Return the callback (done, total, what) for work that counts its steps; `progress` is called with shares."""
+    if progress is None:
         return lambda done, total, what: None
-    return lambda done, total, what: tell(done / total, what)
+    return lambda done, total, what: progress(done / total, what)
+
+
+def seconds_left(elapsed: float, share: float) -> float | None:
+    """Return how long the rest takes if it goes on like this [s]; None at the beginning."""
+    return elapsed * (1 - share) / share if share > 0 else None
 
 
 def _rich_bar(title: str) -> Iterator[Progress]:
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns = (
         TextColumn("{task.description}"),
         BarColumn(bar_width=30),
         TextColumn("{task.percentage:>3.0f} %"),
         TimeElapsedColumn(),
-        TimeRemainingColumn(),
+        TextColumn("{task.fields[left]}"),
         TextColumn("{task.fields[what]}"),
     )
     start = time.monotonic()
     bar = Progress(*columns, console=Console(stderr=True), transient=True)
-    task = bar.add_task(title, total=1.0, what="")
+    task = bar.add_task(title, total=1.0, what="", left="")
     shown = False
 
-    def tell(share: float, what: str) -> None:
+    def progress(share: float, what: str) -> None:
         nonlocal shown
-        if not shown and time.monotonic() - start > _PATIENCE:
+        elapsed = time.monotonic() - start
+        if not shown and elapsed > _PATIENCE:
             shown = True
             bar.start()
-        bar.update(task, completed=share, what=what)
+        # Rich's own column looks at the last half minute alone: one long part, and the time left jumps.
+        left = seconds_left(elapsed, share)
+        bar.update(task, completed=share, what=what, left="" if left is None else f"about {_clock(left)} left")
 
     try:
-        yield tell
+        yield progress
     finally:
         if shown:
             bar.stop()
 
 
+def _clock(seconds: float) -> str:
+    """Return minutes and seconds."""
+    return f"{int(seconds) // 60}:{int(seconds) % 60:02d}"
+
+
 def _plain_lines(title: str) -> Progress:
     start = last = time.monotonic()
 
-    def tell(share: float, what: str) -> None:
+    def progress(share: float, what: str) -> None:
         nonlocal last
         now = time.monotonic()
         if now - start < _PATIENCE or now - last < _PLAIN_EVERY or not 0 < share < 1:
             return
         last = now
-        left = (now - start) * (1 - share) / share
+        left = seconds_left(now - start, share)
         print(f"{title}: {100 * share:.0f} %, about {left:.0f} s left, {what}", file=sys.stderr, flush=True)
 
-    return tell
+    return progress

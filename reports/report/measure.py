@@ -9,9 +9,11 @@ when it is whole.
 import json
 import time
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,12 +24,13 @@ from reports.data.serialize import SCHEMA, plain
 from reports.machine.environment import describe_environment
 from reports.machine.progress import Interrupted, Progress, part_of
 from reports.page.render import render_page
-from reports.report.papers import mutations_part, published_part, stability_part
+from reports.report.expected import PAGE_SECONDS, SceneEntries, other_seconds, scene_seconds, shares
+from reports.report.papers import OtherPart, other_parts, published_data
 from reports.report.scene import raise_own_error, scene_report
 from reports.report.staging import staged
 from validation.comparison.engine_images import EngineImage, images_size
 from validation.configurations.methods import STANDARD, Configuration
-from validation.frames.result_cache import Kept, keeper, now, sweep_results
+from validation.frames.result_cache import CachedResult, ResultCache, cached_result, now, result_cache, sweep_results
 from validation.frames.scene_study import Effort, open_study
 from validation.scenes.registry import SCENES
 
@@ -41,9 +44,6 @@ _MAKERS = (
     "report/scene.py",
     "report/papers.py",
 )
-#: Where the parts begin in the progress, with and without the faults of the physics, which take minutes.
-_PARTS = ("scenes", "stability", "mutations", "published", "page")
-_BEGIN = {False: (0.0, 0.85, 0.9, 0.9, 0.99), True: (0.0, 0.7, 0.71, 0.85, 0.99)}
 
 
 def write_report(
@@ -97,59 +97,61 @@ def write_report(
     target = ensure_folder(folder)
     environment = describe_environment()
     sweep_results()
-    results: list[Kept] = []
-    watch = _Watch(progress, _BEGIN[effort.mutations])
+    results: list[CachedResult] = []
+    start = time.monotonic()
     here = Path(__file__).parent.parent
     machine = {name: str(environment.get(name)) for name in ("processor", "threads", "variant", "llvm", "device")}
-    common = keeper(machine, more=[here / name for name in _MAKERS], fresh=fresh)
+    cache = result_cache(machine, more=[here / name for name in _MAKERS], fresh=fresh)
+    efforts = {name: effort.at(sizes.get(Path(name).stem)) for name in scenes}
+    others = other_parts(effort, scenes, cache)
+    steps = _steps(progress, cache, efforts, configurations, others)
+    seconds = dict.fromkeys(("scenes", "stability", "mutations", "published"), 0.0)
     try:
         with staged(target) as hidden:
-            found = []
-            every = watch.within("scenes")
-            for number, name in enumerate(scenes):
-                stem = Path(name).stem
-                tell = part_of(every, number / len(scenes), (number + 1) / len(scenes), before=f"{stem}: ")
-                study = open_study(name, effort, size=sizes.get(stem))
-                if number == 0:
-                    _try_own(study, configurations)
-                found.append(
-                    scene_report(
-                        study,
-                        configurations=configurations,
-                        images=shown.get(stem, ()),
-                        keeper=common,
-                        folder=hidden,
-                        results=results,
-                        tell=tell,
+            studied = []
+            with _timed(seconds, "scenes"):
+                for number, (name, sized_effort) in enumerate(efforts.items()):
+                    study = open_study(name, sized_effort)
+                    if number == 0:
+                        _try_own(study, configurations)
+                    studied.append(
+                        scene_report(
+                            study,
+                            configurations=configurations,
+                            images=shown.get(Path(name).stem, ()),
+                            cache=cache,
+                            folder=hidden,
+                            results=results,
+                            progress=steps[name],
+                        )
                     )
-                )
-                watch.part("scenes")
-            stability = stability_part(effort, common, results, watch.within("stability"))
-            watch.part("stability")
-            mutations = mutations_part(effort, common, results, watch.within("mutations"))
-            watch.part("mutations")
-            papers = published_part(effort, scenes, common, results, watch.within("published"))
-            watch.part("published")
+            by_kind: dict[str, list[CachedResult]] = {}
+            for number, part in enumerate(others):
+                step = part_of(steps[str(number)], 0.0, 1.0, before=f"{part.title}, ")
+                with _timed(seconds, "published" if part.kind in ("biri", "needless", "billeter") else part.kind):
+                    results.append(cached_result(part.entry, partial(part.compute, step)))
+                by_kind.setdefault(part.kind, []).append(results[-1])
+            stability, mutations = by_kind.get("stability"), by_kind.get("mutations")
             data = {
                 "schema": SCHEMA,
                 "created": now(),
                 "command": command,
-                "seconds": watch.seconds(),
-                "parts": watch.parts,
+                "seconds": round(time.monotonic() - start, 1),
+                "parts": seconds,
                 **_counts(results),
                 "settings": plain(asdict(effort)),
                 "environment": environment,
-                "claims": claims(found) + (unstudied(scenes, list(SCENES)) if tuple(scenes) == effort.scenes else []),
-                "scenes": found,
-                "stability": stability,
-                "mutations": mutations,
-                "published": papers,
+                "claims": claims(studied) + (unstudied(scenes, list(SCENES)) if tuple(scenes) == effort.scenes else []),
+                "scenes": studied,
+                "stability": stability[-1].data["kernels"] if stability else [],
+                "mutations": mutations[-1].data if mutations else None,
+                "published": published_data(by_kind),
             }
-            watch.within("page")(0.0, "the page")
+            steps["page"](0.0, "the page")
             write_page(data, images=hidden, folder=hidden)
     except KeyboardInterrupt as stop:
         raise Interrupted(_kept_words(results, str(stop))) from None
-    watch.within("page")(1.0, "done")
+    steps["page"](1.0, "done")
     return data
 
 
@@ -160,39 +162,42 @@ def write_page(data: Mapping[str, Any], *, images: Path, folder: Path) -> None:
     (folder / "report.html").write_text(render_page(dict(data), images), encoding="utf-8", newline="\n")
 
 
-class _Watch:
-    """The time that the parts of a run take, and how far it is."""
-
-    def __init__(self, progress: Progress | None, begin: Sequence[float]) -> None:
-        self._progress, self._begin = progress, begin
-        self._start = self._last = time.monotonic()
-        self.parts: dict[str, float] = {}  #: seconds of this run by part
-
-    def within(self, part: str) -> Progress:
-        """Return a function to tell the share done of one of the parts."""
-        number = _PARTS.index(part)
-        return part_of(self._progress, self._begin[number], (*self._begin, 1.0)[number + 1])
-
-    def part(self, name: str) -> None:
-        """Note that a part is over."""
-        now = time.monotonic()
-        self.parts[name] = round(self.parts.get(name, 0.0) + now - self._last, 2)
-        self._last = now
-
-    def seconds(self) -> float:
-        """Return the seconds since the start."""
-        return round(time.monotonic() - self._start, 1)
+def _steps(
+    progress: Progress | None,
+    cache: ResultCache,
+    efforts: Mapping[str, Effort],
+    configurations: Sequence[Configuration],
+    others: Sequence[OtherPart],
+) -> dict[str, Progress]:
+    """Return the progress of each part: a scene by its name, another part by its number, and the 'page'."""
+    seconds = {
+        name: sum(scene_seconds(SceneEntries.of(cache, name, effort), configurations).values())
+        for name, effort in efforts.items()
+    }
+    seconds |= {str(number): other_seconds(part.entry, part.kind) for number, part in enumerate(others)}
+    seconds["page"] = PAGE_SECONDS * len(efforts)
+    names = {name: f"{Path(name).stem}: " for name in efforts}
+    return {name: part_of(progress, *share, before=names.get(name, "")) for name, share in shares(seconds).items()}
 
 
-def _counts(results: Sequence[Kept]) -> dict[str, Any]:
+@contextmanager
+def _timed(seconds: dict[str, float], part: str) -> Iterator[None]:
+    """Add the time that a block takes to that of a part [s]."""
+    start = time.monotonic()
+    yield
+    seconds[part] = round(seconds.get(part, 0.0) + time.monotonic() - start, 2)
+
+
+def _counts(results: Sequence[CachedResult]) -> dict[str, Any]:
     """Return how many results were kept, how many computed, and when the first and the last of all."""
-    kept = sum(one.cached for one in results)
-    order = sorted((one.measured for one in results), key=lambda text: datetime.strptime(text, "%Y-%m-%d %H:%M:%S %z"))
+    kept = sum(result.cached for result in results)
+    times = [result.measured for result in results]
+    order = sorted(times, key=lambda text: datetime.strptime(text, "%Y-%m-%d %H:%M:%S %z"))
     measured = {"first": order[0], "last": order[-1]} if order else None
     return {"kept": kept, "computed": len(results) - kept, "measured": measured}
 
 
-def _kept_words(results: Sequence[Kept], more: str) -> str:
+def _kept_words(results: Sequence[CachedResult], more: str) -> str:
     words = f"{len(results)} results are kept" if results else "no result was finished yet"
     return f"{words}{f' ({more})' if more else ''}; nothing was written; run the same command again to go on"
 
@@ -203,12 +208,12 @@ def _try_own(study, configurations: Sequence[Configuration]) -> None:
     from realtime.frame.renderer import render_frame
     from validation.configurations.methods import prepared
 
-    for one in configurations:
-        if one.own:
+    for configuration in configurations:
+        if configuration.own:
             try:
-                render_frame(prepared(study.probe, one))
+                render_frame(prepared(study.probe, configuration))
             except MethodError as error:
-                raise_own_error(one, str(error))
+                raise_own_error(configuration, str(error))
 
 
 def _refuse_twins(scenes: Sequence[str]) -> None:

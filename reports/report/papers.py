@@ -1,111 +1,110 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The parts of a report that belong to no scene: tables of papers, stability of the kernels, faults of the physics."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from reports.data.serialize import mutations_data, plain
-from reports.machine.progress import counted, part_of
+from reports.machine.progress import Progress, counted, part_of
 from reports.papers.billeter import billeter_data
-from reports.papers.biri import rows_data
-from validation.frames.result_cache import Computed, Keeper, Kept, kept_result, slot
+from reports.papers.biri import biri_data
+from validation.frames.result_cache import CachedResult, CacheEntry, Computed, ResultCache, cache_entry
 from validation.frames.scene_study import Effort
 
-Tell = Callable[[float, str], None]
+
+@dataclass(frozen=True)
+class OtherPart:
+    """A part of a report that belongs to no scene."""
+
+    kind: str  #: 'stability', 'mutations', 'biri', 'needless' or 'billeter'
+    title: str  #: for the progress
+    entry: CacheEntry
+    compute: Callable[[Progress], Computed]
 
 
-def stability_part(effort: Effort, keeper: Keeper, results: list[Kept], tell: Tell) -> list[dict[str, Any]]:
-    """Return the stability of every kernel; none where the effort asks for no rays."""
-    if not effort.rays:
-        return []
+def other_parts(effort: Effort, scenes: Sequence[str], cache: ResultCache) -> list[OtherPart]:
+    """Return the parts that an effort asks for; those of papers in the scenes that are studied, table by table."""
+    parts = []
+    if effort.rays:
+        entry = cache_entry(cache, "stability", identity={"rays": effort.rays})
+        parts.append(OtherPart("stability", "stability", entry, lambda progress: _stability(effort.rays, progress)))
+    if effort.mutations:
+        entry = cache_entry(cache, "mutations", identity={})
+        parts.append(OtherPart("mutations", "faults of the physics", entry, _mutations))
+    if "biri" in effort.papers:
+        parts += _biri(effort, scenes, cache)
+    if "billeter" in effort.papers:
+        parts += _billeter(effort, scenes, cache)
+    return parts
+
+
+def published_data(results: Mapping[str, Sequence[CachedResult]]) -> dict[str, Any] | None:
+    """Return the tables of the papers from the results of their parts, by kind; None without any."""
+    biri, billeter = results.get("biri"), results.get("billeter")
+    if not biri and not billeter:
+        return None
+    tables = None
+    if biri:
+        needless = [cost for result in results.get("needless", ()) for cost in result.data["costs"]]
+        rows = [row for result in biri for row in result.data["rows"]]
+        tables = {"stages": biri[-1].data["stages"], "rows": rows, "needless": needless}
+    return {"biri": tables, "billeter": billeter[-1].data if billeter else None}
+
+
+def _stability(rays: int, progress: Progress) -> Computed:
     from validation.kernels.stability import stability
 
-    def compute() -> Computed:
-        told = counted(part_of(tell, 0.0, 1.0, before="stability, "))
-        return {"kernels": plain(stability(count=effort.rays, progress=told))}, {}
-
-    place = slot(keeper, "stability", identity={"rays": effort.rays}, fingerprint={})
-    results.append(kept_result(place, compute))
-    return results[-1].data["kernels"]
+    return {"kernels": plain(stability(count=rays, progress=counted(progress)))}, {}
 
 
-def mutations_part(effort: Effort, keeper: Keeper, results: list[Kept], tell: Tell) -> dict[str, Any] | None:
-    """Return which faults of the physics the checks of the truth find; None where the effort does not ask."""
-    if not effort.mutations:
-        return None
+def _mutations(progress: Progress) -> Computed:
     from validation.mutations.study import study_mutations
 
-    tell(0.0, "faults of the physics")
-    place = slot(keeper, "mutations", identity={}, fingerprint={})
-    told = part_of(tell, 0.0, 1.0, before="faults of the physics, ")
-    results.append(kept_result(place, lambda: (mutations_data(study_mutations(progress=told)), {})))
-    return results[-1].data
+    return mutations_data(study_mutations(progress=progress)), {}
 
 
-def published_part(
-    effort: Effort, scenes: Sequence[str], keeper: Keeper, results: list[Kept], tell: Tell
-) -> dict[str, Any] | None:
-    """Return the tables of the papers, measured again in those of their scenes that are studied; None without any."""
-    found: dict[str, Any] = {}
-    if "biri" in effort.papers:
-        found["biri"] = _biri(effort, scenes, keeper, results, part_of(tell, 0.0, 0.4))
-    if "billeter" in effort.papers:
-        found["billeter"] = _billeter(effort, scenes, keeper, results, part_of(tell, 0.4, 1.0))
-    found = {paper: data for paper, data in found.items() if data is not None}
-    return ({"biri": None, "billeter": None} | found) if found else None
+def _biri(effort: Effort, scenes: Sequence[str], cache: ResultCache) -> list[OtherPart]:
+    """Return Tables 1 and 2 of Biri 2006, each entry a part."""
+    from validation.frames.zero_cost import zero_costs
+    from validation.papers.biri import PUBLISHED, Published, biri_rows
 
-
-def _biri(effort: Effort, scenes: Sequence[str], keeper: Keeper, results: list[Kept], tell: Tell) -> Any:
-    """Return Tables 1 and 2 of Biri 2006, each entry kept for itself."""
-    from validation.frames.zero_cost import needless_costs
-    from validation.papers.biri import PUBLISHED, biri_rows
-
-    entries = [one for one in PUBLISHED if one.scene in scenes]
-    if not entries:
-        return None
     kernels, seconds = effort.paper_kernels, effort.seconds
-    rows: list[Any] = []
-    for number, one in enumerate(entries):
-        share, width = number / len(entries), 1 / len(entries)
 
-        def compute(one=one, share=share, width=width) -> Computed:
-            told = part_of(tell, share, share + width, before="Biri 2006, ")
-            return rows_data(biri_rows([one], kernels, seconds=seconds, progress=told), []), {}
+    def part(published: Published) -> OtherPart:
+        identity = {"scene": published.scene, "size": published.size, "kernels": kernels, "seconds": seconds}
+        return OtherPart(
+            "biri",
+            "Biri 2006",
+            cache_entry(cache, "biri", identity=identity),
+            lambda progress: (biri_data(biri_rows([published], kernels, seconds=seconds, progress=progress), []), {}),
+        )
 
-        identity = {"scene": one.scene, "size": one.size, "kernels": kernels, "seconds": seconds}
-        results.append(kept_result(slot(keeper, "biri", identity=identity, fingerprint={}), compute))
-        rows += results[-1].data["rows"]
-        stages = results[-1].data["stages"]
-    needless: list[Any] = []
-    if "billeter" in effort.papers:  # the effort that leaves nothing out
-        tell(1.0, "what is not needed")
-        place = slot(keeper, "needless", identity={}, fingerprint={})
-        results.append(kept_result(place, lambda: ({"costs": plain(needless_costs())}, {})))
-        needless = results[-1].data["costs"]
-    return {"stages": stages, "rows": rows, "needless": needless}
+    parts = [part(published) for published in PUBLISHED if published.scene in scenes]
+    if parts and "billeter" in effort.papers:  # the effort that leaves nothing out
+        entry = cache_entry(cache, "needless", identity={})
+        costs = OtherPart(
+            "needless", "what is not needed", entry, lambda progress: ({"costs": plain(zero_costs())}, {})
+        )
+        parts.append(costs)
+    return parts
 
 
-def _billeter(effort: Effort, scenes: Sequence[str], keeper: Keeper, results: list[Kept], tell: Tell) -> Any:
-    """Return Figures 6 and 7 and Table 1 of Billeter 2010."""
+def _billeter(effort: Effort, scenes: Sequence[str], cache: ResultCache) -> list[OtherPart]:
+    """Return Figures 6 and 7 and Table 1 of Billeter 2010 as one part."""
     from validation.papers.billeter_images import FIGURES, figure_rows
     from validation.papers.billeter_tessellation import TABLE, table_rows
 
-    images = [one for one in FIGURES if one.scene in scenes]
-    views = [one for one in TABLE if one.scene in scenes]
+    images = [figure for figure in FIGURES if figure.scene in scenes]
+    views = [view for view in TABLE if view.scene in scenes]
     if not images and not views:
-        return None
+        return []
+    named = sorted({*(figure.scene for figure in images), *(view.scene for view in views)})
+    options: dict[str, Any] = {"kernel": effort.paper_kernels[0], "seconds": effort.seconds}
 
-    def compute() -> Computed:
-        options: dict[str, Any] = {"kernel": effort.paper_kernels[0], "seconds": effort.seconds}
-        figures = figure_rows(
-            images, **options, progress=lambda share, what: tell(0.3 * share, f"Billeter 2010, {what}")
-        )
-        table = table_rows(
-            views, **options, progress=lambda share, what: tell(0.3 + 0.7 * share, f"Billeter 2010, {what}")
-        )
-        return billeter_data(figures, table), {}
+    def compute(progress: Progress) -> Computed:
+        figures = figure_rows(images, **options, progress=part_of(progress, 0.0, 0.3))
+        return billeter_data(figures, table_rows(views, **options, progress=part_of(progress, 0.3, 1.0))), {}
 
-    named = sorted({*(one.scene for one in images), *(one.scene for one in views)})
-    identity = {"scenes": named, "kernel": effort.paper_kernels[0], "seconds": effort.seconds}
-    results.append(kept_result(slot(keeper, "billeter", identity=identity, fingerprint={}), compute))
-    return results[-1].data
+    entry = cache_entry(cache, "billeter", identity={"scenes": named, **options})
+    return [OtherPart("billeter", "Billeter 2010", entry, compute)]

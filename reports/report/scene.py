@@ -6,7 +6,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,33 +16,24 @@ from analytic.errors import InputError
 from reference.storage.exr import Image, write_exr
 from reports.data.serialize import image_data, measurement_data, plain, scene_facts, truth_data
 from reports.machine.environment import stamped, threads
+from reports.machine.progress import Progress, part_of
 from reports.plotting.pictures import error_map, exposure, png_bytes, tone_mapped
+from reports.report.expected import SceneEntries, scene_seconds, shares
 from validation.comparison.engine_images import EngineImage, ImageMeasurement, image_flip, measure_image
 from validation.configurations.methods import Configuration
 from validation.estimates.images import layered_frame, layered_truth
 from validation.frames.benchmark import Measurement, configurations_for
 from validation.frames.result_cache import (
+    CachedResult,
     Computed,
-    Keeper,
-    Kept,
-    Slot,
-    find_kept,
-    keep,
-    kept_result,
-    slot,
+    ResultCache,
+    cached_result,
+    load_result,
     source_digest,
+    store_result,
 )
-from validation.frames.scene_study import (
-    SceneStudy,
-    check_truth,
-    study_configuration,
-    study_multiple,
-    wants_flip,
-    with_flips,
-)
+from validation.frames.scene_study import SceneStudy, check_truth, study_configuration, study_multiple, with_flips
 from validation.metrics.flip import Flip
-
-Tell = Callable[[float, str], None]
 
 #: Files of a report by what they are.
 SUFFIXES = {"exr": ".exr", "picture": ".png", "airlight": "-airlight.png", "error": "-error.png"}
@@ -54,10 +45,10 @@ def scene_report(
     *,
     configurations: Sequence[Configuration],
     images: Sequence[EngineImage],
-    keeper: Keeper,
+    cache: ResultCache,
     folder: Path,
-    results: list[Kept],
-    tell: Tell,
+    results: list[CachedResult],
+    progress: Progress,
 ) -> dict[str, Any]:
     """Return what the report says of a scene, and write its files.
 
@@ -69,32 +60,32 @@ def scene_report(
         What to measure; variants that the scene has no use for are left out.
     images
         From elsewhere, to judge.
-    keeper
+    cache
         Of the run.
     folder
         Of the report; the files go into a folder in it that has the scene's name.
     results
         Every part is added to it as soon as it is there.
-    tell
-        Told (share done, what).
+    progress
+        Called with (share done, what).
     """
-    parts = _Parts(study, keeper, folder, results)
-    tell(0.0, "the quadrature truth")
-    truth = parts.result("truth", lambda: _truth(study), asked={"image": study.effort.image}, stem=_REFERENCE)
+    chosen = configurations_for(study.scene.features, configurations)
+    entries = SceneEntries(cache, study.loaded.name, study.loaded.path, study.effort)
+    seconds_of = scene_seconds(entries, chosen, complete=True)
+    steps = {name: part_of(progress, *share) for name, share in shares(seconds_of).items()}
+    parts = _Parts(study, entries, folder, results)
+    steps["truth"](0.0, "the quadrature truth")
+    truth = parts.result("truth", lambda: _truth(study), stem=_REFERENCE)
     factor = truth.data["exposure"]
-    tell(0.3, "checks of the truth")
-    asked = {name: getattr(study.effort, name) for name in ("checked", "margins", "samples", "batches", "patience")}
-    checks = parts.result("agreement", lambda: _checks(study, tell), asked=asked)
-    tell(0.5, "multiple scattering")
-    multiple = parts.result(
-        "multiple", lambda: (plain(study_multiple(study)), {}), asked={"multiple": study.effort.multiple}
-    )
-    chosen = configurations_for(study.scene.plan, configurations)
-    stems = file_stems([*(one.label for one in chosen), *(one.label for one in images)])
-    methods = parts.methods(chosen, stems, factor, lambda share, what: tell(0.55 + 0.4 * share, what))
-    judged = [parts.image(one, stem, factor) for one, stem in zip(images, stems[len(chosen) :])]
+    steps["agreement"](0.0, "checks of the truth")
+    checks = parts.result("agreement", lambda: (plain(check_truth(study, progress=steps["agreement"])), {}))
+    steps["multiple"](0.0, "multiple scattering")
+    multiple = parts.result("multiple", lambda: (plain(study_multiple(study)), {}))
+    stems = file_stems([*(configuration.label for configuration in chosen), *(image.label for image in images)])
+    methods = parts.methods(chosen, stems, factor, steps)
+    judged = [parts.image(image, stem, factor) for image, stem in zip(images, stems[len(chosen) :])]
     seconds = {"truth": truth.seconds, "agreement": checks.seconds, "multiple": multiple.seconds}
-    seconds |= {"methods": round(sum(one["seconds"] for one in methods), 3)}
+    seconds |= {"methods": round(sum(entry["seconds"] for entry in methods), 3)}
     return scene_facts(study) | {
         **truth.data,
         "agreement": checks.data,
@@ -108,76 +99,66 @@ def scene_report(
 class _Parts:
     """The parts of a scene's report: where they are kept and where their files are written."""
 
-    def __init__(self, study: SceneStudy, keeper: Keeper, folder: Path, results: list[Kept]) -> None:
-        self._study, self._keeper, self._folder, self._results = study, keeper, folder, results
+    def __init__(self, study: SceneStudy, entries: SceneEntries, folder: Path, results: list[CachedResult]) -> None:
+        self._study, self._entries, self._folder, self._results = study, entries, folder, results
+        self._made_from = {"scene": study.digest}
 
-    def slot(self, kind: str, asked: Mapping[str, Any], fingerprint: Mapping[str, Any] | None = None) -> Slot:
-        """Return where a part is kept."""
-        loaded = self._study.loaded
-        identity = {"scene": loaded.name, "path": str(loaded.path.resolve()) if loaded.path else None, "asked": asked}
-        made_from = {"scene": self._study.digest} | dict(fingerprint or {})
-        return slot(self._keeper, kind, identity=identity, fingerprint=made_from)
-
-    def result(self, kind: str, compute: Callable[[], Computed], *, asked: Mapping[str, Any], stem: str = "") -> Kept:
+    def result(self, kind: str, compute: Callable[[], Computed], *, stem: str = "") -> CachedResult:
         """Return a part, with its files written."""
-        return self.done(kept_result(self.slot(kind, asked), compute), stem)
+        return self.done(cached_result(self._entries.part(kind, self._made_from), compute), stem)
 
-    def done(self, found: Kept, stem: str) -> Kept:
+    def done(self, result: CachedResult, stem: str) -> CachedResult:
         """Note that a part is there, and write its files."""
-        self._results.append(found)
-        for name, where in self.names(stem, found.files).items():
+        self._results.append(result)
+        for name, where in self.names(stem, result.files).items():
             path = self._folder / where
             path.parent.mkdir(exist_ok=True)
-            path.write_bytes(found.files[name])
-        return found
+            path.write_bytes(result.files[name])
+        return result
 
     def names(self, stem: str, files: Mapping[str, bytes]) -> dict[str, str]:
         """Return the names of a part's files in the folder of the report."""
         return {name: f"{self._study.name}/{stem}{SUFFIXES[name]}" for name in files}
 
-    def entry(self, found: Kept, stem: str) -> dict[str, Any]:
-        """Return the entry of a method or an image from what is kept."""
-        self.done(found, stem)
-        about = {"measured": found.measured, "seconds": found.seconds, "kept": found.cached}
-        return found.data | {"files": self.names(stem, found.files)} | about
+    def written(self, result: CachedResult, stem: str) -> dict[str, Any]:
+        """Return what the report says of a method or an image, with its files written."""
+        self.done(result, stem)
+        about = {"measured": result.measured, "seconds": result.seconds, "kept": result.cached}
+        return result.data | {"files": self.names(stem, result.files)} | about
 
     def methods(
-        self, chosen: Sequence[Configuration], stems: Sequence[str], factor: float, tell: Tell
+        self, chosen: Sequence[Configuration], stems: Sequence[str], factor: float, steps: Mapping[str, Progress]
     ) -> list[dict[str, Any]]:
-        """Return the entries of all configurations."""
-        slots = [self.slot("method", self._asked(one), _own_source(one)) for one in chosen]
-        entries = []
+        """Return what the report says of all configurations."""
+        entries = [self._entries.method(each, self._made_from | _own_source(each)) for each in chosen]
+        methods = []
         workers = threads()
         # As many at once as there are processors, for HDR-FLIP: nothing is lost of those before if this is stopped.
         for first in range(0, len(chosen), workers):
-            several = range(first, min(first + workers, len(chosen)))
-            found = {number: find_kept(slots[number]) for number in several}
-            missing = [number for number in several if found[number] is None]
+            group = range(first, min(first + workers, len(chosen)))
+            results = {number: load_result(entries[number]) for number in group}
+            missing = [number for number in group if results[number] is None]
             measured, seconds = [], []
             for number in missing:
-                tell(number / len(chosen), chosen[number].label)
+                steps[chosen[number].label](0.0, chosen[number].label)
                 start = time.monotonic()
                 measured.append(study_configuration(self._study, chosen[number]))
                 raise_own_error(chosen[number], measured[-1].refused)
                 seconds.append(time.monotonic() - start)
             start = time.monotonic()
             measured = with_flips(self._study, measured, workers=workers)
-            share = (time.monotonic() - start) / max(1, len(missing))
-            for number, one, took in zip(missing, measured, seconds):
-                found[number] = keep(slots[number], _measured(self._study, one, factor), took + share)
-            entries += [self.entry(one, stems[number]) for number, one in found.items() if one is not None]
-        return entries
+            flip = (time.monotonic() - start) / max(1, len(missing))
+            for number, measurement, took in zip(missing, measured, seconds):
+                computed = _measured(self._study, measurement, factor)
+                results[number] = store_result(entries[number], computed, took + flip)
+            methods += [self.written(result, stems[number]) for number, result in results.items() if result is not None]
+        return methods
 
     def image(self, shown: EngineImage, stem: str, factor: float) -> dict[str, Any]:
-        """Return the entry of an image from elsewhere."""
-        asked = {"label": shown.label, "image": self._study.effort.image, "flip": self._study.effort.flip}
-        place = self.slot("image", asked, {"file": source_digest([shown.path])} | _flip_version())
-        return self.entry(kept_result(place, lambda: _judged(self._study, shown, factor)), stem)
-
-    def _asked(self, chosen: Configuration) -> dict[str, Any]:
-        effort = self._study.effort
-        names = ("image", "timed", "seconds", "slow", "limit")
-        return asdict(chosen) | {name: getattr(effort, name) for name in names} | {"flip": wants_flip(effort, chosen)}
+        """Return what the report says of an image from elsewhere."""
+        made_from = self._made_from | {"file": source_digest([shown.path])} | _flip_version()
+        entry = self._entries.image(shown.label, made_from)
+        return self.written(cached_result(entry, lambda: _judged(self._study, shown, factor)), stem)
 
 
 def file_stems(labels: Sequence[str]) -> list[str]:
@@ -222,10 +203,6 @@ def _truth(study: SceneStudy) -> Computed:
     return {"truth": truth_data(truth), "exposure": factor}, files
 
 
-def _checks(study: SceneStudy, tell: Tell) -> Computed:
-    return plain(check_truth(study, progress=lambda share, what: tell(0.3 + 0.2 * share, what))), {}
-
-
 def _measured(study: SceneStudy, measured: Measurement, factor: float) -> Computed:
     data, frame = measurement_data(measured), measured.frame
     if frame is None:
@@ -242,7 +219,7 @@ def _measured(study: SceneStudy, measured: Measurement, factor: float) -> Comput
 
 def _judged(study: SceneStudy, shown: EngineImage, factor: float) -> Computed:
     truth = study.truth
-    measured = measure_image(shown, truth, surfaces=study.scene.plan.surfaces)
+    measured = measure_image(shown, truth, surfaces=study.scene.features.surfaces)
     if study.effort.flip != "none":
         measured = replace(measured, flip=image_flip(measured, truth))
     expected = truth.airlight if measured.layer == "airlight" else truth.airlight + truth.surface

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from realtime.frame.renderer import Frame
 from reference.monte_carlo.batches import LARGEST_SEED, LAYERS, Batches, seed_ranges
-from reference.quadrature.image import TruthImage
+from reference.quadrature.ray_values import TruthImage
 from reference.quadrature.surface import surface_hits
 from reference.scene.read import read_truth
-from reference.storage.cache import scene_digest
 from reference.storage.exr import Image
+from reference.storage.scene_digest import scene_digest
 from validation.configurations.methods import Configuration
 from validation.estimates.budget import LEAST_BATCHES, Budget, RelativeErrors, batch_plan, near_light, relative_errors
 from validation.estimates.monte_carlo import monte_carlo_batches

@@ -24,8 +24,10 @@ from reference.monte_carlo.batches import LARGEST_SEED, Batches, merged
 from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
 from reference.monte_carlo.volpath.integrator import volpath_batch
 from reference.scene.read import read_truth
-from reference.storage.cache import cache_folder, cache_key, drop_arrays, is_kept, load_arrays, store_arrays, sweep
+from reference.storage.cache import cache_folder, drop_arrays, is_kept, load_arrays, store_arrays, sweep
+from reference.storage.cache_size import make_room
 from reference.storage.files import NO_SPACE
+from reference.storage.scene_digest import cache_key
 
 Progress = Callable[[int, int, str], None]
 Trace = Callable[[int], Batches]  # from the seed
@@ -102,6 +104,7 @@ def monte_carlo_batches(
     settings |= _REVISIONS.get(estimator, {})
     settings |= {} if counts is None else {"counts": hashlib.sha256(counts.astype("<u4").tobytes()).hexdigest()}
     folder = cache_key(scene, estimator, settings)
+    make_room()
     sweep(cache_folder() / folder)
     trace = _tracer(scene, estimator, samples, max_depth, counts)
     tally: Counter[str] = Counter()

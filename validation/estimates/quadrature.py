@@ -5,9 +5,12 @@ from collections.abc import Callable
 from dataclasses import Field, fields
 from typing import Any
 
-from reference.quadrature.image import TruthImage, quadrature_image
+from reference.quadrature.image import quadrature_image
+from reference.quadrature.ray_values import TruthImage
 from reference.scene.read import read_truth
-from reference.storage.cache import cache_key, load_arrays, store_arrays
+from reference.storage.cache import load_arrays, store_arrays
+from reference.storage.cache_size import make_room
+from reference.storage.scene_digest import cache_key
 
 Progress = Callable[[int, int, str], None]
 
@@ -38,6 +41,7 @@ def truth_image(
     stored = load_arrays(key)
     if stored is not None and set(stored) == {field.name for field in fields(TruthImage)}:
         return TruthImage(**{field.name: _as_kept(field, stored[field.name]) for field in fields(TruthImage)})
+    make_room()
     image = quadrature_image(read_truth(scene), **settings, progress=progress)
     store_arrays(key, {field.name: getattr(image, field.name) for field in fields(TruthImage)})
     return image

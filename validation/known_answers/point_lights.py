@@ -38,7 +38,8 @@ from numpy.typing import NDArray
 from scipy.integrate import quad
 
 from analytic.geometry import foot_and_height
-from reference.quadrature.image import quadrature_image, ray_values
+from reference.quadrature.image import quadrature_image
+from reference.quadrature.ray_values import ray_values
 from reference.scene.read import TruthScene, read_truth
 from validation.certified.model import (
     SIZE,

@@ -50,7 +50,7 @@ from realtime.shadow_maps.shadow_map import ShadowMap
 from reference.quadrature.surface import surface_hits
 from reference.quadrature.unbounded import Rays, sum_intervals
 from reference.scene.read import TruthLight, TruthScene
-from reference.scene.shapes import exact_distance
+from reference.visibility.exact_distance import exact_distance
 from reference.visibility.intervals import LitIntervals
 from reference.visibility.spot_cone import cone_interval, perpendicular
 from validation.oracles.height_field import Array, HeightField, Index, Path, by_ray, height_field, zero_angle

@@ -13,7 +13,7 @@ from realtime.scene.lights import Light
 
 def integral_type(view: View) -> Any:
     """Return the type of an integral: a number for a grey medium, a colour otherwise."""
-    grey = len(view.medium.sigma_t) == 1 and not view.plan.bounded
+    grey = len(view.medium.sigma_t) == 1 and not view.features.bounded
     return type(view.distance) if grey else type(view.medium.albedo)
 
 

@@ -81,6 +81,7 @@ def rule_and_truth(rays, name, g):
     return np.array(panels_mean(*parts)[0]), np.array(_double_mean(*parts)[0]), np.array(width)
 
 
+@pytest.mark.claim("exact-panels")
 @pytest.mark.parametrize(("name", "g"), PHASES)
 def test_what_the_rule_leaves_without_rounding(variant, name, g):
     rule, truth, width = rule_and_truth(many_rays(20_000, 7), name, g)
@@ -162,6 +163,7 @@ def counts(name, g, widths, depths, **options):
     return np.array(panel_count(phase_of(name, g, types), types.scalar(widths), types.scalar(depths), **options))
 
 
+@pytest.mark.claim("exact-panels")
 @pytest.mark.parametrize(("name", "g"), PHASES)
 def test_the_number_of_panels_grows_with_width_and_depth(variant, name, g):
     widths = np.linspace(0, 20, 200)

@@ -24,6 +24,7 @@ def values(kernel, precision="double", *, phase="isotropic", **parameters):
     return np.array(kernel(geometry, *ends, medium, Light(None, None), **parameters), dtype=np.float64)
 
 
+@pytest.mark.claim("declared-orders")
 @pytest.mark.parametrize("phase", ["isotropic", "hg"])
 @pytest.mark.parametrize("name", ["uniform", "equiangular"])
 def test_midpoint_steps_are_of_second_order(variant, name, phase):
@@ -36,6 +37,7 @@ def test_midpoint_steps_are_of_second_order(variant, name, phase):
     assert slope == pytest.approx(-2, abs=0.05)
 
 
+@pytest.mark.claim("declared-orders")
 def test_nodes_in_theta_converge_geometrically(variant):
     from realtime.kernels.registry import KERNELS
 

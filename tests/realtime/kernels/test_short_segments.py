@@ -59,6 +59,7 @@ def of_rule(rays, name, g, rule, precision):
     return np.array(value, dtype=np.float64), np.array(serves(rule, extent(geometry, x0, x1, (sigma_t,)), phase))
 
 
+@pytest.mark.claim("exact-panels")
 @pytest.mark.parametrize("rule", RULES)
 @pytest.mark.parametrize(("name", "g"), PHASES)
 def test_what_the_rules_leave_without_rounding(variant, name, g, rule):

@@ -14,6 +14,7 @@ def phases():
         yield "hg", g, named_phase("hg", g=g)
 
 
+@pytest.mark.claim("phase-two-sides", tolerance="1e-5 relative: float32")
 def test_against_the_analytic_side(variant):
     """The same functions written twice, in float32 here and in float64 there."""
     import mitsuba as mi

@@ -5,6 +5,7 @@ import pytest
 from tests.helpers.scenes import spot, tiny_scene
 
 
+@pytest.mark.claim("march-maps", tolerance="1 % of the points")
 @pytest.mark.parametrize("kind", ["point", "spot"])
 def test_map_agrees_with_rays_away_from_edges(variant, kind):
     import drjit as dr

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from reference.quadrature.segments import AMBIENT, camera_segments, leg_kinks, optical_depth, scattering_range
-from reference.scene.convex_bodies import crossings
+from reference.visibility.line_crossings import crossings
 from tests.helpers.scenes import body, clear_scene, tiny_scene
 
 FOG = {"type": "homogeneous", "id": "fog", "sigma_t": 0.11, "albedo": 0.6, "has_spectral_extinction": False}
@@ -124,7 +124,7 @@ def test_the_digest_of_a_scene_tells_its_media_apart(variant):
     """A cached truth must not stand in for that of another medium inside, or of other surroundings."""
     import mitsuba as mi
 
-    from reference.storage.cache import scene_digest
+    from reference.storage.scene_digest import scene_digest
 
     def digest(**changes):
         return scene_digest(mi.load_dict(clear_scene(size=(3, 2), **(shapes() | changes))))

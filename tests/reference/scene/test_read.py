@@ -31,6 +31,7 @@ def test_both_sides_read_the_same_scene(variant):
     assert np.rad2deg([cone.cutoff, cone.beam]) == pytest.approx([31, 17])
 
 
+@pytest.mark.claim("pixel-centre", tolerance="5e-7: Mitsuba's float32 matrices")
 def test_rays_are_those_of_mitsuba(variant):
     import mitsuba as mi
 
@@ -44,6 +45,7 @@ def test_rays_are_those_of_mitsuba(variant):
     assert np.max(np.abs(np.array(ray.d).T - truth.direction)) < 5e-7  # float32 matrices on Mitsuba's side
 
 
+@pytest.mark.claim("scenes-refused-by-name")
 @pytest.mark.parametrize(
     ("changes", "message"),
     [({"lamp": None}, "no light"), ({"sky": {"type": "constant"}}, "ConstantBackgroundEmitter")],
@@ -62,7 +64,7 @@ def test_reading_a_scene_renames_none_of_its_shapes(variant):
     import mitsuba as mi
 
     from reference.scene.read import read_truth
-    from reference.storage.cache import scene_digest
+    from reference.storage.scene_digest import scene_digest
 
     ball = body({"type": "sphere", "center": [0.2, 0.1, 0.9], "radius": 0.4}, 0.7, (0.5, 0.5, 0.5))
     scene = mi.load_dict(clear_scene(size=(4, 3), mist=ball, floor=tiny_scene()["floor"]))

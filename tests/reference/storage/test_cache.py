@@ -5,15 +5,8 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from reference.storage.cache import (
-    cache_folder,
-    cache_key,
-    drop_arrays,
-    is_kept,
-    load_arrays,
-    scene_digest,
-    store_arrays,
-)
+from reference.storage.cache import cache_folder, drop_arrays, is_kept, load_arrays, store_arrays
+from reference.storage.scene_digest import cache_key, scene_digest
 from tests.helpers.scenes import spot, tiny_scene
 
 
@@ -108,7 +101,7 @@ def test_digest_is_the_same_in_another_process(variant, tmp_path):
 
     script = (
         "import sys, mitsuba as mi; mi.set_variant(sys.argv[1])\n"
-        "from reference.storage.cache import scene_digest\n"
+        "from reference.storage.scene_digest import scene_digest\n"
         "print(scene_digest(mi.load_string(sys.argv[2])))"
     )
     here = os.path.dirname(os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)))))
@@ -172,6 +165,7 @@ def test_truncated_file_counts_as_none(share):
     assert load_arrays("cut") is None
 
 
+@pytest.mark.claim("damaged-cache")
 @pytest.mark.parametrize("damage", ["flipped bit", "text", "a lone array", "pickle"])
 def test_damaged_file_counts_as_none(damage, tmp_path):
     store_arrays("damaged", {"a": np.arange(1000.0)})
@@ -238,7 +232,7 @@ def test_nothing_half_written_stays_behind(monkeypatch):
 
 def test_fields_of_a_truth_image_are_what_the_cache_keeps(variant):
     """A field added to one and not to the other would make every look-up fail."""
-    from reference.quadrature.image import TruthImage
+    from reference.quadrature.ray_values import TruthImage
     from validation.estimates.quadrature import truth_image
 
     scene = load()

@@ -23,6 +23,7 @@ def cylinder(**changes):
     return {"type": "cylinder", "p0": [0.7, -0.2, 0.1], "p1": [0.8, 0.1, 1.3], "radius": 0.1} | changes
 
 
+@pytest.mark.claim("exact-shadows")
 def test_polygons_and_balls_are_exact_and_other_shapes_are_cast(variant):
     from reference.visibility.lit_intervals import lit_intervals
     from reference.visibility.triangles import EXACT_EDGE
@@ -62,6 +63,7 @@ def test_mixed_scenes_keep_needles_exact_beside_shapes_that_are_cast(variant):
     assert np.abs(lost[~crossed]).max() < 4e-5
 
 
+@pytest.mark.claim("cast-shadows")
 def test_only_shapes_that_are_cast(variant):
     from reference.visibility.lit_intervals import lit_intervals
 
@@ -91,6 +93,7 @@ def test_what_is_lit_in_both(variant):
         assert [part.tolist() for part in found.doubt] == [[1], [0.3], [0.01]]
 
 
+@pytest.mark.claim("shadow-ray-certificate")
 def test_certificate_of_both_routes_is_clean(variant):
     from reference.visibility.lit_intervals import lit_intervals
 
@@ -103,11 +106,13 @@ def test_certificate_of_both_routes_is_clean(variant):
         assert known.missed < 1e-3
 
 
+@pytest.mark.claim("shadow-ray-certificate")
 def test_slivers_that_random_samples_meet_are_mended(variant):
     """From rays that are taken to be lit from end to end, random samples alone find the shadows of a row of posts."""
-    from reference.visibility.lit_intervals import _bisect, visibility_test
+    from reference.visibility.lit_intervals import _bisect
     from reference.visibility.random_checks import Rounding, Toggles, certified_cast
     from reference.visibility.triangles import geometric_intervals
+    from tests.helpers.visibility import visibility_test
 
     posts = {f"post{i}": box((-0.9 + 0.31 * i, 0.1, 0.9), (0.03, 0.03, 3.0)) for i in range(6)}
     truth, light, rays, ends = setup(tiny_scene(ball=None, size=(24, 18), **posts))
@@ -137,12 +142,14 @@ def test_intervals_stay_sorted_and_apart_after_mending(variant):
     assert np.all((found.low >= ends[0][found.ray]) & (found.high <= ends[1][found.ray]))
 
 
+@pytest.mark.claim("shadow-ray-certificate")
 def test_wrong_geometry_is_found_and_left_in_doubt(variant):
     """Intervals from which one box is missing contradict the shadow rays, and the test of all triangles."""
     from reference.scene.shapes import Shapes, read_shapes
-    from reference.visibility.lit_intervals import point_leg, visibility_test
+    from reference.visibility.lit_intervals import point_leg
     from reference.visibility.random_checks import certified_geometry
     from reference.visibility.triangles import geometric_intervals
+    from tests.helpers.visibility import visibility_test
 
     truth, light, rays, ends = setup(box_scene())
     shapes = read_shapes(truth.occluders)
@@ -166,8 +173,9 @@ def test_wrong_geometry_is_found_and_left_in_doubt(variant):
     assert found.doubt is None
 
 
+@pytest.mark.claim("shadow-ray-certificate")
 def test_doubt_widens_the_bound(variant, monkeypatch):
-    import reference.quadrature.image as quadrature
+    import reference.quadrature.ray_values as quadrature
 
     truth, *_ = setup(box_scene())
     plain = quadrature.ray_values(truth)
@@ -185,6 +193,7 @@ def test_doubt_widens_the_bound(variant, monkeypatch):
     assert np.all(doubted.bound[5] - plain.bound[5] > 0)
 
 
+@pytest.mark.claim("bound-in-every-pixel", tolerance="1e-5 relative")
 def test_a_built_in_scene_is_certain_to_1e_minus_5(variant):
     """The figure to reach, at a size for tests: every bound below 1e-5 of its pixel, and nothing contradicted."""
     from reference.quadrature.image import quadrature_image

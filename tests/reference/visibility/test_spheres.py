@@ -28,6 +28,7 @@ def surface_crossed(point, centre, radius):
     return np.linalg.norm(share[..., None] * point - centre, axis=-1) < radius
 
 
+@pytest.mark.claim("exact-shadows", tolerance="1e-9 of an angle about each edge")
 @pytest.mark.parametrize("radius", [0.02, 0.7, 1.69, 1.71, 3.0], ids=["small", "plain", "close", "inside", "large"])
 def test_samples_against_the_definition(radius):
     """Random points of random rays; the light is 1.7 from the centre, so in the last two it is inside of the ball."""
@@ -98,6 +99,7 @@ def test_a_ball_against_a_mesh_of_it(variant):
     assert np.max(lit[1] - lit[0]) < 2 * np.sqrt(2 * inside) * 0.41 / 0.8
 
 
+@pytest.mark.claim("shadow-ray-certificate")
 @pytest.mark.parametrize("place", ["outside", "light", "camera", "both"])
 def test_random_shadow_rays_contradict_nothing(variant, place):
     """Balls, one around the light, the camera or both of them: no shadow ray of Mitsuba says otherwise."""
@@ -107,9 +109,10 @@ def test_random_shadow_rays_contradict_nothing(variant, place):
 
     from reference.scene.read import read_truth
     from reference.scene.shapes import read_shapes
-    from reference.visibility.lit_intervals import lit_intervals, point_leg, visibility_test
+    from reference.visibility.lit_intervals import lit_intervals, point_leg
     from reference.visibility.random_checks import certified_geometry
     from reference.visibility.triangles import EXACT_EDGE, geometric_intervals
+    from tests.helpers.visibility import visibility_test
 
     shells = {
         "light": {"type": "sphere", "center": [0.8, 0.8, 1.7], "radius": 0.6},

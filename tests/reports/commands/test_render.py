@@ -85,15 +85,16 @@ def test_plan_counts_casters_and_warns_of_open_ones(variant, capfd):
     assert err.count("is open") == 2
 
 
+@pytest.mark.claim("flawed-meshes-warn")
 def test_render_warns_of_open_casters_once_each(variant, capfd):
     run("sphere-spot", *SMALL, "--method", "shadow-planes", "--json")
     out, err = capfd.readouterr()
     assert err.count("airlight: warning: shape 'floor' is open") == 1
     times = json.loads(out)
-    assert times["rebuild_ms"] > 0
-    assert times["moved_ms"] > 0
-    assert times["relit_ms"] > 0
-    assert times["recoloured_ms"] > 0
+    assert times["light_moved_ms"] > 0
+    assert times["objects_moved_ms"] > 0
+    assert times["light_moved_camera_kept_ms"] > 0
+    assert times["colours_changed_ms"] > 0
 
 
 @pytest.mark.parametrize(

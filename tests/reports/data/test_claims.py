@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import copy
 
-from reports.data.claims import claims, confirmed, unstudied, verdict
+import pytest
+
+from reports.data.claims import claims, confirmed, unstudied
+from reports.tables.agreement import verdict
 
 
 def timing(median):
@@ -12,7 +15,7 @@ def method(label, rmse, median, *, refused=None):
     """What a report says of a configuration, by hand."""
     if refused:
         return {"label": label, "refused": refused, "error": None, "times": None}
-    times = {name: timing(median) for name in ("frame", "surface", "airlight", "rebuild")}
+    times = {name: timing(median) for name in ("frame", "surface", "airlight", "light_moved")}
     return {"label": label, "refused": None, "error": {"relative_rmse": rmse}, "times": times}
 
 
@@ -55,6 +58,7 @@ def scenes():
     return copy.deepcopy(SCENES)
 
 
+@pytest.mark.claim("claims-follow")
 def test_claims_on_a_truth_that_is_confirmed():
     trust, *fastest, left_out = texts(scenes())
     assert [one["good"] for one in claims(scenes())] == [True, True, True, None, None]
@@ -81,6 +85,7 @@ def test_each_estimator_that_checked_the_truth_has_a_sentence():
     assert not confirmed(data)
 
 
+@pytest.mark.claim("claims-follow")
 def test_claims_on_a_truth_that_is_not_confirmed():
     data = scenes()
     data[1]["agreement"]["surface"]["statistics"]["equivalent"] = False
@@ -135,6 +140,7 @@ def test_error_of_just_the_target_counts():
     assert "is edge" in fastest_of(scene, 0.01)
 
 
+@pytest.mark.claim("claims-follow")
 def test_claims_never_name_a_method_with_nonfinite_pixels():
     """Its RMSE leaves out the very pixels that are wrong."""
     data = scenes()[:1]

@@ -55,6 +55,7 @@ def test_what_is_right_has_no_fault():
     assert first_fault(RIGHT, SMALL) is None
 
 
+@pytest.mark.claim("report-schema")
 @pytest.mark.parametrize(
     ("change", "fault"),
     [

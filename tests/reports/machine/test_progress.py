@@ -18,30 +18,46 @@ def clock(monkeypatch):
     return clock
 
 
+@pytest.mark.claim("progress")
 def test_short_work_says_nothing(capsys, clock):
-    with progress_bar("report") as tell:
+    with progress_bar("report") as progress:
         for step in range(10):
             clock.now += 0.19
-            tell(step / 10, "working")
+            progress(step / 10, "working")
     captured = capsys.readouterr()
     assert captured.err == captured.out == ""
 
 
 def test_long_work_says_what_is_left_in_plain_lines(capsys, clock):
-    with progress_bar("report") as tell:
+    with progress_bar("report") as progress:
         clock.now += 30
-        tell(0.25, "sphere-spot: volpath")
+        progress(0.25, "sphere-spot: volpath")
     captured = capsys.readouterr()
     # A quarter took 30 s: three quarters take 90 s.
     assert captured.err == "report: 25 %, about 90 s left, sphere-spot: volpath\n"
     assert captured.out == ""  # --json must stay JSON
 
 
+def test_the_bar_says_what_is_left_of_the_whole_and_not_of_the_last_half_minute(monkeypatch, clock):
+    """A part that takes as long as all before it moves the time left by no more than it should."""
+    screen = Terminal()
+    monkeypatch.setattr("sys.stderr", screen)
+    monkeypatch.setenv("TERM", "xterm-256color")
+    monkeypatch.setenv("COLUMNS", "120")
+    with progress_bar("report") as progress:
+        for _ in range(5):
+            clock.now += 2
+            progress(0.1, "x")
+        clock.now += 110
+        progress(0.5, "x")
+    assert "about 2:00 left" in screen.getvalue()
+
+
 def test_plain_lines_are_ten_seconds_apart(capsys, clock):
-    with progress_bar("bench") as tell:
+    with progress_bar("bench") as progress:
         for step in range(1, 101):
             clock.now += 0.5
-            tell(step / 101, "x")
+            progress(step / 101, "x")
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 5
     shares = [int(re.findall(r"(\d+) %", line)[0]) for line in lines]
@@ -51,9 +67,9 @@ def test_plain_lines_are_ten_seconds_apart(capsys, clock):
 @pytest.mark.parametrize("share", [0.0, 1.0])
 def test_beginning_and_end_are_no_news(capsys, clock, share):
     """Nothing can be said of the time left at 0, and at 1 the result says it."""
-    with progress_bar("x") as tell:
+    with progress_bar("x") as progress:
         clock.now += 60
-        tell(share, "x")
+        progress(share, "x")
     assert capsys.readouterr().err == ""
 
 
@@ -67,15 +83,16 @@ class Terminal(io.StringIO):
         return True
 
 
+@pytest.mark.claim("progress")
 @pytest.mark.parametrize(("seconds", "shown"), [(0.5, False), (5.0, True)])
 def test_bar_on_a_terminal_appears_after_two_seconds_and_goes_away(monkeypatch, clock, seconds, shown):
     screen = Terminal()
     monkeypatch.setattr("sys.stderr", screen)
     monkeypatch.setenv("TERM", "xterm-256color")
     monkeypatch.setenv("COLUMNS", "120")
-    with progress_bar("report") as tell:
+    with progress_bar("report") as progress:
         clock.now += seconds
-        tell(0.25, "open-fog: volpath")
+        progress(0.25, "open-fog: volpath")
     text = screen.getvalue()
     assert ("open-fog: volpath" in text) is shown
     assert ("25 %" in text) is shown
@@ -91,9 +108,9 @@ def test_bar_goes_away_after_a_failure(monkeypatch, clock):
     monkeypatch.setenv("TERM", "xterm-256color")
 
     def fail():
-        with progress_bar("report") as tell:
+        with progress_bar("report") as progress:
             clock.now += 5
-            tell(0.25, "work")
+            progress(0.25, "work")
             raise KeyError
 
     with pytest.raises(KeyError):
@@ -106,9 +123,9 @@ def test_parts_tell_shares_of_the_whole():
     told = []
     whole = [0.0, 0.3, 0.9, 1.0]  # 0.3 + (0.9 - 0.3) is not 0.9
     for first, last in itertools.pairwise(whole):
-        tell = counted(part_of(lambda share, what: told.append((share, what)), first, last, before="map: "))
+        progress = counted(part_of(lambda share, what: told.append((share, what)), first, last, before="map: "))
         for done in range(3):
-            tell(done, 2, str(done))
+            progress(done, 2, str(done))
     assert [share for share, _ in told] == pytest.approx([0, 0.15, 0.3, 0.3, 0.6, 0.9, 0.9, 0.95, 1])
     assert [share for share, what in told if what != "map: 1"] == [0, 0.3, 0.3, 0.9, 0.9, 1]
     assert told[1][1] == "map: 1"

@@ -5,13 +5,14 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from analytic.geometry import foot_and_height, theta_of_x, x_of_theta
+from analytic.geometry import foot_and_height
 from analytic.panels import airlight_segments
 from realtime.shadow_maps.projection import Projection
 from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map
 from reference.quadrature.unbounded import Rays
 from reference.scene.read import TruthLight, read_truth
 from reference.visibility.spot_cone import perpendicular
+from tests.helpers.changes_of_variables import theta_of_x, x_of_theta
 from tests.helpers.scenes import body, spot, tiny_scene
 from validation.estimates.quadrature import truth_image
 from validation.metrics.errors import error_metrics
@@ -186,6 +187,7 @@ def before_triangles(shadow_map, away):
     return lit, known
 
 
+@pytest.mark.claim("error-by-size-of-the-map")
 @pytest.mark.parametrize("what", ["point", "soft spot", "coloured extinction"])
 def test_errors_fall_with_the_map_size(variant, what):
     """An edge is misplaced by a texel at most, so the error halves with it, give or take where edges fall in texels."""

@@ -39,6 +39,7 @@ def test_depths_are_measured_along_the_light(variant):
     assert found == pytest.approx(-start[..., 2] / axis[2], rel=1e-6)
 
 
+@pytest.mark.claim("directional-light-volumes")
 def test_the_face_just_covers_the_media(variant):
     """The corners of the box and the ball fill the rectangle from side to side, and nothing is before or behind it."""
     from realtime.scene.directional_extent import media_balls
@@ -81,6 +82,7 @@ def height_field(scene, size):
     return lit
 
 
+@pytest.mark.claim("directional-light-volumes", tolerance="relative RMSE 2e-4: the steps' own")
 @pytest.mark.parametrize("size", [8, 64])
 def test_the_walk_against_steps_through_the_height_field(variant, size):
     """The same map, met by a sum over 10 000 steps of every ray in NumPy."""
@@ -190,7 +192,7 @@ def test_one_frame_serves_a_light_that_moves(variant):
 def test_a_plan_counts_the_light(variant):
     from realtime.scene.features import describe
 
-    assert describe(read(shaded()).plan)["lights"] == "1 directional"
+    assert describe(read(shaded()).features)["lights"] == "1 directional"
 
 
 def test_the_map_needs_the_memory_of_one_face(variant):

@@ -52,6 +52,7 @@ def test_a_mesh_is_for_media_without_bounds(variant):
     assert np.max(render(loaded, map=16).airlight) > 0
 
 
+@pytest.mark.claim("memory-before-it-is-taken")
 @pytest.mark.parametrize("evaluation", EVALUATIONS)
 def test_memory_is_counted_before_it_is_taken(variant, monkeypatch, evaluation):
     import realtime.memory

@@ -40,6 +40,7 @@ ALL = [
 ]
 
 
+@pytest.mark.claim("exact-for-its-map", tolerance="1e-7 of the largest, in float32 1e-5")
 @pytest.mark.parametrize(("name", "precision"), ALL)
 def test_frames_are_exact_with_respect_to_the_map(variant, name, precision):
     loaded, size = loaded_scene(name), SCENES[name][1]
@@ -57,6 +58,7 @@ def test_frames_are_exact_with_respect_to_the_map(variant, name, precision):
         assert differ(*(frame.airlight for frame in frames)) < 1e-12
 
 
+@pytest.mark.claim("exact-for-its-map", tolerance="1e-7 of the largest, in float32 1e-5")
 @pytest.mark.parametrize(("name", "precision"), ALL)
 def test_frames_with_upright_walls_are_exact_with_respect_to_the_map(variant, name, precision):
     """As above, with the walls that the rays of the map found."""
@@ -157,6 +159,7 @@ def with_heights(shadow_map, heights):
         return replace(shadow_map, distance=mi.Float64(length / heights))
 
 
+@pytest.mark.claim("exact-for-its-map", tolerance="1e-7 of the largest")
 @pytest.mark.parametrize("kind", ["point", pytest.param("spot", marks=pytest.mark.slow)])
 @settings(max_examples=20, deadline=None, derandomize=True, database=None)
 @given(data=st.data())
@@ -193,6 +196,7 @@ def any_walls(rng, faces, share):
     return sum(side << np.uint32(8 * k) for k, side in enumerate(sides)).ravel()
 
 
+@pytest.mark.claim("exact-for-its-map", tolerance="1e-7 of the largest")
 @pytest.mark.parametrize("kind", ["point", pytest.param("spot", marks=pytest.mark.slow)])
 @settings(max_examples=20, deadline=None, derandomize=True, database=None)
 @given(data=st.data())
@@ -242,6 +246,7 @@ def test_a_light_that_moves_between_frames(variant):
     assert np.max(np.abs(frames[0] - frames[-1])) > 0.01 * np.max(frames[0])
 
 
+@pytest.mark.claim("tessellation-threshold")
 def test_adaptive_meshes_come_closer_with_the_threshold(variant):
     """In a dome, which is curved everywhere."""
     loaded = loaded_scene(floor={"type": "sphere", "center": [0.3, 0.4, 0.2], "radius": 5.1})
@@ -257,6 +262,7 @@ def test_adaptive_meshes_come_closer_with_the_threshold(variant):
     assert errors[0] > 10 * errors[-1]
 
 
+@pytest.mark.claim("without-occluders")
 def test_a_map_that_sees_nothing_lights_everything(variant):
     """Nothing in the cone of a spot, or between the rays of the map: as without shadows."""
     speck = {"type": "sphere", "center": [0.3, 0.2, -90.0], "radius": 1e-3}
@@ -269,6 +275,7 @@ def test_a_map_that_sees_nothing_lights_everything(variant):
             assert np.all(np.abs(frame.airlight - wanted) <= 1e-5 * wanted)
 
 
+@pytest.mark.claim("enclosed-light")
 @pytest.mark.parametrize("shape", ["sphere", "cube"])
 @pytest.mark.parametrize("kind", ["point", "spot"])
 def test_a_light_inside_a_closed_occluder_lights_nothing_outside(variant, shape, kind):

@@ -68,8 +68,8 @@ def view_of(scene):
     pixel = mi.UInt32(tiled_pixels(camera.width, camera.height))
     direction = ray_directions(camera, pixel)[0]
     distance = cast_rays(scene.geometry, None, camera.origin, direction).distance
-    parts = {"plan": scene.plan, "geometry": scene.geometry, "medium": scene.medium, "lights": scene.lights}
-    return frame_view(camera, pixel, distance, **parts, prepared=())
+    parts = {"features": scene.features, "geometry": scene.geometry, "medium": scene.medium, "lights": scene.lights}
+    return frame_view(camera, pixel, distance, **parts)
 
 
 @pytest.mark.parametrize("kind", ["point", "spot"])

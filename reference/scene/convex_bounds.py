@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Convex bounds of media in float64: polyhedra and balls, read from Mitsuba's shapes and checked.
+
+A polyhedron is what its facets' half spaces n . x <= offset have in common. Vertices are float32 numbers, so a facet of
+four corners is only nearly flat; a mesh counts as convex where no vertex lies further outside any facet's plane than
+
+    size (1e-6 + 4 eps largest coordinate / altitude of the facet),        eps = 2^-24:
+
+what rounding the corners of that facet can do to its plane. Slivers with an altitude below 1e-6 of the size have no
+plane worth the name; their neighbours bound the body without them.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linprog, nnls
+
+from analytic.errors import InputError
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+LARGEST_MESH = 20_000  # triangles: the test of convexity looks at every vertex and every facet
+_FLAT = 1e-6  # relative to the size of the body
+
+
+@dataclass(frozen=True)
+class Polyhedron:
+    """A convex polyhedron."""
+
+    normal: Array  #: outward unit normals of the facets, (facets, 3)
+    offset: Array  #: the body is where normal . x <= offset for all facets, (facets,) [m]
+    edge: Array  #: ends of the edges at which the surface bends, (edges, 2, 3) [m]
+
+
+@dataclass(frozen=True)
+class Ball:
+    """A ball."""
+
+    centre: Array  #: [m]
+    radius: float  #: [m]
+
+
+Bounds = Polyhedron | Ball
+
+
+def read_bounds(shape: Any) -> Bounds:
+    """Read the bounds of a medium from a shape.
+
+    Raises
+    ------
+    InputError
+        For a shape that is neither a sphere nor a closed convex mesh whose normals point outwards, by its name.
+    """
+    parameters = mi.traverse(shape)
+    if shape.class_name() == "Sphere":
+        return _read_ball(shape, np.array(parameters["to_world"].matrix, dtype=np.float64).reshape(4, 4))
+    if not shape.is_mesh() or "vertex_positions" not in parameters:
+        raise _refusal(shape, f"is a {shape.class_name()}", "a sphere, a cube or a closed convex mesh")
+    vertices = np.array(parameters["vertex_positions"], dtype=np.float64).reshape(-1, 3)
+    faces = np.array(parameters["faces"], dtype=np.int64).reshape(-1, 3)
+    if len(faces) > LARGEST_MESH:
+        raise _refusal(shape, f"has {len(faces)} triangles", f"at most {LARGEST_MESH}: simplify the mesh")
+    return _read_polyhedron(shape, vertices, faces)
+
+
+def _read_ball(shape: Any, matrix: Array) -> Ball:
+    lengths = np.linalg.norm(matrix[:3, :3], axis=0)
+    if np.ptp(lengths) > 1e-5 * lengths.max():
+        raise _refusal(shape, "is a sphere with different scales along its axes", "one scale, or a mesh")
+    if shape.has_flipped_normals():
+        raise _refusal(shape, "is inside out", "normals that point outwards: remove flip_normals")
+    return Ball(matrix[:3, 3], float(lengths.mean()))
+
+
+def _read_polyhedron(shape: Any, vertices: Array, faces: Index) -> Polyhedron:
+    # Vertices that are doubled for the sake of normals or texture are one again.
+    vertices, same = np.unique(vertices, axis=0, return_inverse=True)
+    faces = same.reshape(-1)[faces]
+    corner = vertices[faces]
+    size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    area = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    twice_area = np.linalg.norm(area, axis=1)
+    longest = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
+    altitude = twice_area / np.maximum(longest, np.finfo(float).tiny)
+    sound = altitude > _FLAT * size
+    edges, sides = _edges(shape, faces)
+    normal = area / np.maximum(twice_area, np.finfo(float).tiny)[:, None]
+    if np.sum(corner[:, 0] * area) * (-1 if shape.has_flipped_normals() else 1) < 0:
+        raise _refusal(shape, "is inside out", "faces that run counter-clockwise seen from outside")
+    if shape.has_flipped_normals():
+        normal = -normal
+    offset = np.mean(np.sum(corner * normal[:, None], axis=2), axis=1)
+    allowed = size * (_FLAT + 2.0**-22 * np.abs(vertices).max() / np.maximum(altitude, _FLAT * size))
+    for first in range(0, len(faces), 256):
+        block = slice(first, first + 256)
+        outside = np.max(vertices @ normal[block].T, axis=0) - offset[block]
+        if np.any(sound[block] & (outside > allowed[block])):
+            raise _refusal(shape, "is not convex", "convex bounds: cut the body into convex parts")
+    if not np.any(sound):
+        raise _refusal(shape, "has no volume", "a closed convex mesh")
+    bends = np.linalg.norm(normal[sides[:, 0]] - normal[sides[:, 1]], axis=1) > 10 * _FLAT
+    bends |= ~sound[sides].all(axis=1)
+    return Polyhedron(normal[sound], offset[sound], vertices[edges[bends]])
+
+
+def _edges(shape: Any, faces: Index) -> tuple[Index, Index]:
+    """Return the ends of the edges and the two faces beside each; refuse a surface that is not closed."""
+    ends = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    face = np.tile(np.arange(len(faces)), 3)
+    lower, upper = ends.min(axis=1), ends.max(axis=1)
+    order = np.lexsort((ends[:, 0] > ends[:, 1], upper, lower))
+    ends, face = ends[order], face[order]
+    # In a closed surface every edge comes twice, once in each direction.
+    closed = len(ends) % 2 == 0 and np.array_equal(ends[::2], ends[1::2, ::-1])
+    if not closed or np.any(lower == upper) or np.any(np.all(ends[2::2] == ends[:-2:2], axis=1)):
+        raise _refusal(shape, "is not a closed surface", "a closed convex mesh without doubled or degenerate faces")
+    return ends[::2], np.stack([face[::2], face[1::2]], axis=1)
+
+
+def _refusal(shape: Any, found: str, wanted: str) -> InputError:
+    return InputError(f"shape '{shape.id()}' bounds a medium and {found}; wanted {wanted}")
+
+
+def holds(bounds: Bounds, point: Array) -> bool:
+    """Return whether a point lies inside a body."""
+    if isinstance(bounds, Ball):
+        return bool(np.linalg.norm(point - bounds.centre) < bounds.radius)
+    return bool(np.all(bounds.normal @ point < bounds.offset))
+
+
+def overlap(one: Bounds, other: Bounds) -> bool:
+    """Return whether two bodies share more than their boundaries, to 1e-6 of their sizes."""
+    if isinstance(one, Ball) and isinstance(other, Ball):
+        gap = float(np.linalg.norm(one.centre - other.centre))
+        return gap < (one.radius + other.radius) * (1 - _FLAT)
+    if isinstance(one, Ball):
+        assert isinstance(other, Polyhedron)
+        return _distance(other, one.centre) < one.radius * (1 - _FLAT)
+    if isinstance(other, Ball):
+        return overlap(other, one)
+    # The largest ball in what both have in common: maximise its radius t under n . x + t <= offset.
+    planes = np.concatenate([one.normal, other.normal])
+    result = linprog(
+        [0.0, 0.0, 0.0, -1.0],
+        A_ub=np.column_stack([planes, np.ones(len(planes))]),
+        b_ub=np.concatenate([one.offset, other.offset]),
+        bounds=[(None, None)] * 4,
+    )
+    size = min(float(np.linalg.norm(np.ptp(body.edge.reshape(-1, 3), axis=0))) for body in (one, other))
+    return bool(result.status == 0 and -result.fun > _FLAT * size)
+
+
+def _distance(body: Polyhedron, point: Array) -> float:
+    """Return the distance from a point to a polyhedron, 0 inside (Lawson and Hanson 1974, chapter 23: LDP by NNLS)."""
+    room = body.offset - body.normal @ point
+    if np.all(room >= 0):
+        return 0.0
+    # min |u| under -n . u >= -room; the residual of the dual problem carries the solution.
+    dual = np.vstack([-body.normal.T, -room])
+    weights, _ = nnls(dual, np.array([0.0, 0.0, 0.0, 1.0]))
+    residual = dual @ weights - np.array([0.0, 0.0, 0.0, 1.0])
+    return float(np.linalg.norm(residual[:3] / residual[3]))

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Names for finished references: a digest of everything that decides their numbers.
+
+That is the scene as Mitsuba holds it (every parameter of every plugin, every vertex), the estimator and its settings,
+and the versions of what computes them.
+"""
+
+import hashlib
+import json
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+
+from reference.storage.cache import GENERATION
+
+#: Plugins without an id are named by their address, which differs from run to run.
+_ADDRESS = re.compile(r"object_\d+|0x[0-9a-f]+")
+
+
+def scene_digest(scene) -> str:
+    """Return a digest of a Mitsuba scene: of every parameter of every plugin in it."""
+    digest = hashlib.sha256()
+    parameters = mi.traverse(scene)
+    for words in _kinds(scene):
+        digest.update(_ADDRESS.sub("", words).encode())
+    for key in parameters.keys():  # noqa: SIM118 - SceneParameters iterates over items
+        digest.update(_ADDRESS.sub("", key).encode())
+        digest.update(_value_bytes(parameters[key]))
+    return digest.hexdigest()
+
+
+def _kinds(scene) -> Iterator[str]:
+    """Yield what decides the numbers but is no parameter: the kinds of the plugins, and which way surfaces face."""
+    for sensor in scene.sensors():
+        yield sensor.class_name()
+        yield _medium_words(sensor.get_medium())
+    for emitter in scene.emitters():
+        yield emitter.class_name()
+    for shape in scene.shapes():
+        yield f"{shape.class_name()} {shape.has_flipped_normals()} {shape.bsdf()}"
+        yield f"inside {_medium_words(shape.interior_medium())}, outside {_medium_words(shape.exterior_medium())}"
+
+
+def _medium_words(medium: Any) -> str:
+    # An isotropic and a Rayleigh phase function have no parameters: they differ by their names alone.
+    return "no medium" if medium is None else f"{medium} {medium.phase_function()}"
+
+
+def _value_bytes(value: Any) -> bytes:
+    # By the name of the type: a colour has a `matrix` too, a swizzle that holds its first channel six times.
+    matrix = value.matrix if "Transform" in type(value).__name__ else value
+    try:
+        return np.array(matrix, dtype=np.float64).tobytes()
+    except (TypeError, ValueError):
+        return repr(value).encode()
+
+
+def cache_key(scene, estimator: str, settings: Mapping[str, Any]) -> str:
+    """Return the name under which a result of an estimator is kept."""
+    from importlib.metadata import version
+
+    content = {
+        "scene": scene_digest(scene),
+        "estimator": estimator,
+        "settings": dict(settings),
+        "versions": {name: version(name) for name in ("mitsuba", "drjit")},
+        "generation": GENERATION,
+    }
+    return f"{estimator}-" + hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:32]

@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import numpy as np
+import pytest
+
+from analytic.errors import InputError
+from reference.scene.convex_bounds import Ball, Polyhedron, overlap, read_bounds
+from tests.helpers.scenes import body, clear_scene, tiny_scene
+from tests.helpers.shapes import ball, bounds_of, box
+
+GREY = (0.7, 0.7, 0.7)
+
+
+def mesh(vertices, faces):
+    import mitsuba as mi
+
+    properties = mi.Properties()
+    properties["mesh_bsdf"] = mi.load_dict({"type": "null"})
+    properties["interior"] = mi.load_dict({"type": "homogeneous", "sigma_t": 0.3, "albedo": 0.5})
+    result = mi.Mesh("odd", vertex_count=len(vertices), face_count=len(faces), props=properties)
+    parameters = mi.traverse(result)
+    parameters["vertex_positions"] = np.asarray(vertices, dtype=np.float32).ravel()
+    parameters["faces"] = np.asarray(faces, dtype=np.uint32).ravel()
+    parameters.update()
+    return result
+
+
+def test_cube_has_six_planes_and_twelve_edges_that_bend(variant):
+    bounds = bounds_of(box((0.1, 0.2, 0.3), (0.4, 0.5, 0.6)))
+    assert isinstance(bounds, Polyhedron)
+    assert len(bounds.edge) == 12
+    assert sorted({tuple(np.round(n, 6)) for n in bounds.normal}) == sorted(
+        map(tuple, np.vstack([np.eye(3), -np.eye(3)]))
+    )
+    assert np.all(bounds.normal @ [0.1, 0.2, 0.3] < bounds.offset)
+
+
+def test_sphere_is_read_in_the_world(variant):
+    import mitsuba as mi
+
+    turned = mi.ScalarTransform4f().translate([1.0, 2.0, 3.0]).rotate([0.6, 0.8, 0], 31).scale(0.5)
+    bounds = bounds_of({"type": "sphere", "center": [0.2, 0.0, 0.0], "radius": 0.7, "to_world": turned})
+    assert isinstance(bounds, Ball)
+    assert bounds.radius == pytest.approx(0.35, rel=1e-6)
+    assert bounds.centre == pytest.approx(np.array(turned @ mi.ScalarPoint3f(0.2, 0, 0)).ravel(), rel=1e-6)
+
+
+OVERLAPS = [
+    (lambda: (box(), box((2.0, 0, 0))), False),  # touching
+    (lambda: (box(), box((1.99, 0, 0))), True),
+    (lambda: (box(), box((0, 0, 0), (0.2, 0.2, 0.2))), True),  # nested
+    (lambda: (box(), ball((2.3, 0, 0), 1.29)), False),
+    (lambda: (box(), ball((2.3, 0, 0), 1.31)), True),
+    (lambda: (ball((2, 2, 2), 1.73), box()), False),  # the corner is sqrt(3) = 1.732 away
+    (lambda: (ball((2, 2, 2), 1.74), box()), True),
+    (lambda: (ball(), box((0, 0, 0), (5.0, 5.0, 5.0))), True),
+    (lambda: (ball(), ball((0, 0, 2.1), 1.09)), False),
+    (lambda: (ball(), ball((0, 0, 2.1), 1.11)), True),
+]
+
+
+@pytest.mark.parametrize(("make", "expected"), OVERLAPS)
+def test_overlap(variant, make, expected):
+    one, other = (bounds_of(shape) for shape in make())
+    assert overlap(one, other) is expected
+    assert overlap(other, one) is expected
+
+
+L_SHAPE = [(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)]
+
+
+def prism(outline):
+    """Vertices and faces of an upright prism; the fan from the first corner covers the L as well."""
+    n = len(outline)
+    vertices = [(*p, 0) for p in outline] + [(*p, 1) for p in outline]
+    sides = [f for i in range(n) for f in ((i, (i + 1) % n, n + (i + 1) % n), (i, n + (i + 1) % n, n + i))]
+    fan = [(0, i + 1, i) for i in range(1, n - 1)] + [(n, n + i, n + i + 1) for i in range(1, n - 1)]
+    return vertices, sides + fan
+
+
+@pytest.mark.claim("media-refused")
+def test_refused_meshes(variant):
+    square, faces = prism([(0, 0), (1, 0), (1, 1), (0, 1)])
+    assert isinstance(read_bounds(mesh(square, faces)), Polyhedron)
+    with pytest.raises(InputError, match="bounds a medium and is not convex"):
+        read_bounds(mesh(*prism(L_SHAPE)))
+    with pytest.raises(InputError, match="bounds a medium and is not a closed surface"):
+        read_bounds(mesh(square, faces[:-1]))
+    with pytest.raises(InputError, match="bounds a medium and is inside out"):
+        read_bounds(mesh(square, [face[::-1] for face in faces]))
+    with pytest.raises(InputError, match="is a Rectangle"):
+        bounds_of({"type": "rectangle"})
+    with pytest.raises(InputError, match="inside out"):
+        bounds_of(ball() | {"flip_normals": True})
+
+
+def test_rounding_of_the_corners_is_not_a_dent(variant):
+    """Two opposite corners of the lid lie one rounding of float32 too high, which makes a valley of the diagonal."""
+    corners, faces = prism([(0, 0), (1, 0), (1, 1), (0, 1)])
+    vertices = np.array(corners, dtype=np.float32) + np.float32(3)
+    for corner in (5, 7):
+        vertices[corner, 2] = np.nextafter(vertices[corner, 2], np.float32(9))
+    bounds = read_bounds(mesh(vertices, faces))
+    assert isinstance(bounds, Polyhedron)
+    assert len(bounds.normal) == 12
+
+
+def glass(shape):
+    return body(shape, 0.3, GREY) | {"bsdf": {"type": "dielectric"}}
+
+
+AMBIENT = {"type": "homogeneous", "sigma_t": 0.2, "albedo": 0.5}
+
+
+@pytest.mark.claim("media-refused")
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        (lambda: {"a": glass(box())}, "'a' bounds a medium and has a SmoothDielectric material"),
+        (lambda: {"a": body(box(), 0.3, GREY), "b": body(ball(radius=0.3), 0.3, GREY)}, "'b' and 'a' overlap"),
+        (lambda: {"a": body(box((0, -4.0, 1.0)), 0.3, GREY)}, "the camera is inside of shape 'a'"),
+        (lambda: {"a": body(box(), 0.3, GREY) | {"exterior": AMBIENT}}, "exterior medium of shape 'a'"),
+        (lambda: {"a": box() | {"bsdf": {"type": "null"}, "exterior": AMBIENT}}, "'a' is a hole in a medium"),
+        (lambda: {"a": box() | {"bsdf": {"type": "mask", "opacity": 0.5, "nested": {"type": "diffuse"}}}}, "partly"),
+        (lambda: {"a": body({"type": "cylinder"}, 0.3, GREY)}, "is a Cylinder"),
+        (lambda: {}, "references no medium"),
+    ],
+)
+def test_refused_scenes(variant, changes, message):
+    import mitsuba as mi
+
+    from reference.scene.read import read_truth
+
+    with pytest.raises(InputError, match=message):
+        read_truth(mi.load_dict(clear_scene(size=(4, 3), **changes())))
+
+
+def test_media_on_opaque_shapes_are_refused(variant):
+    import mitsuba as mi
+
+    from reference.scene.read import read_truth
+
+    solid = tiny_scene()["ball"] | {"interior": AMBIENT}
+    with pytest.raises(InputError, match="'ball' bounds a medium and has a SmoothDiffuse material"):
+        read_truth(mi.load_dict(tiny_scene(size=(4, 3), ball=solid)))

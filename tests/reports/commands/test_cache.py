@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Claim: `airlight cache` shows place, size and kinds of what is kept, and clears it."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from reference.storage.cache import store_arrays
+from reports.commands.main import run
+
+
+@pytest.fixture
+def filled(own_cache):
+    for kind in ("quadrature", "report/truth", "report/method"):
+        for number in range(2):
+            store_arrays(f"{kind}-{number:032x}", {"a": np.zeros(2000)})
+    return own_cache
+
+
+def printed(capsys, *arguments, status=0):
+    assert run(["cache", *arguments]) == status
+    return capsys.readouterr()
+
+
+def test_place_size_and_kinds_are_shown(filled, capsys, monkeypatch):
+    monkeypatch.setenv("AIRLIGHT_CACHE_SIZE", "1GiB")
+    words = printed(capsys).out
+    assert f"{filled}: 6 entries" in words
+    assert "of at most 1 GiB" in words
+    size = sum(path.stat().st_size for path in filled.rglob("*.npz"))
+    numbers = json.loads(printed(capsys, "--json").out)
+    assert (numbers["folder"], numbers["limit"], numbers["bytes"]) == (str(filled), 2**30, size)
+    assert {kind: one["entries"] for kind, one in numbers["kinds"].items()} == {
+        "method": 2,
+        "quadrature": 2,
+        "truth": 2,
+    }
+
+
+def test_an_empty_cache_is_nothing_wrong(own_cache, capsys):
+    assert f"{own_cache}: 0 entries, 0 bytes of at most 4 GiB" in printed(capsys).out
+    assert not own_cache.exists()
+
+
+def test_clear_says_what_it_freed(filled, capsys):
+    size = sum(path.stat().st_size for path in filled.rglob("*.npz"))
+    numbers = json.loads(printed(capsys, "--clear", "--json").out)
+    assert (numbers["removed"], numbers["freed"], numbers["entries"]) == (6, size, 0)
+    assert not list(filled.rglob("*.npz"))
+    assert "0 entries removed, 0 bytes freed" in printed(capsys, "--clear").out
+
+
+def test_clear_fails_where_something_stays(filled, capsys, monkeypatch):
+    def refuse(self, missing_ok=False):
+        raise PermissionError(13, "Permission denied", str(self))
+
+    monkeypatch.setattr(Path, "unlink", refuse)
+    words = printed(capsys, "--clear", status=1).out
+    assert "0 entries removed" in words
+    assert "6 entries" in words
+
+
+@pytest.mark.parametrize(("variable", "value"), [("AIRLIGHT_CACHE_SIZE", "much"), ("AIRLIGHT_CACHE_DIR", __file__)])
+def test_what_cannot_be_used_is_said_in_one_line(own_cache, capsys, monkeypatch, variable, value):
+    monkeypatch.setenv(variable, value)
+    words = printed(capsys, status=2).err
+    assert variable in words
+    assert words.count("\n") == 1
