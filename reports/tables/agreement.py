@@ -4,24 +4,18 @@
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from reports.tables.table import Column, Interval, Row, Table, Value, Verdict
+from reports.tables.table import Column, Interval, Table, Value, Verdict, numbers, table, words
 
+_PERCENT = {"percent": True, "sign": True, "places": 3}
 COLUMNS = (
-    Column("name", "the truth of", words=True),
-    Column("estimator", "checked by", words=True),
+    *words(name="the truth of", estimator="checked by"),
     Column("samples", "samples", after=" M", places=0),
-    Column("bias", "bias", percent=True, sign=True, places=3),
-    Column("interval", "95 % interval", percent=True, sign=True, places=3),
-    Column("margin", "margin \N{PLUS-MINUS SIGN}", percent=True),
+    *numbers("bias", "uncorrected", interval="95 % interval", how=_PERCENT),
+    Column("margin", "margin", percent=True),
     Column("detectable", "detectable", percent=True, digits=2),
-    Column("epsilon", "shadow-ray epsilon"),
-    Column("uncorrected", "uncorrected", percent=True, sign=True, places=3),
-    Column("z_mean", "z: mean", sign=True),
-    Column("z_std", "z: st. deviation"),
-    Column("rejected", "rejected"),
+    *numbers("rejected", "masked", epsilon="shadow-ray epsilon", z_mean="z: mean", z_std="z: st. deviation"),
     Column("expected", "expected", digits=2),
-    Column("masked", "masked"),
-    Column("effort", "effort", words=True),
+    *words("effort"),
     Column("agrees", "agree"),
 )
 BENCH = ("name", "estimator", "samples", "bias", "interval", "margin", "detectable", "uncorrected", "agrees")
@@ -57,19 +51,18 @@ def agreement_table(
     keys
         Of `COLUMNS`; `BENCH` by default.
     """
-    rows = tuple(Row(_values(name, one)) for name, one in compared)
-    return Table(title, COLUMNS, rows, explanation).only(*(keys or BENCH))
+    rows = (_values(name, one) for name, one in compared)
+    return table(title, COLUMNS, rows, explanation=explanation).only(*(keys or BENCH))
 
 
 def _values(name: str, one: Mapping[str, Any]) -> dict[str, Value]:
     statistics = one["statistics"]
-    interval = statistics["relative_bias_ci"]
     return {
         "name": name,
         "estimator": one["estimator"],
         "samples": one["width"] * one["height"] * one["batches"] * one["samples"] / 1e6,
         "bias": statistics["relative_bias"],
-        "interval": None if interval is None or None in interval else Interval(*interval),
+        "interval": Interval.of(statistics["relative_bias_ci"]),
         "margin": statistics["margin"],
         "detectable": statistics["detectable_bias"],
         "epsilon": one.get("epsilon"),
