@@ -9,7 +9,7 @@ from typing import Any
 
 from reports.papers.rates import COLUMNS, rates, size_words
 from reports.tables.methods import per_second
-from reports.tables.table import Interval, Row, Table, Value, measured, numbers, table, words
+from reports.tables.table import Interval, Row, Table, measured, numbers, table, words
 
 Data = Mapping[str, Any]
 
@@ -91,11 +91,10 @@ def _rate_table(rows: Sequence[Data]) -> Table:
     )
     found = []
     for row in rows:
-        published, error = row["published"], row["error"]
-        values: dict[str, Value] = {"name": _name(row), "triangles": row["triangles"]}
-        values |= rates(row, published["fps"], comparable=list(row["size"]) == list(published["size"]))
-        values |= {"rays": per_second(measured(row.get("rays")))}
-        found.append(Row(values | {name: error[name] for name in ("relative_rmse", "relative_bias", "p99")}))
+        published = row["published"]
+        beside = rates(row, published["fps"], comparable=list(row["size"]) == list(published["size"]))
+        alone = per_second(measured(row.get("rays")))
+        found.append({**row["error"], **beside, "name": _name(row), "triangles": row["triangles"], "rays": alone})
     return table("Table 2 of Biri 2006 again: frames a second, and the error of the airlight", columns, found)
 
 

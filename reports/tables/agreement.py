@@ -4,21 +4,24 @@
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from reports.tables.table import Column, Interval, Table, Value, Verdict, numbers, table, words
+from reports.tables.table import Interval, Table, Verdict, numbers, table, words
 
 _PERCENT = {"percent": True, "sign": True, "places": 3}
 COLUMNS = (
     *words(name="the truth of", estimator="checked by"),
-    Column("samples", "samples", after=" M", places=0),
-    *numbers("bias", "uncorrected", interval="95 % interval", how=_PERCENT),
-    Column("margin", "margin", percent=True),
-    Column("detectable", "detectable", percent=True, digits=2),
+    *numbers("samples", how={"after": " M", "places": 0}),
+    *numbers(relative_bias="bias", interval="95 % interval", uncorrected_bias="uncorrected", how=_PERCENT),
+    *numbers("margin", how={"percent": True}),
+    *numbers(detectable_bias="detectable", how={"percent": True, "digits": 2}),
     *numbers("rejected", "masked", epsilon="shadow-ray epsilon", z_mean="z: mean", z_std="z: st. deviation"),
-    Column("expected", "expected", digits=2),
+    *numbers(expected_rejections="expected", how={"digits": 2}),
     *words("effort"),
-    Column("agrees", "agree"),
+    *numbers(agrees="agree"),
 )
-BENCH = ("name", "estimator", "samples", "bias", "interval", "margin", "detectable", "uncorrected", "agrees")
+BENCH = (
+    *("name", "estimator", "samples", "relative_bias", "interval", "margin"),
+    *("detectable_bias", "uncorrected_bias", "agrees"),
+)
 
 
 def verdict(compared: Mapping[str, Any]) -> bool | None:
@@ -55,24 +58,14 @@ def agreement_table(
     return table(title, COLUMNS, rows, explanation=explanation).only(*(keys or BENCH))
 
 
-def _values(name: str, one: Mapping[str, Any]) -> dict[str, Value]:
-    statistics = one["statistics"]
+def _values(name: str, one: Mapping[str, Any]) -> Mapping[str, Any]:
+    width, height, batches, samples = (one[key] for key in ("width", "height", "batches", "samples"))
     return {
+        **one,
+        **one["statistics"],
         "name": name,
-        "estimator": one["estimator"],
-        "samples": one["width"] * one["height"] * one["batches"] * one["samples"] / 1e6,
-        "bias": statistics["relative_bias"],
-        "interval": Interval.of(statistics["relative_bias_ci"]),
-        "margin": statistics["margin"],
-        "detectable": statistics["detectable_bias"],
-        "epsilon": one.get("epsilon"),
-        "uncorrected": one["uncorrected_bias"],
-        "z_mean": statistics.get("z_mean"),
-        "z_std": statistics.get("z_std"),
-        "rejected": statistics.get("rejected"),
-        "expected": statistics.get("expected_rejections"),
-        "masked": one.get("masked"),
-        "effort": f"{one['width']} \N{MULTIPLICATION SIGN} {one['height']} pixels, {one['batches']} "
-        f"\N{MULTIPLICATION SIGN} {one['samples']} spp",
+        "samples": width * height * batches * samples / 1e6,
+        "interval": Interval.of(one["statistics"]["relative_bias_ci"]),
+        "effort": f"{width} x {height} pixels, {batches} x {samples} spp",
         "agrees": Verdict(verdict(one)),
     }

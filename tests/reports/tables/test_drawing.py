@@ -132,7 +132,11 @@ def test_what_means_something_to_a_format_is_escaped(words):
     parser.feed(html(drawn))
     assert parser.tags == {"div", "table", "caption", "thead", "tbody", "tr", "th", "td"}
     assert parser.rows[1][0].replace("\N{MULTIPLICATION SIGN}", "x") == words
-    assert unescaped_latex(latex_rows(latex([drawn]))[0][0]) == flat
+    (cell, _), _ = latex_rows(latex([drawn]))
+    assert unescaped_latex(cell) == flat
+    assert not re.search(r"(?<!\\)[_%#&~^<>\"]", cell)
+    cell = next(line for line in markdown(drawn).splitlines() if line.endswith("| 1 |")).removesuffix(" | 1 |")[2:]
+    assert not re.search(r"(?<!\\)(\\\\)*[|`*_<&\[\]]", cell)
     assert csv_rows(csv(drawn))[0]["a"] == words
     assert flat.split()[0] in text(drawn)
 
