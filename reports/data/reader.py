@@ -9,7 +9,6 @@ from typing import Any
 
 from analytic.errors import InputError
 from reports.data.json_files import read_json
-from reports.data.schema_check import first_fault
 
 SCHEMA_FILE = Path(__file__).parent / "schema" / "report-2.json"
 
@@ -42,7 +41,7 @@ def load_report(path: Path | str) -> tuple[dict[str, Any], Path]:
     if given != wanted:
         got = f"the schema {given!r}" if given is not None else "no schema"
         raise InputError(f"{file} has {got}, wanted {wanted!r}; make the report again with this version of airlight")
-    fault = first_fault(data, schema)
+    fault = _fault(data, schema)
     if fault:
         raise InputError(f"{file} does not keep to {wanted}: {fault}; make the report again")
     for name in named_files(data):
@@ -51,6 +50,19 @@ def load_report(path: Path | str) -> tuple[dict[str, Any], Path]:
         if not (file.parent / name).is_file():
             raise InputError(f"{file} names {name}, which is not beside it; move a report with its whole folder")
     return data, file.parent
+
+
+def _fault(data: Any, schema: Mapping[str, Any]) -> str | None:
+    """Return what is wrong with a report, the place and the words; None if nothing is."""
+    from jsonschema import Draft202012Validator
+    from jsonschema.exceptions import best_match
+
+    error = best_match(Draft202012Validator(schema).iter_errors(data))
+    if error is None:
+        return None
+    words = " ".join(error.message.split())
+    # The message begins with what was found, which may be a whole scene.
+    return f"{error.json_path.replace('$', 'report', 1)}: {words if len(words) < 200 else f'.. {words[-160:]}'}"
 
 
 def redraw_report(data: Mapping[str, Any], folder: Path, target: Path) -> None:
