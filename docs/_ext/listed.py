@@ -4,10 +4,15 @@
 import ast
 import inspect
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
+
+from reports.tables.drawing import markdown
+from reports.tables.lists import kernel_list, method_list
+from reports.tables.table import Name, Row, Table
 
 ROOT = Path(__file__).resolve().parents[2]
 #: Pages of methods that are called otherwise than the method.
@@ -61,19 +66,14 @@ def _cell(words: str) -> str:
 
 def methods() -> str:
     """Return the methods with links to their pages."""
-    from realtime.methods.registry import METHODS
+    shown = method_list().only("name", "what", "kernel", "shadows", "source")
+    return markdown(_named(shown, lambda name: f"{PAGES.get(name, name)}.md"))
 
-    rows = [
-        (
-            f"[`{record.name}`]({PAGES.get(record.name, record.name)}.md)",
-            record.summary,
-            "yes" if record.uses_kernel else "no",
-            "yes" if record.shadows else "no",
-            record.source,
-        )
-        for record in METHODS.values()
-    ]
-    return table(("method", "what it does", "calls a kernel", "knows shadows", "source"), rows, 5)
+
+def _named(shown: Table, address: Callable[[str], str] = lambda name: "") -> Table:
+    """Return a table whose names are code, with links where they have an address."""
+    rows = (Row(row.values | {"name": Name(row.values["name"], address(row.values["name"]))}) for row in shown.rows)
+    return replace(shown, rows=tuple(rows))
 
 
 def parameters(method: str) -> str:
@@ -88,18 +88,7 @@ def parameters(method: str) -> str:
 
 def kernels() -> str:
     """Return the kernels."""
-    from realtime.kernels.registry import KERNELS
-
-    rows = [
-        (
-            f"`{record.name}`",
-            record.summary,
-            ", ".join(f"`{name}={value}`" for name, value in record.parameters.items()),
-            record.source,
-        )
-        for record in KERNELS.values()
-    ]
-    return table(("kernel", "what it does", "size", "source"), rows, 4)
+    return markdown(_named(kernel_list()))
 
 
 def keys() -> str:

@@ -2,16 +2,19 @@
 """Parts of pages that print what a report measured, from `docs/data/report.json`."""
 
 import json
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from listed import table
-
-from reports.tables.terminal import number
+from reports.tables.checks import left_out_table
+from reports.tables.drawing import markdown
+from reports.tables.kernels import cost_table, order_table
+from reports.tables.methods import COLUMNS, method_row
+from reports.tables.table import Column, Name, Row, Table, number
 
 DATA = Path(__file__).resolve().parents[1] / "data"
-_COLUMNS = ("scene", "configuration", "frame ms", "quartiles", "rebuilt ms", "rel. RMSE", "rel. bias", "p99", "max")
+_METHOD = ("frame", "light_moved", "relative_rmse", "relative_bias", "p99", "max")
 
 
 @cache
@@ -31,7 +34,7 @@ def provenance() -> str:
         f"*Measured {report['created'][:10]} on {report['processor']}, {report['threads']} threads, "
         f"{report['variant']}, mitsuba {versions['mitsuba']}, drjit {versions['drjit']}, by "
         f"`{command}`. Times are medians of whole frames of {timed} pixels, kernels compiled before, the "
-        "geometry static; `rebuilt`: after the light moved. Errors are those of the airlight of images of "
+        "geometry static; `light moved`: a frame after it moved. Errors are those of the airlight of images of "
         f"{' and '.join(sizes)} pixels against the `quadrature` truth: relative RMSE and bias over the mean, and "
         "quantiles of |test - ref| / max(ref, 0.001 mean(ref)).*"
     )
@@ -53,10 +56,17 @@ def method(name: str) -> str:
             if one["refused"] or one["error"] is None:
                 notes.append(f"- {scene['name']}, {label}: {one['refused'] or one['note'] or 'not measured'}")
             else:
-                rows.append((f"`{scene['name']}`", label, *_numbers(one)))
+                row = method_row(one)
+                rows.append(Row(row.values | {"scene": Name(scene["name"]), "label": label}))
     if not rows:
         return f"The report at hand did not measure `{name}`."
-    parts = [_pictures(name), table(_COLUMNS, rows, 2), provenance()]
+    columns = (
+        Column("scene", "scene", words=True),
+        Column("label", "configuration", words=True),
+        *list(COLUMNS.values())[1:],
+    )
+    shown = Table("", columns, tuple(rows)).only("scene", "label", *_METHOD)
+    parts = [_pictures(name), markdown(shown), provenance()]
     if notes:
         parts.append("What was refused or left out:\n\n" + "\n".join(notes))
     return "\n\n".join(part for part in parts if part)
@@ -65,16 +75,6 @@ def method(name: str) -> str:
 def _inside(label: str) -> str:
     """Return what stands in the brackets of a label: the kernel and the parameters."""
     return label.split(" (", 1)[1].rstrip(")") if " (" in label else "-"
-
-
-def _numbers(one: dict[str, Any]) -> tuple[str, ...]:
-    error, times = one["error"], one["times"]
-    errors = [number(error[name], 2) for name in ("relative_rmse", "relative_bias", "p99", "max")]
-    if not times:
-        return ("-", "-", "-", *errors)
-    frame = times["frame"]
-    rebuilt = number(times["rebuild"]["median_ms"]) if times["rebuild"] else "-"
-    return (number(frame["median_ms"]), f"{number(frame['low_ms'])}..{number(frame['high_ms'])}", rebuilt, *errors)
 
 
 def _pictures(name: str) -> str:
@@ -98,51 +98,28 @@ def kernel_costs(phase: str) -> str:
     found = data()["kernels"]
     if found is None:
         return "No costs of kernels are at hand: `airlight bench --kernels` measures them."
-    rows = []
+    costs = []
     for one in found["costs"]:
         default = next(iter(KERNELS[one["family"]].parameters.values()), None) if one["family"] in KERNELS else None
-        if one["phase"] != phase or one["size"] not in (default, None):
-            continue
-        if one["refused"]:
-            rows.append((f"`{one['kernel']}`", "refused", "-", "-", "-", "-"))
-            continue
-        spread = one["device"] or one["wall"]
-        errors = [number(one[name], 2) for name in ("median", "p99", "max")]
-        quartiles = f"{number(spread['low'])}..{number(spread['high'])}"
-        rows.append((f"`{one['kernel']}`", number(spread["median"]), quartiles, *errors))
-    return table(("kernel", "ns/ray", "quartiles", "median error", "99 %", "max"), rows)
+        if one["phase"] == phase and one["size"] in (default, None):
+            costs.append(one | {"device": one["device"] or one["wall"]})
+    return markdown(cost_table("", costs, code=True).only("kernel", "device", "median", "p99", "max"))
 
 
 def kernel_orders() -> str:
     """Return the declared and the measured order of convergence of the kernels that have a size."""
     found = data()["kernels"]
-    if found is None:
-        return ""
-    rows = [
-        (
-            f"`{one['kernel']}`",
-            one["declared"]["kind"] if one["declared"] else "-",
-            number(one["declared"]["value"]) if one["declared"] else "-",
-            number(one["measured"]),
-            f"{one['sizes'][0]}..{one['sizes'][-1]}",
-        )
-        for one in found["convergence"]
-    ]
-    return table(("kernel", "law", "declared", "measured", "sizes"), rows, 2)
+    return "" if found is None else markdown(replace(order_table(found["convergence"], code=True), title=""))
 
 
 def left_out() -> str:
     """Return for every scene the share of light that single scattering leaves out."""
-    rows = []
-    for scene in data()["scenes"]:
-        shares = [scene["multiple"][name] for name in ("medium", "everything")] if scene["multiple"] else [None, None]
-        rows.append((f"`{scene['name']}`", *(_share(one) for one in shares)))
-    return table(("scene", "of the airlight", "of all light"), rows)
+    shares = left_out_table(data()["scenes"], code=True)
+    keys = ("scene", "medium", "medium_interval", "everything", "everything_interval")
+    return markdown(replace(shares.only(*keys), title=""))
 
 
-def _share(share: dict[str, Any] | None) -> str:
-    if share is None:
-        return "-"
+def _share(share: dict[str, Any]) -> str:
     low, high = (100 * end for end in share["interval"])
     return f"{100 * share['value']:.1f} % ({low:.1f}..{high:.1f})"
 

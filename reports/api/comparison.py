@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from reports.api.results import Array, Pictured, as_array, read_only
-from reports.tables.terminal import number
+from reports.tables.table import number
 from validation.comparison.images import Comparison
 from validation.metrics.errors import FLOOR, colours
 

@@ -5,10 +5,12 @@ import base64
 from collections.abc import Sequence
 from html import escape
 
+from reports.tables.drawing import html
+from reports.tables.table import Column
+from reports.tables.table import table as make_table
+
 #: Narrower pictures are enlarged to this in whole multiples, so that single pixels can be seen [CSS pixels].
 _NARROW = 240
-
-Cell = str
 
 
 def block(title: str, *parts: str) -> str:
@@ -27,17 +29,10 @@ def bullets(items: Sequence[str]) -> str:
     return f"<ul>{inside}</ul>" if items else ""
 
 
-def table(rows: Sequence[Sequence[Cell]], headers: Sequence[str] = ()) -> str:
-    """Return a table of plain texts; the first cell of each row is its header."""
-    head = "".join(f'<th scope="col" style="text-align:left">{escape(name)}</th>' for name in headers)
-    body = "".join(f"<tr>{_row(row)}</tr>" for row in rows)
-    return f"<table>{f'<thead><tr>{head}</tr></thead>' if headers else ''}<tbody>{body}</tbody></table>"
-
-
-def _row(row: Sequence[Cell]) -> str:
-    first, *others = row
-    cells = "".join(f'<td style="text-align:left">{escape(cell)}</td>' for cell in others)
-    return f'<th scope="row" style="text-align:left">{escape(first)}</th>{cells}'
+def table(rows: Sequence[Sequence[str]]) -> str:
+    """Return a table of names and what there is to say of each."""
+    columns = (Column("name", "", words=True), Column("value", "", words=True))
+    return html(make_table("", columns, rows))
 
 
 def picture(png: bytes, width: int, *, alt: str, caption: str) -> str:

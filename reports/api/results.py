@@ -21,7 +21,7 @@ from numpy.typing import DTypeLike, NDArray
 from analytic.errors import InputError
 from reference.storage.exr import TOTAL, Image
 from reference.storage.exr import layer as image_layer
-from reports.tables.terminal import number
+from reports.tables.table import number
 from validation.configurations.timing import FrameTimes
 
 Array = NDArray[np.floating]
@@ -184,7 +184,7 @@ class Rendering(LayeredImage):
                 f"{number(frame.median_ms)} ms, quartiles {number(frame.low_ms)}..{number(frame.high_ms)}"
             )
             found["of it airlight"] = f"{number(self.times.airlight.median_ms)} ms"
-            found["after the light moved"] = f"{number(self.times.rebuild.median_ms)} ms"
+            found["after the light moved"] = f"{number(self.times.light_moved.median_ms)} ms"
         return found | ({"notes": " ".join(self.notes)} if self.notes else {})
 
     @property

@@ -204,7 +204,7 @@ def _numbers(measured: "Measurement") -> dict[str, Any]:
     row["frame_ms"] = times and times.frame.median_ms
     row["frame_low_ms"] = times and times.frame.low_ms
     row["frame_high_ms"] = times and times.frame.high_ms
-    for stage in ("airlight", "surface", "rebuild", "moved", "relit", "recoloured"):
+    for stage in ("airlight", "surface", "light_moved", "objects_moved", "light_moved_camera_kept", "colours_changed"):
         row[f"{stage}_ms"] = times and getattr(times, stage).median_ms
     for name in ("relative_rmse", "relative_bias", "p50", "p99", "max", "nonfinite", "negative"):
         row[name] = error and plain(getattr(error, name))

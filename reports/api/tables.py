@@ -1,19 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Tables and reports as results of the Python API: frozen, plain numbers by name, tables in a notebook."""
 
-import math
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from analytic.cases import Cases
 from reports.api.results import as_array
-from reports.tables.terminal import number
+
+if TYPE_CHECKING:
+    from reports.tables.table import Row
 
 Array = NDArray[np.float64]
 
@@ -58,15 +59,16 @@ class Integrals:
         return {name: np.asarray(values).tolist() for name, values in names.items()}
 
     def _repr_html_(self) -> str:
-        from reports.api.html import block, paragraph, table
+        from reports.api.html import block, paragraph
+        from reports.tables.drawing import html
+        from reports.tables.table import Column, table
 
-        columns = self.to_dict()
-        rows = [
-            [str(row), *(_cell(values[row]) for values in columns.values())] for row in range(min(_SHOWN, len(self)))
-        ]
+        data = {"": list(range(len(self)))} | self.to_dict()
+        columns = [Column(name, name, digits=9) for name in data]
+        rows = list(zip(*data.values()))[:_SHOWN]
         left = len(self) - len(rows)
         more = paragraph(f"and {left} more") if left else ""
-        return block(self._title(), table(rows, ["", *columns]), more)
+        return block(self._title(), html(table("", columns, rows)), more)
 
     def _title(self) -> str:
         compared = self.summary.get("p50") is not None
@@ -83,10 +85,11 @@ class BenchTable:
     """Speed against error: a row for each configuration in each scene.
 
     A row has `scene`, `width`, `height`, `label`, `method`, `kernel`; medians `frame_ms` with its quartiles
-    `frame_low_ms` and `frame_high_ms`, `airlight_ms`, `surface_ms`, `rebuild_ms` (after the light moved), `moved_ms`
-    (after objects moved), `relit_ms` (after the light moved, camera rays kept), `recoloured_ms` (after only medium or
-    colours changed) [ms]; of the airlight `relative_rmse`, `relative_bias`, `p50`, `p99`, `max`, `nonfinite` and
-    `negative`; `refused`, why the method cannot render the scene, and `note`. What there is none of is None.
+    `frame_low_ms` and `frame_high_ms`, `airlight_ms`, `surface_ms`, `light_moved_ms`, `objects_moved_ms`
+    (after these moved), `light_moved_camera_kept_ms` (after the light moved, camera rays kept), `colours_changed_ms`
+    (after only medium or colours changed) [ms]; of the airlight `relative_rmse`, `relative_bias`, `p50`, `p99`, `max`,
+    `nonfinite` and `negative`; `refused`, why the method cannot render the scene, and `note`. What there is
+    none of is None.
     """
 
     rows: tuple[Mapping[str, Any], ...]
@@ -116,26 +119,26 @@ class BenchTable:
         scene
             Its name; all scenes by default.
         """
-        # Pixels that are not finite are left out of the RMSE: a method that has any must not win by it.
-        good = [
-            row
+        from reports.tables.methods import fastest_within
+
+        entries = [
+            {"row": row, "error": row, "times": row["frame_ms"] and {"frame": {"median_ms": row["frame_ms"]}}}
             for row in self.rows
             if scene in (None, row["scene"])
-            and row["relative_rmse"] is not None
-            and row["relative_rmse"] <= error
-            and not row["nonfinite"]
         ]
-        return min(good, key=lambda row: row["frame_ms"], default=None)
+        best = fastest_within(error, entries)
+        return best["row"] if best else None
 
     def _repr_html_(self) -> str:
-        from reports.api.html import block, paragraph, table
+        from reports.api.html import block
+        from reports.tables.drawing import html
+        from reports.tables.methods import rows_table
 
-        headers = ("method", "frame ms", "frames/s", "airlight ms", "rebuilt ms", "rel. RMSE", "rel. bias", "p99")
-        parts = []
-        for scene in dict.fromkeys((row["scene"], row["width"], row["height"]) for row in self.rows):
-            found = [row for row in self.rows if (row["scene"], row["width"], row["height"]) == scene]
-            parts += [paragraph("{}, {} x {}".format(*scene)), table([_bench_row(row) for row in found], headers)]
-        return block(self._title(), *parts)
+        keys = ("label", "frame", "frame_rate", "airlight", "light_moved", "relative_rmse", "relative_bias", "p99")
+        parts: dict[str, list[Row]] = {}
+        for row in self.rows:
+            parts.setdefault("{scene}, {width} x {height}".format_map(row), []).append(_bench_row(row))
+        return block(self._title(), *(html(rows_table(title, rows, *keys)) for title, rows in parts.items()))
 
     def _title(self) -> str:
         from reports.machine.environment import machine_in_words
@@ -190,13 +193,15 @@ def _address(page: Path) -> str:
         return page.resolve().as_uri()
 
 
-def _cell(value: Any) -> str:
-    return f"{value:.9g}" if isinstance(value, float) else str(value)
+def _bench_row(row: Mapping[str, Any]) -> "Row":
+    from reports.tables.methods import ERRORS, times_values
+    from reports.tables.table import Measured, Row
 
-
-def _bench_row(row: Mapping[str, Any]) -> list[str]:
     if row["refused"]:
-        return [row["label"], f"refused: {row['refused']}", *[""] * 6]
-    rate = 1000 / row["frame_ms"] if row["frame_ms"] else math.inf
-    times = [number(row["frame_ms"]), number(rate), number(row["airlight_ms"]), number(row["rebuild_ms"])]
-    return [row["label"], *times, *(number(row[name], 2) for name in ("relative_rmse", "relative_bias", "p99"))]
+        return Row({"label": row["label"]}, f"refused: {row['refused']}")
+    times: dict[str, Measured | None] = {}
+    for name in ("frame", "airlight", "light_moved"):
+        median = row[f"{name}_ms"]
+        ends = (row.get(f"{name}_low_ms", median), row.get(f"{name}_high_ms", median))
+        times[name] = None if median is None else Measured(median, *ends)
+    return Row({"label": row["label"], **times_values(times), **{name: row.get(name) for name in ERRORS}})

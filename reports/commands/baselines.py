@@ -1,9 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`airlight baselines [SCENE...]`: is every method as accurate as it was?"""
 
-from typing import Annotated
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from validation.frames.baseline_files import Baseline, Move
 
 
 def baselines(
@@ -26,7 +31,6 @@ def baselines(
     from analytic.errors import InputError
     from reports.machine.environment import activate
     from reports.machine.progress import part_of, progress_bar
-    from reports.tables.baselines import print_moves, print_updates
     from reports.tables.terminal import print_json
     from validation.frames.baseline_files import (
         FOLDER,
@@ -63,12 +67,40 @@ def baselines(
         for one in written:
             write_baseline(one)
     if json:
-        from reports.data.serialize import plain
+        from validation.metrics.errors import plain
 
         print_json({"scenes": found, "moves": plain(moves), "stray": stray, "updated": update})
     else:
-        print_moves(found, moves, stray)
+        _print_moves(found, moves, stray)
         if update:
-            print_updates(written, FOLDER)
+            _print_updates(written, FOLDER)
     if stray or (not update and any(moves.values())):
         raise typer.Exit(1)
+
+
+def _print_moves(found: "Mapping[str, Baseline]", moves: "Mapping[str, Sequence[Move]]", stray: Sequence[str]) -> None:
+    """Print what moved, and a line for each scene."""
+    from reports.tables.checks import move_table
+    from reports.tables.terminal import print_table
+
+    table = move_table(one for changed in moves.values() for one in changed)
+    if table.rows:
+        print_table(table)
+    for name, data in found.items():
+        print(f"{name}: {len(data['configurations'])} configurations, {len(moves[name])} moved")
+    for name in stray:
+        print(f"{name}: a baseline without its scene: remove the file")
+
+
+def _print_updates(written: "Sequence[Baseline]", folder: Path) -> None:
+    """Say what was written, and the lines that the changelog must hold."""
+    from validation.frames.baseline_files import changelog_line
+
+    if not written:
+        print("nothing moved, nothing written")
+        return
+    print(f"written to {folder}: {', '.join(one['scene'] for one in written)}")
+    lines = [changelog_line(one) for one in written if one["revision"] > 1]
+    if lines:
+        print("say so in CHANGELOG.md, with the numbers above; a test looks for these lines:")
+        print("\n".join(f"- {line}" for line in lines))

@@ -30,7 +30,7 @@ def bench(
     """Time every method in every scene, or every kernel on many rays, and compare it with the truth.
 
     `airlight` is the airlight alone (the kernel with its ray set-up), `frame` a frame with static geometry and light,
-    `rebuilt` a frame after the light moved. Exit status 1 if single-scatter does not confirm the truth within +-0.05 %,
+    `light moved` a frame after it moved. Exit status 1 if single-scatter does not confirm the truth within +-0.05 %,
     or volpath within +- the margin.
     """
     if not 0 < margin < 1:
@@ -47,7 +47,6 @@ def bench(
     from realtime.scene.read_scene import read_scene
     from reports.machine.environment import activate
     from reports.machine.progress import part_of, progress_bar
-    from reports.tables.bench import print_bench
     from reports.tables.terminal import print_json
     from validation.configurations.methods import chosen_configurations
     from validation.scenes.loading import load_scene, parse_size
@@ -72,17 +71,34 @@ def bench(
 
         print_json({"environment": describe_environment(), "scenes": found})
     else:
-        print_bench(found, markdown=markdown)
+        _print_bench(found, markdown=markdown)
     if any(not one["statistics"]["equivalent"] for scene in found for one in scene["agreement"].values()):
         raise typer.Exit(1)
 
 
+def _print_bench(scenes: list[dict], *, markdown: bool) -> None:
+    """Print a table for each scene, and one for the truth."""
+    from reports.commands.printing import print_heading, print_tables
+    from reports.tables.agreement import agreement_table
+    from reports.tables.methods import methods_table
+
+    tables = [methods_table("{}, {} x {}".format(one["name"], *one["size"]), one["methods"]) for one in scenes]
+    compared = [(f"{one['name']}, {each['layer']}", each) for one in scenes for each in one["agreement"].values()]
+    if compared:
+        title = "Monte Carlo against the quadrature truth; volpath corrected for its shadow-ray epsilon"
+        tables.append(agreement_table(title, compared))
+    if markdown:
+        print_heading()
+    print_tables(tables, as_markdown=markdown)
+
+
 def _bench_scene(name: str, pixels, chosen, *, margin: float | None, progress) -> dict:
-    from reports.data.serialize import measurement_data, plain
+    from reports.data.serialize import measurement_data
     from reports.machine.progress import counted, part_of
     from validation.estimates.agreement import agreements
     from validation.frames.benchmark import bench as run
     from validation.frames.scene_study import EFFORTS
+    from validation.metrics.errors import plain
     from validation.scenes.loading import load_scene
 
     loaded = load_scene(name, pixels)
@@ -109,32 +125,31 @@ def _bench_scene(name: str, pixels, chosen, *, margin: float | None, progress) -
 
 def _bench_kernels(names: list[str] | None, *, json: bool, markdown: bool) -> None:
     from realtime.kernels.registry import KERNELS
+    from reports.commands.printing import print_heading, print_tables
     from reports.machine.environment import activate, describe_environment
     from reports.machine.progress import counted, progress_bar
-    from reports.tables.bench import print_heading, print_markdown
-    from reports.tables.kernels import convergence_data, print_convergence, print_kernel_bench
-    from reports.tables.terminal import print_json, print_table
+    from reports.tables.kernels import convergence_data, kernel_tables, order_table
+    from reports.tables.terminal import print_json
     from validation.configurations.kernel_names import split_name
     from validation.kernels.benchmark import bench_kernels
     from validation.kernels.convergence import convergence, declared
+    from validation.metrics.errors import plain
 
     wanted = [split_name(name)[0].name for name in names] if names else list(KERNELS)
     activate()
     with progress_bar("bench") as progress:
         found = bench_kernels(names, progress=counted(progress))
         rates = [convergence(name) for name in declared() if name in wanted]
+    measured, orders = plain(found), [convergence_data(one) for one in rates]
     if json:
-        from reports.data.serialize import plain
-
-        orders = [convergence_data(one) for one in rates]
-        print_json({"environment": describe_environment(), "kernels": plain(found), "convergence": orders})
+        print_json({"environment": describe_environment(), "kernels": measured, "convergence": orders})
         return
     if markdown:
         print_heading()
-    show = print_markdown if markdown else print_table
-    print_kernel_bench(found, show=show)
-    if rates:
-        print_convergence(rates, show=show)
+    print_tables(kernel_tables(measured["costs"], measured["levels"]), as_markdown=markdown)
+    print("ns/ray: the kernel alone by Dr.Jit's history, median; ~ is extrapolated from fewer steps.")
+    if orders:
+        print_tables([order_table(orders)], as_markdown=markdown)
 
 
 def _bench_estimators(scenes: list[str] | None, *, size: str | None, json: bool) -> None:
@@ -157,7 +172,7 @@ def _bench_estimators(scenes: list[str] | None, *, size: str | None, json: bool)
             progress(number / len(loaded), name)
             found[name] = scene_efficiency(scene)
     if json:
-        from reports.data.serialize import plain
+        from validation.metrics.errors import plain
 
         print_json({"environment": describe_environment(), "estimators": plain(found)})
         return

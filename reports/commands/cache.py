@@ -21,6 +21,7 @@ def cache(
     from analytic.errors import InputError
     from reference.storage.cache import cache_folder
     from reference.storage.cache_size import cache_entries, cache_limit, clear_cache
+    from reports.tables.table import Column, table
     from reports.tables.terminal import print_json, print_table
 
     folder, limit = cache_folder(), cache_limit()
@@ -47,13 +48,19 @@ def cache(
             rows = [
                 (
                     kind,
-                    str(len(of_kind)),
+                    len(of_kind),
                     _size(sum(entry.size for entry in of_kind)),
                     time.strftime("%Y-%m-%d %H:%M", time.localtime(max(entry.used for entry in of_kind))),
                 )
                 for kind, of_kind in kinds.items()
             ]
-            print_table(("kind", "entries", "size", "last used"), rows)
+            columns = (
+                Column("kind", "kind", words=True),
+                Column("entries", "entries"),
+                Column("size", "size"),
+                Column("used", "last used"),
+            )
+            print_table(table("", columns, rows))
     if clear and entries:
         raise typer.Exit(1)
 

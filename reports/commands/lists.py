@@ -1,63 +1,42 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`airlight scenes`, `airlight methods`, `airlight kernels`: what there is, one line each."""
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from reports.tables.table import Table
 
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 
 
 def scenes(json: Json = False) -> None:
     """List the built-in scenes."""
-    from validation.scenes.registry import SCENES
+    from reports.tables.lists import scene_list
 
-    keys = ("name", "purpose", "published")
-    _show([{key: getattr(record, key) for key in keys} for record in SCENES.values()], json)
+    _show(scene_list(), json)
 
 
 def methods(json: Json = False) -> None:
     """List the real-time methods with their parameters."""
-    from realtime.methods.registry import METHODS
+    from reports.tables.lists import method_list
 
-    _show(
-        [
-            {
-                "name": record.name,
-                "what": record.summary,
-                "kernel": "yes" if record.uses_kernel else "no",
-                "shadows": "yes" if record.shadows else "no",
-                "parameters": ", ".join(f"{name}={value}" for name, value in record.parameters.items()),
-                "source": record.source,
-            }
-            for record in METHODS.values()
-        ],
-        json,
-    )
+    _show(method_list(), json)
 
 
 def kernels(json: Json = False) -> None:
     """List the airlight kernels with their parameters."""
-    from realtime.kernels.registry import KERNELS
+    from reports.tables.lists import kernel_list
 
-    _show(
-        [
-            {
-                "name": record.name,
-                "what": record.summary,
-                "parameters": ", ".join(f"{name}={value}" for name, value in record.parameters.items()),
-                "source": record.source,
-            }
-            for record in KERNELS.values()
-        ],
-        json,
-    )
+    _show(kernel_list(), json)
 
 
-def _show(rows: list[dict[str, str]], as_json: bool) -> None:
-    from reports.tables.terminal import print_json, print_words
+def _show(table: "Table", as_json: bool) -> None:
+    from reports.tables.drawing import text_of
+    from reports.tables.terminal import print_json, print_table
 
     if as_json:
-        print_json(rows)
+        print_json([{key: text_of(value) for key, value in row.values.items()} for row in table.rows])
     else:
-        print_words([list(row.values()) for row in rows], list(rows[0]))
+        print_table(table)

@@ -2,9 +2,12 @@
 """`airlight maps [SCENE...]`: error and flicker against the size of the shadow map."""
 
 from functools import partial
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+if TYPE_CHECKING:
+    from validation.frames.map_size import MapErrors, MapFlicker
 
 
 def maps(
@@ -31,13 +34,13 @@ def maps(
     """
     from analytic.errors import InputError
     from realtime.scene.read_scene import read_scene
+    from reports.commands.printing import print_heading
     from reports.machine.environment import activate, describe_environment
     from reports.machine.progress import counted, part_of, progress_bar
-    from reports.tables.bench import print_heading
-    from reports.tables.map_size import map_data, parse_map_sizes, print_maps
     from reports.tables.terminal import print_json
     from validation.configurations.methods import configuration, parse_settings, prepared
     from validation.frames.map_size import map_errors, map_flicker
+    from validation.metrics.errors import plain
     from validation.scenes.loading import load_scene, parse_size
     from validation.scenes.registry import SCENES
 
@@ -64,10 +67,45 @@ def maps(
                 results.append(study(kernel=kernel, parameters=parameters, sizes=texels, progress=counted(part)))
             found.append((one.name, results[0], results[1] if flicker else None))
     if json:
-        scenes_data = [{"name": name} | map_data(errors, moving) for name, errors, moving in found]
+        scenes_data = [
+            {"name": name, "method": errors.configuration.label, "errors": plain(errors), "flicker": plain(moving)}
+            for name, errors, moving in found
+        ]
         print_json({"environment": describe_environment(), "size": list(pixels), "scenes": scenes_data})
         return
     if markdown:
         print_heading()
     for name, errors, moving in found:
-        print_maps(name, pixels, errors, moving, markdown=markdown)
+        title = f"{name}, {pixels[0]} x {pixels[1]}, {errors.configuration.label}"
+        _print_scene(title, errors, moving, markdown=markdown)
+
+
+def _print_scene(title: str, errors: "MapErrors", flicker: "MapFlicker | None", *, markdown: bool) -> None:
+    from reports.tables.map_size import error_sentence, error_table, flicker_sentence, flicker_table
+    from reports.tables.terminal import print_table
+
+    print_table(error_table(title, errors), as_markdown=markdown)
+    print(f"\n{error_sentence(errors)}")
+    if flicker is not None:
+        print_table(flicker_table(title, flicker), as_markdown=markdown)
+        print(f"\n{flicker_sentence(flicker)}")
+
+
+def parse_map_sizes(option: str, words: str) -> list[int]:
+    """Return the sizes of shadow maps that an option names, ascending.
+
+    Raises
+    ------
+    InputError
+        If one is none.
+    """
+    from analytic.errors import InputError
+    from realtime.shadow_maps.shadow_map import check_size
+
+    try:
+        sizes = [int(one) for one in words.split(",")]
+    except ValueError:
+        raise InputError(f"{option}: got {words!r}, wanted sizes in texels, for example 128,256,512") from None
+    for size in sizes:
+        check_size(size)
+    return sorted(set(sizes))

@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`airlight mutations`: would the checks of the truth find a fault of the physics?"""
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 if TYPE_CHECKING:
-    from validation.mutations.study import MutationResult, Sighting
+    from validation.mutations.study import MutationStudy
 
 
 def mutations(
@@ -38,7 +39,7 @@ def mutations(
     with progress_bar("mutations") as progress:
         found = study_mutations(chosen, size=pixels, margin=margin, progress=progress)
     if json:
-        from reports.data.serialize import plain
+        from validation.metrics.errors import plain
 
         data = {
             "environment": describe_environment(),
@@ -55,51 +56,16 @@ def mutations(
         raise typer.Exit(1)
 
 
-def _print_results(found) -> None:
-    from reports.tables.terminal import print_table
+def _print_results(found: "MutationStudy") -> None:
+    from reports.commands.printing import print_tables
+    from reports.tables.checks import control_table, mutation_table
+    from validation.metrics.errors import plain
 
-    headers = (
-        "mutation",
-        "caught",
-        "chance",
-        "by",
-        "true bias",
-        "bias seen",
-        "95 % interval",
-        "margin",
-        "what it stands for",
-    )
-    print_table(headers, [_row(result) for result in found.results])
-    controls = [
-        (
-            f"{one.scene}, {one.layer}, {one.against}",
-            *_numbers(one)[1:],
-            f"{100 * one.chance:.2g} %",
-            "yes" if one.agrees else "NO",
-        )
-        for one in found.control
-    ]
-    control_headers = ("control", "bias seen", "95 % interval", "margin", "false alarms", "agrees")
-    print_table(control_headers, controls, "without a mutation")
+    faults = mutation_table(plain(found.results))
+    shown = faults.only("name", "caught", "chance", "by", "true_bias", "bias", "interval", "margin", "meaning")
+    print_tables([replace(shown, title=""), control_table(plain(found.control))])
     for result in found.results:
         if result.reason:
             seen = "seen by a probe alone" if result.caught else "NOT CAUGHT"
             print(f"{result.name}: {seen}: {result.reason}")
     print(f"{found.caught} of {len(found.results)} mutations caught")
-
-
-def _row(result: "MutationResult") -> tuple[str, ...]:
-    one = result.clearest
-    by = f"{one.scene}, {one.layer}, {one.against}"
-    caught, chance = ("yes" if result.caught else "NO"), f"{100 * result.chance:.0f} %"
-    return (result.name, caught, chance, by if result.caught else "", *_numbers(one), result.meaning)
-
-
-def _numbers(one: "Sighting") -> tuple[str, str, str, str]:
-    low, high = one.interval
-    return (
-        f"{100 * one.true_bias:+.3g} %",
-        f"{100 * one.relative_bias:+.3g} %",
-        f"{100 * low:+.3g} to {100 * high:+.3g} %",
-        f"±{100 * one.margin:g} %",
-    )

@@ -38,9 +38,9 @@ def published(
     or camera rays kept, beside the published figures, with the error of the airlight.
     """
     from analytic.errors import InputError
+    from reports.commands.maps import parse_map_sizes
     from reports.machine.environment import activate, describe_environment
     from reports.machine.progress import progress_bar
-    from reports.tables.map_size import parse_map_sizes
     from reports.tables.terminal import print_json
     from validation.configurations.kernel_names import find_kernel
 
@@ -57,23 +57,35 @@ def published(
         find_kernel(name)
     sizes = parse_map_sizes("--maps", maps)
     activate()
-    data: dict[str, Any] = {"environment": describe_environment()} if json else {}
+    data: dict[str, Any] = {}
     with progress_bar("published") as progress:
-        measured = []
-        for one in papers:
-            if one == "biri":
-                found = _biri(wanted, names, scale=scale, needless=needless, progress=progress)
-            else:
-                found = _billeter(wanted, names[0], scale=scale, maps=sizes, limit=limit, progress=progress)
-            if found is not None:
-                measured.append(found)
-    for as_data, show in measured:
-        if json:
-            data |= as_data()
-        else:
-            show(markdown)
+        if "biri" in papers:
+            data |= _biri(wanted, names, scale=scale, needless=needless, progress=progress)
+        if "billeter" in papers:
+            data |= _billeter(wanted, names[0], scale=scale, maps=sizes, limit=limit, progress=progress)
     if json:
-        print_json(data)
+        print_json({"environment": describe_environment()} | data)
+    else:
+        _print(data, as_markdown=markdown)
+
+
+def _print(data: dict[str, Any], *, as_markdown: bool) -> None:
+    """Print the tables of the papers and what follows from them."""
+    from reports.commands.printing import print_heading, print_tables
+    from reports.papers.billeter import billeter_tables
+    from reports.papers.biri import biri_notes, biri_tables
+
+    if as_markdown:
+        print_heading()
+    if "rows" in data:
+        print_tables(biri_tables(data), as_markdown=as_markdown)
+        for note in biri_notes(data):
+            print(f"\n{note}")
+    if "billeter" in data:
+        print_tables(billeter_tables(data["billeter"]), as_markdown=as_markdown)
+        if data["billeter"]["conclusions"]:
+            print("\nWhat follows:\n")
+            print("\n".join(f"- {sentence}" for sentence in data["billeter"]["conclusions"]))
 
 
 def _wanted_scenes(scenes: str | None, papers: Sequence[str]) -> list[str]:
@@ -95,45 +107,40 @@ def _wanted_scenes(scenes: str | None, papers: Sequence[str]) -> list[str]:
     return wanted
 
 
-def _biri(wanted: Sequence[str], kernels: Sequence[str], *, scale: float, needless: bool, progress) -> tuple | None:
-    """Measure the tables of Biri 2006; return the functions that make data of them and print."""
-    from reports.papers.biri import print_biri, rows_data
+def _biri(
+    wanted: Sequence[str], kernels: Sequence[str], *, scale: float, needless: bool, progress: Callable
+) -> dict[str, Any]:
+    """Measure the tables of Biri 2006, nothing where none of their scenes is wanted."""
+    from reports.papers.biri import biri_data
     from validation.frames.zero_cost import needless_costs
     from validation.papers.biri import PUBLISHED, biri_rows
 
     chosen = [one for one in PUBLISHED if one.scene in wanted]
     if not chosen:
-        return None
+        return {}
     rows = biri_rows(chosen, kernels, scale=scale, progress=progress)
     if needless:
         progress(0.99, "what is not needed")
     costs = needless_costs(size=(round(800 * scale), round(600 * scale))) if needless else []
-    return lambda: rows_data(rows, costs), lambda markdown: print_biri(rows, costs, markdown=markdown)
+    return biri_data(rows, costs)
 
 
 def _billeter(
     wanted: Sequence[str], kernel: str, *, scale: float, maps: Sequence[int], limit: float, progress: Callable
-) -> tuple | None:
-    """Measure the figures and the table of Billeter 2010; return the functions that make data of both and print."""
-    from reports.papers.billeter import billeter_data, print_billeter
+) -> dict[str, Any]:
+    """Measure the figures and the table of Billeter 2010, nothing where none of their scenes is wanted."""
+    from reports.machine.progress import part_of
+    from reports.papers.billeter import billeter_data
     from validation.papers.billeter_images import FIGURES, SIZE, figure_rows
     from validation.papers.billeter_tessellation import TABLE, table_rows
 
     images = [one for one in FIGURES if one.scene in wanted]
     views = [one for one in TABLE if one.scene in wanted]
     if not images and not views:
-        return None
+        return {}
     share = len(images) / (len(images) + 3 * len(maps) * len(views))
     size = (max(1, round(scale * SIZE[0])), max(1, round(scale * SIZE[1])))
-
-    def first(done: float, what: str) -> None:
-        progress(share * done, what)
-
-    def second(done: float, what: str) -> None:
-        progress(share + (1 - share) * done, what)
-
-    figures = figure_rows(images, kernel=kernel, size=size, limit=limit, progress=first)
-    table = table_rows(views, maps=maps, kernel=kernel, size=size, limit=limit, progress=second)
-    return lambda: {"billeter": billeter_data(figures, table)}, lambda markdown: print_billeter(
-        figures, table, markdown=markdown
-    )
+    step = part_of(progress, 0.0, share), part_of(progress, share, 1.0)
+    figures = figure_rows(images, kernel=kernel, size=size, limit=limit, progress=step[0])
+    table = table_rows(views, maps=maps, kernel=kernel, size=size, limit=limit, progress=step[1])
+    return {"billeter": billeter_data(figures, table)}

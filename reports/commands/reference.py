@@ -142,8 +142,8 @@ def _sampling(found: "MonteCarloReference") -> dict[str, Any]:
 
 
 def _print_summary(summary: dict[str, Any], *, json: bool) -> None:
-    from reports.data.serialize import plain
     from reports.tables.terminal import print_json
+    from validation.metrics.errors import plain
 
     if json:
         print_json(plain(summary))

@@ -135,10 +135,10 @@ def _render(name: str, scene, chosen, *, outputs: dict[str, Path | None]) -> dic
             {"name": "surface", "ms": times.surface.median_ms},
             {"name": "airlight", "ms": times.airlight.median_ms},
         ],
-        "rebuild_ms": times.rebuild.median_ms,
-        "moved_ms": times.moved.median_ms,
-        "relit_ms": times.relit.median_ms,
-        "recoloured_ms": times.recoloured.median_ms,
+        "light_moved_ms": times.light_moved.median_ms,
+        "objects_moved_ms": times.objects_moved.median_ms,
+        "light_moved_camera_kept_ms": times.light_moved_camera_kept.median_ms,
+        "colours_changed_ms": times.colours_changed.median_ms,
         "threads": dr.thread_count(),
     }
 
@@ -163,26 +163,27 @@ def _render_frames(loaded, scene, chosen, *, frames: int, animate: str | None, o
 
 
 def _print_times(times: dict[str, Any], variant: str, *, json: bool) -> None:
-    from reports.tables.bench import rate
+    from reports.tables.methods import rate_words
     from reports.tables.terminal import print_json
 
     if json:
         print_json(times | {"device": variant})
         return
     stages = ", ".join(f"{stage['name']} {stage['ms']:.3g} ms" for stage in times["stages"])
-    rebuild, moved, relit, look = (times[f"{name}_ms"] for name in ("rebuild", "moved", "relit", "recoloured"))
+    print(f"{times['scene']}, {times['method']}: {times['frame_ms']:.3g} ms a frame ({rate_words(times['frame_ms'])})")
     print(
-        f"{times['scene']}, {times['method']}: {times['frame_ms']:.3g} ms a frame ({rate(times['frame_ms'])} frames/s)"
+        f"  {stages}; {times['light_moved_ms']:.3g} ms after the light moved, {times['objects_moved_ms']:.3g} ms after "
+        "objects moved"
     )
-    print(f"  {stages}; {rebuild:.3g} ms after the light moved, {moved:.3g} ms after objects moved")
     print(
-        f"  camera rays kept: {relit:.3g} ms after the light moved, {look:.3g} ms after only medium or colours changed"
+        f"  camera rays kept: {times['light_moved_camera_kept_ms']:.3g} ms after the light moved, "
+        f"{times['colours_changed_ms']:.3g} ms after only medium or colours changed"
     )
     print(f"  {variant}, {times['threads']} threads")
 
 
 def _print_frames(found: dict[str, Any], variant: str, *, json: bool) -> None:
-    from reports.tables.bench import rate
+    from reports.tables.methods import rate_words
     from reports.tables.terminal import print_json
 
     if json:
@@ -192,6 +193,6 @@ def _print_frames(found: dict[str, Any], variant: str, *, json: bool) -> None:
     print(f"{found['scene']}, {found['method']}: {found['frames']} frames, {' and '.join(found['moves'])} moving")
     print(f"  {found['files'][0]} to {found['files'][-1]}")
     print(
-        f"  {found['frame_ms']:.3g} ms a frame ({rate(found['frame_ms'])} frames/s): {move:.3g} ms to move, "
+        f"  {found['frame_ms']:.3g} ms a frame ({rate_words(found['frame_ms'])}): {move:.3g} ms to move, "
         f"{rendered:.3g} ms to render, keeping what stood still; {variant}"
     )

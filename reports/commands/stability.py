@@ -26,6 +26,7 @@ def stability(
     from validation.frames.plane_stability import broken, plane_stability
     from validation.kernels.stability import Bar, certified_files
     from validation.kernels.stability import stability as run
+    from validation.metrics.errors import plain
 
     names = None if kernels is None else [name.strip() for name in kernels.split(",") if name.strip()]
     activate()
@@ -36,14 +37,12 @@ def stability(
     broken_planes = broken(planes)
     certified = [path.name for path in certified_files()]
     if json:
-        from reports.data.serialize import plain
-
         data = {"environment": describe_environment(), "certified": certified, "bar": Bar(), "kernels": found}
         data |= {"shadow_planes": planes, "broken_planes": broken_planes}
         print_json(plain(data))
     else:
-        print_stability(found, certified=bool(certified))
+        print_stability(plain(found), certified=bool(certified))
         if planes:
-            print_plane_stability(planes, broken_planes)
+            print_plane_stability(plain(planes), broken_planes)
     if broken_planes or any(kernel.broken for kernel in found):
         raise typer.Exit(1)

@@ -16,6 +16,9 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from reports.tables.agreement import verdict
+from reports.tables.methods import fastest_within
+
 Claim = dict[str, Any]
 Scenes = Sequence[Mapping[str, Any]]
 
@@ -60,22 +63,6 @@ def confirmed(scenes: Scenes) -> bool:
             if not any(verdict(one) for one in compared if one["layer"] == layer):
                 return False
     return True
-
-
-def verdict(compared: Mapping[str, Any]) -> bool | None:
-    """Return whether a comparison confirms the truth; None where it ran out of time before it could tell.
-
-    Out of time is what stopped before the intervals were as narrow as wanted. It can still speak against the truth: by
-    an interval that lies outside the margin as a whole.
-    """
-    statistics = compared["statistics"]
-    if statistics["equivalent"]:
-        return True
-    interval = statistics.get("relative_bias_ci")
-    if compared.get("finished", True) or interval is None or None in interval:
-        return False
-    low, high = interval
-    return None if low <= statistics["margin"] and high >= -statistics["margin"] else False
 
 
 def _claim(kind: str, text: str, good: bool | None = None) -> Claim:
@@ -127,7 +114,7 @@ def _verdict(words: str, compared: list[tuple[str, Mapping[str, Any]]]) -> Claim
 
 def _fastest(scenes: Scenes, target: float) -> list[Claim]:
     """Return which method is fastest within a relative RMSE: once where it is the same everywhere, else by scene."""
-    best = {scene["name"]: _best(scene, target) for scene in scenes}
+    best = {scene["name"]: fastest_within(target, scene["methods"]) for scene in scenes}
     words = f"within {100 * target:g} % relative RMSE"
     labels = {one["label"] if one else None for one in best.values()}
     if len(best) > 1 and len(labels) == 1:
@@ -154,22 +141,6 @@ def _of_scene(name: str, best: Mapping[str, Any] | None, words: str, target: flo
 
 def _rate(one: Mapping[str, Any]) -> str:
     return f"{one['times']['frame']['median_ms']:.3g} ms"
-
-
-def _best(scene: Mapping[str, Any], target: float) -> Mapping[str, Any] | None:
-    """Return the entry that is fastest within a relative RMSE; None where there is none."""
-    # Pixels that are not finite are left out of the RMSE: a method that has any must not win by it.
-    good = [
-        m
-        for m in scene["methods"]
-        if m["times"] and m["error"] and _rmse(m) <= target and not m["error"].get("nonfinite")
-    ]
-    return min(good, key=lambda m: m["times"]["frame"]["median_ms"]) if good else None
-
-
-def _rmse(m: Mapping[str, Any]) -> float:
-    value = m["error"]["relative_rmse"]
-    return float("inf") if value is None else value
 
 
 def _left_out(scenes: Scenes) -> Claim:

@@ -4,7 +4,6 @@
 docs/report-schema.md explains every key of the schema "airlight-report/2". Not-a-number is null.
 """
 
-from dataclasses import asdict, is_dataclass
 from typing import Any
 
 from realtime.scene.features import describe
@@ -13,20 +12,9 @@ from validation.comparison.engine_images import ImageMeasurement
 from validation.frames.baseline_files import read_baseline
 from validation.frames.benchmark import Measurement, knows_shadows
 from validation.frames.scene_study import SceneStudy
-from validation.metrics.errors import plain as plain_value
+from validation.metrics.errors import plain as plain
 
 SCHEMA = "airlight-report/2"
-
-
-def plain(value: Any) -> Any:
-    """Return dataclasses, NumPy numbers and containers as what JSON can hold."""
-    if is_dataclass(value) and not isinstance(value, type):
-        return plain(asdict(value))
-    if isinstance(value, dict):
-        return {str(key): plain(one) for key, one in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(one) for one in value]
-    return plain_value(value)
 
 
 def scene_facts(study: SceneStudy) -> dict[str, Any]:

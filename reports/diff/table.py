@@ -3,9 +3,16 @@
 
 from reports.diff.compare import Difference
 from reports.diff.finding import Finding
-from reports.tables.terminal import number, print_words
+from reports.tables.table import Column, table, words
+from reports.tables.terminal import print_table
 
-_HEADERS = ("", "scene", "method", "what", "old", "new", "change")
+_COLUMNS = (
+    Column("verdict", "", words=True),
+    *words("scene", "method", "what"),
+    Column("old", "old", digits=4),
+    Column("new", "new", digits=4),
+    Column("change", "change", words=True),
+)
 _BUSY = 1.25  # a spread of quartiles from which on the machine was not quiet
 
 
@@ -13,7 +20,7 @@ def print_difference(found: Difference) -> None:
     """Print the findings as a table, the worse ones first, and a sentence on what could be seen."""
     rows = [_row(one) for one in found.findings if one.old is not None or one.new is not None or one.method]
     if rows:
-        print_words(rows, _HEADERS)
+        print_table(table("", _COLUMNS, rows))
     for one in found.findings:
         if one.old is None and one.new is None and not one.method:
             print(f"{one.verdict}: {f'{one.scene}: ' if one.scene else ''}{one.what}")
@@ -22,9 +29,8 @@ def print_difference(found: Difference) -> None:
     print(f"{len(found.worse)} worse, {better} better, {found.errors} errors compared")
 
 
-def _row(one: Finding) -> tuple[str, ...]:
-    words = (one.verdict, one.scene, one.method, one.what)
-    return (*words, number(one.old, 4), number(one.new, 4), _change(one))
+def _row(one: Finding) -> tuple[str | float | None, ...]:
+    return (one.verdict, one.scene, one.method, one.what, one.old, one.new, _change(one))
 
 
 def _change(one: Finding) -> str:

@@ -4,8 +4,10 @@
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from reports.data.claims import TARGETS, confirmed, verdict
+from reports.data.claims import TARGETS, confirmed
 from reports.diff.finding import Finding, Report
+from reports.tables.agreement import verdict
+from reports.tables.methods import fastest_within
 
 
 def compare_truth(old: Report, new: Report, gone: str) -> Iterator[Finding]:
@@ -86,10 +88,5 @@ def compare_winners(before: Mapping[str, Report], after: Mapping[str, Report]) -
 
 
 def _fastest(scene: Report, target: float) -> str | None:
-    def reaches(one: Report) -> bool:
-        error = one.get("error") or {}
-        rmse = error.get("relative_rmse")
-        return bool(one.get("times")) and rmse is not None and rmse <= target and not error.get("nonfinite")
-
-    good = [one for one in scene["methods"] if reaches(one)]
-    return min(good, key=lambda one: one["times"]["frame"]["median_ms"])["label"] if good else None
+    best = fastest_within(target, scene["methods"])
+    return best["label"] if best else None

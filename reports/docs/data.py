@@ -110,7 +110,7 @@ def _kept_scene(scene: dict[str, Any]) -> dict[str, Any]:
 
 
 def _kept_method(one: dict[str, Any]) -> dict[str, Any]:
-    times = {name: one["times"][name] for name in ("frame", "airlight", "rebuild")} if one["times"] else None
+    times = {name: one["times"][name] for name in ("frame", "airlight", "light_moved")} if one["times"] else None
     error = {name: one["error"][name] for name in _ERRORS} if one["error"] else None
     return {name: one[name] for name in _METHOD} | {"times": times, "error": error}
 

@@ -7,30 +7,20 @@ from typing import Any
 from reference.storage.files import ensure_folder
 from reports.figures.files import pixels, value, write_data, write_table
 from reports.figures.report import read_report, report_origin
-from reports.tables.latex import escape, number, table, with_quartiles
+from reports.tables.drawing import latex
+from reports.tables.methods import rows_table
+from reports.tables.table import Measured, Row, Table, Value, number
 
 NAME = "methods-table"
 SUMMARY = "LaTeX table of times and errors of every method in every scene, from a report"
 
+_TIMES = ("frame", "light_moved", "objects_moved")
+_ENDS = {"": "median_ms", "_low": "low_ms", "_high": "high_ms"}
+_ERRORS = ("relative_rmse", "relative_bias", "p99")
 _HEADER = (
-    "scene",
-    "width",
-    "height",
-    "label",
-    "layer",
-    "frame_ms",
-    "frame_ms_low",
-    "frame_ms_high",
-    "repetitions",
-    "moved_ms",
-    "moved_ms_low",
-    "moved_ms_high",
-    "relative_rmse",
-    "relative_bias",
-    "p99",
-    "nonfinite",
-    "truth_bound",
-    "refused",
+    *("scene", "width", "height", "label", "layer"),
+    *(f"{name}_ms{end}" for name in _TIMES for end in _ENDS),
+    *("repetitions", *_ERRORS, "nonfinite", "truth_bound", "refused"),
 )
 
 
@@ -50,11 +40,11 @@ def compute(folder: Path | str, *, report: Path | str) -> None:
         bound = (scene["truth"] or {}).get("relative_bound")
         for one in scene["methods"]:
             error, times = one["error"] or {}, one["times"] or {}
-            errors = [error.get(name) for name in ("relative_rmse", "relative_bias", "p99", "nonfinite")]
+            timings = [times.get(name) or {} for name in _TIMES]
+            shown = (timing.get(key) for timing in timings for key in _ENDS.values())
+            errors = [error.get(name) for name in (*_ERRORS, "nonfinite")]
             what = (scene["name"], *scene["size"], one["label"], one.get("layer", "airlight"))
-            frame, moved = times.get("frame") or {}, times.get("moved") or {}
-            shown = (*_spread(frame), frame.get("repetitions"), *_spread(moved))
-            rows.append((*what, *shown, *errors, bound, one["refused"]))
+            rows.append((*what, *shown, timings[0].get("repetitions"), *errors, bound, one["refused"]))
     settings = {name: data["settings"].get(name) for name in ("image", "timed")}
     write_data(target, NAME, _HEADER, rows, **report_origin(report, data), settings=settings)
 
@@ -65,36 +55,28 @@ def plot(folder: Path | str, *, output: Path | str | None = None, **options: Any
 
 
 def _tabular(rows: list[dict[str, str]]) -> str:
-    headers = (
-        ("method", "frame", "light moved", "rel. RMSE", "rel. bias", "99\\,\\%"),
-        ("", "[ms]", "[ms]", "[1]", "[1]", "[1]"),
-    )
-    body: list[tuple[str, ...] | str] = []
-    for scene in dict.fromkeys(row["scene"] for row in rows):
-        chosen = [row for row in rows if row["scene"] == scene]
-        size, bound = pixels(chosen[0]), value(chosen[0], "truth_bound")
-        truth = f", truth known to {number(bound, 2)}" if bound else ""
-        body.append(rf"\textit{{{escape(scene)}}}, {escape(size)}{truth}")
-        body += [_cells(row) for row in chosen]
+    scenes = dict.fromkeys(row["scene"] for row in rows)
     comment = (
-        "Needs \\usepackage{booktabs}. Times: medians with the distances to the quartiles, kernels compiled before.",
-        "Errors of the airlight against the quadrature truth; 99 %: quantile of |error| / max(truth, mean / 1000).",
+        "Times: medians with the distances to the quartiles, kernels compiled before.",
+        "Errors of the airlight against the quadrature truth; p99: quantile of |error| / max(truth, mean / 1000).",
     )
-    return table("lrrrrr", headers, body, comment=comment)
+    return latex([_scene([row for row in rows if row["scene"] == scene]) for scene in scenes], comment=comment)
 
 
-def _spread(timing: dict[str, Any]) -> tuple[float | None, ...]:
-    return tuple(timing.get(name) for name in ("median_ms", "low_ms", "high_ms"))
+def _scene(rows: list[dict[str, str]]) -> Table:
+    bound = value(rows[0], "truth_bound")
+    truth = f", truth known to {number(bound, 2, zeros=True)}" if bound else ""
+    keys = ("label", *_TIMES, *_ERRORS)
+    return rows_table(rows[0]["scene"], [_row(row) for row in rows], *keys, explanation=pixels(rows[0]) + truth)
 
 
-def _cells(row: dict[str, str]) -> tuple[str, ...]:
-    frame, moved = (
-        with_quartiles(*(value(row, f"{name}{end}") for end in ("", "_low", "_high")))
-        for name in ("frame_ms", "moved_ms")
-    )
+def _row(row: dict[str, str]) -> Row:
     if row["refused"]:
-        return (escape(row["label"]), r"\multicolumn{5}{l}{refused}")
-    name = escape(row["label"]) + ("" if row["layer"] == "airlight" else f" ({escape(row['layer'])})")
+        return Row({"label": row["label"]}, "refused")
+    values: dict[str, Value] = {"label": row["label"]} | {name: value(row, name) for name in _ERRORS}
+    for name in _TIMES:
+        median, low, high = (value(row, f"{name}_ms{end}") for end in _ENDS)
+        values[name] = None if median is None or low is None or high is None else Measured(median, low, high)
     bad = value(row, "nonfinite")
-    name += f", {bad:.0f} pixels not finite" if bad else ""
-    return (name, frame, moved, *(number(value(row, key), 2) for key in ("relative_rmse", "relative_bias", "p99")))
+    remarks = [] if row["layer"] == "airlight" else [row["layer"]]
+    return Row(values, remarks=(*remarks, *([f"{bad:.0f} pixels not finite"] if bad else [])))

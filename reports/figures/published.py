@@ -15,7 +15,8 @@ from reports.figures.files import draw_figure, new_figure, pixels, read_data, va
 from reports.figures.published_rows import HEADER, billeter_entries, biri_entries, measured_papers
 from reports.figures.report import reported_papers
 from reports.plotting.style import WIDTHS, method_style
-from reports.tables.latex import escape, number, table, with_quartiles
+from reports.tables.drawing import latex
+from reports.tables.table import Column, Measured, Table, Value, table
 
 NAME = "published"
 SUMMARY = "frames a second of each table of the papers, published and measured"
@@ -113,25 +114,33 @@ def _measured(panel, row: dict[str, str], height: float, style: dict[str, Any]) 
 
 
 def _tabular(rows: list[dict[str, str]]) -> str:
-    headers = (
-        ("", "", "published", "measured", "ratio", "rel. RMSE"),
-        ("", "", "[1/s]", "[1/s]", "[1]", "[1]"),
-    )
-    body: list[tuple[str, ...] | str] = []
-    for name in dict.fromkeys(row["table"] for row in rows):
-        body.append(rf"\textit{{{escape(name)}}}")
-        for row in (row for row in rows if row["table"] == name):
-            fps, published = value(row, "fps"), value(row, "published_fps")
-            as_published = (row["width"], row["height"]) == (row["published_width"], row["published_height"])
-            variant = "" if row["row"].endswith(row["variant"]) else row["variant"]
-            size = "" if as_published else f"{', ' if variant else ''}{pixels(row)}"
-            shown = with_quartiles(fps, value(row, "fps_low"), value(row, "fps_high"))
-            ratio = fps / published if fps and published and as_published else None
-            printed = f"${published:g}$" if published else "--"
-            cells = (printed, shown, number(ratio, 2), number(value(row, "relative_rmse"), 2))
-            body.append((escape(row["row"]), escape(variant + size), *cells))
     comment = (
-        "Needs \\usepackage{booktabs}. Frames a second after the light moved, everything rebuilt, medians with the",
-        "distances to the quartiles; the error of the airlight is against the quadrature truth.",
+        "Frames a second after the light moved, everything rebuilt, medians with the distances to the quartiles; the",
+        "error of the airlight is against the quadrature truth.",
     )
-    return table("llrrrr", headers, body, comment=comment)
+    papers = dict.fromkeys(row["table"] for row in rows)
+    return latex([_table(paper, [row for row in rows if row["table"] == paper]) for paper in papers], comment=comment)
+
+
+def _table(title: str, rows: list[dict[str, str]]) -> Table:
+    columns = (
+        Column("row", "", words=True),
+        Column("variant", "", words=True),
+        Column("published", "published", "1/s"),
+        Column("measured", "measured", "1/s"),
+        Column("ratio", "ratio", digits=2),
+        Column("relative_rmse", "rel. RMSE", digits=2, share=True),
+    )
+    return table(title, columns, [_cells(row) for row in rows])
+
+
+def _cells(row: dict[str, str]) -> tuple[Value, ...]:
+    fps, low, high, published = (value(row, name) for name in ("fps", "fps_low", "fps_high", "published_fps"))
+    as_published = (row["width"], row["height"]) == (row["published_width"], row["published_height"])
+    variant = "" if row["row"].endswith(row["variant"]) else row["variant"]
+    size = "" if as_published else f"{', ' if variant else ''}{pixels(row)}"
+    shown = None if fps is None or low is None or high is None else Measured(fps, low, high)
+    ratio = fps / published if fps and published and as_published else None
+    # A published figure has the digits that were printed.
+    printed = None if published is None else int(published) if published == int(published) else published
+    return (row["row"], variant + size, printed, shown, ratio, value(row, "relative_rmse"))

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Rows of the figure of the published results, from what `airlight published` measures or a report holds."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from reports.machine.progress import part_of
-from reports.papers.labels import biri_variant
+from reports.papers.billeter import SIZE, billeter_data
+from reports.papers.biri import biri_data, biri_variant
 
 HEADER = (
     "paper",
@@ -24,7 +25,6 @@ HEADER = (
     "relative_rmse",
     "missing",
 )
-_BILLETER_SIZE = [1024, 1024]
 _LIMIT = 10.0  # a frame that takes longer is left out [s]
 
 
@@ -38,9 +38,7 @@ def measured_papers(quick: bool, progress: Callable[[float, str], None] | None) 
     progress
         Told the share done and what comes next.
     """
-    from reports.papers.billeter import billeter_data
-    from reports.papers.biri import rows_data
-    from validation.papers.billeter_images import SIZE, figure_rows
+    from validation.papers.billeter_images import figure_rows
     from validation.papers.billeter_tessellation import MAPS, table_rows
     from validation.papers.biri import biri_rows
 
@@ -48,7 +46,7 @@ def measured_papers(quick: bool, progress: Callable[[float, str], None] | None) 
     size = (round(scale * SIZE[0]), round(scale * SIZE[1]))
     seconds = 0.1 if quick else 0.6
 
-    biri = rows_data(biri_rows(scale=scale, seconds=seconds, progress=part_of(progress, 0.0, 0.3)), [])
+    biri = biri_data(biri_rows(scale=scale, seconds=seconds, progress=part_of(progress, 0.0, 0.3)), [])
     figures = figure_rows(size=size, seconds=seconds, limit=_LIMIT, progress=part_of(progress, 0.3, 0.6))
     maps = MAPS[:1] if quick else MAPS
     step = part_of(progress, 0.6, 1.0)
@@ -78,22 +76,22 @@ def billeter_entries(data: dict[str, Any]) -> list[tuple]:
         values = dict(one["parameters"])
         variant = values.get("evaluation") or (f"{values['steps']} steps" if "steps" in values else "default")
         what = ("billeter", table, f"{one['where']}, map {one['map']}", f"{one['method']}, {variant}", one["method"])
-        found.append((*what, *_figures(row, _BILLETER_SIZE, one["fps"], row["error"])))
+        found.append((*what, *_figures(row, SIZE, one["fps"], row["error"])))
     for row in data.get("table", ()):
         name = f"{row['scene']}, map {row['map']}"
         for_table = "Billeter 2010, Table 1"
         # The published figure differs by evaluation here, so each evaluation has a line of its own.
         line = f"{name}, {row['evaluation']}"
         what = ("billeter", for_table, line, row["evaluation"], "light-volumes")
-        found.append((*what, *_figures(row, _BILLETER_SIZE, row["published"]["fps"], None)))
+        found.append((*what, *_figures(row, SIZE, row["published"]["fps"], None)))
     return found
 
 
-def _figures(row: dict[str, Any], size: list[int], fps: float | None, error: dict[str, Any] | None) -> tuple:
+def _figures(row: dict[str, Any], size: Sequence[int], fps: float | None, error: dict[str, Any] | None) -> tuple:
     """Return size, published and measured frames a second, error, and why nothing was measured."""
-    rebuilt = row["rebuilt"]
+    light_moved = row["light_moved"]
     # The third quartile of the time is the first of the rate.
-    rates = [1000 / rebuilt[name] for name in ("median_ms", "high_ms", "low_ms")] if rebuilt else [None] * 3
+    rates = [1000 / light_moved[name] for name in ("median_ms", "high_ms", "low_ms")] if light_moved else [None] * 3
     relative = error["relative_rmse"] if error else None
     return (*row["size"], *size, fps, *rates, relative, row.get("missing"))
 

@@ -12,9 +12,10 @@ from typing import Any
 from reference.storage.files import ensure_folder
 from reports.figures.files import draw_figure, new_figure, pixels, read_data, value, values, write_data, write_table
 from reports.figures.report import reported_papers
-from reports.papers.labels import biri_variant
+from reports.papers.biri import biri_variant
 from reports.plotting.style import COLOURS, WIDTHS
-from reports.tables.latex import escape, number, table
+from reports.tables.drawing import latex
+from reports.tables.table import Column, Row, Table, Value, table
 
 NAME = "stages"
 SUMMARY = "share of each stage of shadow planes in a frame: Table 1 of Biri 2006, published and measured"
@@ -60,7 +61,7 @@ def compute(
             shown.add(one["scene"])
             named = (one["scene"], one["where"], _PAPER, *one["size"])
             rows += [(*named, stage, share, *[None] * 4) for stage, share in zip(found["stages"], one["shares"])]
-        frame = tuple(row["rebuilt"][name] for name in ("median_ms", "low_ms", "high_ms"))
+        frame = tuple(row["light_moved"][name] for name in ("median_ms", "low_ms", "high_ms"))
         named = (one["scene"], one["where"], biri_variant(row), *row["size"])
         parts = zip(found["stages"], row["shares"], row["stages_ms"])
         rows += [(*named, stage, share, ms, *frame) for stage, share, ms in parts]
@@ -68,10 +69,10 @@ def compute(
 
 
 def _measured(scale: float, progress: Callable[[float, str], None] | None) -> dict[str, Any]:
-    from reports.papers.biri import rows_data
+    from reports.papers.biri import biri_data
     from validation.papers.biri import PUBLISHED, biri_rows
 
-    return rows_data(biri_rows([one for one in PUBLISHED if one.shares], scale=scale, progress=progress), [])
+    return biri_data(biri_rows([one for one in PUBLISHED if one.shares], scale=scale, progress=progress), [])
 
 
 def plot(folder: Path | str, *, output: Path | str | None = None, **options: Any) -> None:
@@ -122,15 +123,20 @@ def _words(scene: str, row: str, group: list[dict[str, str]]) -> str:
 
 
 def _tabular(rows: list[dict[str, str]]) -> str:
-    stages = list(dict.fromkeys(row["stage"] for row in rows))
-    headers = (("share of a frame [\\%]", *map(escape, stages), "frame [ms]"),)
-    body: list[tuple[str, ...] | str] = []
-    for (scene, name), group in _groups(rows).items():
-        if name == _PAPER:
-            body.append(rf"\textit{{{escape(scene)}}} ({escape(group[0]['where'])})")
-        size = "" if name == _PAPER else escape(f", {pixels(group[0])}")
-        # A published share has the digits that were printed.
-        shares = (f"${share:g}$" if name == _PAPER else number(share) for share in values(group, "share_percent"))
-        body.append((escape(name) + size, *shares, number(value(group[0], "frame_ms"))))
-    comment = ("Needs \\usepackage{booktabs}. Table 1 of Biri, Arques, Michelin 2006, published and measured.",)
-    return table("l" + "r" * (len(stages) + 1), headers, body, comment=comment)
+    scenes: dict[str, list[list[dict[str, str]]]] = {}
+    for (scene, _), group in _groups(rows).items():
+        scenes.setdefault(scene, []).append(group)
+    comment = ("Table 1 of Biri, Arques, Michelin 2006, published and measured.",)
+    return latex([_table(scene, groups) for scene, groups in scenes.items()], comment=comment)
+
+
+def _table(scene: str, groups: list[list[dict[str, str]]]) -> Table:
+    stages = [row["stage"] for row in groups[0]]
+    columns = [Column("name", "share of a frame", words=True), *(Column(stage, stage, "%") for stage in stages)]
+    found = []
+    for group in groups:
+        name, printed = group[0]["row"], group[0]["row"] == _PAPER
+        cells: dict[str, Value] = {"name": name if printed else f"{name}, {pixels(group[0])}"}
+        cells |= dict(zip(stages, values(group, "share_percent")))
+        found.append(Row(cells | {"frame": value(group[0], "frame_ms")}, published=printed))
+    return table(scene, [*columns, Column("frame", "frame", "ms")], found, explanation=groups[0][0]["where"])

@@ -101,7 +101,8 @@ def try_kernel(variant: str, patience: float = _PATIENCE) -> dict[str, Any]:
 
 def print_diagnosis(found: dict[str, Any]) -> None:
     """Print a diagnosis as a table, plain where piped."""
-    from reports.tables.terminal import print_words
+    from reports.tables.table import table, words
+    from reports.tables.terminal import print_table
 
     kernel = found["kernel"] or {}
     rows = [
@@ -127,7 +128,7 @@ def print_diagnosis(found: dict[str, Any]) -> None:
         rows.append(("shadow-ray epsilon", "", f"{kernel['epsilon']:.4g}, relative; measured"))
     elif found["variant"]:
         rows.append(("test kernel", "no", "failed"))
-    print_words(rows, ["what", "works", "details"])
+    print_table(table("", words("what", "works", "details"), rows))
     print("Everything that airlight needs works." if found["works"] else f"Not ready: {found['problem']}")
 
 

@@ -5,7 +5,8 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-DASH = "\N{EN DASH}"
+from reports.tables.drawing import DASH, typeset
+from reports.tables.table import number as plain_number
 
 #: Kinds of claims as the page names them.
 KINDS = {
@@ -38,33 +39,12 @@ KEYS: tuple[tuple[tuple[str, ...], str], ...] = (
 
 def number(value: float | None, digits: int = 3) -> str:
     """Return a number with some significant digits, an en dash for none."""
-    if value is None:
-        return DASH
-    text = f"{value:.{digits - 1}e}" if 0 < abs(value) < 1e-3 else f"{value:.{digits}g}"
-    if "e" in text:
-        mantissa, exponent = text.split("e")
-        return f"{mantissa}·10{_superscript(int(exponent))}"
-    return text
+    return typeset(plain_number(value, digits))
 
 
 def percent(value: float | None, digits: int = 3) -> str:
     """Return a relative value in per cent."""
     return DASH if value is None else f"{number(100 * value, digits)} %"
-
-
-def interval(pair: Sequence[float | None] | None) -> str:
-    """Return an interval of relative values in per cent."""
-    if pair is None or pair[0] is None or pair[1] is None:
-        return DASH
-    return f"{100 * pair[0]:+.3f} … {100 * pair[1]:+.3f} %"
-
-
-def rate(milliseconds: float | None) -> str:
-    """Return how often a second something that takes so long can be done."""
-    if milliseconds is None:
-        return DASH
-    value = 1000 / milliseconds
-    return f"{value:.0f}" if value >= 10 else f"{value:.1f}"
 
 
 def words(value: Any) -> str:
@@ -126,15 +106,9 @@ def precision_words(indices: Sequence[Mapping[str, Any]]) -> str:
     )
 
 
-def _superscript(value: int) -> str:
-    return str(value).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
-
-
 FILTERS: Mapping[str, Callable[..., str]] = {
     "number": number,
     "percent": percent,
-    "interval": interval,
-    "rate": rate,
     "words": words,
     "first_sentence": first_sentence,
     "sentence": sentence,

@@ -12,15 +12,13 @@ from pathlib import Path
 from typing import Any
 
 from analytic.errors import InputError
-from reports.data.claims import verdict
 from reports.page.chart import speed_error_chart
 from reports.page.filters import FILTERS, KEYS, KINDS, MARKS, kept_words, precision_words, viewer_words
 from reports.page.image_cache import page_images
 from reports.page.image_index import SceneImages
-from reports.papers.labels import BILLETER_PASSES, BILLETER_SIZE
-from reports.papers.labels import FILTERS as PUBLISHED_FILTERS
+from reports.page.tables import TABLES
 from reports.plotting.colour_maps import signed_colours, unsigned_colours
-from reports.tables.bench import RATES
+from reports.tables.methods import fastest_within
 
 PAGE_LIMIT = 30_000_000  #: bytes of a page
 WORDS_LIMIT = 2_500_000  #: of these for all that is not an image
@@ -55,7 +53,8 @@ def render_page(data: dict[str, Any], folder: Path, *, limit: int = PAGE_LIMIT) 
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {**FILTERS, **PUBLISHED_FILTERS, "verdict": verdict}
+    environment.filters |= FILTERS
+    environment.globals |= TABLES
     # A scene of which nothing could be shown has no viewer, and no images in the page.
     with_images = [scene for scene in data["scenes"] if any(one["files"] for one in scene["methods"])]
     images = page_images(with_images, Path(folder), limit - WORDS_LIMIT)
@@ -71,9 +70,6 @@ def render_page(data: dict[str, Any], folder: Path, *, limit: int = PAGE_LIMIT) 
         scripts=[Markup((TEMPLATES / name).read_text(encoding="utf-8")) for name in SCRIPTS],
         images=Markup(_script_json({"scenes": [one.index for one in images], "maps": _maps()})),
         pixels=[Markup(one.data) for one in images],
-        rates_headers=list(RATES),
-        billeter_passes=BILLETER_PASSES,
-        billeter_size=BILLETER_SIZE,
         key_table=KEYS,
         kinds=KINDS,
         marks=MARKS,
@@ -101,17 +97,16 @@ def _viewer(scene: Mapping[str, Any], number: int, images: SceneImages) -> dict[
 
 def _first_shown(methods: Sequence[Mapping[str, Any]], target: float = 0.01) -> int:
     """Return the place of the fastest method within the target, as the claims name it, or else of the most accurate."""
+    best = fastest_within(target, methods)
+    if best is not None:
+        return next(place for place, one in enumerate(methods) if one is best)
 
-    def order(number: int) -> tuple[float, float]:
-        one = methods[number]
-        error = (one["error"] or {}).get("relative_rmse")
-        if error is None or one["error"].get("nonfinite"):
-            return 2, 0
-        if error <= target and one["times"]:
-            return 0, one["times"]["frame"]["median_ms"]
-        return 1, error
+    def error(place: int) -> float:
+        found = methods[place]["error"] or {}
+        rmse = found.get("relative_rmse")
+        return float("inf") if rmse is None or found.get("nonfinite") else rmse
 
-    return min(range(len(methods)), key=order)
+    return min(range(len(methods)), key=error)
 
 
 def _maps() -> dict[str, str]:

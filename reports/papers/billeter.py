@@ -1,16 +1,33 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Figures 6 and 7 and Table 1 of Billeter 2010 beside our own figures, for a terminal, a README and as JSON."""
+"""Figures 6 and 7 and Table 1 of Billeter 2010 beside our own figures.
 
-from collections.abc import Sequence
+The data are `published.billeter` of report.json, as `airlight published --json` prints them.
+"""
+
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from reports.tables.bench import RATES, print_heading, print_markdown, rate_cells
-from reports.tables.terminal import number, print_table
+from reports.papers.rates import COLUMNS, rates, size_words
+from reports.tables.table import Column, Row, Table, Value, table
+
+Data = Mapping[str, Any]
+
+SIZE = (1024, 1024)  #: of the published images [pixels]; only at this size are rates compared
+#: Of Table 1.
+PASSES = ("surface", "shadow map", "laplacian", "edge map", "tessellate", "vertices", "prepare", "volume")
 
 
-def billeter_data(figures: Sequence, table: Sequence) -> dict[str, Any]:
-    """Return the rows and what follows from them as JSON-ready data."""
-    from reports.data.serialize import plain
+def billeter_data(figures: Sequence[Any], views: Sequence[Any]) -> dict[str, Any]:
+    """Return what was measured and what follows from it as JSON-ready data.
+
+    Parameters
+    ----------
+    figures
+        From `validation.papers.billeter_images.figure_rows`.
+    views
+        From `validation.papers.billeter_tessellation.table_rows`.
+    """
+    from validation.metrics.errors import plain
     from validation.papers.billeter_conclusions import conclusions
 
     return {
@@ -25,114 +42,82 @@ def billeter_data(figures: Sequence, table: Sequence) -> dict[str, Any]:
                 },
                 "scene": row.published.scene,
             }
-            for row in table
+            for row in views
         ],
-        "conclusions": conclusions(figures, table),
+        "conclusions": conclusions(figures, views),
     }
 
 
-def print_billeter(figures: Sequence, table: Sequence, *, markdown: bool = False) -> None:
-    """Print the tables and what follows from them.
-
-    Parameters
-    ----------
-    figures
-        From `validation.papers.billeter_images.figure_rows`.
-    table
-        From `validation.papers.billeter_tessellation.table_rows`.
-    markdown
-        Print Markdown, with the date and the machine.
-    """
-    from validation.papers.billeter_conclusions import conclusions
-
-    show = print_markdown if markdown else print_table
-    if markdown:
-        print_heading()
-    if figures:
-        _print_figures(figures, show)
-    if table:
-        _print_rates(table, show)
-        _print_passes(table, show)
-    missing = [(f"{row.entry.where}, {_image(row)}", row.missing) for row in figures if row.missing]
-    missing += [(_view(row), row.missing) for row in table if row.missing]
-    if missing:
-        print("\nNot measured:\n")
-        for name, reason in missing:
-            print(f"- {name}: {reason}.")
-    found = conclusions(figures, table)
-    if found:
-        print("\nWhat follows:\n")
-        for sentence in found:
-            print(f"- {sentence}")
+def billeter_tables(data: Data) -> list[Table]:
+    """Return the tables: images, views of Table 1, and its passes."""
+    images = [_image_table(data["figures"])] if data["figures"] else []
+    return images + ([_view_table(data["table"]), _pass_table(data["table"])] if data["table"] else [])
 
 
-def _print_figures(rows: Sequence, show) -> None:
-    headers = (
-        "frames a second",
-        "published",
-        *RATES,
-        "rel. RMSE",
-        "p99",
-        "against the map",
-        "p99",
+def _image(row: Data) -> str:
+    entry = row["entry"]
+    values = ", ".join(f"{name}={value}" for name, value in (("map", entry["map"]), *entry["parameters"]))
+    return f"{entry['where']}, {entry['scene']}, {size_words(row)}: {entry['method']} ({values})"
+
+
+def _view(row: Data) -> str:
+    return f"{row['scene']}, {size_words(row)}, map {row['map']}: {row['evaluation']}"
+
+
+def _rates(row: Data, published: float | None) -> dict[str, Value]:
+    return rates(row, published, comparable=tuple(row["size"]) == SIZE)
+
+
+def _not_measured(row: Data) -> str:
+    return f"not measured: {row['missing']}" if row.get("missing") else ""
+
+
+def _image_table(rows: Sequence[Data]) -> Table:
+    errors = (("error", ""), ("map_error", "against the map"))
+    columns = [Column("name", "frames a second", words=True), *COLUMNS]
+    for key, against in errors:
+        columns.append(Column(f"{key}_rmse", against or "rel. RMSE", digits=2, share=True))
+        columns.append(Column(f"{key}_p99", "p99", digits=2, share=True))
+    found = []
+    for row in rows:
+        values: dict[str, Value] = {"name": _image(row), **_rates(row, row["entry"]["fps"])}
+        for key, _ in errors:
+            error = row.get(key) or {}
+            values |= {f"{key}_rmse": error.get("relative_rmse"), f"{key}_p99": error.get("p99")}
+        found.append(Row(values, _not_measured(row)))
+    return table(
+        "Figures 6 and 7 of Billeter 2010 again: frames a second, and the error of the airlight",
+        columns,
+        found,
+        explanation="The error is against the truth, and against what the shadow map stands for.",
     )
-    cells = []
-    for row in rows:
-        name, fps = f"{row.entry.where}, {_image(row)}", row.entry.fps
-        if row.rebuilt is None:
-            cells.append((name, number(fps), *["-"] * 9))
-            continue
-        errors = [number(value, 2) for one in (row.error, row.map_error) for value in (one.relative_rmse, one.p99)]
-        cells.append((name, number(fps), *_rates(row, fps), *errors))
-    show(headers, cells, "Figures 6 and 7 of Billeter 2010 again: frames a second, and the error of the airlight")
 
 
-def _print_rates(rows: Sequence, show) -> None:
-    headers = (
-        "frames a second",
-        "triangles",
-        "published",
-        *RATES,
-        "rel. RMSE to the static mesh",
+def _view_table(rows: Sequence[Data]) -> Table:
+    columns = (
+        Column("name", "frames a second", words=True),
+        Column("triangles", "triangles"),
+        *COLUMNS,
+        Column("relative_rmse", "rel. RMSE to the static mesh", digits=2, share=True),
     )
-    cells = []
+    found = []
     for row in rows:
-        if row.rebuilt is None:
-            cells.append((_view(row), "-", number(row.published_fps), *["-"] * 6))
-            continue
-        against = "-" if row.against_static is None else number(row.against_static.relative_rmse, 2)
-        triangles = str(row.triangles) if row.triangles else "-"
-        rates = _rates(row, row.published_fps)
-        cells.append((_view(row), triangles, number(row.published_fps), *rates, against))
-    what = dict.fromkeys(f"{row.published.scene} for {row.published.what}" for row in rows)
-    show(headers, cells, f"Table 1 of Billeter 2010 again, {'; '.join(what)}: frames a second")
+        values: dict[str, Value] = {"name": _view(row), "triangles": row["triangles"] or None}
+        values |= _rates(row, row["published"]["fps"])
+        values["relative_rmse"] = (row.get("against_static") or {}).get("relative_rmse")
+        found.append(Row(values, _not_measured(row)))
+    what = dict.fromkeys(f"{row['scene']} for {row['published']['what']}" for row in rows)
+    return table(f"Table 1 of Billeter 2010 again, {'; '.join(what)}: frames a second", columns, found)
 
 
-def _print_passes(rows: Sequence, show) -> None:
-    from validation.papers.billeter_tessellation import PASSES
-
-    cells = []
+def _pass_table(rows: Sequence[Data]) -> Table:
+    columns = (Column("name", "ms of each pass", words=True), *(Column(one, one) for one in PASSES))
+    found = []
     for row in rows:
-        published = row.published.passes.get((row.map, row.evaluation))
+        published = row["published"]["passes"]
         if published:
-            name = f"{row.published.scene}, map {row.map}, {row.evaluation}: published"
-            cells.append((name, *(number(published.get(one)) for one in PASSES)))
-        if row.passes:
-            cells.append((_view(row), *(number(row.passes.get(one)) for one in PASSES)))
-    show(("ms of each pass", *PASSES), cells, "Table 1 of Billeter 2010 again: the passes")
-
-
-def _rates(row, fps: float | None) -> tuple[str, ...]:
-    from validation.papers.billeter_images import SIZE
-
-    return rate_cells(row, fps if row.size == SIZE else None)
-
-
-def _image(row) -> str:
-    entry = row.entry
-    values = ", ".join(f"{name}={value}" for name, value in (("map", entry.map), *entry.parameters))
-    return f"{entry.scene}, {row.size[0]} x {row.size[1]}: {entry.method} ({values})"
-
-
-def _view(row) -> str:
-    return f"{row.published.scene}, {row.size[0]} x {row.size[1]}, map {row.map}: {row.evaluation}"
+            name = f"{row['scene']}, map {row['map']}, {row['evaluation']}: published"
+            found.append(Row({"name": name} | {one: published.get(one) for one in PASSES}, published=True))
+        if row["passes"]:
+            found.append(Row({"name": _view(row)} | {one: row["passes"].get(one) for one in PASSES}))
+    return table("Table 1 of Billeter 2010 again: the passes", columns, found)

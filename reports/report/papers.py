@@ -8,7 +8,7 @@ from typing import Any
 from reports.data.serialize import mutations_data, plain
 from reports.machine.progress import Progress, counted, part_of
 from reports.papers.billeter import billeter_data
-from reports.papers.biri import rows_data
+from reports.papers.biri import biri_data
 from validation.frames.result_cache import CachedResult, CacheEntry, Computed, ResultCache, cache_entry
 from validation.frames.scene_study import Effort
 
@@ -77,7 +77,7 @@ def _biri(effort: Effort, scenes: Sequence[str], cache: ResultCache) -> list[Oth
             "biri",
             "Biri 2006",
             cache_entry(cache, "biri", identity=identity),
-            lambda progress: (rows_data(biri_rows([published], kernels, seconds=seconds, progress=progress), []), {}),
+            lambda progress: (biri_data(biri_rows([published], kernels, seconds=seconds, progress=progress), []), {}),
         )
 
     parts = [part(published) for published in PUBLISHED if published.scene in scenes]

@@ -1,62 +1,99 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The tables of `airlight bench --kernels`: what kernels cost, and which is cheapest at each error."""
+"""What kernels cost, which is cheapest at each error, and how fast they converge: `bench --kernels`, documentation.
 
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+The data are those that `airlight bench --kernels --json` prints.
+"""
 
-from reports.tables.terminal import number, print_table
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
 
-if TYPE_CHECKING:
-    from validation.kernels.benchmark import KernelBench, KernelCost, Level, Spread
-    from validation.kernels.convergence import Convergence
+from reports.tables.table import Column, Interval, Measured, Name, Row, Table, Value, table
 
-_COSTS = ("kernel", "ns/ray", "quartiles", "wall ns/ray", "quartiles", "rays", "median", "99 %", "max", "not finite")
-_LEVELS = ("error", "cheapest", "ns/ray", "cheapest uniform", "costs", "cheapest table", "costs")
-_WORDS = {"max": "maximum error", "p99": "99 % of the rays"}
+Entry = Mapping[str, Any]
 
-Show = Callable[[Sequence[str], Sequence[Sequence[str]], str], None]
-
-
-def print_kernel_bench(found: "KernelBench", *, show: Show = print_table) -> None:
-    """Print what `validation.kernels.benchmark.bench_kernels` found.
-
-    Parameters
-    ----------
-    found
-        Costs and levels.
-    show
-        Prints a table from headers, rows and a title.
-    """
-    for phase in dict.fromkeys(cost.phase for cost in found.costs):
-        costs = [cost for cost in found.costs if cost.phase == phase]
-        for cost in costs:
-            if cost.refused:
-                print(f"{cost.kernel}, {phase}: refused: {cost.refused}")
-        g = f", g = {costs[0].g:g}" if phase == "hg" else ""
-        show(_COSTS, [_cost_row(cost) for cost in costs if not cost.refused], f"{phase}{g}, float32, wide rays")
-        for statistic, words in _WORDS.items():
-            levels = [one for one in found.levels if (one.phase, one.statistic) == (phase, statistic)]
-            show(_LEVELS, [_level_row(one) for one in levels], f"{phase}: speed against error, {words}")
-    print("ns/ray: the kernel alone by Dr.Jit's history, median; ~ is extrapolated from fewer steps.")
+COSTS = (
+    Column("kernel", "kernel", words=True),
+    Column("device", "", "ns/ray", spread="quartiles"),
+    Column("wall", "wall", "ns/ray", spread="quartiles"),
+    Column("rays", "rays"),
+    Column("median", "median", digits=2),
+    Column("p99", "99 %", digits=2),
+    Column("max", "max", digits=2),
+    Column("nonfinite", "not finite", alarm=True),
+)
+_STATISTICS = {"max": "maximum error", "p99": "99 % of the rays"}
+_FAMILIES = ("uniform", "table")
 
 
-def print_convergence(found: "Sequence[Convergence]", *, show: Show = print_table) -> None:
-    """Print declared and measured orders and rates."""
-    rows = [
-        (
-            one.kernel,
-            one.declared.kind if one.declared else "-",
-            number(one.declared.value) if one.declared else "-",
-            number(one.measured),
-            f"{one.sizes[0]}..{one.sizes[-1]}",
-        )
-        for one in found
+def kernel_tables(costs: Iterable[Entry], levels: Iterable[Entry]) -> Iterator[Table]:
+    """Yield for each phase function the table of costs and the tables of the cheapest kernels at each error."""
+    costs, levels = list(costs), list(levels)
+    for phase in dict.fromkeys(cost["phase"] for cost in costs):
+        chosen = [cost for cost in costs if cost["phase"] == phase]
+        g = f", g = {chosen[0]['g']:g}" if phase == "hg" else ""
+        yield cost_table(f"{phase}{g}, float32, wide rays", chosen)
+        for statistic, words in _STATISTICS.items():
+            rows = [level for level in levels if (level["phase"], level["statistic"]) == (phase, statistic)]
+            yield level_table(f"{phase}: speed against error, {words}", rows)
+
+
+def cost_table(title: str, costs: Iterable[Entry], *, code: bool = False) -> Table:
+    """Return what kernels cost and how wrong they are; their names as code where they are for typing."""
+    return Table(title, COSTS, tuple(_cost_row(cost, code) for cost in costs))
+
+
+def _cost_row(cost: Entry, code: bool) -> Row:
+    values: dict[str, Value] = {"kernel": Name(cost["kernel"]) if code else cost["kernel"]}
+    if cost["refused"]:
+        return Row(values, f"refused: {cost['refused']}")
+    about = not cost.get("rays", 1)
+    values |= {name: _spread(cost[name], about) for name in ("device", "wall")}
+    values |= {"rays": cost.get("rays") or None}
+    return Row(values | {name: cost[name] for name in ("median", "p99", "max", "nonfinite")})
+
+
+def _spread(spread: Mapping[str, float] | None, about: bool) -> Measured | None:
+    return Measured(spread["median"], spread["low"], spread["high"], about) if spread else None
+
+
+def level_table(title: str, levels: Iterable[Entry]) -> Table:
+    """Return which kernel is cheapest at each error, and how much more others cost."""
+    columns = [
+        Column("level", "error", digits=6),
+        Column("cheapest", "cheapest", words=True),
+        Column("ns", "", "ns/ray"),
     ]
-    show(("kernel", "law", "declared", "measured", "sizes"), rows, "convergence in float64")
+    for family in _FAMILIES:
+        columns += [Column(family, f"cheapest {family}", words=True), Column(f"{family}_ratio", "costs", after=" x")]
+    rows = []
+    for level in levels:
+        rivals = [
+            part for name in _FAMILIES for part in (level["rivals"].get(name) or "none", level["ratios"].get(name))
+        ]
+        rows.append((level["level"], level["cheapest"] or "none", level["ns"], *rivals))
+    return table(title, columns, rows)
 
 
-def convergence_data(found: "Convergence") -> dict[str, Any]:
-    """Return one convergence for JSON: what is declared and measured, without the rays."""
+def order_table(convergences: Iterable[Entry], *, code: bool = False) -> Table:
+    """Return the declared and the measured order of convergence."""
+    columns = (
+        Column("kernel", "kernel", words=True),
+        Column("law", "law", words=True),
+        Column("declared", "declared"),
+        Column("measured", "measured"),
+        Column("sizes", "sizes"),
+    )
+    rows = []
+    for one in convergences:
+        declared = one["declared"] or {}
+        name = Name(one["kernel"]) if code else one["kernel"]
+        sizes = Interval(one["sizes"][0], one["sizes"][-1])
+        rows.append((name, declared.get("kind"), declared.get("value"), one["measured"], sizes))
+    return table("convergence in float64", columns, rows)
+
+
+def convergence_data(found: Any) -> dict[str, Any]:
+    """Return a `validation.kernels.convergence.Convergence` for JSON: what is declared and measured, not the rays."""
     from validation.metrics.errors import plain
 
     declared = found.declared
@@ -67,31 +104,3 @@ def convergence_data(found: "Convergence") -> dict[str, Any]:
         "declared": {"kind": declared.kind, "value": declared.value, "power": declared.power} if declared else None,
         "measured": plain(found.measured),
     }
-
-
-def _cost_row(cost: "KernelCost") -> tuple[str, ...]:
-    about = "" if cost.rays else "~"
-    return (
-        cost.kernel,
-        *_spread(cost.device, about),
-        *_spread(cost.wall, about),
-        str(cost.rays or "-"),
-        number(cost.median),
-        number(cost.p99),
-        number(cost.max),
-        str(cost.nonfinite or ""),
-    )
-
-
-def _spread(spread: "Spread | None", about: str) -> tuple[str, str]:
-    if spread is None:
-        return "-", "-"
-    return about + number(spread.median), f"{number(spread.low)}..{number(spread.high)}"
-
-
-def _level_row(level: "Level") -> tuple[str, ...]:
-    cells = [f"{level.level:g}", level.cheapest or "none", number(level.ns)]
-    for family in ("uniform", "table"):
-        ratio = level.ratios.get(family)
-        cells += [level.rivals.get(family) or "none", "-" if ratio is None else f"{number(ratio)} x"]
-    return tuple(cells)

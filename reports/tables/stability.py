@@ -1,25 +1,27 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The tables of `airlight stability`, in the manner of Boost's accuracy reports: Max = 3.2ε (Mean = 0.4ε)."""
+"""Where kernels break, in the manner of Boost's accuracy reports: Max = 3.2ε (Mean = 0.4ε).
 
-from typing import TYPE_CHECKING
+The data are those that `airlight stability --json` prints.
+"""
 
-from reports.tables.terminal import number, print_table
-from validation.kernels.errors import EPSILON, Errors
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
-if TYPE_CHECKING:
-    from validation.frames.plane_stability import PlaneStability
-    from validation.kernels.stability import KernelStability, SetStability
+from reports.tables.table import Column, Row, Table, number, table
+from reports.tables.terminal import print_table
 
-_HEADERS = ("rays", "count", "refused", "float32", "median", "99 %", "NaN/Inf/<0", "float64", "NaN/Inf/<0", "32 vs 64")
+Entry = Mapping[str, Any]
+
+_EPSILON = {"single": 2.0**-23, "double": 2.0**-52}
 
 
-def print_stability(found: "list[KernelStability]", *, certified: bool) -> None:
-    """Print what `validation.kernels.stability.stability` found.
+def print_stability(kernels: Sequence[Entry], *, certified: bool) -> None:
+    """Print the tables of every kernel.
 
     Parameters
     ----------
-    found
-        One entry for each kernel.
+    kernels
+        An entry for each, as in JSON.
     certified
         Whether the files of certified values were there.
     """
@@ -28,103 +30,148 @@ def print_stability(found: "list[KernelStability]", *, certified: bool) -> None:
         print(
             "The certified values are not installed (they are in tests/data of a clone): only generated rays are used."
         )
-    for kernel in found:
-        claim = ", claims to be exact" if kernel.exact else ""
-        print(f"\n=== {kernel.kernel}{claim} ===")
-        for phase, words in kernel.refused.items():
+    for kernel in kernels:
+        claim = ", claims to be exact" if kernel["exact"] else ""
+        print(f"\n=== {kernel['kernel']}{claim} ===")
+        for phase, words in kernel["refused"].items():
             print(f"refuses {phase}: {words}")
-        for one in kernel.sets:
-            print_table(_HEADERS, [_row(one, group) for group in one.single], one.name)
+        for one in kernel["sets"]:
+            print_table(set_table(one))
             _print_worst(one)
-        _print_gamma(kernel)
-        _print_laws(kernel)
-        for words in kernel.broken:
-            print(f"BROKEN: {kernel.kernel}, {words}")
+        print_table(gamma_table(kernel["gamma"]))
+        print_table(law_table(kernel["laws"]))
+        for words in kernel["broken"]:
+            print(f"BROKEN: {kernel['kernel']}, {words}")
 
 
-def print_plane_stability(found: "list[PlaneStability]", broken: list[str]) -> None:
-    """Print what `validation.frames.plane_stability.plane_stability` found, and what of it breaks the bar of the
-    default.
-    """
-    headers = ("shadow planes", "sum", "precision", "median", "99 %", "max", "beyond 1e-4", "negative", "NaN/Inf")
-    rows = [
-        (
-            one.case,
-            one.sum,
-            one.precision,
-            number(one.median),
-            number(one.p99),
-            number(one.max),
-            *(str(count) if count else "" for count in (one.beyond, one.negative, one.nonfinite)),
-        )
-        for one in found
-    ]
+def print_plane_stability(cases: Iterable[Entry], broken: Iterable[str]) -> None:
+    """Print what was found of shadow planes, and what of it breaks the bar of the default."""
     print()
-    print_table(headers, rows, "cancellation between shadow planes: errors relative to each pixel's true value")
+    print_table(plane_table(cases))
     print(
-        "segments: J of each lit segment (the default); gamma: differences of Gamma a segment; planes: Gamma plane by"
+        "segments: J of each lit segment (the default); gamma: differences of Gamma a segment; planes: Gamma plane by\n"
+        "plane as published, float32 against float64 (its negative pixels are the artefact of Fig. 4)"
     )
-    print("plane as published, float32 against float64 (its negative pixels are the artefact of Fig. 4)")
     for words in broken:
         print(f"BROKEN: shadow planes, {words}")
 
 
-def boost(errors: Errors, precision: str) -> str:
-    """Return 'Max = 3.2ε (Mean = 0.4ε)', a dash where nothing was compared."""
-    if errors.max is None or errors.mean is None:
-        return "-"
-    epsilon = EPSILON[precision]
-    return f"Max = {number(errors.max / epsilon)}ε (Mean = {number(errors.mean / epsilon)}ε)"
-
-
-def _row(one: "SetStability", group: str) -> tuple[str, ...]:
-    single, double = one.single[group], one.double[group]
-    return (
-        group,
-        str(single.rays),
-        str(single.refused) if single.refused else "",
-        boost(single, "single"),
-        number(single.median),
-        number(single.p99),
-        _counts(single),
-        boost(double, "double"),
-        _counts(double),
-        number(one.single_against_double[group].max),
+def summary_table(kernels: Iterable[Entry]) -> Table:
+    """Return a row for each kernel and each set of rays, all of these together."""
+    columns = (
+        Column("kernel", "kernel", words=True),
+        Column("set", "rays", words=True),
+        Column("rays", "measured"),
+        Column("refused", "refused"),
+        Column("median", "float32 median", digits=2),
+        Column("p99", "99 %", digits=2),
+        Column("max", "largest", digits=2),
+        Column("odd", "not finite or negative", alarm=True),
+        Column("double", "float64 largest", digits=2),
     )
+    rows = []
+    for kernel in kernels:
+        for one in kernel["sets"]:
+            single, double = one["single"]["all"], one["double"]["all"]
+            odd = single["nan"] + single["infinite"] + single["negative"]
+            errors = (single["median"], single["p99"], single["max"])
+            rows.append((kernel["kernel"], one["name"], single["rays"], single["refused"], *errors, odd, double["max"]))
+    return table("Stability of the kernels", columns, rows, explanation="All rays of each set together.")
 
 
-def _counts(errors: Errors) -> str:
-    counts = (errors.nan, errors.infinite, errors.negative)
+def set_table(one: Entry) -> Table:
+    """Return the errors of a kernel on one set of rays, by group."""
+    columns = (
+        Column("group", "rays", words=True),
+        Column("count", "count"),
+        Column("refused", "refused"),
+        Column("single", "float32", words=True),
+        Column("median", "median"),
+        Column("p99", "99 %"),
+        Column("single_odd", "NaN/Inf/<0"),
+        Column("double", "float64", words=True),
+        Column("double_odd", "NaN/Inf/<0"),
+        Column("precisions", "32 vs 64"),
+    )
+    rows = []
+    for group, single in one["single"].items():
+        double = one["double"][group]
+        first = (group, single["rays"], single["refused"] or "", boost(single, "single"))
+        quantiles = (single["median"], single["p99"], _odd(single))
+        both = one["single_against_double"][group]["max"]
+        rows.append((*first, *quantiles, boost(double, "double"), _odd(double), both))
+    return table(one["name"], columns, rows)
+
+
+def boost(errors: Entry, precision: str) -> str:
+    """Return 'Max = 3.2ε (Mean = 0.4ε)', a dash where nothing was compared."""
+    if errors["max"] is None or errors["mean"] is None:
+        return "-"
+    epsilon = _EPSILON[precision]
+    return f"Max = {number(errors['max'] / epsilon)}ε (Mean = {number(errors['mean'] / epsilon)}ε)"
+
+
+def _odd(errors: Entry) -> str:
+    counts = (errors["nan"], errors["infinite"], errors["negative"])
     return "/".join(map(str, counts)) if any(counts) else ""
 
 
-def _print_worst(one: "SetStability") -> None:
+def _print_worst(one: Entry) -> None:
     """Print the worst rays as a file that `airlight integrate` reads."""
-    single, double = one.single["all"].worst, one.double["all"].worst
-    if single is None and double is None:
-        return
-    print(f"worst rays, float32 then float64:\n{one.columns}")
-    for line in (single, double):
-        if line is not None:
-            print(line)
+    worst = [line for line in (one["single"]["all"]["worst"], one["double"]["all"]["worst"]) if line is not None]
+    if worst:
+        print("\n".join(["worst rays, float32 then float64:", one["columns"], *worst]))
 
 
-def _print_gamma(kernel: "KernelStability") -> None:
-    headers = ("slivers", "J(x0, x1)", "J(0, x1) - J(0, x0)", "median", "negative", "in ε (J(0, x0) + J(0, x1))")
+def gamma_table(by_precision: Mapping[str, Entry]) -> Table:
+    """Return what is lost to cancellation where J is a difference of two Gammas."""
+    columns = (
+        Column("precision", "slivers", words=True),
+        Column("direct", "J(x0, x1)", words=True),
+        Column("difference", "J(0, x1) - J(0, x0)", words=True),
+        Column("median", "median"),
+        Column("negative", "negative", alarm=True),
+        Column("rounding", "in ε (J(0, x0) + J(0, x1))", words=True),
+    )
     rows = [
         (
             precision,
-            boost(one.direct, precision),
-            boost(one.difference, precision),
-            number(one.difference.median),
-            str(one.difference.negative),
-            f"Max = {number(one.max_rounding)} (Median = {number(one.median_rounding)})",
+            boost(one["direct"], precision),
+            boost(one["difference"], precision),
+            one["difference"]["median"],
+            one["difference"]["negative"],
+            f"Max = {number(one['max_rounding'])} (Median = {number(one['median_rounding'])})",
         )
-        for precision, one in kernel.gamma.items()
+        for precision, one in by_precision.items()
     ]
-    print_table(headers, rows, "cancellation: thin lit slivers far from the light")
+    return table("cancellation: thin lit slivers far from the light", columns, rows)
 
 
-def _print_laws(kernel: "KernelStability") -> None:
-    rows = [(law.name, str(law.rows), number(law.single), number(law.double)) for law in kernel.laws]
-    print_table(("law", "rays", "float32", "float64"), rows, "exact laws: largest relative deviation")
+def law_table(laws: Iterable[Entry]) -> Table:
+    """Return how far a kernel is off laws that hold exactly."""
+    columns = (
+        Column("law", "law", words=True),
+        Column("rays", "rays"),
+        Column("single", "float32"),
+        Column("double", "float64"),
+    )
+    rows = [(law["name"], law["rows"], law["single"], law["double"]) for law in laws]
+    return table("exact laws: largest relative deviation", columns, rows)
+
+
+def plane_table(cases: Iterable[Entry]) -> Table:
+    """Return the errors of shadow planes in hard cases."""
+    columns = (
+        Column("case", "shadow planes", words=True),
+        Column("sum", "sum", words=True),
+        Column("precision", "precision", words=True),
+        Column("median", "median"),
+        Column("p99", "99 %"),
+        Column("max", "max"),
+        Column("beyond", "beyond 1e-4"),
+        Column("negative", "negative", alarm=True),
+        Column("nonfinite", "NaN/Inf", alarm=True),
+    )
+    keys = [column.key for column in columns]
+    rows = [Row({key: one[key] for key in keys}) for one in cases]
+    return table("cancellation between shadow planes: errors relative to each pixel's true value", columns, rows)

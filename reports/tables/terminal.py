@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tables for a terminal, and the same numbers as JSON."""
+"""What commands print: tables, and the same data as JSON."""
 
 import json
-from collections.abc import Sequence
+import shutil
+import sys
 from typing import Any
+
+from reports.tables.drawing import markdown, text
+from reports.tables.table import Table
 
 
 def print_json(data: Any) -> None:
@@ -11,42 +15,10 @@ def print_json(data: Any) -> None:
     print(json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False))
 
 
-def print_table(headers: Sequence[str], rows: Sequence[Sequence[str]], title: str | None = None) -> None:
-    """Print a table: the first column to the left, the others to the right; as wide as it needs where piped."""
-    from rich import box
-    from rich.table import Table
-
-    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
-    for number, header in enumerate(headers):
-        table.add_column(header, justify="left" if number == 0 else "right", overflow="fold")
-    for row in rows:
-        table.add_row(*row)
-    _print(table)
-
-
-def print_words(rows: Sequence[Sequence[str]], headers: Sequence[str]) -> None:
-    """Print a table of words, every column to the left."""
-    from rich import box
-    from rich.table import Table
-
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for header in headers:
-        table.add_column(header, overflow="fold")
-    for row in rows:
-        table.add_row(*row)
-    _print(table)
-
-
-def _print(table) -> None:
-    """Print a table as wide as the terminal, or as it needs where piped."""
-    from rich.console import Console
-
-    console = Console(highlight=False, markup=False)
-    if not console.is_terminal:
-        console = Console(highlight=False, markup=False, width=240)
-    console.print(table)
-
-
-def number(value: float | None, digits: int = 3) -> str:
-    """Return a number with some significant digits, a dash for none."""
-    return "-" if value is None else f"{value:.{digits}g}"
+def print_table(table: Table, *, as_markdown: bool = False) -> None:
+    """Print a table: as wide as the terminal, as it needs where piped, or as Markdown."""
+    if as_markdown:
+        print(f"\n{markdown(table)}", end="")
+        return
+    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+    print(text(table, width=width), end="")

@@ -94,7 +94,7 @@ def method(label, **changes):
         "left_out": False,
         "note": None,
         "knows_shadows": True,
-        "times": {name: timing(3.21) for name in ("frame", "surface", "airlight", "rebuild")},
+        "times": {name: timing(3.21) for name in ("frame", "surface", "airlight", "light_moved")},
         "error": error,
         "flip": {"value": 0.0321, "note": ""},
         "files": {"picture": "s/good.png", "error": "s/good-error.png", "exr": "s/good.exr"},

@@ -9,7 +9,13 @@ import numpy as np
 LABELS = ("unshadowed (exact)", "ray-march (steps=100)", "shadow-planes (exact)", "light-volumes (exact)")
 SCENES = ("fog", "hall", "pens")
 
-_STAGES = {"surface": 0.3, "airlight": 0.7, "frame": 1.0, "rebuild": 1.4, "moved": 1.9}  # of the work of a frame
+_STAGES = {
+    "surface": 0.3,
+    "airlight": 0.7,
+    "frame": 1.0,
+    "light_moved": 1.4,
+    "objects_moved": 1.9,
+}  # of the work of a frame
 
 
 def timing(samples) -> dict[str, float]:

@@ -165,12 +165,10 @@ class FrameTimes:
     frame: Timing  #: camera rays, lit surface, tiles and airlight; shadow maps or planes are there
     surface: Timing  #: camera rays and lit surface
     airlight: Timing  #: tiles and airlight: the kernel with its ray set-up, or the marching
-    rebuild: Timing  #: a frame after the light moved: shadow maps or silhouettes and planes, all stages
-    moved: Timing  #: a frame after the objects moved too: acceleration structure, adjacent planes, all of the above
-    relit: Timing  #: a frame after the light alone moved: that of `rebuild` with the camera rays of the last frame
-    recoloured: (
-        Timing  #: a frame after nothing moved, medium or colours changed: surface and airlight from what is there
-    )
+    light_moved: Timing  #: a frame after the light moved: shadow maps or silhouettes and planes, all stages
+    objects_moved: Timing  #: a frame after the objects moved too: acceleration structure, adjacent planes, all stages
+    light_moved_camera_kept: Timing  #: a frame after the light moved, with the camera rays of the last frame
+    colours_changed: Timing  #: a frame after only medium or colours changed: surface and airlight from what is there
 
 
 def time_frame(renderer: FrameRenderer, *, seconds: float = 0.6, slow: float | None = None) -> FrameTimes:
@@ -208,7 +206,7 @@ def time_frame(renderer: FrameRenderer, *, seconds: float = 0.6, slow: float | N
 
     objects = _objects(scene)
 
-    def moved():
+    def objects_moved():
         # Where they stand: the work is that of any other place.
         there = turned_objects(scene, objects, np.eye(3)) if objects else scene
         next_frame(renderer, there, None, camera_moved=False, geometry_moved=True, light_moved=True)
@@ -220,10 +218,10 @@ def time_frame(renderer: FrameRenderer, *, seconds: float = 0.6, slow: float | N
         frame=time_repeated(lambda: run_stages(renderer, prepared), seconds=seconds),
         surface=time_repeated(surface, seconds=seconds),
         airlight=time_repeated(airlight, seconds=seconds),
-        rebuild=few(moved_light(renderer)),
-        moved=few(moved),
-        relit=few(moved_light_alone(renderer, kept)),
-        recoloured=few(changed_look(renderer, kept)),
+        light_moved=few(moved_light(renderer)),
+        objects_moved=few(objects_moved),
+        light_moved_camera_kept=few(moved_light_alone(renderer, kept)),
+        colours_changed=few(changed_look(renderer, kept)),
     )
 
 
@@ -261,15 +259,15 @@ def _slow_frame(renderer: FrameRenderer, *, turns: int) -> FrameTimes:
         return Timing(median, low, high, turns)
 
     airlight = in_tiles + rest
-    rebuild = prepare + surface + airlight
+    light_moved = prepare + surface + airlight
     return FrameTimes(
         frame=timing(surface + airlight),
         surface=timing(surface),
         airlight=timing(airlight),
-        rebuild=timing(rebuild),
-        moved=timing(move + rebuild),
-        relit=timing(shade + airlight + prepare * bool(needed & {"light", "look"})),
-        recoloured=timing(shade + rest + prepare * ("look" in needed)),
+        light_moved=timing(light_moved),
+        objects_moved=timing(move + light_moved),
+        light_moved_camera_kept=timing(shade + airlight + prepare * bool(needed & {"light", "look"})),
+        colours_changed=timing(shade + rest + prepare * ("look" in needed)),
     )
 
 

@@ -11,7 +11,7 @@ Channels count as values of their own: nothing is summed or weighted over them. 
 image, so that every relative number is free of units, and dim airlight counts as much as bright.
 """
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, is_dataclass
 from typing import Any
 
 import numpy as np
@@ -153,7 +153,11 @@ def colours(image: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def plain(value: Any) -> Any:
-    """Return a number, a pair or a text as JSON holds it: no NumPy types, None for what is not finite."""
+    """Return dataclasses, containers and numbers as JSON holds them: no NumPy types, None for what is not finite."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return plain(asdict(value))
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, tuple | list):
         return [plain(item) for item in value]
     if isinstance(value, bool | np.bool_):

@@ -46,7 +46,7 @@ def conclusions(figures: Sequence[FigureRow], table: Sequence[TableRow]) -> list
 
 def _adaptive(table: Sequence[TableRow]) -> Iterator[str]:
     for published in _views(table):
-        rows = {(row.map, row.evaluation): _rate(row.rebuilt) for row in table if row.published == published}
+        rows = {(row.map, row.evaluation): _rate(row.light_moved) for row in table if row.published == published}
         pairs = {size: (rows.get((size, "static")), rows.get((size, "adaptive"))) for size, _ in rows}
         known = {size: (one, other) for size, (one, other) in pairs.items() if one and other}
         if not known:
@@ -69,7 +69,7 @@ def _walk(table: Sequence[TableRow]) -> Iterator[str]:
         found = []
         for size in dict.fromkeys(row.map for row in table if row.published == published):
             rates = {
-                row.evaluation: _rate(row.rebuilt) for row in table if (row.published, row.map) == (published, size)
+                row.evaluation: _rate(row.light_moved) for row in table if (row.published, row.map) == (published, size)
             }
             meshes = [rate for name in ("static", "adaptive") if (rate := rates.get(name))]
             if meshes and (walk := rates.get("walk")):
@@ -82,13 +82,13 @@ def _marching(figures: Sequence[FigureRow]) -> Iterator[str]:
     whole = [row for row in figures if row.entry.where != TILES]
     marched = {dict(row.entry.parameters)["steps"]: row for row in whole if row.entry.method == "ray-march"}
     volume = _fastest([row for row in figures if row.entry.where.startswith("Fig. 7")])
-    if volume is None or volume.error is None or volume.map_error is None or volume.rebuilt is None:
+    if volume is None or volume.error is None or volume.map_error is None or volume.light_moved is None:
         return
     for steps, row in marched.items():
-        if row.rebuilt is None or row.error is None or row.map_error is None:
+        if row.light_moved is None or row.error is None or row.map_error is None:
             yield f"Fig. 7: marching with {steps} samples was not measured: {row.missing}."
             continue
-        times = row.rebuilt.median_ms / volume.rebuilt.median_ms
+        times = row.light_moved.median_ms / volume.light_moved.median_ms
         words = f"Fig. 7: marching with {steps} samples takes {times:.3g} times as long as the light volume"
         if row.entry.fps and volume.entry.fps:
             words += f" (published: {volume.entry.fps / row.entry.fps:.3g})"
@@ -111,9 +111,15 @@ def _tiles(figures: Sequence[FigureRow]) -> Iterator[str]:
         values = dict(row.entry.parameters)
         del values["tolerance"]
         other = by_entry.get((row.entry.method, row.entry.map, tuple(values.items())))
-        if other is None or row.rebuilt is None or other.rebuilt is None or row.error is None or other.error is None:
+        if (
+            other is None
+            or row.light_moved is None
+            or other.light_moved is None
+            or row.error is None
+            or other.error is None
+        ):
             continue
-        share = row.rebuilt.median_ms / other.rebuilt.median_ms
+        share = row.light_moved.median_ms / other.light_moved.median_ms
         yield (
             f"{row.entry.scene}, {row.entry.configuration('exact').label}: where airlight between the corners of tiles "
             f"is interpolated, a frame takes {share:.2f} of the time; relative RMSE against the truth "
@@ -125,8 +131,8 @@ def _walls(figures: Sequence[FigureRow]) -> Iterator[str]:
     pairs: dict[tuple[str, int], dict[str, tuple[float, float]]] = {}
     for row in figures:
         walls = dict(row.entry.parameters).get("walls") if row.entry.where != TILES else None
-        if walls is not None and row.rebuilt is not None and row.error is not None:
-            measured = row.rebuilt.median_ms, row.error.relative_rmse
+        if walls is not None and row.light_moved is not None and row.error is not None:
+            measured = row.light_moved.median_ms, row.error.relative_rmse
             pairs.setdefault((row.entry.scene, row.entry.map), {})[str(walls)] = measured
     for (scene, texels), found in pairs.items():
         if len(found) == 2:
@@ -142,8 +148,8 @@ def _map_sizes(figures: Sequence[FigureRow]) -> Iterator[str]:
     times: dict[int, tuple[float, float]] = {}
     for size in sorted({row.entry.map for row in rows}):
         row = _fastest([row for row in rows if row.entry.map == size])
-        if row is not None and row.rebuilt is not None and row.entry.fps:
-            times[size] = row.rebuilt.median_ms, row.entry.fps
+        if row is not None and row.light_moved is not None and row.entry.fps:
+            times[size] = row.light_moved.median_ms, row.entry.fps
     if len(times) < 2:
         return
     small, large = min(times), max(times)
@@ -161,8 +167,8 @@ def _views(table: Sequence[TableRow]) -> list[PublishedTable]:
 
 def _fastest(rows: Sequence[FigureRow]) -> FigureRow | None:
     """Return the row of light volumes that was measured and is the fastest."""
-    timed = [row for row in rows if row.entry.method == "light-volumes" and row.rebuilt is not None]
-    return min(timed, key=lambda row: row.rebuilt.median_ms if row.rebuilt else 0.0) if timed else None
+    timed = [row for row in rows if row.entry.method == "light-volumes" and row.light_moved is not None]
+    return min(timed, key=lambda row: row.light_moved.median_ms if row.light_moved else 0.0) if timed else None
 
 
 def _rate(timing: Timing | None) -> float | None:

@@ -101,10 +101,14 @@ class FigureRow:
 
     entry: FigureEntry
     size: tuple[int, int]  #: [pixels]
-    rebuilt: Timing | None = None  #: a frame after the light moved: shadow map, volume, all stages
+    light_moved: Timing | None = None  #: a frame after the light moved: shadow map, volume, all stages
     static: Timing | None = None  #: a frame with static light and geometry, of a camera that moved
-    relit: Timing | None = None  #: a frame after the light moved, the camera rays of the last one kept
-    recoloured: Timing | None = None  #: a frame after only medium or colours changed: map, tiles, camera rays are kept
+    light_moved_camera_kept: Timing | None = (
+        None  #: a frame after the light moved, the camera rays of the last one kept
+    )
+    colours_changed: Timing | None = (
+        None  #: a frame after only medium or colours changed: map, tiles, camera rays are kept
+    )
     error: Metrics | None = None  #: of the airlight against the truth
     map_error: Metrics | None = None  #: of the airlight against what the shadow map stands for
     missing: str | None = None
@@ -242,9 +246,9 @@ def time_rates(renderer: FrameRenderer, seconds: float) -> dict[str, Any]:
     """Time frames after the light moved and with less than that, in turns; the fields of a row by name."""
     kept = first_frame(renderer)
     works = {
-        "rebuilt": moved_light(renderer),
+        "light_moved": moved_light(renderer),
         "static": lambda: run_stages(renderer, kept.prepared),
-        "relit": moved_light_alone(renderer, kept),
-        "recoloured": changed_look(renderer, kept),
+        "light_moved_camera_kept": moved_light_alone(renderer, kept),
+        "colours_changed": changed_look(renderer, kept),
     }
     return dict(zip(works, time_in_turns(list(works.values()), seconds=3 * seconds, least=3), strict=True))

@@ -92,10 +92,10 @@ class TableRow:
     size: tuple[int, int]  #: of the frame [pixels]
     faces: int = 1  #: of the shadow map
     triangles: int = 0  #: of the light volume; 0 where it has none
-    rebuilt: Timing | None = None
+    light_moved: Timing | None = None
     static: Timing | None = None
-    relit: Timing | None = None
-    recoloured: Timing | None = None
+    light_moved_camera_kept: Timing | None = None
+    colours_changed: Timing | None = None
     passes: Mapping[str, float] = field(default_factory=dict)  #: [ms]
     against_static: Metrics | None = None  #: of the airlight against that of the static mesh
     missing: str | None = None
@@ -171,9 +171,9 @@ def _expected_missing(empty: TableRow, last: TableRow | None, limit: float) -> T
     """Return a row that says why it is not begun, if the last size of the map says so."""
     if last is None:
         return None
-    if last.rebuilt is None:
+    if last.light_moved is None:
         return replace(empty, missing=f"not begun after map {last.map}: {last.missing}")
-    expected = 1e-3 * last.rebuilt.median_ms * (empty.map / last.map) ** 2
+    expected = 1e-3 * last.light_moved.median_ms * (empty.map / last.map) ** 2
     if expected <= limit:
         return None
     words = f"a frame may take {expected:.0f} s, by that of map {last.map}: more than the limit of {limit:g} s"

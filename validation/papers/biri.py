@@ -98,10 +98,10 @@ class TableRow:
     size: tuple[int, int]  #: of the frame that was timed [pixels]
     triangles: int
     stages_ms: tuple[float, ...]  #: of Table 1, in the order of `STAGES`
-    rebuilt: Timing  #: a frame after the light moved: all stages
+    light_moved: Timing  #: a frame after the light moved: all stages
     static: Timing  #: a frame whose planes are there: camera rays, surface, tile lists, airlight
-    relit: Timing  #: a frame after the light moved, the camera rays of the last one kept
-    recoloured: Timing  #: a frame after only medium or colours changed: planes, tile lists, camera rays are kept
+    light_moved_camera_kept: Timing  #: a frame after the light moved, the camera rays of the last one kept
+    colours_changed: Timing  #: a frame after only medium or colours changed: planes, tile lists, camera rays are kept
     rays: Timing  #: the camera rays alone
     error: Metrics  #: of the airlight at pixel centres, at `error_size`
     error_size: tuple[int, int]
@@ -158,7 +158,9 @@ def biri_row(
         camera_rays(renderer),
         *_stages(renderer, kernel, kept),
     ]
-    rebuilt, static, relit, recoloured, rays, *stages = time_in_turns(works, seconds=8 * seconds)
+    light_moved, static, light_moved_camera_kept, colours_changed, rays, *stages = time_in_turns(
+        works, seconds=8 * seconds
+    )
     return TableRow(
         published,
         kernel,
@@ -167,10 +169,10 @@ def biri_row(
         size,
         sum(shape.face_count() for shape in loaded.shapes()),
         _shared([stage.median_ms for stage in stages]),
-        rebuilt,
+        light_moved,
         static,
-        relit,
-        recoloured,
+        light_moved_camera_kept,
+        colours_changed,
         rays,
         error,
         error_size,

@@ -4,7 +4,7 @@ import json
 import pytest
 
 from reports.commands import main as cli
-from reports.tables.map_size import parse_map_sizes
+from reports.commands.maps import parse_map_sizes
 
 
 def test_command_prints_errors_with_their_slope(variant, capfd):

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import copy
 
-from reports.data.claims import claims, confirmed, unstudied, verdict
+from reports.data.claims import claims, confirmed, unstudied
+from reports.tables.agreement import verdict
 
 
 def timing(median):
@@ -12,7 +13,7 @@ def method(label, rmse, median, *, refused=None):
     """What a report says of a configuration, by hand."""
     if refused:
         return {"label": label, "refused": refused, "error": None, "times": None}
-    times = {name: timing(median) for name in ("frame", "surface", "airlight", "rebuild")}
+    times = {name: timing(median) for name in ("frame", "surface", "airlight", "light_moved")}
     return {"label": label, "refused": None, "error": {"relative_rmse": rmse}, "times": times}
 
 

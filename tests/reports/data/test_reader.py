@@ -39,7 +39,7 @@ def small_report():
         "refused": None,
         "left_out": False,
         "note": None,
-        "times": {name: timing(2.0) for name in ("frame", "surface", "airlight", "rebuild", "moved")},
+        "times": {name: timing(2.0) for name in ("frame", "surface", "airlight", "light_moved", "objects_moved")},
         "error": error(0.002),
         "surface_error": None,
         "flip": None,

@@ -135,7 +135,7 @@ def test_every_method_kernel_and_scene_has_its_place(extension):
 
 
 def test_a_method_s_table_holds_the_numbers_of_the_report(extension):
-    from reports.tables.terminal import number
+    from reports.tables.table import number
 
     measured = extension("measured")
     table = measured.method("shadow-planes")

@@ -27,7 +27,7 @@ ERROR = {name: 0.01 for name in ("relative_rmse", "relative_bias", "p50", "p99",
 def method(name, kernel=None, parameters=None, **changes):
     label = f"{name} ({kernel})" if kernel else name
     files = {"picture": "open-fog/a.png", "error": "open-fog/b.png"}
-    times = {key: TIMES for key in ("frame", "surface", "airlight", "rebuild", "moved")}
+    times = {key: TIMES for key in ("frame", "surface", "airlight", "light_moved", "objects_moved")}
     found = {"label": label, "method": name, "kernel": kernel, "parameters": parameters or {}, "knows_shadows": True}
     found |= {"refused": None, "note": None, "times": times, "error": ERROR, "files": files, "flip": None}
     return found | changes
@@ -90,7 +90,7 @@ def test_a_report_is_kept_without_what_is_not_shown(variant, folder, tmp_path):
     assert scene["counts"] == {"shapes": 0, "triangles": 0, "lights": 1}
     assert scene["baseline"] == 7
     assert scene["methods"][2]["refused"] == "not in this fog"
-    assert set(scene["methods"][0]["times"]) == {"frame", "airlight", "rebuild"}
+    assert set(scene["methods"][0]["times"]) == {"frame", "airlight", "light_moved"}
     assert found["pictures"]["unshadowed"]["label"] == "unshadowed (exact)"  # the one that shows the method best
     assert "min-max" not in found["pictures"]
     assert (data / "method-unshadowed-error.png").exists()

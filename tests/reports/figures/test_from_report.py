@@ -30,7 +30,9 @@ def method(label, error, *, layer="airlight", files=None):
         "method": label.split(" ")[0],
         "refused": None,
         "layer": layer,
-        "times": {"frame": timing(12.5), "moved": timing(25.0)} if layer == "airlight" else None,
+        "times": {"frame": timing(12.5), "light_moved": timing(20.0), "objects_moved": timing(25.0)}
+        if layer == "airlight"
+        else None,
         "error": metrics,
         "files": files or {},
     }
@@ -54,7 +56,7 @@ def published():
         "triangles": 34_549,
         "stages_ms": [1.0, 2.0, 3.0, 4.0, 10.0],
         "shares": [5.0, 10.0, 15.0, 20.0, 50.0],
-        "rebuilt": timing(20.0),
+        "light_moved": timing(20.0),
         "static": timing(10.0),
         "error": {"relative_rmse": 8e-7},
     }
@@ -66,14 +68,14 @@ def published():
         "parameters": [["evaluation", "mesh"]],
         "fps": 230,
     }
-    image = {"entry": entry, "size": [512, 512], "rebuilt": timing(50.0), "error": {"relative_rmse": 0.04}}
+    image = {"entry": entry, "size": [512, 512], "light_moved": timing(50.0), "error": {"relative_rmse": 0.04}}
     view = {
         "published": {"what": "Sponza", "fps": 86, "passes": {}},
         "scene": "colonnade",
         "map": 1024,
         "evaluation": "static",
         "size": [1024, 1024],
-        "rebuilt": None,
+        "light_moved": None,
         "missing": "a frame takes 40 s",
     }
     stages = ["silhouettes", "scene", "airlight of the scene", "sorting", "shadow planes"]
@@ -117,6 +119,10 @@ def report(tmp_path_factory):
     return folder
 
 
+#: Frame, light moved, objects moved: medians, and the distances to their quartiles.
+SPREADS = [("12.5", "1.2", "2.5"), ("20.0", "2.0", "4.0"), ("25.0", "2.5", "5.0")]
+
+
 def rows_of(path):
     with open(path, newline="", encoding="utf-8") as file:
         return list(csv.DictReader(file))
@@ -146,14 +152,16 @@ def test_methods_table_has_units_quartiles_and_what_was_refused(report, tmp_path
     figure_methods_table.compute(tmp_path, report=report)
     figure_methods_table.plot(tmp_path)
     text = (tmp_path / "methods-table.tex").read_text(encoding="utf-8")
-    assert r"\textit{a\_scene}, 32 $\times$ 24, truth known to $4.0\times10^{-11}$" in text
-    assert r"march (steps=8) & $12.5_{-1.2}^{+2.5}$ & $25.0_{-2.5}^{+5.0}$ & $0.020$ & $-0.020$ & $0.060$ \\" in text
-    assert r"engine (total) & -- & -- & $0.10$" in text
-    assert r"refused\_one & \multicolumn{5}{l}{refused} \\" in text
-    assert "[ms]" in text
+    assert r"\textit{a\_scene}, 32 $\times$ 24, truth known to \num{4.0e-11}" in text
+    times = " & ".join(rf"$\num{{{m}}}_{{-\num{{{a}}}}}^{{+\num{{{b}}}}}$" for m, a, b in SPREADS)
+    assert rf"march (steps=8) & {times} & \num{{0.020}} & \num{{-0.020}} & \num{{0.060}} \\" in text
+    assert r"engine (total) & -- & -- & -- & \num{0.10}" in text
+    assert r"refused\_one & \multicolumn{6}{l}{refused} \\" in text
+    assert "method & frame & light moved & objects moved & rel. RMSE & rel. bias & p99" in text
+    assert "[ms] & [ms] & [ms]" in text
     for line in text.splitlines():  # as many cells as columns
         if line.endswith(r"\\") and "multicolumn" not in line:
-            assert line.count("&") == 5
+            assert line.count("&") == 6
 
 
 def test_stages_come_from_the_report_and_add_up(report, tmp_path):
@@ -163,8 +171,11 @@ def test_stages_come_from_the_report_and_add_up(report, tmp_path):
         assert sum(float(row["share_percent"]) for row in rows if row["row"] == name) == 100
     assert drawn(figure_stages, tmp_path) == drawn(figure_stages, tmp_path)
     text = (tmp_path / "stages.tex").read_text(encoding="utf-8")
-    assert r"published & $1$ & $9$ & $22$ & $9$ & $59$ & -- \\" in text
-    assert r"exact, 800 $\times$ 600 & $5.00$ & $10.0$ & $15.0$ & $20.0$ & $50.0$ & $20.0$ \\" in text
+    assert r"published & \num{1} & \num{9} & \num{22} & \num{9} & \num{59} & -- \\" in text
+    assert (
+        r"exact, 800 $\times$ 600 & \num{5.00} & \num{10.0} & \num{15.0} & \num{20.0} & \num{50.0} & \num{20.0} \\"
+        in text
+    )
 
 
 def test_published_compares_only_what_has_the_published_size(report, tmp_path):
@@ -178,8 +189,9 @@ def test_published_compares_only_what_has_the_published_size(report, tmp_path):
     assert rows[2]["missing"] == "a frame takes 40 s"
     assert drawn(figure_published, tmp_path) == drawn(figure_published, tmp_path)
     text = (tmp_path / "published.tex").read_text(encoding="utf-8")
-    assert r"& $23$ & $50.0_{-8.3}^{+5.6}$ & $2.2$ & $8.0\times10^{-7}$ \\" in text
-    assert r"light-volumes, mesh, 512 $\times$ 512 & $230$ & $20.0_{-3.3}^{+2.2}$ & -- & $0.040$ \\" in text
+    assert r"& \num{23} & $\num{50.0}_{-\num{8.3}}^{+\num{5.6}}$ & \num{2.2} & \num{8.0e-7} \\" in text
+    rate = r"$\num{20.0}_{-\num{3.3}}^{+\num{2.2}}$"
+    assert rf"light-volumes, mesh, 512 $\times$ 512 & \num{{230}} & {rate} & -- & \num{{0.040}} \\" in text
 
 
 def test_the_strip_shows_where_methods_are_wrong(report, tmp_path):

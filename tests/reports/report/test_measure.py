@@ -164,7 +164,7 @@ def test_every_number_of_the_data_is_on_the_page(written):
     page = (written.folder / "report.html").read_text(encoding="utf-8")
     (scene,) = written.data["scenes"]
     for one in scene["methods"][1:]:
-        for name in ("frame", "airlight", "surface", "rebuild"):
+        for name in ("frame", "airlight", "surface", "light_moved"):
             assert number(one["times"][name]["median_ms"]) in page
         for name in ("relative_rmse", "relative_bias", "p50", "p99"):
             assert percent(one["error"][name]) in page

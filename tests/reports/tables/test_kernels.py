@@ -6,7 +6,8 @@ import typer
 
 from reports.commands.stability import stability as command
 from reports.data.serialize import plain
-from reports.tables.kernels import convergence_data, print_convergence, print_kernel_bench
+from reports.tables.drawing import text
+from reports.tables.kernels import convergence_data, kernel_tables, order_table
 from reports.tables.stability import boost
 from validation.kernels.benchmark import KernelBench, KernelCost, Spread, speed_against_error
 from validation.kernels.convergence import Convergence
@@ -17,19 +18,19 @@ ERRORS = Errors(3, 0, 2.0**-23, 1e-6, 2.0**-20, 2.0**-22, 0, 0, 0, None)
 
 
 def test_errors_are_printed_in_the_manner_of_boost():
-    assert boost(ERRORS, "single") == "Max = 8ε (Mean = 2ε)"
-    assert boost(Errors(0, 3, None, None, None, None, 0, 0, 0, None), "double") == "-"
+    assert boost(plain(ERRORS), "single") == "Max = 8ε (Mean = 2ε)"
+    assert boost(plain(Errors(0, 3, None, None, None, None, 0, 0, 0, None)), "double") == "-"
 
 
-def test_costs_and_levels_are_printed(capsys):
+def test_costs_and_levels_are_printed():
     costs = (
         KernelCost("exact", "exact", None, "isotropic", 0.0, 480_000, SPREAD, SPREAD, 1e-7, 1e-6, 2e-5),
         KernelCost("uniform-8", "uniform", 8, "isotropic", 0.0, 0, SPREAD, SPREAD, 0.1, 0.5, 0.9),
         KernelCost("closed-form", "closed-form", None, "isotropic", 0.0, refused="not today"),
     )
-    print_kernel_bench(KernelBench(costs, speed_against_error(costs)))
-    printed = capsys.readouterr().out
-    assert "closed-form, isotropic: refused: not today" in printed
+    found = plain(KernelBench(costs, speed_against_error(costs)))
+    printed = "".join(text(table) for table in kernel_tables(found["costs"], found["levels"]))
+    assert "closed-form: refused: not today" in printed
     exact, uniform = (next(line for line in printed.splitlines() if name in line) for name in ("exact", "uniform-8"))
     assert exact.split()[:3] == ["exact", "7.5", "7.25..8"]
     assert uniform.split()[1] == "~7.5"
@@ -42,9 +43,9 @@ def test_costs_and_levels_are_printed(capsys):
     ]
 
 
-def test_convergence_without_a_declaration_is_printed(capsys):
-    print_convergence([Convergence("own", (4, 8), (0.1, 0.01), 3.3, 0.5)])
-    assert capsys.readouterr().out.splitlines()[-2].split() == ["own", "-", "-", "-", "4..8"]
+def test_convergence_without_a_declaration_is_printed():
+    table = order_table([convergence_data(Convergence("own", (4, 8), (0.1, 0.01), 3.3, 0.5))])
+    assert text(table).splitlines()[-2].split() == ["own", "-", "-", "-", "4..8"]
 
 
 @pytest.fixture

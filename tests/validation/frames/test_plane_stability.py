@@ -6,6 +6,7 @@ import pytest
 
 from reports.tables.stability import print_plane_stability
 from validation.frames.plane_stability import _compared, broken, hard_cases, plane_stability
+from validation.metrics.errors import plain
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +50,7 @@ def test_errors_are_counted_in_units_of_the_true_value():
 
 
 def test_table_names_what_is_broken(found, capsys):
-    print_plane_stability(found, ["deep stack, single: 3 negative"])
+    print_plane_stability(plain(found), ["deep stack, single: 3 negative"])
     text = capsys.readouterr().out
     assert "deep stack" in text
     assert "BROKEN: shadow planes, deep stack, single: 3 negative" in text

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from reports.commands import main as cli
-from reports.papers.billeter import billeter_data, print_billeter
+from reports.papers.billeter import billeter_data, billeter_tables
+from reports.tables.drawing import text
 from validation.configurations.timing import Timing
 from validation.metrics.errors import error_metrics
 from validation.papers.billeter_conclusions import conclusions, pays_from
@@ -75,8 +76,8 @@ def test_a_figure_is_judged_against_truth_and_map(variant):
     for row in (walk, mesh, upright):
         assert row.map_error is not None
         assert row.map_error.relative_rmse < 1e-5  # all are exact with respect to their map, and what it has of walls
-        assert row.rebuilt is not None
-        assert row.rebuilt.median_ms > 0
+        assert row.light_moved is not None
+        assert row.light_moved.median_ms > 0
     assert upright.error is not None
     assert upright.error.relative_rmse < 0.7 * walk.error.relative_rmse
     assert march.map_error is not None
@@ -117,7 +118,7 @@ def test_hall_of_the_table_has_one_map(variant):
 
 def test_what_takes_too_long_is_left_out_and_said(variant):
     rows = table_rows(TABLE[1:], maps=(16, 32), limit=1e-6, **SMALL)
-    assert all(row.rebuilt is None for row in rows)
+    assert all(row.light_moved is None for row in rows)
     assert "more than the limit" in rows[0].missing
     assert rows[4].missing.startswith("not begun after map 16: a frame takes")
     assert any("could not be compared" in one for one in conclusions([], rows))
@@ -127,7 +128,7 @@ def test_a_row_that_must_be_expected_to_take_too_long_is_not_begun(variant, monk
     from validation.papers import billeter_tessellation as billeter_tables
 
     def measured(empty, *rest, **values):
-        return replace(empty, rebuilt=timing(1000))
+        return replace(empty, light_moved=timing(1000))
 
     monkeypatch.setattr(billeter_tables, "_measured", measured)
     rows = table_rows(TABLE[1:], maps=(16, 32, 64), limit=5.0, **SMALL)
@@ -154,7 +155,7 @@ def timing(milliseconds: float) -> Timing:
 
 
 def table_row(size: int, evaluation: str, milliseconds: float) -> TableRow:
-    return TableRow(TABLE[0], size, evaluation, (8, 8), rebuilt=timing(milliseconds))
+    return TableRow(TABLE[0], size, evaluation, (8, 8), light_moved=timing(milliseconds))
 
 
 def test_conclusion_about_adaptive_is_that_of_the_measurement():
@@ -247,14 +248,13 @@ def test_command_prints_the_figures(variant, quick, monkeypatch, capfd):
     assert "Not measured" not in out
 
 
-def test_what_is_not_measured_is_printed_with_its_reason(capfd):
+def test_what_is_not_measured_is_printed_with_its_reason():
     peer = next(one for one in FIGURES if one.where == "peer")
     figures = [FigureRow(peer, (8, 8), missing="no room")]
     table = [TableRow(TABLE[1], 4096, "static", (8, 8), missing="too slow")]
-    print_billeter(figures, table)
-    out = capfd.readouterr().out
-    assert "- peer, colonnade, 8 x 8: min-max (map=512): no room." in out
-    assert "- tangle, 8 x 8, map 4096: static: too slow." in out
+    out = "".join(text(one) for one in billeter_tables(billeter_data(figures, table)))
+    assert "peer, colonnade, 8 x 8: min-max (map=512): not measured: no room" in out
+    assert "tangle, 8 x 8, map 4096: static: not measured: too slow" in out
     assert "96.3" in out  # the pass that was published for this row
     assert billeter_data(figures, table)["table"][0]["missing"] == "too slow"
 

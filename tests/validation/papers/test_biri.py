@@ -23,7 +23,10 @@ def test_a_row_has_every_stage_and_its_error(variant):
     assert all(stage > 0 for stage in row.stages_ms[:4])
     assert sum(row.shares) == pytest.approx(100)
     assert row.error.relative_rmse < 1e-3  # the target of the method in every built-in scene
-    assert all(one.median_ms > 0 for one in (row.rebuilt, row.static, row.relit, row.recoloured, row.rays))
+    assert all(
+        one.median_ms > 0
+        for one in (row.light_moved, row.static, row.light_moved_camera_kept, row.colours_changed, row.rays)
+    )
 
 
 def test_every_entry_is_measured_with_every_kernel(variant):

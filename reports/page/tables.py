@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The tables of the page, from the data of a report."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
+
+from reports.page.filters import words
+from reports.papers.billeter import billeter_tables
+from reports.papers.biri import biri_notes, biri_tables
+from reports.tables.agreement import agreement_table
+from reports.tables.checks import left_out_table, mutation_table
+from reports.tables.drawing import html
+from reports.tables.methods import method_row, rows_table
+from reports.tables.stability import summary_table
+from reports.tables.table import Column, Row, Table, table
+
+Data = Mapping[str, Any]
+
+_METHODS = (
+    *("label", "frame", "frame_rate", "airlight", "surface", "light_moved", "objects_moved"),
+    *("relative_rmse", "relative_bias", "p50", "p99", "flip", "nonfinite"),
+)
+_AGREEMENT = (
+    *("name", "agrees", "margin", "bias", "interval", "detectable", "epsilon", "uncorrected"),
+    *("z_mean", "z_std", "rejected", "expected", "masked", "effort"),
+)
+
+
+def methods(scene: Data, timed: Sequence[int]) -> Table:
+    """Return what the methods of a scene cost and how wrong they are."""
+    shadows = scene["plan"]["shadows"].startswith("vis")
+    explanation = (
+        f"Times at {words(timed)} pixels, medians, below those of a frame their quartiles; errors at "
+        f"{words(scene['size'])} pixels, of the airlight against the truth, or of all light where an image has no "
+        "layers (total). A method that knows no shadows is marked; its error is then the light that shadows take away."
+    )
+    rows = [method_row(one, shadows=shadows) for one in scene["methods"]]
+    return rows_table(f"Times and errors of the methods in {scene['name']}", rows, *_METHODS, explanation=explanation)
+
+
+def agreement(scene: Data) -> Table:
+    """Return what estimators say of the truth of a scene."""
+    explanation = (
+        "Our own integrator, and Mitsuba's volpath against the same integral with the shadow ray shortened by the "
+        "measured epsilon. Agreement means that the 95 % interval of the relative bias lies inside the margin; "
+        "detectable is the least bias that is found in nine runs of ten, uncorrected the bias without the epsilon, "
+        "masked are pixels whose ray passes close to a light."
+    )
+    title = f"Monte Carlo estimators against the quadrature in {scene['name']}"
+    return agreement_table(title, scene["agreement"].items(), *_AGREEMENT, explanation=explanation)
+
+
+def mutations(results: Iterable[Data]) -> Table:
+    """Return which faults of the physics were caught."""
+    return mutation_table(results).only("name", "caught", "meaning", "estimator", "reason")
+
+
+def seconds(scenes: Sequence[Data]) -> Table:
+    """Return where the time went."""
+    parts = list(scenes[0]["seconds"])
+    columns = [Column("scene", "scene", words=True), *(Column(part, part, "s") for part in parts)]
+    rows = [Row({"scene": scene["name"]} | {part: scene["seconds"][part] for part in parts}) for scene in scenes]
+    return table(
+        "Where the time went", columns, rows, explanation="Of results that were kept, what they took when measured."
+    )
+
+
+def facts(title: str, entries: Data) -> Table:
+    """Return what is known by name."""
+    columns = (Column("name", "", words=True), Column("value", "", words=True, long=True))
+    return table(title, columns, [(key.replace("_", " "), words(value)) for key, value in entries.items()])
+
+
+def _drawn(function: Callable[..., Table | Iterable[Table]]) -> Callable[..., Any]:
+    """Return a function that draws what another returns."""
+
+    def draw(*arguments: Any) -> Any:
+        from markupsafe import Markup
+
+        made = function(*arguments)
+        return Markup("\n".join(html(one) for one in ([made] if isinstance(made, Table) else made)))
+
+    return draw
+
+
+#: What the templates call, by name.
+TABLES: dict[str, Callable[..., Any]] = {
+    "methods_table": _drawn(methods),
+    "agreement_table": _drawn(agreement),
+    "stability_table": _drawn(summary_table),
+    "left_out_table": _drawn(left_out_table),
+    "mutation_table": _drawn(mutations),
+    "seconds_table": _drawn(seconds),
+    "facts_table": _drawn(facts),
+    "biri_tables": _drawn(biri_tables),
+    "biri_notes": biri_notes,
+    "billeter_tables": _drawn(billeter_tables),
+}

@@ -1,0 +1,13 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The tables and figures of two papers, measured here beside what was printed.
+
+Each module makes plain data of what was measured, as they stand in report.json, and tables of these data.
+
+Read in this order:
+
+- `rates.py`: frames a second of a row beside the published ones
+- `biri.py`: Tables 1 and 2 of Biri, Arques, Michelin 2006
+- `billeter.py`: Figures 6 and 7 and Table 1 of Billeter, Sintorn, Assarsson 2010
+
+May import: `reports.tables`, `validation.metrics`, `validation.papers`.
+"""

@@ -1,0 +1,22 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Tables: each is written once, as data with units, and drawn as terminal text, Markdown, HTML, LaTeX or CSV.
+
+A function of this room takes plain data, with the names of report.json where they stand there, and returns a `Table`.
+Who prints, writes a page or a paper chooses how it is drawn.
+
+Read in this order:
+
+- `table.py`: the record, its values, and how a number becomes digits
+- `drawing.py`: the five ways to draw it
+- `terminal.py`: how commands print tables and JSON
+- `methods.py`: what methods cost and how wrong they are; the fastest within an error
+- `agreement.py`: the truth against Monte Carlo, and the verdict
+- `kernels.py`: costs, levels and orders of kernels
+- `stability.py`: where kernels and sums of shadow planes break
+- `map_size.py`: error and flicker against the size of the shadow map
+- `checks.py`: baselines that moved, mutations, light left out
+- `lists.py`: scenes, methods, kernels
+- `scene.py`: the description of a scene for another renderer
+
+May import: `realtime.kernels`, `realtime.methods`, `validation.frames`, `validation.metrics`, `validation.scenes`.
+"""

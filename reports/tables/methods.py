@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What methods cost and how wrong they are: the table of `airlight bench`, the page, the documentation and papers."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from reports.tables.table import Column, Measured, Row, Table, Value, digits_of, measured
+
+Entry = Mapping[str, Any]  #: of a method in a scene, as in report.json
+
+#: What is timed of a frame, by its name in report.json.
+TIMES = ("frame", "airlight", "surface", "light_moved", "objects_moved", "light_moved_camera_kept", "colours_changed")
+ERRORS = ("relative_rmse", "relative_bias", "p50", "p99", "max", "nonfinite")
+
+COLUMNS = {
+    column.key: column
+    for column in (
+        Column("label", "method", words=True),
+        Column("frame", "frame", "ms", spread="quartiles"),
+        Column("frame_rate", "frames/s", whole=True),
+        Column("airlight", "airlight", "ms"),
+        Column("airlight_rate", "airlight/s", whole=True),
+        Column("surface", "rays + surface", "ms"),
+        Column("light_moved", "light moved", "ms"),
+        Column("objects_moved", "objects moved", "ms"),
+        Column("light_moved_camera_kept", "light moved, camera rays kept", "ms"),
+        Column("colours_changed", "colours changed", "ms"),
+        Column("relative_rmse", "rel. RMSE", digits=2, share=True),
+        Column("relative_bias", "rel. bias", digits=2, share=True),
+        Column("p50", "median error", digits=2, share=True),
+        Column("p99", "p99", digits=2, share=True),
+        Column("max", "max", digits=2, share=True),
+        Column("flip", "HDR-FLIP"),
+        Column("nonfinite", "not finite", alarm=True),
+    )
+}
+#: Columns of what `bench` prints.
+BENCH = (
+    "label",
+    "frame",
+    "frame_rate",
+    "airlight",
+    "airlight_rate",
+    "light_moved",
+    "relative_rmse",
+    "relative_bias",
+    "p99",
+    "max",
+)
+
+
+def methods_table(title: str, entries: Iterable[Entry], *keys: str, explanation: str = "") -> Table:
+    """Return the table of the methods in a scene.
+
+    Parameters
+    ----------
+    title
+        Of the table.
+    entries
+        The `methods` of a scene of report.json.
+    keys
+        Of `COLUMNS`; `BENCH` by default.
+    explanation
+        See `reports.tables.table.Table`.
+    """
+    return rows_table(title, [method_row(one) for one in entries], *keys, explanation=explanation)
+
+
+def rows_table(title: str, rows: Sequence[Row], *keys: str, explanation: str = "") -> Table:
+    """Return the table of rows that have some of `COLUMNS`."""
+    return Table(title, tuple(COLUMNS.values()), tuple(rows), explanation).only(*(keys or BENCH))
+
+
+def method_row(entry: Entry, *, shadows: bool = False) -> Row:
+    """Return what a method costs and how wrong it is as a row.
+
+    Parameters
+    ----------
+    entry
+        Of report.json.
+    shadows
+        Whether something casts a shadow, so that a method that knows none is marked.
+    """
+    kind, layer = entry.get("kind"), entry.get("layer")
+    remarks = [f"image, {layer}"] if kind == "image" else ["user's function"] if kind == "function" else []
+    if shadows and kind != "image" and not entry["knows_shadows"]:
+        remarks.append("no shadows")
+    remarks += [entry["note"]] if entry.get("note") else []
+    values: dict[str, Value] = {"label": entry["label"]}
+    if entry["refused"]:
+        why = "left out" if entry.get("left_out") else "refused"
+        return Row(values, f"{why}: {entry['refused']}", tuple(remarks))
+    times, error = entry["times"] or {}, entry["error"] or {}
+    values |= times_values({name: measured(times.get(name)) for name in TIMES})
+    values |= {name: error.get(name) for name in ERRORS}
+    values["flip"] = (entry.get("flip") or {}).get("value")
+    return Row(values, remarks=tuple(remarks))
+
+
+def times_values(times: Mapping[str, Measured | None]) -> dict[str, Value]:
+    """Return times [ms] and the rates of those that are shown as rates [1/s]."""
+    rates = {f"{name}_rate": per_second(times.get(name)) for name in ("frame", "airlight")}
+    return {**times, **rates}
+
+
+def per_second(time: Measured | None) -> float | None:
+    """Return how often a second something can be done that takes so many milliseconds."""
+    return 1000 / time.median if time and time.median > 0 else None
+
+
+def rate_words(milliseconds: float) -> str:
+    """Return how many frames a second there are of so many milliseconds."""
+    return f"{digits_of(1000 / milliseconds, COLUMNS['frame_rate'])} frames/s"
+
+
+def fastest_within(error: float, entries: Iterable[Entry]) -> Entry | None:
+    """Return the method of the fastest frame among those with at most a relative RMSE; None where there is none.
+
+    Pixels that are not finite are left out of the RMSE: a method that has any must not win by it.
+    """
+
+    def reaches(entry: Entry) -> bool:
+        found = entry.get("error") or {}
+        rmse = found.get("relative_rmse")
+        return bool(entry.get("times")) and rmse is not None and rmse <= error and not found.get("nonfinite")
+
+    return min(filter(reaches, entries), key=lambda entry: entry["times"]["frame"]["median_ms"], default=None)

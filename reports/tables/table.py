@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A table as data: columns that say what their values are, and rows of values with nothing rounded.
+
+`reports.tables.drawing` draws it: on a terminal, as Markdown, HTML, LaTeX and CSV. The rules that all of these share
+are here: which columns there are, and how a number becomes digits.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A median with its quartiles."""
+
+    median: float
+    low: float  #: first quartile
+    high: float  #: third quartile
+    about: bool = False  #: extrapolated, not measured in full
+
+
+@dataclass(frozen=True)
+class Interval:
+    """Two ends of one thing."""
+
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether a check passed; None where it was not decided within its time."""
+
+    good: bool | None
+    words: str = ""  #: said behind it
+
+
+@dataclass(frozen=True)
+class Name:
+    """The name of something that one types, with the address of its page where it has one."""
+
+    text: str
+    target: str = ""
+
+
+Value = None | bool | int | float | str | Measured | Interval | Verdict | Name
+
+
+@dataclass(frozen=True)
+class Column:
+    """What the values of a column are and how many digits of them are shown."""
+
+    key: str  #: of the values in a row, and the name of the column in CSV
+    heading: str
+    unit: str = ""  #: behind the heading
+    words: bool = False  #: text, to the left; numbers stand to the right
+    long: bool = False  #: sentences, which may be broken
+    digits: int = 3  #: significant ones
+    places: int | None = None  #: digits behind the point in place of significant ones
+    whole: bool = False  #: from ten on without digits behind the point, below with one: rates
+    sign: bool = False  #: a plus before what is positive
+    percent: bool = False  #: a share, written in per cent
+    share: bool = False  #: a share that HTML writes in per cent and the others as it is
+    after: str = ""  #: behind every number, such as a multiplication sign
+    spread: str = ""  #: heading of the quartiles of `Measured`, in a column of their own where cells have no room
+    alarm: bool = False  #: anything but zero is bad
+
+
+@dataclass(frozen=True)
+class Row:
+    """Values by the key of their column; what a row leaves out is None."""
+
+    values: Mapping[str, Value]
+    reason: str = ""  #: why the row ends early
+    remarks: tuple[str, ...] = ()  #: on what is in the first column
+    published: bool = False  #: printed in a paper, not measured
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table as data.
+
+    Raises
+    ------
+    ValueError
+        For a value that belongs to no column.
+    """
+
+    title: str
+    columns: tuple[Column, ...]
+    rows: tuple[Row, ...]
+    explanation: str = ""  #: what a caption adds to the title
+
+    def __post_init__(self) -> None:
+        keys = {column.key for column in self.columns}
+        for row in self.rows:
+            stray = set(row.values) - keys
+            if stray:
+                raise ValueError(f"table {self.title!r}: no column for {', '.join(sorted(stray))}")
+
+    def only(self, *keys: str) -> "Table":
+        """Return the table with these columns alone, in this order."""
+        column_of = {column.key: column for column in self.columns}
+        rows = (replace(row, values={k: v for k, v in row.values.items() if k in keys}) for row in self.rows)
+        return replace(self, columns=tuple(column_of[key] for key in keys), rows=tuple(rows))
+
+
+def table(
+    title: str, columns: Iterable[Column], rows: Iterable[Row | Sequence[Value]], *, explanation: str = ""
+) -> Table:
+    """Return a table; a row may be its values in the order of the columns."""
+    known = tuple(columns)
+    return Table(title, known, tuple(_row(row, known) for row in rows), explanation)
+
+
+def _row(row: Row | Sequence[Value], columns: Sequence[Column]) -> Row:
+    if isinstance(row, Row):
+        return row
+    return Row({column.key: value for column, value in zip(columns, row, strict=True)})
+
+
+def words(*headings: str) -> tuple[Column, ...]:
+    """Return columns of text whose keys are their headings."""
+    return tuple(Column(heading, heading, words=True) for heading in headings)
+
+
+def number(value: float | None, digits: int = 3, *, zeros: bool = False) -> str:
+    """Return a number with some significant digits, a hyphen for none.
+
+    Parameters
+    ----------
+    value
+        May be infinite or not a number.
+    digits
+        Significant digits.
+    zeros
+        Keep zeros at the end: they say how exact a number is.
+    """
+    if value is None:
+        return "-"
+    if value == 0:
+        return "0"
+    text = f"{value:#.{digits}g}" if zeros else f"{value:.{digits}g}"
+    return text.removesuffix(".").replace(".e", "e")
+
+
+def digits_of(value: float, column: Column, *, zeros: bool = False, percent: bool = False) -> str:
+    """Return a number of a column in ASCII digits, without what stands behind it.
+
+    Parameters
+    ----------
+    value
+        As it is in the row.
+    column
+        Where it stands.
+    zeros
+        See `number`.
+    percent
+        Write a share in per cent although the column does not ask for it.
+    """
+    shown = 100 * value if percent or column.percent else value
+    if isinstance(value, int) and shown is value:
+        text = str(value)
+    elif column.places is not None:
+        text = f"{shown:.{column.places}f}"
+    elif column.whole:
+        text = f"{shown:.0f}" if abs(shown) >= 10 else f"{shown:.1f}"
+    else:
+        text = number(shown, column.digits, zeros=zeros)
+    return f"+{text}" if column.sign and shown > 0 else text
+
+
+def with_spread(median: float, low: float, high: float) -> tuple[str, str, str]:
+    """Return a median and the distances to its quartiles, to one digit behind the first of the wider distance."""
+    from math import floor, log10
+
+    widest = max(high - median, median - low, abs(median) * 1e-3)
+    places = max(0, 1 - floor(log10(widest))) if widest > 0 else 1
+    return f"{median:.{places}f}", f"{median - low:.{places}f}", f"{high - median:.{places}f}"
+
+
+def is_number(value: Value) -> bool:
+    """Return whether a value is a plain number: true and false are none."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def heading(column: Column) -> str:
+    """Return the heading of a column with its unit."""
+    return f"{column.heading} {column.unit}".strip()
+
+
+def measured(timing: Mapping[str, float] | None) -> Measured | None:
+    """Return a timing of report.json, None for none."""
+    return None if timing is None else Measured(timing["median_ms"], timing["low_ms"], timing["high_ms"])

@@ -1,0 +1,289 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""One table drawn five ways carries the same cells, whatever stands in them."""
+
+import csv as comma_separated
+import io
+import math
+import re
+from html.parser import HTMLParser
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from reports.tables.drawing import DASH, csv, html, latex, markdown, text, typeset
+from reports.tables.table import Column, Interval, Measured, Name, Row, Table, Verdict, number, table, with_spread
+
+COLUMNS = (
+    Column("name", "what is_it", words=True),
+    Column("time", "time", "ms", spread="quartiles"),
+    Column("rate", "frames/s", whole=True),
+    Column("bias", "bias", percent=True, sign=True, places=3),
+    Column("ends", "95 % interval"),
+    Column("count", "not finite", alarm=True),
+    Column("agrees", "agrees"),
+)
+HARD = ["a|b & c_d", "<b>\"50 %\" 'q'</b>", "a\nb", "\\{x}$y^2$ ~ #1", "*_`code`_*", "[a](b)", "&amp; \\& \\|", "2 x 3"]
+
+
+def unescaped_latex(cell):
+    for written, read in (
+        (r"\textbackslash{}", "\0"),
+        (r"\textasciitilde{}", "~"),
+        (r"\textasciicircum{}", "^"),
+        (r"\textless{}", "<"),
+        (r"\textgreater{}", ">"),
+        (r"\textquotedbl{}", '"'),
+        (r"$\times$", "\N{MULTIPLICATION SIGN}"),
+    ):
+        cell = cell.replace(written, read)
+    return re.sub(r"\\([{}$&%#_])", r"\1", cell).replace("\0", "\\")
+
+
+def latex_rows(drawn):
+    """The cells of each row between the rules; a bare & ends a cell."""
+    body = drawn.split("\\midrule\n")[1].split("\\bottomrule")[0]
+    return [re.split(r"(?<!\\) & ", line.removesuffix(r" \\")) for line in body.splitlines()]
+
+
+def markdown_rows(drawn):
+    rows = [line for line in drawn.splitlines() if line.startswith("|")][2:]
+    cells = [re.findall(r"\| ((?:\\.|[^|\\])*) (?=\|)", row) for row in rows]
+    return [[re.sub(r"\\([\\|`*_<&\[\]])", r"\1", cell) for cell in row] for row in cells]
+
+
+class _Cells(HTMLParser):
+    def __init__(self):
+        super().__init__(convert_charrefs=True)
+        self.rows, self.classes, self.inside, self.tags = [], [], False, set()
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.add(tag)
+        if tag == "tr":
+            self.rows.append([])
+        if tag in ("td", "th"):
+            self.rows[-1].append("")
+            self.classes.append(dict(attrs).get("class"))
+            self.inside = True
+
+    def handle_endtag(self, tag):
+        if tag in ("td", "th"):
+            self.inside = False
+
+    def handle_data(self, data):
+        if self.inside:
+            self.rows[-1][-1] += data
+
+
+def html_rows(drawn):
+    parser = _Cells()
+    parser.feed(drawn)
+    return parser.rows[1:]
+
+
+def csv_rows(drawn):
+    return list(comma_separated.DictReader(io.StringIO(drawn)))
+
+
+def as_number(cell):
+    """A number as its digits in any of the five say it; None for a dash."""
+    cell = re.sub(r"\\num\{([^}]*)\}", r"\1", cell).replace(r"\,\%", "").replace(" %", "").strip()
+    if cell in ("-", "--", DASH, ""):
+        return None
+    power = re.fullmatch(r"(.*)·10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)", cell)
+    if power:
+        cell = f"{power[1]}e{power[2].translate(str.maketrans('⁻⁰¹²³⁴⁵⁶⁷⁸⁹', '-0123456789'))}"
+    return {"nan": math.nan, r"$\infty$": math.inf, r"$-\infty$": -math.inf}.get(cell) or float(cell)
+
+
+FINITE = st.floats(min_value=-1e12, max_value=1e12, allow_subnormal=False)
+WORDS = st.text(st.characters(codec="ascii", exclude_categories=["Cc"]), min_size=1).map(
+    lambda words: " ".join(words.split()) or "x"
+)
+
+
+@settings(deadline=None)  # the first imports rich
+@given(rows=st.lists(st.tuples(WORDS, FINITE | st.none(), st.integers(0, 10**9)), max_size=4))
+def test_five_ways_carry_the_same_cells(rows):
+    """Words come back as they went in, numbers to the digits of their column."""
+    columns = (Column("name", "name", words=True), Column("value", "value", digits=4), Column("count", "count"))
+    drawn = table("", columns, rows)
+    found = [markdown_rows(markdown(drawn)), html_rows(html(drawn)), latex_rows(latex([drawn]))]
+    found.append([list(row.values()) for row in csv_rows(csv(drawn))])
+    assert [len(one) for one in found] == [len(rows)] * 4
+    for place, (name, value, count) in enumerate(rows):
+        words = [found[0][place][0], found[1][place][0], unescaped_latex(found[2][place][0]), found[3][place][0]]
+        assert {" ".join(re.sub(r" \N{MULTIPLICATION SIGN}(?= \d|$)", " x", one).split()) for one in words} == {name}
+        for cells in (one[place] for one in found):
+            shown = as_number(cells[1])
+            assert shown is None if value is None else shown == pytest.approx(value, rel=1e-3)
+            assert int(as_number(cells[2])) == count
+    assert all(str(count) in text(drawn) for _, _, count in rows)
+
+
+@pytest.mark.parametrize("words", HARD)
+def test_what_means_something_to_a_format_is_escaped(words):
+    drawn = table(words, (Column("a", words, words=True), Column("b", "b")), [(words, 1), ("second", 2)])
+    flat = " ".join(words.split())
+    (first, _), (second, _) = markdown_rows(markdown(drawn))
+    assert (first, second) == (flat, "second")
+    parser = _Cells()
+    parser.feed(html(drawn))
+    assert parser.tags == {"div", "table", "caption", "thead", "tbody", "tr", "th", "td"}
+    assert parser.rows[1][0].replace("\N{MULTIPLICATION SIGN}", "x") == words
+    assert unescaped_latex(latex_rows(latex([drawn]))[0][0]) == flat
+    assert csv_rows(csv(drawn))[0]["a"] == words
+    assert flat.split()[0] in text(drawn)
+
+
+def test_brackets_are_words():
+    """Units stand in brackets, which rich would take for its own marks and leave out."""
+    shown = text(
+        table("times [ms]", (Column("a", "[red] scene", words=True), Column("b", "time", "[ms]")), [("x [m]", 1)])
+    )
+    assert all(words in shown for words in ("times [ms]", "[red] scene", "time [ms]", "x [m]"))
+
+
+def drawn_row(**values):
+    return Table("title", COLUMNS, (Row(values),))
+
+
+def test_values_are_written_by_their_column():
+    row = drawn_row(
+        name="a",
+        time=Measured(12.345, 12.0, 13.0),
+        rate=857.3,
+        bias=-1.2345e-3,
+        ends=Interval(1.0, 2.5),
+        count=3,
+        agrees=Verdict(False, "±1 %"),
+    )
+    cells = ["a", "12.3", "12..13", "857", "-0.123 %", "1..2.5", "3", "NO, ±1 %"]
+    assert markdown_rows(markdown(row)) == [cells]
+    assert re.split(r"  +", text(row).splitlines()[4].strip()) == cells
+    assert html_rows(html(row)) == [["a", "12.3 12 … 13", "857", "-0.123 %", "1 … 2.5", "3", "NO, ±1 %"]]
+    assert '<td class="bad">3</td><td class="bad">NO, ±1 %</td>' in html(row)
+    assert latex_rows(latex([row])) == [
+        [
+            "a",
+            r"$\num{12.35}_{-\num{0.35}}^{+\num{0.65}}$",
+            r"\num{857}",
+            r"\num{-0.123}\,\%",
+            r"\num{1.00}--\num{2.50}",
+            r"\num{3}",
+            r"NO, $\pm$1 \%",
+        ]
+    ]
+    (read,) = csv_rows(csv(row))
+    assert (read["time"], read["time_low"], read["ends_high"], read["bias"]) == ("12.345", "12", "2.5", "-0.0012345")
+
+
+def test_quartiles_without_a_column_are_the_title_of_a_cell():
+    shown = html(table("", (Column("a", "a"), Column("b", "b", "ms")), [(1, Measured(2.0, 1.5, 3.0, about=True))]))
+    assert '<td title="quartiles 1.5 to 3 ms">~2</td>' in shown
+
+
+@pytest.mark.parametrize(("value", "words"), [(None, None), (math.nan, "nan"), (math.inf, "inf"), (-math.inf, "-inf")])
+def test_what_is_no_number_is_said(value, words):
+    row = table("", (Column("a", "a"), Column("b", "b")), [("x", value)])
+    assert markdown_rows(markdown(row))[0][1] == (words or "-")
+    assert html_rows(html(row))[0][1] == (words or DASH)
+    assert latex_rows(latex([row]))[0][1] == {"inf": r"$\infty$", "-inf": r"$-\infty$"}.get(words, words or "--")
+    assert csv_rows(csv(row))[0]["b"] == ("" if words in (None, "nan") else words)
+
+
+def test_tables_without_rows_have_headings():
+    empty = table("nothing", COLUMNS, [])
+    assert markdown(empty).splitlines()[2] == (
+        "| what is\\_it | time ms | quartiles | frames/s | bias | 95 % interval | not finite | agrees |"
+    )
+    assert "frames/s" in text(empty)
+    assert html_rows(html(empty)) == []
+    assert latex_rows(latex([empty])) == []
+    assert csv(empty) == "name,time,rate,bias,ends,count,agrees\n"
+
+
+def test_a_row_that_ends_early_says_why():
+    """In the row where cells can be joined, below it elsewhere; a name alone is no row there."""
+    rows = (Row({"name": "a", "time": Measured(1, 1, 1)}, "no <light>"), Row({"name": "b"}, "no_room", ("slow",)))
+    drawn = Table("t", COLUMNS, rows)
+    assert '<td class="words" colspan="5">no &lt;light&gt;</td>' in html(drawn)
+    assert '<th scope="row" style="text-align:left">b <span class="quiet">(slow)</span></th>' in html(drawn)
+    assert latex_rows(latex([drawn]))[1] == ["b (slow)", r"\multicolumn{6}{l}{no\_room}"]
+    assert [row[0] for row in markdown_rows(markdown(drawn))] == ["a"]
+    assert markdown(drawn).splitlines()[-3:] == ["- a: no \\<light>", "- b: slow", "- b: no\\_room"]
+    assert text(drawn).splitlines()[-3:] == ["a: no <light>", "b: slow", "b: no_room"]
+    assert [(row["reason"], row["remarks"]) for row in csv_rows(csv(drawn))] == [
+        ("no <light>", ""),
+        ("no_room", "slow"),
+    ]
+
+
+def test_names_are_code_with_a_link():
+    drawn = table("", (Column("a", "a", words=True),), [(Name("min-max", "min-max.md"),), (Name("a_b"),)])
+    assert markdown(drawn).splitlines()[2:] == ["| [`min-max`](min-max.md) |", "| `a_b` |"]
+    assert '<a href="min-max.md"><code>min-max</code></a>' in html(drawn)
+    assert latex_rows(latex([drawn]))[1] == [r"\texttt{a\_b}"]
+
+
+def test_shares_are_in_per_cent_in_html_alone():
+    row = table("", (Column("a", "a", words=True), Column("b", "b", digits=2, share=True)), [("x", 0.012345)])
+    assert (markdown_rows(markdown(row))[0][1], html_rows(html(row))[0][1]) == ("0.012", "1.23 %")
+    assert latex_rows(latex([row]))[0][1] == r"\num{0.012}"
+
+
+def test_latex_has_the_rules_of_booktabs_and_says_what_it_needs():
+    columns = (Column("a", "name", words=True), Column("b", "time", "ms"))
+    drawn = latex(
+        [table("one_1", columns, [("a", 1)], explanation="to 4.0e-11"), table("two", columns, [("b", 2.5)])],
+        comment=("why",),
+    )
+    assert drawn.splitlines() == [
+        r"% Needs \usepackage{booktabs,siunitx}.",
+        "% why",
+        r"\begin{tabular}{lr}",
+        r"\toprule",
+        r"name & time \\",
+        r" & [ms] \\",
+        r"\midrule",
+        r"\multicolumn{2}{l}{\textit{one\_1}, to \num{4.0e-11}} \\",
+        r"a & \num{1} \\",
+        r"\addlinespace",
+        r"\multicolumn{2}{l}{\textit{two}} \\",
+        r"b & \num{2.50} \\",
+        r"\bottomrule",
+        r"\end{tabular}",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("value", "plain", "zeros"),
+    [
+        (None, "-", "-"),
+        (0.0, "0", "0"),
+        (12.34, "12.3", "12.3"),
+        (25.0, "25", "25.0"),
+        (999.9, "1e+03", "1.00e+03"),
+        (100.0, "100", "100"),
+        (-4.56e-7, "-4.56e-07", "-4.56e-07"),
+        (math.inf, "inf", "inf"),
+    ],
+)
+def test_numbers_have_three_digits(value, plain, zeros):
+    assert (number(value), number(value, zeros=True)) == (plain, zeros)
+
+
+def test_powers_of_ten_are_typeset():
+    assert (typeset("1.2e-05"), typeset("3e+03"), typeset("-"), typeset("12")) == ("1.2·10⁻⁵", "3·10³", DASH, "12")
+
+
+def test_a_median_has_the_digits_of_its_quartiles():
+    assert with_spread(12.347, 12.123, 12.903) == ("12.35", "0.22", "0.56")
+    assert with_spread(144.4, 139.2, 153.7) == ("144.4", "5.2", "9.3")
+    assert with_spread(140.0, 133.0, 171.0) == ("140", "7", "31")
+
+
+def test_a_value_without_a_column_is_a_mistake():
+    with pytest.raises(ValueError, match="no column for nmae"):
+        drawn_row(nmae="a")
+    assert drawn_row(name="a", count=2).only("count").columns == (COLUMNS[5],)
