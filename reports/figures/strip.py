@@ -11,8 +11,9 @@ from typing import Any
 
 from analytic.errors import InputError
 from reference.storage.files import ensure_folder
+from reports.data.reader import read_report
 from reports.figures.files import draw_figure, new_figure, read_data, value, write_data
-from reports.figures.report import measured, read_report, report_origin
+from reports.figures.report import measured, report_origin
 from reports.plotting.style import COLOURS, WIDTHS
 
 NAME = "strip"

@@ -5,7 +5,8 @@ import json
 import pytest
 
 from reports.commands.main import run
-from reports.diff.compare import compare_reports, read_report
+from reports.data.reader import read_report
+from reports.diff.compare import compare_reports
 from tests.helpers.reports import agreement, checked, errors, method, report, slow_down
 
 
@@ -295,11 +296,11 @@ def test_the_reports_of_these_tests_keep_to_the_schema():
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (None, "there is no file"),
-        ("{", "no JSON"),
-        ("[]", "the schema is None"),
-        ('{"schema": "airlight-report/9"}', "the schema is 'airlight-report/9'"),
-        ('{"schema": "airlight-report/2", "scenes": []}', "'environment' is missing"),
+        (None, "No such file or directory; wanted what `airlight report"),
+        ("{", "is not valid JSON"),
+        ("[]", "has no schema, wanted 'airlight-report/2'"),
+        ('{"schema": "airlight-report/9"}', "has the schema 'airlight-report/9', wanted 'airlight-report/2'"),
+        ('{"schema": "airlight-report/2", "scenes": []}', "'created' is missing"),
     ],
 )
 def test_what_is_no_report_is_refused(tmp_path, capsys, text, message):

@@ -73,12 +73,12 @@ def test_the_page_is_drawn_again_in_place_and_as_a_whole_elsewhere(folder, tmp_p
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("{", "is no JSON"),
+        ("{", "is not valid JSON"),
         ("[]", "has no schema, wanted 'airlight-report/2'"),
         ('{"schema": "airlight-report/1"}', "the schema 'airlight-report/1', wanted 'airlight-report/2'; make the"),
         (
             '{"schema": "airlight-report/2"}',
-            "does not keep to airlight-report/2: report: 'created' is a required",
+            "does not keep to airlight-report/2: 'created' is missing",
         ),
     ],
 )

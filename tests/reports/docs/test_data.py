@@ -95,9 +95,9 @@ def test_costs_of_kernels_come_and_stay(variant, folder, tmp_path):
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        ('{"schema": "airlight-report/9"}', "wanted airlight-report/1 or airlight-report/2"),
-        ("[1]", "wanted the folder of a report"),
-        ("{", "is no JSON"),
+        ('{"schema": "airlight-report/9"}', "wanted 'airlight-report/2'"),
+        ("[1]", "has no schema"),
+        ("{", "is not valid JSON"),
     ],
 )
 def test_what_is_no_report_is_refused(content, words, folder, tmp_path):
