@@ -61,11 +61,10 @@ def figures(
     Computing writes the data, drawing only reads them: the same data give the same bytes. Figures of whole frames and
     images are made from a report (`airlight report`); the others are measured here.
     """
-    from analytic.errors import InputError
+    from analytic.errors import InputError, nearest
     from reference.storage.files import ensure_folder
     from reports.machine.progress import part_of, progress_bar
     from reports.plotting.style import WIDTHS
-    from validation.scenes.loading import nearest
 
     for name in names or ():
         if name not in FIGURES:

@@ -6,13 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from analytic.errors import InputError
+from analytic.errors import InputError, nearest
 from realtime.errors import InputError as MethodError
 from realtime.frame.renderer import FrameRenderer, frame_renderer
 from realtime.methods.registry import find_method
 from realtime.scene.read_scene import Scene
 from validation.configurations.kernel_names import find_kernel
-from validation.scenes.loading import nearest
 
 _TRUE, _FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
 

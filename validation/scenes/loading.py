@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Scenes by name or by path, checked before any work is done."""
 
-import difflib
 import os
 import re
 from dataclasses import dataclass, field
@@ -10,7 +9,7 @@ from typing import Any
 
 import mitsuba as mi
 
-from analytic.errors import InputError
+from analytic.errors import InputError, nearest
 from validation.scenes.record import Animation
 from validation.scenes.registry import SCENES
 
@@ -64,12 +63,6 @@ def parse_size(text: str) -> tuple[int, int]:
     if not match:
         raise InputError(f"size: got {text!r}, wanted WIDTHxHEIGHT in pixels, for example 800x600")
     return int(match[1]), int(match[2])
-
-
-def nearest(word: str, known) -> str:
-    """Return ', did you mean X?' or an empty string."""
-    close = difflib.get_close_matches(word, list(known), n=1, cutoff=0.4)
-    return f"; did you mean {close[0]!r}?" if close else ""
 
 
 def _existing(name_or_path: str) -> Path:
