@@ -85,36 +85,6 @@ def path_length(x: Values, foot: Values, height: Values) -> Array:
     return np.where(s >= 0, q, np.where(q > 0, below, 0.0))
 
 
-def theta_of_x(x: Values, foot: Values, height: Values) -> Array:
-    """Return theta = atan((x - foot)/height) [rad]; +-pi/2 where the height is zero."""
-    return np.arctan2(np.asarray(x, dtype=np.float64) - foot, height)
-
-
-def x_of_theta(theta: Values, foot: Values, height: Values) -> Array:
-    """Return the distance x = foot + height tan(theta) [m]. Valid for |theta| < pi/2."""
-    return np.asarray(foot, dtype=np.float64) + height * np.tan(theta)
-
-
-def w_of_x(x: Values, foot: Values, height: Values) -> Array:
-    """Return w = asinh((x - foot)/height) [1]. Valid for height > 0."""
-    return np.arcsinh((np.asarray(x, dtype=np.float64) - foot) / height)
-
-
-def x_of_w(w: Values, foot: Values, height: Values) -> Array:
-    """Return the distance x = foot + height sinh(w) [m]."""
-    return np.asarray(foot, dtype=np.float64) + height * np.sinh(w)
-
-
-def theta_of_w(w: Values) -> Array:
-    """Return theta = atan(sinh w) [rad], the Gudermannian of w, as 2 atan(tanh(w/2))."""
-    return 2 * np.arctan(np.tanh(0.5 * np.asarray(w, dtype=np.float64)))
-
-
-def w_of_theta(theta: Values) -> Array:
-    """Return w = asinh(tan theta) [1]. Valid for |theta| < pi/2."""
-    return np.arcsinh(np.tan(np.asarray(theta, dtype=np.float64)))
-
-
 def _points(name: str, value: ArrayLike) -> Array:
     points = np.asarray(value, dtype=np.float64)
     if points.ndim not in (1, 2) or points.shape[-1] != 3:

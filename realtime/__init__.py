@@ -1,8 +1,25 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The side under test: real-time single scattering in Dr.Jit, float32 and float64 from one source.
 
-`realtime.scene.read_scene` reads a Mitsuba scene and makes the plan of what it needs; `realtime.kernels` evaluate the
-airlight integral between two distances along a ray; `realtime.methods` turn a view into the in-scattered radiance of
-every pixel; `realtime.frame.renderer` makes a frame of it. Mitsuba only reads the scene and casts rays. Nothing here
-imports the side of truth.
+A scene is read once, a method turns the view of a frame into the layers of every pixel, and a frame is composed of the
+layers. Mitsuba only reads the scene and casts rays. Nothing here imports the truth (`analytic`, `reference`) or what
+compares both sides.
+
+Read in this order:
+
+- `errors.py`: the exception for mistakes of the user;
+- `memory.py`: refuses work that needs more memory than the machine has;
+- `parameters.py`: typed parameters of methods, with defaults, ranges and help;
+- `numerics/`: array types, error-free arithmetic, fast functions, Gauss-Legendre nodes;
+- `scene/`: camera, lights, media, phase functions and meshes, read from Mitsuba; the features of a scene; what moves;
+- `rays/`: the geometry of rays and lights, and the cone of a spot;
+- `shadow_maps/`: shadow maps and the field of inverse depth over them;
+- `tiles/`: pixels in tiles of 4 x 4, lists of candidates, and adaptive sampling between the corners of tiles;
+- `kernels/`: the airlight integral between two distances along a ray;
+- `bounded_media/`: rays, legs and airlight in bounded media;
+- `intervals/`: the lit intervals of rays, their sum, and the nearest crossings;
+- `methods/`: the methods: `interface/`, `unshadowed`, `ray_march`, `shadow_planes/`, `light_volumes/`, `epipolar/`;
+- `frame/`: camera rays, the lit surface, and whole frames, one or the next.
+
+May import: `realtime.errors`.
 """

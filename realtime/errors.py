@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The exception for what the user got wrong, on the side under test.
+"""The exception for mistakes of the user, on the side under test.
 
-`analytic.errors` holds its twin: the two sides share no code (DESIGN section 1), and the command line reports both
-alike.
+`analytic.errors` holds the same class for the side of truth, since the two sides share no code (DESIGN section 1). The
+command line treats both alike.
 """
 
 
 class InputError(ValueError):
-    """Something that the user gave cannot be used; the message says what was given, what is wanted and what to do."""
+    """Input that cannot be used. The message says in one line what was given, what is wanted and what to do."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Refusing work that needs more memory than the machine has, before any of it is taken."""
+"""Refuses work that needs more memory than the machine has, before it allocates any."""
 
 import os
 
@@ -7,7 +7,7 @@ from realtime.errors import InputError
 
 
 def machine_memory() -> int | None:
-    """Return how much memory the machine has, or None where it does not say [bytes]."""
+    """Return the physical memory of the machine [bytes], or None if the system does not tell."""
     try:
         return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (AttributeError, ValueError, OSError):
@@ -15,21 +15,21 @@ def machine_memory() -> int | None:
 
 
 def check_memory(what: str, needed: int, advice: str) -> None:
-    """Refuse what needs more memory than the machine has.
+    """Raise an error if work needs more memory than the machine has.
 
     Parameters
     ----------
     what
-        What was given, at the beginning of the message.
+        What the user asked for, as the message begins.
     needed
-        Memory [bytes].
+        Memory that the work needs [bytes].
     advice
-        What to do, at its end.
+        What the user can do, as the message ends.
 
     Raises
     ------
     InputError
-        If the machine has less.
+        If the machine has less memory.
     """
     machine = machine_memory()
     if machine is not None and needed > machine:

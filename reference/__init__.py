@@ -1,10 +1,23 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The ground truth: single-scattering images, each with its own error.
+"""The ground truth: images of single scattering, each with its own error.
 
-Three estimators whose derivations share no code lead to it. `reference.quadrature.image` finds the lit intervals of
-every camera ray by exact geometry or ray-traced visibility and sums certified integrals over them in float64.
-`reference.monte_carlo.single_scatter.integrator` samples the same integral as an integrator of Mitsuba.
-`reference.monte_carlo.volpath.integrator` runs Mitsuba's volumetric path tracer, which nobody here wrote, and
-`reference.scene.shadow_epsilon` measures what biases it. The last two go in batches whose spread gives the standard
-error.
+Three estimators lead to it. `quadrature` finds the lit intervals of every camera ray by exact geometry or by ray
+casting and sums airlight integrals over them in float64. `monte_carlo.single_scatter` samples the same integral as an
+integrator of Mitsuba. `monte_carlo.volpath` runs Mitsuba's volumetric path tracer, which nobody here wrote.
+
+None of the three imports another. What two of them share is the reading of the scene (`scene`: coefficients, lights,
+the rays through pixel centres, as Mitsuba gives them), the class of errors for the user, and between the two that
+sample the means over batches. Reading a scene is no derivation; all that is derived from these facts, from the planes
+of directional lights to the crossings of bounds, belongs to one estimator alone. `tests/test_independence.py` follows
+all imports to their end and holds this list.
+
+Read in this order:
+
+- `storage`: files written whole, layered OpenEXR images, and the cache of finished references;
+- `scene`: a Mitsuba scene read as numbers;
+- `visibility`: which parts of camera rays a light reaches;
+- `quadrature`: the first estimator;
+- `monte_carlo`: the other two, and batches of samples.
+
+May import: `analytic`.
 """

@@ -1,4 +1,25 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The command line, the error report, figures and tables for papers."""
+"""The command line, the Python interface, the error report, figures and tables for papers, the documentation.
+
+Read in this order:
+
+- `machine/`: what works on this machine, the Mitsuba variant, progress bars;
+- `data/`: report.json: its schema, writing, reading and claims;
+- `plotting/`: the style of charts, colour maps, pictures;
+- `tables/`: tables as data, and how they are drawn;
+- `papers/`: tables of papers beside the published figures;
+- `interchange/`: descriptions of scenes for other renderers, glTF, frames of animations;
+- `diff/`: the comparison of two reports;
+- `page/`: the page of a report;
+- `figures/`: figures and tables for papers, one module each;
+- `report/`: measures what a report asks for and writes it;
+- `api/`: the functions of `import airlight` and their results;
+- `commands/`: the commands, one module each;
+- `docs/`: builds the documentation.
+
+`images/` holds pictures of the README.
+
+May import: `analytic`, `realtime`, `reference`, `validation`.
+"""
 
 __version__ = "0.1.0"

@@ -92,6 +92,7 @@ def _left_over(machine: Path) -> set[str]:
     return names - {"airlight", "airlight.py", "requirements.lock", "pyproject.toml", ".venv"}
 
 
+@pytest.mark.claim("launcher")
 def test_first_start_installs_and_later_starts_do_not(machine):
     first = _start(machine, "report", "--scenes", "a b,c", "*")
     script = machine / "a project" / "airlight.py"
@@ -202,6 +203,7 @@ def test_airlight_python_chooses_the_interpreter(machine):
     assert "AIRLIGHT_PYTHON" in refused.stderr
 
 
+@pytest.mark.claim("launcher")
 def test_a_python_that_is_too_old_is_refused_by_its_real_version(machine):
     old = machine / "programs" / "python3.11"
     _program(old, "#!/bin/sh\nexit 1\n")
@@ -218,6 +220,7 @@ def test_the_version_test_is_understood_by_the_real_python(machine):
     assert path.strip() == os.path.realpath(path.strip())
 
 
+@pytest.mark.claim("launcher")
 def test_missing_ensurepip_gives_the_line_to_type(machine):
     (machine / "programs" / "no-ensurepip").touch()
     _program(machine / "programs" / "apt-get", _APT)

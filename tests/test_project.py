@@ -7,7 +7,9 @@ import sys
 import tomllib
 import zipfile
 from contextlib import suppress
+from graphlib import CycleError, TopologicalSorter
 from importlib.metadata import PackageNotFoundError, version
+from itertools import permutations
 from pathlib import Path
 
 import pytest
@@ -15,9 +17,10 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 from packaging.version import Version
 
-ROOT = Path(__file__).parent.parent
-FOLDERS = ("analytic", "realtime", "reference", "validation", "reports")
-MODULES = sorted([ROOT / "airlight.py", *(path for folder in FOLDERS for path in (ROOT / folder).rglob("*.py"))])
+from tests.helpers.imports import FOLDERS, folder_graph, import_graph, inside, modules, reached
+
+ROOT = Path(__file__).resolve().parents[1]
+MODULES = sorted(modules().values())
 
 # The design's table: whom each may import. What a folder holds may import itself.
 ALLOWED = {
@@ -28,13 +31,11 @@ ALLOWED = {
     "reports": {"analytic", "realtime", "reference", "validation"},
     "airlight": set(FOLDERS),
 }
-# Within the side of truth, the volpath estimator and the integrals share none of their derivations.
-UNRELATED = [
-    (
-        "reference/monte_carlo/volpath/integrator.py",
-        {"reference.quadrature", "analytic"},
-    )
-]
+# Methods are compared with one another, and the three estimators of the truth confirm one another.
+METHODS = tuple(
+    f"realtime.methods.{name}" for name in ("unshadowed", "ray_march", "shadow_planes", "light_volumes", "epipolar")
+)
+ESTIMATORS = ("reference.quadrature", "reference.monte_carlo.volpath", "reference.monte_carlo.single_scatter")
 
 
 def _python(*arguments: str, **options) -> subprocess.CompletedProcess:
@@ -48,47 +49,78 @@ def test_style_and_types(arguments):
     assert ran.returncode == 0, ran.stdout + ran.stderr
 
 
-def _imports(tree: ast.AST) -> list[str]:
-    """Return every module that a file imports, also inside functions."""
-    found = []
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Import):
-            found += [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, "relative imports hide who imports whom"
-            found += [f"{node.module}.{alias.name}" for alias in node.names]
-    return found
+@pytest.fixture(scope="module")
+def graph():
+    return import_graph({name: path.read_text() for name, path in modules().items()})
 
 
-def _forbidden(owner: str, source: str) -> list[str]:
-    ours = {name for name in _imports(ast.parse(source)) if name.split(".")[0] in ALLOWED}
-    return sorted(name for name in ours if name.split(".")[0] not in ALLOWED[owner] | {owner})
+@pytest.mark.claim("methods-share-nothing-with-the-truth")
+@pytest.mark.parametrize("owner", ALLOWED)
+def test_who_may_import_whom(graph, owner):
+    """To the end: also what a module imports by way of others belongs to a folder that its own may import."""
+    allowed = ALLOWED[owner] | {owner}
+    modules_of_owner = [module for module in graph if inside(module, owner)]
+    assert modules_of_owner
+    for module in modules_of_owner:
+        assert {name for name in reached(graph, [module]) if name.split(".")[0] not in allowed} == set(), module
 
 
-@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(ROOT)))
-def test_who_may_import_whom(path):
-    owner = path.relative_to(ROOT).parts[0].removesuffix(".py")
-    assert _forbidden(owner, path.read_text()) == []
+@pytest.mark.claim("no-shared-derivation")
+@pytest.mark.parametrize("apart", [METHODS, ESTIMATORS], ids=["methods", "estimators"])
+def test_imports_of_one_lead_to_none_of_the_others(graph, apart):
+    for one, other in permutations(apart, 2):
+        start = [module for module in graph if inside(module, one)]
+        assert start, one
+        assert {module for module in reached(graph, start) if inside(module, other)} == set(), (one, other)
+
+
+def test_every_method_is_kept_apart():
+    """Whoever adds a method adds it to the list of those that import none of one another."""
+    folder = modules()["realtime.methods.registry"].parent
+    found = {path.stem for path in folder.iterdir() if path.name[0] not in "._"}
+    shared = {"registry", "interface", "user_method", "user_result"}
+    assert {f"realtime.methods.{name}" for name in found - shared} == set(METHODS)
 
 
 def test_the_walk_over_imports_finds_what_is_forbidden():
-    source = "def f():\n    from analytic import phase\n    import numpy\n    import validation.scenes.loading\n"
-    assert _forbidden("realtime", source) == ["analytic.phase", "validation.scenes.loading"]
-    assert _forbidden("reference", source) == ["validation.scenes.loading"]
-
-
-@pytest.mark.parametrize(("path", "others"), UNRELATED, ids=lambda value: value if isinstance(value, str) else "")
-def test_estimators_of_the_truth_share_no_derivation(path, others):
-    # errors are words, no derivation
-    imported = [name for name in _imports(ast.parse((ROOT / path).read_text())) if "errors" not in name]
-    assert not [name for name in imported if any(name == other or name.startswith(f"{other}.") for other in others)]
+    sources = {
+        "analytic.phase": "",
+        "reference.read": "def f():\n    from analytic.phase import PhaseFunction\n    import numpy\n",
+        "realtime.deep": "import reference.read\n",
+        "realtime.method": "from realtime import deep\n",
+    }
+    found = import_graph(sources)
+    assert found["reference.read"] == {"analytic.phase"}
+    assert reached(found, ["realtime.method"]) == set(sources)
+    with pytest.raises(CycleError):
+        TopologicalSorter(import_graph(sources | {"analytic.phase": "from realtime.method import f"})).prepare()
+    files = {name: ROOT / f"{name.replace('.', '/')}.py" for name in sources}
+    assert folder_graph(found, files) == {
+        "analytic": set(),
+        "reference": {"analytic"},
+        "realtime": {"reference"},
+    }
 
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(ROOT)))
-def test_modules_are_short_and_licensed(path):
-    lines = path.read_text().splitlines()
-    assert lines[0] == "# SPDX-License-Identifier: BSD-3-Clause"
-    assert len(lines) <= 400
+def test_modules_are_licensed(path):
+    assert path.read_text().splitlines()[0] == "# SPDX-License-Identifier: BSD-3-Clause"
+
+
+def test_numerics_are_imported_at_the_top():
+    """Where a reader looks for them; only `reports` is lazy, so that `--help` answers at once."""
+    late = [
+        f"{path.relative_to(ROOT)}, line {node.lineno}"
+        for path in MODULES
+        if path.relative_to(ROOT).parts[0] in ("analytic", "realtime", "reference", "validation")
+        for function in ast.walk(ast.parse(path.read_text()))
+        if isinstance(function, ast.FunctionDef)
+        for node in ast.walk(function)
+        if isinstance(node, ast.Import | ast.ImportFrom)
+        for name in ([node.module or ""] if isinstance(node, ast.ImportFrom) else [alias.name for alias in node.names])
+        if name.split(".")[0] in ("drjit", "mitsuba", "numpy")
+    ]
+    assert late == []
 
 
 def test_only_one_place_sets_the_mitsuba_variant():
@@ -116,6 +148,66 @@ def test_no_test_sets_a_variant_that_another_runs_in():
     assert not {(name, given) for name, given in setters if given in VARIANTS}
 
 
+def _asserts(node: ast.AST, helpers: set[str]) -> bool:
+    for inner in ast.walk(node):
+        if isinstance(inner, ast.Assert):
+            return True
+        if isinstance(inner, ast.Call):
+            name = ast.unparse(inner.func)
+            if name.startswith(("pytest.raises", "pytest.warns", "np.testing.assert_")) or name in helpers:
+                return True
+    return False
+
+
+def faults_of_tests(trees: dict[str, ast.Module]) -> list[str]:
+    """Name tests without an assertion, tests that end by a return, and skips without a condition or a reason."""
+    functions = [(name, node) for name, tree in trees.items() for node in ast.walk(tree)]
+    functions = [(name, node) for name, node in functions if isinstance(node, ast.FunctionDef)]
+    helpers: set[str] = set()
+    while more := {node.name for _, node in functions if _asserts(node, helpers)} - helpers:
+        helpers |= more
+    faults = []
+    for name, node in functions:
+        if node.name.startswith("test_"):
+            faults += [] if _asserts(node, helpers) else [f"{name}: {node.name} asserts nothing"]
+            returns = [inner for inner in ast.walk(node) if isinstance(inner, ast.Return) and inner.value is None]
+            faults += [f"{name}: {node.name} returns; `assume` or `pytest.skip` would say so"] if returns else []
+        for statement in node.body:
+            call = statement.value if isinstance(statement, ast.Expr) else None
+            if isinstance(call, ast.Call) and ast.unparse(call.func) == "pytest.skip":
+                faults.append(f"{name}: {node.name} is skipped without a condition")
+    for name, tree in trees.items():
+        for call in (node for node in ast.walk(tree) if isinstance(node, ast.Call)):
+            what, given = ast.unparse(call.func), {word.arg for word in call.keywords}
+            if what == "pytest.mark.skip" or (what == "pytest.skip" and not call.args):
+                faults.append(f"{name}: {what} without a condition or a reason")
+            if what in ("pytest.mark.skipif", "pytest.mark.xfail", "pytest.importorskip") and "reason" not in given:
+                faults.append(f"{name}: {what} without a reason")
+    return faults
+
+
+def test_tests_can_fail_and_say_why_they_are_skipped():
+    paths = sorted((ROOT / "tests").rglob("*.py"))
+    assert faults_of_tests({str(path.relative_to(ROOT)): ast.parse(path.read_text()) for path in paths}) == []
+
+
+def test_faults_of_tests_are_found():
+    source = (
+        "def check(x):\n    assert x\n"
+        "def test_good():\n    check(1)\n"
+        "def test_empty():\n    print(1)\n"
+        "def test_early(x):\n    if x: return\n    assert x\n"
+        "def test_never():\n    pytest.skip('later')\n    assert 0\n"
+        "@pytest.mark.skipif(True)\ndef test_silent():\n    assert 0\n"
+    )
+    assert faults_of_tests({"a": ast.parse(source)}) == [
+        "a: test_empty asserts nothing",
+        "a: test_early returns; `assume` or `pytest.skip` would say so",
+        "a: test_never is skipped without a condition",
+        "a: pytest.mark.skipif without a reason",
+    ]
+
+
 def test_importing_everything_sets_no_variant():
     names = [".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__") for path in MODULES]
     code = f"import importlib\nfor name in {names!r}: importlib.import_module(name)\n"
@@ -124,6 +216,7 @@ def test_importing_everything_sets_no_variant():
     assert ran.returncode == 0, ran.stderr
 
 
+@pytest.mark.claim("help-is-light")
 def test_the_front_door_and_help_import_nothing_heavy():
     heavy = ("mitsuba", "drjit", "numpy", "scipy", "mpmath", "matplotlib", "colour", "OpenEXR", "jinja2")
     code = (
@@ -150,6 +243,7 @@ def _project() -> dict:
     return tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 
 
+@pytest.mark.claim("locked-dependencies")
 def test_the_lock_pins_what_the_project_asks_for_and_all_that_it_needs():
     locked = _locked()
     project = _project()

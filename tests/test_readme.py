@@ -30,6 +30,7 @@ def run(arguments, folder):
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=600)
 
 
+@pytest.mark.claim("snippet-of-the-readme")
 @pytest.mark.parametrize("code", snippets("python"))
 def test_python_snippets(code, tmp_path):
     assert len(code.strip().splitlines()) <= 11
@@ -50,6 +51,7 @@ def test_ci_runs_the_two_commands():
     assert snippets("sh")[0].splitlines() == ["./airlight report", "./airlight test"]
 
 
+@pytest.mark.claim("own-scene")
 @pytest.mark.slow
 def test_scene_with_a_mesh_of_the_users_own(tmp_path):
     (tmp_path / "mesh.obj").write_text(
@@ -72,6 +74,7 @@ def test_commands_of_the_table_exist():
         assert re.search(rf"\b{name}\b", helped), name
 
 
+@pytest.mark.claim("single-scatter-agrees", "volpath-agrees", "costs-printed-by-bench")
 def test_the_table_of_costs_was_printed_by_bench():
     """Dated, and no number written by hand: a table for each of its scenes, and every check of the truth agrees."""
     from reports.tables.drawing import markdown
@@ -112,6 +115,7 @@ def named_commands(text: str) -> list[tuple[str, list[str]]]:
     return [(one[1], re.findall(r"(?<!\w)--?[a-z][a-z-]*", one[2])) for one in found if one]
 
 
+@pytest.mark.claim("documented-commands")
 @pytest.mark.parametrize("name", DOCUMENTS)
 def test_commands_and_options_that_documents_name_exist(name):
     known = commands()
@@ -128,7 +132,7 @@ def test_commands_are_found_in_documents():
     )
     assert named_commands(text) == [("merge", ["-o"]), ("bench", ["--no-such"]), ("doctor", [])]
     assert len(named_commands(README)) > 20
-    assert "--target" in dict(named_commands(DOCUMENTS["DESIGN.md"]))["reference"]
+    assert "--target-error" in dict(named_commands(README))["reference"]
 
 
 @pytest.mark.parametrize("name", DOCUMENTS)
@@ -142,21 +146,31 @@ def test_links_lead_somewhere(name):
             assert not anchor or anchor in [re.sub(r"[^\w -]", "", one.lower()).replace(" ", "-") for one in headings]
 
 
-def test_the_parameters_of_shadow_planes_are_explained():
-    from realtime.bounded_media.airlight import FORMS
-    from realtime.methods.registry import METHODS
-    from realtime.methods.shadow_planes import method as shadow_planes
+@pytest.mark.claim("margins", tolerance="none: equal")
+def test_margins_are_those_of_the_efforts():
+    from validation.frames.scene_study import EFFORTS
 
-    section = DOCUMENTS["docs/shadow-planes.md"].split("## The parameters")[1].split("**The three orders.**")[0]
-    rows = re.findall(r"^\| `(\w+)` \| ([^|]*) \|", section, flags=re.MULTILINE)
-    explained = {name: values.replace("`", "") for name, values in rows}
-    defaults = METHODS["shadow-planes"].parameters
-    assert set(explained) == set(defaults)
-    words = {"order": "ORDERS", "evaluation": "EVALUATIONS", "sum": "SUMS", "buffer": "BUFFERS"}
-    for name, default in defaults.items():
-        allowed = FORMS if name == "media" else getattr(shadow_planes, words[name]) if name in words else [str(default)]
-        assert explained[name].split(", ") == list(allowed), name
-        assert explained[name].split(", ")[0] == str(default), name
+    columns = ("quick", "default", "full")
+    table = DOCUMENTS["docs/ground-truth.md"].split("## How to read an agreement")[1]
+    rows = re.findall(r"^\| `(single-scatter|volpath)` \| (.*) \|$", table, flags=re.MULTILINE)
+    assert {name for name, _ in rows} == set(EFFORTS["default"].margins)
+    for name, cells in rows:
+        stated = [float(cell) / 100 for cell in re.findall(r"±([\d.]+) %", cells)]
+        assert stated == pytest.approx([EFFORTS[effort].margins[name] for effort in columns], rel=1e-12), name
+
+
+@pytest.mark.claim("cast-shadows", "shadow-ray-certificate")
+def test_rays_of_the_truth_are_sampled_and_checked_as_often_as_stated(variant):
+    import inspect
+
+    from reference.quadrature.image import quadrature_image
+    from reference.scene.read import read_truth
+    from validation.scenes.loading import load_scene
+
+    assert inspect.signature(quadrature_image).parameters["samples"].default == 256
+    image = quadrature_image(read_truth(load_scene("sphere-spot", (8, 6)).scene))
+    assert image.checked > 0
+    assert image.checked % 32 == 0  # for each camera ray that looks into the light
 
 
 def test_scenes_and_names_of_the_api_are_those_of_the_program():

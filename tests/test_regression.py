@@ -13,6 +13,7 @@ from validation.scenes.registry import SCENES
 QUICK = ("open-fog", "sphere-spot")  # every method and every kernel; the other scenes take longer
 
 
+@pytest.mark.claim("baselines", tolerance="the band of each number in its baseline")
 @pytest.mark.parametrize(
     "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in SCENES]
 )
@@ -22,6 +23,7 @@ def test_errors_are_those_of_the_baseline(name, variant):
     assert moves == [], "\n".join(str(move) for move in moves)
 
 
+@pytest.mark.claim("baselines")
 def test_a_fault_of_a_thousandth_is_found(monkeypatch, variant):
     import validation.configurations.methods
     from validation.frames import baseline_runs
@@ -33,7 +35,7 @@ def test_a_fault_of_a_thousandth_is_found(monkeypatch, variant):
         "find_kernel",
         lambda name: lambda *args, **known: 1.001 * find(name)(*args, **known),
     )
-    monkeypatch.setattr(baseline_runs, "baseline_configurations", lambda name, plan: (YARDSTICK,))
+    monkeypatch.setattr(baseline_runs, "baseline_configurations", lambda name, features: (YARDSTICK,))
     moves = compare_baseline(read_baseline("open-fog"), measure_baseline("open-fog", times=False))
     moved = {one.what: one for one in moves if one.label == YARDSTICK.label}
     assert moved["airlight relative_bias"].new == pytest.approx(1e-3, rel=1e-3)

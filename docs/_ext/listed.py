@@ -17,6 +17,8 @@ from reports.tables.table import Name, Row, Table
 ROOT = Path(__file__).resolve().parents[2]
 #: Pages of methods that are called otherwise than the method.
 PAGES: dict[str, str] = {}
+#: What the help of parameters leads to.
+LINKS = {"between the corners of tiles": "methods.md#between-the-corners-of-tiles"}
 
 
 def table(headers: Sequence[str], rows: Sequence[Sequence[str]], words: int = 1) -> str:
@@ -77,13 +79,28 @@ def _named(shown: Table, address: Callable[[str], str] = lambda name: "") -> Tab
 
 
 def parameters(method: str) -> str:
-    """Return the defaults of a method's parameters in a sentence."""
+    """Return a table of a method's parameters: values, the default first, and what they do."""
+    from dataclasses import fields
+
     from realtime.methods.registry import METHODS
 
-    values = METHODS[method].parameters
-    if not values:
-        return "The method has no parameters."
-    return "Defaults: " + ", ".join(f"`{name}={value}`" for name, value in values.items()) + "."
+    rows = [(f"`{item.name}`", *_parameter(item)) for item in fields(METHODS[method].parameters)]
+    return table(("`--set`", "values", "what it does"), rows, 3) if rows else "The method has no parameters."
+
+
+def _parameter(item: Any) -> tuple[str, str]:
+    """Return the values of a parameter, its default first, and what it does."""
+    from realtime.parameters import limits_of, wanted_values
+
+    limits = limits_of(item)
+    if isinstance(item.default, str):
+        values = ", ".join(f"`{choice}`" for choice in dict.fromkeys((item.default, *limits.choices)))
+    else:
+        values = f"{item.default}; {wanted_values(item)}"
+    what = _cell(limits.help)
+    for words, link in LINKS.items():
+        what = what.replace(words, f"[{words}]({link})")
+    return _cell(values), what
 
 
 def kernels() -> str:

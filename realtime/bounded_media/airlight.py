@@ -41,64 +41,107 @@ References
 Biri, Arques, Michelin 2006, sections 4.2 and 5.2.
 """
 
+from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
 
-from realtime.bounded_media.directional_airlight import ParallelRay, parallel_airlight, parallel_source
+from realtime.bounded_media.body_views import light_sides
+from realtime.bounded_media.directional_airlight import ParallelRay
 from realtime.bounded_media.panels import BodySegment, body_integral
 from realtime.bounded_media.ray_segments import MediaRay, Piece, light_leg, other_bodies_near, sum_over_pieces
 from realtime.errors import InputError
 from realtime.numerics.array_types import is_single
 from realtime.numerics.fast_exp import exp_bounded
 from realtime.numerics.gauss_legendre import unit_nodes
-from realtime.rays.ray_light import clip_to_cone, distance_to_light, falloff, stretches
+from realtime.rays.ray_light import distance_to_light, falloff, ray_geometry, smooth_subsegments
+from realtime.scene.lights import Light
 from realtime.scene.medium import Medium, least_extinction
-from realtime.scene.phase import evaluate
 
 FORMS = ("exact", "paper")
 _NODES, _NODES_PAPER = 24, 6
 _OPTICAL_REACH = 18.0  # e^-18 = 1.5e-8 of the light is left
 
 
-def bounded_airlight(ray: MediaRay | ParallelRay, x0, x1):
-    """Return sum_j albedo_j sigma_j J_j over the lit segment [x0, x1], RGB [1/m^2]; without unit for parallel light.
+@dataclass(frozen=True)
+class PlacedRay(MediaRay):
+    """Camera rays in bounded media, and one light that has a place; `ParallelRay` answers for one at infinity."""
+
+    def airlight(self, x0, x1):
+        """Return sum_j albedo_j sigma_j J_j over the lit segment [x0, x1], RGB [1/m^2].
+
+        Parameters
+        ----------
+        x0, x1
+            The segment [m]; `x1` may be infinite.
+
+        Notes
+        -----
+        Valid for any segment. Times intensity / (4 pi) it is the radiance.
+        """
+        panels = smooth_subsegments(self.geometry, self.light, *self.geometry.lit_segment(x0, x1))
+        zero = dr.zeros(type(self.medium.albedo), dr.width(self.geometry.height, x0, x1))
+        return sum_over_pieces(self.pieces, panels, lambda *segment: _piece_integral(self, *segment), zero)
+
+    def source(self, x):
+        """Return albedo sigma exp(-tau) p at the distance x of the rays, RGB [1/m], 0 where nothing scatters."""
+        Color = type(self.medium.albedo)
+        total = dr.zeros(Color, dr.width(x))
+        r = distance_to_light(self.geometry, x)
+        for piece in self.pieces:
+            total += dr.if_stmt(
+                args=(x, r),
+                cond=(x >= piece.begin) & (x < piece.end),
+                true_fn=lambda x, r, piece=piece: _scattered(self, piece, _attenuation(self, piece, [x], [r])[0], x, r),
+                false_fn=lambda x, r: Color(0),
+            )
+        return total
+
+
+LitRay = PlacedRay | ParallelRay  #: camera rays in bounded media and one light: what answers `airlight` and `source`
+
+
+def lit_ray(
+    medium: Medium,
+    light: Light,
+    *,
+    origin,
+    direction,
+    low=None,
+    pieces: tuple[Piece, ...],
+    form: str = "exact",
+    sides: tuple[Any, ...] | None = None,
+) -> LitRay:
+    """Return camera rays in bounded media with one light.
 
     Parameters
     ----------
-    ray
-        The rays.
-    x0, x1
-        The segment [m]; `x1` may be infinite.
+    medium, light
+        The medium with others in it, and any light.
+    origin, direction, low
+        The camera, one for all lanes [m], unit directions, and what rounding took from these if it is known.
+    pieces
+        Of the rays, from `realtime.bounded_media.ray_segments.camera_pieces`.
+    form
+        One of `FORMS`.
+    sides
+        The media as the light sees them, from `realtime.bounded_media.body_views.light_sides`, if they are known.
 
-    Notes
-    -----
-    Valid for any segment. Times intensity / (4 pi) it is the radiance.
+    Raises
+    ------
+    InputError
+        For the published form with a light at infinity.
     """
-    if isinstance(ray, ParallelRay):
-        return parallel_airlight(ray, x0, x1)
-    if ray.light.kind == "spot":
-        x0, x1 = clip_to_cone(ray.geometry, x0, x1)
-    panels = stretches(ray.geometry, ray.light, x0, x1)
-    zero = dr.zeros(type(ray.medium.albedo), dr.width(ray.geometry.height, x0, x1))
-    return sum_over_pieces(ray.pieces, panels, lambda *segment: _piece_integral(ray, *segment), zero)
-
-
-def bounded_source(ray: MediaRay | ParallelRay, x):
-    """Return albedo sigma exp(-tau) p at the distance x of the rays, RGB [1/m], 0 where nothing scatters."""
-    if isinstance(ray, ParallelRay):
-        return parallel_source(ray, x)
-    Color = type(ray.medium.albedo)
-    total = dr.zeros(Color, dr.width(x))
-    r = distance_to_light(ray.geometry, x)
-    for piece in ray.pieces:
-        total += dr.if_stmt(
-            args=(x, r),
-            cond=(x >= piece.begin) & (x < piece.end),
-            true_fn=lambda x, r, piece=piece: _scattered(ray, piece, _attenuation(ray, piece, [x], [r])[0], x, r),
-            false_fn=lambda x, r: Color(0),
-        )
-    return total
+    if not light.w:
+        if form != "exact":
+            raise InputError(f"media={form}: the published approximation is of lights with a place; use media=exact")
+        return ParallelRay(medium, light, origin, direction, pieces, sides or light_sides(medium, light))
+    geometry = ray_geometry(origin, direction, light, low=low)
+    # The published form needs no legs from the light.
+    known = () if form != "exact" else sides or light_sides(medium, light)
+    seen, entries = tuple(one.seen for one in known), tuple(one.entering for one in known)
+    exits = tuple(one.leaving for one in known) if len(known) > 1 else ()
+    return PlacedRay(medium, light, geometry, origin - light.position, direction, pieces, seen, entries, exits, form)
 
 
 def ambient_radiance(ray_pieces: tuple[Piece, ...], distance, ambient: float):
@@ -179,7 +222,7 @@ def _node_count(ray: MediaRay, piece: Piece, *, single: bool) -> int:
 def _scattered(ray: MediaRay, piece: Piece, transmittance: list[Any], x, r):
     """Return albedo sigma p and the spot's profile times a transmittance, as a colour."""
     Color = type(ray.medium.albedo)
-    weight = evaluate(piece.medium.phase, (ray.geometry.foot - x) / r)
+    weight = piece.medium.phase.evaluate((ray.geometry.foot - x) / r)
     if ray.light.soft:
         weight = weight * falloff(ray.geometry, ray.light, x)
     channels = [sigma * weight * value for sigma, value in zip(piece.medium.sigma_t, transmittance)]

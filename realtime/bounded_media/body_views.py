@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from realtime.bounded_media.convex_clip import Seen, seen_from
-from realtime.bounded_media.directional_legs import ParallelSeen, seen_along
+from realtime.bounded_media.directional_legs import seen_along
 from realtime.bounded_media.facet_walk import EntryPlanes, entry_planes, exit_planes
 from realtime.scene.lights import Light
 from realtime.scene.medium import Body, Medium
@@ -25,7 +25,7 @@ class MediaSides:
     """All bodies of a scene as its camera and its lights see them."""
 
     camera: tuple[BodySides, ...]
-    lights: tuple[Any, ...]  #: by light, from `light_sides` or `sunny_sides`
+    lights: tuple[Any, ...]  #: by light, from `light_sides`
 
 
 def body_sides(body: Body, point, *, leaving: bool = True) -> BodySides:
@@ -34,19 +34,16 @@ def body_sides(body: Body, point, *, leaving: bool = True) -> BodySides:
     return BodySides(seen, entry_planes(seen), exit_planes(seen) if leaving else None)
 
 
-def light_sides(medium: Medium, light: Light) -> tuple[BodySides, ...]:
-    """Return the bodies as a light sees them; where legs leave a body matters only to those in another one."""
+def light_sides(medium: Medium, light: Light) -> tuple[Any, ...]:
+    """Return the bodies as a light sees them: `BodySides` of one with a place, else `ParallelSeen`."""
+    if not light.w:
+        return tuple(seen_along(body, light.axis) for body in medium.bodies)
+    # Where legs leave a body matters only to those in another one.
     several = len(medium.bodies) > 1
     return tuple(body_sides(body, light.position, leaving=several) for body in medium.bodies)
-
-
-def sunny_sides(medium: Medium, light: Light) -> tuple[ParallelSeen, ...]:
-    """Return the bodies as a directional light sees them."""
-    return tuple(seen_along(body, light.axis) for body in medium.bodies)
 
 
 def media_sides(medium: Medium, lights: tuple[Light, ...], origin) -> MediaSides:
     """Return the bodies of a scene as its camera, at `origin` [m], and its lights see them."""
     camera = tuple(body_sides(body, origin) for body in medium.bodies)
-    seen = (sunny_sides(medium, one) if one.kind == "directional" else light_sides(medium, one) for one in lights)
-    return MediaSides(camera, tuple(seen))
+    return MediaSides(camera, tuple(light_sides(medium, light) for light in lights))

@@ -28,16 +28,13 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.bounded_media.body_views import sunny_sides
 from realtime.bounded_media.directional_legs import ParallelSeen, cylinder_bend, parallel_legs, slope_from
 from realtime.bounded_media.ray_segments import Piece, sum_over_pieces
-from realtime.errors import InputError
 from realtime.numerics.array_types import is_single
 from realtime.numerics.fast_exp import exp_bounded
 from realtime.numerics.gauss_legendre import unit_nodes
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium, least_extinction
-from realtime.scene.phase import evaluate_half
 
 _FEW_PLANES = 12  # whose bends are worth the search for them
 _NODES, _NODES_DOUBLE = 10, 24
@@ -57,49 +54,33 @@ class ParallelRay:
     pieces: tuple[Piece, ...]
     seen: tuple[ParallelSeen, ...]
 
+    def airlight(self, x0, x1):
+        """Return sum_j albedo_j sigma_j p times the integral over the lit segment [x0, x1], RGB [1].
 
-def parallel_ray(
-    medium: Medium, light: Light, *, origin, direction, pieces, form: str = "exact", sides=None
-) -> ParallelRay:
-    """Return what the integrals of a directional light need; `pieces` and `sides` as in
-    `realtime.bounded_media.ray_segments`.
-    """
-    if form != "exact":
-        raise InputError(f"media={form}: the published approximation is of lights with a place; use media=exact")
-    return ParallelRay(medium, light, origin, direction, pieces, sides or sunny_sides(medium, light))
+        Parameters
+        ----------
+        x0, x1
+            The segment [m]; `x1` may be infinite.
 
+        Notes
+        -----
+        Valid for any segment. Times irradiance / (4 pi) it is the radiance.
+        """
+        zero = dr.zeros(type(self.medium.albedo), dr.width(x0, x1, self.direction))
+        return sum_over_pieces(self.pieces, [(x0, x1)], lambda *segment: _integral(self, *segment), zero)
 
-def parallel_airlight(ray: ParallelRay, x0, x1):
-    """Return sum_j albedo_j sigma_j p times the integral over the lit segment [x0, x1], RGB [1].
-
-    Parameters
-    ----------
-    ray
-        The rays.
-    x0, x1
-        The segment [m]; `x1` may be infinite.
-
-    Notes
-    -----
-    Valid for any segment. Times irradiance / (4 pi) it is the radiance.
-    """
-    Color = type(ray.medium.albedo)
-    zero = dr.zeros(Color, dr.width(x0, x1, ray.direction))
-    return sum_over_pieces(ray.pieces, [(x0, x1)], lambda *segment: _integral(ray, *segment), zero)
-
-
-def parallel_source(ray: ParallelRay, x):
-    """Return albedo sigma exp(-tau) p at the distance x of the rays, RGB [1/m], 0 where nothing scatters."""
-    Color = type(ray.medium.albedo)
-    total = dr.zeros(Color, dr.width(x))
-    for piece in ray.pieces:
-        total += dr.if_stmt(
-            args=(x,),
-            cond=(x >= piece.begin) & (x < piece.end),
-            true_fn=lambda x, piece=piece: _weight(ray, piece) * Color(*_attenuation(ray, piece, [x])[0]),
-            false_fn=lambda x: Color(0),
-        )
-    return total
+    def source(self, x):
+        """Return albedo sigma exp(-tau) p at the distance x of the rays, RGB [1/m], 0 where nothing scatters."""
+        Color = type(self.medium.albedo)
+        total = dr.zeros(Color, dr.width(x))
+        for piece in self.pieces:
+            total += dr.if_stmt(
+                args=(x,),
+                cond=(x >= piece.begin) & (x < piece.end),
+                true_fn=lambda x, piece=piece: _weight(self, piece) * Color(*_attenuation(self, piece, [x])[0]),
+                false_fn=lambda x: Color(0),
+            )
+        return total
 
 
 def _integral(ray: ParallelRay, piece: Piece, x0, x1):
@@ -197,7 +178,7 @@ def _weight(ray: ParallelRay, piece: Piece):
     """Return albedo sigma p, as a colour [1/m]."""
     down = 0.25 * dr.squared_norm(ray.light.axis + ray.direction)
     up = 0.25 * dr.squared_norm(ray.light.axis - ray.direction)
-    phase = evaluate_half(piece.medium.phase, down, up)
+    phase = piece.medium.phase.evaluate_half(down, up)
     return piece.medium.albedo * type(ray.medium.albedo)(*(sigma * phase for sigma in piece.medium.sigma_t))
 
 

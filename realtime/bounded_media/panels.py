@@ -37,7 +37,6 @@ from realtime.numerics.gauss_legendre import unit_nodes
 from realtime.rays.ray_light import RayGeometry, falloff
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium
-from realtime.scene.phase import evaluate
 
 _NODES, _NODES_DOUBLE = 3, 6
 _MOST = 1000  # panels; more than any segment needs: what is not a number must end too
@@ -46,8 +45,6 @@ _DEPTH = 1.6
 _SHARE = 0.5
 _NEARER, _FARTHER = 0.5, 0.8
 _STEEP, _LEAST = 0.2, 0.002  # share for a ball, and of its radius in any case
-#: Shares of the largest angle for phase functions with lobes; a table has kinks, and no accuracy between them.
-_TURN = {"isotropic": 1.0, "rayleigh": 0.8, "hazy": 0.6, "murky": 0.35, "tabulated": 0.25}
 
 
 @dataclass(frozen=True)
@@ -153,8 +150,7 @@ def _ball_length(one: BodySegment, x):
 
 
 def _largest_tangent(one: BodySegment):
-    phase = one.medium.phase
-    turn = dr.maximum(1 - dr.abs(phase.g), 0.03) if phase.name == "hg" else _TURN[phase.name]
+    turn = one.medium.phase.largest_turn()
     if one.light.soft:
         turn = dr.minimum(turn, 0.4)
     return _TANGENT * turn
@@ -177,7 +173,7 @@ def _panel(one: BodySegment, walk: Entry, *, ends, squares, h) -> list[Any]:
         r = dr.sqrt(dr.fma(s, s, h * h))
         before = _before_body(one, walk, x, r)
         inside = (x - one.begin) + (r - before)
-        weight = share * evaluate(one.medium.phase, -s / r) / dr.fma(t * t, tangent, 1)
+        weight = share * one.medium.phase.evaluate(-s / r) / dr.fma(t * t, tangent, 1)
         if one.light.soft:
             weight *= falloff(one.geometry, one.light, x)
         for channel, (depth, own) in enumerate(zip(one.before, one.medium.sigma_t)):

@@ -9,7 +9,7 @@ from typing import Any
 
 import drjit as dr
 
-from realtime.bounded_media.body_views import BodySides, body_sides, light_sides
+from realtime.bounded_media.body_views import BodySides, body_sides
 from realtime.bounded_media.convex_clip import Seen, inverse_crossings, near_line, share_inside
 from realtime.bounded_media.directional_legs import parallel_legs, seen_along
 from realtime.bounded_media.facet_walk import EntryPlanes, clear_of, line_crossings
@@ -31,7 +31,7 @@ class Piece:
 
 @dataclass(frozen=True)
 class MediaRay:
-    """Camera rays in bounded media, and one light."""
+    """Camera rays in bounded media, and one light that has a place."""
 
     medium: Medium
     light: Light
@@ -42,7 +42,7 @@ class MediaRay:
     seen: tuple[Seen, ...]  #: the bodies as the light sees them
     entries: tuple[EntryPlanes | None, ...]  #: by body, the planes where legs to points within it enter
     exits: tuple[EntryPlanes | None, ...]  #: by body, the planes where legs leave it; only where there are several
-    form: str  #: of `FORMS`
+    form: str  #: of `realtime.bounded_media.airlight.FORMS`
 
 
 def sum_over_pieces(pieces: tuple[Piece, ...], segments, integral, zero):
@@ -115,28 +115,6 @@ def camera_pieces(medium: Medium, origin, direction, sides: tuple[BodySides, ...
     return tuple(pieces)
 
 
-def media_ray(
-    medium: Medium,
-    light: Light,
-    geometry: RayGeometry,
-    *,
-    origin,
-    direction,
-    pieces,
-    form: str = "exact",
-    sides: tuple[BodySides, ...] | None = None,
-) -> MediaRay:
-    """Return what the integrals of one light need.
-
-    `pieces` is from `camera_pieces`, `sides` are the bodies as the light sees them, if they are known; the paper's form
-    needs no legs.
-    """
-    known = () if form != "exact" else sides or light_sides(medium, light)
-    seen, entries = tuple(one.seen for one in known), tuple(one.entering for one in known)
-    exits = tuple(one.leaving for one in known) if len(known) > 1 else ()
-    return MediaRay(medium, light, geometry, origin - light.position, direction, pieces, seen, entries, exits, form)
-
-
 def _passage(sides: BodySides, direction):
     """Return where camera rays enter and leave a body [m], both infinite where they miss it."""
     seen, planes = sides.seen, (sides.entering, sides.leaving)
@@ -189,7 +167,7 @@ def path_transmittance(medium: Medium, light: Light, *, depths, point, active):
     active
         Lanes to compute.
     """
-    if light.kind == "directional":
+    if not light.w:
         still = dr.zeros(type(point))
         for body in medium.bodies:
             (inside,) = parallel_legs(seen_along(body, light.axis), point, still, [type(point.x)(0)], active)

@@ -4,35 +4,45 @@
 import drjit as dr
 import mitsuba as mi
 
+from realtime.bounded_media.body_views import MediaSides, media_sides
 from realtime.frame.surface import visible_triangle
 from realtime.methods.interface.view import View
+from realtime.numerics.array_types import Metres, PerRay
 from realtime.scene.camera import Camera, ray_directions
-from realtime.scene.features import Plan
+from realtime.scene.features import SceneFeatures
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium
-from realtime.tiles.layout import TILE
+from realtime.tiles.layout import SIDE, TILE, Layout
 
 
 def frame_view(
     camera: Camera,
-    pixel,
-    distance,
+    pixel: PerRay,
+    distance: Metres,
     *,
-    plan: Plan,
+    features: SceneFeatures,
     geometry,
     medium: Medium,
     lights: tuple[Light, ...],
-    prepared,
-    tiles=None,
-    tile=None,
-    sides=None,
+    layout: Layout | None = None,
+    tile: PerRay | None = None,
+    sides: MediaSides | None = None,
 ) -> View:
     """Return what a method is given for some pixels.
 
-    `geometry` may be None where the method casts no rays, and `tile` where sixteen pixels that follow one another are a
-    tile.
+    `geometry` may be None where the method casts no rays, `layout` where these are the pixels of a whole image or
+    of its first tile, and `tile` where sixteen pixels that follow one another are a tile.
     """
     direction, low = ray_directions(camera, pixel)
+    shown = {"features": features, "geometry": geometry, "medium": medium, "lights": lights}
+
+    def part():
+        # The planes of bodies are written to a table, which no branch may do: so before there are parts.
+        sides = media_sides(medium, lights, camera.origin) if features.bounded else None
+        return lambda pixel, distance, tile, layout: frame_view(
+            camera, pixel, distance, layout=layout, tile=tile, sides=sides, **shown
+        )
+
     return View(
         origin=camera.origin,
         direction=direction,
@@ -40,16 +50,15 @@ def frame_view(
         distance=distance,
         lights=lights,
         medium=medium,
-        plan=plan,
-        visible=lambda point, light: _visible(geometry, point, light),
+        features=features,
+        visible=lambda point, light: ~geometry.ray_test(light.shadow_ray(point)),
         camera=camera,
         pixel=pixel,
-        rays=_rays(camera, pixel),
-        square_tiles=_in_square_tiles(camera, pixel),
-        visible_triangle=lambda: visible_triangle(geometry, camera.origin, direction),
-        prepared=prepared,
-        tiles=tiles,
+        layout=_layout(camera) if layout is None else layout,
         tile=dr.arange(mi.UInt32, dr.width(pixel)) // TILE if tile is None else tile,
+        rays=_rays(camera, pixel),
+        visible_triangle=lambda: visible_triangle(geometry, camera.origin, direction),
+        part=part,
         sides=sides,
     )
 
@@ -59,18 +68,6 @@ def _rays(camera: Camera, pixel):
     return lambda lane: ray_directions(camera, dr.gather(mi.UInt32, pixel, lane))
 
 
-def _in_square_tiles(camera: Camera, pixel) -> bool:
-    return camera.width % 4 == 0 and camera.height % 4 == 0 and dr.width(pixel) > 1
-
-
-def _visible(geometry, point, light):
-    """Cast a shadow ray from the light, where nothing can block it at once, to just before the point."""
-    if light.kind == "directional":
-        # From the point on, where a ray is exact, though not from the surface that it may lie on.
-        away = 2e-6 * light.face.depth
-        return ~geometry.ray_test(mi.Ray3f(mi.Point3f(point - light.axis * away), mi.Vector3f(-light.axis)))
-    start = mi.Point3f(light.position)
-    direction = mi.Vector3f(point) - mi.Vector3f(start)
-    length = dr.norm(direction)
-    # Twenty units in the last place before the point: on a surface the point itself must not block the light.
-    return ~geometry.ray_test(mi.Ray3f(start, direction / length, length * (1 - 2e-6), 0.0, []))
+def _layout(camera: Camera) -> Layout:
+    """Return how the pixels of a whole image lie, and those of its first tile, with which a method is tried."""
+    return Layout.SQUARES if camera.width % SIDE == 0 and camera.height % SIDE == 0 else Layout.LINES

@@ -3,9 +3,9 @@
 
 | moved | made anew |
 | --- | --- |
-| camera | camera rays, tiles, and what was prepared if it depends on the camera |
+| camera | camera rays, lists of tiles, and what was prepared if it depends on the camera |
 | geometry | everything |
-| light | what was prepared, tiles |
+| light | what was prepared, lists of tiles |
 | medium, colours | nothing of these |
 
 Surface and airlight are computed for every frame. Who calls says what moved: nothing is compared, so what moved without
@@ -14,30 +14,35 @@ being named stays where it was.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
-from realtime.frame.renderer import FrameRenderer, evaluated, run_airlight, run_cast_and_shade, run_shade, run_tiles
+from realtime.frame.renderer import FrameRenderer, evaluated, run_cast_and_shade, run_cull, run_method, run_shade
+from realtime.frame.surface import Cast
+from realtime.methods.interface.layers import History
+from realtime.methods.interface.method import Preparation
 from realtime.scene.read_scene import Scene
 
 
 @dataclass(frozen=True)
-class Kept:
+class FrameCache:
     """What a frame leaves to the next one, by what it depends on."""
 
-    cast: Any  #: camera and geometry
-    prepared: Any  #: lights and geometry, shadow planes also the camera: `Method.prepared_from`
-    tiles: Any  #: camera, geometry and lights
+    cast: Cast  #: camera and geometry
+    state: Any  #: lights and geometry, shadow planes also the camera: `Method.prepared_from`
+    lists: Any  #: camera, geometry and lights
+    history: History | None = None  #: the last frame, for passes over the image
 
 
 def next_frame(
     renderer: FrameRenderer,
     scene: Scene,
-    kept: Kept | None,
+    cache: FrameCache | None,
     *,
     camera_moved: bool,
     geometry_moved: bool,
     light_moved: bool,
-) -> tuple[tuple[Any, Any, Any], Kept]:
+) -> tuple[tuple[Any, Any, Any], FrameCache]:
     """Render a scene after the one that left something.
 
     Parameters
@@ -46,7 +51,7 @@ def next_frame(
         The stages of the frame.
     scene
         The scene as it is now: that of the renderer but for camera, positions, lights, colours and medium.
-    kept
+    cache
         What the last frame left; None for the first, for which everything is made. If nothing is said to move in it,
         it is shaded by the function that the next ones will use: then these record nothing.
     camera_moved, geometry_moved, light_moved
@@ -57,28 +62,29 @@ def next_frame(
     -------
     stages
         As from `realtime.frame.renderer.run_stages`: bit by bit what it returns for this scene.
-    kept
+    cache
         For the next frame.
     """
     renderer = replace(renderer, scene=scene)
     cast_again = camera_moved or geometry_moved
-    tile_again = cast_again or light_moved or kept is None
+    cull_again = cast_again or light_moved or cache is None
     moved = {"camera": camera_moved, "geometry": geometry_moved, "light": light_moved, "look": True}
-    prepare_again = kept is None or any(moved[what] for what in renderer.method.prepared_from)
-    kept = kept or Kept(None, None, None)
-    finish = _started(renderer.prepare, scene) if prepare_again else None
+    if cache is None or any(moved[what] for what in renderer.method.prepared_from):
+        finish = _started(renderer.prepare, scene)
+    else:
+        finish = partial(getattr, cache, "state")
     if cast_again:
         cast, by_light = run_cast_and_shade(renderer)
     else:
-        cast = kept.cast or run_cast_and_shade(renderer)[0]
+        cast = cache.cast if cache else run_cast_and_shade(renderer)[0]
         by_light = run_shade(renderer, cast)
-    prepared = finish() if finish else kept.prepared
-    tiles = run_tiles(renderer, prepared, cast.distance) if tile_again else kept.tiles
-    stages = evaluated(cast, by_light, run_airlight(renderer, prepared, cast.distance, by_light, tiles))
-    return stages, Kept(cast, prepared, tiles)
+    state = finish()
+    lists = cache.lists if cache and not cull_again else run_cull(renderer, state, cast.distance)
+    layers = run_method(renderer, state, cast, by_light, lists, cache.history if cache else None)
+    return evaluated(cast, by_light, layers), FrameCache(cast, state, lists, layers[2])
 
 
-def _started(prepare: Callable[[Scene], Any], scene: Scene) -> Callable[[], Any]:
+def _started(prepare: Preparation, scene: Scene) -> Callable[[], Any]:
     """Return what finishes the preparation.
 
     One that works on the host has a method `start`: it reads what it needs of the scene, for which the device must have

@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A frame: camera rays, the lit surface, what the method sorts by tiles, and the airlight; each stage one frozen
-function.
+"""A frame: camera rays, the lit surface, what the method sorts by tiles, its layers, and passes over the whole image.
 
-Frozen functions (`drjit.freeze`) record their kernels on the first call and replay them afterwards, so a frame costs
-its kernels and little else. A method whose arrays change their sizes from frame to frame cannot be frozen. All that
-moves (camera, lights, medium, shadow maps) is passed in as opaque arrays. What of a frame serves the next one too:
-`realtime.frame.incremental`.
+Each stage is one frozen function. Frozen functions (`drjit.freeze`) record their kernels on the first call and replay
+them afterwards, so a frame costs its kernels and little else. A method whose arrays change their sizes from frame to
+frame cannot be frozen. All that moves (camera, lights, medium, shadow maps) is passed in as opaque arrays. What of a
+frame serves the next one too: `realtime.frame.incremental`.
 """
 
 from collections.abc import Callable
@@ -16,17 +15,21 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from realtime.bounded_media.body_views import media_sides
 from realtime.errors import InputError
 from realtime.frame.frame_view import frame_view
+from realtime.frame.layers import adaptive_layers, composed, image_passes
 from realtime.frame.recorded import Frozen
 from realtime.frame.surface import Cast
 from realtime.frame.surface_stages import no_surface, surface_stages
-from realtime.kernels.table import resident_tables
-from realtime.methods.registry import Method
+from realtime.kernels.preparation import prepare_kernel, with_tables
+from realtime.methods.interface.layers import History
+from realtime.methods.interface.method import Method, Preparation
+from realtime.numerics.array_types import Metres, PerRay
+from realtime.parameters import read_parameters
 from realtime.scene.camera import tiled_pixels
 from realtime.scene.read_scene import Scene
-from realtime.tiles.adaptive_sampling import between_corners, tile_corners
+from realtime.tiles.adaptive_sampling import Corners, tile_corners
+from realtime.tiles.layout import TILE
 
 
 @dataclass(frozen=True)
@@ -35,13 +38,16 @@ class FrameRenderer:
 
     scene: Scene
     method: Method
-    pixel: Any  #: pixel numbers in the order of the lanes
-    prepare: Callable[[Scene], Any]  #: what the method needs before the frame: shadow maps, shadow planes
+    pixel: PerRay  #: pixel numbers in the order of the lanes
+    prepare: Preparation  #: scene -> the state of the method: shadow maps, shadow planes
     surface: Callable[..., Any]  #: -> what camera rays meet, and what `shade` returns for it
-    shade: Callable[..., Any]  #: -> surface radiance: by light where `airlight` finds shadows, or a sum
-    tiles: Callable[..., Any] | None  #: -> what the method sorts by tiles; None where it does not
-    airlight: Callable[..., Any]  #: -> airlight radiance, and that of the surface where this finds its shadows, or None
-    corners: Any  #: how the tiles of the image lie; None where every pixel is computed
+    shade: Callable[..., Any]  #: -> surface radiance: by light where the method knows their visibility, or a sum
+    cull: Callable[..., Any]  #: -> what concerns each tile; () where the method sorts nothing
+    render: Callable[..., Any]  #: -> airlight, and the surface where layers change it; layers where there are passes
+    passes: Callable[..., Any] | None  #: -> airlight, surface and what they leave; None where the method has none
+    tables: Any  #: what the kernel reads; None for most
+    corners: Corners | None  #: how the tiles of the image lie; None where every pixel is computed
+    lane: PerRay | None  #: the entry of every pixel row by row, for passes
     shade_casts_rays: bool  #: whether shading asks Mitsuba for shapes or shadows
     casts_rays: bool  #: whether the method casts rays of its own
 
@@ -79,7 +85,7 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
     kernel
         An airlight kernel function; needed where `method.uses_kernel`.
     parameters
-        Parameters of the method; the others have its defaults.
+        Values of the method's parameters; the others have its defaults.
 
     Raises
     ------
@@ -87,63 +93,60 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
         For a parameter that the method does not have, where a kernel is missing, and for what method or kernel refuse;
         what the kernel of a method that is not frozen refuses comes with the first frame.
     """
-    unknown = set(parameters) - set(method.parameters)
-    if unknown:
-        known = ", ".join(method.parameters) or "none"
-        raise InputError(f"method {method.name}: got a parameter {sorted(unknown)[0]!r}, wanted one of: {known}")
+    chosen = read_parameters(method.name, method.parameters, parameters)
     if method.uses_kernel and kernel is None:
         raise InputError(f"method {method.name}: got no kernel, wanted one of realtime.kernels.registry.KERNELS")
-    settings = dict(method.parameters) | parameters
-    tolerance = settings.pop("tolerance") if method.tiled else 0.0
-    by_rays = method.tiled is not None and method.tiled(settings)
-    plan, camera = scene.plan, scene.camera
-    lights_surfaces = method.lights_surfaces(settings)
+    by_rays = method.by_rays is not None and method.by_rays(chosen)
+    tolerance = chosen.tolerance if method.by_rays else 0.0
+    features, camera = scene.features, scene.camera
+    provides_visibility = method.provides_visibility(chosen)
     pixel = mi.UInt32(tiled_pixels(camera.width, camera.height))
     corners = tile_corners(pixel, camera, tolerance, by_rays=by_rays, lights=len(scene.lights))
-    surface, shade, shade_casts_rays = surface_stages(scene, lights_surfaces=lights_surfaces)
+    surface, shade, shade_casts_rays = surface_stages(scene, provides_visibility=provides_visibility)
+    tables = prepare_kernel(kernel, type(camera.origin.x)) if method.uses_kernel else None
 
-    def sort_tiles(pixel, camera, medium, lights, prepared, distance):
-        assert method.tiles is not None
-        shown = {"geometry": None, "medium": medium, "lights": lights, "prepared": prepared}
-        return method.tiles(frame_view(camera, pixel, distance, plan=plan, **shown), **settings)
+    def sort(pixel, camera, medium, lights, state, distance):
+        assert method.cull is not None
+        shown = {"features": features, "geometry": None, "medium": medium, "lights": lights}
+        return method.cull(frame_view(camera, pixel, distance, **shown), state, chosen)
 
-    def run_method(geometry, pixel, camera, medium, lights, prepared, tiles, distance, by_light, corners=None):
-        shown = {"geometry": geometry, "medium": medium, "lights": lights, "prepared": prepared, "tiles": tiles}
+    def run(geometry, pixel, camera, medium, lights, state, lists, distance, by_light, tables, corners=None):
+        shown = {"features": features, "geometry": geometry, "medium": medium, "lights": lights}
+        view = frame_view(camera, pixel, distance, **shown)
 
-        def sample(pixel, distance, tile=None):
-            view = frame_view(camera, pixel, distance, plan=plan, tile=tile, **shown)
-            found = method.function(view, kernel=kernel, **settings)
-            return found if lights_surfaces else (found, ())
+        def layers_of(view):
+            return method.render(view, state, lists, kernel=with_tables(kernel, tables), parameters=chosen)
 
-        if corners is None:
-            airlight, lit = sample(pixel, distance)
-        else:
-            if plan.bounded:
-                shown["sides"] = media_sides(medium, lights, camera.origin)
-            how = {"width": camera.width, "tolerance": tolerance}
-            airlight, lit = between_corners(corners, pixel, distance, sample, **how)
-        if not lights_surfaces:
-            return airlight, None
-        return airlight, sum(dr.select(reached, color, 0) for reached, color in zip(lit, by_light))
+        layers = layers_of(view) if corners is None else adaptive_layers(layers_of, view, corners, tolerance)
+        return layers if method.passes else composed(layers, by_light)
 
     # Asked of every scene: it checks the parameters also where nothing casts a shadow.
-    prepare = method.prepare(scene, **settings) if method.prepare else _nothing
-    if not plan.shadows:
-        prepare = _nothing
-    casts_rays = method.casts_rays(settings)
-    tiles = sort_tiles if method.tiles and plan.shadows else None
-    airlight = run_method
-    if method.frozen(settings):
-        # Trace one pixel without launching anything: what the method refuses must not be raised while a frozen function
+    prepare = method.prepare(scene, chosen) if method.prepare else _no_state
+    if not features.shadows:
+        prepare = _no_state
+    cull = sort if method.cull and features.shadows else _no_lists
+    casts_rays = method.casts_rays(chosen)
+    render: Callable[..., Any] = run
+    passes: Callable[..., Any] | None = None
+    if method.passes:
+        passes = image_passes(method, chosen, surfaces=features.surfaces)
+    if method.frozen(chosen):
+        # Trace one tile without launching anything: what the method refuses must not be raised while a frozen function
         # is being recorded, which Dr.Jit 1.5 answers by aborting a later recording.
-        one = type(camera.origin.x)(1)
-        one_pixel = (mi.UInt32(0), camera, scene.medium, scene.lights)
-        dark = no_surface(None, None, *one_pixel, None)
-        run_method(scene.geometry if casts_rays else None, *one_pixel, prepare(scene), None, one, dark)
-        resident = resident_tables()
-        airlight = Frozen(run_method, state_fn=lambda *_, **__: resident)
-        tiles = tiles and Frozen(sort_tiles)
-    dr.eval(pixel)
+        few = mi.UInt32(np.array(pixel)[:TILE])
+        shown = few, camera, scene.medium, scene.lights
+        near = dr.full(type(camera.origin.x), 1, dr.width(few))
+        state = prepare(scene)
+        lists = cull(*shown, state, near)
+        dark = no_surface(None, None, *shown, None)
+        run(scene.geometry if casts_rays else None, *shown, state, lists, near, dark, tables)
+        render = Frozen(run)
+        cull = Frozen(sort) if cull is sort else cull
+        passes = passes and Frozen(passes)
+    lane = None
+    if passes is not None:
+        lane = mi.UInt32(np.argsort(np.array(pixel)).astype(np.uint32))
+    dr.eval(pixel, lane)
     return FrameRenderer(
         scene,
         method,
@@ -151,9 +154,12 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
         prepare,
         surface=surface,
         shade=shade,
-        tiles=tiles,
-        airlight=airlight,
+        cull=cull,
+        render=render,
+        passes=passes,
+        tables=tables,
         corners=corners,
+        lane=lane,
         shade_casts_rays=shade_casts_rays,
         casts_rays=casts_rays,
     )
@@ -178,16 +184,16 @@ def image_frame(renderer: FrameRenderer, stages) -> Frame:
     )
 
 
-def run_stages(renderer: FrameRenderer, prepared):
+def run_stages(renderer: FrameRenderer, state):
     """Run the stages on the device and return distance, surface and airlight, evaluated, in the order of the lanes."""
     cast, by_light = run_cast_and_shade(renderer)
-    return evaluated(cast, by_light, run_tiles_and_airlight(renderer, prepared, cast.distance, by_light))
+    return evaluated(cast, by_light, run_method(renderer, state, cast, by_light))
 
 
-def evaluated(cast: Cast, by_light, found):
+def evaluated(cast: Cast, by_light, layers):
     """Return distance, surface and airlight, evaluated, from what the stages returned."""
-    airlight, lit_surface = found
-    surface = by_light[0] if lit_surface is None else lit_surface
+    airlight, behind = layers[:2]
+    surface = by_light[0] if behind is None else behind
     dr.eval(cast.distance, surface, airlight)
     return cast.distance, surface, airlight
 
@@ -205,52 +211,63 @@ def run_shade(renderer: FrameRenderer, cast: Cast):
     return renderer.shade(renderer.shade_geometry, *arguments)
 
 
-def run_surface(renderer: FrameRenderer):
-    """Run the stage of camera rays and lit surface; return the distance, and what `run_shade` returns."""
-    cast, by_light = run_cast_and_shade(renderer)
-    return cast.distance, by_light
-
-
-def run_tiles(renderer: FrameRenderer, prepared, distance):
-    """Run the stage of what the method sorts by tiles; None where it has none."""
+def run_cull(renderer: FrameRenderer, state, distance: Metres):
+    """Run the stage that sorts by tiles."""
     scene = renderer.scene
-    if renderer.tiles is None:
-        return None
-    return renderer.tiles(renderer.pixel, scene.camera, scene.medium, scene.lights, prepared, distance)
+    return renderer.cull(renderer.pixel, scene.camera, scene.medium, scene.lights, state, distance)
 
 
-def run_tiles_and_airlight(renderer: FrameRenderer, prepared, distance, by_light):
-    """Run all that comes after the surface; arguments and result as of `run_airlight`."""
-    tiles = run_tiles(renderer, prepared, distance)
-    return run_airlight(renderer, prepared, distance, by_light, tiles)
-
-
-def run_airlight(renderer: FrameRenderer, prepared, distance, by_light, tiles=None):
-    """Run the stage of the airlight, and return what it does, not evaluated.
+def run_method(
+    renderer: FrameRenderer, state, cast: Cast, by_light, lists=None, history: History | None = None
+) -> tuple[PerRay, PerRay | None, History | None]:
+    """Run the stages of the method, and return what they do, not evaluated.
 
     Parameters
     ----------
-    renderer, prepared
+    renderer, state
         The stages, and what their `prepare` returned.
-    distance, by_light
-        From `run_surface`.
-    tiles
-        From `run_tiles`; None if the method is to build its own on the way.
+    cast, by_light
+        From `run_cast_and_shade`.
+    lists
+        From `run_cull`; None to run that too.
+    history
+        What the last frame returned, for passes; None for the first.
+
+    Returns
+    -------
+    airlight
+        In-scattered radiance [W/(m^2 sr)].
+    surface
+        What is seen through it [W/(m^2 sr)]; None where that is the shaded surface as it is.
+    history
+        For the next frame; None where the method has no passes.
     """
-    scene = renderer.scene
-    if renderer.corners is not None and tiles is None:
-        tiles = run_tiles(renderer, prepared, distance)
-    arguments = (renderer.pixel, scene.camera, scene.medium, scene.lights, prepared, tiles, distance, by_light)
-    return renderer.airlight(renderer.geometry, *arguments, renderer.corners)
+    scene, pixel = renderer.scene, renderer.pixel
+    if lists is None:
+        lists = run_cull(renderer, state, cast.distance)
+    shown = pixel, scene.camera, scene.medium, scene.lights
+    inputs = state, lists, cast.distance, by_light, renderer.tables, renderer.corners
+    layers = renderer.render(renderer.geometry, *shown, *inputs)
+    if renderer.passes is None:
+        return *layers, None
+    geometry = scene.geometry if scene.facets is None else None
+    place = geometry, scene.facets, pixel, renderer.lane, scene.camera, scene.medium
+    airlight, surface, layers, g_buffer = renderer.passes(*place, cast, by_light, layers, history)
+    return airlight, surface, History(layers, g_buffer, scene.camera)
 
 
-def _nothing(scene: Scene) -> tuple[()]:
+def _no_state(scene: Scene) -> tuple[()]:
+    return ()
+
+
+def _no_lists(*place) -> tuple[()]:
     return ()
 
 
 def _image(renderer: FrameRenderer, values, shape):
     lanes = np.array(values)
     lanes = lanes.T if lanes.ndim == 2 else lanes
+    lanes = np.broadcast_to(lanes, (dr.width(renderer.pixel), *lanes.shape[1:]))  # a constant has one entry
     image = np.empty_like(lanes)
     image[np.array(renderer.pixel)] = lanes
     return image.reshape(shape)

@@ -133,16 +133,11 @@ def lit_surface(scene, surface: VisibleSurface, *, medium: Medium, light: Light,
     shadows
         Whether to cast shadow rays; a method that finds out otherwise what is lit leaves them to that.
     """
-    if light.kind == "directional":
-        return _sunlit(scene, surface, medium=medium, light=light, depths=depths, shadows=shadows)
-    to_light = light.position - surface.point
-    r = dr.norm(to_light)
-    cosine = dr.dot(surface.normal, to_light) / r
-    arriving = light.intensity * _profile(light, surface.point, -to_light / r)
+    cosine, r, arriving = _arriving(light, surface)
     lit = surface.seen & (cosine > 0)
     if shadows:
-        lit &= ~scene.ray_test(surface.interaction.spawn_ray_to(mi.Point3f(light.position)), lit)
-    reflected = surface.albedo * arriving * (dr.inv_pi * cosine / dr.square(r))
+        lit &= ~scene.ray_test(light.shadow_ray_from(surface.interaction), lit)
+    reflected = surface.albedo * arriving * (dr.inv_pi * cosine / dr.square(r) if light.w else dr.inv_pi * cosine)
     if medium.bodies:
         kept = path_transmittance(medium, light, depths=depths, point=surface.point, active=lit)
     else:
@@ -150,20 +145,22 @@ def lit_surface(scene, surface: VisibleSurface, *, medium: Medium, light: Light,
     return dr.select(lit, reflected * kept, type(medium.albedo)(0))
 
 
-def _sunlit(scene, surface: VisibleSurface, *, medium: Medium, light: Light, depths, shadows: bool):
-    """Return what `lit_surface` does for a directional light, through bounded media."""
-    cosine = -dr.dot(surface.normal, light.axis)
-    lit = surface.seen & (cosine > 0)
-    if shadows:
-        lit &= ~scene.ray_test(surface.interaction.spawn_ray(mi.Vector3f(-light.axis)), lit)
-    reflected = surface.albedo * light.intensity * (dr.inv_pi * cosine)
-    kept = path_transmittance(medium, light, depths=depths, point=surface.point, active=lit)
-    return dr.select(lit, reflected * kept, type(medium.albedo)(0))
+def _arriving(light: Light, surface: VisibleSurface):
+    """Return the cosine at which a light meets a surface, the distance that it came, and its intensity there.
+
+    Light from infinity has an irradiance for an intensity, and its distance counts nowhere.
+    """
+    if not light.w:
+        return -dr.dot(surface.normal, light.axis), None, light.intensity
+    to_light = light.toward(surface.point)
+    r = dr.norm(to_light)
+    cosine = dr.dot(surface.normal, to_light) / r
+    return cosine, r, light.intensity * _profile(light, surface.point, -to_light / r)
 
 
 def _profile(light: Light, point, away):
     """Return the relative intensity of the light in the unit direction `away`, from the light to a point."""
-    if light.kind == "point":
+    if light.cone is None:
         return type(away.x)(1)
     inside = dr.dot(light.axis, away) > light.cos_cutoff
     if not light.soft:

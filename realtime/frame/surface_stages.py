@@ -19,14 +19,14 @@ from realtime.scene.camera import ray_directions
 from realtime.scene.read_scene import Scene
 
 
-def surface_stages(scene: Scene, *, lights_surfaces: bool) -> tuple[Callable[..., Any], Callable[..., Any], bool]:
+def surface_stages(scene: Scene, *, provides_visibility: bool) -> tuple[Callable[..., Any], Callable[..., Any], bool]:
     """Return the stages for a scene.
 
     Parameters
     ----------
     scene
         The scene; what matters is what cannot move.
-    lights_surfaces
+    provides_visibility
         Whether the method finds out which surfaces are lit.
 
     Returns
@@ -38,10 +38,10 @@ def surface_stages(scene: Scene, *, lights_surfaces: bool) -> tuple[Callable[...
     casts_rays
         Whether `shade` needs the geometry.
     """
-    if not scene.plan.surfaces:
+    if not scene.features.surfaces:
         return _nothing_met, no_surface, False
     # A map of a light at infinity shows the media alone, but not all that is lit.
-    asked = [light.kind == "directional" or not lights_surfaces for light in scene.lights]
+    asked = [not (light.w and provides_visibility) for light in scene.lights]
 
     def cast_all(geometry, facets, pixel, camera, medium) -> Cast:
         direction, _ = ray_directions(camera, pixel)
@@ -57,7 +57,7 @@ def surface_stages(scene: Scene, *, lights_surfaces: bool) -> tuple[Callable[...
         depths = optical_depths(medium, cast.distance, cast.insides) if medium.bodies else None
         shown = {"medium": medium, "depths": depths}
         colors = [lit_surface(geometry, seen, light=light, shadows=one, **shown) for light, one in zip(lights, asked)]
-        return tuple(colors) if lights_surfaces else (sum(colors),)
+        return tuple(colors) if provides_visibility else (sum(colors),)
 
     @Frozen
     def surface(geometry, facets, pixel, camera, medium, lights):

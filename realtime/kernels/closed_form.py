@@ -40,14 +40,7 @@ from realtime.numerics.array_types import is_single, smallest
 from realtime.rays.ray_light import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium, per_extinction
-
-# The coefficients of u^0, u^1, ... of the phase functions.
-_POLYNOMIALS = {
-    "isotropic": (1.0,),
-    "rayleigh": (1.5, -3.0, 3.0),
-    "hazy": (0.5, *[0.0] * 7, 4.5),
-    "murky": (33 / 83, *[0.0] * 31, 50 * 33 / 83),
-}
+from realtime.scene.phase import PHASES
 
 _EULER = 0.57721566490153286
 
@@ -87,17 +80,18 @@ def closed_form(geometry: RayGeometry, x0, x1, medium: Medium, light: Light):
     Graphics Forum 28(2); Pegoraro, Schott, Parker 2009, *An analytical approach to single scattering for anisotropic
     media and light distributions*, Graphics Interface, for polynomials in the cosine.
     """
-    if medium.phase.name not in _POLYNOMIALS:
+    polynomial = medium.phase.polynomial
+    if polynomial is None:
+        known = ", ".join(phase.name for phase in PHASES if phase.polynomial)
         raise InputError(
             f"kernel closed-form: phase function {medium.phase.name!r} is no polynomial in the cosine; use the kernel "
-            f"'quadrature' or one of {', '.join(_POLYNOMIALS)}"
+            f"'quadrature' or one of {known}"
         )
     if light.soft:
         raise InputError(
             "kernel closed-form: a spot that falls off between beam and cut-off has no closed form; use the kernel "
             "'quadrature' or a spot with beam_width = cutoff_angle"
         )
-    polynomial = _POLYNOMIALS[medium.phase.name]
     foot, h = geometry.foot, geometry.height
     Float = type(h)
     floor = 1e-9 if is_single(Float) else 1e-17

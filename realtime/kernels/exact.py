@@ -35,13 +35,11 @@ from realtime.kernels.quadrature import path_interval, quadrature
 from realtime.kernels.short_segments import FEW, MORE, extent, serves, short_segment
 from realtime.numerics.array_types import is_single
 from realtime.numerics.gauss_legendre import unit_nodes
-from realtime.rays.ray_light import RayGeometry, falloff, stretches
+from realtime.rays.ray_light import RayGeometry, falloff, smooth_subsegments
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium, per_extinction
-from realtime.scene.phase import Phase, evaluate_half
+from realtime.scene.phase import Phase
 
-#: The scale d of the substitution (Henyey-Greenstein: by g).
-_SCALE = {"hazy": 0.7, "murky": 0.5}
 #: In float64: nodes of the isotropic case, and for the others panels of equal width in v and the nodes of each.
 _ISOTROPIC_DOUBLE, _PANELS, _PANEL_NODES = 40, 10, 24
 
@@ -77,7 +75,7 @@ def exact(geometry: RayGeometry, x0, x1, medium: Medium, light: Light):
 def _in_single(geometry: RayGeometry, segment, extinctions, phase: Phase, light: Light):
     """Return one value per extinction."""
     if light.soft:
-        return _over_stretches(geometry, segment, extinctions, phase, light)
+        return _over_subsegments(geometry, segment, extinctions, phase, light)
     x0, x1 = segment
     found = extent(geometry, x0, x1, extinctions)
 
@@ -86,7 +84,7 @@ def _in_single(geometry: RayGeometry, segment, extinctions, phase: Phase, light:
             args=(x0, x1),
             cond=serves(MORE, found, phase),
             true_fn=lambda x0, x1: short_segment(geometry, x0, x1, phase, extinctions, rule=MORE),
-            false_fn=lambda x0, x1: _stretch(geometry, x0, x1, extinctions, phase, light),
+            false_fn=lambda x0, x1: _subsegment(geometry, x0, x1, extinctions, phase, light),
         )
 
     return dr.if_stmt(
@@ -98,22 +96,24 @@ def _in_single(geometry: RayGeometry, segment, extinctions, phase: Phase, light:
 
 
 def _in_double(geometry: RayGeometry, segment, sigma_t, medium: Medium, light: Light):
-    if medium.phase.name == "isotropic" and not light.soft:
+    if medium.phase.constant and not light.soft:
         x0, x1 = segment
         grey = Medium((sigma_t,), medium.albedo, medium.phase)
         return quadrature(geometry, x0, x1, grey, light, nodes=_ISOTROPIC_DOUBLE)
-    return _over_stretches(geometry, segment, (sigma_t,), medium.phase, light)[0]
+    return _over_subsegments(geometry, segment, (sigma_t,), medium.phase, light)[0]
 
 
-def _over_stretches(geometry: RayGeometry, segment, extinctions, phase: Phase, light: Light):
+def _over_subsegments(geometry: RayGeometry, segment, extinctions, phase: Phase, light: Light):
     """Return one value per extinction."""
-    parts = [_stretch(geometry, a, b, extinctions, phase, light) for a, b in stretches(geometry, light, *segment)]
+    parts = [
+        _subsegment(geometry, a, b, extinctions, phase, light) for a, b in smooth_subsegments(geometry, light, *segment)
+    ]
     return [sum(values) for values in zip(*parts)]
 
 
-def _stretch(geometry: RayGeometry, x0, x1, extinctions, phase: Phase, light: Light):
+def _subsegment(geometry: RayGeometry, x0, x1, extinctions, phase: Phase, light: Light):
     Float = type(geometry.height)
-    scale, tail = _lobe_scales(phase, Float)
+    scale, tail = phase.lobe_scales(Float)
     h, e0, e1, difference = path_interval(geometry, x0, x1, reduce(dr.minimum, extinctions), tail=tail)
     f0, f1 = e0 / scale, e1 / scale
     c0, c1 = dr.sqrt(dr.fma(f0, f0, 1)), dr.sqrt(dr.fma(f1, f1, 1))
@@ -144,7 +144,7 @@ def _double_mean(phase: Phase, start, scale, width, decays, weight):
         step = scale * dr.fma(f0, cosh_less, c0 * sinh)
         e = scale * f0 + step
         up = dr.rcp(dr.fma(e, e, 1))
-        lobe = dr.fma(c0, cosh_less, dr.fma(f0, sinh, c0)) * up * evaluate_half(phase, dr.square(e) * up, up)
+        lobe = dr.fma(c0, cosh_less, dr.fma(f0, sinh, c0)) * up * phase.evaluate_half(dr.square(e) * up, up)
         value = dr.exp(-decay * step) * lobe
         return value if weight is None else value * weight(e)
 
@@ -160,11 +160,3 @@ def _double_mean(phase: Phase, start, scale, width, decays, weight):
         labels=("index", "total"),
     )
     return [total]
-
-
-def _lobe_scales(phase: Phase, Float):
-    """Return the E where a forward lobe ends, at most 1, and the E where a backward lobe begins, at least 1."""
-    if phase.name == "hg":
-        forward, backward = dr.maximum(Float(phase.g), 0), dr.maximum(-Float(phase.g), 0)
-        return (1 - forward) / (1 + forward), (1 + backward) / (1 - backward)
-    return Float(_SCALE.get(phase.name, 1.0)), 1.0

@@ -16,7 +16,6 @@ from realtime.numerics.array_types import smallest
 from realtime.rays.ray_light import RayGeometry, distance_to_light, falloff
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium, least_extinction, per_extinction
-from realtime.scene.phase import evaluate
 
 _REACH = 20.0  # optical depths after which uniform steps end an endless ray: e^-20 = 2e-9
 
@@ -88,7 +87,7 @@ def _check(steps: int) -> None:
 def _integrand(geometry: RayGeometry, medium: Medium, light: Light, sigma_t, point):
     """Return exp(-sigma_t (x + r)) p times the falloff of a spot, at `point` = (x, r)."""
     x, r = point
-    value = dr.exp(-sigma_t * (x + r)) * evaluate(medium.phase, (geometry.foot - x) / r)
+    value = dr.exp(-sigma_t * (x + r)) * medium.phase.evaluate((geometry.foot - x) / r)
     return value * falloff(geometry, light, x) if light.soft else value
 
 

@@ -21,7 +21,7 @@ also have some T. So there are
     m = ceil(max((v1 - v0)/w, T/T1))
 
 equal panels. w and T1 are the largest that keep random rays of every magnitude within 1e-6 of the integral, rounding
-left aside, for each phase function; `tests/realtime/kernels/test_panels.py` tries others.
+left aside, for each phase function, which knows its own w; `tests/realtime/kernels/test_panels.py` tries others.
 
 **What they cost.** All rays of a packet take part in as many steps as the one that needs most, no more. Panels of a ray
 are equally wide: sinh and cosh of the offsets of the nodes are the same in each, and computed once. From the start of a
@@ -42,16 +42,12 @@ import mitsuba as mi
 
 from realtime.numerics.fast_exp import LOG2_E, exp2_bounded, sinh_bounded
 from realtime.numerics.gauss_legendre import unit_nodes
-from realtime.scene.phase import Phase, evaluate_half
+from realtime.scene.phase import Phase
 
 _NODES = 8
 _MOST = 160  # panels; more than any segment needs: what is not a number must end too
 _DEPTH = 10.5  # T1
-#: w. A table has kinks, and no accuracy to speak of between them.
-_WIDTH = {"isotropic": 2.9, "rayleigh": 1.5, "hazy": 1.15, "murky": 0.75, "tabulated": 0.4}
-#: w for Henyey and Greenstein: a backward lobe rises within the range of integration.
-_FORWARD, _BACKWARD = 2.4, 1.7
-_SOFT = 0.85  #: and for a light whose intensity falls off
+_SOFT = 0.85  #: w for a light whose intensity falls off
 _NO_RATE = 1e-30
 _DEEPEST = 116.0  # e^-80
 
@@ -92,7 +88,7 @@ def panels_mean(phase: Phase, start, scale, width, decays, weight: Callable[[Any
     def panel(index, f, c, depths, totals):
         for share, sinh, less in nodes:
             step = dr.fma(f, less, c * sinh)
-            value = share * density(phase, f + step, dr.fma(f, sinh, dr.fma(c, less, c)), scale)
+            value = share * phase.density(f + step, dr.fma(f, sinh, dr.fma(c, less, c)), scale)
             if weight is not None:
                 value *= weight(scale * (f + step))
             kept = [_kept(dr.fma(rate, step, depth)) for rate, depth in zip(rates, depths)]
@@ -119,35 +115,11 @@ def _kept(depth):
 def panel_count(phase: Phase, width, depth, *, soft: bool = False):
     """Return the number of panels m of segments of some width in v, and depth T; 0 where the width is 0."""
     Float = type(width)
-    if phase.name == "hg":
-        widest = dr.select(Float(phase.g) >= 0, Float(_FORWARD), Float(_BACKWARD))
-    else:
-        widest = Float(_WIDTH[phase.name])
+    widest = phase.panel_width(Float)
     if soft:
         widest = dr.minimum(widest, _SOFT)
     count = dr.maximum(width / widest, depth * (1 / _DEPTH))
     return dr.select(width > 0, mi.UInt32(dr.ceil(dr.minimum(count, _MOST))), 0)
-
-
-def density(phase: Phase, f, c, scale):
-    """Return P(E) cosh v at E = d f, c = cosh v; where d = 1, P = p / c^2.
-
-    Henyey and Greenstein's function is (1 - g)(1 + g)/b^(3/2) with b (1 + E^2) = (1 - g)^2 + (1 + g)^2 E^2, whatever
-    the sign of g: all that is left of it are a reciprocal and a square root.
-    """
-    if phase.name == "isotropic":
-        return dr.rcp(c)
-    if phase.name == "rayleigh":
-        inverse = dr.rcp(c)
-        cos = dr.fma(2 * inverse, inverse, -1)
-        return inverse * dr.fma(0.75 * cos, cos, 0.75)
-    square = dr.square(scale * f)
-    if phase.name == "hg":
-        g = type(f)(phase.g)
-        inverse = dr.rcp(dr.fma(square, dr.square((1 + g) / (1 - g)), 1))
-        return dr.sqrt(dr.fma(square, inverse, inverse)) * inverse * c * ((1 + g) / dr.square(1 - g))
-    up = dr.rcp(square + 1)
-    return c * up * evaluate_half(phase, square * up, up)
 
 
 def _offset(u):

@@ -20,9 +20,7 @@ from realtime.numerics.fast_exp import exp_bounded
 from realtime.rays.ray_light import RayGeometry, falloff
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium
-from realtime.scene.phase import Phase, evaluate_half
-
-_LOBE_WIDTH = {"hazy": 0.6, "murky": 0.35}  # m, found by trial: a factor of two either way costs a factor of two to ten
+from realtime.scene.phase import Phase
 
 
 @dataclass(frozen=True)
@@ -50,7 +48,6 @@ class Piece:
     reach: Any  #: (E - E0)/m beyond which nothing is left
     width: Any  #: U
     factor: Any  #: (2 m/h) exp(-sigma_t (x0 + r0)) [1/m]
-    coefficients: tuple[Any, ...] = ()  #: A_1, A_2, ... over U/2, see the module
 
 
 def piece_of(geometry: RayGeometry, x0, x1, sigma_t, phase: Phase) -> Piece:
@@ -62,11 +59,7 @@ def piece_of(geometry: RayGeometry, x0, x1, sigma_t, phase: Phase) -> Piece:
     # J is even in h: with the light beside the segment, a height below rounding of its distance is as good as zero.
     beside = dr.maximum(dr.maximum(s0, -s1), 0)
     h = dr.maximum(geometry.height, (1e-7 if single else 1e-15) * beside)
-    scale, spread = Float(_LOBE_WIDTH.get(phase.name, 1.0)), Float(1)
-    if phase.name == "hg":
-        g = Float(phase.g)
-        spread = (1 - g) / (1 + g)
-        scale = dr.minimum(1, spread)
+    scale, spread = phase.fit_scales(Float)
     r0 = dr.sqrt(dr.fma(s0, s0, h * h))
     start = _path_over_height(s0, r0, h) / scale
     thickness = sigma_t * h * scale
@@ -126,12 +119,12 @@ def integrand(piece: Piece, u, geometry: RayGeometry, medium: Medium, light: Lig
     growth = dr.fma(start, sinh * sinh / (1 + cosh), cosh_start * sinh)
     cosh_w = dr.fma(cosh_start, cosh, start * sinh)
     value = exp_bounded(-piece.thickness * growth)
-    if medium.phase.name == "isotropic" and not light.soft:
+    if medium.phase.constant and not light.soft:
         return value / cosh_w
     e = piece.scale * (start + growth)
     squared = e * e
     up = dr.rcp(1 + squared)
-    value *= cosh_w * up * evaluate_half(medium.phase, squared * up, up)
+    value *= cosh_w * up * medium.phase.evaluate_half(squared * up, up)
     if light.soft:
         value *= falloff(geometry, light, piece.foot + 0.5 * piece.height * (e - dr.rcp(e)))
     return value

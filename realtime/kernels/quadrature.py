@@ -33,10 +33,9 @@ import numpy as np
 from realtime.errors import InputError
 from realtime.numerics.array_types import is_single, smallest
 from realtime.numerics.fast_exp import exp_bounded
-from realtime.rays.ray_light import RayGeometry, falloff, stretches
+from realtime.rays.ray_light import RayGeometry, falloff, smooth_subsegments
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium, per_extinction
-from realtime.scene.phase import evaluate
 
 
 def quadrature(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, nodes: int = 16):
@@ -66,10 +65,10 @@ def sum_panels(geometry: RayGeometry, panels, medium: Medium, light: Light, node
 
 
 def _panels(geometry: RayGeometry, x0, x1, medium: Medium, light: Light):
-    if medium.phase.name != "isotropic" and not light.soft:
+    if not medium.phase.constant and not light.soft:
         split = dr.clip(geometry.foot, x0, x1)
         return [(x0, split), (split, x1)]
-    return stretches(geometry, light, x0, x1)
+    return smooth_subsegments(geometry, light, x0, x1)
 
 
 @lru_cache
@@ -137,7 +136,7 @@ def _pairs(geometry: RayGeometry, ray, panel, *, phase, light: Light, nodes):
     """Sum the pairs of nodes of one panel; `ray` is foot, height, extinction and `panel` half width, E_c, C_c."""
     foot, h, sigma_t = ray
     half, e_mid, c_mid = panel
-    plain = phase.name == "isotropic" and not light.soft
+    plain = phase.constant and not light.soft
     decay_e, decay_c = -(sigma_t * h) * e_mid, -(sigma_t * h) * c_mid
     e_mid_squared = dr.square(e_mid)
     total = type(h)(0)
@@ -154,7 +153,7 @@ def _pairs(geometry: RayGeometry, ray, panel, *, phase, light: Light, nodes):
             total += weight * dr.fma(after, difference, before * cosh_after) / product
             continue
         for factor, inverse, sign in ((after, dr.rcp(cosh_after), 1.0), (before, cosh_after / product, -1.0)):
-            value = factor * inverse * evaluate(phase, dr.fma(2 * inverse, inverse, -1))
+            value = factor * inverse * phase.evaluate(dr.fma(2 * inverse, inverse, -1))
             if light.soft:
                 e = dr.fma(sign * c_mid, sh, e_mid * ch)
                 value *= falloff(geometry, light, foot + 0.5 * h * (e - dr.rcp(e)))

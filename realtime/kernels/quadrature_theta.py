@@ -15,7 +15,6 @@ from realtime.numerics.gauss_legendre import unit_nodes
 from realtime.rays.ray_light import RayGeometry, distance_to_light, falloff
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium, per_extinction
-from realtime.scene.phase import evaluate
 
 
 def quadrature_theta(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, nodes: int = 16):
@@ -36,7 +35,7 @@ def quadrature_theta(geometry: RayGeometry, x0, x1, medium: Medium, light: Light
     if not isinstance(nodes, int) or nodes < 1:
         raise InputError(f"nodes: got {nodes!r}, wanted a whole number of at least 1")
     split = dr.clip(geometry.foot, x0, x1)
-    whole = medium.phase.name == "isotropic" and not light.soft
+    whole = medium.phase.constant and not light.soft
     panels = [(x0, x1)] if whole else [(x0, split), (split, x1)]
     return per_extinction(
         medium,
@@ -53,7 +52,7 @@ def _panel(geometry: RayGeometry, x0, x1, sigma_t, medium: Medium, light: Light,
     for fraction, weight in unit_nodes(nodes):
         x = dr.fma(h, dr.tan(dr.fma(width, fraction, theta0)), foot)
         r = distance_to_light(geometry, x)
-        value = dr.exp(-sigma_t * (x + r)) * evaluate(medium.phase, (foot - x) / r)
+        value = dr.exp(-sigma_t * (x + r)) * medium.phase.evaluate((foot - x) / r)
         if light.soft:
             value *= falloff(geometry, light, x)
         total += weight * value

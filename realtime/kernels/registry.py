@@ -26,7 +26,7 @@ from realtime.kernels.quadrature_theta import quadrature_theta
 from realtime.kernels.table import table
 from realtime.kernels.taylor import taylor
 from realtime.kernels.taylor_printed import taylor_printed
-from realtime.rays.ray_light import RayGeometry, clip_to_cone
+from realtime.rays.ray_light import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium
 
@@ -145,6 +145,4 @@ def airlight_integral(kernel, geometry: RayGeometry, x0, x1, *, medium: Medium, 
     medium, light
         What fills the scene and what lights it.
     """
-    if light.kind == "spot":
-        x0, x1 = clip_to_cone(geometry, x0, x1)
-    return kernel(geometry, x0, x1, medium, light)
+    return kernel(geometry, *geometry.lit_segment(x0, x1), medium, light)

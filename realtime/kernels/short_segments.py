@@ -16,6 +16,7 @@ A segment is short where L/r and sigma_t (1 + s1/r1) L are below limits up to wh
 - foot: close to the light, x itself has not the digits.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import reduce
 from typing import Any
@@ -25,7 +26,7 @@ import drjit as dr
 from realtime.numerics.fast_exp import exp_bounded
 from realtime.numerics.gauss_legendre import unit_nodes
 from realtime.rays.ray_light import RayGeometry
-from realtime.scene.phase import Phase, evaluate_half
+from realtime.scene.phase import Phase, Reach
 
 
 @dataclass(frozen=True)
@@ -34,11 +35,11 @@ class Rule:
 
     nodes: int
     depth: float  #: largest sigma_t (1 + s1/r1) L
-    lengths: dict[str, float]  #: largest L/r by phase function; a table has kinks
+    length: Callable[[Reach], float]  #: largest L/r of a phase function
 
 
-FEW = Rule(4, 2.0, {"isotropic": 0.55, "rayleigh": 0.5, "hazy": 0.45, "murky": 0.4, "hg": 0.55, "tabulated": 0.1})
-MORE = Rule(8, 10.0, {"isotropic": 1.7, "rayleigh": 1.5, "hazy": 1.3, "murky": 1.3, "hg": 1.9, "tabulated": 0.2})
+FEW = Rule(4, 2.0, lambda reach: reach.few)
+MORE = Rule(8, 10.0, lambda reach: reach.more)
 
 
 @dataclass
@@ -63,7 +64,7 @@ def serves(rule: Rule, found: Extent, phase: Phase):
 
     Length and depth each spoil part of it: by themselves they may reach their limits, together an ellipse.
     """
-    of_length, of_depth = 1 / rule.lengths[phase.name] ** 2, 1 / rule.depth**2
+    of_length, of_depth = 1 / rule.length(phase.reach) ** 2, 1 / rule.depth**2
     return dr.fma(found.square, of_length, dr.square(found.depth) * of_depth) < 1
 
 
@@ -94,8 +95,8 @@ def short_segment(geometry: RayGeometry, x0, x1, phase: Phase, extinctions, *, r
         inverse = dr.rsqrt(square)
         r = square * inverse
         value = share * dr.square(inverse)
-        if phase.name != "isotropic":
-            value *= evaluate_half(phase, *_half_angle(s, r, inverse, height_squared))
+        if not phase.constant:
+            value *= phase.evaluate_half(*_half_angle(s, r, inverse, height_squared))
         path = x0 + (step + r)
         totals = [dr.fma(value, exp_bounded(-sigma_t * path), total) for sigma_t, total in zip(extinctions, totals)]
     return [total * length for total in totals]

@@ -38,6 +38,7 @@ import drjit as dr
 import numpy as np
 
 from realtime.errors import InputError
+from realtime.kernels.preparation import prepared_by
 from realtime.numerics.array_types import four_numbers
 from realtime.rays.ray_light import RayGeometry
 from realtime.scene.lights import Light
@@ -48,7 +49,35 @@ _LARGEST_U = 10.0  # of Sun's table
 _LARGEST_SIZE = 2048  # 128 MiB in float32 on the device; the quadratures below are good to this size
 
 
-def table(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, form: str = "sun", size: int = 64):
+def upload_table(Float, *, form: str = "sun", size: int = 64):
+    """Return a table on the device, an array of `Float`; parameters as those of `table`."""
+    _check(form, size)
+    if Float is float:
+        raise InputError(
+            "kernel table: the scalar backend has no arrays to hold a table; use an LLVM or CUDA variant, or another "
+            "kernel"
+        )
+    if dr.flag(dr.JitFlag.FreezingScope):
+        raise InputError(
+            "kernel table: got a frozen function that records while the table is not on the device; call "
+            "realtime.kernels.preparation.prepare_kernel before, and pass on what it returns"
+        )
+    records = Float(table_records(form, size).ravel())
+    dr.make_opaque(records)
+    return records
+
+
+def _check(form: str, size: int) -> None:
+    if form not in FORMS:
+        raise InputError(f"form: got {form!r}, wanted one of {', '.join(FORMS)}")
+    if not isinstance(size, int) or not 2 <= size <= _LARGEST_SIZE:
+        raise InputError(f"size: got {size!r}, wanted a whole number from 2 to {_LARGEST_SIZE}")
+
+
+@prepared_by(upload_table)
+def table(
+    geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, form: str = "sun", size: int = 64, tables=None
+):
     """Return the airlight integral J as the difference of two reads of a table [1/m].
 
     Parameters
@@ -59,12 +88,14 @@ def table(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, form: 
         'sun', the published table, or 'tail', scaled tails and heads.
     size
         Entries along each side, 64 in the paper.
+    tables
+        What `upload_table` returned; None uploads the table for this call alone.
 
     Raises
     ------
     InputError
         For a phase function that is not isotropic, a spot that falls off inside its cone, an unknown form, a size
-        outside [2, 2048], and where a frozen function records before the table is on the device (`upload_table`).
+        outside [2, 2048], and where a frozen function records that was given no table.
 
     Notes
     -----
@@ -85,11 +116,8 @@ def table(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, form: 
     Sun, Ramamoorthi, Narasimhan, Nayar 2005, *A practical analytic single scattering model for real time rendering*,
     ACM Transactions on Graphics 24(3).
     """
-    if form not in FORMS:
-        raise InputError(f"form: got {form!r}, wanted one of {', '.join(FORMS)}")
-    if not isinstance(size, int) or not 2 <= size <= _LARGEST_SIZE:
-        raise InputError(f"size: got {size!r}, wanted a whole number from 2 to {_LARGEST_SIZE}")
-    if medium.phase.name != "isotropic":
+    _check(form, size)
+    if not medium.phase.constant:
         raise InputError(
             f"kernel table: phase function {medium.phase.name!r} is not tabulated; use the kernel 'quadrature' or an "
             "isotropic medium"
@@ -99,42 +127,9 @@ def table(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, form: 
             "kernel table: a spot that falls off between beam and cut-off is not tabulated; use the kernel "
             "'quadrature' or a spot with beam_width = cutoff_angle"
         )
-    records = upload_table(type(geometry.height), form, size)
+    records = upload_table(type(geometry.height), form=form, size=size) if tables is None else tables
     difference = _sun if form == "sun" else _tail
     return per_extinction(medium, lambda sigma_t: difference(geometry, (x0, x1), sigma_t, records, size))
-
-
-def upload_table(Float, form: str, size: int):
-    """Return a table on the device of `Float`, uploaded once and kept.
-
-    A frozen function cannot take an array from the host, and reads one on the device only if it is among its inputs.
-    So call the kernel once (or this) before anything that holds the kernel is frozen, and freeze with
-    ``state_fn=lambda *_, **__: resident``, where ``resident = resident_tables()``.
-    """
-    if Float is float:
-        raise InputError(
-            "kernel table: the scalar backend has no arrays to hold a table; use an LLVM or CUDA variant, or another "
-            "kernel"
-        )
-    key = (Float, form, size)
-    if key not in _UPLOADED:
-        if dr.flag(dr.JitFlag.FreezingScope):
-            raise InputError(
-                "kernel table: got a frozen function that records while the table is not on the device; call "
-                "realtime.kernels.table.upload_table before"
-            )
-        records = Float(table_records(form, size).ravel())
-        dr.make_opaque(records)
-        _UPLOADED[key] = records
-    return _UPLOADED[key]
-
-
-def resident_tables() -> tuple:
-    """Return all tables that are on a device, for `drjit.freeze`'s `state_fn` (see `upload_table`)."""
-    return tuple(_UPLOADED.values())
-
-
-_UPLOADED: dict = {}  # (type, form, size) -> array
 
 
 def _sun(geometry: RayGeometry, ends, sigma_t, records, size: int):

@@ -15,7 +15,7 @@ The coefficients follow from three recurrences, for any degree:
   1.
 * e = exp(-a (g - 1)) solves e' = -a g' e, hence n e_n = -a sum_{k=1..n} k g_k e_{n-k}, e_0 = 1. The factor e^-a is left
   out.
-* c_n = sum_k e_{n-k} p_k, where p_k is the series of p(-sin theta), by `_phase_series`.
+* c_n = sum_k e_{n-k} p_k, where p_k is the series of p(-sin theta), by `realtime.scene.phase`.
 
 The printed annex of the paper differs in six places (DESIGN section 3).
 
@@ -31,7 +31,7 @@ from realtime.numerics.array_types import largest
 from realtime.rays.ray_light import RayGeometry, falloff
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium, per_extinction
-from realtime.scene.phase import Phase
+from realtime.scene.phase import PHASES, Phase, series_product
 
 
 def taylor(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, degree: int = 4):
@@ -59,11 +59,11 @@ def taylor(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, degre
     foot, h = geometry.foot, geometry.height
     s0, s1 = x0 - foot, dr.minimum(x1 - foot, largest(type(h)))
     theta0, theta1 = dr.atan2(s0, h), dr.atan2(s1, h)
-    series = _phase_series(medium.phase, degree, type(h))
+    series = phase_series(medium.phase, degree, "taylor")
 
     def integral(sigma_t):
         a = sigma_t * h
-        coefficients = _product(_extinction_series(a, degree), series, degree)
+        coefficients = series_product(_extinction_series(a, degree), series, degree)
         if light.soft:
             total = _weighted(geometry, light, (theta0, theta1), coefficients)
         else:
@@ -111,40 +111,13 @@ def _extinction_series(a, degree: int):
     return e
 
 
-def _product(left, right, degree: int):
-    return [sum(left[n - k] * right[k] for k in range(n + 1)) for n in range(degree + 1)]
-
-
-def _phase_series(phase: Phase, degree: int, Float):
-    """Return the coefficients of p(-sin theta) in powers of theta."""
-    sine = [0.0 if n % 2 == 0 else (-1.0) ** (n // 2) / _factorial(n) for n in range(degree + 1)]
-    one = [1.0] + [0.0] * degree
-    if phase.name == "isotropic":
-        return one
-    if phase.name == "rayleigh":
-        return [0.75 * (a + b) for a, b in zip(one, _product(sine, sine, degree))]
-    if phase.name in ("hazy", "murky"):
-        doublings, scale, mean = (3, 9.0, 2.0) if phase.name == "hazy" else (5, 50.0, 83 / 33)
-        power = [0.5 * (a - b) for a, b in zip(one, sine)]
-        for _ in range(doublings):
-            power = _product(power, power, degree)
-        return [(a + scale * b) / mean for a, b in zip(one, power)]
-    if phase.name == "hg":
-        return _henyey_greenstein_series(phase.g, sine, degree)
-    raise InputError(
-        f"kernel taylor: phase function {phase.name!r} has no Taylor series; use the kernel 'quadrature' or one of "
-        "isotropic, rayleigh, hazy, murky, hg"
-    )
-
-
-def _henyey_greenstein_series(g, sine, degree: int):
-    """Return the series of (1 - g^2) b^(-3/2), b = 1 + g^2 + 2 g sin theta, from b y' = -(3/2) b' y."""
-    b = [1 + g * g] + [2 * g * s for s in sine[1:]]
-    y = [(1 - g) * (1 + g) * dr.rsqrt(b[0]) / b[0]]
-    for n in range(1, degree + 1):
-        y.append(sum((-1.5 * k - (n - k)) * b[k] * y[n - k] for k in range(1, n + 1)) / (n * b[0]))
-    return y
-
-
-def _factorial(n: int) -> float:
-    return 1.0 if n < 2 else n * _factorial(n - 1)
+def phase_series(phase: Phase, degree: int, kernel: str):
+    """Return the coefficients of p(-sin theta) in powers of theta; refuse for a kernel what has none."""
+    series = phase.series(degree)
+    if series is None:
+        known = ", ".join(one.name for one in PHASES if one.series is not Phase.series)
+        raise InputError(
+            f"kernel {kernel}: phase function {phase.name!r} has no Taylor series; use the kernel 'quadrature' or one "
+            f"of {known}"
+        )
+    return series

@@ -26,11 +26,12 @@ Three choices let the kernel be compared with others:
 import drjit as dr
 
 from realtime.errors import InputError
-from realtime.kernels.taylor import _extinction_series, _integrated, _phase_series, _product, _weighted
+from realtime.kernels.taylor import _extinction_series, _integrated, _weighted, phase_series
 from realtime.numerics.array_types import largest
 from realtime.rays.ray_light import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium, per_extinction
+from realtime.scene.phase import series_product
 
 PRINTED_PHASES = ("isotropic", "rayleigh", "hazy", "murky")
 HIGHEST_DEGREE = 4
@@ -71,13 +72,13 @@ def taylor_printed(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, 
     foot, h = geometry.foot, geometry.height
     s0, s1 = x0 - foot, dr.minimum(x1 - foot, largest(type(h)))
     theta0, theta1 = dr.atan2(s0, h), dr.atan2(s1, h)
-    derived = _phase_series(medium.phase, degree, type(h))
+    derived = phase_series(medium.phase, degree, "taylor-printed")
 
     def integral(sigma_t):
         a = sigma_t * h
         printed = printed_coefficients(a, name)
         if degree >= len(printed):
-            printed = printed + _product(_extinction_series(a, degree), derived, degree)[len(printed) :]
+            printed = printed + series_product(_extinction_series(a, degree), derived, degree)[len(printed) :]
         coefficients = printed[: degree + 1]
         if light.soft:
             total = _weighted(geometry, light, (theta0, theta1), coefficients)

@@ -13,119 +13,118 @@ steps.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import drjit as dr
 import mitsuba as mi
 
-from realtime.bounded_media.airlight import bounded_source
-from realtime.bounded_media.directional_airlight import ParallelRay
-from realtime.bounded_media.ray_segments import MediaRay
+from realtime.bounded_media.airlight import LitRay
 from realtime.errors import InputError
 from realtime.memory import check_memory
+from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.view import View, bounded_radiance, radiance, rays_in_media
-from realtime.rays.ray_light import RayGeometry, clip_to_cone, distance_to_light, falloff, ray_geometry
+from realtime.parameters import Parameters, parameter
+from realtime.rays.ray_light import RayGeometry, distance_to_light, falloff, ray_geometry
 from realtime.scene.lights import Light
 from realtime.scene.medium import least_extinction, per_extinction
-from realtime.scene.phase import evaluate
 from realtime.scene.read_scene import Scene
-from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, check_size, lit_in_map, map_memory
+from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, lit_in_map, map_memory, map_size
+from realtime.tiles.adaptive_sampling import tolerance
 
-SPACINGS = ("equiangular", "uniform")
-SHADOWS = ("ray", "map", "none")
 _OPTICAL_REACH = 20.0
 
 
-def ray_march(
-    view: View, *, kernel=None, steps: int = 100, spacing: str = "equiangular", shadow: str = "ray", map: int = 512
-):
+@dataclass(frozen=True)
+class RayMarchParameters(Parameters):
+    """The parameters of ray marching."""
+
+    steps: int = parameter(100, "steps of every ray and light", least=1)
+    spacing: str = parameter(
+        "equiangular", "in the angle at the light, or in the distance", choices=("equiangular", "uniform")
+    )
+    shadow: str = parameter(
+        "ray", "a shadow ray a step, a look-up in a shadow map, or no shadows", choices=("ray", "map", "none")
+    )
+    map: int = map_size(512, "texels on a side of a face of the map, with `shadow=map`")
+    tolerance: float = tolerance()
+
+
+def ray_march(view: View, state, lists, *, kernel, parameters: RayMarchParameters) -> Layers:
     """Return the airlight of every ray by marching [W/(m^2 sr)].
 
     Parameters
     ----------
     view
         The frame.
-    kernel
+    state
+        From `prepare_maps`.
+    lists, kernel
         Not used: each step evaluates the integrand itself.
-    steps
-        Steps a ray and light, at least 1.
-    spacing
-        'equiangular' or 'uniform'.
-    shadow
-        'ray' (a shadow ray a step), 'map' (a shadow-map look-up a step) or 'none'.
-    map
-        Resolution of the shadow map where `shadow` is 'map' [texels].
+    parameters
+        Values of the parameters.
 
     Raises
     ------
     InputError
-        For an unknown spacing or shadow, less than one step, or uniform steps on an endless ray through a vacuum.
+        For uniform steps on an endless ray through a vacuum.
 
     References
     ----------
     Billeter, Sintorn, Assarsson 2010, section 2 (the marcher that they compare with). Kulla, Fajardo 2012, *Importance
     sampling techniques for path tracing in participating media*, section 4 (the equi-angular variable).
     """
-    _check(steps, spacing, shadow, view)
+    steps, spacing = parameters.steps, parameters.spacing
+    if spacing == "uniform" and view.features.vacuum and not view.medium.clear:
+        raise InputError("spacing=uniform: an endless ray through a vacuum has no step length; use spacing=equiangular")
     total = type(view.medium.albedo)(0)
-    in_media = rays_in_media(view) if view.plan.bounded else ()
+    in_media = rays_in_media(view) if view.features.bounded else ()
     for number, light in enumerate(view.lights):
         x0, x1 = type(view.distance)(0), view.distance
         media = in_media[number] if in_media else None
-        if isinstance(media, ParallelRay):
-            lit = _visibility(view, number, shadow)
+        if media and not light.w:
+            lit = _visibility(view, state, number, parameters.shadow)
             integral = _march_parallel(view, media, _within(media, x0, x1), steps=steps, lit=lit)
             total += bounded_radiance(light, integral)
             continue
         geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
-        if light.kind == "spot":
-            x0, x1 = clip_to_cone(geometry, x0, x1)
+        x0, x1 = geometry.lit_segment(x0, x1)
         if spacing == "uniform" and not view.medium.clear:
             x1 = dr.minimum(x1, x0 + _OPTICAL_REACH / least_extinction(view.medium))
         if media and view.medium.clear:
             x0, x1 = _within(media, x0, x1)
-        lit = _visibility(view, number, shadow)
+        lit = _visibility(view, state, number, parameters.shadow)
         integral = _march(view, light, geometry, (x0, x1), steps=steps, spacing=spacing, lit=lit, media=media)
         total += bounded_radiance(light, integral) if media else radiance(view.medium, light, integral)
-    return total
+    return Layers(total)
 
 
-def prepare_maps(scene: Scene, *, shadow: str, map: int, **_) -> Callable[[Scene], tuple[ShadowMap, ...]]:
+def prepare_maps(scene: Scene, parameters: RayMarchParameters) -> Callable[[Scene], tuple[ShadowMap, ...]]:
     """Return the function that casts a shadow map for every light of a frame, if they are asked for.
 
     Raises
     ------
     InputError
-        If `map` is no size of a shadow map, or needs more memory than the machine has.
+        If the maps need more memory than the machine has.
     """
-    check_size(map)
-    if shadow != "map":
+    map = parameters.map
+    if parameters.shadow != "map":
         return lambda scene: ()
     needed = sum(map_memory(light, map) for light in scene.lights)
     check_memory(f"map: {map} texels for {len(scene.lights)} light(s)", needed, "use a smaller map")
     return lambda scene: tuple(cast_shadow_map(scene.geometry, light, map) for light in scene.lights)
 
 
-def _check(steps: int, spacing: str, shadow: str, view: View) -> None:
-    for name, value, allowed in (("spacing", spacing, SPACINGS), ("shadow", shadow, SHADOWS)):
-        if value not in allowed:
-            raise InputError(f"{name}: got {value!r}, wanted one of {', '.join(allowed)}")
-    if not isinstance(steps, int) or steps < 1:
-        raise InputError(f"steps: got {steps!r}, wanted a whole number of at least 1")
-    if spacing == "uniform" and view.plan.vacuum and not view.medium.clear:
-        raise InputError("spacing=uniform: an endless ray through a vacuum has no step length; use spacing=equiangular")
-
-
-def _visibility(view: View, number: int, shadow: str):
+def _visibility(view: View, maps, number: int, shadow: str):
     """Return the function that says whether the light of a number reaches a point."""
     light = view.lights[number]
-    if shadow == "none" or not view.plan.shadows:
+    if shadow == "none" or not view.features.shadows:
         return lambda point: True
     if shadow == "map":
-        return lambda point: lit_in_map(view.prepared[number], light, point)
+        return lambda point: lit_in_map(maps[number], light, point)
     return lambda point: view.visible(point, light)
 
 
-def _within(media: MediaRay | ParallelRay, x0, x1):
+def _within(media: LitRay, x0, x1):
     """Return the part of a segment from the first to the last body."""
     first, last = x1, x0
     for piece in media.pieces:
@@ -135,7 +134,7 @@ def _within(media: MediaRay | ParallelRay, x0, x1):
 
 
 def _march(
-    view: View, light: Light, geometry: RayGeometry, segment, *, steps: int, spacing: str, lit, media: MediaRay | None
+    view: View, light: Light, geometry: RayGeometry, segment, *, steps: int, spacing: str, lit, media: LitRay | None
 ):
     """Sum the steps of every ray in one loop, so that the kernel does not grow with their number."""
     x0, x1 = segment
@@ -153,9 +152,9 @@ def _march(
         weight = dr.rcp(dr.square(r)) if spacing == "uniform" else dr.rcp(height)
         point = view.origin + view.direction * x
         if media:
-            term = weight * bounded_source(media, x)
+            term = weight * media.source(x)
             return index + 1, total + dr.select((width > 0) & lit(point), term, 0)
-        weight *= evaluate(medium.phase, (foot - x) / r)
+        weight *= medium.phase.evaluate((foot - x) / r)
         if light.soft:
             weight *= falloff(geometry, light, x)
         term = per_extinction(medium, lambda sigma_t: weight * dr.exp(-sigma_t * (x + r)))
@@ -171,7 +170,7 @@ def _march(
     return total * width
 
 
-def _march_parallel(view: View, media: ParallelRay, segment, *, steps: int, lit):
+def _march_parallel(view: View, media: LitRay, segment, *, steps: int, lit):
     """Sum equal steps of every ray under a directional light; see `_march`."""
     x0, x1 = segment
     Float = type(view.distance)
@@ -182,7 +181,7 @@ def _march_parallel(view: View, media: ParallelRay, segment, *, steps: int, lit)
     def step(index, total):
         x = dr.fma(Float(index) + 0.5, width, x0)
         reached = (width > 0) & lit(view.origin + view.direction * x)
-        return index + 1, total + dr.select(reached, bounded_source(media, x), 0)
+        return index + 1, total + dr.select(reached, media.source(x), 0)
 
     _, total = dr.while_loop(
         state=(mi.UInt32(0), type(view.medium.albedo)(0) + dr.zeros(Float, dr.width(width))),

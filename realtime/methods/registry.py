@@ -1,32 +1,35 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Real-time methods: the in-scattered radiance of every pixel of a view.
+"""Real-time methods: the layers of every pixel of a view.
 
-A method is a function ``method(view, *, kernel, **parameters)``, see `realtime.methods.interface.view`. `METHODS` is
-the registry: add a `Method` to it and every command and report knows it. `find_method` also finds a user's own, which
-is not in it.
+A method is a record, `realtime.methods.interface.method.Method`. `METHODS` is the registry: add a record to it and
+every command and report knows it. `find_method` also finds a user's own, which is not in it.
 """
 
-import difflib
-from types import MappingProxyType
-
 from realtime.errors import InputError
-from realtime.methods.epipolar.method import min_max, prepare_min_max
-from realtime.methods.interface.method import Method
+from realtime.methods.epipolar.method import MinMaxParameters, min_max, prepare_min_max
+from realtime.methods.interface.method import Method, always
 from realtime.methods.light_volumes.method import (
+    LightVolumeParameters,
+    cull_light_volumes,
     finds_lit_surfaces,
-    light_volume_tiles,
     light_volumes,
     prepare_light_volumes,
 )
-from realtime.methods.ray_march import prepare_maps, ray_march
-from realtime.methods.shadow_planes.method import prepare_shadow_planes, shadow_plane_tiles, shadow_planes
-from realtime.methods.unshadowed import unshadowed
+from realtime.methods.ray_march import RayMarchParameters, prepare_maps, ray_march
+from realtime.methods.shadow_planes.method import (
+    ShadowPlaneParameters,
+    cull_shadow_planes,
+    prepare_shadow_planes,
+    shadow_planes,
+)
+from realtime.methods.unshadowed import render_unshadowed
 from realtime.methods.user_method import own_method
+from realtime.parameters import nearest
 
 METHODS: dict[str, Method] = {
     "unshadowed": Method(
         "unshadowed",
-        unshadowed,
+        render_unshadowed,
         "one airlight integral a ray and light, no volumetric shadows",
         "Biri, Arques, Michelin 2006, section 4.1; Sun et al. 2005",
         shadows=False,
@@ -39,11 +42,9 @@ METHODS: dict[str, Method] = {
         uses_kernel=False,
         prepare=prepare_maps,
         prepared_from=frozenset({"geometry", "light"}),
-        casts_rays=lambda settings: settings["shadow"] == "ray",
-        tiled=lambda settings: True,
-        parameters=MappingProxyType(
-            {"steps": 100, "spacing": "equiangular", "shadow": "ray", "map": 512, "tolerance": 0.0}
-        ),
+        casts_rays=lambda parameters: parameters.shadow == "ray",
+        by_rays=always,
+        parameters=RayMarchParameters,
     ),
     "shadow-planes": Method(
         "shadow-planes",
@@ -52,24 +53,11 @@ METHODS: dict[str, Method] = {
         "Biri, Arques, Michelin 2006",
         prepare=prepare_shadow_planes,
         prepared_from=frozenset({"camera", "geometry", "light"}),
-        tiles=shadow_plane_tiles,
-        casts_rays=lambda settings: settings["evaluation"] == "vertex",  # to know the triangle of a surface
-        lights_surfaces=lambda settings: True,
-        tiled=lambda settings: settings["evaluation"] == "pixel",
-        parameters=MappingProxyType(
-            {
-                "order": "exact",
-                "evaluation": "pixel",
-                "sum": "segments",
-                "buffer": "float",
-                "white": 1.0,
-                "rows": 16,
-                "ambient": 0.0,
-                "media": "exact",
-                "cone": 0,
-                "tolerance": 0.0,
-            }
-        ),
+        cull=cull_shadow_planes,
+        casts_rays=lambda parameters: parameters.evaluation == "vertex",  # to know the triangle of a surface
+        provides_visibility=always,
+        by_rays=lambda parameters: parameters.evaluation == "pixel",
+        parameters=ShadowPlaneParameters,
     ),
     "light-volumes": Method(
         "light-volumes",
@@ -78,21 +66,11 @@ METHODS: dict[str, Method] = {
         "Billeter, Sintorn, Assarsson 2010",
         prepare=prepare_light_volumes,
         prepared_from=frozenset({"geometry", "light"}),
-        tiles=light_volume_tiles,
-        lights_surfaces=finds_lit_surfaces,
-        tiled=lambda settings: settings["evaluation"] == "walk",
-        frozen=lambda settings: settings["evaluation"] == "walk",  # the crossings of a mesh are counted on the way
-        parameters=MappingProxyType(
-            {
-                "map": 512,
-                "evaluation": "walk",
-                "tessellation": "static",
-                "threshold": 1e-3,
-                "surface": "map",
-                "walls": "upright",
-                "tolerance": 0.0,
-            }
-        ),
+        cull=cull_light_volumes,
+        provides_visibility=finds_lit_surfaces,
+        by_rays=lambda parameters: parameters.evaluation == "walk",
+        frozen=lambda parameters: parameters.evaluation == "walk",  # the crossings of a mesh are counted on the way
+        parameters=LightVolumeParameters,
     ),
     "min-max": Method(
         "min-max",
@@ -101,7 +79,7 @@ METHODS: dict[str, Method] = {
         "Chen, Baran, Durand, Jarosz 2011; Yusov 2013",
         prepare=prepare_min_max,
         prepared_from=frozenset({"geometry", "light"}),
-        parameters=MappingProxyType({"map": 512, "slices": 0, "samples": 0, "step": 16, "sampling": "slices"}),
+        parameters=MinMaxParameters,
     ),
 }
 
@@ -124,6 +102,7 @@ def find_method(name: str) -> Method:
         return METHODS[name]
     if ":" in name:
         return own_method(name)
-    close = difflib.get_close_matches(name, METHODS, n=1, cutoff=0.4)
-    hint = f"; did you mean {close[0]!r}?" if close else ""
-    raise InputError(f"method: got {name!r}, wanted one of {', '.join(METHODS)}, or your own 'module:function'{hint}")
+    raise InputError(
+        f"method: got {name!r}, wanted one of {', '.join(METHODS)}, or your own 'module:function'"
+        f"{nearest(name, METHODS)}"
+    )

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Airlight without volumetric shadows: one integral from the camera to the visible surface, for each light."""
 
-from realtime.bounded_media.airlight import bounded_airlight
 from realtime.kernels.registry import airlight_integral
+from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.view import View, bounded_radiance, radiance, rays_in_media
+from realtime.parameters import Parameters
 from realtime.rays.ray_light import ray_geometry
 
 
@@ -28,11 +29,16 @@ def unshadowed(view: View, *, kernel):
     """
     total = type(view.medium.albedo)(0)
     start = type(view.distance)(0)
-    if view.plan.bounded:
+    if view.features.bounded:
         rays = rays_in_media(view)
-        return sum(bounded_radiance(ray.light, bounded_airlight(ray, start, view.distance)) for ray in rays)
+        return sum(bounded_radiance(ray.light, ray.airlight(start, view.distance)) for ray in rays)
     for light in view.lights:
         geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
         integral = airlight_integral(kernel, geometry, start, view.distance, medium=view.medium, light=light)
         total += radiance(view.medium, light, integral)
     return total
+
+
+def render_unshadowed(view: View, state, lists, *, kernel, parameters: Parameters) -> Layers:
+    """Return `unshadowed` as the layers of a method."""
+    return Layers(unshadowed(view, kernel=kernel))

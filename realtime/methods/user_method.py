@@ -14,17 +14,19 @@ import inspect
 import os
 import sys
 import traceback
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import field, make_dataclass, replace
 from functools import partial
 from pathlib import Path
-from types import MappingProxyType, ModuleType
+from types import ModuleType
 from typing import Any
 
 from realtime.errors import InputError
-from realtime.methods.interface.method import Method
-from realtime.methods.user_result import check_finite, checked_radiance
+from realtime.methods.interface.layers import Layers
+from realtime.methods.interface.method import Method, always, never
+from realtime.methods.user_result import check_finite, checked_layers, checked_radiance
+from realtime.parameters import Parameters, values
 
 _WANTED = "wanted 'module:function' or 'path/to/file.py:function'"
 _TYPES = (bool, int, float, str)
@@ -48,13 +50,14 @@ def own_method(name: str) -> Method:
     if isinstance(found, Method):
         return replace(
             found,
-            function=_guarded(found.function, name, lights_surfaces=found.lights_surfaces),
+            render=_guarded_render(found.render, name, provides_visibility=found.provides_visibility),
             check=found.check or partial(check_finite, name=name),
         )
     if isinstance(found, type) or not callable(found):
         kind = "class" if isinstance(found, type) else type(found).__name__
         raise InputError(f"method {name}: this is a {kind}; wanted a function of the view")
     takes_kernel, parameters = _signature(found, name)
+    fields = [(key, type(default), field(default=default)) for key, default in parameters.items()]
     return Method(
         name,
         _guarded(found, name, takes_kernel=takes_kernel),
@@ -62,10 +65,10 @@ def own_method(name: str) -> Method:
         _file(found) or "one's own",
         uses_kernel=takes_kernel,
         prepare=_guarded_prepare(getattr(found, "prepare", None), name),
-        casts_rays=lambda settings: True,
-        frozen=lambda settings: bool(getattr(found, "frozen", False)),
+        casts_rays=always,
+        frozen=always if getattr(found, "frozen", False) else never,
         shadows=bool(getattr(found, "shadows", True)),
-        parameters=MappingProxyType(parameters),
+        parameters=make_dataclass("OwnParameters", fields, bases=(Parameters,), frozen=True),
         check=partial(check_finite, name=name),
     )
 
@@ -167,26 +170,29 @@ def _signature(function: Callable[..., Any], name: str) -> tuple[bool, dict[str,
     return takes_kernel, parameters
 
 
-def _guarded(
-    function: Callable[..., Any],
-    name: str,
-    *,
-    takes_kernel: bool = True,
-    lights_surfaces: Callable[[Mapping[str, Any]], bool] = lambda settings: False,
-) -> Callable[..., Any]:
-    """Return the function with its errors named and its result checked."""
+def _guarded(function: Callable[..., Any], name: str, *, takes_kernel: bool) -> Callable[..., Layers]:
+    """Return a plain function as what renders a method, with its errors named and its result checked."""
 
-    def method(view, *, kernel=None, **parameters):
-        given = {"kernel": kernel} if takes_kernel else {}
+    def render(view, state, lists, *, kernel, parameters):
+        given = values(parameters) | ({"kernel": kernel} if takes_kernel else {})
         with _own_errors(f"method {name}", _file(function)):
-            found = function(view, **given, **parameters)
-        if not lights_surfaces(parameters):
-            return checked_radiance(found, view, name)
-        if not isinstance(found, tuple) or len(found) != 2:
-            raise InputError(f"method {name}: returned a {type(found).__name__}; wanted (radiance, lit by light)")
-        return checked_radiance(found[0], view, name), found[1]
+            found = function(replace(view, prepared=state), **given)
+        return Layers(checked_radiance(found, view, name))
 
-    return method
+    return render
+
+
+def _guarded_render(
+    function: Callable[..., Layers], name: str, *, provides_visibility: Callable[[Any], bool]
+) -> Callable[..., Layers]:
+    """Return what renders a record of the user's own, with its errors named and its result checked."""
+
+    def render(view, state, lists, *, kernel, parameters):
+        with _own_errors(f"method {name}", _file(function)):
+            found = function(view, state, lists, kernel=kernel, parameters=parameters)
+        return checked_layers(found, view, name, visibility=provides_visibility(parameters))
+
+    return render
 
 
 def _guarded_prepare(prepare: Any, name: str) -> Callable[..., Any] | None:
@@ -196,9 +202,9 @@ def _guarded_prepare(prepare: Any, name: str) -> Callable[..., Any] | None:
     if not callable(prepare):
         raise InputError(f"method {name}: its `prepare` is a {type(prepare).__name__}; wanted a function of the scene")
 
-    def ready(scene, **parameters):
+    def ready(scene, parameters):
         with _own_errors(f"method {name}", _file(prepare)):
-            made = prepare(scene, **parameters)
+            made = prepare(scene, **values(parameters))
         if not callable(made):
             raise InputError(
                 f"method {name}: `prepare` returned a {type(made).__name__}; wanted a function of the scene"

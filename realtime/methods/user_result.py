@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What a user's own method returned, made a colour for every pixel or refused."""
 
+from dataclasses import replace
 from typing import Any
 
 import drjit as dr
@@ -8,6 +9,7 @@ import mitsuba as mi
 import numpy as np
 
 from realtime.errors import InputError
+from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.view import View
 
 _WANTED = "wanted the radiance of every pixel, an RGB colour or one number: a Dr.Jit array, or NumPy's (pixels, 3)"
@@ -39,6 +41,39 @@ def checked_radiance(found: Any, view: View, name: str):
             raise InputError(f"method {name}: returned {dr.width(one)} values for {width} pixels; {_WANTED}")
     # A constant has one entry: every pixel gets it.
     return Color(*(Float(one) + dr.zeros(Float, width) for one in channels))
+
+
+def checked_layers(found: Any, view: View, name: str, *, visibility: bool) -> Layers:
+    """Return the layers of a method, their in-scattered radiance as `checked_radiance` does.
+
+    Parameters
+    ----------
+    found
+        What the method `name` returned.
+    view
+        What it was given.
+    name
+        Its name, for messages.
+    visibility
+        Whether it says that it provides the visibility of its lights.
+
+    Raises
+    ------
+    InputError
+        For what is no `Layers`, radiance of another type or shape, and a visibility that is not that of every light.
+    """
+    if not isinstance(found, Layers):
+        raise InputError(
+            f"method {name}: returned a {type(found).__name__}; wanted realtime.methods.interface.layers.Layers"
+        )
+    shares = 0 if found.visibility is None else len(found.visibility)
+    wanted = len(view.lights) if visibility else 0
+    if shares != wanted or (found.visibility is None) == visibility:
+        raise InputError(
+            f"method {name}: returned the visibility of {shares} lights, wanted that of {wanted}: one for each light "
+            "where `provides_visibility`, otherwise None"
+        )
+    return replace(found, in_scattered=checked_radiance(found.in_scattered, view, name))
 
 
 def check_finite(airlight, *, name: str) -> None:

@@ -2,7 +2,7 @@
 """Dr.Jit array types of one precision, so that every method runs in float32 and float64 from the same source."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import drjit as dr
 import mitsuba as mi
@@ -10,6 +10,12 @@ import mitsuba as mi
 from realtime.errors import InputError
 
 PRECISIONS = ("single", "double")
+
+# What arrays hold, for signatures. Dr.Jit has a class for each precision and backend, so their type is not checked.
+PerRay: TypeAlias = Any  #: one entry per ray: a number, a vector or a colour
+PerTile: TypeAlias = Any  #: one entry per tile of sixteen rays
+Metres: TypeAlias = Any  #: lengths [m]
+PerMetre: TypeAlias = Any  #: extinctions, inverse depths and airlight integrals [1/m]
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The geometry of a ray and a light: the foot of the perpendicular, the height, and the cone of a spot.
 
-With v = light - origin and a unit direction d, ``foot = v . d`` and ``height = |v x d|``. The textbook form
+With v = l - w origin, the homogeneous vector from the camera to the light (`realtime.scene.lights`), and a unit
+direction d, ``foot = v . d`` and ``height = |v x d|``. For a light at infinity, w = 0, v has unit length, and they are
+the cosine and the sine of the angle between ray and light. The textbook form
 sqrt(|v|^2 - foot^2) cancels where the ray passes close to the light: at height 1e-3 |v| it has no correct digit left in
 float32. Each component of the cross product is a difference of two products, a b - c d, and Kahan's form with fused
 multiply-add gives it to 1.5 units in the last place:
@@ -29,8 +31,8 @@ _PARALLEL = 1e-6  #: sine between a ray and the axis of a spot below which their
 class RayGeometry:
     """Where a light lies as seen from a camera ray; every field has one entry per ray."""
 
-    foot: Any  #: signed distance along the ray of the foot of the perpendicular from the light [m]
-    height: Any  #: distance from the light to the ray [m]
+    foot: Any  #: signed distance along the ray of the foot of the perpendicular from the light [m]; w = 0: a cosine
+    height: Any  #: distance from the light to the ray [m]; w = 0: a sine
     axial: Any = None  #: spot only: cosine between the ray and the axis of the spot
     offset: Any = None  #: spot only: component along the axis of the vector from the light to the foot [m]
     enter: Any = None  #: spot only: distance at which the ray enters the cone, -inf if it misses it [m]
@@ -41,6 +43,13 @@ class RayGeometry:
     slide: Any = None  #: soft spot only: slant times the distance from the foot to the point closest to the axis [m]
     gap: Any = None  #: soft spot only: distance between the ray and the axis, as endless lines [m]
 
+    def lit_segment(self, x0, x1) -> tuple[Any, Any]:
+        """Return the part of [x0, x1] that the light could reach, x1 = x0 where there is none [m].
+
+        That is all of it, but for a spot, which lights what is inside its cone. `x1` may be infinite.
+        """
+        return (x0, x1) if self.enter is None else _clip(self.enter, self.leave, x0, x1)
+
 
 def ray_geometry(origin, direction, light: Light, *, low=None) -> RayGeometry:
     """Return foot and height of rays with respect to one light, and where they are in the cone of a spot.
@@ -50,17 +59,17 @@ def ray_geometry(origin, direction, light: Light, *, low=None) -> RayGeometry:
     origin, direction
         Camera rays, three-vectors of Dr.Jit arrays [m]; `direction` has unit length.
     light
-        A point or spot light.
+        Any light.
     low
         What rounding took from `direction`, if that is known (see `realtime.scene.camera.ray_directions`).
 
     Notes
     -----
-    Valid for any ray and a light that has a place. A ray through the light has height 0.
+    Valid for any ray. A ray through the light, or parallel to the light, has height 0.
     """
-    v, v_low = two_sum(light.position, -origin)
+    v, v_low = two_sum(light.position, -origin) if light.w else (-light.axis, -light.axis_low)
     d = direction
-    if light.kind == "spot":
+    if light.cone is not None:
         return _spot_geometry((v, v_low), d, low, light)
     cross = type(v)(
         difference_of_products(v.y, d.z, v.z, d.y),
@@ -91,26 +100,8 @@ def distance_to_light(geometry: RayGeometry, x):
     return dr.sqrt(dr.fma(s, s, geometry.height * geometry.height))
 
 
-def clip_to_cone(geometry: RayGeometry, x0, x1):
-    """Clip [x0, x1] to the part of the ray inside the cone of a spot.
-
-    Parameters
-    ----------
-    geometry
-        Rays and a spot.
-    x0, x1
-        The segment [m]; `x1` may be infinite.
-
-    Returns
-    -------
-    x0, x1
-        The clipped segment [m]; x1 = x0 where the segment misses the cone.
-    """
-    return _clip(geometry.enter, geometry.leave, x0, x1)
-
-
-def stretches(geometry: RayGeometry, light: Light, x0, x1):
-    """Cut [x0, x1] where a soft spot's `falloff` has kinks, at the cone of the beam; one stretch for other lights.
+def smooth_subsegments(geometry: RayGeometry, light: Light, x0, x1):
+    """Cut [x0, x1] where a soft spot's `falloff` has kinks, at the cone of the beam; one piece for other lights.
 
     A ray that misses the beam is cut where it is closest to the axis: the closer it passes, the more like a kink.
     """

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from realtime.errors import InputError
 from realtime.numerics.array_types import types_of
-from realtime.scene.directional_extent import directional_fields, face_balls
-from realtime.scene.lights import Light
+from realtime.scene.directional_extent import directional_fields, extent_spheres
+from realtime.scene.lights import DirectionalExtent, Light
 from realtime.scene.medium import Medium
 from realtime.scene.mesh_adjacency import Casters
 from realtime.scene.read_scene import Scene
@@ -39,8 +39,8 @@ def turned_light(light: Light, about: Array, turn: Array) -> Light:
     turn
         Rotation matrix, (3, 3).
     """
-    if light.kind == "directional":
-        return replace(light, **_turned_sun(light, turn))
+    if light.extent is not None:
+        return replace(light, **_turned_directional(light, light.extent, turn))
     position = np.array(light.position, dtype=np.float64).ravel()
     arrays = {"position": _like(light.position, about + turn @ (position - about))}
     if light.axis is not None:
@@ -51,10 +51,10 @@ def turned_light(light: Light, about: Array, turn: Array) -> Light:
     return replace(light, **arrays)
 
 
-def _turned_sun(light: Light, turn: Array) -> dict[str, Any]:
+def _turned_directional(light: Light, extent: DirectionalExtent, turn: Array) -> dict[str, Any]:
     high, low = (np.array(part, dtype=np.float64).ravel() for part in (light.axis, light.axis_low))
-    types = types_of(type(light.face.back))
-    return directional_fields(turn @ (high + low), face_balls(light.face), float(light.face.back[0]), types)
+    types = types_of(type(extent.back))
+    return directional_fields(turn @ (high + low), extent_spheres(extent), float(extent.back[0]), types)
 
 
 def coloured_light(light: Light, share: float) -> Light:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The face of a directional light: the smallest rectangle across it through which all light of the media comes.
+"""The extent of a directional light: the smallest rectangle across it through which all light of the media comes.
 
 Light enters there before all shapes, and leaves through the same rectangle behind the media. Heights above that end are
 small numbers where depths may be large ones, so its middle stands for the place of the light.
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realtime.numerics.array_types import ArrayTypes
-from realtime.scene.lights import Face, with_low
+from realtime.scene.lights import DirectionalExtent, with_low
 from realtime.scene.medium import Body
 
 Array = NDArray[np.float64]
@@ -77,15 +77,15 @@ def directional_fields(axis: Array, balls: Array, back: float, types: ArrayTypes
     position = made.pop("position")
     media = types.vector(*(types.scalar(column) for column in balls[:, :3].T))
     numbers = {"depth": types.scalar(float(np.float32(back + behind))), "back": types.scalar(back)}
-    face = Face(**made, **numbers, media=media, radii=types.scalar(balls[:, 3]))
-    fields = {"position": position, "axis": _vector(high, types), "axis_low": _vector(low, types), "face": face}
+    extent = DirectionalExtent(**made, **numbers, media=media, radii=types.scalar(balls[:, 3]))
+    fields = {"position": position, "axis": _vector(high, types), "axis_low": _vector(low, types), "extent": extent}
     dr.make_opaque(*fields.values())
     return fields
 
 
-def face_balls(face: Face) -> Array:
-    """Return the balls of the media that a face was made for."""
-    return np.column_stack([np.array(face.media, dtype=np.float64).T, np.array(face.radii, dtype=np.float64)])
+def extent_spheres(extent: DirectionalExtent) -> Array:
+    """Return the spheres about the media that an extent was made for."""
+    return np.column_stack([np.array(extent.media, dtype=np.float64).T, np.array(extent.radii, dtype=np.float64)])
 
 
 def _middle(balls: Array) -> Array:

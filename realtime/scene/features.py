@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a scene needs of a method: a frame runs the code its plan names and nothing else (DESIGN section 5)."""
+"""What a scene needs of a method: a frame runs the code that these features ask for, no other (DESIGN section 5)."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ from realtime.errors import InputError
 
 
 @dataclass(frozen=True)
-class Plan:
+class SceneFeatures:
     """What a scene needs; every field chooses code, none is data."""
 
     shadows: bool  #: there is something that can cast a shadow
@@ -24,34 +24,38 @@ class Plan:
     notes: tuple[str, ...] = ()  #: what the user should know of this scene
 
 
-def check_places(plan: Plan, method: str) -> None:
+def check_places(features: SceneFeatures, method: str) -> None:
     """Refuse a directional light for a method whose planes or slices go through the place of a light."""
-    if plan.directional_lights:
+    if features.directional_lights:
         raise InputError(
             f"{method}: the scene has a directional light, wanted lights that have a place (point, spot); use "
             "--method light-volumes or ray-march"
         )
 
 
-def describe(plan: Plan) -> dict[str, str]:
-    """Return the plan in words, one entry for each decision."""
-    counts = (("point", plan.point_lights), ("spot", plan.spot_lights), ("directional", plan.directional_lights))
+def describe(features: SceneFeatures) -> dict[str, str]:
+    """Return the features in words, one entry for each decision."""
+    counts = (
+        ("point", features.point_lights),
+        ("spot", features.spot_lights),
+        ("directional", features.directional_lights),
+    )
     lights = [f"{count} {kind}" for kind, count in counts if count]
     words = {
-        "surfaces": "lit surfaces" if plan.surfaces else "none: no ray is cast for the camera",
-        "shadows": "visibility tests" if plan.shadows else "none: nothing casts a shadow",
+        "surfaces": "lit surfaces" if features.surfaces else "none: no ray is cast for the camera",
+        "shadows": "visibility tests" if features.shadows else "none: nothing casts a shadow",
         "extinction": "one for all channels"
-        if plan.extinctions == 1
+        if features.extinctions == 1
         else "one for each channel: three integrals a ray",
         "phase function": "isotropic: left out of the integrand"
-        if plan.isotropic
+        if features.isotropic
         else "anisotropic: split at the foot point",
-        "medium": f"bounded, in {'clear air' if plan.clear else 'another medium'}: rays clipped, no kernel"
-        if plan.bounded
+        "medium": f"bounded, in {'clear air' if features.clear else 'another medium'}: rays clipped, no kernel"
+        if features.bounded
         else "unbounded: every ray lies in it whole",
         "lights": " and ".join(lights),
         "spot falloff": "inside the cone: integrand weighted"
-        if plan.soft_spots
+        if features.soft_spots
         else "none: rays are clipped to cones at most",
     }
     return words

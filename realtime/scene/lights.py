@@ -1,17 +1,27 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Point, spot and directional lights as Dr.Jit values.
 
-A directional light is at infinity. What it lights is media with bounds; the middle of a face across it, where these
-end, stands for its place (`realtime.scene.directional_extent`).
+A light is a homogeneous position (l, w): a place l with w = 1, or with w = 0 the direction l towards a light at
+infinity. The vector from a point P towards it is l - w P, in metres for w = 1 and of unit length for w = 0. All that
+follows from it alone holds for both: the foot and the height of a ray (`realtime.rays.ray_light`), the projection of
+its shadow map (`realtime.shadow_maps.projection`), silhouettes and shadow planes, epipolar slices.
+
+What a directional light lights is media with bounds; the middle of the rectangle across it where these end stands for
+its place (`realtime.scene.directional_extent`).
 """
 
 import math
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
+from numpy.typing import NDArray
 
 from realtime.numerics.array_types import ArrayTypes, is_single
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -24,24 +34,26 @@ class Cone:
 
 
 @dataclass(frozen=True)
-class Face:
+class DirectionalExtent:
     """A rectangle across a directional light where the media end, and the media before it."""
 
     across: Any  #: half of one side, a three-vector [m]
     up: Any  #: half of the other [m]
     depth: Any  #: how far before it there are no shapes any more [m]
-    media: Any  #: middles of balls whose hull holds the media, several entries [m]
+    media: Any  #: middles of spheres whose hull holds the media, several entries [m]
     radii: Any  #: their radii [m]
     back: Any  #: how far from the middle of the media there are none, in any direction [m]
 
 
 @dataclass(frozen=True)
 class Light:
-    """A light. The arrays hold one entry and are opaque, so a light that moves recompiles nothing."""
+    """A light. The arrays hold one entry and are opaque, so a light that moves recompiles nothing.
 
-    kind: str  #: 'point', 'spot' or 'directional'
-    soft: bool  #: spot: the intensity falls off between beam and cut-off; else constant inside the cone
-    position: Any  #: three-vector; directional: the middle of `face` [m]
+    Which fields are there says what it can be asked: a `cone` clips rays, a `beam` within it makes the intensity vary
+    along them, and a light with an `extent` is at infinity.
+    """
+
+    position: Any  #: three-vector; directional: the middle of `extent` [m]
     intensity: Any  #: radiant intensity on the axis [W/sr], RGB; directional: irradiance of a plane across it [W/m^2]
     axis: Any = None  #: spot: unit vector from the light along its axis; directional: in which the light travels
     axis_low: Any = None  #: spot, directional: what rounding took from `axis`
@@ -49,12 +61,80 @@ class Light:
     cone: Any = None  #: spot: the `Cone` of the cut-off
     beam: Any = None  #: soft spot: the `Cone` in which the intensity is full
     inverse_transition: Any = None  #: soft spot: 1 / (cutoff - beam) [1/rad]
-    face: Any = None  #: directional: the `Face` through which all light of the media comes
+    extent: Any = None  #: directional: the `DirectionalExtent` through which all light of the media comes
+
+    @property
+    def w(self) -> int:
+        """The last coordinate of its homogeneous position: 1 for a place, 0 for a direction."""
+        return 0 if self.extent is not None else 1
+
+    @property
+    def kind(self) -> str:
+        """Its name in messages and counts: 'point', 'spot' or 'directional'."""
+        return "spot" if self.cone is not None else "point" if self.w else "directional"
+
+    @property
+    def soft(self) -> bool:
+        """Whether the intensity falls off between beam and cut-off; else it is constant on the lit part of a ray."""
+        return self.beam is not None
 
     @property
     def cos_cutoff(self) -> Any:
-        """Cosine of the half angle beyond which there is no light."""
-        return self.cone.cos if self.cone else None
+        """Cosine of the half angle beyond which there is no light; None without a cone."""
+        return self.cone.cos if self.cone is not None else None
+
+    def toward(self, point) -> Any:
+        """Return l - w P: the vector from points to the light [m], or the unit direction to a light at infinity."""
+        return self.position - point if self.w else -self.axis
+
+    def shadow_ray(self, point) -> Any:
+        """Return the Mitsuba ray that is blocked where the light does not reach a point; a surface there blocks none.
+
+        Parameters
+        ----------
+        point
+            Points [m].
+        """
+        if not self.w:
+            # From the point on, where a ray is exact, though not from the surface that it may lie on.
+            away = 2e-6 * self.extent.depth
+            return mi.Ray3f(mi.Point3f(point - self.axis * away), mi.Vector3f(-self.axis))
+        start = mi.Point3f(self.position)
+        direction = mi.Vector3f(point) - mi.Vector3f(start)
+        length = dr.norm(direction)
+        # Twenty units in the last place before the point: on a surface the point itself must not block the light.
+        return mi.Ray3f(start, direction / length, length * (1 - 2e-6), 0.0, [])
+
+    def shadow_ray_from(self, interaction) -> Any:
+        """Return the Mitsuba ray from a surface interaction that is blocked where the light does not reach it."""
+        if self.w:
+            return interaction.spawn_ray_to(mi.Point3f(self.position))
+        return interaction.spawn_ray(mi.Vector3f(-self.axis))
+
+    def without_cone(self) -> "Light":
+        """Return the light all around of which a spot shows a cone."""
+        return Light(self.position, self.intensity)
+
+
+@dataclass(frozen=True)
+class HostPosition:
+    """The homogeneous position of a light on the host, in float64."""
+
+    l: Array  # noqa: E741  #: (3,), a place [m] or a unit direction towards the light
+    w: int
+
+    def toward(self, points: Array) -> Array:
+        """Return l - w P for points (..., 3)."""
+        return self.l - self.w * points
+
+
+def host_position(light: Light) -> HostPosition:
+    """Bring the homogeneous position of a light to the host, in float64."""
+
+    def of(vector) -> Array:
+        return np.array(vector, dtype=np.float64).ravel()
+
+    return HostPosition(of(light.position), 1) if light.w else HostPosition(-(of(light.axis) + of(light.axis_low)), 0)
 
 
 def spot_fields(axis, cutoff: float, beam: float, types: ArrayTypes) -> dict[str, Any]:

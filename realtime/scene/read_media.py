@@ -15,7 +15,7 @@ from realtime.errors import InputError
 from realtime.numerics.array_types import ArrayTypes
 from realtime.scene.convex_bounds import Bounds, holds, mean_distance, overlap, plane_neighbours, read_bounds
 from realtime.scene.medium import Body, Medium
-from realtime.scene.phase import Phase
+from realtime.scene.phase import HenyeyGreenstein, Isotropic, Phase, Tabulated, named_phase
 
 _PHASES = {
     "IsotropicPhaseFunction": "isotropic",
@@ -143,7 +143,7 @@ def convex_body(medium: Medium, bounds: Bounds, types: ArrayTypes) -> Body:
 def _clear(types: ArrayTypes) -> Medium:
     albedo = types.color(0.0)
     dr.make_opaque(albedo)
-    return Medium((dr.opaque(types.scalar, 0.0),), albedo, Phase("isotropic"), clear=True)
+    return Medium((dr.opaque(types.scalar, 0.0),), albedo, Isotropic(), clear=True)
 
 
 def _in_channels(medium: Medium, channels: int) -> Medium:
@@ -182,10 +182,10 @@ def _read_phase(phase, types: ArrayTypes) -> Phase:
         )
     parameters = mi.traverse(phase)
     if name == "hg":
-        return Phase(name, g=dr.opaque(types.scalar, float(parameters["g"][0])))
+        return HenyeyGreenstein(dr.opaque(types.scalar, float(parameters["g"][0])))
     if name == "tabulated":
         values = np.array(parameters["values"], dtype=np.float64)
         # The mean over the sphere is half the integral over the cosine: the trapezoidal rule is exact on linear pieces.
         mean = (values.sum() - 0.5 * (values[0] + values[-1])) / (len(values) - 1)
-        return Phase(name, values=types.scalar(values / mean))
-    return Phase(name)
+        return Tabulated(types.scalar(values / mean))
+    return named_phase(name)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reading a Mitsuba scene: the camera, the medium, the lights, and the plan of what they need.
+"""Reading a Mitsuba scene: the camera, the medium, the lights, and what of them asks for code of its own.
 
 Mitsuba's own scene is the scene; nothing of ours is needed in it. What no method can do yet is refused by name.
 """
@@ -17,7 +17,7 @@ from realtime.errors import InputError
 from realtime.numerics.array_types import ArrayTypes, array_types, is_single
 from realtime.scene.camera import Camera
 from realtime.scene.directional_extent import directional_fields, distance_before, media_balls
-from realtime.scene.features import Plan
+from realtime.scene.features import SceneFeatures
 from realtime.scene.lights import Light, spot_fields
 from realtime.scene.medium import Medium
 from realtime.scene.read_media import opaque_scene, read_medium, sort_shapes
@@ -32,7 +32,7 @@ class Scene:
     camera: Camera
     medium: Medium
     lights: tuple[Light, ...]
-    plan: Plan
+    features: SceneFeatures
     facets: Facets | None = None  #: the triangles, where a table says all that shading needs
     positions: Mapping[str, Any] = field(default_factory=dict)  #: vertices of the shapes that moved, by name [m]
 
@@ -65,7 +65,9 @@ def read_scene(scene, precision: str = "single") -> Scene:
         for emitter in scene.emitters()
     )
     geometry = opaque_scene(scene, opaque)
-    return Scene(geometry, camera, medium, lights, _make_plan(opaque, medium, lights), read_facets(geometry, types))
+    return Scene(
+        geometry, camera, medium, lights, _scene_features(opaque, medium, lights), read_facets(geometry, types)
+    )
 
 
 def _read_camera(scene, types: ArrayTypes):
@@ -109,13 +111,11 @@ def _read_light(emitter, types: ArrayTypes) -> Light:
         "position": types.vector(*(float(c) for c in position)),
         "intensity": types.color(*(float(c) for c in intensity)),
     }
-    soft = False
     if kind == "spot":
         cutoff, beam = _read_angles(parameters)
-        soft = beam < cutoff
         arrays |= spot_fields(matrix[:3, 2] / np.linalg.norm(matrix[:3, 2]), cutoff, beam, types)
     dr.make_opaque(*arrays.values())
-    return Light(kind, soft, **arrays)
+    return Light(**arrays)
 
 
 def _read_directional(emitter, medium: Medium, opaque, types: ArrayTypes) -> Light:
@@ -134,7 +134,7 @@ def _read_directional(emitter, medium: Medium, opaque, types: ArrayTypes) -> Lig
     balls = media_balls(medium.bodies)
     arrays |= directional_fields(axis, balls, distance_before(balls, opaque), types)
     dr.make_opaque(*arrays.values())
-    return Light("directional", False, **arrays)
+    return Light(**arrays)
 
 
 def _read_colour(value, name: str, unit: str):
@@ -157,7 +157,7 @@ def _read_angles(parameters) -> tuple[float, float]:
     return cutoff, beam
 
 
-def _make_plan(opaque, medium: Medium, lights: tuple[Light, ...]) -> Plan:
+def _scene_features(opaque, medium: Medium, lights: tuple[Light, ...]) -> SceneFeatures:
     notes = []
     for shape in opaque:
         flags = shape.bsdf().flags()
@@ -166,11 +166,11 @@ def _make_plan(opaque, medium: Medium, lights: tuple[Light, ...]) -> Plan:
                 f"shape '{shape.id()}' is not purely diffuse: shaded by its diffuse reflectance, airlight unaffected"
             )
     media = [body.medium for body in medium.bodies] + [medium] * (not medium.clear)
-    return Plan(
+    return SceneFeatures(
         shadows=bool(opaque),
         surfaces=bool(opaque),
         extinctions=len(medium.sigma_t),
-        isotropic=all(one.phase.name == "isotropic" for one in media),
+        isotropic=all(one.phase.constant for one in media),
         bounded=bool(medium.bodies),
         clear=medium.clear,
         vacuum=any(float(sigma_t[0]) == 0 for sigma_t in medium.sigma_t),

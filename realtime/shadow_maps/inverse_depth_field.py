@@ -2,16 +2,10 @@
 """The light volume as a height field: the inverse of the planar depth over the texels of a shadow map.
 
 Billeter, Sintorn, Assarsson 2010, section 4, displace a grid by the depths of a shadow map; what lies between the light
-and the displaced grid is lit. A point beyond (u, v) of a face is
-
-    P = light + (axis + u across + v up) / s,      s = 1 / planar depth,
-
-and (u, v, s) are projective coordinates of P: planes stay planes and lines stay lines. So the triangles of the
-displaced grid are triangles over the texels of the map, linear in s; a camera ray is a straight line; and a point is
-lit where its s is above the height field. Where nothing is hit s = 0: a vertex at infinity.
-
-The map of a directional light has parallel rays: P = light + u across + v up - s axis, with s the height above the
-plane through "light" behind which there are no media; what is hit beyond it has s = 0. All the rest is the same.
+and the displaced grid is lit. A point has the projective coordinates (u, v, s) of `realtime.shadow_maps.projection`:
+planes stay planes and lines stay lines. So the triangles of the displaced grid are triangles over the texels of the
+map, linear in s; a camera ray is a straight line; and a point is lit where its s is above the height field. Where
+nothing is hit s = 0: a vertex at infinity, or for parallel rays the end of the media.
 
 A texel is cut along the diagonal from its corner (0, 0) to (1, 1), into
 
@@ -36,34 +30,29 @@ import drjit as dr
 import mitsuba as mi
 
 from realtime.numerics.array_types import four_numbers, two_numbers
-from realtime.shadow_maps.shadow_map import ShadowMap
+from realtime.shadow_maps.projection import Projection
+from realtime.shadow_maps.shadow_map import ShadowMap, inverse_depth
 
 LEAF = 4  #: texels on a side of a node of the last level: smaller nodes cost more to find than they save
 _DIVIDE = 0.7  # from the least height of a leaf to the largest, of the height that divides its texels
 
 
 @dataclass(frozen=True)
-class LightHeights:
+class InverseDepthField:
     """Inverse planar depths over the faces of a shadow map, or heights for parallel rays, with their bounds."""
 
     size: int  #: texels on a side
-    frame: tuple[Any, Any, Any] | None  #: of a spot's face, see `realtime.shadow_maps.shadow_map`; None for a cube
+    projection: Projection  #: of its faces
     texels: Any  #: the heights s00, s10, s01, s11 of every texel, face by face, row by row [1/m]
     bounds: Any  #: least and largest height of every node of the pyramid, face by face [1/m]
     gaps: Any = None  #: by leaf: largest height of the texels below the height that divides them, least of those above
     sides: Any = None  #: by leaf: bit 4 row + column of texels below that height, and 16 more of those on both sides
-    depth: Any = None  #: of a directional light: distance of the plane that heights are above, see `ShadowMap` [m]
     walls: Any = None  #: by texel, where on its sides upright walls stand, see `jump_search`; None for none
 
     @property
     def faces(self) -> int:
         """How many faces the map has."""
-        return 1 if self.frame else 6
-
-    @property
-    def axis(self) -> Any:
-        """The direction of a directional light, None for others."""
-        return self.frame[2] if self.frame and self.depth is not None else None
+        return self.projection.faces
 
     @property
     def finest(self) -> int:
@@ -81,30 +70,9 @@ def level_start(level: int) -> int:
     return (4**level - 1) // 3
 
 
-def inverse_depth(shadow_map: ShadowMap):
-    """Return the inverse planar depth [1/m], or the height for parallel rays [m], at every corner of the texels."""
-    size, distance = shadow_map.size, shadow_map.distance
-    Float = type(distance)
-    index = dr.arange(mi.UInt32, dr.width(distance))
-    row = index // (size + 1)
-    u = dr.fma(Float(index - row * (size + 1)), 2.0 / size, -1.0)
-    v = dr.fma(Float(row % (size + 1)), 2.0 / size, -1.0)
-    return height_at(shadow_map.frame, shadow_map.depth, (u, v), distance)
-
-
-def height_at(frame, depth, place, distance):
-    """Return the height at (u, v) of a face whose map has a distance there [1/m]; `depth` as in `LightHeights`."""
-    if depth is not None:
-        return dr.maximum(depth - distance, 0)
-    u, v = place
-    across = dr.squared_norm(frame[0]) if frame else type(distance)(1)
-    return dr.sqrt(dr.fma(across, dr.square(u) + dr.square(v), 1)) / distance
-
-
-def light_heights(shadow_map: ShadowMap) -> LightHeights:
+def inverse_depth_field(shadow_map: ShadowMap) -> InverseDepthField:
     """Return the height field of a shadow map, with its pyramid of bounds."""
     size = shadow_map.size
-    depth = shadow_map.depth
     height = inverse_depth(shadow_map)
     dr.eval(height)
     Float = type(height)
@@ -116,16 +84,16 @@ def light_heights(shadow_map: ShadowMap) -> LightHeights:
     four = [dr.gather(Float, height, corner + step) for step in (0, 1, size + 1, size + 2)]
     dr.scatter(texels, four_numbers(Float)(*four), index)
     dr.eval(texels)
-    found = LightHeights(size, shadow_map.frame, texels, dr.empty(Float, 0))
-    bounds = dr.empty(Float, 2 * found.faces * found.nodes)
-    gaps, sides = _write_leaves(found, height, bounds)
-    for level in reversed(range(found.finest)):
-        _write_level(found, bounds, level)
+    field = InverseDepthField(size, shadow_map.projection, texels, dr.empty(Float, 0))
+    bounds = dr.empty(Float, 2 * field.faces * field.nodes)
+    gaps, sides = _write_leaves(field, height, bounds)
+    for level in reversed(range(field.finest)):
+        _write_level(field, bounds, level)
         dr.eval(bounds)
-    return LightHeights(size, shadow_map.frame, texels, bounds, gaps, sides, depth)
+    return InverseDepthField(size, shadow_map.projection, texels, bounds, gaps, sides)
 
 
-def node_bounds(heights: LightHeights, face, level, i, j, active=True):
+def node_bounds(heights: InverseDepthField, face, level, i, j, active=True):
     """Return the least and largest height over the node in column `i` and row `j` of a level of the pyramid [1/m]."""
     before = 0x55555555 & ((mi.UInt32(1) << (2 * level)) - 1)
     node = face * heights.nodes + before + (j << level) + i
@@ -133,13 +101,13 @@ def node_bounds(heights: LightHeights, face, level, i, j, active=True):
     return pair.x, pair.y
 
 
-def texel_heights(heights: LightHeights, face, i, j, active=True):
+def texel_heights(heights: InverseDepthField, face, i, j, active=True):
     """Return the heights s00, s10, s01 and s11 of the texel in column `i` and row `j` of a face [1/m]."""
     texel = (face * heights.size + j) * heights.size + i
     return dr.gather(four_numbers(type(heights.texels)), heights.texels, texel, active)
 
 
-def texel_walls(heights: LightHeights, face, i, j, active=True):
+def texel_walls(heights: InverseDepthField, face, i, j, active=True):
     """Return the walls of the texel in column `i` and row `j` of a face."""
     return dr.gather(mi.UInt32, heights.walls, (face * heights.size + j) * heights.size + i, active)
 
@@ -154,7 +122,7 @@ class Leaf:
     both: Any  #: and of each on both sides
 
 
-def leaf_sides(heights: LightHeights, face, i, j, active=True) -> Leaf:
+def leaf_sides(heights: InverseDepthField, face, i, j, active=True) -> Leaf:
     """Return how the texels of the leaf in column `i` and row `j` are sorted."""
     leaf = (((face << heights.finest) + j) << heights.finest) + i
     gap = dr.gather(two_numbers(type(heights.gaps)), heights.gaps, leaf, active)
@@ -162,7 +130,7 @@ def leaf_sides(heights: LightHeights, face, i, j, active=True) -> Leaf:
     return Leaf(gap.x, gap.y, sides & 0xFFFF, sides >> 16)
 
 
-def _write_leaves(heights: LightHeights, corners, bounds):
+def _write_leaves(heights: InverseDepthField, corners, bounds):
     """Write the bounds of the leaves from the heights at all corners; return their gaps and sides."""
     side = 1 << heights.finest
     leaf = dr.arange(mi.UInt32, heights.faces * side * side)
@@ -196,14 +164,14 @@ def _of_texels(rows, smaller):
     return [smaller(*pair) for two in pairwise(pairs) for pair in zip(*two)]
 
 
-def _write_level(heights: LightHeights, bounds, level: int) -> None:
+def _write_level(heights: InverseDepthField, bounds, level: int) -> None:
     """Write the bounds of the nodes of a level, from those of the next one."""
     side = 1 << level
     index = dr.arange(mi.UInt32, heights.faces * side * side)
     row = index // side
     face, i = row // side, index - row * side
     j = row - face * side
-    full = LightHeights(heights.size, heights.frame, heights.texels, bounds)
+    full = InverseDepthField(heights.size, heights.projection, heights.texels, bounds)
     four = [node_bounds(full, face, level + 1, 2 * i + k % 2, 2 * j + k // 2) for k in range(4)]
     low, high = four[0]
     for lower, higher in four[1:]:

@@ -29,9 +29,10 @@ import mitsuba as mi
 import numpy as np
 
 from realtime.errors import InputError
-from realtime.numerics.array_types import four_numbers
+from realtime.numerics.array_types import Metres, PerRay, PerTile, four_numbers
+from realtime.parameters import parameter
 from realtime.scene.camera import Camera
-from realtime.tiles.layout import SIDE, TILE
+from realtime.tiles.layout import SIDE, TILE, Layout
 
 _DEPTHS = 1.1  # largest to least distance in a tile
 _LIGHTS = 32  # one bit each
@@ -41,12 +42,26 @@ _LIGHTS = 32  # one bit each
 class Corners:
     """How the tiles of an image lie: numbers of tiles, by tile."""
 
-    right: Any  #: the next tile to the right; itself in the last column
-    below: Any
-    diagonal: Any
-    row: tuple[Any, Any, Any]  #: three that follow one another in a row: it and its neighbours, or those next to an end
-    column: tuple[Any, Any, Any]
-    inner: Any  #: whether there are tiles on the right and below
+    right: PerTile  #: the next tile to the right; itself in the last column
+    below: PerTile
+    diagonal: PerTile
+    row: tuple[
+        PerTile, PerTile, PerTile
+    ]  #: three that follow one another in a row: it and its neighbours, or those next to an end
+    column: tuple[PerTile, PerTile, PerTile]
+    inner: PerTile  #: whether there are tiles on the right and below
+
+
+def tolerance() -> Any:
+    """Return the field of the parameter that every method has whose rays can be interpolated."""
+    return parameter(
+        0.0,
+        "what may be interpolated between the corners of tiles, as a share of the airlight; 0: nothing, every pixel is "
+        "computed",
+        least=0,
+        below=1,
+        wanted="a share of the airlight from 0 up to 1",
+    )
 
 
 def tile_corners(pixel, camera: Camera, tolerance: float, *, by_rays: bool, lights: int) -> Corners | None:
@@ -68,11 +83,9 @@ def tile_corners(pixel, camera: Camera, tolerance: float, *, by_rays: bool, ligh
     Raises
     ------
     InputError
-        For a tolerance that is no share, a method that draws all pixels together, more lights than a number has bits,
-        and an image whose sides are no multiples of four or less than three tiles.
+        For a method that draws all pixels together, more lights than a number has bits, and an image whose sides are
+        no multiples of four or less than three tiles.
     """
-    if not 0 <= tolerance < 1:
-        raise InputError(f"tolerance: got {tolerance!r}, wanted a share of the airlight from 0 up to 1")
     if not tolerance:
         return None
     if not by_rays:
@@ -106,8 +119,16 @@ def tile_corners(pixel, camera: Camera, tolerance: float, *, by_rays: bool, ligh
     return found
 
 
-def between_corners(corners: Corners, pixel, distance, sample: Callable[..., Any], *, width: int, tolerance: float):
-    """Return the airlight of every pixel, and by light whether it reaches the visible surface.
+def between_corners(
+    corners: Corners,
+    pixel: PerRay,
+    distance: Metres,
+    sample: Callable[..., tuple[tuple[PerRay, ...], tuple[PerRay, ...]]],
+    *,
+    width: int,
+    tolerance: float,
+) -> tuple[tuple[PerRay, ...], tuple[PerRay, ...]]:
+    """Return of every pixel what a method computes, interpolated between the corners of tiles where that is enough.
 
     Parameters
     ----------
@@ -116,11 +137,17 @@ def between_corners(corners: Corners, pixel, distance, sample: Callable[..., Any
     pixel, distance
         Pixel numbers in square tiles, and the distances to the visible surfaces [m].
     sample
-        Function (pixel, distance, tile) -> radiance [W/(m^2 sr)], and by light whether it reaches the surface.
+        Function (pixel, distance, tile, layout) -> numbers and colours, the airlight [W/(m^2 sr)] first, and masks, by
+        light whether it reaches the surface. Numbers and colours may be interpolated, masks have to be equal.
     width
         Of the image [pixels].
     tolerance
-        Largest second difference between corners, of the airlight.
+        Largest second difference between corners, as a share of the value.
+
+    Returns
+    -------
+    values, masks
+        As from `sample`.
 
     Notes
     -----
@@ -130,20 +157,23 @@ def between_corners(corners: Corners, pixel, distance, sample: Callable[..., Any
     tiles = dr.width(distance) // TILE
     tile = dr.arange(mi.UInt32, tiles)
     first = tile * TILE
-    color, reached = sample(dr.gather(mi.UInt32, pixel, first), dr.gather(Float, distance, first), tile)
-    color, lit = color + dr.zeros(Float, tiles), _bits(reached) + dr.zeros(mi.UInt32, tiles)
-    dr.eval(color, lit)
-    bend = _second_difference(corners, color)
-    dr.eval(bend)
+    there = dr.gather(mi.UInt32, pixel, first), dr.gather(Float, distance, first)
+    parts, reached = sample(*there, tile, Layout.CORNERS)
+    parts = tuple(part + dr.zeros(Float, tiles) for part in parts)
+    lit = _bits(reached) + dr.zeros(mi.UInt32, tiles)
+    dr.eval(parts, lit)
+    bends = [_second_difference(corners, part) for part in parts]
+    dr.eval(bends)
     four = tile, corners.right, corners.below, corners.diagonal
-    values = [dr.gather(type(color), color, one) for one in four]
+    values = [[dr.gather(type(part), part, one) for part in parts] for one in four]
     smooth = corners.inner & _depths_alike(distance, four)
-    for one, value in zip(four, values):
-        bends = dr.gather(type(color), bend, one)
-        for channel in range(3):
-            smooth &= bends[channel] <= tolerance * value[channel]
+    for one, found in zip(four, values):
+        for bend, value in zip(bends, found):
+            here = dr.gather(type(bend), bend, one)
+            for limit, least in zip(_channels(here), _channels(value)):
+                smooth &= limit <= tolerance * least
         smooth &= dr.gather(mi.UInt32, lit, one) == lit
-    tables = _bilinear(values)
+    tables = [_bilinear([_channels(value) for value in corner]) for corner in zip(*values)]
     dr.eval(tables, smooth)
 
     lane = dr.arange(mi.UInt32, dr.width(distance))
@@ -151,20 +181,29 @@ def between_corners(corners: Corners, pixel, distance, sample: Callable[..., Any
     row = pixel // width
     x, y = (Float(value & (SIDE - 1)) * (1 / SIDE) for value in (pixel - row * width, row))
 
-    def between(pixel, distance, own):
+    def interpolated(kind, part, own):
         channels = []
-        for table in tables:
+        for table in part:
             base, across, down, twist = dr.gather(four_numbers(Float), table, own)
             channels.append(dr.fma(y, dr.fma(x, twist, down), dr.fma(x, across, base)))
-        return type(color)(*channels), dr.gather(mi.UInt32, lit, own)
+        return kind(*channels)
+
+    def between(pixel, distance, own):
+        found = tuple(interpolated(type(part), table, own) for part, table in zip(parts, tables))
+        return found, dr.gather(mi.UInt32, lit, own)
 
     def computed(pixel, distance, own):
-        color, reached = sample(pixel, distance, own)
-        return color, _bits(reached)
+        found, reached = sample(pixel, distance, own, Layout.SOME)
+        return found, _bits(reached)
 
     smooth = dr.gather(mi.Bool, smooth, own)
-    color, bits = dr.if_stmt(args=(pixel, distance, own), cond=smooth, true_fn=between, false_fn=computed)
-    return color, tuple((bits >> number & 1) != 0 for number in range(len(reached)))
+    found, bits = dr.if_stmt(args=(pixel, distance, own), cond=smooth, true_fn=between, false_fn=computed)
+    return found, tuple((bits >> number & 1) != 0 for number in range(len(reached)))
+
+
+def _channels(value) -> list[Any]:
+    """Return the channels of a colour, or a number as its only one."""
+    return list(value) if dr.depth_v(value) > 1 else [value]
 
 
 def _bits(reached):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The airlight of one light at infinity along the camera rays of a scene, in bodies of media."""
+"""The airlight of one directional light along the camera rays of a scene, in bounded media."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -9,17 +9,18 @@ from numpy.typing import NDArray
 
 from reference.quadrature.directional_sums import sum_directional
 from reference.quadrature.segments import camera_segments, scattering_range
-from reference.scene.directional_light import DirectionalLight, ParallelRays, parallel_rays
+from reference.scene.directional_light import DirectionalLight
 from reference.scene.read import TruthScene
 from reference.visibility.directional_casting import directional_intervals, edge_scale
 from reference.visibility.intervals import LitIntervals
+from reference.visibility.parallel_rays import ParallelRays, parallel_rays
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class DirectionalAirlight:
-    """What a light at infinity sends along rays."""
+    """What a directional light sends along rays."""
 
     radiance: Array  #: (rays, 3) [W/(m^2 sr)]
     bound: Array  #: of its error, (rays, 3) [W/(m^2 sr)]

@@ -4,7 +4,7 @@
     L = f(w_i, w_o) cos I / r^2 exp(-sigma_t (distance + s r)),
 
 with f cos by `BSDF.eval` and I / r^2 by `Emitter.sample_direction`; s scales the shadow leg (see
-`reference.quadrature.image`). Through bounded media the optical depth is that of both legs piece by piece. A
+`reference.quadrature.ray_values`). Through bounded media the optical depth is that of both legs piece by piece. A
 directional light has its irradiance in the place of I / r^2, and its leg is endless: to be dimmed it has only bodies
 to pass.
 """
@@ -59,7 +59,7 @@ def lit_surface(
         known, None, a shadow ray is cast; Mitsuba starts it 1e-4 off the surface, so that it can graze what the point
         itself is clear of.
     shadow_scale
-        See `reference.quadrature.image`.
+        See `reference.quadrature.ray_values`.
     """
     interaction = hits.interaction
     total = np.zeros((len(hits.distance), 3))

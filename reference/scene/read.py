@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from analytic.errors import InputError
 from analytic.phase import PhaseFunction
 from reference.scene.camera import camera_matrix, film_directions, pixel_centres
-from reference.scene.convex_bodies import Bounds, holds, overlap, read_bounds
+from reference.scene.convex_bounds import Bounds, holds, overlap, read_bounds
 from reference.scene.directional_light import DirectionalLight, endless_medium, is_directional, read_directional
 
 Array = NDArray[np.float64]
@@ -70,7 +70,7 @@ class TruthScene:
     medium: TruthMedium  #: the medium without bounds, a vacuum of extinction 0 where there is none
     lights: tuple[TruthLight, ...]  #: point and spot lights
     media: tuple[BoundedMedium, ...] = ()  #: the media with bounds, disjoint
-    directional: tuple[DirectionalLight, ...] = ()  #: lights at infinity; all media then have bounds
+    directional: tuple[DirectionalLight, ...] = ()  #: directional lights; all media then have bounds
 
 
 def read_truth(scene) -> TruthScene:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The legs from a light at infinity to points of camera rays, for the routes of `reference.visibility.lit_intervals`.
+"""The legs from a directional light to points of camera rays, for the routes of `reference.visibility.lit_intervals`.
 
 A leg begins where it has passed all opaque shapes: at the plane across the light's direction that touches the box
 around them from the light's side. Its point is told by the share of the way from `first` to `last`. A smooth surface
@@ -17,12 +17,12 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.scene.directional_light import ParallelRays
 from reference.scene.read import TruthScene
 from reference.scene.shapes import Shapes
 from reference.visibility.directional_geometry import parallel_intervals
 from reference.visibility.intervals import LitIntervals
 from reference.visibility.lit_intervals import Legs, found_intervals
+from reference.visibility.parallel_rays import ParallelRays
 from reference.visibility.random_checks import ROUNDING, Leg
 
 Array = NDArray[np.float64]

@@ -115,8 +115,8 @@ def render(
         parameters=dict(chosen.parameters),
         label=chosen.label,
         precision=precision,
-        plan=describe(read.plan),
-        notes=read.plan.notes,
+        plan=describe(read.features),
+        notes=read.features.notes,
         times=time_frame(renderer) if timed else None,
     )
 

@@ -217,5 +217,5 @@ def _described(loaded: OpenScene) -> tuple[dict[str, str], tuple[str, ...]]:
     from realtime.scene.features import describe
     from realtime.scene.read_scene import read_scene
 
-    plan = read_scene(loaded.scene).plan
-    return describe(plan), plan.notes
+    features = read_scene(loaded.scene).features
+    return describe(features), features.notes

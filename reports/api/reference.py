@@ -66,7 +66,6 @@ def reference(
     >>> traced.standard_error.shape
     (24, 32, 3)
     """
-
     known = ("quadrature", "single-scatter", "volpath")
     if estimator not in known:
         raise InputError(f"estimator: got {estimator!r}, wanted one of {', '.join(known)}" + nearest(estimator, known))

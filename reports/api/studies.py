@@ -161,7 +161,7 @@ def bench(
         for number, (one, scene) in enumerate(zip(loaded, read)):
             callback(number / len(loaded), f"{one.name}: the truth")
             truth = truth_image(one.scene)
-            useful = configurations_for(scene.plan, chosen)
+            useful = configurations_for(scene.features, chosen)
             for place, each in enumerate(useful):
                 callback((number + place / len(useful)) / len(loaded), f"{one.name}: {each.label}")
                 measured = measure(scene, each, truth=truth, seconds=seconds, with_flip=flip)

@@ -54,12 +54,12 @@ def cache(
                 )
                 for kind, of_kind in kinds.items()
             ]
-            columns = (
+            columns = [
                 Column("kind", "kind", words=True),
                 Column("entries", "entries"),
                 Column("size", "size"),
-                Column("used", "last used"),
-            )
+                Column("last_used", "last used"),
+            ]
             print_table(table("", columns, rows))
     if clear and entries:
         raise typer.Exit(1)

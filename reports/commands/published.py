@@ -112,7 +112,7 @@ def _biri(
 ) -> dict[str, Any]:
     """Measure the tables of Biri 2006, nothing where none of their scenes is wanted."""
     from reports.papers.biri import biri_data
-    from validation.frames.zero_cost import needless_costs
+    from validation.frames.zero_cost import zero_costs
     from validation.papers.biri import PUBLISHED, biri_rows
 
     chosen = [one for one in PUBLISHED if one.scene in wanted]
@@ -121,7 +121,7 @@ def _biri(
     rows = biri_rows(chosen, kernels, scale=scale, progress=progress)
     if needless:
         progress(0.99, "what is not needed")
-    costs = needless_costs(size=(round(800 * scale), round(600 * scale))) if needless else []
+    costs = zero_costs(size=(round(800 * scale), round(600 * scale))) if needless else []
     return biri_data(rows, costs)
 
 

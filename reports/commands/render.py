@@ -87,7 +87,7 @@ def _print_plan(scene, chosen, *, json: bool) -> None:
     from realtime.scene.features import describe
     from reports.tables.terminal import print_json
 
-    words, notes = describe(scene.plan), list(scene.plan.notes)
+    words, notes = describe(scene.features), list(scene.features.notes)
     if find_method(chosen.method).prepare is prepare_shadow_planes:
         casters = caster_plan(scene)
         words |= describe_casters(casters)

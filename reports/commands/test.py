@@ -6,31 +6,49 @@ from typing import Annotated
 
 import typer
 
-# Processes that share the tests. Dr.Jit's kernels use every processor already: with two processes on two busy cores the
-# suite took as long as with one (96 s against 98 s, 2026-11-21), and the tests of timing are disturbed.
-_WORKERS = 0
-
 
 def run_tests(
     context: typer.Context,
-    everything: Annotated[bool, typer.Option("--all", help="Also the statistical and the slow tests.")] = False,
-    workers: Annotated[int, typer.Option(min=0, help="Processes that share the tests; 0 for this one.")] = _WORKERS,
+    everything: Annotated[
+        bool, typer.Option("--all", help="Also the statistical and slow tests, all mutations and all baselines.")
+    ] = False,
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            min=0, help="Processes that share the tests; 0 for this one; 2 by default if there are two cores."
+        ),
+    ] = None,
 ) -> None:
-    """Run the fast tests of the source checkout, or all; other arguments go to pytest, paths are relative to it."""
+    """Run the fast tests of the source checkout, or all; other arguments go to pytest, paths are relative to it.
+
+    With --all a summary is printed, and the date, the machine and the counts go to docs/verification.md. With --all and
+    arguments for pytest, tests of all tiers run and nothing is written. Exit status 1 if anything failed.
+    """
     import os
     import sys
 
-    from reports.machine.environment import MissingError, prepare
+    from reports.machine.environment import MissingError, prepare, threads
 
     root = Path(__file__).resolve().parents[2]
     if not (root / "tests").is_dir():
         raise MissingError(
             f"there are no tests in {root}, they come with the source only: clone it and run `./airlight test` there"
         )
-    prepare()
-    command = [sys.executable, "-m", "pytest"]
-    command += ["-n", str(workers)] if workers else []
-    command += [] if everything else ["-m", "not statistical and not slow"]
+    variant = prepare().variant
+    shared = (2 if threads() > 1 else 0) if workers is None else workers
+    # Each process begins with its own half of the files: few kernels are compiled and few scenes loaded twice.
+    sharing = ["-n", str(shared), "--dist", "worksteal"] if shared else []
     os.chdir(root)
+    if everything and not context.args:
+        from reports.docs.full_run import all_parts, run_all
+        from reports.machine.environment import describe_environment, machine_in_words
+        from reports.machine.gpu import cuda_status
+
+        device = cuda_status().reason if variant == "cuda_ad_rgb" else None
+        machine = machine_in_words(describe_environment() | {"variant": variant, "device": device})
+        if not run_all(all_parts(sharing), root, machine=machine):
+            raise typer.Exit(1)
+        return
+    tiers = [] if everything else ["-m", "not statistical and not slow"]
     sys.stdout.flush()
-    os.execv(sys.executable, [*command, *context.args])
+    os.execv(sys.executable, [sys.executable, "-m", "pytest", *sharing, *tiers, *context.args])

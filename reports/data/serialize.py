@@ -7,7 +7,7 @@ docs/report-schema.md explains every key of the schema "airlight-report/2". Not-
 from typing import Any
 
 from realtime.scene.features import describe
-from reference.quadrature.image import TruthImage
+from reference.quadrature.ray_values import TruthImage
 from validation.comparison.engine_images import ImageMeasurement
 from validation.frames.baseline_files import read_baseline
 from validation.frames.benchmark import Measurement, knows_shadows
@@ -17,7 +17,7 @@ from validation.metrics.errors import plain as plain
 
 def scene_facts(study: SceneStudy) -> dict[str, Any]:
     """Return what a scene is, before anything is measured in it."""
-    loaded, effort, plan = study.loaded, study.effort, study.scene.plan
+    loaded, effort, features = study.loaded, study.effort, study.scene.features
     baseline = None if loaded.path else read_baseline(loaded.name)
     return {
         "name": loaded.name,
@@ -27,8 +27,8 @@ def scene_facts(study: SceneStudy) -> dict[str, Any]:
         "baseline": baseline["revision"] if baseline else None,
         "size": list(effort.image),
         "timed": list(effort.timed),
-        "plan": describe(plan),
-        "notes": list(plan.notes),
+        "plan": describe(features),
+        "notes": list(features.notes),
     }
 
 

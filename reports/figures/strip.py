@@ -87,7 +87,6 @@ def _scene(data: dict[str, Any], name: str | None) -> dict[str, Any]:
 
 def _methods(scene: dict[str, Any], wanted: str | Sequence[str] | None) -> list[dict[str, Any]]:
     """Return the methods to show: those that were asked for, or the most accurate of each."""
-
     known = {one["label"]: one for layer in ("airlight", "total") for one in _shown(scene, layer)}
     if wanted is None:
         best: dict[str, dict[str, Any]] = {}

@@ -8,7 +8,13 @@ from typing import Any
 
 from reports.machine.progress import Interrupted, Progress
 
-STAGES = ("surface", "shade", "tiles", "airlight")  #: the functions of a frame that are frozen, of a `FrameRenderer`
+STAGES = (
+    "surface",
+    "shade",
+    "cull",
+    "render",
+    "passes",
+)  #: the functions of a frame that are frozen, of a `FrameRenderer`
 
 
 def check_ending(option: str, path: Path, ending: str, *, instead: str = "") -> None:

@@ -22,7 +22,7 @@ def biri_data(rows: Sequence[Any], costs: Sequence[Any]) -> dict[str, Any]:
     rows
         From `validation.papers.biri.biri_rows`.
     costs
-        From `validation.frames.zero_cost.needless_costs`, or none.
+        From `validation.frames.zero_cost.zero_costs`, or none.
     """
     from validation.metrics.errors import plain
     from validation.papers.biri import STAGES

@@ -66,7 +66,7 @@ def _mutations(progress: Progress) -> Computed:
 
 def _biri(effort: Effort, scenes: Sequence[str], cache: ResultCache) -> list[OtherPart]:
     """Return Tables 1 and 2 of Biri 2006, each entry a part."""
-    from validation.frames.zero_cost import needless_costs
+    from validation.frames.zero_cost import zero_costs
     from validation.papers.biri import PUBLISHED, Published, biri_rows
 
     kernels, seconds = effort.paper_kernels, effort.seconds
@@ -84,7 +84,7 @@ def _biri(effort: Effort, scenes: Sequence[str], cache: ResultCache) -> list[Oth
     if parts and "billeter" in effort.papers:  # the effort that leaves nothing out
         entry = cache_entry(cache, "needless", identity={})
         costs = OtherPart(
-            "needless", "what is not needed", entry, lambda progress: ({"costs": plain(needless_costs())}, {})
+            "needless", "what is not needed", entry, lambda progress: ({"costs": plain(zero_costs())}, {})
         )
         parts.append(costs)
     return parts

@@ -69,7 +69,7 @@ def scene_report(
     progress
         Called with (share done, what).
     """
-    chosen = configurations_for(study.scene.plan, configurations)
+    chosen = configurations_for(study.scene.features, configurations)
     entries = SceneEntries(cache, study.loaded.name, study.loaded.path, study.effort)
     seconds_of = scene_seconds(entries, chosen, complete=True)
     steps = {name: part_of(progress, *share) for name, share in shares(seconds_of).items()}
@@ -219,7 +219,7 @@ def _measured(study: SceneStudy, measured: Measurement, factor: float) -> Comput
 
 def _judged(study: SceneStudy, shown: EngineImage, factor: float) -> Computed:
     truth = study.truth
-    measured = measure_image(shown, truth, surfaces=study.scene.plan.surfaces)
+    measured = measure_image(shown, truth, surfaces=study.scene.features.surfaces)
     if study.effort.flip != "none":
         measured = replace(measured, flip=image_flip(measured, truth))
     expected = truth.airlight if measured.layer == "airlight" else truth.airlight + truth.surface

@@ -18,7 +18,7 @@ def method_list() -> Table:
 
     columns = [_words(name) for name in ("name", "what", "kernel", "shadows", "parameters", "source")]
     rows = [
-        (one.name, one.summary, one.uses_kernel, one.shadows, _defaults(one.parameters), one.source)
+        (one.name, one.summary, one.uses_kernel, one.shadows, _defaults(one.defaults), one.source)
         for one in METHODS.values()
     ]
     return table("", columns, rows)

@@ -4,7 +4,8 @@
 import numpy as np
 import pytest
 
-from analytic import InputError, integrate_cases, read_cases
+from analytic.cases import integrate_cases, read_cases
+from analytic.errors import InputError
 
 HEAD = "phase,g,t,h,x0,x1,sigma_t\n"
 

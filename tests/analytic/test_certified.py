@@ -8,11 +8,14 @@ import pytest
 from mpmath import exp, mpf, workdps
 
 import analytic.certified as module
-from analytic import InputError, PhaseFunction, integrate_certified, isotropic_closed_form
+from analytic.certified import integrate_certified, isotropic_closed_form
+from analytic.errors import InputError
+from analytic.phase import PhaseFunction
 
 ISOTROPIC = PhaseFunction("isotropic")
 
 
+@pytest.mark.claim("certified-digits", tolerance="1e-18 relative")
 def test_every_tag_to_eighteen_digits(data_folder):
     with (data_folder / "airlight_integral.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))[7::169]
@@ -25,6 +28,7 @@ def test_every_tag_to_eighteen_digits(data_folder):
             assert abs(value / mpf(row["value"]) - 1) < 1e-18, row
 
 
+@pytest.mark.claim("certified-digits", tolerance="1e-21 relative")
 @pytest.mark.parametrize(
     "inputs",
     [
@@ -49,6 +53,7 @@ def test_a_ray_through_a_light_beside_the_segment():
     assert integrate_certified(3.0, 0.0, 3.0, 3.0, 0.25, ISOTROPIC) == 0
 
 
+@pytest.mark.claim("certified-digits")
 def test_routes_that_disagree_certify_nothing(monkeypatch):
     correct = module._by_path
     monkeypatch.setattr(module, "_by_path", lambda *inputs: correct(*inputs) * (1 + mpf(10) ** -19))

@@ -6,8 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from analytic import InputError, foot_and_height, path_length
-from analytic.geometry import theta_of_w, theta_of_x, w_of_theta, w_of_x, x_of_theta, x_of_w
+from analytic.errors import InputError
+from analytic.geometry import foot_and_height, path_length
+from tests.helpers.changes_of_variables import theta_of_w, theta_of_x, w_of_theta, w_of_x, x_of_theta, x_of_w
 
 EPSILON = np.finfo(float).eps
 
@@ -61,6 +62,7 @@ finite = st.floats(min_value=-1e3, max_value=1e3)
 heights = st.floats(min_value=1e-6, max_value=1e3)
 
 
+@pytest.mark.claim("path-keeps-digits")
 @given(x=finite, foot=finite, height=heights)
 def test_path_length_satisfies_its_equation(x, foot, height):
     s, q = x - foot, float(path_length(x, foot, height))
@@ -69,6 +71,7 @@ def test_path_length_satisfies_its_equation(x, foot, height):
     assert abs(q * q - 2 * q * s - height**2) <= 8 * EPSILON * (q * q + 2 * abs(q * s) + height**2)
 
 
+@pytest.mark.claim("path-keeps-digits", tolerance="4 roundings")
 def test_path_length_does_not_cancel_before_the_light():
     from mpmath import mpf, sqrt, workdps
 

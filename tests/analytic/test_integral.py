@@ -6,19 +6,16 @@ import math
 import numpy as np
 import pytest
 
-from analytic import (
-    InputError,
-    PhaseFunction,
-    integrate_angle,
-    integrate_distance,
-    integrate_path,
-    read_cases,
-)
+from analytic.cases import read_cases
+from analytic.errors import InputError
+from analytic.integral import integrate_angle, integrate_distance, integrate_path
+from analytic.phase import PhaseFunction
 
 FORMS = [integrate_distance, integrate_angle, integrate_path]
 ISOTROPIC = PhaseFunction("isotropic")
 
 
+@pytest.mark.claim("integral-certified", "integral-three-forms", tolerance="the estimate, 2e-11 relative at most")
 @pytest.mark.parametrize("form", FORMS)
 def test_certified_values(data_folder, form):
     cases = read_cases(data_folder / "airlight_integral.csv")
@@ -63,6 +60,7 @@ def test_a_vacuum_without_end(form):
     assert abs(result.value - expected) <= result.error <= 1e-10 * expected
 
 
+@pytest.mark.claim("integral-three-forms")
 def test_the_forms_agree_where_no_table_reaches():
     rng = np.random.default_rng(17)
     phases = [

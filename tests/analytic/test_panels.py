@@ -8,7 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from analytic import InputError, PhaseFunction, airlight_segments, integrate_cases, integrate_distance, read_cases
+from analytic.cases import integrate_cases, read_cases
+from analytic.errors import InputError
+from analytic.integral import integrate_distance
+from analytic.panels import airlight_segments
+from analytic.phase import PhaseFunction
 
 ISOTROPIC = PhaseFunction("isotropic")
 PHASES = [
@@ -28,6 +32,12 @@ def worst_by_tag(cases, relative):
 
 # Tolerances: the panels are right to rounding, of which the exponent, up to 70 in these files, has the largest share
 # (1e-14); the rays add the rounding of the foot point, eps |light - origin|, times the steepness of the integrand.
+@pytest.mark.claim(
+    "integral-certified", tolerance="2e-14 relative, 1e-12 where rays are given as vectors; 1e-10 is asked for"
+)
+@pytest.mark.claim(
+    "integral-tolerance", tolerance="2e-14 relative, 1e-12 where rays are given as vectors; 1e-10 is asked for"
+)
 @pytest.mark.parametrize(
     ("name", "tolerance"), [("airlight_integral.csv", 2e-14), ("airlight_integral_rays.csv", 1e-12)]
 )
@@ -42,6 +52,7 @@ def test_every_certified_value(data_folder, name, tolerance):
     assert (np.abs(value - cases.value) <= error + (0 if "rays" not in name else tolerance * value)).all()
 
 
+@pytest.mark.claim("integral-tolerance", tolerance="the estimate itself")
 def test_the_error_estimate_covers_the_error_at_loose_tolerances(data_folder):
     cases = read_cases(data_folder / "airlight_integral.csv")
     for rtol in (1e-2, 1e-5):
@@ -66,6 +77,7 @@ def close(a, b, *, relative=2e-10):
     return np.abs(a - b) <= relative * np.maximum(np.abs(a), np.abs(b))
 
 
+@pytest.mark.claim("laws-of-the-integral", tolerance="1e-11 relative: the rounding of the exponent")
 @settings(deadline=None)
 @given(segments, st.floats(min_value=1e-3, max_value=1e3))
 def test_law_of_units(segment, k):
@@ -76,6 +88,7 @@ def test_law_of_units(segment, k):
     assert close(scaled * k, value, relative=1e-11)
 
 
+@pytest.mark.claim("laws-of-the-integral", tolerance="the sum of the estimates")
 @settings(deadline=None)
 @given(segments, st.floats(min_value=0.01, max_value=0.99))
 def test_segments_add_up(segment, share):
@@ -87,6 +100,7 @@ def test_segments_add_up(segment, share):
     assert abs(value[0] - value[1] - value[2]) <= error.sum() + 1e-15 * value[0]
 
 
+@pytest.mark.claim("laws-of-the-integral", tolerance="1e-9 relative")
 @settings(deadline=None)
 @given(segments, st.floats(min_value=-0.95, max_value=0.95))
 def test_in_a_vacuum_a_ray_run_backwards_swaps_forward_and_backward(segment, g):

@@ -4,7 +4,8 @@
 import numpy as np
 import pytest
 
-from analytic import InputError, PhaseFunction
+from analytic.errors import InputError
+from analytic.phase import PhaseFunction
 
 SMOOTH = [
     PhaseFunction("isotropic"),
@@ -31,12 +32,14 @@ def moment(phase, power):
     return 0.5 * np.sum(half[:, None] * weights * phase(c) * c**power)
 
 
+@pytest.mark.claim("phase-mean-one", tolerance="1e-12")
 @pytest.mark.parametrize("phase", ALL, ids=identity)
 def test_mean_over_the_sphere_is_one(phase):
     assert moment(phase, 0) == pytest.approx(1.0, abs=1e-12)  # rounding of 200 weights, of which a lobe counts few
 
 
 # Mean cosines: (1/2) int c up^n dc / (mean), with int of c ((1+c)/2)^n = 2 n / ((n+1)(n+2)).
+@pytest.mark.claim("phase-forward", tolerance="1e-12")
 @pytest.mark.parametrize(
     ("phase", "expected"),
     [
@@ -90,6 +93,7 @@ def scalar_mitsuba():
         mi.set_variant(before)
 
 
+@pytest.mark.claim("phase-forward", tolerance="3e-6 relative: float32")
 @pytest.mark.parametrize(
     ("plugin", "phase"),
     [

@@ -4,7 +4,9 @@
 import numpy as np
 import pytest
 
-from analytic import InputError, PhaseFunction, taylor_coefficients
+from analytic.errors import InputError
+from analytic.phase import PhaseFunction
+from analytic.series import taylor_coefficients
 
 PHASES = [
     PhaseFunction("isotropic"),
@@ -16,6 +18,7 @@ PHASES = [
 ]
 
 
+@pytest.mark.claim("series-by-two-routes", tolerance="1e-12 relative")
 @pytest.mark.parametrize("phase", PHASES, ids=lambda p: f"{p.name}{p.g or ''}")
 @pytest.mark.parametrize("a", [0.0, 0.31, 4.7])
 def test_against_mpmath(phase, a):
@@ -34,6 +37,7 @@ def test_against_mpmath(phase, a):
 A = np.array([0.0, 0.13, 1.9])
 
 
+@pytest.mark.claim("errata-of-biri", tolerance="1e-14 relative")
 @pytest.mark.parametrize(
     ("name", "mean", "order", "derived"),
     [

@@ -10,7 +10,7 @@ def rays_of(truth, light=0):
     """Return the rays of an image, and where they begin and end as angles at a light."""
     from analytic.geometry import foot_and_height
     from reference.quadrature.surface import surface_hits
-    from reference.scene.shapes import exact_distance
+    from reference.visibility.exact_distance import exact_distance
     from reference.visibility.spot_cone import cone_interval, perpendicular
 
     lamp, direction = truth.lights[light], truth.direction

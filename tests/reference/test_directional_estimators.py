@@ -49,6 +49,7 @@ CASES = {
 }
 
 
+@pytest.mark.claim("single-scatter-agrees", tolerance="four to six standard errors")
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[] if name == "box and ball" else pytest.mark.statistical) for name in CASES]
 )
@@ -78,6 +79,7 @@ def test_single_scatter_agrees_with_the_quadrature(variant, name):
     assert batches.mean[1] == pytest.approx(image.surface.reshape(-1, 3), rel=1e-5, abs=1e-12)
 
 
+@pytest.mark.claim("sampled-distances")
 def test_sampled_distances_have_their_density(variant):
     """The mean of 1/density over the samples is the length; the density is below 1/(2 length) nowhere."""
     import mitsuba as mi
@@ -103,6 +105,7 @@ def test_enclosed_scene_is_exactly_dark(variant):
     assert np.all(batches.mean == 0)
 
 
+@pytest.mark.claim("volpath-agrees")
 @pytest.mark.statistical
 @pytest.mark.parametrize("name", ["box and ball", "thick, light from behind"])
 def test_volpath_agrees(variant, name):
@@ -117,6 +120,7 @@ def test_volpath_agrees(variant, name):
     assert_volpath_agrees(read_truth(mi.load_dict(CASES[name]())), batches=16, least_precision=0.03)
 
 
+@pytest.mark.claim("directional-wants-bounds")
 @pytest.mark.parametrize("estimator", ["quadrature", "single-scatter"])
 @pytest.mark.parametrize("bounded", [False, True], ids=["fog alone", "a body in fog"])
 def test_medium_without_bounds_is_refused(variant, estimator, bounded):

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
-from reference.quadrature.image import TruthImage
+from reference.quadrature.ray_values import TruthImage
 from reference.storage.exr import NOTE, TOTAL, Image, layer, read_exr
 from validation.comparison.engine_hints import Hints, find_hints
 from validation.comparison.images import Comparison, compare_images, read_mask

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
-from reference.quadrature.image import TruthImage
+from reference.quadrature.ray_values import TruthImage
 from reference.storage.exr import NOTE, TOTAL, Image, layer, read_exr
 from validation.metrics.errors import Metrics, error_metrics
 from validation.metrics.flip import Flip, flip_hdr

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Kernels as a user names them: 'quadrature', 'quadrature-32' or one's own, 'module:function'."""
+"""Kernels by name: 'quadrature', 'quadrature-32', or a user's own as 'module:function'."""
 
 import importlib
 from collections.abc import Callable
@@ -16,14 +16,14 @@ def find_kernel(name: str) -> Callable[..., Any]:
     Parameters
     ----------
     name
-        A name of `realtime.kernels.registry.KERNELS`; 'name-N', the same with its first parameter set to the whole
-        number N; or 'module:function'.
+        A name of `realtime.kernels.registry.KERNELS`, 'name-N' for the same kernel with its first parameter set to the
+        whole number N, or 'module:function'.
 
     Raises
     ------
     InputError
-        For an unknown name (the nearest is named), a number for a kernel without parameters, and what cannot be
-        imported or is no function.
+        For an unknown name (the message suggests the nearest), a number for a kernel without parameters, and a
+        'module:function' that cannot be imported or called.
     """
     if ":" in name:
         return _imported(name)
@@ -34,7 +34,13 @@ def find_kernel(name: str) -> Callable[..., Any]:
 
 
 def split_name(name: str) -> tuple[Kernel, int | None]:
-    """Return the record of a kernel and the N of 'name-N', None where there is none."""
+    """Return the record of a kernel, and the N of 'name-N' or None for a plain name.
+
+    Raises
+    ------
+    InputError
+        As `find_kernel`.
+    """
     if name in KERNELS:
         return KERNELS[name], None
     base, separator, digits = name.rpartition("-")
@@ -50,16 +56,16 @@ def split_name(name: str) -> tuple[Kernel, int | None]:
 
 
 def sized(name: str, size: int | None) -> str:
-    """Return 'name-N', or the name alone for no size."""
+    """Return 'name-N' for a size N, or the plain name for None."""
     return name if size is None else f"{name}-{size}"
 
 
 def _imported(name: str) -> Callable[..., Any]:
     module, _, function = name.partition(":")
     try:
-        found = getattr(importlib.import_module(module), function)
+        kernel = getattr(importlib.import_module(module), function)
     except (ImportError, AttributeError, ValueError) as error:
         raise InputError(f"kernel: cannot load {name!r}: {error}; wanted an importable 'module:function'") from error
-    if not callable(found):
-        raise InputError(f"kernel: {name!r} is a {type(found).__name__}; wanted an importable 'module:function'")
-    return found
+    if not callable(kernel):
+        raise InputError(f"kernel: {name!r} is a {type(kernel).__name__}; wanted an importable 'module:function'")
+    return kernel

@@ -1,24 +1,23 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Configurations: a method with a kernel and the values of its parameters, as a user names them."""
+"""Configurations: a method with a kernel and the values of its parameters, by the names that a user gives."""
 
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from analytic.errors import InputError, nearest
+from analytic.errors import InputError
 from realtime.errors import InputError as MethodError
 from realtime.frame.renderer import FrameRenderer, frame_renderer
 from realtime.methods.registry import find_method
+from realtime.parameters import read_parameters
 from realtime.scene.read_scene import Scene
 from validation.configurations.kernel_names import find_kernel
-
-_TRUE, _FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
 
 
 @dataclass(frozen=True)
 class Configuration:
-    """A method, the kernel that it calls (if it calls one) and the parameters that differ from its defaults."""
+    """A method, its kernel (None if it calls none) and the parameters that differ from their defaults."""
 
     method: str
     kernel: str | None = None
@@ -26,7 +25,7 @@ class Configuration:
 
     @property
     def label(self) -> str:
-        """A name for tables, plots and files."""
+        """The name of the configuration in tables, plots and files."""
         values = [f"{name}={value}" for name, value in self.parameters]
         inside = ", ".join(([self.kernel] if self.kernel else []) + values)
         return f"{self.method} ({inside})" if inside else self.method
@@ -37,10 +36,10 @@ class Configuration:
         return ":" in self.method
 
 
-#: Of airlight between the corners of tiles, where tables show it: 99 % of the pixels are within 1e-3.
+#: The tolerance of adaptive sampling in tables: with it, 99 % of the pixels are within 1e-3.
 TOLERANCE = 0.005
 
-#: What `bench` and `report` measure unless told otherwise.
+#: The configurations that `bench` and `report` measure by default.
 STANDARD: tuple[Configuration, ...] = (
     Configuration("unshadowed", "taylor"),
     Configuration("unshadowed", "quadrature"),
@@ -61,7 +60,7 @@ STANDARD: tuple[Configuration, ...] = (
     Configuration("light-volumes", "exact", (("map", 2048),)),
 )
 
-#: What `report --quick` measures: one of each kind.
+#: The configurations that `report --quick` measures: one of each kind.
 QUICK: tuple[Configuration, ...] = (
     Configuration("unshadowed", "exact"),
     Configuration("ray-march", None, (("steps", 100),)),
@@ -91,8 +90,8 @@ def configuration(
     Raises
     ------
     InputError
-        For an unknown method, kernel or parameter (the nearest is named), a value of the wrong type, and a method of
-        one's own that cannot be loaded.
+        For an unknown method, kernel or parameter (the nearest is named), a value of the wrong type or outside its
+        range, values that contradict one another, and a method of one's own that cannot be loaded.
     """
     method = method if isinstance(method, str) else _function_name(method)
     try:
@@ -104,21 +103,30 @@ def configuration(
     if record.uses_kernel:
         kernel = kernel or "exact"
         find_kernel(kernel)
-    values = [(name, _converted(record, name, value)) for name, value in (parameters or {}).items()]
-    return Configuration(method, kernel, tuple(values))
+    try:
+        chosen = read_parameters(method, record.parameters, parameters or {})
+    except MethodError as error:
+        raise InputError(str(error)) from error
+    return Configuration(method, kernel, tuple((name, getattr(chosen, name)) for name in parameters or {}))
 
 
 def chosen_configurations(methods: Sequence[str]) -> tuple[Configuration, ...]:
-    """Return the standard configurations of some methods, and the defaults of a method that has none."""
-    found: list[Configuration] = []
+    """Return the standard configurations of some methods; a method without any has its defaults."""
+    chosen: list[Configuration] = []
     for method in methods:
-        checked = configuration(method)
-        found += [one for one in STANDARD if one.method == method] or [checked]
-    return tuple(found)
+        default = configuration(method)
+        chosen += [standard for standard in STANDARD if standard.method == method] or [default]
+    return tuple(chosen)
 
 
 def parse_settings(settings: Sequence[str]) -> dict[str, str]:
-    """Return the mapping of 'NAME=VALUE' words."""
+    """Return values by name from words of the form 'NAME=VALUE'.
+
+    Raises
+    ------
+    InputError
+        If a word has another form.
+    """
     pairs = {}
     for setting in settings:
         name, separator, value = setting.partition("=")
@@ -135,41 +143,13 @@ def prepared(scene: Scene, chosen: Configuration) -> FrameRenderer:
 
 
 def _function_name(function: Callable[..., Any]) -> str:
-    """Return 'module:function', by which it can be found again."""
+    """Return 'module:function', the name by which a function can be imported again."""
     name = f"{getattr(function, '__module__', '')}:{getattr(function, '__qualname__', '')}"
-    found: Any = sys.modules.get(getattr(function, "__module__", None) or "")
+    named: Any = sys.modules.get(getattr(function, "__module__", None) or "")
     for part in getattr(function, "__qualname__", "").split("."):
-        found = getattr(found, part, None)
-    if not callable(function) or found is not function:
+        named = getattr(named, part, None)
+    if not callable(function) or named is not function:
         raise InputError(
             f"method: got {function!r}, wanted a name or a function at the top of a module: give it a name there"
         )
     return name
-
-
-def _converted(record, name: str, value: Any) -> int | float | str:
-    if name not in record.parameters:
-        known = ", ".join(record.parameters) or "none"
-        raise InputError(
-            f"method {record.name}: got a parameter {name!r}, wanted one of: {known}" + nearest(name, record.parameters)
-        )
-    default = record.parameters[name]
-    if isinstance(default, bool):
-        word = str(value).strip().lower()
-        if word not in _TRUE + _FALSE:
-            raise InputError(f"method {record.name}: {name} got {value!r}, wanted true or false")
-        return word in _TRUE
-    if isinstance(default, float):
-        try:
-            return float(value)
-        except (TypeError, ValueError):
-            raise InputError(f"method {record.name}: {name} got {value!r}, wanted a number") from None
-    if isinstance(default, int):
-        try:
-            # int() would cut off what stands behind the point, and take True for 1.
-            if isinstance(value, float | bool):
-                raise TypeError
-            return int(value)
-        except (TypeError, ValueError):
-            raise InputError(f"method {record.name}: {name} got {value!r}, wanted a whole number") from None
-    return str(value)

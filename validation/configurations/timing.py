@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Timing: medians after warm-up, with their spread.
 
-A frame is timed from the call to the arrays being ready on the device (`drjit.sync_thread`), kernels compiled and
-recorded before. The wall clock is used on purpose: launch and replay are part of what a user waits for.
+A timing runs from the call until the arrays are ready on the device (`drjit.sync_thread`), after kernels have been
+compiled and recorded. It uses the wall clock on purpose: a user also waits for launch and replay.
 """
 
 import time
@@ -15,27 +15,25 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.frame.incremental import Kept, next_frame
+from realtime.frame.incremental import FrameCache, next_frame
 from realtime.frame.recorded import Frozen
 from realtime.frame.renderer import (
     FrameRenderer,
-    run_airlight,
     run_cast_and_shade,
+    run_cull,
+    run_method,
     run_shade,
     run_stages,
-    run_surface,
-    run_tiles,
-    run_tiles_and_airlight,
 )
 from realtime.frame.surface import cast_rays
 from realtime.scene.animate import Objects, read_objects, turned_objects
 from realtime.scene.camera import ray_directions
 from realtime.scene.read_scene import Scene
 
-#: Of a frame that takes longer than this the stages are timed once, in one more frame: its spread matters little, and
-#: some thirty such frames, as others have, would take minutes [s].
+#: A frame that takes longer is timed stage by stage, in few frames [s]. Its spread matters little, and the usual thirty
+#: or more frames would take minutes.
 SLOW = 8.0
-_TURNS = 1.5  # about so long is spent on frames that are timed stage by stage, one to five of them [s]
+_TURNS = 1.5  # approximate time for the one to five frames that are timed stage by stage [s]
 
 
 @dataclass(frozen=True)
@@ -49,12 +47,12 @@ class Timing:
 
 
 def time_repeated(work: Callable[[], Any], *, seconds: float = 0.6, least: int = 5, most: int = 200) -> Timing:
-    """Time a piece of work again and again.
+    """Time a piece of work repeatedly.
 
     Parameters
     ----------
     work
-        Called with nothing; must leave its results evaluated.
+        A function without arguments that evaluates its results.
     seconds
         Stop after about this long, but not before `least` repetitions.
     least, most
@@ -67,7 +65,7 @@ def time_repeated(work: Callable[[], Any], *, seconds: float = 0.6, least: int =
 def time_in_turns(
     works: Sequence[Callable[[], Any]], *, seconds: float = 3.0, least: int = 5, most: int = 200
 ) -> list[Timing]:
-    """Time several pieces of work in turns; parameters as in `times_in_turns`."""
+    """Time several pieces of work in turns, with the parameters of `times_in_turns`, and return a timing for each."""
     times = times_in_turns(works, seconds=seconds, least=least, most=most)
     quartiles = np.percentile(times, [25, 50, 75], axis=0).T
     return [Timing(float(median), float(low), float(high), len(times)) for low, median, high in quartiles]
@@ -76,18 +74,18 @@ def time_in_turns(
 def times_in_turns(
     works: Sequence[Callable[[], Any]], *, seconds: float, least: int, most: int, alternate: bool = False
 ) -> NDArray[np.float64]:
-    """Time several pieces of work in turns, so that whatever else the machine does hits all of them alike.
+    """Time several pieces of work in turns, so that other load on the machine affects all of them alike.
 
     Parameters
     ----------
     works
-        Each called with nothing; must leave its results evaluated.
+        Functions without arguments that evaluate their results.
     seconds
         Stop after about this long, but not before `least` turns.
     least, most
         Bounds of the number of turns.
     alternate
-        Whether every other turn goes backwards: what comes second may find the caches warm.
+        Whether every other turn runs backwards, since the second piece may find warm caches.
 
     Returns
     -------
@@ -112,14 +110,12 @@ def times_in_turns(
     return np.array(times)
 
 
-def timed_frame(renderer: FrameRenderer, scene: Scene, kept: Kept | None, **moved: bool):
-    """Render the next frame, as `realtime.frame.incremental.next_frame`; return stages, what is kept, and the time
-    [ms].
-    """
+def timed_frame(renderer: FrameRenderer, scene: Scene, cache: FrameCache | None, **moved: bool):
+    """Render the next frame, as `realtime.frame.incremental.next_frame`; return stages, cache, and time [ms]."""
     begin = time.perf_counter()
-    stages, kept = next_frame(renderer, scene, kept, **moved)
+    stages, cache = next_frame(renderer, scene, cache, **moved)
     dr.sync_thread()
-    return stages, kept, 1e3 * (time.perf_counter() - begin)
+    return stages, cache, 1e3 * (time.perf_counter() - begin)
 
 
 def moved_light(renderer: FrameRenderer) -> Callable[[], Any]:
@@ -127,14 +123,14 @@ def moved_light(renderer: FrameRenderer) -> Callable[[], Any]:
     return _step(renderer, None, light_moved=True)
 
 
-def moved_light_alone(renderer: FrameRenderer, kept: Kept) -> Callable[[], Any]:
+def moved_light_alone(renderer: FrameRenderer, cache: FrameCache) -> Callable[[], Any]:
     """Return a frame after the light moved, camera and geometry as they stood: camera rays are kept."""
-    return _step(renderer, kept, light_moved=True)
+    return _step(renderer, cache, light_moved=True)
 
 
-def changed_look(renderer: FrameRenderer, kept: Kept) -> Callable[[], Any]:
+def changed_look(renderer: FrameRenderer, cache: FrameCache) -> Callable[[], Any]:
     """Return a frame after the medium or colours of lights changed: only surface and airlight are computed."""
-    return _step(renderer, kept, light_moved=False)
+    return _step(renderer, cache, light_moved=False)
 
 
 def camera_rays(renderer: FrameRenderer) -> Callable[[], Any]:
@@ -148,12 +144,12 @@ def camera_rays(renderer: FrameRenderer) -> Callable[[], Any]:
     return lambda: dr.eval(cast(scene.geometry, scene.facets, renderer.pixel, scene.camera))
 
 
-def _step(renderer: FrameRenderer, kept: Kept | None, *, light_moved: bool) -> Callable[[], Any]:
-    moved = {"camera_moved": kept is None, "geometry_moved": False, "light_moved": light_moved}
-    return lambda: next_frame(renderer, renderer.scene, kept, **moved)
+def _step(renderer: FrameRenderer, cache: FrameCache | None, *, light_moved: bool) -> Callable[[], Any]:
+    moved = {"camera_moved": cache is None, "geometry_moved": False, "light_moved": light_moved}
+    return lambda: next_frame(renderer, renderer.scene, cache, **moved)
 
 
-def first_frame(renderer: FrameRenderer) -> Kept:
+def first_frame(renderer: FrameRenderer) -> FrameCache:
     """Render the frame of the renderer's scene and return what it leaves."""
     return next_frame(renderer, renderer.scene, None, camera_moved=True, geometry_moved=True, light_moved=True)[1]
 
@@ -185,13 +181,13 @@ def time_frame(renderer: FrameRenderer, *, seconds: float = 0.6, slow: float | N
         them: up to five frames in place of some forty; `SLOW` by default [s].
     """
     scene = renderer.scene
-    kept = first_frame(renderer)
-    prepared, distance = kept.prepared, kept.cast.distance
-    by_light = run_shade(renderer, kept.cast)
-    dr.eval(distance, by_light)
+    cache = first_frame(renderer)
+    state, cast = cache.state, cache.cast
+    by_light = run_shade(renderer, cast)
+    dr.eval(cast, by_light)
 
     def airlight():
-        dr.eval(run_tiles_and_airlight(renderer, prepared, distance, by_light))
+        dr.eval(run_method(renderer, state, cast, by_light))
 
     dr.sync_thread()
     begin = time.perf_counter()
@@ -202,7 +198,7 @@ def time_frame(renderer: FrameRenderer, *, seconds: float = 0.6, slow: float | N
         return _slow_frame(renderer, turns=int(np.clip(_TURNS / took, 1, 5)))
 
     def surface():
-        dr.eval(run_surface(renderer))
+        dr.eval(run_cast_and_shade(renderer))
 
     objects = _objects(scene)
 
@@ -215,13 +211,13 @@ def time_frame(renderer: FrameRenderer, *, seconds: float = 0.6, slow: float | N
         return time_repeated(work, seconds=0.5 * seconds, least=3)
 
     return FrameTimes(
-        frame=time_repeated(lambda: run_stages(renderer, prepared), seconds=seconds),
+        frame=time_repeated(lambda: run_stages(renderer, state), seconds=seconds),
         surface=time_repeated(surface, seconds=seconds),
         airlight=time_repeated(airlight, seconds=seconds),
         light_moved=few(moved_light(renderer)),
         objects_moved=few(objects_moved),
-        light_moved_camera_kept=few(moved_light_alone(renderer, kept)),
-        colours_changed=few(changed_look(renderer, kept)),
+        light_moved_camera_kept=few(moved_light_alone(renderer, cache)),
+        colours_changed=few(changed_look(renderer, cache)),
     )
 
 
@@ -239,16 +235,16 @@ def _slow_frame(renderer: FrameRenderer, *, turns: int) -> FrameTimes:
 
         there = turned_objects(scene, objects, np.eye(3)) if objects else scene
         done()
-        prepared = renderer.prepare(there)
+        state = renderer.prepare(there)
         done()
         cast, by_light = run_cast_and_shade(renderer)
         dr.eval(cast, by_light)
         done()
         dr.eval(run_shade(renderer, cast))
         done()
-        tiles = run_tiles(renderer, prepared, cast.distance)
+        lists = run_cull(renderer, state, cast.distance)
         done()
-        dr.eval(run_airlight(renderer, prepared, cast.distance, by_light, tiles))
+        dr.eval(run_method(renderer, state, cast, by_light, lists))
         done()
         steps.append(1e3 * np.diff(times))
     move, prepare, surface, shade, in_tiles, rest = np.array(steps).T

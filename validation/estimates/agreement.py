@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from reference.monte_carlo.allocation import allocated
 from reference.monte_carlo.batches import LARGEST_SEED, LAYERS, Batches
-from reference.quadrature.image import TruthImage
+from reference.quadrature.ray_values import TruthImage
 from reference.scene.read import TruthScene, read_truth
 from reference.scene.shadow_epsilon import measure_shadow_epsilon
 from validation.estimates.monte_carlo import monte_carlo_batches

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from realtime.frame.renderer import Frame
 from reference.monte_carlo.batches import LARGEST_SEED, LAYERS, Batches, seed_ranges
-from reference.quadrature.image import TruthImage
+from reference.quadrature.ray_values import TruthImage
 from reference.quadrature.surface import surface_hits
 from reference.scene.read import read_truth
 from reference.storage.exr import Image

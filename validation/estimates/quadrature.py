@@ -5,7 +5,8 @@ from collections.abc import Callable
 from dataclasses import Field, fields
 from typing import Any
 
-from reference.quadrature.image import TruthImage, quadrature_image
+from reference.quadrature.image import quadrature_image
+from reference.quadrature.ray_values import TruthImage
 from reference.scene.read import read_truth
 from reference.storage.cache import load_arrays, store_arrays
 from reference.storage.cache_size import make_room

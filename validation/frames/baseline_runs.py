@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a baseline holds, measured: every standard configuration of a scene, and every kernel where only fog is."""
+"""Measures what a baseline holds: the standard configurations of a scene, and every kernel in `open-fog`."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -12,9 +12,9 @@ import numpy as np
 from realtime.errors import InputError
 from realtime.frame.renderer import FrameRenderer, render_frame, run_stages
 from realtime.kernels.registry import KERNELS
-from realtime.scene.features import Plan
+from realtime.scene.features import SceneFeatures
 from realtime.scene.read_scene import Scene, read_scene
-from reference.quadrature.image import TruthImage
+from reference.quadrature.ray_values import TruthImage
 from validation.configurations.methods import STANDARD, Configuration, prepared
 from validation.estimates.quadrature import truth_image
 from validation.frames.baseline_files import ERRORS, SCHEMA, SIZE, SLOWER, Baseline
@@ -24,19 +24,19 @@ from validation.scenes.loading import load_scene
 
 Progress = Callable[[float, str], None]
 
-YARDSTICK = Configuration("unshadowed", "exact")  #: what times are told in
+YARDSTICK = Configuration("unshadowed", "exact")  #: the unit of times: frames of this configuration
 FOG = "open-fog"  #: the scene in which every kernel is measured
 
-_SURFACE = ("relative_rmse", "max", "nonfinite")  # it has one cause, the shadows that a method knows
-_SLOW = 1.0  # a frame that takes longer is not timed: so many of them would take half of the whole run [s]
-_LEAST = 7  # turns of a frame and one of the yardstick
-_TRIES = (0.4, 1.0, 2.0)  # for how long a frame is timed, and again where it seems to have become too slow [s]
+_SURFACE = ("relative_rmse", "max", "nonfinite")  # methods change the surface only by their shadows
+_SLOW = 1.0  # a slower frame is not timed: timing such frames would take half of the whole run [s]
+_LEAST = 7  # turns, each of one frame and one frame of the yardstick
+_TRIES = (0.4, 1.0, 2.0)  # durations of the timings; the longer ones follow only if the frame seems too slow [s]
 
 
-def baseline_configurations(name: str, plan: Plan) -> tuple[Configuration, ...]:
+def baseline_configurations(name: str, features: SceneFeatures) -> tuple[Configuration, ...]:
     """Return what the baseline of a scene holds."""
     kernels = [Configuration("unshadowed", kernel) for kernel in KERNELS] if name == FOG else []
-    return tuple(dict.fromkeys((*configurations_for(plan, STANDARD), *kernels)))
+    return tuple(dict.fromkeys((*configurations_for(features, STANDARD), *kernels)))
 
 
 def measure_baseline(
@@ -49,11 +49,11 @@ def measure_baseline(
     name
         A built-in scene.
     kept
-        The baseline that it will be compared with: what seems too slow beside it is timed again, for longer.
+        The baseline to compare with. A frame that seems too slow beside it is timed again, for longer.
     times
-        Also time a frame of each configuration beside one of the yardstick, where a processor does the work.
+        Whether to time a frame of each configuration beside one of the yardstick; only on a CPU.
     progress
-        Called with (share done, what) now and then.
+        Callback with the share done and a description of the next step, or None.
 
     Returns
     -------
@@ -65,14 +65,15 @@ def measure_baseline(
     truth = truth_image(loaded.scene)
     timed = times and "llvm" in mi.variant()
     yardstick = prepared(scene, YARDSTICK) if timed else None
-    chosen = baseline_configurations(name, scene.plan)
+    chosen = baseline_configurations(name, scene.features)
     before = kept["configurations"] if kept else {}
     entries = {}
-    for number, one in enumerate(chosen):
+    for number, configuration in enumerate(chosen):
+        label = configuration.label
         if progress is not None:
-            progress(number / len(chosen), f"{name}: {one.label}")
-        ratio = before.get(one.label, {}).get("frame_ratio", np.inf)
-        entries[one.label] = _entry(scene, one, truth, yardstick, enough=SLOWER * ratio)
+            progress(number / len(chosen), f"{name}: {label}")
+        ratio = before.get(label, {}).get("frame_ratio", np.inf)
+        entries[label] = _entry(scene, configuration, truth, yardstick, enough=SLOWER * ratio)
     return {
         "schema": SCHEMA,
         "scene": name,
@@ -93,17 +94,17 @@ def _entry(
         return {"refused": str(error)}
     numbers = error_metrics(truth.airlight, frame.airlight).to_json()
     numbers["mean"] = float(np.mean(np.asarray(frame.airlight, dtype=np.float64)))
-    found: dict[str, Any] = {"airlight": _kept({name: numbers[name] for name in ERRORS})}
-    if scene.plan.surfaces:
+    entry: dict[str, Any] = {"airlight": _kept({name: numbers[name] for name in ERRORS})}
+    if scene.features.surfaces:
         surface = error_metrics(truth.surface, frame.surface).to_json()
-        found["surface"] = _kept({name: surface[name] for name in _SURFACE})
+        entry["surface"] = _kept({name: surface[name] for name in _SURFACE})
     if yardstick is not None and chosen != YARDSTICK:
-        found |= _frame_ratio(renderer, yardstick, enough)
-    return found
+        entry |= _frame_ratio(renderer, yardstick, enough)
+    return entry
 
 
 def _frame_ratio(renderer: FrameRenderer, yardstick: FrameRenderer, enough: float) -> dict[str, float]:
-    """Time a frame and one of the yardstick in turns; nothing where it takes too long."""
+    """Time a frame and one of the yardstick in turns; return an empty dict if the frame takes too long."""
     works = [_frame(renderer), _frame(yardstick)]
     if _processor_time(works[0]) > _SLOW:
         return {}
@@ -119,11 +120,11 @@ def _frame_ratio(renderer: FrameRenderer, yardstick: FrameRenderer, enough: floa
         ratio = float(shortest[0] / shortest[1])
         if ratio <= enough:
             break
-    return {"frame_ratio": float(f"{ratio:.2g}")}  # two digits: more of them would be noise
+    return {"frame_ratio": float(f"{ratio:.2g}")}  # two digits: more would be noise
 
 
 def _processor_time(work: Callable[[], Any]) -> float:
-    """Return what a piece of work takes of the processors, all threads together [s]."""
+    """Return the processor time of a piece of work, summed over all threads [s]."""
     begin = time.process_time()
     work()
     dr.sync_thread()
@@ -136,6 +137,6 @@ def _frame(renderer: FrameRenderer) -> Callable[[], Any]:
 
 
 def _kept(numbers: Mapping[str, Any]) -> dict[str, Any]:
-    """Round to the digits that a baseline keeps."""
+    """Return numbers rounded to the six digits that a baseline keeps."""
     values = {name: plain(value) for name, value in numbers.items()}
     return {name: float(f"{v:.6g}") if isinstance(v, float) else v for name, v in values.items()}

@@ -9,9 +9,9 @@ from realtime.errors import InputError
 from realtime.frame.recorded import Frozen
 from realtime.frame.renderer import Frame, render_frame
 from realtime.methods.registry import find_method
-from realtime.scene.features import Plan
+from realtime.scene.features import SceneFeatures
 from realtime.scene.read_scene import Scene, read_scene
-from reference.quadrature.image import TruthImage
+from reference.quadrature.ray_values import TruthImage
 from validation.configurations.methods import STANDARD, Configuration, prepared
 from validation.configurations.timing import FrameTimes, time_frame
 from validation.estimates.quadrature import truth_image
@@ -21,34 +21,36 @@ from validation.scenes.loading import LoadedScene
 
 Progress = Callable[[int, int, str], None]
 
-_DOUBTFUL = 0.3  # of a configuration whose preparation took longer a small frame is tried before the large one [s]
-_LONG = 25.0  # a first frame, with the compilation of its kernels, that took longer is not timed at a larger size [s]
+_DOUBTFUL = 0.3  # after a longer preparation, a small frame is rendered before the large one [s]
+_LONG = 25.0  # after a longer first frame, compilation included, no larger frame is timed [s]
 
 
 @dataclass(frozen=True)
 class Measurement:
-    """What one configuration costs in one scene and how wrong it is."""
+    """The cost and the error of one configuration in one scene."""
 
     configuration: Configuration
-    frame: Frame | None  #: None where it was refused
+    frame: Frame | None  #: None if the method refused the scene
     times: FrameTimes | None
     error: Metrics | None  #: of the airlight
     surface_error: Metrics | None
-    flip: Flip | None = None  #: HDR-FLIP of all light, airlight and surface; None where it was not asked for
+    flip: Flip | None = None  #: HDR-FLIP of airlight plus surface; None if it was not asked for
     refused: str | None = None  #: why there is no frame
-    left_out: bool = False  #: whether `refused` is about time: the configuration could render this scene
-    note: str | None = None  #: what its times are, where not those of the others
+    left_out: bool = False  #: whether only the time speaks against this configuration, which could render the scene
+    note: str | None = None  #: how its times differ from those of other configurations
 
 
-def configurations_for(plan: Plan, configurations: Sequence[Configuration] = STANDARD) -> tuple[Configuration, ...]:
-    """Leave out what the scene does not need.
+def configurations_for(
+    features: SceneFeatures, configurations: Sequence[Configuration] = STANDARD
+) -> tuple[Configuration, ...]:
+    """Return the configurations that differ in this scene from the ones before them.
 
-    Variants that differ in their shadows need something that casts one, the paper's way with bounded media needs such
-    media, in clear air.
+    Variants of the shadows are left out if nothing casts a shadow. The published treatment of bounded media is left out
+    if the scene has none, or if they do not lie in clear air.
     """
-    needless = set() if plan.shadows else {"shadow", "order", "map"}
-    needless |= set() if plan.clear else {"media"}
-    return tuple(chosen for chosen in configurations if not needless & set(dict(chosen.parameters)))
+    without_effect = set() if features.shadows else {"shadow", "order", "map"}
+    without_effect |= set() if features.clear else {"media"}
+    return tuple(chosen for chosen in configurations if not without_effect & set(dict(chosen.parameters)))
 
 
 def measure(
@@ -74,16 +76,16 @@ def measure(
     truth
         The quadrature truth of the same scene.
     timed
-        The scene at another size to time, where that differs from the size of the truth.
+        The scene at the size of the timed frames; None if that is the size of the truth.
     seconds
         Time to spend on each timing.
     with_flip
-        Also compute HDR-FLIP; where that cannot be had, it holds a note.
+        Whether to compute HDR-FLIP; if the package is missing, the result holds a note.
     slow
         See `validation.configurations.timing.time_frame` [s].
     limit, probe
-        Leave the configuration out if a frame is expected to take longer than `limit` [s], by one of the same scene at
-        a small size, which `probe` returns. Asked for where preparing took long, and for a method of one's own.
+        A configuration is left out if a frame of it would take longer than `limit` [s]. The estimate comes from a frame
+        of the small scene that `probe` returns. It is made only after a long preparation and for a user's own method.
     """
     try:
         begin = time.perf_counter()
@@ -102,7 +104,7 @@ def measure(
     if timed is not None and took > _LONG:
         timed = None
         notes.append(f"timed at {scene.camera.width} x {scene.camera.height}: larger frames take minutes")
-    if chosen.own and not isinstance(renderer.airlight, Frozen):
+    if chosen.own and not isinstance(renderer.render, Frozen):
         notes.append("not frozen: its Python runs again for every frame")
     times = time_frame(renderer if timed is None else prepared(timed, chosen), seconds=seconds, slow=slow)
     return Measurement(
@@ -110,14 +112,14 @@ def measure(
         frame,
         times,
         error_metrics(truth.airlight, frame.airlight),
-        error_metrics(truth.surface, frame.surface) if scene.plan.surfaces else None,
+        error_metrics(truth.surface, frame.surface) if scene.features.surfaces else None,
         flip_hdr(truth.airlight + truth.surface, frame.airlight + frame.surface) if with_flip else None,
         note="; ".join(notes) or None,
     )
 
 
 def _too_long(probe: Scene, chosen: Configuration, scene: Scene, limit: float) -> str | None:
-    """Say that a frame would take too long, by the second of the same scene at a small size; None if it would not."""
+    """Return why a frame would take too long, judged by the second frame of a small scene, or None."""
     small, large = probe.camera, scene.camera
     renderer = prepared(probe, chosen)
     render_frame(renderer)
@@ -128,7 +130,7 @@ def _too_long(probe: Scene, chosen: Configuration, scene: Scene, limit: float) -
     if expected <= limit:
         return None
     return (
-        f"not measured: by one of {small.width} x {small.height} pixels that took {took:.2g} s, a frame of "
+        f"not measured: by a frame of {small.width} x {small.height} pixels that took {took:.2g} s, a frame of "
         f"{large.width} x {large.height} would take {expected:.0f} s, more than the limit of {limit:g} s"
     )
 
@@ -136,12 +138,12 @@ def _too_long(probe: Scene, chosen: Configuration, scene: Scene, limit: float) -
 def bench(
     loaded: LoadedScene, configurations: Sequence[Configuration] = STANDARD, *, progress: Progress | None = None
 ) -> Iterator[tuple[Scene, Measurement]]:
-    """Measure the configurations of a scene at its own size, one after the other."""
+    """Yield the measurements of a scene's configurations at its own size, one after the other."""
     scene = read_scene(loaded.scene)
-    chosen = configurations_for(scene.plan, configurations)
+    chosen = configurations_for(scene.features, configurations)
     truth = truth_image(loaded.scene)
-    for number, one in enumerate(chosen):
-        yield scene, measure(scene, one, truth=truth)
+    for number, configuration in enumerate(chosen):
+        yield scene, measure(scene, configuration, truth=truth)
         if progress is not None:
             progress(number + 1, len(chosen), loaded.name)
 

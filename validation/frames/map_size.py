@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a shadow map costs in accuracy: error against its size, and the flicker of a light that moves.
+"""The error of a shadow map against its size, and the flicker under a light that moves.
 
 **The order of the error.** With N texels on a side a shadow edge lies within a texel of its place in the map, an angle
 of O(1/N) as seen from the light. A camera ray that crosses the edge enters or leaves the light too early or too late by
@@ -15,7 +15,7 @@ order 1, but for the root of a logarithm, and over sizes of N the slope is 1 - 1
 edge that the camera sees edge-on hides the rays within epsilon of it whole: there the order is 1/2. Occluders that are
 thinner than a texel do not converge before the map resolves them.
 
-**Upright walls.** Where rays have found the jumps on the sides of texels
+**Upright walls.** Where rays have found the jumps on the edges of texels
 (`realtime.methods.light_volumes.jump_search`) the edge of a shadow is known to epsilon = 1/64 of a texel, or to
 O(1/N^2) where it is a smooth outline between two sides. What is left of order 1 has a constant that is smaller by as
 much. Corners of outlines lie within a texel, which has the wrong shape there: a share of O(1/N) of the rays that cross
@@ -58,10 +58,10 @@ SIZES = (32, 64, 128, 256, 512, 1024, 2048, 4096)  #: of shadow maps [texels]
 
 @dataclass(frozen=True)
 class Slope:
-    """The straight line through errors against sizes, both as logarithms: error ~ size^-order."""
+    """The slope of a straight line through the logarithms of errors and sizes: error ~ size^-order."""
 
     order: float  #: NaN for fewer than two errors above 0
-    standard_error: float  #: of the order, from the scatter about the line; NaN for fewer than three
+    standard_error: float  #: of the order, from the scatter about the line; NaN for fewer than three errors above 0
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ class MapErrors:
     @property
     def errors(self) -> tuple[float, ...]:
         """Relative RMSE by size."""
-        return tuple(one.relative_rmse for one in self.metrics)
+        return tuple(error.relative_rmse for error in self.metrics)
 
 
 @dataclass(frozen=True)
@@ -85,11 +85,11 @@ class MapFlicker:
 
     configuration: Configuration  #: with the parameters that all sizes share
     sizes: tuple[int, ...]  #: [texels]
-    texels: tuple[float, ...]  #: by size, how many texels the light moves from frame to frame
+    texels: tuple[float, ...]  #: by size, how many texels a shadow moves from frame to frame
     flicker: tuple[float, ...]  #: by size, RMS of the image's change less the truth's, over the truth's mean
     errors: tuple[float, ...]  #: by size, RMSE of all frames over the truth's mean
     truth_change: float  #: RMS of the truth's own change over its mean
-    nonfinite: int  #: pixels that are left out: NaN or infinite in some image
+    nonfinite: int  #: pixels that are left out, because some image has NaN or infinity there
     slope: Slope  #: of the flicker
 
 
@@ -99,7 +99,7 @@ def fitted_slope(sizes: ArrayLike, errors: ArrayLike) -> Slope:
     Parameters
     ----------
     sizes, errors
-        Shape (n,); errors that are not above 0 and finite are left out.
+        (n,) each. Errors that are not positive and finite are left out.
     """
     n, e = np.asarray(sizes, dtype=np.float64), np.asarray(errors, dtype=np.float64)
     counts = (e > 0) & np.isfinite(e)
@@ -130,28 +130,27 @@ def map_errors(
     scene
         The `mi.Scene`, rendered at its own size.
     method, kernel, parameters
-        See `validation.configurations.methods.configuration`; the method has a parameter `map`, which is set here.
-        What else limits its accuracy, the steps of a marcher above all, must be well below the error of the largest
-        map.
+        See `validation.configurations.methods.configuration`. This function sets the method's parameter `map`. Its
+        other errors, such as that of the steps of a marcher, must be well below the error of the largest map.
     sizes
         Of the shadow map [texels].
     progress
-        Called with (done, total, what) before every size.
+        Callback with the number done, the total and a description, before every size, or None.
 
     Raises
     ------
     InputError
-        For a method without shadow maps, a size that is none, or no sizes at all.
+        For a method without shadow maps, a size that is not valid, or no sizes at all.
     """
     shared, by_size = _configurations(method, kernel, parameters, sizes)
     read, truth = read_scene(scene), truth_image(scene).airlight
-    found = []
+    metrics = []
     for number, (size, chosen) in enumerate(by_size.items()):
         if progress is not None:
             progress(number, len(by_size), f"{shared.label}, map {size}")
-        found.append(error_metrics(truth, render_frame(prepared(read, chosen)).airlight))
-    slope = fitted_slope(list(by_size), [one.relative_rmse for one in found])
-    return MapErrors(shared, tuple(by_size), tuple(found), slope)
+        metrics.append(error_metrics(truth, render_frame(prepared(read, chosen)).airlight))
+    slope = fitted_slope(list(by_size), [error.relative_rmse for error in metrics])
+    return MapErrors(shared, tuple(by_size), tuple(metrics), slope)
 
 
 def map_flicker(
@@ -166,19 +165,19 @@ def map_flicker(
     about: tuple[float, float, float] | None = None,
     progress: Progress | None = None,
 ) -> MapFlicker:
-    """Measure how the airlight of a light that circles slowly flickers, against the size of the shadow map.
+    """Measure the flicker of the airlight under a slowly circling light, against the size of the shadow map.
 
     Parameters
     ----------
     scene, method, kernel, parameters, sizes, progress
         As for `map_errors`.
     frames
-        How many, at least 2.
+        Number of frames, at least 2.
     step
-        By how much the light turns from frame to frame [rad]; made a whole part of a turn. As seen from a light what
-        stands in the middle of its circle moves by this angle, `MapFlicker.texels` of 2 / size each.
+        By how much the light turns from frame to frame [rad], rounded to a whole fraction of a turn. As seen from the
+        light, what stands in the middle of its circle moves by this angle: `MapFlicker.texels` of 2 / size each.
     about
-        Where the axis of the circle is [m]; see `validation.scenes.animation`.
+        A point on the axis of the circle, (3,) [m]; None: the middle of the scene.
 
     Raises
     ------
@@ -186,7 +185,7 @@ def map_flicker(
         As `map_errors`, and for fewer than two frames or a step that is not above 0 and below a radian.
     """
     if frames < 2:
-        raise InputError(f"frames: got {frames}, wanted at least 2: flicker is what differs between them")
+        raise InputError(f"frames: got {frames}, wanted at least 2: flicker is the difference between frames")
     if not 0 < step < 1:
         raise InputError(f"step: got {step:g}, wanted an angle above 0 and below 1 [rad]")
     shared, by_size = _configurations(method, kernel, parameters, sizes)
@@ -195,7 +194,7 @@ def map_flicker(
     total = 1 + len(by_size)
     if progress is not None:
         progress(0, total, "quadrature")
-    truth = np.stack([_truth_of(known, one) for one in _frames(read, about, turn, frames)])
+    truth = np.stack([_truth_of(known, moved) for moved in _frames(read, about, turn, frames)])
     images = []
     for number, (size, chosen) in enumerate(by_size.items()):
         if progress is not None:
@@ -205,13 +204,13 @@ def map_flicker(
     truth = truth[:, finite]
     errors = [image[:, finite] - truth for image in images]
     mean = float(truth.mean())
-    flicker = tuple(_rms(np.diff(one, axis=0)) / mean for one in errors)
+    flicker = tuple(_rms(np.diff(error, axis=0)) / mean for error in errors)
     return MapFlicker(
         configuration=shared,
         sizes=tuple(by_size),
         texels=tuple(np.pi / turn * size for size in by_size),
         flicker=flicker,
-        errors=tuple(_rms(one) / mean for one in errors),
+        errors=tuple(_rms(error) / mean for error in errors),
         truth_change=_rms(np.diff(truth, axis=0)) / mean,
         nonfinite=int(np.sum(~finite)),
         slope=fitted_slope(list(by_size), flicker),
@@ -226,7 +225,9 @@ def _configurations(
         raise InputError("sizes: got none, wanted at least one size of a shadow map, for example 512")
     values = dict(parameters or {})
     if "map" in values:
-        raise InputError(f"parameters: got map={values['map']}, wanted it in `sizes`: the map's size is what varies")
+        raise InputError(
+            f"parameters: got map={values['map']}, wanted it in `sizes`: this study varies the size of the map"
+        )
     by_size = {size: configuration(method, kernel, values | {"map": size}) for size in sizes}
     return configuration(method, kernel, values), by_size
 
@@ -237,11 +238,12 @@ def _frames(scene: Scene, about: tuple[float, float, float] | None, turn: int, f
 
 
 def _truth_of(known: TruthScene, moved: Scene) -> Array:
-    """Return the true airlight with the lights where they moved to."""
-    near = [light for light in moved.lights if light.kind != "directional"]
-    far = [light for light in moved.lights if light.kind == "directional"]
-    lights = tuple(_truth_light(one, other) for one, other in zip(known.lights, near, strict=True))
-    directional = tuple(replace(one, direction=_axis(other)) for one, other in zip(known.directional, far, strict=True))
+    """Return the true airlight, (height, width, 3), with the lights at the places of a moved scene."""
+    near = [light for light in moved.lights if light.w]
+    far = [light for light in moved.lights if not light.w]
+    lights = tuple(_truth_light(light, there) for light, there in zip(known.lights, near, strict=True))
+    turned = zip(known.directional, far, strict=True)
+    directional = tuple(replace(light, direction=_axis(there)) for light, there in turned)
     return quadrature_image(replace(known, lights=lights, directional=directional)).airlight
 
 
@@ -261,7 +263,7 @@ def _axis(light: Light) -> Array:
 def _rendered(scene: Scene, chosen: Configuration, frames: Iterator[Scene]) -> Array:
     """Return the airlight of frames, (frames, height, width, 3)."""
     renderer = prepared(scene, chosen)
-    images = [render_frame(replace(renderer, scene=one)).airlight for one in frames]
+    images = [render_frame(replace(renderer, scene=moved)).airlight for moved in frames]
     return np.array(images, dtype=np.float64)
 
 

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where sums of many shadow planes lose digits: deep stacks of slats, a strong light close by, thin light far away.
+"""Cases in which sums over many shadow planes lose digits: deep stacks of slats, a strong light nearby, a dim one.
 
-A ray that crosses n planes has the airlight sum_i Gamma(b_i) - Gamma(a_i), and with relative rounding errors eps of
-each Gamma the sum is wrong by about eps sum_i Gamma: many times the light that is left where slats leave little of it,
-or where a strong light close to the camera fills Gamma before the first shadow. The integrals J(a_i, b_i) of the lit
-segments are all positive: their sum keeps the digits of its terms. `sum=segments` adds these, `sum=gamma` the
-differences, and order=none and order=paper add Gamma plane by plane; all are compared with the quadrature truth, whose
-lit intervals are those of exact geometry.
+The airlight of a ray that crosses shadow planes is sum_i Gamma(b_i) - Gamma(a_i). If each Gamma has a relative rounding
+error eps, the sum has an error of about eps sum_i Gamma. That is many times the sum itself where slats let little light
+through, or where a strong light close to the camera makes Gamma large before the first shadow. The integrals J(a_i,
+b_i) of the lit segments are positive, so their sum keeps the digits of its terms. `sum=segments` adds these integrals,
+`sum=gamma` adds the differences, and `order=none` and `order=paper` add Gamma plane by plane. All are compared with the
+quadrature truth, whose lit intervals come from exact geometry.
 """
 
 from collections.abc import Callable
@@ -28,14 +28,14 @@ from validation.scenes.solids import box
 Progress = Callable[[int, int, str], None]
 
 SIZE = (64, 48)  #: of the images [pixels]
-WITHIN = 1e-4  #: of the pixel's true value: what the default keeps to
+WITHIN = 1e-4  #: largest error of `sum=segments`, relative to the true value of the pixel
 SUMS = ("segments", "gamma")
 PRECISIONS = ("single", "double")
 
 
 @dataclass(frozen=True)
 class PlaneStability:
-    """The errors of an image of one hard case."""
+    """The errors of one image of a hard case."""
 
     case: str
     sum: str  #: 'segments', 'gamma', or 'planes': float32 against float64 of Gamma plane by plane
@@ -44,13 +44,13 @@ class PlaneStability:
     median: float  #: of |error| / true value
     p99: float
     max: float
-    beyond: int  #: values of pixels and channels that miss the truth by more than `WITHIN`
-    negative: int  #: below -1e-5 of the mean
+    beyond: int  #: number of values (pixels and channels) that miss the truth by more than `WITHIN`
+    negative: int  #: number of values below -1e-5 of the mean
     nonfinite: int
 
 
 def hard_cases() -> dict[str, Callable[[], dict[str, Any]]]:
-    """Return the scenes by name, as functions that return what `mi.load_dict` takes."""
+    """Return the scenes by name, as functions that return a dictionary for `mi.load_dict`."""
     return {
         "deep stack": lambda: _slats(0.37, lamp=(0.2, 1.61, 1.07), power=17.0),
         "lantern close by": _lantern,
@@ -67,9 +67,9 @@ def plane_stability(*, size: tuple[int, int] = SIZE, progress: Progress | None =
     size
         Of the images [pixels].
     progress
-        Called with (done, total, what) before every case.
+        Callback with the number done, the total and a description, before every case, or None.
     """
-    found = []
+    results = []
     cases = hard_cases()
     for number, (name, build) in enumerate(cases.items()):
         if progress is not None:
@@ -82,20 +82,24 @@ def plane_stability(*, size: tuple[int, int] = SIZE, progress: Progress | None =
         for precision in PRECISIONS:
             for terms in SUMS:
                 image = _airlight(scene, precision, sum=terms)
-                found.append(_compared((name, terms, precision), image, truth, scale=truth))
+                results.append(_compared((name, terms, precision), image, truth, scale=truth))
         single, double = (_airlight(scene, precision, order="none") for precision in PRECISIONS)
-        found.append(_compared((name, "planes", "single"), single, double, scale=truth))
-    return found
+        results.append(_compared((name, "planes", "single"), single, double, scale=truth))
+    return results
 
 
-def broken(found: list[PlaneStability]) -> list[str]:
-    """Return in words what the default, sum=segments, does not keep."""
+def broken(results: list[PlaneStability]) -> list[str]:
+    """Return a sentence for each limit that the default, `sum=segments`, does not keep."""
     words = []
-    for one in found:
-        if one.sum != "segments":
+    for result in results:
+        if result.sum != "segments":
             continue
-        limits = {f"values beyond {WITHIN:g}": one.beyond, "negative": one.negative, "NaN or infinite": one.nonfinite}
-        words += [f"{one.case}, {one.precision}: {count} {what}" for what, count in limits.items() if count]
+        counts = {
+            f"values beyond {WITHIN:g}": result.beyond,
+            "negative": result.negative,
+            "NaN or infinite": result.nonfinite,
+        }
+        words += [f"{result.case}, {result.precision}: {count} {what}" for what, count in counts.items() if count]
     return words
 
 
@@ -105,7 +109,7 @@ def _airlight(scene, precision: str, **parameters):
 
 
 def _compared(what: tuple[str, str, str], image, expected, *, scale) -> PlaneStability:
-    """Compare an image with another in units of the true values."""
+    """Return the errors of an image against another, relative to the true values."""
     finite = np.isfinite(image)
     mean = scale.mean()
     error = (np.abs(image - expected) / np.maximum(scale, FLOOR * mean))[finite]
@@ -122,7 +126,7 @@ def _compared(what: tuple[str, str, str], image, expected, *, scale) -> PlaneSta
 
 
 def _lantern() -> dict[str, Any]:
-    """Return a lantern of nine blades with narrow gaps, a metre from the camera: thin beams of a strong light."""
+    """Return a lantern of nine blades with narrow gaps a metre from the camera: thin beams of a strong light."""
     centre = np.array([0.31, -3.07, 0.79])
     parts = [placed(box((0.41, 0.37, 0.013)), (centre + np.array([0, 0, z])).tolist()) for z in (-0.23, 0.23)]
     for number in range(9):
@@ -133,7 +137,7 @@ def _lantern() -> dict[str, Any]:
 
 
 def _slats(sigma_t: float, *, lamp: tuple[float, float, float], power: float) -> dict[str, Any]:
-    """Return forty-one slats one behind the other, upright and across by turns, in fog."""
+    """Return forty-one slats in fog, one behind the other, alternately upright and horizontal."""
     slats = []
     for number in range(41):
         upright = number % 2

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Results of a study on disk, so that what did not change is not computed again.
+"""Results of a study on disk, so that a report computes only what changed.
 
-A result is a piece of data (what JSON holds) and files (bytes by name), as they stand in a report. It is found by its
-*identity*, what a user would call the same measurement: the kind, the scene's name, the configuration, the effort, the
-machine. It counts as long as its *fingerprint* is the same: the content of the scene, the versions of Mitsuba, Dr.Jit
-and NumPy, and the bytes of the source code that computes it. So a change of the code replaces what it made before and
-does not pile up beside it. Files are those of `reference.storage.cache`: written whole or not at all, with a digest of
-their own content, and one that is damaged counts as none.
+A result is data that JSON can hold, and files (bytes by name), as in a report. Its *identity* is what a user would call
+the same measurement: the kind, the scene's name, the configuration, the effort, the machine. Its *fingerprint* covers
+what the numbers depend on: the content of the scene, the versions of Mitsuba, Dr.Jit and NumPy, and the bytes of the
+source code that computes it. A result is valid while its fingerprint is the same. A result with the same identity and
+another fingerprint replaces the old one, so changes of the code do not fill the disk. `reference.storage.cache` stores
+the results: it writes each file whole or not at all, with a digest, and ignores damaged files.
 """
 
 import hashlib
@@ -22,14 +22,14 @@ import numpy as np
 from reference.storage.cache import cache_folder, load_arrays, peek_array, store_arrays, sweep
 from reference.storage.cache_size import make_room
 
-#: Raise this when the meaning of what is kept changes, but not its source.
+#: Raise this number when kept results change their meaning without a change of the source code.
 GENERATION = 1
 
-_FOLDER = "report"  # in the folder of the cache
+_FOLDER = "report"  # within the folder of the cache
 _ROOT = Path(__file__).resolve().parents[2]
 _SIDES = ("analytic", "realtime", "reference", "validation")
 _PACKAGES = ("mitsuba", "drjit", "numpy", "scipy")
-_FILE = "file-"  # before the name of a file among the arrays
+_FILE = "file-"  # prefix of the names of arrays that hold a file
 
 Computed = tuple[dict[str, Any], Mapping[str, bytes]]  # data and files
 
@@ -38,9 +38,9 @@ Computed = tuple[dict[str, Any], Mapping[str, bytes]]  # data and files
 class ResultCache:
     """What all results of one run have in common."""
 
-    fingerprint: Mapping[str, str]  #: of source and versions
-    machine: Mapping[str, str]  #: processor, threads, variant and compiler: times are those of a machine
-    fresh: bool = False  #: whether to compute everything again
+    fingerprint: Mapping[str, str]  #: of the source code and the versions
+    machine: Mapping[str, str]  #: processor, threads, variant and compiler, on which times depend
+    fresh: bool = False  #: whether to compute every result again
 
 
 @dataclass(frozen=True)
@@ -59,8 +59,8 @@ class CachedResult:
 
     data: dict[str, Any]
     files: Mapping[str, bytes] = field(repr=False)
-    measured: str  #: when it was computed
-    seconds: float  #: that computing took
+    measured: str  #: date and time of the computation
+    seconds: float  #: that the computation took
     cached: bool
 
 
@@ -70,11 +70,11 @@ def result_cache(machine: Mapping[str, str], *, more: Sequence[Path] = (), fresh
     Parameters
     ----------
     machine
-        What times depend on: processor, threads, variant, compiler.
+        Processor, threads, variant and compiler, on which times depend.
     more
-        Files of source code, besides the four sides, on which results depend.
+        Further files of source code on which results depend, besides `own_sources`.
     fresh
-        Whether to compute everything again.
+        Whether to compute every result again.
     """
     from importlib.metadata import version
 
@@ -84,12 +84,12 @@ def result_cache(machine: Mapping[str, str], *, more: Sequence[Path] = (), fresh
 
 
 def own_sources() -> list[Path]:
-    """Return the files of the code that computes: truth, methods and studies."""
+    """Return the source files of truth, methods and studies, which compute the results."""
     return [path for side in _SIDES for path in (_ROOT / side).rglob("*.py")]
 
 
 def source_digest(paths: Sequence[Path]) -> str:
-    """Return a digest of the bytes of some files; where they lie does not matter, their names do."""
+    """Return a digest of files: of their bytes, their names and the names of their folders, not of their full paths."""
     digest = hashlib.sha256()
     for path in sorted(paths, key=lambda path: (path.parent.name, path.name, str(path))):
         content = path.read_bytes()
@@ -107,11 +107,11 @@ def cache_entry(
     cache
         Of the run.
     kind
-        What it is, one word.
+        One word, such as 'method' or 'truth'.
     identity
-        What makes it another measurement: the scene's name, the configuration, what the effort asks of it.
+        What tells this measurement from others: the scene's name, the configuration, the effort.
     fingerprint
-        What else its numbers depend on: the content of the scene.
+        What else the numbers depend on, such as the content of the scene.
     """
     key = f"{_FOLDER}/{kind}-{_digest({**identity, 'machine': cache.machine})}"
     whole = _digest({**cache.fingerprint, **(fingerprint or {})})
@@ -173,12 +173,12 @@ def expected_seconds(entry: CacheEntry) -> float | None:
 
 
 def now() -> str:
-    """Return date and time with the zone."""
+    """Return date and time as YYYY-MM-DD HH:MM:SS with the time zone."""
     return time.strftime("%Y-%m-%d %H:%M:%S %z")
 
 
 def sweep_results() -> None:
-    """Remove what a killed run left half-written."""
+    """Remove files that a killed run left unfinished."""
     sweep(cache_folder() / _FOLDER)
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The study of one scene: its truth, how far that can be trusted, and every configuration measured against it.
+"""The study of one scene: its truth, the checks of the truth, and the error and cost of every configuration.
 
-Each part is a function of its own, so that a report can keep what it computed before and ask for the rest.
+Each part is a function of its own, so that a report can reuse earlier results and compute only the rest.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -11,7 +11,7 @@ from functools import cached_property
 from typing import Any
 
 from realtime.scene.read_scene import Scene, read_scene
-from reference.quadrature.image import TruthImage
+from reference.quadrature.ray_values import TruthImage
 from reference.storage.scene_digest import scene_digest
 from validation.configurations.methods import QUICK, Configuration
 from validation.estimates.agreement import Agreement, agreements
@@ -24,8 +24,8 @@ from validation.scenes.registry import SCENES
 
 Progress = Callable[[float, str], None]
 
-_MULTIPLE = (64, 48)  # pixels of the image whose multiple scattering is measured: one share, of the whole image
-_PROBE = (64, 48)  # pixels of the frame that says whether one at full size would take too long
+_MULTIPLE = (64, 48)  # size of the image whose share of multiple scattering is measured [pixels]
+_PROBE = (64, 48)  # size of the frame from which the time of a full-size frame is estimated [pixels]
 
 
 @dataclass(frozen=True)
@@ -36,20 +36,20 @@ class Effort:
     image: tuple[int, int]  #: width and height of the images that are compared and shown [pixels]
     timed: tuple[int, int]  #: width and height of the frames that are timed [pixels]
     checked: tuple[int, int]  #: width and height of the comparisons of the truth [pixels]
-    margins: Mapping[str, float]  #: by estimator, of its relative bias
-    samples: Mapping[str, int]  #: by estimator, a pixel in each batch of these comparisons
+    margins: Mapping[str, float]  #: by estimator, the margin of its relative bias
+    samples: Mapping[str, int]  #: by estimator, samples per pixel in each batch of these comparisons
     seconds: float  #: spent on each timing
-    scenes: tuple[str, ...] = ()  #: studied unless others are named
-    batches: int = 2048  #: of these comparisons at most
-    multiple: tuple[int, int] = (8, 4)  #: batches, and samples a pixel in each, for the share of multiple scattering
-    patience: float = 10.0  #: seconds after which an estimator that has not decided is stopped
-    slow: float = 0.15  #: where the airlight takes longer, whole frames are timed stage by stage [s]
-    limit: float = 20.0  #: a frame that would take longer is not measured, and the report says so [s]
-    flip: str = "none"  #: of which configurations HDR-FLIP is computed: 'none', one of each 'kinds' (`QUICK`), 'all'
-    mutations: bool = False  #: count how many faults of the physics the checks of the truth find
-    rays: int = 0  #: generated rays on which kernels are tried, besides the certified ones; 0 leaves this out
-    papers: tuple[str, ...] = ()  #: whose tables are measured again: 'biri', 'billeter'
-    paper_kernels: tuple[str, ...] = ("exact",)  #: with these kernels
+    scenes: tuple[str, ...] = ()  #: scenes that are studied by default
+    batches: int = 2048  #: largest number of batches in these comparisons
+    multiple: tuple[int, int] = (8, 4)  #: batches, and samples per pixel in each, for the share of multiple scattering
+    patience: float | None = None  #: an estimator that has not decided after this time is stopped [s]; None: never
+    slow: float = 0.15  #: if the airlight takes longer, whole frames are timed stage by stage [s]
+    limit: float = 20.0  #: frames that would take longer are not measured, and the report says so [s]
+    flip: str = "none"  #: which configurations get HDR-FLIP: 'none', 'kinds' (those of `QUICK`) or 'all'
+    mutations: bool = False  #: whether to count the mutations that the checks of the truth find
+    rays: int = 0  #: number of generated rays for the stability of kernels; 0 leaves it out
+    papers: tuple[str, ...] = ()  #: papers whose tables are measured again: 'biri', 'billeter'
+    paper_kernels: tuple[str, ...] = ("exact",)  #: kernels of these tables
 
     def at(self, size: tuple[int, int] | None) -> "Effort":
         """Return the effort with images and timed frames of another size [pixels]; itself for None."""
@@ -60,13 +60,13 @@ def _by_estimator(single_scatter: Any, volpath: Any) -> Mapping[str, Any]:
     return {"single-scatter": single_scatter, "volpath": volpath}
 
 
-# What `report --quick` looks at unless told otherwise: scenes that take seconds; and what the default leaves out: of
-# `tangle` a frame takes up to minutes, in `clutter` the checks of the truth take long and show what `hall` shows.
+# `report --quick` studies scenes that take seconds. The default effort leaves out `tangle`, of which a frame takes up
+# to minutes, and `clutter`, in which the checks of the truth take long and show what `hall` shows.
 _QUICK = ("open-fog", "sphere-spot", "two-pens")
 _HEAVY = ("clutter", "tangle")
 
-# Samples: a batch of few takes as long as it needs to be launched, and those of `single-scatter` are spread evenly over
-# the ray, so that four times as many are worth more than four times.
+# Few samples per batch would be a waste: then launches take all the time, and `single-scatter`, which stratifies its
+# samples over the ray, gains more than a factor of four from four times as many.
 EFFORTS: dict[str, Effort] = {
     effort.name: effort
     for effort in (
@@ -121,29 +121,29 @@ EFFORTS: dict[str, Effort] = {
 
 @dataclass(frozen=True)
 class SceneStudy:
-    """One scene with what is asked of it; what costs time is done when it is first asked for."""
+    """One scene and the effort of its study; properties that take time are computed on first use."""
 
     loaded: LoadedScene  #: at the size of the images
     effort: Effort
 
     @cached_property
     def digest(self) -> str:
-        """Of the content of the scene."""
+        """Digest of the content of the scene."""
         return scene_digest(self.loaded.scene)
 
     @cached_property
     def scene(self) -> Scene:
-        """The scene for the methods."""
+        """The scene as methods read it."""
         return read_scene(self.loaded.scene)
 
     @cached_property
     def timed(self) -> Scene | None:
-        """The scene at the size of the frames that are timed; None where that is the size of the images."""
+        """The scene at the size of the timed frames; None if that is the size of the images."""
         return None if self.effort.timed == self.effort.image else read_scene(self.at(self.effort.timed).scene)
 
     @cached_property
     def probe(self) -> Scene:
-        """The scene at a small size: what takes long there takes too long at the full one."""
+        """The scene at a small size, for an estimate of the time of a full-size frame."""
         return read_scene(self.at(_PROBE).scene)
 
     @cached_property
@@ -153,7 +153,7 @@ class SceneStudy:
 
     @property
     def name(self) -> str:
-        """The name of the scene: a built-in one, or the stem of its file."""
+        """The name of a built-in scene, or the stem of the user's file."""
         return self.loaded.name
 
     def at(self, size: tuple[int, int]) -> LoadedScene:
@@ -167,7 +167,7 @@ def open_study(name_or_path: str, effort: Effort) -> SceneStudy:
 
 
 def check_truth(study: SceneStudy, *, progress: Progress | None = None) -> dict[str, Agreement]:
-    """Compare the truth with Monte Carlo estimators, at the effort's size, margins and patience."""
+    """Compare the truth with the Monte Carlo estimators, with the size, margins and patience of the effort."""
     effort = study.effort
     return agreements(
         study.at(effort.checked).scene,
@@ -180,13 +180,13 @@ def check_truth(study: SceneStudy, *, progress: Progress | None = None) -> dict[
 
 
 def study_multiple(study: SceneStudy) -> MultipleScattering:
-    """Measure what single scattering leaves out of the image."""
+    """Measure the share of light that single scattering leaves out."""
     batches, samples = study.effort.multiple
     return multiple_scattering_share(study.at(_MULTIPLE).scene, batches=batches, samples=samples)
 
 
 def study_configuration(study: SceneStudy, chosen: Configuration) -> Measurement:
-    """Measure a configuration against the truth, all but HDR-FLIP: see `with_flips`."""
+    """Measure a configuration against the truth, without HDR-FLIP, which `with_flips` adds."""
     effort = study.effort
     return measure(
         study.scene,
@@ -201,13 +201,13 @@ def study_configuration(study: SceneStudy, chosen: Configuration) -> Measurement
 
 
 def with_flips(study: SceneStudy, measured: Sequence[Measurement], *, workers: int) -> list[Measurement]:
-    """Return measurements with their HDR-FLIP, where the effort asks for it.
+    """Return measurements with their HDR-FLIP, if the effort asks for it.
 
-    FLIP runs on one processor, in a process of its own: several at once take no longer than one. They must not run
+    FLIP runs on one processor in a process of its own, so `workers` of them take no longer than one. They must not run
     while anything is timed.
     """
 
-    def one(measurement: Measurement) -> Measurement:
+    def flipped(measurement: Measurement) -> Measurement:
         frame = measurement.frame
         if frame is None or not wants_flip(study.effort, measurement.configuration):
             return measurement
@@ -215,9 +215,9 @@ def with_flips(study: SceneStudy, measured: Sequence[Measurement], *, workers: i
         return replace(measurement, flip=flip_hdr(light, frame.airlight + frame.surface))
 
     with ThreadPoolExecutor(workers) as pool:
-        return list(pool.map(one, measured))
+        return list(pool.map(flipped, measured))
 
 
 def wants_flip(effort: Effort, chosen: Configuration) -> bool:
-    """Return whether an effort asks for HDR-FLIP of a configuration."""
+    """Return whether an effort asks for the HDR-FLIP of a configuration."""
     return effort.flip == "all" or (effort.flip == "kinds" and (chosen in QUICK or chosen.own))

@@ -18,12 +18,12 @@ from analytic.cases import Cases
 from analytic.errors import InputError
 from realtime.errors import InputError as RealtimeInputError
 from realtime.frame.recorded import Frozen
+from realtime.kernels.preparation import prepare_kernel, with_tables
 from realtime.kernels.registry import KERNELS
-from realtime.kernels.table import resident_tables
 from realtime.rays.ray_light import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium
-from realtime.scene.phase import Phase
+from realtime.scene.phase import named_phase
 from validation.configurations.kernel_names import find_kernel, sized, split_name
 from validation.configurations.timing import Timing, time_repeated
 from validation.kernels.errors import relative_error
@@ -248,7 +248,7 @@ def _frozen(function: Kernel, cases: Cases, rays: int | None = None) -> Callable
     """Return work that evaluates a kernel on rays that lie on the device, frozen after its first call."""
     part = slice(0, rays)
     name = cases.phase[0]
-    phase = Phase(
+    phase = named_phase(
         name,
         g=dr.opaque(mi.Float, float(cases.g[0])) if name == "hg" else None,
         values=mi.Float(np.asarray(TABLE)) if name == "tabulated" else None,
@@ -258,17 +258,17 @@ def _frozen(function: Kernel, cases: Cases, rays: int | None = None) -> Callable
     geometry = RayGeometry(mi.Float(cases.foot[part]), mi.Float(cases.height[part]), None, None)
     x0, x1 = mi.Float(cases.x0[part]), mi.Float(cases.x1[part])
     dr.eval(geometry.foot, geometry.height, x0, x1)
-    # Once outside: what a kernel uploads must be there before it is recorded.
-    dr.eval(function(geometry, x0, x1, medium, light))
-    resident = resident_tables()
+    tables = prepare_kernel(function, mi.Float)
+    # Once outside: what a kernel refuses must not be raised while it is recorded.
+    dr.eval(with_tables(function, tables)(geometry, x0, x1, medium, light))
 
-    def evaluate(geometry, x0, x1, medium, light):
-        return function(geometry, x0, x1, medium, light)
+    def evaluate(geometry, x0, x1, medium, light, tables):
+        return with_tables(function, tables)(geometry, x0, x1, medium, light)
 
-    replay = Frozen(evaluate, state_fn=lambda *_, **__: resident)
+    replay = Frozen(evaluate)
 
     def work():
-        J = replay(geometry, x0, x1, medium, light)
+        J = replay(geometry, x0, x1, medium, light, tables)
         dr.eval(J)
         return J
 

@@ -16,7 +16,7 @@ from realtime.numerics.array_types import array_types
 from realtime.rays.ray_light import RayGeometry, ray_geometry
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium
-from realtime.scene.phase import Phase
+from realtime.scene.phase import named_phase
 
 Array = NDArray[np.float64]
 Kernel = Callable[..., Any]
@@ -86,7 +86,7 @@ def evaluate_rows(
     """
     types = array_types(precision)
     name = cases.phase[rows[0]]
-    phase = Phase(
+    phase = named_phase(
         name,
         g=types.scalar(cases.g[rows]) if name == "hg" else None,
         values=types.scalar(np.asarray(table)) if name == "tabulated" else None,

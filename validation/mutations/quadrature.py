@@ -180,7 +180,7 @@ _LIGHTS = (
     _quadrature(
         "first-light-only",
         "all lights but the first ignored",
-        "reference.quadrature.image",
+        "reference.quadrature.ray_values",
         "airlight += found.radiance",
         "airlight += found.radiance * (number == 0)",
         "the built-in scenes have one light each",
@@ -249,7 +249,7 @@ _SHADOWS = (
     _quadrature(
         "through-surfaces",
         "rays not ended at the visible surface",
-        "reference.quadrature.image",
+        "reference.quadrature.ray_values",
         "theta1 = np.where(ended, ",
         "theta1 = np.where(ended & False, ",
     ),

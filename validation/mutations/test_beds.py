@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.monte_carlo.batches import Batches, merged
-from reference.quadrature.image import TruthImage
+from reference.quadrature.ray_values import TruthImage
 from reference.scene.read import TruthScene, read_truth
 from reference.scene.shadow_epsilon import measure_shadow_epsilon
 from validation.estimates.agreement import batch_estimate, layer_masks, width_to_reach

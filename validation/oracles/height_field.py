@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the slow twin of light volumes is made of: the height field of a shadow map in float64, and rays over a face.
+"""What the oracle of light volumes is made of: the height field of a shadow map in float64, and rays over a face.
 
 See `validation.oracles.light_volume` for the derivation.
 """
@@ -62,8 +62,8 @@ def height_field(shadow_map: ShadowMap, walls: NDArray[np.uint32] | None = None)
 
 def _frames(shadow_map: ShadowMap) -> Array:
     """Return across, up and axis of every face as rows, (faces, 3, 3)."""
-    if shadow_map.frame:
-        return np.array([np.array(one, dtype=np.float64).reshape(3) for one in shadow_map.frame])[None]
+    if basis := shadow_map.projection.basis:
+        return np.array([np.array(one, dtype=np.float64).reshape(3) for one in basis])[None]
     frames = np.zeros((6, 3, 3))
     for face in range(6):
         axis = face // 2

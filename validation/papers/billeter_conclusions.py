@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What Billeter, Sintorn, Assarsson 2010 conclude from their figures, and whether it holds for ours.
+"""The conclusions of Billeter, Sintorn, Assarsson 2010, and whether they hold for our measurements.
 
-Each sentence is made of what was measured, none is known before.
+Every sentence is computed from the rows that were measured.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -10,30 +10,34 @@ from validation.configurations.timing import Timing
 from validation.papers.billeter_images import TILES, FigureRow
 from validation.papers.billeter_tessellation import PublishedTable, TableRow
 
-#: Rates closer than this count as equal.
+#: Rates whose ratio is below this count as equal.
 EQUAL = 1.03
 
 
 def pays_from(rates: Mapping[int, tuple[float, float]]) -> int | None:
-    """Return the smallest map from which on adaptive tessellation is faster at every size; None if at the last it is
-    not.
+    """Return the smallest map [texels] from which on adaptive tessellation is faster at every larger size.
 
     Parameters
     ----------
     rates
-        By size of the map, frames a second of static and adaptive.
+        By size of the map [texels], frames a second with static and with adaptive tessellation.
+
+    Returns
+    -------
+    int or None
+        None if adaptive tessellation is not faster at the largest map.
     """
-    found = None
+    smallest = None
     for size in sorted(rates, reverse=True):
         static, adaptive = rates[size]
         if adaptive <= EQUAL * static:
             break
-        found = size
-    return found
+        smallest = size
+    return smallest
 
 
 def conclusions(figures: Sequence[FigureRow], table: Sequence[TableRow]) -> list[str]:
-    """Return the sentences that the rows allow."""
+    """Return sentences on the paper's conclusions, as far as the rows allow them."""
     return [
         *_adaptive(table),
         *_walk(table),
@@ -48,11 +52,11 @@ def _adaptive(table: Sequence[TableRow]) -> Iterator[str]:
     for published in _views(table):
         rows = {(row.map, row.evaluation): _rate(row.light_moved) for row in table if row.published == published}
         pairs = {size: (rows.get((size, "static")), rows.get((size, "adaptive"))) for size, _ in rows}
-        known = {size: (one, other) for size, (one, other) in pairs.items() if one and other}
+        known = {size: (static, adaptive) for size, (static, adaptive) in pairs.items() if static and adaptive}
         if not known:
             yield f"{published.scene}: adaptive tessellation could not be compared with static at any map."
             continue
-        ratios = ", ".join(f"{other / one:.2f} at {size}" for size, (one, other) in sorted(known.items()))
+        ratios = ", ".join(f"{adaptive / static:.2f} at {size}" for size, (static, adaptive) in sorted(known.items()))
         shared = {size: published.fps[size] for size in known if size in published.fps}
         words = f"{published.scene}: adaptive tessellation is faster than static {_from(pays_from(known))}"
         words += f" (its frames a second over static's: {ratios})"
@@ -66,16 +70,16 @@ def _adaptive(table: Sequence[TableRow]) -> Iterator[str]:
 
 def _walk(table: Sequence[TableRow]) -> Iterator[str]:
     for published in _views(table):
-        found = []
+        ratios = []
         for size in dict.fromkeys(row.map for row in table if row.published == published):
             rates = {
                 row.evaluation: _rate(row.light_moved) for row in table if (row.published, row.map) == (published, size)
             }
             meshes = [rate for name in ("static", "adaptive") if (rate := rates.get(name))]
             if meshes and (walk := rates.get("walk")):
-                found.append(f"{walk / max(meshes):.2f} at {size}")
-        if found:
-            yield f"{published.scene}: frames a second of walk over those of the faster mesh: {', '.join(found)}."
+                ratios.append(f"{walk / max(meshes):.2f} at {size}")
+        if ratios:
+            yield f"{published.scene}: frames a second of walk over those of the faster mesh: {', '.join(ratios)}."
 
 
 def _marching(figures: Sequence[FigureRow]) -> Iterator[str]:
@@ -134,9 +138,9 @@ def _walls(figures: Sequence[FigureRow]) -> Iterator[str]:
         if walls is not None and row.light_moved is not None and row.error is not None:
             measured = row.light_moved.median_ms, row.error.relative_rmse
             pairs.setdefault((row.entry.scene, row.entry.map), {})[str(walls)] = measured
-    for (scene, texels), found in pairs.items():
-        if len(found) == 2:
-            (slanted_ms, slanted), (upright_ms, upright) = found["slanted"], found["upright"]
+    for (scene, texels), by_walls in pairs.items():
+        if len(by_walls) == 2:
+            (slanted_ms, slanted), (upright_ms, upright) = by_walls["slanted"], by_walls["upright"]
             yield (
                 f"{scene}, map {texels}: with upright walls a frame takes {upright_ms / slanted_ms:.2f} times as long "
                 f"as with slanted ones, and has {_ratio(upright, slanted):.2g} of their error against the truth."
@@ -158,15 +162,15 @@ def _map_sizes(figures: Sequence[FigureRow]) -> Iterator[str]:
 
 
 def _views(table: Sequence[TableRow]) -> list[PublishedTable]:
-    found: list[PublishedTable] = []
+    views: list[PublishedTable] = []
     for row in table:
-        if row.published not in found:
-            found.append(row.published)
-    return found
+        if row.published not in views:
+            views.append(row.published)
+    return views
 
 
 def _fastest(rows: Sequence[FigureRow]) -> FigureRow | None:
-    """Return the row of light volumes that was measured and is the fastest."""
+    """Return the fastest row of light volumes that was measured, or None."""
     timed = [row for row in rows if row.entry.method == "light-volumes" and row.light_moved is not None]
     return min(timed, key=lambda row: row.light_moved.median_ms if row.light_moved else 0.0) if timed else None
 
@@ -175,8 +179,8 @@ def _rate(timing: Timing | None) -> float | None:
     return None if timing is None else 1000 / timing.median_ms
 
 
-def _ratio(one: float, other: float) -> float:
-    return one / other if other > 0 else float("nan")
+def _ratio(numerator: float, denominator: float) -> float:
+    return numerator / denominator if denominator > 0 else float("nan")
 
 
 def _from(size: int | None) -> str:

@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Figures 6 and 7 of Billeter, Sintorn, Assarsson 2010 again: frames a second beside the published ones, and the error.
+"""Figures 6 and 7 of Billeter, Sintorn, Assarsson 2010 measured again: frames a second, and the error.
 
-Fig. 6 is a simple scene with an omni light at three sizes of the shadow map, Fig. 7 a hall of columns by marching and
-by the light volume. Neither published scene is at hand: `omni-box` and `colonnade` stand for them. The paper gives no
-size of the image for Fig. 6; that of Fig. 7 is taken for both. Its hall has one map, ours a lamp that shines all round,
-with six.
+Fig. 6 shows a simple scene with an omni light at three sizes of the shadow map. Fig. 7 shows a hall of columns, by
+marching and by the light volume. Neither scene is available: `omni-box` and `colonnade` stand for them. The paper gives
+no image size for Fig. 6, so both have that of Fig. 7. The published hall has one map; ours has a lamp that shines in
+all directions, so its map has six faces.
 
-Every frame is judged twice, at one pixel in `stride` along both axes: against the truth, and against what its own
-shadow map stands for, the height field met in float64 (`validation.oracles.light_volume`). What a marcher misses of
-the second is its steps and, as it looks texels up without interpolation, the steps of the map.
+Every frame is compared at one pixel in `stride` along both axes, with two images: with the truth, and with the volume
+that its own shadow map bounds, the height field met by the same rays in float64 (`validation.oracles.light_volume`).
+The second error of a marcher comes from its steps and from the steps of the map, which it looks up without
+interpolation.
 """
 
 import time
@@ -36,41 +37,41 @@ from validation.configurations.timing import (
     time_in_turns,
 )
 from validation.metrics.errors import Metrics, error_metrics
-from validation.oracles.light_volume import traced_walls, twin_airlight
+from validation.oracles.light_volume import oracle_airlight, traced_walls
 from validation.scenes.loading import load_scene
 
 Array = NDArray[np.float64]
 
 SIZE = (1024, 1024)  #: of the published images [pixels]
-LIMIT = 30.0  #: a frame that takes longer is not measured [s]
+LIMIT = 30.0  #: frames that take longer are not measured [s]
 
 
 @dataclass(frozen=True)
 class FigureEntry:
-    """One image of a figure, and what stands for it here."""
+    """One image of a figure, and the configuration that stands for it here."""
 
     where: str
     scene: str
     map: int  #: [texels]
     method: str
     parameters: tuple[tuple[str, float | str], ...] = ()  #: without the map
-    fps: float | None = None  #: published; None for a peer that the paper does not have
+    fps: float | None = None  #: published frames a second; None if the paper has no such image
 
     def configuration(self, kernel: str) -> Configuration:
-        """Return the configuration to measure."""
+        """Return the configuration to measure with a kernel."""
         values = dict(self.parameters) | {"map": self.map}
         return configuration(self.method, None if self.method == "ray-march" else kernel, values)
 
     @property
     def upright(self) -> bool:
-        """Whether the walls of its light volume stand upright."""
+        """Whether its light volume has upright walls."""
         return dict(self.parameters).get("walls") == "upright"
 
 
-TILES = "tiles"  #: where rows stand whose airlight is interpolated between the corners of tiles
+TILES = "tiles"  #: `where` of rows whose airlight is interpolated between the corners of tiles
 _TOLERANCE = ("tolerance", TOLERANCE)
 _MESH: tuple[tuple[str, float | str], ...] = (("evaluation", "mesh"),)
-#: The height field of the mesh without triangles, and with upright walls where the map jumps.
+#: The height field of the mesh, walked without triangles; and the same with upright walls where the map jumps.
 _WALK, _UPRIGHT = ((("evaluation", "walk"), ("walls", walls)) for walls in ("slanted", "upright"))
 
 
@@ -88,7 +89,7 @@ FIGURES: tuple[FigureEntry, ...] = (
     FigureEntry("Fig. 7b", "colonnade", 512, "ray-march", _march(400), 10),
     *(FigureEntry("Fig. 7c", "colonnade", 512, "light-volumes", how, 96) for how in (_MESH, _WALK, _UPRIGHT)),
     FigureEntry("peer", "colonnade", 512, "min-max"),
-    # Between the corners of tiles, which the paper has not.
+    # Interpolation between the corners of tiles, which the paper does not have.
     FigureEntry(TILES, "colonnade", 512, "light-volumes", (*_WALK, _TOLERANCE)),
     FigureEntry(TILES, "colonnade", 512, "light-volumes", (*_UPRIGHT, _TOLERANCE)),
     FigureEntry(TILES, "colonnade", 512, "ray-march", (*_march(400), _TOLERANCE)),
@@ -97,7 +98,7 @@ FIGURES: tuple[FigureEntry, ...] = (
 
 @dataclass(frozen=True)
 class FigureRow:
-    """One image, measured beside what was published; without times and errors where `missing` says why."""
+    """One image, measured; if it could not be measured, `missing` says why and all times and errors are None."""
 
     entry: FigureEntry
     size: tuple[int, int]  #: [pixels]
@@ -110,13 +111,13 @@ class FigureRow:
         None  #: a frame after only medium or colours changed: map, tiles, camera rays are kept
     )
     error: Metrics | None = None  #: of the airlight against the truth
-    map_error: Metrics | None = None  #: of the airlight against what the shadow map stands for
+    map_error: Metrics | None = None  #: of the airlight against the volume that the shadow map bounds
     missing: str | None = None
 
 
 @dataclass(frozen=True)
 class _Stage:
-    """A scene at the size of the frame, and its truth at some pixels of it."""
+    """A scene at the size of the frame, and its truth at the compared pixels."""
 
     scene: Scene
     truth: TruthScene  #: of the pixels that are compared
@@ -151,7 +152,7 @@ def figure_rows(
     limit
         A frame that takes longer is not measured [s].
     progress
-        Told the share done and what comes next.
+        Callback with the share done and a description of the next step, or None.
     """
     rows: list[FigureRow] = []
     stage: _Stage | None = None
@@ -170,19 +171,19 @@ def figure_rows(
 
 def _stage(name: str, size: tuple[int, int]) -> _Stage:
     loaded = load_scene(name, size).scene
-    # An odd step: over tiles of 4 x 4 pixels every place in a tile has its turn.
+    # An odd stride: then every position in tiles of 4 x 4 pixels is compared somewhere.
     stride = 2 * (max(size) // 256) + 1
     truth = sampled_truth(read_truth(loaded), stride)
     return _Stage(read_scene(loaded), truth, stride, quadrature_image(truth).airlight)
 
 
 def sampled(image: Array, stride: int) -> Array:
-    """Return one pixel in `stride` along both axes of an image, from the middle of the first ones on."""
+    """Return one pixel in `stride` along both axes of an image, beginning at the middle of the first block."""
     return image[stride // 2 :: stride, stride // 2 :: stride]
 
 
 def sampled_truth(truth: TruthScene, stride: int) -> TruthScene:
-    """Return the scene with only the rays of the pixels that `sampled` takes."""
+    """Return the scene with the rays of only those pixels that `sampled` takes."""
     direction = sampled(truth.direction.reshape(truth.height, truth.width, 3), stride)
     height, width, _ = direction.shape
     return replace(truth, width=width, height=height, direction=direction.reshape(-1, 3))
@@ -219,20 +220,20 @@ def _figure_row(
 
 
 def _twin(entry: FigureEntry, stage: _Stage, distance: Array) -> Array:
-    """Return what the shadow maps of an entry stand for."""
+    """Return the airlight of the volume that the shadow maps of an entry bound, in float64."""
     scene = stage.scene
     maps = [cast_shadow_map(scene.geometry, light, entry.map) for light in scene.lights]
     walls = traced_walls(scene, maps) if entry.upright else None
-    return twin_airlight(stage.truth, maps, distance=distance, walls=walls)
+    return oracle_airlight(stage.truth, maps, distance=distance, walls=walls)
 
 
 def frame_within(renderer: FrameRenderer, limit: float) -> Frame:
-    """Render a frame, or say that frames take too long to be timed.
+    """Render a frame, unless frames take too long for timing.
 
     Raises
     ------
     TimeoutError
-        If it took longer than `limit` [s], compiling included.
+        If the frame took longer than `limit` [s], compilation included.
     """
     start = time.perf_counter()
     frame = render_frame(renderer)
@@ -247,7 +248,7 @@ def time_rates(renderer: FrameRenderer, seconds: float) -> dict[str, Any]:
     kept = first_frame(renderer)
     works = {
         "light_moved": moved_light(renderer),
-        "static": lambda: run_stages(renderer, kept.prepared),
+        "static": lambda: run_stages(renderer, kept.state),
         "light_moved_camera_kept": moved_light_alone(renderer, kept),
         "colours_changed": changed_look(renderer, kept),
     }

@@ -1,17 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Table 1 of Billeter, Sintorn, Assarsson 2010 again: static and adaptive tessellation, and what their passes cost.
+"""Table 1 of Billeter, Sintorn, Assarsson 2010 measured again: static and adaptive tessellation, and their passes.
 
-The published views are the Sponza atrium and the mesh "Yeah Right", each with a light that has one map, the images
-probably those of Fig. 7, 1024 x 1024. Here the hall is `colonnade` with a spot in place of its lamp, which would have
-six maps; the irregular mesh is `tangle`. Figures that cannot be read in the copy of the paper at hand are left out.
+The published views are the Sponza atrium and the mesh "Yeah Right", each with a light that has one map, probably at the
+image size of Fig. 7, 1024 x 1024. Here the hall is `colonnade` with a spot in place of its lamp, which would have six
+maps; the irregular mesh is `tangle`. Figures that are illegible in our copy of the paper are left out.
 
-The passes, on the wall clock:
+The passes, in wall-clock time:
 
-- surface: camera rays and lit surface. shadow map: its casting.
+- surface: camera rays and lit surface;
+- shadow map: its rays;
 - laplacian, edge map, tessellate, vertices: those of
-`realtime.methods.light_volumes.published.mesh.tessellation_stages`.
-- prepare: all before the airlight, so the shadow map with the mesh or the height field that is made of it.
-- volume: the triangles against the pixels, and the signed sum; without triangles the airlight.
+  `realtime.methods.light_volumes.published.mesh.tessellation_stages`;
+- prepare: all before the airlight, that is the shadow map and the mesh or the height field;
+- volume: the rasterisation of the triangles and the signed sum; without triangles the airlight.
 
 Times of frames are those after the light moved, with everything rebuilt, as published; and beside them those of frames
 that keep what stood still.
@@ -27,7 +28,7 @@ import numpy as np
 
 from analytic.errors import InputError
 from realtime.errors import InputError as RealtimeError
-from realtime.frame.renderer import Frame, FrameRenderer, run_surface, run_tiles_and_airlight
+from realtime.frame.renderer import Frame, FrameRenderer, run_cast_and_shade, run_method
 from realtime.methods.light_volumes.published.mesh import tessellation_stages
 from realtime.scene.read_scene import Scene, read_scene
 from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map
@@ -39,7 +40,7 @@ from validation.scenes.colonnade import colonnade
 from validation.scenes.loading import load_scene, resize
 
 MAPS = (1024, 2048, 4096)  #: of the published table [texels]
-#: How the volume is evaluated: static and adaptive as published, the same without triangles, and with upright walls.
+#: Parameters by evaluation: static and adaptive as published, the walk without triangles, and with upright walls.
 EVALUATIONS: Mapping[str, Mapping[str, str]] = {
     "static": {"evaluation": "mesh", "tessellation": "static"},
     "adaptive": {"evaluation": "mesh", "tessellation": "adaptive"},
@@ -53,10 +54,10 @@ PASSES = ("surface", "shadow map", "laplacian", "edge map", "tessellate", "verti
 class PublishedTable:
     """One view of the table."""
 
-    scene: str  #: which stands for it here
+    scene: str  #: the built-in scene that stands for it here
     what: str
     fps: Mapping[int, tuple[float, float]]  #: by map, static and adaptive
-    passes: Mapping[tuple[int, str], Mapping[str, float]]  #: by map and tessellation, the passes that are legible [ms]
+    passes: Mapping[tuple[int, str], Mapping[str, float]]  #: by map and tessellation, the legible passes [ms]
 
 
 TABLE = (
@@ -84,7 +85,7 @@ TABLE = (
 
 @dataclass(frozen=True)
 class TableRow:
-    """A view at a size of the map with one evaluation; without times where `missing` says why."""
+    """A view at a size of the map with one evaluation; if it has no times, `missing` says why."""
 
     published: PublishedTable
     map: int  #: [texels]
@@ -102,7 +103,7 @@ class TableRow:
 
     @property
     def published_fps(self) -> float | None:
-        """Frames a second of the paper; None where it has none."""
+        """Published frames a second; None if the paper has none."""
         place = {"static": 0, "adaptive": 1}.get(self.evaluation)
         rates = self.published.fps.get(self.map)
         return None if place is None or rates is None else rates[place]
@@ -168,7 +169,7 @@ def table_scene(name: str, size: tuple[int, int]) -> Any:
 
 
 def _expected_missing(empty: TableRow, last: TableRow | None, limit: float) -> TableRow | None:
-    """Return a row that says why it is not begun, if the last size of the map says so."""
+    """Return a row without measurements and the reason, if the row of the last map predicts a time beyond the limit."""
     if last is None:
         return None
     if last.light_moved is None:
@@ -183,7 +184,7 @@ def _expected_missing(empty: TableRow, last: TableRow | None, limit: float) -> T
 def _measured(
     empty: TableRow, scene: Scene, frames: dict[str, Frame], *, kernel: str, seconds: float, limit: float
 ) -> TableRow:
-    """Measure a row; `frames` holds those of the same map by evaluation, and receives this one."""
+    """Measure a row; `frames` holds the frames of the same map by evaluation, and receives the new one."""
     values = dict(EVALUATIONS[empty.evaluation]) | {"map": empty.map}
     try:
         renderer = prepared(scene, configuration("light-volumes", kernel, values))
@@ -203,16 +204,16 @@ def _measured(
 
 
 def _passes(renderer: FrameRenderer, row: TableRow, seconds: float) -> tuple[dict[str, float], int]:
-    """Return what the passes cost [ms], and the triangles of all light volumes."""
+    """Return the times of the passes [ms], and the number of triangles of all light volumes."""
     scene = renderer.scene
     ready = renderer.prepare(scene)
-    distance, by_light = run_surface(renderer)
-    dr.eval(distance, by_light)
+    cast, by_light = run_cast_and_shade(renderer)
+    dr.eval(cast, by_light)
     works: dict[str, Callable[[], Any]] = {
-        "surface": lambda: dr.eval(run_surface(renderer)),
+        "surface": lambda: dr.eval(run_cast_and_shade(renderer)),
         "shadow map": lambda: _shadow_maps(scene, row.map),
         "prepare": lambda: renderer.prepare(scene),
-        "volume": lambda: dr.eval(run_tiles_and_airlight(renderer, ready, distance, by_light)),
+        "volume": lambda: dr.eval(run_method(renderer, ready, cast, by_light)),
     }
     times = {name: time_repeated(work, seconds=seconds, least=3).median_ms for name, work in works.items()}
     if row.evaluation == "adaptive":
@@ -227,7 +228,7 @@ def _shadow_maps(scene: Scene, texels: int) -> list[ShadowMap]:
 
 
 def _tessellation(scene: Scene, texels: int) -> dict[str, float]:
-    """Return what the passes of the tessellation cost for all lights [ms], medians of three."""
+    """Return the times of the passes of the tessellation, summed over the lights [ms], medians of three."""
     pairs = list(zip(_shadow_maps(scene, texels), scene.lights, strict=True))
-    runs = [[tessellation_stages(one, light)[0] for one, light in pairs] for _ in range(3)]
-    return {name: float(np.median([sum(one[name] for one in run) for run in runs])) for name in runs[0][0]}
+    runs = [[tessellation_stages(shadow_map, light)[0] for shadow_map, light in pairs] for _ in range(3)]
+    return {name: float(np.median([sum(times[name] for times in run) for run in runs])) for name in runs[0][0]}

@@ -1,19 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tables 1 and 2 of Biri, Arques, Michelin 2006 again: share of time by stage, and frames a second, with the error.
+"""Tables 1 and 2 of Biri, Arques, Michelin 2006 measured again: share of time by stage, frames a second, errors.
 
-How each stage of Table 1 is measured, on the wall clock, medians, all in turns with the whole frame:
+The stages of Table 1 are medians of wall-clock times, measured in turns with the whole frame:
 
-1. silhouettes: `realtime.methods.shadow_planes.silhouettes.silhouette` of the parts whose shadow can be seen, with the
-culling, on the host. 2. the scene with surface shadows: camera rays and lit surface, one frozen function. Its shadows
-come out of stage 5,
-   which counts layers anyway.
-3. the medium's contribution of the scene, unshadowed: the airlight of the method `unshadowed` with the same kernel. The
-   method under test never computes it by itself, each lit segment has its part of it: this is what one evaluation a ray
-   costs, and stage 5 is lessened by it.
-4. sorting: the planes with their bins (the rest of what is prepared on the host) and the tile lists.
-5. shadow planes: the airlight from the tile lists on, less stage 3.
+1. Silhouettes: `realtime.methods.shadow_planes.silhouettes.silhouette` of the parts whose shadow is in view, with view
+   culling, on the host.
+2. The scene with surface shadows: camera rays and lit surface, one frozen function. Stage 5 provides the shadows, since
+   it counts the layers of shadow anyway.
+3. The airlight of the scene without shadows: that of the method `unshadowed` with the same kernel. `shadow-planes`
+never
+   computes it alone, because each lit segment is a part of it. So this is the cost of one evaluation per ray, and
+   stage 5 is reduced by it.
+4. Sorting: the planes with their bins, that is the rest of the preparation on the host, and the tile lists.
+5. Shadow planes: the airlight after the tile lists, less stage 3.
 
-A frame takes less than their sum: the host finds planes while the device casts and shades.
+A frame takes less time than the sum of the stages, since the host finds planes while the device casts rays and shades.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,15 +24,15 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from realtime.frame.incremental import Kept
+from realtime.frame.incremental import FrameCache
 from realtime.frame.renderer import (
     FrameRenderer,
     render_frame,
-    run_airlight,
+    run_cast_and_shade,
+    run_cull,
+    run_method,
     run_shade,
     run_stages,
-    run_surface,
-    run_tiles,
 )
 from realtime.methods.shadow_planes.method import PlanePreparation
 from realtime.methods.shadow_planes.silhouettes import silhouette
@@ -59,13 +60,13 @@ KERNELS = ("exact", "taylor")
 
 @dataclass(frozen=True)
 class Published:
-    """What the paper says of a scene."""
+    """The published results for a scene."""
 
     scene: str
     where: str
     size: tuple[int, int]
     fps: float
-    shares: tuple[float, ...] | None = None  #: of Table 1 [%]
+    shares: tuple[float, ...] | None = None  #: of the stages in Table 1 [%]
     note: str = ""
     cone: int = 0  #: edges of the paper's cone over the spot; 0: no spot
 
@@ -89,12 +90,12 @@ PUBLISHED = (
 
 @dataclass(frozen=True)
 class TableRow:
-    """A scene at a size with a kernel, measured beside what was published."""
+    """The measurements of a scene at a size with a kernel."""
 
     published: Published
     kernel: str
-    cone: int  #: edges of the planes that bound the spot; 0: the cone itself
-    tolerance: float  #: of what is interpolated between the corners of tiles; 0: nothing
+    cone: int  #: edges of the pyramid that bounds the spot; 0: the cone itself
+    tolerance: float  #: for interpolation between the corners of tiles; 0: no interpolation
     size: tuple[int, int]  #: of the frame that was timed [pixels]
     triangles: int
     stages_ms: tuple[float, ...]  #: of Table 1, in the order of `STAGES`
@@ -108,7 +109,7 @@ class TableRow:
 
     @property
     def shares(self) -> tuple[float, ...]:
-        """Share of each stage in the sum of all, for a frame after the light moved [%]."""
+        """Share of each stage in the sum of all stages, for a frame after the light moved [%]."""
         total = sum(self.stages_ms)
         return tuple(100 * stage / total for stage in self.stages_ms)
 
@@ -132,14 +133,13 @@ def biri_row(
     kernel
         Name of the airlight kernel.
     cone, tolerance
-        Edges of the planes that bound a spot, see `realtime.methods.shadow_planes.method`, and what may be
-        interpolated, see `realtime.tiles.adaptive_sampling`.
+        Parameters of the method, see `realtime.methods.shadow_planes.method` and `realtime.tiles.adaptive_sampling`.
     size
-        Of the frame that is timed [pixels].
+        Width and height of the frame that is timed [pixels].
     error_size
-        Of the frame that is compared with the truth [pixels].
+        Width and height of the frame that is compared with the truth [pixels].
     seconds
-        Time to spend on a timing, about.
+        Approximate time to spend on each timing [s].
     """
     changed = {"cone": cone, "tolerance": tolerance}
     chosen = Configuration("shadow-planes", kernel, tuple((name, value) for name, value in changed.items() if value))
@@ -152,7 +152,7 @@ def biri_row(
     kept = first_frame(renderer)
     works = [
         moved_light(renderer),
-        lambda: run_stages(renderer, kept.prepared),
+        lambda: run_stages(renderer, kept.state),
         moved_light_alone(renderer, kept),
         changed_look(renderer, kept),
         camera_rays(renderer),
@@ -192,58 +192,58 @@ def biri_rows(
     Parameters
     ----------
     published, kernels
-        What to measure; every entry with every kernel, a spot by its cone itself and by the planes of the paper; with
-        `exact` also interpolated between the corners of tiles, to `validation.configurations.methods.TOLERANCE`.
+        What to measure: every entry with every kernel, a spot both with its cone and with the pyramid of the paper,
+        and the kernel `exact` also with the tolerance `validation.configurations.methods.TOLERANCE`.
     scale
-        Of the width and height of all images, for a quick look; 1 for the published sizes.
+        Factor on the width and height of all images; 1 for the published sizes.
     seconds
-        Time to spend on a timing, about.
+        Approximate time to spend on each timing [s].
     progress
-        Told the share done and what comes next.
+        Callback with the share done and a description of the next step, or None.
     """
     wanted: list[tuple[Published, str, dict[str, Any]]] = []
-    for one in published:
+    for entry in published:
         for kernel in kernels:
-            wanted += [(one, kernel, {"cone": cone}) for cone in dict.fromkeys((0, one.cone))]
-            wanted += [(one, kernel, {"tolerance": TOLERANCE})] if kernel == "exact" else []
+            wanted += [(entry, kernel, {"cone": cone}) for cone in dict.fromkeys((0, entry.cone))]
+            wanted += [(entry, kernel, {"tolerance": TOLERANCE})] if kernel == "exact" else []
     rows: list[TableRow] = []
-    for one, kernel, changed in wanted:
-        size = _whole_tiles(scale * one.size[0]), _whole_tiles(scale * one.size[1])
+    for entry, kernel, changed in wanted:
+        size = _whole_tiles(scale * entry.size[0]), _whole_tiles(scale * entry.size[1])
         half = (max(1, size[0] // 2), max(1, size[1] // 2))
         if progress is not None:
-            progress(len(rows) / len(wanted), f"{one.scene}, {size[0]} x {size[1]}, {kernel}")
-        # What is interpolated depends on the size of a pixel.
+            progress(len(rows) / len(wanted), f"{entry.scene}, {size[0]} x {size[1]}, {kernel}")
+        # The error of interpolation depends on the size of a pixel, so it is measured at the timed size.
         error_size = size if "tolerance" in changed else half
-        rows.append(biri_row(one, kernel, **changed, size=size, error_size=error_size, seconds=seconds))
+        rows.append(biri_row(entry, kernel, **changed, size=size, error_size=error_size, seconds=seconds))
     return rows
 
 
 def _whole_tiles(length: float) -> int:
-    """Return the side of an image in which tiles can be interpolated: three of them and more [pixels]."""
+    """Return the side of an image of at least three whole tiles, so that tiles can be interpolated [pixels]."""
     return SIDE * max(3, round(length / SIDE))
 
 
 def _shared(measured: Sequence[float]) -> tuple[float, ...]:
-    """Return what each stage of Table 1 costs [ms], from the times of `_stages`."""
+    """Return the time of each stage of Table 1 [ms], from the times of `_stages`."""
     silhouettes, surface, unshadowed, host, in_tiles, airlight = measured
     sorting = max(0.0, host - silhouettes) + in_tiles
     return silhouettes, surface, unshadowed, sorting, max(0.0, airlight - unshadowed)
 
 
-def _stages(renderer: FrameRenderer, kernel: str, kept: Kept) -> list[Callable[[], Any]]:
-    """Return the work of silhouettes, scene, unshadowed airlight, all that is on the host, tile lists, and airlight."""
+def _stages(renderer: FrameRenderer, kernel: str, kept: FrameCache) -> list[Callable[[], Any]]:
+    """Return the work of silhouettes, scene, unshadowed airlight, all on the host, tile lists, and airlight."""
     scene = renderer.scene
-    distance = kept.cast.distance
-    by_light = run_shade(renderer, kept.cast)
-    dr.eval(distance, by_light)
+    cast = kept.cast
+    by_light = run_shade(renderer, cast)
+    dr.eval(cast, by_light)
     plain = prepared(scene, Configuration("unshadowed", kernel))
     return [
         lambda: _silhouettes(renderer, scene),
-        lambda: dr.eval(run_surface(renderer)),
-        lambda: dr.eval(run_airlight(plain, (), distance, ())),
+        lambda: dr.eval(run_cast_and_shade(renderer)),
+        lambda: dr.eval(run_method(plain, (), cast, (), ())),
         lambda: renderer.prepare(scene),
-        lambda: run_tiles(renderer, kept.prepared, distance),
-        lambda: dr.eval(run_airlight(renderer, kept.prepared, distance, by_light, kept.tiles)),
+        lambda: run_cull(renderer, kept.state, cast.distance),
+        lambda: dr.eval(run_method(renderer, kept.state, cast, by_light, kept.lists)),
     ]
 
 

@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Animations: what moves in the frames of a scene, and how.
 
-One turn over all frames, so that the last leads on to the first:
+The frames make one turn, so that the last one leads on to the first:
 
-* `light`: every light circles about a vertical axis, a spot with its direction. Vertical is the axis of coordinates
-  nearest to the camera's up.
+* `light`: every light circles about a vertical axis, and the axis of a spot turns with it. Vertical is the axis of
+  coordinates nearest to the camera's up.
 * `objects`: every object turns about the vertical through its own middle.
-* `medium`: the extinction swings between half and one and a half times its value, as 1 + sin(turn) / 2.
-* `colour`: the lights' red, green and blue go round, with the same sum.
+* `medium`: the extinction is multiplied by 1 + sin(turn) / 2, between half and one and a half times its value.
+* `colour`: the intensities of red, green and blue rotate among the channels; their sum stays.
 
-Only what moves is made anew (`moved_parts`, `realtime.frame.incremental`); kernels are those of the first frame.
+The frame renderer recomputes only what moves (`moved_parts`, `realtime.frame.incremental`) and reuses the kernels of
+the first frame.
 """
 
 from collections.abc import Callable, Iterator
@@ -36,7 +37,13 @@ Array = NDArray[np.float64]
 
 
 def parse_moves(text: str) -> tuple[str, ...]:
-    """Return what moves from 'light,colour'."""
+    """Return what moves, from words separated by commas such as 'light,colour'.
+
+    Raises
+    ------
+    InputError
+        For a word that is not in `validation.scenes.record.MOVES`.
+    """
     moves = tuple(dict.fromkeys(word.strip() for word in text.split(",")))
     for move in moves:
         if move not in MOVES:
@@ -45,7 +52,7 @@ def parse_moves(text: str) -> tuple[str, ...]:
 
 
 def moved_parts(animation: Animation) -> dict[str, bool]:
-    """Return what of each frame is elsewhere than in the last, as `realtime.frame.incremental.next_frame` takes it."""
+    """Return what differs between a frame and the last, as keywords of `realtime.frame.incremental.next_frame`."""
     return {
         "camera_moved": False,
         "geometry_moved": "objects" in animation.moves,
@@ -56,7 +63,22 @@ def moved_parts(animation: Animation) -> dict[str, bool]:
 def animate(scene: Scene, animation: Animation, frames: int) -> Iterator[Scene]:
     """Yield the scene of every frame, one turn in all; the first is the scene as it was read.
 
-    A scene is good until the next is asked for: objects move in the Mitsuba scene that all of them share.
+    A yielded scene is valid only until the next one is asked for: all of them share one Mitsuba scene, in which the
+    objects move.
+
+    Parameters
+    ----------
+    scene
+        As `realtime.scene.read_scene.read_scene` returns it.
+    animation
+        What moves.
+    frames
+        How many scenes to yield.
+
+    Raises
+    ------
+    InputError
+        If there are no frames, or if objects shall move and no mesh is closed.
     """
     if frames < 1:
         raise InputError(f"frames: got {frames}, wanted at least 1")
@@ -66,7 +88,7 @@ def animate(scene: Scene, animation: Animation, frames: int) -> Iterator[Scene]:
 
 
 def _step(scene: Scene, animation: Animation) -> Callable[[float], Scene]:
-    """Return the function that gives the scene after a share of the turn."""
+    """Return a function from a share of the turn, 0 to 1, to the scene after it."""
     up = vertical(scene)
     about = np.array(animation.about) if animation.about else middle(scene)
     objects = None
@@ -92,7 +114,7 @@ def _step(scene: Scene, animation: Animation) -> Callable[[float], Scene]:
 
 
 def vertical(scene: Scene) -> Array:
-    """Return the axis of coordinates nearest to the camera's up."""
+    """Return the axis of coordinates nearest to the camera's up, a unit vector (3,)."""
     up = np.array(scene.camera.up, dtype=np.float64).ravel()
     axis = np.zeros(3)
     largest = int(np.argmax(np.abs(up)))
@@ -101,7 +123,10 @@ def vertical(scene: Scene) -> Array:
 
 
 def middle(scene: Scene) -> Array:
-    """Return the middle of the box of all shapes; without shapes, what the camera looks at beside the first light."""
+    """Return the middle of the bounding box of all shapes, (3,) [m].
+
+    Without shapes it is the point on the camera's axis that is closest to the first light.
+    """
     if scene.geometry.shapes():
         box = scene.geometry.bbox()
         return 0.5 * (np.array(box.min, dtype=np.float64).ravel() + np.array(box.max, dtype=np.float64).ravel())

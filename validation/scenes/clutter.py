@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A cluttered table about a lamp: Biri 2006, Fig. 7c and Table 2, 20 747 triangles.
 
-Of the published scene the text says that it has a lot of shadow planes and a moving light that changes colour. The
-objects here are our own.
+The paper says that its scene has a lot of shadow planes and a moving light that changes colour. The objects here are
+our own.
 """
 
 from typing import Any
@@ -36,9 +36,9 @@ def clutter() -> dict[str, Any]:
 
 
 def _objects() -> list[tuple[Mesh, tuple[float, float, float]]]:
-    """Return the objects where a sunflower has its seeds, and a cage of nine rods around the lamp.
+    """Return objects placed like the seeds of a sunflower, and a cage of nine rods around the lamp.
 
-    Each sinks into the table a little, so that no light passes below it.
+    Each object reaches a little below the table top, so that no light passes under it.
     """
     colours = [(0.61, 0.29, 0.21), (0.27, 0.43, 0.59), (0.67, 0.59, 0.31), (0.37, 0.53, 0.33), (0.63, 0.61, 0.57)]
     result = []
@@ -55,7 +55,7 @@ def _objects() -> list[tuple[Mesh, tuple[float, float, float]]]:
 
 
 def _cup(scale: float) -> Mesh:
-    """Return a cup: up the outside, over the rim, down the inside; 2 * 18 * 10 triangles."""
+    """Return a cup of 2 * 18 * 10 triangles: its profile runs up the outside, over the rim and down the inside."""
     radius = np.array([0.13, 0.15, 0.16, 0.19, 0.21, 0.205, 0.195, 0.17, 0.14, 0.11])
     height = np.array([0.0, 0.02, 0.11, 0.27, 0.41, 0.423, 0.41, 0.27, 0.11, 0.047])
     return lathe(scale * radius, scale * height, 18)
@@ -102,7 +102,7 @@ def _backdrop() -> Mesh:
 SCENE = SceneRecord(
     "clutter",
     clutter,
-    "A table of small things about a lamp: shadows within shadows wherever one looks, 20 747 triangles.",
+    "A table of small things about a lamp: shadows within shadows all over the image, 20 747 triangles.",
     "Biri, Arques, Michelin 2006, Fig. 7c and Table 2: 25 frames/s; there other objects, about a moving light",
     Animation(("light", "colour"), about=(0.19, 0.29, 0.91)),
 )

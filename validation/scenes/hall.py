@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A great hall lit through a wheel window: Biri 2006, Fig. 1 and Table 2, 107 514 triangles.
 
-Of the published scene the text says that it is complex, has around 100 000 triangles and a moving light. The hall here
-is our own.
+The paper says that its scene is complex, with around 100 000 triangles and a moving light. The hall here is our own.
 """
 
 from typing import Any
@@ -33,8 +32,8 @@ _STONE, _DARK, _WOOD = (0.57, 0.53, 0.46), (0.41, 0.38, 0.34), (0.37, 0.27, 0.19
 def hall() -> dict[str, Any]:
     """Return a hall of two arcades with statues, beams and a chandelier, 102 460 triangles of closed casters.
 
-    Open are the floor, the ceiling, the side walls and the end wall with its round window, 5054 triangles. The lamp is
-    behind the window: the walls shadow most of what the columns shadow.
+    The floor, the ceiling, the side walls and the end wall with its round window are open, 5054 triangles. The lamp is
+    behind the window, so the walls shadow most of what the columns shadow.
     """
     casters = {name: mitsuba_mesh(name, mesh, reflectance) for name, (mesh, reflectance) in _casters().items()}
     shell = {name: mitsuba_mesh(name, mesh, _DARK) for name, mesh in _shell().items()}
@@ -75,7 +74,7 @@ def _column() -> Mesh:
 
 
 def _statue(number: int) -> Mesh:
-    """Return a draped figure on a plinth, its folds turning with height: 2 * 56 * 32 triangles."""
+    """Return a draped figure on a plinth, with folds that turn with height: 2 * 56 * 32 triangles."""
     level = np.linspace(0.0, 1.0, 32)[:, None]
     angle = 2 * np.pi * np.arange(56)[None] / 56
     stops = [0, 0.2, 0.21, 0.3, 0.55, 0.62, 0.79, 0.83, 0.86, 0.93, 0.98, 1]
@@ -88,7 +87,7 @@ def _statue(number: int) -> Mesh:
 
 
 def _wheel() -> Mesh:
-    """Return the tracery of the window: two rings and eleven spokes that run into them."""
+    """Return the tracery of the window: two rings and eleven spokes that join them."""
     upright = rotation((1, 0, 0), 90)
     spoke = lathe([0.061, 0.047, 0.063], [0.43, 1.07, 1.83], 12)
     spokes = [placed(spoke, (0, 0, 0), rotation((0, 1, 0), 360 * number / 11 + 20.3)) for number in range(11)]
@@ -108,7 +107,7 @@ def _chandelier() -> Mesh:
 
 
 def _shell() -> dict[str, Mesh]:
-    """Return what is open: floor, ceiling, side walls and the end wall with its hole, 5054 triangles."""
+    """Return the open meshes: floor, ceiling, side walls and the end wall with its hole, 5054 triangles."""
     hole = (6.27 / 12.3, _WINDOW[2] / 8.7, 1.77)
     return {
         "floor": grid((-6.1, -12.7, 0.0), (12.3, 0, 0), (0, 24.6, 0), (23, 41)),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Scenes by name or by path, checked before any work is done."""
+"""Loading of scenes by name or by path; input is checked before any work is done."""
 
 import os
 import re
@@ -20,7 +20,7 @@ _LARGEST = 16384
 class LoadedScene:
     """A Mitsuba scene and where it came from."""
 
-    name: str  #: a built-in name, or the stem of the file
+    name: str  #: name of the built-in scene, or stem of the file
     scene: Any  #: the `mi.Scene`
     purpose: str
     published: str
@@ -41,9 +41,9 @@ def load_scene(name_or_path: str, size: tuple[int, int] | None = None) -> Loaded
     Raises
     ------
     InputError
-        For an unknown name, a missing or malformed file, and a size that no image can have. Whether methods and truth
-        can deal with what is in the scene, `realtime.scene.read_scene.read_scene` and
-        `reference.scene.read.read_truth` say.
+        For an unknown name, a missing or malformed file, and a size that no image can have. This function does not
+        check whether the methods or the truth support the scene: `realtime.scene.read_scene.read_scene` and
+        `reference.scene.read.read_truth` do.
     """
     if name_or_path in SCENES:
         record = SCENES[name_or_path]
@@ -58,7 +58,13 @@ def load_scene(name_or_path: str, size: tuple[int, int] | None = None) -> Loaded
 
 
 def parse_size(text: str) -> tuple[int, int]:
-    """Return width and height from 'WxH'."""
+    """Return width and height [pixels] from 'WIDTHxHEIGHT'.
+
+    Raises
+    ------
+    InputError
+        If the text has another form.
+    """
     match = re.fullmatch(r"(\d+)[xX](\d+)", text.strip())
     if not match:
         raise InputError(f"size: got {text!r}, wanted WIDTHxHEIGHT in pixels, for example 800x600")
@@ -85,7 +91,7 @@ def _existing(name_or_path: str) -> Path:
 def _parse(path: Path):
     try:
         scene = mi.load_file(str(path))
-    except Exception as error:  # Mitsuba reports every kind of bad input as a RuntimeError, Python plugins as anything
+    except Exception as error:  # Mitsuba raises RuntimeError for all bad input; Python plugins raise anything
         reason = re.sub(r"^\[[^\]]*\]\s*", "", " ".join(str(error).split()))
         raise InputError(f"scene {path}: Mitsuba cannot read it: {reason}") from error
     if not isinstance(scene, mi.Scene):
@@ -94,7 +100,20 @@ def _parse(path: Path):
 
 
 def resize(scene, size: tuple[int, int]) -> None:
-    """Give the cameras of a Mitsuba scene images of another width and height [pixels]."""
+    """Set the image size of all cameras of a Mitsuba scene.
+
+    Parameters
+    ----------
+    scene
+        The `mi.Scene`; it is changed in place.
+    size
+        Width and height [pixels].
+
+    Raises
+    ------
+    InputError
+        If a side is shorter than 1 or longer than 16384 pixels.
+    """
     if not all(1 <= n <= _LARGEST for n in size):
         raise InputError(f"size: got {size[0]}x{size[1]}, wanted at least 1x1 and at most {_LARGEST} pixels on a side")
     for sensor in scene.sensors():
@@ -102,6 +121,6 @@ def resize(scene, size: tuple[int, int]) -> None:
         parameters["film.size"] = list(size)
         parameters["film.crop_size"] = list(size)
         if "x_fov" in parameters:
-            # Touching a parameter of the sensor itself makes it derive its projection from the film again.
+            # The sensor recomputes its projection only when one of its own parameters is set.
             parameters["x_fov"] = parameters["x_fov"]
         parameters.update()

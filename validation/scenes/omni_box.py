@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A room about a lamp that shines all round: after Billeter 2010, Fig. 6.
 
-Of the published scene the text says that it is simple and has an omni light source. The room here is our own: the
-boxes shadow all six faces of a map about the lamp, some across the edges where faces meet.
+The paper says that its scene is simple and has an omni light source. The room here is our own: its boxes cast shadows
+on all six faces of a cube map about the lamp, some across the edges of faces.
 """
 
 from typing import Any
@@ -15,7 +15,7 @@ from validation.scenes.solids import box
 
 _LAMP = (0.13, 0.07, 1.57)
 _WOOD, _WALL = (0.43, 0.31, 0.19), (0.17, 0.19, 0.21)
-#: Of each bar: angle about the lamp [degrees], distance from it and thickness [m].
+#: For each bar: angle about the lamp [degrees], distance from the lamp and thickness [m].
 _BARS = (
     (17.3, 0.71, 0.13),
     (61.9, 0.83, 0.21),
@@ -25,7 +25,7 @@ _BARS = (
     (249.1, 0.73, 0.15),
     (317.9, 0.87, 0.23),
 )
-#: Of each post and crate: size and position of its middle [m], turn about the vertical [degrees].
+#: For each post and crate: size and position of its middle [m], turn about the vertical [degrees].
 _STANDING = (
     ((0.29, 0.24, 3.31), (-1.73, 0.87, 1.643), 13.7),
     ((0.17, 0.14, 3.31), (-1.27, -1.19, 1.643), 41.3),
@@ -49,7 +49,7 @@ def omni_box() -> dict[str, Any]:
 
 
 def _bars() -> list[Mesh]:
-    """Return the bars that hang about the lamp, nearly along the view: it meets their shadows on edge."""
+    """Return the bars about the lamp, nearly parallel to the view, so that camera rays meet their shadows on edge."""
     result = []
     for number, (degrees, distance, thickness) in enumerate(_BARS):
         angle = np.deg2rad(degrees)
@@ -61,12 +61,12 @@ def _bars() -> list[Mesh]:
 
 
 def _standing() -> list[Mesh]:
-    """Return the posts and crates; they sink into the floor, and the posts into the ceiling."""
+    """Return the posts and crates; they reach into the floor, and the posts into the ceiling."""
     return [placed(box(size), where, rotation((0, 0, 1), turn)) for size, where, turn in _STANDING]
 
 
 def _room() -> Mesh:
-    """Return the floor, the ceiling and three walls, their normals into the room."""
+    """Return the floor, the ceiling and three walls, with normals that point into the room."""
     left, front, width, depth, height = -2.87, -2.43, 5.71, 4.93, 3.29
     return joined(
         [

@@ -8,20 +8,20 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Vertices = NDArray[np.float64]  #: (vertices, 3)
-Faces = NDArray[np.int64]  #: (faces, 3), counter-clockwise seen from outside
+Vertices = NDArray[np.float64]  #: (vertices, 3) [m]
+Faces = NDArray[np.int64]  #: (faces, 3), counter-clockwise as seen from outside
 Mesh = tuple[Vertices, Faces]
 
 
 def lathe(radius: ArrayLike, height: ArrayLike, sides: int) -> Mesh:
-    """Return the closed surface of a profile turned about the z axis: 2 sides len(radius) triangles.
+    """Return the closed surface of a profile turned about the z axis, 2 sides len(radius) triangles.
 
     Parameters
     ----------
     radius, height
-        The profile from bottom to top [m]; every radius is above 0, the ends are closed by fans.
+        The profile from bottom to top, (n,) each [m]. Every radius is positive; fans close the ends.
     sides
-        Corners of each ring.
+        Number of corners of each ring.
     """
     radius, height = np.asarray(radius, dtype=np.float64), np.asarray(height, dtype=np.float64)
     angle = 2 * np.pi * np.arange(sides) / sides
@@ -30,14 +30,14 @@ def lathe(radius: ArrayLike, height: ArrayLike, sides: int) -> Mesh:
 
 
 def skin(rings: ArrayLike, *, ring_of_rings: bool = False) -> Mesh:
-    """Return the closed surface through rings of points: 2 k n triangles for n rings of k points, with or without ends.
+    """Return the closed surface through n rings of k points, 2 k n triangles with or without ends.
 
     Parameters
     ----------
     rings
-        Shape (n, k, 3) [m]. Each ring runs counter-clockwise for one who looks back at it from the next.
+        (n, k, 3) [m]. Each ring runs counter-clockwise as seen from the next ring.
     ring_of_rings
-        Join the last ring to the first; otherwise both ends are closed by fans about the mean of their ring.
+        Whether the last ring is joined to the first. Otherwise fans about the mean of a ring close both ends.
     """
     rings = np.asarray(rings, dtype=np.float64)
     count, sides = rings.shape[:2]
@@ -59,7 +59,15 @@ def skin(rings: ArrayLike, *, ring_of_rings: bool = False) -> Mesh:
 
 
 def grid(corner: Sequence[float], across: Sequence[float], up: Sequence[float], cells: tuple[int, int]) -> Mesh:
-    """Return an open rectangle of 2 cells[0] cells[1] triangles; its normal is across x up."""
+    """Return an open rectangle of 2 cells[0] cells[1] triangles; its normal is across x up.
+
+    Parameters
+    ----------
+    corner, across, up
+        A corner and the two edges that start there, (3,) each [m].
+    cells
+        Number of cells along `across` and along `up`, two triangles each.
+    """
     n, m = cells
     u, v = np.meshgrid(np.arange(n + 1) / n, np.arange(m + 1) / m, indexing="ij")
     vertices = np.asarray(corner) + u.reshape(-1, 1) * np.asarray(across) + v.reshape(-1, 1) * np.asarray(up)
@@ -69,7 +77,7 @@ def grid(corner: Sequence[float], across: Sequence[float], up: Sequence[float], 
 
 
 def rotation(axis: Sequence[float], degrees: float) -> NDArray[np.float64]:
-    """Return the matrix of a rotation about an axis (Rodrigues' formula)."""
+    """Return the matrix, (3, 3), of a rotation about an axis through the origin by an angle [degrees] (Rodrigues)."""
     x, y, z = np.asarray(axis, dtype=np.float64) / np.linalg.norm(axis)
     skew = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     angle = np.deg2rad(degrees)
@@ -77,19 +85,19 @@ def rotation(axis: Sequence[float], degrees: float) -> NDArray[np.float64]:
 
 
 def placed(mesh: Mesh, position: Sequence[float], turn: NDArray[np.float64] | None = None) -> Mesh:
-    """Return a mesh turned about the origin, then moved."""
+    """Return a mesh turned about the origin by a matrix, (3, 3), then moved by `position`, (3,) [m]."""
     vertices, faces = mesh
     return (vertices if turn is None else vertices @ turn.T) + np.asarray(position), faces
 
 
 def scaled(mesh: Mesh, factor: float | Sequence[float]) -> Mesh:
-    """Return a mesh stretched from the origin, by one factor or by one for each axis."""
+    """Return a mesh scaled about the origin, by one factor or by one for each axis."""
     vertices, faces = mesh
     return vertices * factor, faces
 
 
 def joined(meshes: Sequence[Mesh]) -> Mesh:
-    """Return several meshes as one."""
+    """Return several meshes as one, with the parts in the order given."""
     offsets = np.cumsum([0] + [len(vertices) for vertices, _ in meshes[:-1]])
     return (
         np.concatenate([vertices for vertices, _ in meshes]),
@@ -98,13 +106,13 @@ def joined(meshes: Sequence[Mesh]) -> Mesh:
 
 
 def mitsuba_mesh(name: str, mesh: Mesh, reflectance: Sequence[float]):
-    """Return a Mitsuba mesh with flat shading and a two-sided diffuse material."""
+    """Return a Mitsuba mesh with flat shading and a two-sided diffuse material of an RGB reflectance, 0 to 1."""
     diffuse = {"type": "diffuse", "reflectance": {"type": "rgb", "value": list(reflectance)}}
     return _mesh(name, mesh, {"mesh_bsdf": {"type": "twosided", "bsdf": diffuse}})
 
 
 def medium_boundary(name: str, mesh: Mesh, medium: dict[str, Any]):
-    """Return a Mitsuba mesh that lets light pass and is filled with a medium."""
+    """Return a Mitsuba mesh of the material `null` around a medium, the boundary of a bounded medium."""
     return _mesh(name, mesh, {"mesh_bsdf": {"type": "null"}, "interior": medium | {"id": f"{name}-medium"}})
 
 
@@ -124,14 +132,24 @@ def _mesh(name: str, mesh: Mesh, plugins: dict[str, dict[str, Any]]):
 def fog(
     sigma_t: float | Sequence[float], albedo: Sequence[float], phase: dict[str, Any] | None = None
 ) -> dict[str, Any]:
-    """Return a homogeneous medium with the id 'fog'; `sigma_t` is grey or RGB [1/m]."""
+    """Return a homogeneous medium with the id 'fog'.
+
+    Parameters
+    ----------
+    sigma_t
+        Extinction, grey or RGB [1/m].
+    albedo
+        Single-scattering albedo, RGB.
+    phase
+        Dictionary of the phase function; isotropic by default.
+    """
     grey = isinstance(sigma_t, float)
     channels = [sigma_t] if isinstance(sigma_t, float) else list(sigma_t)
     scale = max(channels)
     return {
         "type": "homogeneous",
         "id": "fog",
-        # An rgb value of Mitsuba lies in [0, 1]; the scale takes the rest.
+        # Mitsuba wants rgb values in [0, 1], so the scale carries the magnitude.
         "sigma_t": 1.0 if grey else {"type": "rgb", "value": [value / scale for value in channels]},
         "scale": scale,
         "has_spectral_extinction": not grey,
@@ -153,7 +171,19 @@ def camera(
     size: tuple[int, int],
     in_fog: bool = True,
 ) -> dict[str, Any]:
-    """Return a perspective sensor, in the medium 'fog' or in none; `fov` is the horizontal field of view [degrees]."""
+    """Return a perspective sensor whose up is z.
+
+    Parameters
+    ----------
+    origin, target
+        Where the camera is and a point that it looks at, (3,) each [m].
+    fov
+        Horizontal field of view [degrees].
+    size
+        Width and height of the image [pixels].
+    in_fog
+        Whether the camera is in the medium with the id 'fog' or in clear air.
+    """
     medium = {"medium": {"type": "ref", "id": "fog"}} if in_fog else {}
     return medium | {
         "type": "perspective",

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Small scenes with everything in them that the built-in scenes lack, for checks of the checks.
+"""Small scenes that hold what the built-in scenes lack, for checks of the checks.
 
-`many-lights`: the built-in scenes have one light each, none of them soft and none behind the camera; their fog is grey
-but for `two-pens`, and forward scattering but for Rayleigh's symmetric law. What only such a scene can show, a formula
-for soft spots or a sum over lights, is shown here.
+`many-lights` has several lights, one of them a soft spot and one behind the camera, in coloured, backward scattering
+fog. Each built-in scene has one light, without a soft edge and before the camera, and no fog scatters backward. So only
+this scene can reveal a fault in the formula for soft spots or in the sum over lights.
 
-`sun`: a light at infinity on a box and a ball of coloured fog, each in the light of the other or of what casts shadows.
+`sun` has a directional light on two bounded media, a box and a sphere of coloured fog, with occluders before them.
 """
 
 from typing import Any
@@ -16,7 +16,7 @@ from validation.scenes.parts import camera, fog, point_light
 
 
 def many_lights() -> dict[str, Any]:
-    """Return a ball over a floor in coloured, backward scattering fog under a soft spot, a lamp, and one behind."""
+    """Return a sphere over a floor in coloured, backward scattering fog, with a soft spot and two point lights."""
     return {
         "type": "scene",
         "fog": fog((0.113, 0.149, 0.187), (0.91, 0.83, 0.74), {"type": "hg", "g": -0.41}),
@@ -45,7 +45,7 @@ def many_lights() -> dict[str, Any]:
 
 
 def sun() -> dict[str, Any]:
-    """Return a slab and a ball that shadow a box and a ball of fog, and a floor, under a directional light."""
+    """Return a slab and a sphere that shadow two bounded media, a box and a sphere, under a directional light."""
     transform = mi.ScalarTransform4f()
     grey = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.43, 0.47, 0.53]}}
     clear = {"type": "null"}

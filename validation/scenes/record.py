@@ -10,11 +10,13 @@ MOVES = ("light", "objects", "medium", "colour")
 
 @dataclass(frozen=True)
 class Animation:
-    """What moves in the frames of a scene; see `validation.scenes.animation`."""
+    """What moves in the frames of a scene; `validation.scenes.animation` says how."""
 
     moves: tuple[str, ...] = ("light",)  #: of `MOVES`
-    about: tuple[float, float, float] | None = None  #: where the axis of the lights' circle is [m]; None: in the middle
-    objects: tuple[str, ...] = ()  #: names of the shapes that turn; none: all closed ones
+    about: tuple[float, float, float] | None = (
+        None  #: a point on the axis that lights circle [m]; None: the middle of the scene
+    )
+    objects: tuple[str, ...] = ()  #: names of the shapes that turn; empty: all closed ones
 
 
 @dataclass(frozen=True)
@@ -23,6 +25,6 @@ class SceneRecord:
 
     name: str
     build: Callable[[], dict[str, Any]]  #: the dictionary for `mi.load_dict`; needs an active Mitsuba variant
-    purpose: str  #: what it is for, one sentence
-    published: str  #: the published figure that it answers to
+    purpose: str  #: one sentence: what the scene is for
+    published: str  #: the published figure that the scene stands for
     animation: Animation = field(default_factory=Animation)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The built-in scenes: one registry for tests, benchmarks and figures.
 
-Each is built procedurally with arbitrary, never round numbers, so that no constant of the code can hide behind one of
-the scene. `SCENES` is the registry: add a `SceneRecord` to it and every command and report knows it.
+A function builds each scene from arbitrary, never round numbers, so that no constant of the code can hide behind a
+constant of the scene. Every command and report knows the scenes that have a `SceneRecord` in `SCENES`.
 """
 
 from validation.scenes.clutter import SCENE as CLUTTER

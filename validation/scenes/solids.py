@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Solids of the built-in scenes: closed meshes without seams, every edge met by two triangles, and walls with openings.
+"""Solids of the built-in scenes: closed meshes in which every edge has two triangles, and walls with openings.
 
-Shadow planes need loops of silhouette edges: each vertex exists once, and faces run counter-clockwise seen from
-outside.
+Silhouette edges form closed loops only if triangles share their vertices. So each vertex is stored once, and faces run
+counter-clockwise as seen from outside.
 """
 
 from collections.abc import Sequence
@@ -14,20 +14,20 @@ from validation.scenes.parts import Mesh, grid, skin
 
 
 def box(size: Sequence[float]) -> Mesh:
-    """Return a box about the origin: 12 triangles, 8 vertices."""
+    """Return a box about the origin with edges of lengths `size`, (3,) [m]: 12 triangles, 8 vertices."""
     corners = np.array([[x, y, z] for z in (-0.5, 0.5) for y in (-0.5, 0.5) for x in (-0.5, 0.5)])
     quads = np.array([[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]])
     return corners * np.asarray(size), np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
 
 
 def tetrahedron(radius: float) -> Mesh:
-    """Return a regular tetrahedron whose corners have this distance to the origin: 4 triangles."""
+    """Return a regular tetrahedron whose corners are at a distance `radius` [m] from the origin: 4 triangles."""
     corners = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3)
     return radius * corners, np.array([[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])
 
 
 def icosphere(levels: int) -> Mesh:
-    """Return the unit sphere as an icosahedron divided `levels` times: 20 * 4^levels triangles, strictly convex."""
+    """Return the unit sphere as an icosahedron subdivided `levels` times: 20 * 4^levels triangles, strictly convex."""
     golden = (1 + np.sqrt(5)) / 2
     base = [(s, t * golden) for s in (-1, 1) for t in (-1, 1)]
     vertices = np.array([(0, s, t) for s, t in base] + [(s, t, 0) for s, t in base] + [(t, 0, s) for s, t in base])
@@ -44,7 +44,7 @@ def icosphere(levels: int) -> Mesh:
 
 
 def _divided(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Mesh:
-    """Return each face as four, the midpoints of its edges moved out to the unit sphere."""
+    """Return each face as four, with the midpoints of its edges moved out to the unit sphere."""
     edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
     unique, number = np.unique(edges, axis=0, return_inverse=True)
     middle = vertices[unique].sum(axis=1)
@@ -56,7 +56,7 @@ def _divided(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Mesh:
 
 
 def gem(sides: int, rings: int) -> Mesh:
-    """Return a faceted unit ball, each ring turned by half a side against the next: 2 sides rings triangles, convex."""
+    """Return a faceted unit sphere whose rings are turned by half a side each: 2 sides rings triangles, convex."""
     polar = np.pi * (1 - np.arange(1, rings + 1) / (rings + 1))
     i = np.arange(sides)
     j = (i + 1) % sides
@@ -74,9 +74,17 @@ def gem(sides: int, rings: int) -> Mesh:
 
 
 def torus(radius: float, thickness: float, cells: tuple[int, int]) -> Mesh:
-    """Return a ring about the z axis of 2 cells[0] cells[1] triangles; cells[0] go round the axis."""
+    """Return a torus about the z axis of 2 cells[0] cells[1] triangles.
+
+    Parameters
+    ----------
+    radius, thickness
+        Radii of the torus and of its tube [m].
+    cells
+        Number of cells round the axis, and round the tube.
+    """
     around = 2 * np.pi * np.arange(cells[0])[:, None] / cells[0]
-    # Clockwise in (distance, height), so that the ring is counter-clockwise seen from the next one.
+    # Clockwise in (distance, height): then each ring is counter-clockwise as seen from the next one.
     across = -2 * np.pi * np.arange(cells[1])[None] / cells[1]
     distance = radius + thickness * np.cos(across)
     height = np.broadcast_to(thickness * np.sin(across), (cells[0], cells[1]))
@@ -90,22 +98,32 @@ def prism(outline: ArrayLike, height: float) -> Mesh:
     Parameters
     ----------
     outline
-        Shape (k, 2) [m], counter-clockwise, all of it in sight of its mean.
+        (k, 2) [m], counter-clockwise and star-shaped about the mean of its points.
     height
-        [m]
+        Height of the prism [m].
     """
     outline = np.asarray(outline, dtype=np.float64)
     return skin([np.column_stack([outline, np.full(len(outline), z)]) for z in (0.0, height)])
 
 
 def star(inner: float, outer: float, points: int) -> NDArray[np.float64]:
-    """Return the outline of a star about the origin, (2 points, 2)."""
+    """Return the outline of a star about the origin with an inner and an outer radius [m], (2 points, 2) [m]."""
     angle = np.pi * np.arange(2 * points) / points
     return np.where(np.arange(2 * points) % 2, inner, outer)[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
 
 def arch(radii: tuple[float, float], depth: float, steps: int) -> Mesh:
-    """Return half a ring of rectangular section in the plane y = 0, standing on z = 0: 8 (steps + 1) triangles."""
+    """Return half a ring of rectangular section in the plane y = 0, standing on z = 0: 8 (steps + 1) triangles.
+
+    Parameters
+    ----------
+    radii
+        Inner and outer radius [m].
+    depth
+        Along y [m].
+    steps
+        Number of segments of the half circle.
+    """
     inner, outer = radii
     section = np.array([[inner, -0.5], [outer, -0.5], [outer, 0.5], [inner, 0.5]]) * (1, depth)
     angle = np.pi * np.arange(steps + 1)[:, None] / steps
@@ -114,7 +132,7 @@ def arch(radii: tuple[float, float], depth: float, steps: int) -> Mesh:
 
 
 def gable(corner: Sequence[float], across: Sequence[float], up: Sequence[float], cells: tuple[int, int]) -> Mesh:
-    """Return an open wall with a gable of half its height: 2 cells[0] cells[1] + cells[0] triangles."""
+    """Return a wall as of `parts.grid` with a gable of half its height: 2 cells[0] cells[1] + cells[0] triangles."""
     vertices, faces = grid(corner, across, up, cells)
     apex = np.asarray(corner) + 0.5 * np.asarray(across) + 1.5 * np.asarray(up)
     eaves = np.arange(cells[0] + 1) * (cells[1] + 1) + cells[1]
@@ -125,22 +143,22 @@ def gable(corner: Sequence[float], across: Sequence[float], up: Sequence[float],
 def pierced(
     corner: Sequence[float], across: Sequence[float], up: Sequence[float], *, hole, cells: tuple[int, int]
 ) -> Mesh:
-    """Return an open wall with a round hole: 2 cells[0] cells[1] triangles, cells[0] of them along the hole.
+    """Return an open wall with a round hole: 2 cells[0] cells[1] triangles, cells[0] of which touch the hole.
 
     Parameters
     ----------
     corner, across, up
-        The rectangle [m]; its normal is across x up.
+        A corner of the rectangle and the two edges that start there, (3,) each [m]; the normal is across x up.
     hole
-        Centre in parts of `across` and of `up`, and radius [m].
+        Position of the centre along `across` and along `up`, as shares of them, and the radius [m].
     cells
-        Cells around the hole, 8 or more and even, and from the hole to the border.
+        Number of cells around the hole, even and at least 8, and from the hole to the border.
     """
     u, v, radius = hole
     right, above = np.asarray(across, dtype=np.float64), np.asarray(up, dtype=np.float64)
     angle = 2 * np.pi * (np.arange(cells[0]) + 0.5) / cells[0]
     width, height = np.linalg.norm(right), np.linalg.norm(above)
-    # The border point of each ray lies where it meets the first of two sides; the ray nearest a corner bends into it.
+    # Each ray from the centre ends at the side that it meets first; the ray nearest to a corner ends at the corner.
     x, y = np.cos(angle), np.sin(angle)
     sideways = np.where(x > 0, 1 - u, u) * width / np.abs(x)
     upwards = np.where(y > 0, 1 - v, v) * height / np.abs(y)

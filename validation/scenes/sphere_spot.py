@@ -34,8 +34,8 @@ def sphere_spot() -> dict[str, Any]:
 
 
 def _sphere():
-    # Polar angles in the middle of 17 equal bands, ends closed by fans; the axis then points from the sphere to the
-    # light.
+    # Rings lie in the middle of 17 equal bands of the polar angle, and fans close the ends. The rotation points the
+    # axis at the light.
     polar = np.pi * (1 - (np.arange(17) + 0.5) / 17)
     sphere = lathe(_RADIUS * np.sin(polar), _RADIUS * np.cos(polar), 32)
     towards = np.subtract(_LIGHT, _CENTRE)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A tangle of tubes in fog before a spot light: after Billeter 2010, Fig. 8c, which shows the mesh "Yeah Right".
 
-Of the published mesh the text says that it has 188 000 triangles and is irregular; it is a piece of sculpture full of
-holes. The tubes here are our own.
+The paper says that its mesh is irregular, with 188 000 triangles; it is a sculpture full of holes. The tubes here are
+our own.
 """
 
 from dataclasses import dataclass
@@ -23,10 +23,10 @@ _LAMP = (-1.73, 3.37, 4.13)
 class _Tube:
     """A tube along a torus knot."""
 
-    turns: tuple[int, int]  #: about the axis of the torus and about its core, without a common divisor
-    radii: tuple[float, float]  #: of the core, and from there to the middle of the tube [m]
+    turns: tuple[int, int]  #: about the axis of the torus and about its core, coprime
+    radii: tuple[float, float]  #: of the core, and from the core to the middle of the tube [m]
     thickness: float  #: mean radius of the tube [m]
-    cells: tuple[int, int]  #: along the tube and about it
+    cells: tuple[int, int]  #: along and about the tube
     axis: tuple[float, float, float]  #: about which the torus is turned
     degrees: float  #: by which it is turned [degrees]
 
@@ -41,7 +41,7 @@ _TUBES = (
     _Tube((3, 5), (0.89, 0.47), 0.031, (1277, 9), (-0.2, 0.3, 1.0), 139.1),
     _Tube((1, 4), (1.19, 0.41), 0.043, (883, 11), (1.0, 0.1, -0.8), 101.7),
 )
-#: Waves that bend space and everything in it: displacement [m], wave vector [1/m], phase.
+#: Waves that displace all points: displacement [m], wave vector [1/m], phase.
 _WAVES = (
     ((0.113, -0.047, 0.071), (0.7, 1.9, 1.1), 0.7),
     ((-0.051, 0.079, 0.043), (2.3, -1.1, 1.7), 2.9),
@@ -76,10 +76,10 @@ def _tubes() -> Mesh:
 
 
 def _knot(tube: _Tube) -> Mesh:
-    """Return a tube along a knot on a torus about the z axis, its section uneven: 2 cells[0] cells[1] triangles.
+    """Return a tube of uneven section along a knot on a torus about the z axis: 2 cells[0] cells[1] triangles.
 
-    The normal of the torus is at right angles to every curve on it, so it carries the sections all the way round
-    without a seam.
+    The normal of the torus is perpendicular to every curve on it. So it orients the sections all the way round, and the
+    last section joins the first without a seam.
     """
     (about, across), (radius, core), (rings, sides) = tube.turns, tube.radii, tube.cells
     t = 2 * np.pi * np.arange(rings)[:, None] / rings
@@ -100,10 +100,10 @@ def _knot(tube: _Tube) -> Mesh:
 
 
 def _bent(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the points where the waves take them.
+    """Return the points, (n, 3) [m], displaced by the waves.
 
-    Displacement times wave vector, 0.33 + 0.32 + 0.30 summed over the waves, is below 1: no two points meet and no
-    surface is turned inside out.
+    The products of displacement and wave vector sum to 0.33 + 0.32 + 0.30 over the waves. The sum is below 1, so the
+    map is one to one: no surface touches another or turns inside out.
     """
     moved = points.copy()
     for displacement, wave, phase in _WAVES:

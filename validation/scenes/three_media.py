@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Three bodies of coloured fog that a bar runs through: Biri 2006, Fig. 7b and Table 2, 14 785 triangles.
+"""Three bounded media of coloured fog and a bar through them: Biri 2006, Fig. 7b and Table 2, 14 785 triangles.
 
 The published scene, known from a sentence and a small picture, has one box in a red, a blue and a green medium. Here
-the box is a long bar and has company, so that casters are at every position to the boundaries.
+the box is a long bar, and other casters lie inside, across and between the media.
 """
 
 from typing import Any
@@ -30,8 +30,8 @@ from validation.scenes.solids import box, gable, gem, icosphere, prism, star, te
 def three_media() -> dict[str, Any]:
     """Return three convex media, 462 triangles, closed casters within, across and between them, a floor and a wall.
 
-    The only open parts are the floor and the wall, whose gable makes the sum odd. Nothing but the three bodies holds a
-    medium: the camera, the lamp and the room are in clear air.
+    Only the floor and the wall are open; the gable of the wall makes the number of triangles odd. The camera, the lamp
+    and the room are in clear air.
     """
     media = {name: medium_boundary(name, mesh, medium) for name, mesh, medium in _media()}
     casters = {name: mitsuba_mesh(name, mesh, reflectance) for name, mesh, reflectance in _casters()}
@@ -71,7 +71,7 @@ def _media() -> list[tuple[str, Mesh, dict[str, Any]]]:
 
 
 def _casters() -> list[tuple[str, Mesh, tuple[float, float, float]]]:
-    """Return the closed casters: the bar runs through all three media, the rest is inside, between and before them."""
+    """Return the closed casters: a bar through all three media, and others inside, between and before them."""
     level, height = np.linspace(0.0, 1.0, 41), np.linspace(0.0, 1.0, 43)
     spindle = lathe(0.023 + 0.093 * np.sin(np.pi * level) ** 2 * (1.3 + np.cos(9.1 * level)), 1.37 * level, 36)
     vase = lathe(0.11 + 0.13 * np.sin(2.3 * height + 0.4) ** 2, 0.97 * height, 36)
@@ -102,7 +102,7 @@ def _wall() -> Mesh:
 SCENE = SceneRecord(
     "three-media",
     three_media,
-    "Three bodies of coloured fog and casters at every position to their boundaries, 14 785 triangles.",
+    "Three bounded media of coloured fog, with casters inside, across and between them, 14 785 triangles.",
     "Biri, Arques, Michelin 2006, Fig. 7b and Table 2: 35 frames/s; there one box in red, blue and green, here a bar",
     Animation(("objects",), objects=("bar",)),
 )

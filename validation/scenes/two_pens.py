@@ -27,7 +27,7 @@ def two_pens() -> dict[str, Any]:
 
 
 def _pen(length: float) -> Mesh:
-    """Return a pen: point, barrel, a ring and a cap, standing on its point."""
+    """Return a pen of a length [m] with point, barrel, ring and cap, which stands on its point."""
     level = np.linspace(0.0, 1.0, _RINGS)
     profile = np.interp(level, [0, 0.013, 0.11, 0.19, 0.55, 0.57, 0.59, 0.97, 1.0], [3, 9, 37, 53, 59, 71, 61, 55, 23])
     return lathe(profile / 700, length * level, _SIDES)

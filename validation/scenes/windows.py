@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Sun through the windows of a hazy room: shafts between glazing bars, in a box of fog, from a light at infinity.
+"""Sun through the windows of a hazy room: a directional light, shafts between glazing bars, a box of fog.
 
-Windows with bars cut the light into parallel beams, and what stands and hangs in the room cuts these again. A light at
-infinity needs media with bounds: the fog fills a slanted box within the walls. The camera stands before the room, which
-is open to it, in clear air.
+The glazing bars cut the light into parallel beams, and objects in the room cut the beams again. A directional light
+needs bounded media, so the fog fills a slanted box within the walls. The camera is in clear air before the open side of
+the room.
 """
 
 from collections.abc import Sequence
@@ -30,14 +30,14 @@ from validation.scenes.solids import box, gem, icosphere, prism, star, torus
 
 _LEFT, _FRONT, _WIDTH, _DEPTH, _HEIGHT = -2.63, -2.17, 5.37, 5.89, 3.43
 _THICKNESS = 0.19
-#: Lines of the wall along the room and upwards [m]; between them are stone, and panes from odd lines to even ones.
+#: Lines that divide the wall, along the room and upwards [m]; the panes lie between an odd line and the next.
 _PANES_ALONG = (0.53, 0.97, 1.04, 1.47, 2.39, 2.83, 2.91, 3.37, 4.31, 4.73, 4.81, 5.27)
 _PANES_UP = (0.83, 1.51, 1.58, 2.23, 2.29, 2.87)
 _STONE, _WOOD, _CLAY, _BRASS = (0.43, 0.41, 0.37), (0.37, 0.23, 0.13), (0.51, 0.29, 0.19), (0.59, 0.49, 0.23)
 
 
 def windows() -> dict[str, Any]:
-    """Return a room of 526 triangles, three windows of six panes each, things of 1210 in it, and fog in a box of 12."""
+    """Return a room of 526 triangles with three windows of six panes, objects of 1210 and fog in a box of 12."""
     return {
         "type": "scene",
         "sensor": camera((0.83, -6.91, 2.03), (-0.17, 0.29, 1.49), fov=47.9, size=(800, 600), in_fog=False),
@@ -57,13 +57,13 @@ _PHASE = {"type": "hg", "g": 0.37}
 
 
 def _haze() -> Mesh:
-    """Return the box of fog: it leaves a little air to all walls, and none of its faces is parallel to one."""
+    """Return the box of fog; it touches no wall, and none of its faces is parallel to a wall."""
     middle = (_LEFT + 0.5 * _WIDTH + 0.013, _FRONT + 0.5 * _DEPTH + 0.031, 0.5 * _HEIGHT + 0.017)
     return placed(box((_WIDTH - 0.29, _DEPTH - 0.37, _HEIGHT - 0.23)), middle, rotation((0.3, -0.2, 1.0), 1.3))
 
 
 def _room() -> Mesh:
-    """Return the floor, the ceiling, the wall at the back and the one opposite the windows; ten cells of two."""
+    """Return the floor, the ceiling, the back wall and the wall opposite the windows, 10 triangles."""
     left, width = _LEFT - _THICKNESS, _WIDTH + _THICKNESS
     back = _FRONT + _DEPTH
     return joined(
@@ -77,23 +77,23 @@ def _room() -> Mesh:
 
 
 def _window_wall() -> Mesh:
-    """Return the wall with the windows, a closed mesh: a slab with eighteen holes that go through it."""
+    """Return the wall with the windows as a closed mesh: a slab with eighteen through holes."""
     return pierced_slab(
         np.array([0.0, *_PANES_ALONG, _DEPTH]), np.array([0.0, *_PANES_UP, _HEIGHT]), _THICKNESS, (_LEFT, _FRONT, 0.0)
     )
 
 
 def pierced_slab(along: NDArray, up: NDArray, thickness: float, corner: Sequence[float]) -> Mesh:
-    """Return a closed upright slab in the plane x = corner with holes where both of a cell's numbers are odd.
+    """Return a closed upright slab in the plane x = corner[0] with a hole in every cell (i, j) with i and j odd.
 
     Parameters
     ----------
     along, up
-        Lines of the cells along y and z, from the corner on, ascending, an even number of each [m].
+        Lines between cells along y and z, from the corner on, ascending, an even number of each, (n,) [m].
     thickness
         Towards -x [m].
     corner
-        Its lowest corner [m].
+        The lowest corner of the slab, (3,) [m].
     """
     n, m = len(along) - 1, len(up) - 1
     y, z = np.meshgrid(along, up, indexing="ij")
@@ -114,7 +114,7 @@ def pierced_slab(along: NDArray, up: NDArray, thickness: float, corner: Sequence
             ring = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)]
             quads.append([at(*point, 0) for point in ring])
             quads.append([at(*point, 1) for point in reversed(ring)])
-            # A side of the cell with nothing beyond it is a wall between both layers.
+            # Where the next cell is open, a wall joins the two layers.
             for a, b, beyond in zip(ring, [*ring[1:], ring[0]], [(i, j - 1), (i + 1, j), (i, j + 1), (i - 1, j)]):
                 if not solid(*beyond):
                     quads.append([at(*a, 1), at(*b, 1), at(*b, 0), at(*a, 0)])
@@ -123,7 +123,7 @@ def pierced_slab(along: NDArray, up: NDArray, thickness: float, corner: Sequence
 
 
 def _things() -> list[tuple[str, Mesh, tuple[float, float, float]]]:
-    """Return what stands on the floor and hangs from above; each is closed, and sinks in a little where it stands."""
+    """Return the objects in the room; all are closed, and those that stand reach a little below the floor."""
     level = np.linspace(0.0, 1.0, 15)
     vase = lathe(0.09 + 0.11 * np.sin(2.7 * level + 0.5) ** 2, 0.67 * level, 18)
     return [
@@ -145,7 +145,7 @@ def _table() -> Mesh:
 SCENE = SceneRecord(
     "windows",
     windows,
-    "Sun through three barred windows into a hazy room: parallel shafts of a light at infinity, bounded fog.",
-    "none: the published scenes have lamps; this one is for directional lights, which shafts of sun are made of",
+    "Sun through three barred windows into a hazy room: parallel shafts of a directional light, bounded fog.",
+    "none: the published scenes have lamps; this one tests directional lights",
     Animation(("objects",), objects=("ring",)),
 )

@@ -1,15 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One-dimensional min/max mipmaps in epipolar slices: the lit pieces of rays by steps of 2^k texels of a shadow map.
+"""One-dimensional min/max mipmaps in epipolar slices: lit intervals by steps of 2^k texels of a shadow map.
 
 All rays of an epipolar slice see the same line of the shadow map. So a binary tree of the bounds along it, one for each
-slice, tells a ray at once of long pieces that are lit or dark as a whole (Chen, Baran, Durand, Jarosz 2011). Airlight
-is computed at samples of the slices, at intervals and at breaks of the depth, and interpolated to the pixels
-(Engelhardt and Dachsbacher 2010; Yusov 2013).
+slice, tells a ray at once of long intervals that are lit or dark as a whole (Chen, Baran, Durand, Jarosz 2011).
+Airlight is computed at samples of the slices, at regular distances and at breaks of the depth, and interpolated to the
+pixels (Engelhardt and Dachsbacher 2010; Yusov 2013).
 
-Three things differ from what is published, all to the good of the method: each lit piece is integrated by a kernel and
-not marched; a leaf of the tree is linear and not constant, see `realtime.methods.epipolar.min_max_tree`; and what is
-interpolated is not the airlight but its quotient by a simple estimate, see `_yardstick`: the published scenes are lit
-by the sun, and near a point light the airlight itself goes as 1 / distance.
+Three things differ from what is published, all to the good of the method: each lit interval is integrated by a kernel
+and not marched; a leaf of the tree is linear and not constant, see `realtime.methods.epipolar.min_max_tree`; and what
+is interpolated is not the airlight but its quotient by a simple estimate, see `_yardstick`: the published scenes are
+lit by the sun, and near a point light the airlight itself goes as 1 / distance.
+
+The sampling is no wrapper around other methods, as `realtime.tiles.adaptive_sampling` is. Slices are cut for one light
+and hold its tree, by which samples and pixels alike are walked, and samples lie between the centres of pixels, where
+lists of tiles, which bound the sixteen rays of a tile alone, miss what concerns them.
 """
 
 from collections.abc import Callable
@@ -19,7 +23,6 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.errors import InputError
 from realtime.memory import check_memory
 from realtime.methods.epipolar.min_max_tree import SliceHeights, slice_heights
 from realtime.methods.epipolar.samples import (
@@ -41,21 +44,54 @@ from realtime.methods.epipolar.slices import (
     pixel_number,
     slice_coordinate,
 )
-from realtime.methods.epipolar.walk import sum_lit_pieces
+from realtime.methods.epipolar.walk import sum_lit_intervals
+from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.light_airlight import RayAirlight, integral_type, ray_airlight
 from realtime.methods.interface.view import View, rays_in_media
 from realtime.numerics.array_types import bytes_of
+from realtime.parameters import Parameters, parameter
 from realtime.rays.ray_light import distance_to_light
 from realtime.scene.camera import Camera
 from realtime.scene.features import check_places
 from realtime.scene.lights import Light
 from realtime.scene.medium import transmittance
-from realtime.scene.phase import evaluate
 from realtime.scene.read_scene import Scene
-from realtime.shadow_maps.inverse_depth_field import inverse_depth
-from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, check_size, map_memory
+from realtime.shadow_maps.projection import light_faces
+from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, inverse_depth, map_memory, map_size
+from realtime.tiles.layout import Layout
 
-SAMPLINGS = ("slices", "pixels")
+_MOST = 65536  # slices, and samples of a slice
+
+
+@dataclass(frozen=True)
+class MinMaxParameters(Parameters):
+    """The parameters of one-dimensional min/max mipmaps."""
+
+    map: int = map_size(
+        512,
+        "texels on a side of a face of the shadow map, and of a slice's line for an edge of the cube or the cone "
+        "of a spot",
+    )
+    slices: int = parameter(
+        0,
+        "epipolar slices; 0 for half of width plus height, the published high quality",
+        least=0,
+        most=_MOST,
+        wanted=f"up to {_MOST}, or 0 for as many as the image needs",
+    )
+    samples: int = parameter(
+        0,
+        "samples of a slice, rounded up to a multiple of 32; 0 for half of the larger side",
+        least=0,
+        most=_MOST,
+        wanted=f"up to {_MOST}, or 0 for as many as the image needs",
+    )
+    step: int = parameter(16, "one sample in so many is computed, besides those at breaks of the depth", choices=STEPS)
+    sampling: str = parameter(
+        "slices",
+        "interpolate, or compute every pixel in its nearest slice: then `samples` and `step` have no effect",
+        choices=("slices", "pixels"),
+    )
 
 
 @dataclass(frozen=True)
@@ -66,33 +102,21 @@ class EpipolarMap:
     heights: Any  #: inverse planar depths at the corners of its texels [1/m]
 
 
-def min_max(
-    view: View, *, kernel, map: int = 512, slices: int = 0, samples: int = 0, step: int = 16, sampling: str = "slices"
-):
+def min_max(view: View, state: tuple[EpipolarMap, ...], lists, *, kernel, parameters: MinMaxParameters) -> Layers:
     """Return the airlight of every ray by one-dimensional min/max mipmaps [W/(m^2 sr)].
 
     Parameters
     ----------
     view
         The frame.
+    state
+        By light its shadow map, from `prepare_min_max`.
+    lists
+        Not used: what concerns a ray is the line of its slice.
     kernel
         An airlight kernel, see `realtime.kernels`.
-    map
-        Resolution of the shadow map, and of a slice's map for an edge of the cube or the cone of a spot [texels].
-    slices
-        Epipolar slices; 0 for (width + height) / 2, the published high quality.
-    samples
-        Samples of a slice, rounded up to a multiple of 32; 0 for max(width, height) / 2.
-    step
-        One sample in `step` is computed, besides those at breaks of the depth.
-    sampling
-        'slices', or 'pixels': every pixel is computed, in the slice that is nearest to it. Nothing is interpolated over
-        the image then, and `samples` and `step` have no effect.
-
-    Raises
-    ------
-    InputError
-        For parameters out of range.
+    parameters
+        Values of the parameters.
 
     Notes
     -----
@@ -107,45 +131,34 @@ def min_max(
     total = type(view.medium.albedo)(0)
     for number, light in enumerate(view.lights):
         airlight = _ray_airlight(view, number, kernel)
-        if not view.plan.shadows:
+        if not view.features.shadows:
             total += airlight.radiance(airlight.integral(*airlight.segment))
             continue
-        found: EpipolarMap = view.prepared[number]
         camera = view.camera
-        cut = image_slices(camera, light, slices or _usual_slices(camera))
-        heights = slice_heights(found.shadow_map, found.heights, cut, light)
+        cut = image_slices(camera, light, parameters.slices or _usual_slices(camera))
+        heights = slice_heights(state[number].shadow_map, state[number].heights, cut, light)
         point = image_point(camera, view.direction)
-        if sampling == "pixels":
+        if parameters.sampling == "pixels":
             total += airlight.radiance(_lit_integral(airlight, heights, _nearest(cut, point)))
             continue
         depth = _depth_image(cut, point, view.distance)
-        drawn = mark_samples(cut, depth, count=_whole_words(samples, camera), step=step)
+        drawn = mark_samples(cut, depth, count=_whole_words(parameters.samples, camera), step=parameters.step)
         shares = _sampled_shares(view, number, kernel, drawn, heights)
         total += airlight.radiance(_interpolated(airlight, drawn, shares, heights, point))
-    return total
+    return Layers(total)
 
 
-def prepare_min_max(
-    scene: Scene, *, map: int, slices: int, samples: int, step: int, sampling: str
-) -> Callable[[Scene], tuple[EpipolarMap, ...]]:
+def prepare_min_max(scene: Scene, parameters: MinMaxParameters) -> Callable[[Scene], tuple[EpipolarMap, ...]]:
     """Return the function that casts the shadow map of every light of a frame.
 
     Raises
     ------
     InputError
-        For parameters out of range, directional lights, and more memory than the machine has.
+        For directional lights, and more memory than the machine has.
     """
-    check_size(map)
-    check_places(scene.plan, "min-max")
-    if sampling not in SAMPLINGS:
-        raise InputError(f"sampling: got {sampling!r}, wanted one of {', '.join(SAMPLINGS)}")
-    for name, value in (("slices", slices), ("samples", samples)):
-        if not 0 <= value <= 65536:
-            raise InputError(f"{name}: got {value!r}, wanted up to 65536, or 0 for as many as the image needs")
-    if step not in STEPS:
-        raise InputError(f"step: got {step!r}, wanted one of {', '.join(str(one) for one in STEPS)}")
-
-    if scene.plan.shadows:
+    check_places(scene.features, "min-max")
+    map, slices, samples = parameters.map, parameters.slices, parameters.samples
+    if scene.features.shadows:
         held = sum(2 * map_memory(light, map) for light in scene.lights)
         drawn = max((_memory_of_slices(scene, light, map, slices, samples) for light in scene.lights), default=0)
         what = f"map: {map} texels, slices: {slices or _usual_slices(scene.camera)}"
@@ -166,7 +179,7 @@ def _whole_words(samples: int, camera: Camera) -> int:
 def _memory_of_slices(scene: Scene, light: Light, size: int, slices: int, samples: int) -> int:
     """Return about how much the slices of a light take [bytes]: per leaf its value, two bounds, four of the tree."""
     number = bytes_of(type(light.position.x))
-    leaves = size if light.kind == "spot" else 2 * size
+    leaves = size if light_faces(light) == 1 else 2 * size
     lanes = _whole_words(samples, scene.camera)
     return (slices or _usual_slices(scene.camera)) * (number * 7 * leaves + lanes * (4 + 3 * number))
 
@@ -181,16 +194,16 @@ def _epipolar_map(scene: Scene, light: Light, size: int) -> EpipolarMap:
 def _ray_airlight(view: View, number: int, kernel) -> RayAirlight:
     """Return the airlight of one light along the rays of a view."""
     light = view.lights[number]
-    media = rays_in_media(replace(view, lights=(light,)))[0] if view.plan.bounded else None
+    media = rays_in_media(replace(view, lights=(light,)))[0] if view.features.bounded else None
     return ray_airlight(view, light, kernel, media)
 
 
 def _lit_integral(airlight: RayAirlight, heights: SliceHeights, number, active=True):
-    """Return the integral over the lit pieces of rays, each in a slice; 0 where not `active`."""
+    """Return the integral over the lit intervals of rays, each in a slice; 0 where not `active`."""
     x0, x1 = airlight.segment
     zero = dr.zeros(integral_type(airlight.view), dr.width(airlight.view.distance))
     ends = x0, dr.select(active, x1, x0)
-    return sum_lit_pieces(heights, number, airlight.geometry, ends, airlight.integral, zero)
+    return sum_lit_intervals(heights, number, airlight.geometry, ends, airlight.integral, zero)
 
 
 def _nearest(slices: Slices, point):
@@ -216,14 +229,14 @@ def _sampled_shares(view: View, number: int, kernel, samples: Samples, heights: 
         sample = dr.gather(mi.UInt32, marked, lane)
         (i, j), slice_number, depth = sample_ray(samples, sample)
         direction = dr.normalize(camera.forward + camera.left * i + camera.up * j)
-        seen = replace(view, direction=direction, direction_low=None, distance=depth, square_tiles=False)
+        seen = replace(view, direction=direction, direction_low=None, distance=depth, layout=Layout.SOME)
         airlight = _ray_airlight(seen, number, kernel)
         share = _lit_integral(airlight, heights, slice_number) / _yardstick(airlight)
         dr.scatter(shares, dr.select(dr.isfinite(share), share, no_value(share)), sample)
         return lane
 
     lane = spread(dr.width(marked))
-    if view.plan.bounded:
+    if view.features.bounded:
         # The planes of bodies are written to a table first, which no branch may do: empty room repeats the last sample.
         computed(dr.minimum(lane, dr.maximum(count, 1) - 1))
     else:
@@ -254,7 +267,7 @@ def _yardstick(airlight: RayAirlight):
     r0, r1 = distance_to_light(geometry, x0), distance_to_light(geometry, end)
     x = dr.select(endless, x0 + r0, (x0 * r1 + end * r0) / (r0 + r1))
     r = distance_to_light(geometry, x)
-    weight = dr.atan2(across, along) / height * evaluate(medium.phase, (foot - x) / r)
+    weight = dr.atan2(across, along) / height * medium.phase.evaluate((foot - x) / r)
     return dr.select(x1 > x0, transmittance(medium, x + r) * weight, 0)
 
 

@@ -22,7 +22,8 @@ import mitsuba as mi
 from realtime.methods.epipolar.slices import Slices
 from realtime.numerics.array_types import two_numbers
 from realtime.scene.lights import Light
-from realtime.shadow_maps.shadow_map import ShadowMap, cube_coordinates, face_coordinates
+from realtime.shadow_maps.projection import cube_coordinates, light_faces
+from realtime.shadow_maps.shadow_map import ShadowMap
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,7 @@ def slice_heights(shadow_map: ShadowMap, heights, slices: Slices, light: Light) 
         Of the light.
     heights
         Its inverse planar depths at the corners of the texels
-        (`realtime.shadow_maps.inverse_depth_field.inverse_depth`) [1/m].
+        (`realtime.shadow_maps.shadow_map.inverse_depth`) [1/m].
     slices
         The slices of the image.
     light
@@ -67,8 +68,9 @@ def slice_heights(shadow_map: ShadowMap, heights, slices: Slices, light: Light) 
     ----------
     Chen, Baran, Durand, Jarosz 2011, *Real-time volumetric shadows using 1D min-max mipmaps*.
     """
-    edges = 1 if light.kind == "spot" else 2
-    chord = _chord(slices, light, shadow_map.size) if light.kind == "spot" else None
+    one = light_faces(light) == 1
+    edges = 1 if one else 2
+    chord = _chord(slices, light, shadow_map.size) if one else None
     Float = type(heights)
     empty = SliceHeights(shadow_map.size, edges, slices, chord, None)
     samples = empty.leaves + 1
@@ -118,8 +120,8 @@ def _tree(heights: SliceHeights, one, other):
 def _height(shadow_map: ShadowMap, heights, direction):
     """Return s of the surface in a direction k: it is hit at k / s [1/m times |k|]."""
     size = shadow_map.size
-    if shadow_map.frame:
-        a, b, depth = face_coordinates(shadow_map.frame, mi.UInt32(0), direction)
+    if shadow_map.projection.basis:
+        a, b, _, depth = shadow_map.projection.homogeneous(mi.UInt32(0), direction, 0)
         face, u, v = mi.UInt32(0), a / depth, b / depth
     else:
         face, u, v = cube_coordinates(direction)

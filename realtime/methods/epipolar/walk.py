@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The lit pieces of rays in the height maps of epipolar slices.
+"""The lit intervals of rays in the height maps of epipolar slices.
 
 In a slice (`realtime.methods.epipolar.min_max_tree`) let t and h be foot and height of a ray. From cross(k, direction)
 = s cross(P, direction) = s h and D direction = (-t, h),
@@ -25,6 +25,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
+from realtime.intervals.lit_intervals import LitIntervals, add_waiting, close_interval, no_intervals, open_interval
 from realtime.methods.epipolar.min_max_tree import SliceHeights, line_point, node_pair
 from realtime.rays.ray_light import RayGeometry
 
@@ -36,16 +37,14 @@ class _Walk:
     place: Any  #: the first leaf of the node to look at
     level: Any  #: the node has 2^level leaves
     lit: Any  #: whether the light reaches the ray there
-    opened: Any  #: where it came back [m]
-    closed: Any  #: where it ended [m]
-    ready: Any  #: a lit piece has ended
-    done: Any  #: there are no more
+    intervals: LitIntervals  #: in distances [m]
+    done: Any  #: there are no more nodes
 
 
-def sum_lit_pieces(
+def sum_lit_intervals(
     heights: SliceHeights, number, geometry: RayGeometry, segment, integral: Callable[[Any, Any], Any], zero
 ):
-    """Add up an integral over the lit pieces of rays.
+    """Add up an integral over the lit intervals of rays.
 
     Parameters
     ----------
@@ -56,11 +55,11 @@ def sum_lit_pieces(
     geometry
         The rays and the light.
     segment
-        Distances (x0, x1) between which to look; `x1` may be infinite, and x1 <= x0 for rays to leave out.
+        Distances (x0, x1) between which to look; `x1` may be infinite, and x1 <= x0 for rays to leave out [m].
     integral
-        Function (x0, x1) -> value of one piece.
+        Function (x0, x1) -> value of one interval.
     zero
-        The value of no piece, one for each ray.
+        The value of no interval, one for each ray.
     """
     x0, x1 = segment
     width = dr.width(zero)
@@ -79,29 +78,25 @@ def sum_lit_pieces(
         # From a leaf that begins no larger node the way up is by steps.
         level=dr.select(leaf % heights.size == 0, mi.UInt32(heights.top), mi.UInt32(0)),
         lit=_line_value(heights, number, ray, begin) >= height * s,
-        opened=+x0,
-        closed=+x0,
-        ready=dr.full(mi.Bool, False, width),
+        intervals=no_intervals(zero, +x0),
         done=~(x1 > x0),
     )
 
-    def body(total, walk):
+    def between(begin, end):
+        return integral(begin, dr.maximum(begin, end))
+
+    def body(walk):
         (walk,) = dr.while_loop(
             state=(walk,),
-            cond=lambda walk: ~walk.ready & ~walk.done,
+            cond=lambda walk: ~walk.intervals.waits & ~walk.done,
             body=lambda walk: (_step(heights, number, ray, (x0, x1), (end, last), walk),),
             labels=("walk",),
         )
-        begin = dr.clip(walk.opened, x0, x1)
-        value = integral(begin, dr.clip(walk.closed, begin, x1))
-        total = total + dr.select(walk.ready, value, 0)
-        walk.ready = mi.Bool(False)
-        return total, walk
+        walk.intervals = add_waiting(walk.intervals, between)
+        return (walk,)
 
-    total, _ = dr.while_loop(
-        state=(zero, start), cond=lambda total, walk: ~walk.done, body=body, labels=("total", "walk")
-    )
-    return total
+    (walk,) = dr.while_loop(state=(start,), cond=lambda walk: ~walk.done, body=body, labels=("walk",))
+    return walk.intervals.total
 
 
 def _step(heights: SliceHeights, number, ray, segment, stop, walk: _Walk) -> _Walk:
@@ -110,39 +105,32 @@ def _step(heights: SliceHeights, number, ray, segment, stop, walk: _Walk) -> _Wa
     end, last = stop
     Float = type(height)
     after = walk.place + (mi.UInt32(1) << walk.level)
-    one, other = node_pair(heights, number, walk.place, walk.level)
+    s0, s1 = node_pair(heights, number, walk.place, walk.level)
     kx0, ky0 = line_point(heights, number, Float(walk.place))
     kx1, ky1 = line_point(heights, number, Float(after))
     g0, g1 = _line(ray, kx0, ky0), _line(ray, kx1, ky1)
     # The ray may end within the node.
     g_end = dr.select(Float(after) > end, _line_value(heights, number, ray, end), g1)
-    all_lit = dr.minimum(g0, g_end) >= height * dr.maximum(one, other)
-    all_dark = dr.maximum(g0, g_end) < height * dr.minimum(one, other)
+    all_lit = dr.minimum(g0, g_end) >= height * dr.maximum(s0, s1)
+    all_dark = dr.maximum(g0, g_end) < height * dr.minimum(s0, s1)
     whole, leaf = all_lit | all_dark, walk.level == 0
     # Within a leaf, from end to end.
-    d0, d1 = dr.abs(g0 - height * one), g1 - height * other
+    d0, d1 = dr.abs(g0 - height * s0), g1 - height * s1
     lit = dr.select(whole, all_lit, d1 >= 0)
     passed = whole | leaf
-    changed = passed & (lit != walk.lit)
+    lit = dr.select(passed, lit, walk.lit)
     # Where a whole node differs from what was before it, by rounding, the change is at its beginning.
     ky = dr.select(whole, ky0, ky0 * dr.abs(d1) + ky1 * d0)
-    divisor = dr.select(whole, g0, height * (one * dr.abs(d1) + other * d0))
+    divisor = dr.select(whole, g0, height * (s0 * dr.abs(d1) + s1 * d0))
     x = dr.select(divisor > 0, square * ky / divisor, dr.inf)
     x = dr.clip(x, segment[0], segment[1])
     over = passed & (after > last)
-    closes = changed & walk.lit
-    remains = over & lit
-    step_up = passed & ((after & ((mi.UInt32(2) << walk.level) - 1)) == 0) & (walk.level < heights.top)
+    changed, remains = lit != walk.lit, over & lit
+    intervals = open_interval(walk.intervals, x, changed & lit)
+    intervals = close_interval(intervals, dr.select(remains, segment[1], x), remains | (changed & walk.lit))
+    step_up = passed & (dr.tzcnt(after) > walk.level) & (walk.level < heights.top)
     level = dr.select(passed, dr.select(step_up, walk.level + 1, walk.level), walk.level - 1)
-    return _Walk(
-        place=dr.select(passed, after, walk.place),
-        level=level,
-        lit=dr.select(passed, lit, walk.lit),
-        opened=dr.select(changed & lit, x, walk.opened),
-        closed=dr.select(remains, segment[1], dr.select(closes, x, walk.closed)),
-        ready=closes | remains,
-        done=over,
-    )
+    return _Walk(dr.select(passed, after, walk.place), level, lit, intervals, over)
 
 
 def _line(ray, kx, ky):
@@ -167,7 +155,7 @@ def _position(heights: SliceHeights, number, ray, x):
         q = dr.select(px >= 0, py / (px + py), 2 - py / (py - px))
         q = dr.select(px + py == 0, 0, q)
     else:
-        x0, y0, x1, y1 = (dr.gather(type(x), one, number) for one in heights.chord)
+        x0, y0, x1, y1 = (dr.gather(type(x), place, number) for place in heights.chord)
         before, beyond = x0 * py - y0 * px, px * y1 - py * x1
         # Outside the wedge of the chord one of them is negative.
         before, beyond = dr.maximum(before, 0), dr.maximum(beyond, 0)

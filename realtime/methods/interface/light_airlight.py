@@ -4,27 +4,23 @@
 from dataclasses import dataclass
 from typing import Any
 
-from realtime.bounded_media.airlight import bounded_airlight
-from realtime.bounded_media.directional_airlight import ParallelRay
-from realtime.bounded_media.ray_segments import MediaRay
+from realtime.bounded_media.airlight import LitRay
 from realtime.kernels.registry import airlight_integral, gamma
 from realtime.methods.interface.view import View, bounded_radiance, radiance
-from realtime.rays.ray_light import clip_to_cone, ray_geometry
+from realtime.rays.ray_light import RayGeometry, ray_geometry
 from realtime.scene.lights import Light
 
 
 def integral_type(view: View) -> Any:
     """Return the type of an integral: a number for a grey medium, a colour otherwise."""
-    grey = len(view.medium.sigma_t) == 1 and not view.plan.bounded
+    grey = len(view.medium.sigma_t) == 1 and not view.features.bounded
     return type(view.distance) if grey else type(view.medium.albedo)
 
 
 def ray_airlight(
-    view: View, light: Light, kernel, media: MediaRay | ParallelRay | None = None, *, geometry: Any = None
+    view: View, light: Light, kernel, media: LitRay | None = None, *, geometry: Any = None
 ) -> "RayAirlight":
     """Return the airlight of a light along the rays of a view; `media` where they are bounded, `geometry` if known."""
-    if light.kind == "directional":
-        return RayAirlight(view, light, None, kernel, media)
     if geometry is None:
         geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
     return RayAirlight(view, light, geometry, kernel, media)
@@ -36,20 +32,19 @@ class RayAirlight:
 
     view: View
     light: Light
-    geometry: Any  #: a `RayGeometry`; None for a light at infinity
+    geometry: RayGeometry
     kernel: Any
-    media: MediaRay | ParallelRay | None  #: where media are bounded
+    media: LitRay | None  #: where media are bounded
 
     @property
     def segment(self) -> tuple[Any, Any]:
         """The part of the rays that the light could reach: up to the visible surface, in the cone of a spot [m]."""
-        x0, x1 = type(self.view.distance)(0), self.view.distance
-        return clip_to_cone(self.geometry, x0, x1) if self.light.kind == "spot" else (x0, x1)
+        return self.geometry.lit_segment(type(self.view.distance)(0), self.view.distance)
 
     def integral(self, x0, x1):
         """Return the integral over a segment; `radiance` knows its units."""
         if self.media:
-            return bounded_airlight(self.media, x0, x1)
+            return self.media.airlight(x0, x1)
         return airlight_integral(self.kernel, self.geometry, x0, x1, medium=self.view.medium, light=self.light)
 
     def radiance(self, integral):

@@ -1,39 +1,67 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The record of a method: its function, and what a user and a frame must know of it."""
+"""The record of a method: its stages, and what a user and a frame must know of it."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from types import MappingProxyType
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
+
+from realtime.methods.interface.layers import Layers
+from realtime.methods.interface.view import View
+from realtime.parameters import Parameters, defaults
+from realtime.scene.read_scene import Scene
 
 #: What of a scene may change from frame to frame; `look` is all that moves nothing: the medium and the lights' colours.
 MOVABLE = ("camera", "geometry", "light", "look")
 
+#: What runs before a frame when things moved: a function of the scene as it is now that returns the method's state.
+Preparation = Callable[[Scene], Any]
+
+
+def never(parameters: Any) -> bool:
+    """Return False, whatever the parameters."""
+    return False
+
+
+def always(parameters: Any) -> bool:
+    """Return True, whatever the parameters."""
+    return True
+
 
 @dataclass(frozen=True)
 class Method:
-    """A method under its name, with what a user must know of it."""
+    """A method under its name: its stages in the order in which they run, then what a user and a frame must know.
+
+    In a scene where nothing casts a shadow neither `prepare` nor `cull` runs, state and lists are ().
+    """
 
     name: str
-    function: Callable[..., Any]
+    #: ``render(view, state, lists, *, kernel, parameters)``: the layers of every ray.
+    render: Callable[..., Layers]
     summary: str
     source: str
-    uses_kernel: bool = True
-    prepare: Callable[..., Any] | None = None  #: (scene, **parameters) -> function of the scene, run when things moved
-    prepared_from: frozenset[str] = frozenset(MOVABLE)  #: what `prepare` looks at; while it stands still, it is not run
-    tiles: Callable[..., tuple[Any, ...] | None] | None = (
-        None  #: (view, **parameters) -> `view.tiles`, from camera, geometry and lights, without their colours and media
-    )
-    lights_surfaces: Callable[[Mapping[str, Any]], bool] = lambda settings: (
-        False
-    )  #: parameters -> whether it returns, after the radiance, by light whether it reaches the surface
-    casts_rays: Callable[[Mapping[str, Any]], bool] = lambda settings: False  #: parameters -> whether it casts rays
-    frozen: Callable[[Mapping[str, Any]], bool] = lambda settings: True  #: parameters -> whether it can be frozen
-    tiled: Callable[[Mapping[str, Any]], bool] | None = (
-        None  #: parameters -> whether it computes each ray by itself, as its parameter `tolerance` wants
-    )
+    parameters: type[Parameters] = Parameters
+    #: ``prepare(scene, parameters)`` checks what parameters ask of the scene and returns what makes the state: by light
+    #: a shadow map, or shadow planes. None: the state is ().
+    prepare: Callable[[Scene, Any], Preparation] | None = None
+    #: What `prepare` looks at; while that stands still, its state is kept.
+    prepared_from: frozenset[str] = frozenset(MOVABLE)
+    #: ``cull(view, state, parameters)``: by light lists of what concerns each tile, from camera, geometry and lights,
+    #: without their colours and the media. None: there is nothing to sort, the lists are ().
+    cull: Callable[[View, Any, Any], Any] | None = None
+    #: ``f(layers, g_buffer, history, *, camera, parameters)`` -> layers: functions over the whole image, run in turn
+    #: on what `render` returned. All arrays have an entry per pixel, row by row; `history` is None in the first frame.
+    passes: tuple[Callable[..., Layers], ...] = ()
+    uses_kernel: bool = True  #: whether `render` is given an airlight kernel
     shadows: bool = True  #: whether it knows shadows; one that does not is wrong where there are occluders
-    parameters: Mapping[str, int | float | str] = field(
-        default_factory=lambda: MappingProxyType({})
-    )  #: name -> default
+    provides_visibility: Callable[[Any], bool] = never  #: parameters -> whether its layers have a visibility
+    casts_rays: Callable[[Any], bool] = never  #: parameters -> whether it casts rays
+    frozen: Callable[[Any], bool] = always  #: parameters -> whether Dr.Jit can record it once and replay it
+    #: Parameters -> whether it computes each ray by itself, on any layout: then a frame may interpolate. It has the
+    #: parameter `tolerance`, `realtime.tiles.adaptive_sampling.tolerance`. None: it has not.
+    by_rays: Callable[[Any], bool] | None = None
     check: Callable[[Any], None] | None = None  #: airlight (height, width, 3) -> raises what is wrong with it
+
+    @property
+    def defaults(self) -> dict[str, Any]:
+        """The defaults of its parameters by their names."""
+        return defaults(self.parameters)

@@ -14,7 +14,7 @@ and what `realtime.methods.light_volumes.tile_lists` leaves out has no change of
 beginning is lit at its end after an even number of crossings: no tolerance can break it.
 
 A leaf's texels are looked at only where the tile may cross them and the ray passes: one bit each, 64 bits for four
-leaves. What is found to be crossed is computed again to be kept, since most is not.
+leaves. Crossings are computed again when they are kept: most texels have none.
 
 Crossings are kept in order of distance, the nearest eight. A ray with more goes over its texels again for those that
 are farther; two may lie at the same distance, so it counts anew how many it has passed.
@@ -26,6 +26,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
+from realtime.intervals.nearest_crossings import Crossings, filled, insert
 from realtime.methods.light_volumes.pyramid import unpacked
 from realtime.methods.light_volumes.ray_lines import distance_at
 from realtime.methods.light_volumes.texel_crossings import Passage, may_cross, passage, texel_crossings
@@ -36,16 +37,16 @@ PLACES = 8  #: crossings that a ray keeps; even, so that it is lit after them as
 
 
 @dataclass
-class Crossings:
+class NearestCrossings:
     """Crossings of rays, beyond some distance."""
 
-    queue: list[Any]  #: the nearest, in order, infinite where there are no more [m]
+    queue: Crossings  #: the nearest, by distance, infinite where there are no more [m]
     lost: Any  #: whether others had no place in it
     odd: Any  #: whether an odd number of them is not beyond that distance
 
 
-def nearest_crossings(heights, face, line: Line, source, after, active):
-    """Return the nearest crossings of rays beyond some distance, and whether there are more.
+def nearest_crossings(heights, face, line: Line, source, after, active) -> NearestCrossings:
+    """Return the nearest crossings of rays beyond some distance.
 
     Parameters
     ----------
@@ -67,7 +68,7 @@ def nearest_crossings(heights, face, line: Line, source, after, active):
     last = dr.select(active, last, first)
     slope = slope_of(line, heights.size)
 
-    def of_chunk(k, found):
+    def of_chunk(k, nearest):
         bits = _chunk_bits(line, slope, leaves, k, last)
 
         def texel(bits):
@@ -77,37 +78,40 @@ def nearest_crossings(heights, face, line: Line, source, after, active):
 
         def look(bits, crossed):
             lowest = bits & (~bits + 1)
-            found = may_cross(line, passage(heights, face, line, texel(bits)))
-            return bits ^ lowest, crossed | dr.select(found, lowest, 0)
+            is_crossed = may_cross(line, passage(heights, face, line, texel(bits)))
+            return bits ^ lowest, crossed | dr.select(is_crossed, lowest, 0)
 
         _, crossed = dr.while_loop(
             state=(bits, mi.UInt64(0)), cond=lambda bits, crossed: bits != 0, body=look, labels=("bits", "crossed")
         )
 
-        def keep(crossed, found):
-            found = _with_crossings(line, passage(heights, face, line, texel(crossed)), found, after)
-            return crossed & (crossed - 1), found
+        def keep(crossed, nearest):
+            nearest = _with_crossings(line, passage(heights, face, line, texel(crossed)), nearest, after)
+            return crossed & (crossed - 1), nearest
 
-        _, found = dr.while_loop(
-            state=(crossed, found), cond=lambda crossed, found: crossed != 0, body=keep, labels=("crossed", "found")
+        _, nearest = dr.while_loop(
+            state=(crossed, nearest),
+            cond=lambda crossed, nearest: crossed != 0,
+            body=keep,
+            labels=("crossed", "nearest"),
         )
-        return k + CHUNK, found
+        return k + CHUNK, nearest
 
-    def of_larger(k, found):
+    def of_larger(k, nearest):
         node = unpacked(dr.gather(mi.UInt32, leaves.entries, k))
         side = mi.UInt32(heights.size) >> node.level
-        return k + 1, _square_crossings(heights, face, line, (node.i * side, node.j * side, side), found, after)
+        return k + 1, _square_crossings(heights, face, line, (node.i * side, node.j * side, side), nearest, after)
 
-    queue, no = [dr.full(Float, dr.inf, width) for _ in range(PLACES)], dr.full(mi.Bool, False, width)
-    found = Crossings(queue, no, no & True)
+    no = dr.full(mi.Bool, False, width)
+    nearest = NearestCrossings(filled(dr.inf, PLACES, Float, width, gains=False), no, no & True)
     for kind, body in ((~larger, of_chunk), (larger, of_larger)):
-        _, found = dr.while_loop(
-            state=(dr.select(kind, first, last), found),
-            cond=lambda k, found: k < last,
+        _, nearest = dr.while_loop(
+            state=(dr.select(kind, first, last), nearest),
+            cond=lambda k, nearest: k < last,
             body=body,
-            labels=("k", "found"),
+            labels=("k", "nearest"),
         )
-    return found
+    return nearest
 
 
 def _chunk_bits(line: Line, slope, leaves, k, last):
@@ -120,25 +124,26 @@ def _chunk_bits(line: Line, slope, leaves, k, last):
     return bits
 
 
-def _with_crossings(line: Line, over: Passage, found: Crossings, after) -> Crossings:
+def _with_crossings(line: Line, over: Passage, nearest: NearestCrossings, after) -> NearestCrossings:
     """Add the crossings of a texel; few rays have two, in a branch of their own."""
     here = texel_crossings(line, over)
-    found = _with_crossing(found, here.crosses, distance_at(line.ray, here.t), after)
+    nearest = _with_crossing(nearest, here.crosses, distance_at(line.ray, here.t), after)
 
-    def add(found, x):
-        return _with_crossing(found, dr.full(type(here.twice), True), x, after)
+    def add(nearest, x):
+        return _with_crossing(nearest, dr.full(type(here.twice), True), x, after)
 
-    args = found, distance_at(line.ray, here.second)
-    return dr.if_stmt(args=args, cond=here.twice, true_fn=add, false_fn=lambda found, x: found)
+    args = nearest, distance_at(line.ray, here.second)
+    return dr.if_stmt(args=args, cond=here.twice, true_fn=add, false_fn=lambda nearest, x: nearest)
 
 
-def _with_crossing(found: Crossings, crosses, x, after) -> Crossings:
+def _with_crossing(nearest: NearestCrossings, crosses, x, after) -> NearestCrossings:
     """Add a crossing at distance `x` where there is one."""
-    queue, out = _inserted(found.queue, dr.select(crosses & (x > after), x, dr.inf))
-    return Crossings(queue, found.lost | (out < dr.inf), found.odd ^ (crosses & (x <= after)))
+    x_beyond = dr.select(crosses & (x > after), x, dr.inf)
+    queue, farthest, _ = insert(nearest.queue, x_beyond, larger_is_nearer=False)
+    return NearestCrossings(queue, nearest.lost | (farthest < dr.inf), nearest.odd ^ (crosses & (x <= after)))
 
 
-def _square_crossings(heights, face, line: Line, square, found: Crossings, after) -> Crossings:
+def _square_crossings(heights, face, line: Line, square, nearest: NearestCrossings, after):
     """Add the crossings in a square of texels, one after the other."""
     column, row, side = square
     ray, Float = line.ray, type(after)
@@ -150,25 +155,16 @@ def _square_crossings(heights, face, line: Line, square, found: Crossings, after
     i = dr.select(by_u, dr.select(line.right, column, column + side - 1), i)
     j = dr.select((in_v >= begin) & ~by_u, dr.select(line.up, row, row + side - 1), j)
 
-    def step(i, j, t, found):
+    def step(i, j, t, nearest):
         over = passage(heights, face, line, (i, j))
-        found = _with_crossings(line, over, found, after)
+        nearest = _with_crossings(line, over, nearest, after)
         by_u = borders(Float(i), ray.u[0], ray.per_u)[1] <= over.t[1]
         i = dr.select(by_u, dr.select(line.right, i + 1, i - 1), i)
-        return i, dr.select(by_u, j, dr.select(line.up, j + 1, j - 1)), over.t[1], found
+        return i, dr.select(by_u, j, dr.select(line.up, j + 1, j - 1)), over.t[1], nearest
 
     return dr.while_loop(
-        state=(i, j, begin, found),
-        cond=lambda i, j, t, found: t < end,
+        state=(i, j, begin, nearest),
+        cond=lambda i, j, t, nearest: t < end,
         body=step,
-        labels=("i", "j", "t", "found"),
+        labels=("i", "j", "t", "nearest"),
     )[-1]
-
-
-def _inserted(queue, x):
-    """Return the queue with a distance in its place, and the farthest of all, which it has no room for."""
-    places = []
-    for place in queue:
-        places.append(dr.minimum(place, x))
-        x = dr.maximum(place, x)
-    return places, x

@@ -21,7 +21,7 @@ import mitsuba as mi
 
 from realtime.methods.light_volumes.texel_walls import BOTTOM, LEFT, PLACES, RIGHT, TOP, walled_heights
 from realtime.scene.lights import Light
-from realtime.shadow_maps.inverse_depth_field import LEAF, LightHeights, height_at
+from realtime.shadow_maps.inverse_depth_field import LEAF, InverseDepthField
 from realtime.shadow_maps.shadow_map import cast_map_rays
 
 _HALVINGS = PLACES.bit_length() - 1
@@ -30,7 +30,7 @@ _KEPT = 0.5  # of the change between the samples that a jump keeps in the last i
 _SIDES = 2 * LEAF * (LEAF + 1)  # of the texels of a leaf
 
 
-def with_walls(heights: LightHeights, scene, light: Light) -> LightHeights:
+def with_walls(heights: InverseDepthField, scene, light: Light) -> InverseDepthField:
     """Return a height field with upright walls where the map of a light jumps.
 
     Parameters
@@ -58,7 +58,7 @@ class _Edge:
     upright: Any  #: whether it goes along v
 
 
-def _edge_of(heights: LightHeights, leaf, side) -> _Edge:
+def _edge_of(heights: InverseDepthField, leaf, side) -> _Edge:
     """Return a side by the number of its leaf and its own in there."""
     nodes = 1 << heights.finest
     row = leaf // nodes
@@ -70,7 +70,7 @@ def _edge_of(heights: LightHeights, leaf, side) -> _Edge:
     return _Edge(face, (leaf - row * nodes) * LEAF + i, (row - face * nodes) * LEAF + j, upright)
 
 
-def _jumping_sides(heights: LightHeights):
+def _jumping_sides(heights: InverseDepthField):
     """Return the sides over which heights differ enough, by their leaves' numbers and their own."""
     per_face = 4**heights.finest
     leaf = dr.arange(mi.UInt32, heights.faces * per_face)
@@ -90,7 +90,7 @@ def _jumping_sides(heights: LightHeights):
     return dr.gather(mi.UInt32, of_leaf, some), dr.gather(mi.UInt32, side, some)
 
 
-def _ends(heights: LightHeights, edge: _Edge):
+def _ends(heights: InverseDepthField, edge: _Edge):
     """Return the heights at both ends of sides."""
     size = heights.size
     i, j = dr.minimum(edge.i, size - 1), dr.minimum(edge.j, size - 1)
@@ -101,7 +101,7 @@ def _ends(heights: LightHeights, edge: _Edge):
     return tuple(dr.gather(type(heights.texels), heights.texels, place) for place in (first, first + step))
 
 
-def _trace(heights: LightHeights, scene, light: Light, sides, walls):
+def _trace(heights: InverseDepthField, scene, light: Light, sides, walls):
     """Find the walls on sides and write them to both texels of each; return the numbers of these texels."""
     edge = _edge_of(heights, *sides)
     one, other = _ends(heights, edge)
@@ -113,7 +113,7 @@ def _trace(heights: LightHeights, scene, light: Light, sides, walls):
         u = dr.fma(dr.select(edge.upright, column, column + middle), 2.0 / size, -1.0)
         v = dr.fma(dr.select(edge.upright, row + middle, row), 2.0 / size, -1.0)
         distance = cast_map_rays(scene, light, (edge.face, u, v))
-        height = height_at(heights.frame, heights.depth, (type(one)(u), type(one)(v)), distance)
+        height = heights.projection.inverse_depth((type(one)(u), type(one)(v)), distance)
         far = dr.abs(height - one) < dr.abs(height - other)
         number = (number << 1) + dr.select(far, mi.UInt32(1), mi.UInt32(0))
         return step + 1, number, dr.select(far, height, one), dr.select(far, other, height)

@@ -22,73 +22,89 @@ over the pixels that it
   one has fewer triangles where the map is flat (`realtime.methods.light_volumes.published.tessellation`).
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
 
 from realtime.errors import InputError
 from realtime.memory import check_memory
+from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.light_airlight import RayAirlight, integral_type, ray_airlight
 from realtime.methods.interface.view import View, rays_in_media
 from realtime.methods.light_volumes.jump_search import with_walls
 from realtime.methods.light_volumes.published.mesh import THRESHOLD, memory_needed, volume_mesh
 from realtime.methods.light_volumes.published.signed_sum import mesh_airlight
 from realtime.methods.light_volumes.tile_lists import Leaves, tile_leaves
-from realtime.methods.light_volumes.walk import sum_lit_pieces
+from realtime.methods.light_volumes.walk import sum_lit_intervals
 from realtime.numerics.array_types import bytes_of
+from realtime.parameters import Parameters, parameter
 from realtime.scene.lights import Light
 from realtime.scene.read_scene import Scene
-from realtime.shadow_maps.inverse_depth_field import LightHeights, level_start, light_heights
-from realtime.shadow_maps.shadow_map import cast_shadow_map, check_size, map_memory
+from realtime.shadow_maps.inverse_depth_field import InverseDepthField, inverse_depth_field, level_start
+from realtime.shadow_maps.projection import light_faces, light_projection
+from realtime.shadow_maps.shadow_map import cast_shadow_map, map_memory, map_size
+from realtime.tiles.adaptive_sampling import tolerance
+from realtime.tiles.layout import Layout
 
-EVALUATIONS = ("walk", "mesh")
-TESSELLATIONS = ("static", "adaptive")
-SURFACES = ("map", "ray")
-WALLS = ("upright", "slanted")
+
+@dataclass(frozen=True)
+class LightVolumeParameters(Parameters):
+    """The parameters of light volumes."""
+
+    map: int = map_size(512, "texels on a side of a face of the shadow map, a power of two")
+    evaluation: str = parameter(
+        "walk",
+        "how crossings are found: each ray over the map, or each triangle over the image",
+        choices=("walk", "mesh"),
+    )
+    tessellation: str = parameter(
+        "static",
+        "of the mesh: two triangles a texel, or larger ones where the map is flat",
+        choices=("static", "adaptive"),
+    )
+    threshold: float = parameter(
+        THRESHOLD,
+        "for `adaptive`: departure from the map that is allowed, relative to the depth",
+        above=0,
+        wanted=f"a positive number, for instance {THRESHOLD:g}",
+    )
+    surface: str = parameter(
+        "map", "where the shadows on surfaces come from; a mesh always casts rays", choices=("map", "ray")
+    )
+    walls: str = parameter(
+        "upright",
+        "where the map jumps: at a place that rays find, or across one texel as published; a mesh has slanted ones",
+        choices=("upright", "slanted"),
+    )
+    tolerance: float = tolerance()
+
+    def _check_together(self) -> None:
+        if self.tessellation == "adaptive" and self.evaluation != "mesh":
+            raise InputError(
+                f"tessellation=adaptive: got evaluation={self.evaluation}, which has no triangles to save; wanted "
+                "evaluation=mesh with it"
+            )
 
 
 def light_volumes(
-    view: View,
-    *,
-    kernel,
-    map: int = 512,
-    evaluation: str = "walk",
-    tessellation: str = "static",
-    threshold: float = THRESHOLD,
-    surface: str = "map",
-    walls: str = "upright",
-):
-    """Return the airlight of every ray in the light volumes [W/(m^2 sr)].
+    view: View, state: tuple[Any, ...], lists: tuple[Leaves, ...], *, kernel, parameters: LightVolumeParameters
+) -> Layers:
+    """Return the airlight of every ray in the light volumes, and by light whether it reaches the visible surface.
 
     Parameters
     ----------
     view
         The frame.
+    state
+        By light its height field, or its mesh, from `prepare_light_volumes`.
+    lists
+        By light the leaves of the height field that concern each tile, from `cull_light_volumes`.
     kernel
         An airlight kernel, see `realtime.kernels`.
-    map
-        Resolution of the shadow maps, a power of two [texels].
-    evaluation
-        'walk' or 'mesh', see above.
-    tessellation
-        'static' or 'adaptive', of the mesh.
-    threshold
-        Departure of an adaptive mesh from the shadow map that is allowed, relative to the depth.
-    surface
-        Where the shadows on surfaces come from: 'map', which costs nothing with evaluation=walk, or 'ray'. A mesh needs
-        rays for them.
-    walls
-        What joins both sides of a jump of the map for evaluation=walk: 'upright', where rays from the light find it
-        between two samples (`realtime.methods.light_volumes.jump_search`), or 'slanted', as published. A mesh has
-        slanted ones.
-
-    Returns
-    -------
-    radiance
-        In-scattered radiance [W/(m^2 sr)].
-    lit
-        By light, whether it reaches the visible surface; only where `finds_lit_surfaces`.
+    parameters
+        Values of the parameters.
 
     Notes
     -----
@@ -105,112 +121,89 @@ def light_volumes(
     """
     total = type(view.medium.albedo)(0)
     lit = []
-    in_media = rays_in_media(view) if view.plan.bounded else ()
+    in_media = rays_in_media(view) if view.features.bounded else ()
     for number, light in enumerate(view.lights):
-        if evaluation == "mesh" and view.plan.shadows:
-            total += mesh_airlight(view, light, view.prepared[number], kernel=kernel)
+        if parameters.evaluation == "mesh" and view.features.shadows:
+            total += mesh_airlight(view, light, state[number], kernel=kernel)
             continue
         airlight = ray_airlight(view, light, kernel, in_media[number] if in_media else None)
-        if view.plan.shadows:
-            leaves = view.tiles[number] if view.tiles else _leaves(view, number)
-            value, reached = _walk(view.prepared[number], leaves, airlight)
+        if view.features.shadows:
+            value, reached = _walk(state[number], lists[number], airlight)
         else:
             value, reached = airlight.radiance(airlight.integral(*airlight.segment)), True
         total += value
         # A surface may be beside the map of a directional light, whose shadows on surfaces come from rays.
-        lit.append(True if light.kind == "directional" else reached)
-    return (total, tuple(lit)) if finds_lit_surfaces({"evaluation": evaluation, "surface": surface}) else total
+        lit.append(reached if light.w else True)
+    return Layers(total, tuple(lit) if finds_lit_surfaces(parameters) else None)
 
 
-def finds_lit_surfaces(settings: Mapping[str, Any]) -> bool:
+def finds_lit_surfaces(parameters: LightVolumeParameters) -> bool:
     """Return whether the method, with these parameters, says which surfaces are lit."""
-    return settings["evaluation"] == "walk" and settings["surface"] == "map"
+    return parameters.evaluation == "walk" and parameters.surface == "map"
 
 
-def light_volume_tiles(view: View, *, evaluation: str, **_) -> tuple[Leaves, ...] | None:
+def cull_light_volumes(view: View, state: tuple[Any, ...], parameters: LightVolumeParameters) -> tuple[Leaves, ...]:
     """Return by light the leaves of its height field that concern each tile; a mesh has none."""
-    if evaluation == "mesh":
-        return None
-    return tuple(_leaves(view, number) for number in range(len(view.lights)))
+    if parameters.evaluation == "mesh":
+        return ()
+    return tuple(_leaves(view, light, heights) for light, heights in zip(view.lights, state))
 
 
-def _leaves(view: View, number: int) -> Leaves:
-    toward = view.lights[number].position - view.origin
-    place = {"light": toward, "square": view.square_tiles}
-    return tile_leaves(view.prepared[number], lambda lane: view.rays(lane)[0], view.distance, **place)
+def _leaves(view: View, light: Light, heights: InverseDepthField) -> Leaves:
+    toward = light.position - view.origin
+    place = {"light": toward, "square": view.layout is Layout.SQUARES}
+    return tile_leaves(heights, lambda lane: view.rays(lane)[0], view.distance, **place)
 
 
-def _walk(heights: LightHeights, leaves: Leaves, airlight: RayAirlight):
+def _walk(heights: InverseDepthField, leaves: Leaves, airlight: RayAirlight):
     """Return the airlight of one light along the rays [W/(m^2 sr)], and whether it reaches their ends."""
     view = airlight.view
     zero = dr.zeros(integral_type(view), dr.width(view.distance))
     away = view.origin - airlight.light.position
     place = {"away": away, "direction": view.direction, "segment": airlight.segment, "tile": view.tile}
-    value, reached = sum_lit_pieces(heights, leaves, **place, integral=airlight.integral, zero=zero)
+    value, reached = sum_lit_intervals(heights, leaves, **place, integral=airlight.integral, zero=zero)
     return airlight.radiance(value), reached
 
 
-def prepare_light_volumes(
-    scene: Scene, *, map: int, evaluation: str, tessellation: str, threshold: float, surface: str, walls: str
-) -> Callable[[Scene], tuple[Any, ...]]:
+def prepare_light_volumes(scene: Scene, parameters: LightVolumeParameters) -> Callable[[Scene], tuple[Any, ...]]:
     """Return the function that makes the height field, or the mesh, of every light of a frame.
 
     Raises
     ------
     InputError
-        For parameters out of range or that contradict each other, a mesh in bounded media, and more memory than the
-        machine has.
+        For a mesh in bounded media, and more memory than the machine has.
     """
-    _check(map, evaluation, tessellation, threshold, surface, walls)
-    if evaluation == "mesh" and scene.plan.bounded:
+    map, evaluation = parameters.map, parameters.evaluation
+    if evaluation == "mesh" and scene.features.bounded:
         raise InputError(
             "evaluation=mesh: the scene has a medium with bounds, wanted one medium that fills all space; use "
             "evaluation=walk"
         )
-    if scene.plan.shadows:
+    if scene.features.shadows:
         needed = sum(_memory_of(light, map, evaluation) for light in scene.lights)
         check_memory(f"map: {map} texels for {len(scene.lights)} light(s)", needed, "use a smaller map")
 
     def volume(scene: Scene, light: Light):
         shadow_map = cast_shadow_map(scene.geometry, light, map)
         if evaluation == "walk":
-            heights = light_heights(shadow_map)
-            return with_walls(heights, scene.geometry, light) if walls == "upright" else heights
+            heights = inverse_depth_field(shadow_map)
+            return with_walls(heights, scene.geometry, light) if parameters.walls == "upright" else heights
+        tessellation, threshold = parameters.tessellation, parameters.threshold
         return volume_mesh(shadow_map, light, tessellation=tessellation, threshold=threshold)
 
     return lambda scene: tuple(volume(scene, light) for light in scene.lights)
 
 
-def _check(map: int, evaluation: str, tessellation: str, threshold: float, surface: str, walls: str) -> None:
-    check_size(map)
-    words = (
-        ("evaluation", evaluation, EVALUATIONS),
-        ("tessellation", tessellation, TESSELLATIONS),
-        ("surface", surface, SURFACES),
-        ("walls", walls, WALLS),
-    )
-    for name, value, allowed in words:
-        if value not in allowed:
-            raise InputError(f"{name}: got {value!r}, wanted one of {', '.join(allowed)}")
-    if tessellation == "adaptive" and evaluation != "mesh":
-        raise InputError(
-            f"tessellation=adaptive: got evaluation={evaluation}, which has no triangles to save; wanted "
-            "evaluation=mesh with it"
-        )
-    if not 0 < threshold < float("inf"):
-        raise InputError(f"threshold: got {threshold!r}, wanted a positive number, for instance {THRESHOLD:g}")
-
-
 def _memory_of(light: Light, size: int, evaluation: str) -> int:
     """Return about how much the volume of a light takes, an upper bound where it is adaptive [bytes]."""
     number = bytes_of(type(light.position.x))
-    faces = 6 if light.kind == "point" else 1
+    faces = light_faces(light)
     corners = map_memory(light, size)
     if evaluation == "mesh":
         # Drawing it takes four doubles for each vertex as it is, and four for it in the image.
         return corners + memory_needed(faces, size) + faces * (size + 1) ** 2 * 8 * 8
     # Distances and heights at the corners, four heights and walls a texel, two bounds a node, a gap and sides a leaf.
-    heights = LightHeights(size, None, None, None)
+    heights = InverseDepthField(size, light_projection(light), None, None)
     leaves = 4**heights.finest
     numbers = 4 * size**2 + 2 * level_start(heights.finest + 1) + 2 * leaves
     return 2 * corners + faces * (number * numbers + 4 * leaves + 4 * size**2)

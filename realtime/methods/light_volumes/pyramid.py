@@ -13,7 +13,7 @@ import mitsuba as mi
 
 from realtime.methods.light_volumes.tile_beams import BeamPlanes, may_meet, over_square
 from realtime.numerics.array_types import is_single
-from realtime.shadow_maps.inverse_depth_field import LightHeights, node_bounds
+from realtime.shadow_maps.inverse_depth_field import InverseDepthField, node_bounds
 
 
 @dataclass
@@ -44,7 +44,7 @@ def unpacked(entry) -> Node:
     return Node(entry >> 26, entry & 0x1FFF, (entry >> 13) & 0x1FFF)
 
 
-def descend(heights: LightHeights, planes: BeamPlanes, face, leaf, count, write, active):
+def descend(heights: InverseDepthField, planes: BeamPlanes, face, leaf, count, write, active):
     """Count and write the nodes of level `leaf` that beams may meet."""
 
     def body(node: Node, count, going):
@@ -78,7 +78,7 @@ def descend(heights: LightHeights, planes: BeamPlanes, face, leaf, count, write,
     return count
 
 
-def meets(heights: LightHeights, planes: BeamPlanes, face, node: Node, active):
+def meets(heights: InverseDepthField, planes: BeamPlanes, face, node: Node, active):
     """Return whether a beam may meet the height field over a node, and what it was found from."""
     low, high = node_bounds(heights, face, node.level, node.i, node.j, active)
     half = _half(type(low), node.level)

@@ -9,7 +9,7 @@ has
 and y = x / c. All four are linear along the projective line: with t from 0 to 1 between two points of the ray, each is
 (1 - t) its value at one and t its value at the other, and x = y / s. At the end of an endless ray s = 0 and y = 1 / dc.
 
-Of a directional light's face u, v and s = -c are linear in x itself, so y = x with weight 1 in place of s; the
+Of a directional light's face u, v and s are linear in x itself, so y = x with weight 1 in place of s; the
 ray is cut where s = 0, and all before the largest height is lit.
 
 The part of the ray in the face is cut out by c + a >= 0, c - a >= 0, c + b >= 0, c - b >= 0. A ray that stays on the
@@ -23,8 +23,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.shadow_maps.inverse_depth_field import LightHeights, node_bounds
-from realtime.shadow_maps.shadow_map import face_coordinates, parallel_coordinates
+from realtime.shadow_maps.inverse_depth_field import InverseDepthField, node_bounds
 
 _NEARER = 1 - 1e-4  # of the nearest height, with room for rounding
 _STEEP = 1e30  # stands for 1/0: lines that are never crossed lie far beyond [0, 1]
@@ -48,15 +47,13 @@ class FaceRay:
     stops: Any = False  #: whether the ray ends in the face, and does not go on in another one
 
 
-def in_face(heights: LightHeights, face, away, direction, segment):
+def in_face(heights: InverseDepthField, face, away, direction, segment):
     """Return the part of a segment of rays that lies in a face, x0 >= x1 where none does; see `face_ray`."""
-    a0, b0, c0 = face_coordinates(heights.frame, face, away)
-    da, db, dc = face_coordinates(heights.frame, face, direction)
+    a0, b0, s0, c0 = heights.projection.homogeneous(face, away, 1)
+    da, db, ds, dc = heights.projection.homogeneous(face, direction, 0)
     begin, end = segment
-    if heights.depth is not None:
-        (a0, b0, c0), (da, db, dc) = (parallel_coordinates(heights.frame, one) for one in (away, direction))
-        begin, end = _cut(begin, end, -c0, -dc)
-        c0, dc = type(c0)(1), type(dc)(0)
+    if not heights.projection.w:
+        begin, end = _cut(begin, end, s0, ds)
     # The neighbours across come later in the order of axes, but for the last axis; those above only for the first one.
     for start, slope, is_first in (
         (c0 + a0, dc + da, face < 4),
@@ -69,7 +66,7 @@ def in_face(heights: LightHeights, face, away, direction, segment):
     return begin, end
 
 
-def face_ray(heights: LightHeights, face, away, direction, segment) -> FaceRay:
+def face_ray(heights: InverseDepthField, face, away, direction, segment) -> FaceRay:
     """Return rays in a face.
 
     Parameters
@@ -85,16 +82,16 @@ def face_ray(heights: LightHeights, face, away, direction, segment) -> FaceRay:
     segment
         The distances (x0, x1) of the part in the face; `x1` may be infinite.
     """
-    a0, b0, c0 = face_coordinates(heights.frame, face, away)
-    da, db, dc = face_coordinates(heights.frame, face, direction)
+    a0, b0, s0, c0 = heights.projection.homogeneous(face, away, 1)
+    da, db, ds, dc = heights.projection.homogeneous(face, direction, 0)
     begin, end = segment
     zero = mi.UInt32(0)
     _, highest = node_bounds(heights, face, zero, zero, zero)
-    if heights.depth is not None:
-        (a0, b0, c0), (da, db, dc) = (parallel_coordinates(heights.frame, one) for one in (away, direction))
+    if not heights.projection.w:
+        (*_, c0), (*_, dc) = (heights.projection.products(face, vector) for vector in (away, direction))  # -s
         t0, t1 = _cut(begin, end, highest / _NEARER + c0, dc)
         walks = (t0 < t1) & (highest > 0)
-        ends = [_parallel_coordinates(heights.size, x, (a0, b0, -c0), (da, db, -dc), walks) for x in (t0, t1)]
+        ends = [_parallel_coordinates(heights.size, x, (a0, b0, s0), (da, db, ds), walks) for x in (t0, t1)]
         return _face_ray(begin, end, walks, ends, parallel=True)
     nearest = _NEARER / highest  # infinite where nothing is hit: all is lit
     t0, t1 = _cut(begin, end, c0 - nearest, dc)

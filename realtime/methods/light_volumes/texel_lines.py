@@ -11,7 +11,7 @@ import mitsuba as mi
 
 from realtime.methods.light_volumes.ray_lines import FaceRay, at_line
 from realtime.methods.light_volumes.texel_walls import height_in, parts_of
-from realtime.shadow_maps.inverse_depth_field import LightHeights, texel_heights, texel_walls
+from realtime.shadow_maps.inverse_depth_field import InverseDepthField, texel_heights, texel_walls
 
 _ROUNDING = 1e-5  # of a height of the map, with room
 _STEEPEST = 1e6  # rows a column; what is steeper goes over all rows of its column
@@ -30,7 +30,7 @@ class Line:
     slack: Any  #: how far below the height field a point at t = 1 may seem that lies on what it samples
 
 
-def line_of(heights: LightHeights, face, ray: FaceRay) -> Line:
+def line_of(heights: InverseDepthField, face, ray: FaceRay) -> Line:
     """Return the line of a ray; D at its ends is that of the texel whose own borders are on either side of them."""
     right, up = ray.per_u > 0, ray.per_v > 0
     excess, cells, slack = [], [], type(ray.begin)(0)

@@ -27,7 +27,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.shadow_maps.inverse_depth_field import LightHeights, level_start, texel_heights
+from realtime.shadow_maps.inverse_depth_field import InverseDepthField, level_start, texel_heights
 
 PLACES = 64  #: on a side, where a wall may stand: what is smaller costs rays, and outlines between two sides are bent
 BOTTOM, TOP, LEFT, RIGHT = range(4)  #: sides of a texel, v = 0, v = 1, u = 0 and u = 1, by their bytes
@@ -129,7 +129,7 @@ def height_in(parts: Parts, x, y):
     return height_at(parts, value_at(parts.line, x, y) > 0, x, y)
 
 
-def walled_heights(heights: LightHeights, walls, texels) -> LightHeights:
+def walled_heights(heights: InverseDepthField, walls, texels) -> InverseDepthField:
     """Return a height field with walls in its texels, and the bounds of its nodes as these need them.
 
     Parameters
@@ -151,7 +151,7 @@ def walled_heights(heights: LightHeights, walls, texels) -> LightHeights:
     return replace(heights, bounds=bounds, gaps=gaps, walls=walls)
 
 
-def _widen(heights: LightHeights, arrays, texel, walls) -> None:
+def _widen(heights: InverseDepthField, arrays, texel, walls) -> None:
     """Widen bounds and gaps to hold the planes over texels with a corner cut off."""
     (bounds, gaps), mode = arrays, dr.ReduceMode.Direct  # few: no copies of the arrays for each thread
     face, i, j = texel

@@ -22,17 +22,16 @@ difference of the two Gammas instead, as the paper does.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from realtime.bounded_media.airlight import FORMS, ambient_radiance, check_form
-from realtime.bounded_media.directional_airlight import ParallelRay
-from realtime.bounded_media.ray_segments import MediaRay
+from realtime.bounded_media.airlight import FORMS, LitRay, ambient_radiance, check_form
 from realtime.errors import InputError
+from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.light_airlight import RayAirlight, integral_type, ray_airlight
 from realtime.methods.interface.view import View, rays_in_media
 from realtime.methods.shadow_planes.pixel_rays import aim_at, read_spot, seen_rays, seen_ways
@@ -40,20 +39,88 @@ from realtime.methods.shadow_planes.plane_table import PlaneIndex, index_planes
 from realtime.methods.shadow_planes.published_crossings import Buffer, sum_crossings
 from realtime.methods.shadow_planes.published_mesh import mesh_gamma, surface_gamma
 from realtime.methods.shadow_planes.spot_pyramid import cone_ring
-from realtime.methods.shadow_planes.sweep import RayPlanes, ray_planes, sum_lit_segments
+from realtime.methods.shadow_planes.sweep import RayPlanes, ray_planes, sum_lit_intervals
 from realtime.methods.shadow_planes.tile_lists import Lists, tile_lists
 from realtime.methods.shadow_planes.view_culling import bodies_in_view
 from realtime.numerics.array_types import ArrayTypes, types_of
+from realtime.parameters import Parameters, parameter
 from realtime.scene.camera import HostCamera, read_camera
 from realtime.scene.features import check_places
 from realtime.scene.lights import Light
 from realtime.scene.mesh_adjacency import Casters, read_casters, with_positions
 from realtime.scene.read_scene import Scene
+from realtime.tiles.adaptive_sampling import tolerance
+from realtime.tiles.layout import Layout
 
-ORDERS = ("exact", "paper", "none")
-EVALUATIONS = ("pixel", "vertex")
-SUMS = ("segments", "gamma")
-BUFFERS = ("float", "8bit")
+
+@dataclass(frozen=True)
+class ShadowPlaneParameters(Parameters):
+    """The parameters of shadow planes."""
+
+    order: str = parameter(
+        "exact", "how shadow within shadow is decided, see below", choices=("exact", "paper", "none")
+    )
+    evaluation: str = parameter(
+        "pixel",
+        "Gamma at every crossing, or at the vertices of a mesh of each plane and of the surfaces, interpolated, as "
+        "published",
+        choices=("pixel", "vertex"),
+    )
+    sum: str = parameter(
+        "segments",
+        "sums of J over lit segments, which are positive, or differences of Gamma, which cancel; differences only with "
+        "order=exact and evaluation=pixel",
+        choices=("segments", "gamma"),
+    )
+    buffer: str = parameter(
+        "float",
+        "the paper's frame buffer: 255 steps up to `white`, clamped after every plane",
+        choices=("float", "8bit"),
+    )
+    white: float = parameter(
+        1.0, "the radiance that fills the 8-bit buffer; what is brighter is cut off", above=0, unit="W/(m^2 sr)"
+    )
+    rows: int = parameter(
+        16,
+        "rows of the mesh of a plane, each 1.5 times as far from the light as the last; beyond the last Gamma is "
+        "constant",
+        least=2,
+    )
+    ambient: float = parameter(
+        0.0,
+        "radiance of a constant light field in the medium, the paper's stand-in for multiple scattering, which adds "
+        "albedo ambient (1 - exp(-sigma_t x)); the truth has none",
+        least=0,
+        unit="W/(m^2 sr)",
+    )
+    media: str = parameter(
+        "exact", "bounded media: the true depth on both legs, or the constant R of section 4.2", choices=FORMS
+    )
+    cone: int = parameter(
+        0,
+        "edges of the pyramid of planes that bounds a spot, 32 in the paper; 0 is the cone itself, and planes bound no "
+        "light",
+        least=3,
+        most=4096,
+        also=(0,),
+        wanted="0 for the cone itself, or 3 to 4096 edges",
+    )
+    tolerance: float = tolerance()
+
+    def _check_together(self) -> None:
+        if self.cone and self.evaluation == "vertex":
+            raise InputError(
+                "cone: wanted evaluation=pixel; the planes of a cone begin too close to the light to be meshed"
+            )
+        if self.sum == "gamma" and not self.segments:
+            raise InputError(
+                "sum=gamma: wanted order=exact, evaluation=pixel and buffer=float; the others add Gammas anyway"
+            )
+
+    @property
+    def segments(self) -> bool:
+        """Whether the lit segments of a ray are known, so that each can be integrated by itself."""
+        return self.order == "exact" and self.evaluation == "pixel" and self.buffer == "float"
 
 
 @dataclass(frozen=True)
@@ -80,17 +147,16 @@ class PlanePreparation:
         return with_positions(self.casters, scene.positions)
 
 
-def prepare_shadow_planes(scene: Scene, **settings) -> PlanePreparation:
+def prepare_shadow_planes(scene: Scene, parameters: ShadowPlaneParameters) -> PlanePreparation:
     """Read the casters of a scene and return the function that finds the shadow planes of a frame.
 
     Raises
     ------
     InputError
-        For a parameter out of range, casters without triangles and directional lights.
+        For casters without triangles and directional lights.
     """
-    _check(**settings)
-    check_places(scene.plan, "shadow-planes")
-    return PlanePreparation(read_casters(scene.geometry), settings["cone"])
+    check_places(scene.features, "shadow-planes")
+    return PlanePreparation(read_casters(scene.geometry), parameters.cone)
 
 
 def plane_finder(
@@ -102,7 +168,7 @@ def plane_finder(
     """
     position = np.array(light.position, dtype=np.float64).ravel()
     ring = None
-    if cone and light.kind == "spot":
+    if cone and light.cone is not None:
         ring = cone_ring(np.array(light.axis, dtype=np.float64).ravel(), float(light.cos_cutoff[0]), cone)
     seen = None if ring is not None else read_spot(light)
 
@@ -116,54 +182,26 @@ def plane_finder(
 
 def shadow_planes(
     view: View,
+    state: tuple[PlaneIndex, ...],
+    lists: tuple[Lists, ...],
     *,
     kernel,
-    order: str = "exact",
-    evaluation: str = "pixel",
-    sum: str = "segments",
-    buffer: str = "float",
-    white: float = 1.0,
-    rows: int = 16,
-    ambient: float = 0.0,
-    media: str = "exact",
-    cone: int = 0,
-):
-    """Return the airlight of every ray between shadow planes.
+    parameters: ShadowPlaneParameters,
+) -> Layers:
+    """Return the airlight of every ray between shadow planes, and by light whether it reaches the visible surface.
 
     Parameters
     ----------
     view
         The frame.
+    state
+        By light its shadow planes, from `prepare_shadow_planes`.
+    lists
+        By light the planes that concern each tile, from `cull_shadow_planes`.
     kernel
         An airlight kernel, see `realtime.kernels`.
-    order
-        'exact', 'paper' or 'none', see above.
-    evaluation
-        'pixel': Gamma at every crossing; 'vertex': Gamma at the vertices of a mesh of each plane and of the surfaces,
-        interpolated, as published.
-    sum
-        'segments' or 'gamma'; only with order=exact and evaluation=pixel.
-    buffer
-        'float', or '8bit': the paper's frame buffer, which holds 255 steps up to `white` and clamps after every plane.
-    white
-        Radiance at which the 8-bit buffer is full [W/(m^2 sr)].
-    rows
-        Rows of vertices of the mesh of a plane, each 1.5 times as far from the light as the last.
-    ambient
-        Radiance of a constant light field in the medium, the paper's stand-in for multiple scattering [W/(m^2 sr)];
-        adds albedo ambient (1 - exp(-sigma_t x)). The truth has none.
-    media
-        In bounded media 'exact' or 'paper', the constant R of section 4.2, see `realtime.bounded_media.airlight`.
-    cone
-        Edges of the cone of a spot, whose planes then bound its light, 32 in the paper: a pyramid inside the cone. 0
-        for the cone itself, as a scene without casters has it always.
-
-    Returns
-    -------
-    radiance
-        In-scattered radiance [W/(m^2 sr)].
-    lit
-        By light, whether it reaches the visible surface.
+    parameters
+        Values of the parameters.
 
     Notes
     -----
@@ -178,46 +216,50 @@ def shadow_planes(
     """
     total = type(view.medium.albedo)(0)
     lit = []
-    in_media: tuple[MediaRay | ParallelRay, ...] = ()
-    if view.plan.bounded:
-        check_form(view.medium, media)
-        _check_bounded(evaluation)
-        in_media = rays_in_media(view, media)
+    in_media: tuple[LitRay, ...] = ()
+    if view.features.bounded:
+        check_form(view.medium, parameters.media)
+        _check_bounded(parameters.evaluation)
+        in_media = rays_in_media(view, parameters.media)
     for number, light in enumerate(view.lights):
-        if cone and light.kind == "spot" and not light.soft and view.plan.shadows:
-            light = replace(light, kind="point")  # planes bound it
-        if not view.plan.shadows:
+        if parameters.cone and light.cone is not None and not light.soft and view.features.shadows:
+            light = light.without_cone()  # planes bound it
+        if not view.features.shadows:
             airlight = ray_airlight(view, light, kernel, in_media[number] if in_media else None)
             total += airlight.radiance(airlight.integral(type(view.distance)(0), view.distance))
             lit.append(True)
             continue
-        index = view.prepared[number]
-        lists = view.tiles[number] if view.tiles else tile_planes(view, index, order=order)
+        index = state[number]
         seen = seen_rays(index.aim, view.camera, view.pixel, index.distance, light)
-        rays = ray_planes(lists, seen.x, seen.y, seen.z, tile=view.tile)
+        rays = ray_planes(lists[number], seen.x, seen.y, seen.z, tile=view.tile)
         airlight = ray_airlight(view, light, kernel, in_media[number] if in_media else None, geometry=seen.geometry)
-        if order == "exact" and evaluation == "pixel" and buffer == "float":
-            value, reached = _segments(index, lists, rays, airlight, differences=sum == "gamma")
+        if parameters.segments:
+            differences = parameters.sum == "gamma"
+            value, reached = _segments(index, lists[number], rays, airlight, differences=differences)
         else:
-            at_plane, at_surface = _gammas(index, airlight, evaluation=evaluation, rows=rows)
-            levels = Buffer(white) if buffer == "8bit" else None
+            at_plane, at_surface = _gammas(index, airlight, evaluation=parameters.evaluation, rows=parameters.rows)
+            levels = Buffer(parameters.white) if parameters.buffer == "8bit" else None
+            gammas = at_plane, at_surface
             value, reached = sum_crossings(
-                index, lists, rays, view.distance, (at_plane, at_surface), order=order, buffer=levels
+                index, lists[number], rays, view.distance, gammas, order=parameters.order, buffer=levels
             )
         total += value
         lit.append(reached)
+    ambient = parameters.ambient
     if ambient and in_media:
         total += ambient_radiance(in_media[0].pieces, view.distance, ambient)
     elif ambient:
         distance = dr.minimum(view.distance, 1e30)
         for_channel = [1 - dr.exp(-sigma_t * distance) for sigma_t in view.medium.sigma_t]
         total += view.medium.albedo * ambient * type(total)(*for_channel)
-    return total, tuple(lit)
+    return Layers(total, tuple(lit))
 
 
-def shadow_plane_tiles(view: View, *, order: str, **_) -> tuple[Lists, ...]:
+def cull_shadow_planes(
+    view: View, state: tuple[PlaneIndex, ...], parameters: ShadowPlaneParameters
+) -> tuple[Lists, ...]:
     """Return by light the planes that concern each tile of the image."""
-    return tuple(tile_planes(view, index, order=order) for index in view.prepared)
+    return tuple(tile_planes(view, index, order=parameters.order) for index in state)
 
 
 def tile_planes(view: View, index: PlaneIndex, *, order: str) -> Lists:
@@ -227,7 +269,7 @@ def tile_planes(view: View, index: PlaneIndex, *, order: str) -> Lists:
         pixel = dr.gather(mi.UInt32, view.pixel, lane)
         return seen_ways(index.aim, view.camera, pixel)
 
-    return tile_lists(index, rays, view.distance, order=order, square=view.square_tiles)
+    return tile_lists(index, rays, view.distance, order=order, square=view.layout is Layout.SQUARES)
 
 
 def _segments(index: PlaneIndex, lists: Lists, rays: RayPlanes, airlight: RayAirlight, *, differences: bool):
@@ -238,7 +280,7 @@ def _segments(index: PlaneIndex, lists: Lists, rays: RayPlanes, airlight: RayAir
         return airlight.gamma(b) - airlight.gamma(a) if differences else airlight.integral(a, b)
 
     zero = dr.zeros(integral_type(view), dr.width(view.distance))
-    value, reached = sum_lit_segments(index, lists, rays, airlight.segment, integral, zero)
+    value, reached = sum_lit_intervals(index, lists, rays, airlight.segment, integral, zero)
     return airlight.radiance(value), reached
 
 
@@ -262,44 +304,4 @@ def _check_bounded(evaluation: str) -> None:
         raise InputError(
             "evaluation=vertex: Gamma has kinks where planes cross the bounds of a medium, between any vertices; use "
             "evaluation=pixel in scenes with bounded media"
-        )
-
-
-def _check(
-    *,
-    order: str,
-    evaluation: str,
-    sum: str,
-    buffer: str,
-    white: float,
-    rows: int,
-    ambient: float,
-    media: str,
-    cone: int,
-) -> None:
-    words = (
-        ("order", order, ORDERS),
-        ("evaluation", evaluation, EVALUATIONS),
-        ("sum", sum, SUMS),
-        ("buffer", buffer, BUFFERS),
-        ("media", media, FORMS),
-    )
-    for name, value, allowed in words:
-        if value not in allowed:
-            raise InputError(f"{name}: got {value!r}, wanted one of {', '.join(allowed)}")
-    if not white > 0:
-        raise InputError(f"white: got {white!r}, wanted a radiance above 0 [W/(m^2 sr)]")
-    if not 0 <= ambient < float("inf"):
-        raise InputError(f"ambient: got {ambient!r}, wanted a finite radiance of 0 or more [W/(m^2 sr)]")
-    if rows < 2:
-        raise InputError(f"rows: got {rows!r}, wanted at least 2 rows of vertices")
-    if cone and not 3 <= cone <= 4096:
-        raise InputError(f"cone: got {cone!r}, wanted 0 for the cone itself, or 3 to 4096 edges")
-    if cone and evaluation == "vertex":
-        raise InputError(
-            "cone: wanted evaluation=pixel; the planes of a cone begin too close to the light to be meshed"
-        )
-    if sum == "gamma" and (order != "exact" or evaluation != "pixel" or buffer != "float"):
-        raise InputError(
-            "sum=gamma: wanted order=exact, evaluation=pixel and buffer=float; the others add Gammas anyway"
         )

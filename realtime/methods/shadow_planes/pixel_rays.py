@@ -102,7 +102,7 @@ class HostSpot:
 
 def read_spot(light: Light) -> HostSpot | None:
     """Bring what only a spot has to the host; None for other lights."""
-    if light.kind != "spot":
+    if light.cone is None:
         return None
     sines = [
         np.sqrt(float(np.sum(_one(cone.square_sin)) + np.sum(_one(cone.square_sin_low)))) if cone else None
@@ -159,7 +159,7 @@ def seen_rays(aim: Aim, camera: Camera, pixel, distance, light: Light) -> SeenRa
     x, y, z = w.x * scale, w.y * scale, w.z * scale
     foot, height = -distance * z, distance * scale * dr.sqrt(across_square)
     geometry = RayGeometry(foot, height)
-    if light.kind == "spot":
+    if light.cone is not None:
         geometry = _in_cone(aim, (c, r), (x, y, z, scale), geometry, light=light, distance=distance)
     return SeenRay(x, y, z, geometry)
 

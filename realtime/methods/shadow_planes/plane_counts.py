@@ -43,7 +43,7 @@ def caster_plan(scene: Scene) -> CasterPlan:
     InputError
         For a caster without triangles, and a directional light.
     """
-    check_places(scene.plan, "shadow-planes")
+    check_places(scene.features, "shadow-planes")
     casters = with_positions(read_casters(scene.geometry), scene.positions)
     camera = read_camera(scene.camera)
     lights = tuple(_light_plan(casters, camera, light) for light in scene.lights)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The lit segments of a camera ray between shadow planes: a walk along the planes of its tile.
+"""The lit intervals of a camera ray between shadow planes: a walk along the planes of its tile.
 
 `realtime.methods.shadow_planes.plane_table` has the mathematics. With D the distance from the light to the camera and
 w the direction of the ray in the frame of the light, a plane is crossed at the distance x with D/x = A wx + B wy - wz,
-where 0 < D/x < D (P wx + Q wy). The walk works with that quotient, which falls from the camera on, and divides twice a
-segment.
+where 0 < D/x < D (P wx + Q wy). The walk works with that quotient, which falls from the camera on, and divides twice an
+interval.
 
 A count holds how many layers lie between the light and the point: it starts with those between light and camera, and
 the point is lit where it is zero. Planes come in the order in which the middle ray of the tile crosses them. Two that
@@ -14,10 +14,9 @@ eight; after that it collects the eight nearest crossings from the whole list, g
 and so on. That is right for any order. At 800 x 600 a queue of two fails in none to three of a hundred tiles of the
 built-in scenes, one of eight in less than one in a thousand.
 
-Sixteen rays that follow one another walk together, and what one of them does all of them wait for. So a walk is one
-loop that reads a plane or goes over a crossing, and the integral of a segment that has ended waits until every fourth
-plane: neighbours whose segments end at two edges of one silhouette are then served at once. What is lit to the end of
-the ray is added behind the loop, which rays that cross nothing do not enter.
+A walk is one loop that reads a plane or goes over a crossing. An interval that has ended waits until every fourth plane
+(`realtime.intervals.lit_intervals` says why): neighbours whose intervals end at two edges of one silhouette are then
+served at once. What is lit to the end of the ray is added behind the loop, which rays that cross nothing do not enter.
 """
 
 from collections.abc import Callable
@@ -27,7 +26,8 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.methods.shadow_planes.crossing_queue import filled, inserted, popped, pushed
+from realtime.intervals.lit_intervals import LitIntervals, add_waiting, close_interval, no_intervals, sum_at_end
+from realtime.intervals.nearest_crossings import exchange, filled, insert, pop
 from realtime.methods.shadow_planes.plane_table import FULL, GAIN_SHIFT, GAIN_ZERO, NUMBER, PlaneIndex
 from realtime.methods.shadow_planes.tile_lists import Lists, Source, entry_at
 from realtime.numerics.array_types import four_numbers, two_numbers
@@ -89,207 +89,183 @@ def read_plane(index: PlaneIndex, lists: Lists, ray: RayPlanes, k, active):
     return quotient, counts & crossed, gain, number
 
 
-def sum_lit_segments(index: PlaneIndex, lists: Lists, ray: RayPlanes, segment, integral, zero):
-    """Add up an integral over the lit segments of every ray.
+def sum_lit_intervals(index: PlaneIndex, lists: Lists, ray: RayPlanes, segment, integral, zero):
+    """Add up an integral over the lit intervals of every ray.
 
     Parameters
     ----------
     index, lists, ray
         The planes and the rays.
     segment
-        Distances (x0, x1) between which to look; `x1` may be infinite.
+        Distances (x0, x1) between which to look; `x1` may be infinite [m].
     integral
-        Function (x0, x1) -> value of one segment.
+        Function (x0, x1) -> value of one interval.
     zero
-        The value of no segment.
+        The value of no interval, one for each ray.
 
     Returns
     -------
     total
-        Sum over the lit segments.
+        Sum over the lit intervals.
     lit
         Whether the light reaches the end of the segment.
     """
     x0, x1 = segment
-    ray_end = index.distance / x1
 
-    def with_segment(total, opened, closed):
+    def between(opened, closed):
         begin = dr.maximum(index.distance / opened, x0)
-        return total + integral(begin, dr.maximum(dr.minimum(index.distance / closed, x1), begin))
+        return integral(begin, dr.maximum(dr.minimum(index.distance / closed, x1), begin))
 
-    passing = _Passing(index, lists, ray, ray_end, with_segment, zero)
+    sweep = _Sweep(index, lists, ray, index.distance / x1, between, zero)
     wanted = x1 > x0
-    found = _walked(passing, wanted & ray.sorted, places=FEW)
-    found = dr.if_stmt(
-        args=found,
-        cond=found[2],
-        true_fn=lambda total, lit, lost: _walked(passing, lost, places=MANY),
-        false_fn=lambda *found: found,
+    total, lit, lost = _walk(sweep, wanted & ray.sorted, places=FEW)
+    total, lit, lost = dr.if_stmt(
+        args=(total, lit, lost),
+        cond=lost,
+        true_fn=lambda total, lit, lost: _walk(sweep, lost, places=MANY),
+        false_fn=lambda *unchanged: unchanged,
     )
-    total, lit, lost = found
     return dr.if_stmt(
         args=(total, lit),
         cond=lost | (wanted & ~ray.sorted),
-        true_fn=lambda total, lit: _collected(passing),
-        false_fn=lambda *found: found,
+        true_fn=lambda total, lit: _collect(sweep),
+        false_fn=lambda *unchanged: unchanged,
     )
 
 
 @dataclass(frozen=True)
-class _Passing:
+class _Sweep:
     """What does not change on a walk."""
 
     index: PlaneIndex
     lists: Lists
     ray: RayPlanes
     ray_end: Any  #: D/x at the end of the ray
-    with_segment: Callable[[Any, Any, Any], Any]  #: total, where a segment begins and ends -> total with it
-    zero: Any  #: the total of no segment
+    integral: Callable[[Any, Any], Any]  #: between two quotients D/x
+    zero: Any  #: the sum of no interval
 
 
 @dataclass
 class _Passed:
-    """What a ray has passed; distances as quotients D/x."""
+    """What a ray has passed; places are quotients D/x."""
 
     layers: Any  #: over the point
     quotient: Any  #: of the last crossing
-    opened: Any  #: where the light came back
-    total: Any  #: of the segments that have ended
-    begun: Any  #: where the last one began
-    ended: Any  #: where it ended
-    waits: Any  #: whether it waits to be added
+    opened: Any  #: where the light came back last
+    intervals: LitIntervals
 
 
-def _start(passing: _Passing) -> _Passed:
+def _start(sweep: _Sweep) -> _Passed:
     """Return what every ray has passed at the camera."""
-    Float, width = type(passing.ray_end), dr.width(passing.ray.x)
-    return _Passed(
-        layers=dr.zeros(Float, width) + passing.index.layers,
-        quotient=dr.full(Float, dr.inf, width),
-        opened=dr.full(Float, dr.inf, width),
-        total=passing.zero,
-        begun=dr.zeros(Float, width),
-        ended=dr.zeros(Float, width),
-        waits=dr.full(mi.Bool, False, width),
-    )
+    Float, width = type(sweep.ray_end), dr.width(sweep.ray.x)
+    camera = dr.full(Float, dr.inf, width)
+    return _Passed(dr.zeros(Float, width) + sweep.index.layers, camera, +camera, no_intervals(sweep.zero, +camera))
 
 
-def _gone_over(passing: _Passing, passed: _Passed, quotient, gain, *, crosses, due) -> _Passed:
-    """Go over a crossing where `crosses` is true.
-
-    The segment that ended before is added where it is `due`, or another one ends.
-    """
+def _pass_plane(sweep: _Sweep, passed: _Passed, quotient, gain, *, crosses, due) -> _Passed:
+    """Go over a plane where `crosses` is true; an interval that waits is added where `due` or another ends."""
     layers = passed.layers + dr.select(crosses, gain, 0)
     opens = crosses & (passed.layers > 0) & (layers <= 0)
     closes = crosses & (passed.layers <= 0) & (layers > 0)
-    total = dr.if_stmt(
-        args=(passed.total, passed.begun, passed.ended),
-        cond=passed.waits & (closes | due),
-        true_fn=passing.with_segment,
-        false_fn=lambda total, begun, ended: total,
-    )
+    intervals = add_waiting(passed.intervals, sweep.integral, closes | due)
     return _Passed(
         layers,
         dr.select(crosses, quotient, passed.quotient),
         dr.select(opens, quotient, passed.opened),
-        total,
-        dr.select(closes, passed.opened, passed.begun),
-        dr.select(closes, quotient, passed.ended),
-        closes | (passed.waits & ~due),
+        close_interval(intervals, quotient, closes, begin=passed.opened),
     )
 
 
-def _read(passing: _Passing, place, reads):
+def _sum(sweep: _Sweep, passed: _Passed, active):
+    """Return the sum at the end of the ray."""
+    at_end = {"opened": passed.opened, "lit": passed.layers <= 0, "active": active}
+    return sum_at_end(passed.intervals, sweep.integral, sweep.ray_end, **at_end)
+
+
+def _read(sweep: _Sweep, place, reads):
     """Return the quotient of a plane and its gain, and whether the ray crosses it before its end."""
-    Float = type(passing.ray_end)
+    Float = type(sweep.ray_end)
 
     def read(place, reads):
-        quotient, crossed, gain, _ = read_plane(passing.index, passing.lists, passing.ray, place, reads)
-        return quotient, gain, crossed & (quotient > passing.ray_end)
+        quotient, crossed, gain, _ = read_plane(sweep.index, sweep.lists, sweep.ray, place, reads)
+        return quotient, gain, crossed & (quotient > sweep.ray_end)
 
     return dr.if_stmt(
         args=(place, reads), cond=reads, true_fn=read, false_fn=lambda *_: (Float(0), Float(0), mi.Bool(False))
     )
 
 
-def _walked(passing: _Passing, active, *, places: int):
+def _walk(sweep: _Sweep, active, *, places: int):
     """Go over the planes in the order of the list.
 
     Returns
     -------
     total, lit
-        As `sum_lit_segments` does.
+        As `sum_lit_intervals` does.
     lost
         Whether the order was wrong, or wrong by more than the queue could mend.
     """
-    Float, width = type(passing.ray_end), dr.width(passing.ray.x)
-    count = passing.ray.source.count
+    Float, width = type(sweep.ray_end), dr.width(sweep.ray.x)
+    count = sweep.ray.source.count
     end = dr.select(active & (count > 0), count + places, 0)
 
     def body(place, waiting, passed, lost):
         reads = place < count
-        quotient, gain, crossed = _read(passing, place, reads)
-        # Behind the last plane those that wait come out.
-        waiting, at, gained = pushed(waiting, quotient, gain, crossed | ~reads)
-        crosses = (crossed | ~reads) & (at > 0)
-        lost |= crosses & (at > passed.quotient)
+        quotient, gain, crossed = _read(sweep, place, reads)
+        # Where nothing is crossed the queue stays as it is: infinitely near, that comes out again. Behind the last
+        # plane those that wait come out.
+        moves = crossed | ~reads
+        key, gain = dr.select(moves, quotient, dr.inf), dr.select(moves, gain, 0)
+        waiting, nearest, gained = exchange(waiting, key, gain, larger_is_nearer=True)
+        crosses = moves & (nearest > 0)
+        lost |= crosses & (nearest > passed.quotient)
         due = (place & _DUE) == _DUE
-        passed = _gone_over(passing, passed, at, gained, crosses=crosses, due=due)
+        passed = _pass_plane(sweep, passed, nearest, gained, crosses=crosses, due=due)
         return place + 1, waiting, passed, lost
 
     # What comes out of the queue first has no place and no gain: nothing happens there.
     nothing_waits = filled(dr.inf, places, Float, width)
     _, _, passed, lost = dr.while_loop(
-        state=(dr.zeros(mi.UInt32, width), nothing_waits, _start(passing), dr.full(mi.Bool, False, width)),
+        state=(dr.zeros(mi.UInt32, width), nothing_waits, _start(sweep), dr.full(mi.Bool, False, width)),
         cond=lambda place, waiting, passed, lost: (place < end) & ~lost,
         body=body,
         labels=("place", "waiting", "passed", "lost"),
     )
-    return _ended(passing, passed, active & ~lost), passed.layers <= 0, lost
+    return _sum(sweep, passed, active & ~lost), passed.layers <= 0, lost
 
 
-def _ended(passing: _Passing, passed: _Passed, active):
-    """Return the total with the segment that waits, and with one that is lit to the end of the ray."""
-    lit = passed.layers <= 0
-
-    def body(total, waits, lit):
-        begun, ended = dr.select(waits, passed.begun, passed.opened), dr.select(waits, passed.ended, passing.ray_end)
-        return passing.with_segment(total, begun, ended), waits & False, waits & lit
-
-    total, _, _ = dr.while_loop(
-        state=(passed.total, passed.waits & active, lit & active),
-        cond=lambda total, waits, lit: waits | lit,
-        body=body,
-        labels=("total", "waits", "lit"),
-    )
-    return total
-
-
-def _collected(passing: _Passing):
+def _collect(sweep: _Sweep):
     """Collect the nearest crossings beyond the last one from the whole list and go over them, until there are none.
 
-    Returns what `sum_lit_segments` does.
-    """
-    Float, width = type(passing.ray_end), dr.width(passing.ray.x)
-    count = passing.ray.source.count
+    Of crossings at one quotient, which come in the order of the list, as many as were gone over are left out.
 
-    def body(place, nearest, more, passed, done):
+    Returns what `sum_lit_intervals` does.
+    """
+    Float, width = type(sweep.ray_end), dr.width(sweep.ray.x)
+    count = sweep.ray.source.count
+
+    def body(place, nearest, more, ties, seen, passed, done):
         reads = place < count
-        quotient, gain, crossed = _read(passing, place, reads)
-        nearest = inserted(nearest, quotient, gain, crossed & (quotient < passed.quotient))
-        more |= nearest.quotient[-1] > 0
-        nearest, at, gained = popped(nearest, ~reads)
-        passed = _gone_over(passing, passed, at, gained, crosses=~reads & (at > 0), due=mi.Bool(False))
+        quotient, gain, crossed = _read(sweep, place, reads)
+        tie = crossed & (quotient == passed.quotient)
+        beyond = crossed & ((quotient < passed.quotient) | (tie & (seen >= ties)))
+        seen += dr.select(tie, mi.UInt32(1), 0)
+        nearest, left_out, _ = insert(nearest, dr.select(beyond, quotient, 0), gain, larger_is_nearer=True)
+        more |= left_out > 0
+        nearest, at, gained = pop(nearest, 0, ~reads)
+        crosses = ~reads & (at > 0)
+        ties = dr.select(crosses, dr.select(at == passed.quotient, ties + 1, 1), ties)
+        passed = _pass_plane(sweep, passed, at, gained, crosses=crosses, due=mi.Bool(False))
         empty = ~reads & (at <= 0)
         again = empty & more
-        place = dr.select(reads, place + 1, dr.select(again, 0, place))
-        return place, nearest, more & ~again, passed, done | (empty & ~more)
+        place, seen = dr.select(reads, place + 1, dr.select(again, 0, place)), dr.select(again, 0, seen)
+        return place, nearest, more & ~again, ties, seen, passed, done | (empty & ~more)
 
-    none, no = filled(0, MANY, Float, width), dr.full(mi.Bool, False, width)
+    none, no, zero = filled(0, MANY, Float, width), dr.full(mi.Bool, False, width), dr.zeros(mi.UInt32, width)
     *_, passed, _ = dr.while_loop(
-        state=(dr.zeros(mi.UInt32, width), none, no, _start(passing), no),
-        cond=lambda place, nearest, more, passed, done: ~done,
+        state=(zero, none, no, +zero, +zero, _start(sweep), no),
+        cond=lambda place, nearest, more, ties, seen, passed, done: ~done,
         body=body,
-        labels=("place", "nearest", "more", "passed", "done"),
+        labels=("place", "nearest", "more", "ties", "seen", "passed", "done"),
     )
-    return _ended(passing, passed, mi.Bool(True)), passed.layers <= 0
+    return _sum(sweep, passed, mi.Bool(True)), passed.layers <= 0

@@ -140,12 +140,6 @@ def equi_angular(u, span: Span):
     return _distance(u * equi_angular_range(span), span)
 
 
-def equi_angular_pdf(y, span: Span):
-    """Return the density of `equi_angular` at y [1/m]."""
-    s = span.start + y
-    return span.height / (equi_angular_range(span) * (span.height * span.height + s * s))
-
-
 def _distance(angle, span: Span):
     """Return how far from the start of the span the point is that the light sees at an angle from it [m]."""
     s0, h = span.start, span.height
@@ -219,11 +213,6 @@ def mixture_of(span: Span, sigma_t: Sequence[Any]) -> Mixture:
 def mixture_pdfs(y, mixture: Mixture) -> tuple[Any, Any]:
     """Return what either technique adds to the density of the mixture at y [1/m]; their shares are the MIS weights."""
     return tuple(pdf for _, pdf in _terms(y, mixture))
-
-
-def mixture_cdf(y, mixture: Mixture):
-    """Return the probability that `sample_distance` stays below y."""
-    return sum(cdf for cdf, _ in _terms(y, mixture))
 
 
 def _terms(y, mixture: Mixture) -> list[tuple[Any, Any]]:

@@ -20,7 +20,6 @@ from reference.monte_carlo.single_scatter.boundary_walk import (
     read_surroundings,
     require_homogeneous,
 )
-from reference.scene.directional_light import endless_medium, is_directional
 
 
 @dataclass(frozen=True)
@@ -61,8 +60,8 @@ def read_task(scene, medium, samples: int) -> Task:
     InputError
         For an emitter, a medium or a material that it has no answer for.
     """
-    directional = tuple(one for one in scene.emitters() if is_directional(one))
-    lights = tuple(_read_light(emitter) for emitter in scene.emitters() if not is_directional(emitter))
+    directional = tuple(emitter for emitter in scene.emitters() if _is_directional(emitter))
+    lights = tuple(_read_light(emitter) for emitter in scene.emitters() if not _is_directional(emitter))
     around, media = read_surroundings(scene)
     if directional:
         _refuse_endless(scene, medium, directional[0])
@@ -70,7 +69,7 @@ def read_task(scene, medium, samples: int) -> Task:
         require_homogeneous(medium)
         media = [*media, medium]
     known = medium is None or isinstance(medium, mi.Medium)
-    return Task(around, lights, directional, samples, grey=known and all(_is_grey(one) for one in media))
+    return Task(around, lights, directional, samples, grey=known and all(_is_grey(each) for each in media))
 
 
 def _refuse_endless(scene, medium, emitter) -> None:
@@ -79,9 +78,20 @@ def _refuse_endless(scene, medium, emitter) -> None:
     around = [shape.exterior_medium() for shape in scene.shapes()]
     if isinstance(medium, mi.Medium) and medium not in inside:
         around.append(medium)
-    for one in around:
-        if one is not None and max(float(np.ravel(c)[0]) for c in coefficients(mi.MediumPtr(one), mi.Bool(True))[1]):
-            raise InputError(f"single-scatter: {endless_medium(emitter)}")
+    for outside in around:
+        if outside is None:
+            continue
+        _, sigma_t = coefficients(mi.MediumPtr(outside), mi.Bool(True))
+        if max(float(np.ravel(channel)[0]) for channel in sigma_t):
+            raise InputError(
+                f"single-scatter: light '{emitter.id()}' is directional: nothing of it arrives through a medium "
+                "without bounds; give the medium bounds, a closed shape of material 'null' with the medium as its "
+                "interior"
+            )
+
+
+def _is_directional(emitter) -> bool:
+    return str(emitter.class_name()) == "DirectionalEmitter"
 
 
 def _is_grey(medium) -> bool:

@@ -38,6 +38,7 @@ def look(origin, target, *, size=SMALL, up=(0, 0, 1)):
     return sensor | {"to_world": place}
 
 
+@pytest.mark.claim("directional-light-volumes", tolerance="relative RMSE 1e-6, in float32 1e-5")
 @pytest.mark.parametrize("precision", ["double", "single"])
 def test_a_box_under_light_from_above_has_a_closed_form(variant, precision):
     """With the light coming straight down the leg is H - z, linear in x, and the integral is an exponential's.
@@ -76,6 +77,7 @@ CASES = {
 }
 
 
+@pytest.mark.claim("directional-light-volumes")
 @pytest.mark.parametrize("case", CASES)
 def test_bodies_against_sums_over_small_steps(variant, case):
     bodies, parts, along = CASES[case]
@@ -204,6 +206,7 @@ def test_shadows_on_surfaces_are_those_of_rays_whatever_the_method(variant):
     assert np.count_nonzero((rayed == 0) & (open_floor > 0)) > 3
 
 
+@pytest.mark.claim("directional-wants-bounds")
 @pytest.mark.parametrize("method", ["unshadowed", "ray-march", "light-volumes"])
 def test_a_medium_without_bounds_is_refused(variant, method):
     with pytest.raises(InputError, match=r"directional light and a medium without bounds.*give the medium bounds"):

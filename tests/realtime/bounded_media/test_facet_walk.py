@@ -28,11 +28,11 @@ def seen_body(name, light, precision="double"):
     from realtime.bounded_media.convex_clip import seen_from
     from realtime.numerics.array_types import array_types
     from realtime.scene.medium import Medium
-    from realtime.scene.phase import Phase
+    from realtime.scene.phase import named_phase
     from realtime.scene.read_media import convex_body
 
     types = array_types(precision)
-    medium = Medium((types.scalar(1.0),), types.color(1.0), Phase("isotropic"))
+    medium = Medium((types.scalar(1.0),), types.color(1.0), named_phase("isotropic"))
     body = convex_body(medium, bounds_of(name), types)
     return seen_from(body, types.vector(*(float(c) for c in light))), types
 
@@ -59,6 +59,7 @@ def least_of_all(name, light, v):
     return u[..., room < 0].min(axis=-1, initial=np.inf), u[..., room > 0].max(axis=-1)
 
 
+@pytest.mark.claim("bounded-media-of-methods", tolerance="1e-9 relative, in float32 2e-4")
 @pytest.mark.parametrize("precision", ["single", "double"])
 @pytest.mark.parametrize("light", [(2.4, 1.9, 2.1), (-1.9, 1.5, 0.9)])
 @pytest.mark.parametrize("name", SOLIDS)

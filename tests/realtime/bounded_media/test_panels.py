@@ -21,16 +21,16 @@ def segments(name, light, phase, *, sigma_t, precision="double"):
     from realtime.rays.ray_light import ray_geometry
     from realtime.scene.lights import Light
     from realtime.scene.medium import Medium
-    from realtime.scene.phase import Phase
+    from realtime.scene.phase import named_phase
 
     seen, types = seen_body(name, light, precision)
     start, direction, low, high = lines_in(name, light)
     part = np.where(np.arange(len(low)) % 2, 0.37, 1.0) * (high - low)
     kind, g = phase
     medium = Medium(
-        (types.scalar(sigma_t),), types.color(1.0), Phase(kind, g=types.scalar(g) if kind == "hg" else None)
+        (types.scalar(sigma_t),), types.color(1.0), named_phase(kind, g=types.scalar(g) if kind == "hg" else None)
     )
-    lamp = Light("point", False, types.vector(*(float(c) for c in light)), types.color(1.0))
+    lamp = Light(types.vector(*(float(c) for c in light)), types.color(1.0))
     v0, d = types.vector(*start.T), types.vector(*direction.T)
     from realtime.bounded_media.facet_walk import entry_planes
 

@@ -10,6 +10,7 @@ import pytest
 from realtime.frame.incremental import next_frame
 from realtime.frame.renderer import FrameRenderer, frame_renderer, image_frame, run_stages
 from realtime.kernels.registry import KERNELS
+from realtime.methods.interface.layers import Layers
 from realtime.methods.registry import METHODS
 from realtime.scene.animate import coloured_light, read_objects, thicker_medium, turned_light, turned_objects
 from realtime.scene.read_scene import Scene, read_scene
@@ -97,6 +98,7 @@ CASES = [
 ]
 
 
+@pytest.mark.claim("kept-frames", tolerance="none: equal bit by bit")
 @pytest.mark.parametrize(("scene", "method", "parameters", "steps"), CASES)
 def test_images_are_those_of_frames_made_afresh(variant, scene, method, parameters, steps):
     renderer, afresh = (made(scene := scene() if callable(scene) else scene, method, **parameters) for _ in range(2))
@@ -122,20 +124,21 @@ def counting(renderer: FrameRenderer, counts: Counter) -> FrameRenderer:
 
         return run  # without the method `start` of a preparation: the order of the stages is another, nothing else
 
-    return replace(renderer, **{name: counted(name) for name in ("prepare", "surface", "shade", "tiles", "airlight")})
+    return replace(renderer, **{name: counted(name) for name in ("prepare", "surface", "shade", "cull", "render")})
 
 
+@pytest.mark.claim("kept-frames")
 @pytest.mark.parametrize(
     ("method", "moved", "ran"),
     [
         ("shadow-planes", (), ("shade",)),
-        ("shadow-planes", ("light",), ("shade", "prepare", "tiles")),
-        ("shadow-planes", ("camera",), ("surface", "prepare", "tiles")),
-        ("shadow-planes", ("geometry",), ("surface", "prepare", "tiles")),
+        ("shadow-planes", ("light",), ("shade", "prepare", "cull")),
+        ("shadow-planes", ("camera",), ("surface", "prepare", "cull")),
+        ("shadow-planes", ("geometry",), ("surface", "prepare", "cull")),
         ("light-volumes", (), ("shade",)),
-        ("light-volumes", ("light",), ("shade", "prepare", "tiles")),
-        ("light-volumes", ("camera",), ("surface", "tiles")),
-        ("light-volumes", ("geometry",), ("surface", "prepare", "tiles")),
+        ("light-volumes", ("light",), ("shade", "prepare", "cull")),
+        ("light-volumes", ("camera",), ("surface", "cull")),
+        ("light-volumes", ("geometry",), ("surface", "prepare", "cull")),
     ],
 )
 def test_nothing_runs_that_nothing_asks_for(variant, method, moved, ran):
@@ -145,19 +148,19 @@ def test_nothing_runs_that_nothing_asks_for(variant, method, moved, ran):
     assert set(counts.values()) == {1}
     counts.clear()
     next_frame(renderer, renderer.scene, kept, **STILL | {f"{what}_moved": True for what in moved})
-    assert counts == Counter((*ran, "airlight"))
+    assert counts == Counter((*ran, "render"))
 
 
 def test_what_a_method_of_ones_own_prepares_is_made_anew_unless_it_says_otherwise(variant):
     """It may have looked at the medium."""
 
-    def of_medium(scene, **_):
+    def of_medium(scene, parameters):
         return lambda scene: tuple(scene.medium.sigma_t[0] for _ in scene.lights)
 
-    def method(view, *, kernel):
-        return type(view.medium.albedo)(view.prepared[0] + 0 * view.direction.x)
+    def render(view, state, lists, *, kernel, parameters):
+        return Layers(type(view.medium.albedo)(state[0] + 0 * view.direction.x))
 
-    own = replace(METHODS["unshadowed"], function=method, prepare=of_medium, uses_kernel=False)
+    own = replace(METHODS["unshadowed"], render=render, prepare=of_medium, uses_kernel=False)
     renderer = frame_renderer(ball(), own)
     _, kept = next_frame(renderer, renderer.scene, None, **STILL)
     thick = replace(renderer.scene, medium=thicker_medium(renderer.scene.medium, 2.0))
@@ -165,6 +168,7 @@ def test_what_a_method_of_ones_own_prepares_is_made_anew_unless_it_says_otherwis
     np.testing.assert_allclose(host(renderer, stages)["airlight"], 2 * 0.31, rtol=1e-6)
 
 
+@pytest.mark.claim("frames-are-replayed")
 @pytest.mark.parametrize("tolerance", [0.0, 0.1])
 def test_frames_replay_whatever_moves(variant, tolerance):
     """No stage is recorded again, but for the camera rays, once, where part of Mitsuba's scene is another."""
@@ -173,4 +177,4 @@ def test_frames_replay_whatever_moves(variant, tolerance):
     for now, moved in frames(renderer.scene, STEPS):
         _, kept = next_frame(renderer, now, kept, **moved)
     assert renderer.surface.n_recordings <= 2
-    assert [stage.n_recordings for stage in (renderer.shade, renderer.tiles, renderer.airlight)] == [1, 1, 1]
+    assert [stage.n_recordings for stage in (renderer.shade, renderer.cull, renderer.render)] == [1, 1, 1]

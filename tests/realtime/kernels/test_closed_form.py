@@ -66,6 +66,7 @@ def test_exponential_integral_in_vacuum(variant):
 
 
 # A few dozen roundings at most: of the path lengths, of 12 to 90 terms of E1, and of up to 32 steps of the recurrence.
+@pytest.mark.claim("closed-form-cancels")
 @pytest.mark.parametrize("phase", PHASES)
 @pytest.mark.parametrize("precision", ["single", "double"])
 def test_error_is_the_rounding_of_the_tails(variant, rows, phase, precision):
@@ -81,6 +82,7 @@ def test_error_is_the_rounding_of_the_tails(variant, rows, phase, precision):
     assert 0.1 < np.median(ratio) < 10
 
 
+@pytest.mark.claim("closed-form-cancels")
 @pytest.mark.parametrize("phase", PHASES)
 def test_accuracy_by_tag(variant, rows, phase):
     """Good for ordinary rays; nothing left in float32 of segments far before the light and of slivers."""
@@ -128,6 +130,7 @@ def test_limits(variant, precision):
     assert evaluate(closed_form, [ONE | {"x1": ONE["x0"]}], precision)[0] == 0
 
 
+@pytest.mark.claim("refused-phase-functions")
 def test_refuses_what_has_no_closed_form(variant):
     from realtime.kernels.closed_form import closed_form
     from realtime.scene.lights import Light
@@ -136,7 +139,7 @@ def test_refuses_what_has_no_closed_form(variant):
         evaluate(closed_form, [ONE | {"phase": "hg", "g": 0.3}], "single")
 
     def with_soft_spot(geometry, x0, x1, medium, light):
-        return closed_form(geometry, x0, x1, medium, Light("spot", True, None, None))
+        return closed_form(geometry, x0, x1, medium, Light(None, None, cone=1, beam=1))
 
     with pytest.raises(InputError, match="kernel closed-form: a spot that falls off"):
         evaluate(with_soft_spot, [ONE], "single")

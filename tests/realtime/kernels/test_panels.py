@@ -24,9 +24,9 @@ PHASES = [
 
 
 def phase_of(name, g, types):
-    from realtime.scene.phase import Phase
+    from realtime.scene.phase import named_phase
 
-    return Phase(name, g=types.scalar(g) if name == "hg" else None)
+    return named_phase(name, g=types.scalar(g) if name == "hg" else None)
 
 
 def kernel_values(rays, name, g, *, precision="single"):
@@ -40,7 +40,7 @@ def kernel_values(rays, name, g, *, precision="single"):
     types = array_types(precision)
     foot, height, x0, x1, sigma_t = (types.scalar(np.atleast_1d(column)) for column in rays)
     medium = Medium((sigma_t,), types.color(1), phase_of(name, g, types))
-    value = exact(RayGeometry(foot, height), x0, x1, medium, Light("point", False, None, None))
+    value = exact(RayGeometry(foot, height), x0, x1, medium, Light(None, None))
     return np.array(value, dtype=np.float64)
 
 
@@ -62,7 +62,7 @@ def rule_and_truth(rays, name, g):
     """Return J/[what all nodes share] by the rule for float32, but in float64, and by 25 times as many nodes."""
     import drjit as dr
 
-    from realtime.kernels.exact import _double_mean, _lobe_scales
+    from realtime.kernels.exact import _double_mean
     from realtime.kernels.panels import panels_mean
     from realtime.kernels.quadrature import path_interval
     from realtime.numerics.array_types import array_types
@@ -71,7 +71,7 @@ def rule_and_truth(rays, name, g):
     types = array_types("double")
     foot, height, x0, x1, sigma_t = (types.scalar(column) for column in rays)
     phase = phase_of(name, g, types)
-    scale, tail = _lobe_scales(phase, types.scalar)
+    scale, tail = phase.lobe_scales(types.scalar)
     h, e0, e1, _ = path_interval(RayGeometry(foot, height), x0, x1, sigma_t, tail=tail)
     # Cut where float32 cuts: this is about nodes.
     e1 = dr.minimum(e1, e0 + dr.minimum(20 / (sigma_t * h), 1e7 * (tail + e0)))
@@ -81,6 +81,7 @@ def rule_and_truth(rays, name, g):
     return np.array(panels_mean(*parts)[0]), np.array(_double_mean(*parts)[0]), np.array(width)
 
 
+@pytest.mark.claim("exact-panels")
 @pytest.mark.parametrize(("name", "g"), PHASES)
 def test_what_the_rule_leaves_without_rounding(variant, name, g):
     rule, truth, width = rule_and_truth(many_rays(20_000, 7), name, g)
@@ -94,14 +95,14 @@ def test_what_the_rule_leaves_without_rounding(variant, name, g):
 def test_segments_as_wide_and_as_deep_as_their_panels_may_be(variant, name, g, panels):
     import drjit as dr
 
-    from realtime.kernels.exact import _double_mean, _lobe_scales
+    from realtime.kernels.exact import _double_mean
     from realtime.kernels.panels import panel_count, panels_mean
     from realtime.numerics.array_types import array_types
 
     rng = np.random.default_rng(panels)
     types = array_types("double")
     phase = phase_of(name, g, types)
-    scale, _ = _lobe_scales(phase, types.scalar)
+    scale, _ = phase.lobe_scales(types.scalar)
     widths = np.linspace(0.1, 10, 9901)
     widest = widths[counts(name, g, widths, np.zeros(9901)) <= panels].max()
     depths = np.linspace(1, 40, 3901)
@@ -162,6 +163,7 @@ def counts(name, g, widths, depths, **options):
     return np.array(panel_count(phase_of(name, g, types), types.scalar(widths), types.scalar(depths), **options))
 
 
+@pytest.mark.claim("exact-panels")
 @pytest.mark.parametrize(("name", "g"), PHASES)
 def test_the_number_of_panels_grows_with_width_and_depth(variant, name, g):
     widths = np.linspace(0, 20, 200)
@@ -214,7 +216,7 @@ def test_the_colours_of_a_medium_are_those_of_grey_ones(variant, name, g, extinc
     foot, height, x0, x1, _ = many_rays(2000, 9)
     medium = Medium(tuple(types.scalar(one) for one in extinctions), types.color(1), phase_of(name, g, types))
     rays = RayGeometry(types.scalar(foot), types.scalar(height))
-    light = Light("point", False, None, None)
+    light = Light(None, None)
     colour = np.array(exact(rays, types.scalar(x0), types.scalar(x1), medium, light), dtype=np.float64)
     for channel, sigma_t in zip(colour, extinctions):
         depth = sigma_t * (x0 + np.hypot(x0 - foot, height))
@@ -228,7 +230,7 @@ def soft_spot(types, cutoff, beam):
     from realtime.scene.lights import Light, spot_fields
 
     fields = spot_fields([0, 0, -1.0], np.radians(cutoff), np.radians(beam), types)
-    return Light("spot", True, types.vector(0), types.color(1), **fields)
+    return Light(types.vector(0), types.color(1), **fields)
 
 
 @pytest.mark.parametrize(("cutoff", "beam"), [(40, 0.0), (20, 0.4), (60, 50), (80, 5)])

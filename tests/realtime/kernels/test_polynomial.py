@@ -4,16 +4,11 @@ import csv
 import numpy as np
 import pytest
 
-from analytic import PhaseFunction, airlight_segments
+from analytic.panels import airlight_segments
+from analytic.phase import PhaseFunction
 from realtime.errors import InputError
-from realtime.kernels.polynomial import (
-    _antiderivative,
-    _nodes,
-    evaluate,
-    evaluate_segment,
-    polynomial,
-    polynomial_coefficients,
-)
+from realtime.kernels.polynomial import _nodes, polynomial
+from tests.helpers.ray_polynomial import _antiderivative, evaluate, evaluate_segment, polynomial_coefficients
 
 PHASES = ("isotropic", "rayleigh", "hazy", "murky", "hg")
 RAY = {"foot": 1.3, "height": 0.7, "x0": 0.0, "x1": 2.9, "sigma_t": 0.43}
@@ -31,14 +26,16 @@ def arguments(columns, phase="isotropic", precision="double", *, g=None, values=
     from realtime.rays.ray_light import RayGeometry
     from realtime.scene.lights import Light
     from realtime.scene.medium import Medium
-    from realtime.scene.phase import Phase
+    from realtime.scene.phase import named_phase
 
     types = array_types(precision)
     c = {key: types.scalar(np.atleast_1d(columns[key]).astype(np.float64)) for key in RAY}
-    phase = Phase(phase, g=None if g is None else types.scalar(g), values=None if values is None else values(types))
+    phase = named_phase(
+        phase, g=None if g is None else types.scalar(g), values=None if values is None else values(types)
+    )
     medium = Medium((c["sigma_t"],), types.color(1), phase)
     geometry = RayGeometry(c["foot"], c["height"], None, None)
-    return geometry, c["x0"], c["x1"], medium, light or Light("point", False, None, None)
+    return geometry, c["x0"], c["x1"], medium, light or Light(None, None)
 
 
 def numbers(value):
@@ -96,6 +93,7 @@ def rho(width, start, singularity):
     return max(abs(z + np.sqrt(z * z - 1 + 0j)), abs(z - np.sqrt(z * z - 1 + 0j)))
 
 
+@pytest.mark.claim("declared-orders")
 @pytest.mark.parametrize("g", [0.0, 0.6, 0.9, -0.8])
 def test_rate_of_convergence_is_the_declared_one(variant, g):
     """Errors of Gamma inside the range, in a vacuum, fall as rho^-N/(N + 1): a simple pole, integrated (g = 0).
@@ -206,8 +204,6 @@ def soft_spot(precision):
     types = array_types(precision)
     cutoff, beam = np.deg2rad(50.0), np.deg2rad(20.0)
     light = Light(
-        "spot",
-        True,
         types.vector(0.1, 0.2, 2.0),
         types.color(1),
         **spot_fields((0, 0, -1), cutoff, beam, types),
@@ -220,13 +216,12 @@ def soft_spot(precision):
 def test_soft_spot(variant, phase):
     from scipy.integrate import quad
 
-    from realtime.rays.ray_light import clip_to_cone
     from realtime.scene.medium import Medium
-    from realtime.scene.phase import Phase
+    from realtime.scene.phase import named_phase
 
     types, geometry, light = soft_spot("double")
-    medium = Medium((types.scalar(0.4),), types.color(1), Phase(phase))
-    x0, x1 = clip_to_cone(geometry, types.scalar(0, 0), types.scalar(9, 9))
+    medium = Medium((types.scalar(0.4),), types.color(1), named_phase(phase))
+    x0, x1 = geometry.lit_segment(types.scalar(0, 0), types.scalar(9, 9))
     value = numbers(polynomial(geometry, x0, x1, medium, light, degree=23))
     fit = polynomial_coefficients(geometry, x0, x1, medium, light, degree=23)
     np.testing.assert_allclose(numbers(evaluate(fit, x1)), value, rtol=1e-13)
@@ -262,15 +257,15 @@ def test_tabulated_phase_function(variant):
 
 def test_a_colour_is_three_grey_media(variant):
     from realtime.scene.medium import Medium
-    from realtime.scene.phase import Phase
+    from realtime.scene.phase import named_phase
 
     geometry, x0, x1, grey, light = arguments(RAY)
     extinctions = [type(x0)(v) for v in (0.0, 0.5, 3.0)]
-    medium = Medium(tuple(extinctions), grey.albedo, Phase("rayleigh"))
+    medium = Medium(tuple(extinctions), grey.albedo, named_phase("rayleigh"))
     colour = numbers(polynomial(geometry, x0, x1, medium, light))
     gamma = numbers(evaluate(polynomial_coefficients(geometry, x0, x1, medium, light), x1))
     for channel, sigma_t in enumerate(extinctions):
-        single = Medium((sigma_t,), grey.albedo, Phase("rayleigh"))
+        single = Medium((sigma_t,), grey.albedo, named_phase("rayleigh"))
         expected = numbers(polynomial(geometry, x0, x1, single, light))
         np.testing.assert_array_equal(colour[channel], expected)
         np.testing.assert_allclose(gamma[channel], expected, rtol=1e-13)

@@ -19,14 +19,14 @@ def evaluate(kernel, rows, precision, **parameters):
     from realtime.rays.ray_light import RayGeometry
     from realtime.scene.lights import Light
     from realtime.scene.medium import Medium
-    from realtime.scene.phase import Phase
+    from realtime.scene.phase import named_phase
 
     types = array_types(precision)
     column = {key: types.scalar([float(row[key]) for row in rows]) for key in ("g", "t", "h", "x0", "x1", "sigma_t")}
     name = rows[0]["phase"]
-    medium = Medium((column["sigma_t"],), types.color(1), Phase(name, g=column["g"] if name == "hg" else None))
+    medium = Medium((column["sigma_t"],), types.color(1), named_phase(name, g=column["g"] if name == "hg" else None))
     geometry = RayGeometry(column["t"], column["h"], None, None)
-    light = Light("point", False, None, None)
+    light = Light(None, None)
     return np.array(kernel(geometry, column["x0"], column["x1"], medium, light, **parameters), dtype=np.float64)
 
 
@@ -41,6 +41,7 @@ def worst(values, rows):
 # Certified values at float32 inputs. Sixteen nodes alone reach 4e-6 (the double-precision column of the same nodes
 # shows it: `near_light` is the worst tag); float32 adds rounding of the exponent, 6e-8 times an optical depth of up to
 # 100.
+@pytest.mark.claim("quadrature-kernel")
 @pytest.mark.parametrize(
     ("precision", "nodes", "bound"), [("single", 16, 6e-6), ("double", 16, 6e-6), ("double", 32, 1e-11)]
 )
@@ -54,6 +55,7 @@ def test_quadrature_isotropic(variant, rows, precision, nodes, bound):
 
 # Sharp lobes (g up to 0.98 in the file) are wider than what 16 nodes a panel resolve: 1e-3; 64 nodes resolve all of
 # them.
+@pytest.mark.claim("quadrature-kernel")
 @pytest.mark.parametrize("phase", ["rayleigh", "hazy", "murky", "hg"])
 @pytest.mark.parametrize(("precision", "nodes", "bound"), [("single", 16, 2e-3), ("double", 64, 1e-9)])
 def test_quadrature_anisotropic(variant, rows, phase, precision, nodes, bound):
@@ -72,6 +74,7 @@ def test_quadrature_refuses_odd_numbers_of_nodes(variant, rows, nodes):
         evaluate(quadrature, rows[:1], "single", nodes=nodes)
 
 
+@pytest.mark.claim("series-by-two-routes", tolerance="1e-12 relative")
 @pytest.mark.parametrize("phase", ["isotropic", "rayleigh", "hazy", "murky", "hg"])
 def test_taylor_is_the_integral_of_the_series(variant, phase):
     """Against mpmath: its own Taylor series of the integrand, integrated term by term in 30 digits."""
@@ -96,6 +99,7 @@ def test_taylor_is_the_integral_of_the_series(variant, phase):
     assert value == pytest.approx(expected, rel=1e-12)  # float64 rounding of a dozen operations
 
 
+@pytest.mark.claim("taylor-near-the-foot")
 def test_taylor_converges_to_the_integral_near_the_foot(variant):
     from realtime.kernels.quadrature import quadrature
     from realtime.kernels.taylor import taylor
@@ -107,6 +111,7 @@ def test_taylor_converges_to_the_integral_near_the_foot(variant):
     assert errors[-1] < 1e-7
 
 
+@pytest.mark.claim("refused-phase-functions")
 def test_taylor_refuses_a_tabulated_phase_function(variant):
     from realtime.kernels.taylor import taylor
 

@@ -15,13 +15,13 @@ from realtime.rays.ray_light import RayGeometry
 from realtime.kernels.registry import KERNELS
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium
-from realtime.scene.phase import Phase
+from realtime.scene.phase import named_phase
 
-cases, light, found = read_cases(sys.argv[1]), Light("point", False, None, None), {}
+cases, light, found = read_cases(sys.argv[1]), Light(None, None), {}
 for name, kernel in KERNELS.items():
     found[name] = []
     for k in range(0, 300, 11):
-        phase = Phase(cases.phase[k], g=float(cases.g[k]) if cases.phase[k] == "hg" else None)
+        phase = named_phase(cases.phase[k], g=float(cases.g[k]) if cases.phase[k] == "hg" else None)
         medium = Medium((float(cases.sigma_t[k]),), mi.Color3f(1), phase)
         geometry = RayGeometry(float(cases.foot[k]), float(cases.height[k]), None, None)
         try:

@@ -2,6 +2,7 @@
 import csv
 import subprocess
 import sys
+from functools import partial
 
 import numpy as np
 import pytest
@@ -64,6 +65,7 @@ def test_last_column_of_the_published_table():
     assert found == pytest.approx(ci * np.sin(u) + (np.pi / 2 - si) * np.cos(u), rel=1e-12)
 
 
+@pytest.mark.claim("table-edge")
 @pytest.mark.parametrize("precision", ["single", "double"])
 def test_tail_form_on_certified_cases(variant, cases, precision):
     error = relative_error(cases, precision, form="tail")
@@ -74,6 +76,7 @@ def test_tail_form_on_certified_cases(variant, cases, precision):
     assert error[sliver].max() < (0.2 if precision == "single" else 3e-3)
 
 
+@pytest.mark.claim("declared-orders")
 def test_tail_form_converges_as_declared(variant, cases):
     """Like log(size)/size^2: alpha log alpha = 2 b^2 log b has an unbounded second derivative at b = 0."""
     sizes = np.array([16, 32, 64, 128, 256])
@@ -99,6 +102,7 @@ def test_published_form_is_exact_in_vacuum(variant, cases):
     assert relative_error(cases, "double")[cases[1] == "vacuum"].max() < 1e-12
 
 
+@pytest.mark.claim("table-edge")
 def test_published_form_reads_the_edge_beyond_its_table(variant):
     """Beyond u = 10 the value is that of u = 10 times the true prefactor: far too large or small, by what that says."""
     from realtime.kernels.table import table
@@ -157,6 +161,7 @@ def test_refuses_bad_parameters(variant, parameters, message):
         evaluate(table, [ONE], "single", **parameters)
 
 
+@pytest.mark.claim("refused-phase-functions")
 def test_refuses_what_it_cannot_do(variant):
     from realtime.kernels.table import table
     from realtime.scene.lights import Light
@@ -165,7 +170,7 @@ def test_refuses_what_it_cannot_do(variant):
         evaluate(table, [ONE | {"phase": "rayleigh"}], "single")
 
     def with_soft_spot(geometry, x0, x1, medium, light):
-        return table(geometry, x0, x1, medium, Light("spot", True, None, None))
+        return table(geometry, x0, x1, medium, Light(None, None, cone=1, beam=1))
 
     with pytest.raises(InputError, match="kernel table: a spot that falls off"):
         evaluate(with_soft_spot, [ONE], "single")
@@ -177,35 +182,38 @@ def test_frozen_and_in_colour(variant, form, precision):
     """Recorded once, right after another medium and another number of rays; three extinctions give three values."""
     import drjit as dr
 
-    from realtime.kernels.table import resident_tables, table
+    from realtime.kernels.preparation import prepare_kernel, with_tables
+    from realtime.kernels.table import table
     from realtime.numerics.array_types import array_types
     from realtime.rays.ray_light import RayGeometry
     from realtime.scene.lights import Light
     from realtime.scene.medium import Medium
-    from realtime.scene.phase import Phase
+    from realtime.scene.phase import Isotropic
 
     types = array_types(precision)
-    light = Light("point", False, None, None)
+    light = Light(None, None)
 
-    def kernel(t, h, x0, x1, medium):
-        return table(RayGeometry(t, h, None, None), x0, x1, medium, light, form=form, size=31)
+    sized = partial(table, form=form, size=31)
+
+    def kernel(t, h, x0, x1, medium, tables):
+        return with_tables(sized, tables)(RayGeometry(t, h, None, None), x0, x1, medium, light)
 
     def arguments(count, extinctions):
-        medium = Medium(tuple(dr.opaque(types.scalar, s) for s in extinctions), types.color(1), Phase("isotropic"))
+        medium = Medium(tuple(dr.opaque(types.scalar, s) for s in extinctions), types.color(1), Isotropic())
         # Not from NumPy, whose memory can be unaligned, which records anew.
         columns = [dr.linspace(types.scalar, low, low + 1, count) for low in (1.1, 0.3, 0.2, 2.5)]
         dr.eval(columns)
         return (*columns, medium)
 
-    kernel(*arguments(1, (0.1, 0.2, 0.3)))
-    resident = resident_tables()
-    frozen = dr.freeze(kernel, state_fn=lambda *_, **__: resident)
+    tables = prepare_kernel(sized, types.scalar)
+    frozen = dr.freeze(kernel)
     for count, extinctions in ((7, (0.11, 0.4, 0.9)), (7, (0.2, 0.5, 0.7)), (12, (0.3, 0.1, 1.3))):
         given = arguments(count, extinctions)
-        found = np.array(frozen(*given))
+        found = np.array(frozen(*given, tables))
         assert found.shape == (3, count)
         for row, sigma_t in zip(found, extinctions):
-            alone = np.array(kernel(*given[:-1], Medium((types.scalar(sigma_t),), types.color(1), Phase("isotropic"))))
+            grey = Medium((types.scalar(sigma_t),), types.color(1), Isotropic())
+            alone = np.array(kernel(*given[:-1], grey, None))  # uploads a table of its own
             # Recorded code may fuse differently: roundings, of reads of which half cancels.
             assert row == pytest.approx(alone, rel=1e-5 if precision == "single" else 1e-13)
     assert frozen.n_recordings == 1
@@ -221,7 +229,7 @@ import mitsuba as mi
 from realtime.kernels.table import upload_table
 @dr.freeze
 def function(x):
-    upload_table(type(x), "sun", 17)
+    upload_table(type(x), form="sun", size=17)
     return x + 1
 try:
     function(dr.opaque(mi.Float, 1, 3))
@@ -229,4 +237,6 @@ except RuntimeError as error:
     print(error.__cause__)
 """
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False)
-    assert "table is not on the device; call realtime.kernels.table.upload_table before" in found.stdout, found.stderr
+    assert "table is not on the device; call realtime.kernels.preparation.prepare_kernel before" in found.stdout, (
+        found.stderr
+    )

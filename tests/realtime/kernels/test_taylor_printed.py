@@ -2,7 +2,8 @@
 import numpy as np
 import pytest
 
-from analytic import PhaseFunction, taylor_coefficients
+from analytic.phase import PhaseFunction
+from analytic.series import taylor_coefficients
 from realtime.errors import InputError
 from realtime.kernels.taylor import taylor
 from realtime.kernels.taylor_printed import PRINTED_PHASES, printed_coefficients, taylor_printed
@@ -39,14 +40,15 @@ def rays(precision):
 def run(kernel, name, precision, **parameters):
     from realtime.scene.lights import Light
     from realtime.scene.medium import Medium
-    from realtime.scene.phase import Phase
+    from realtime.scene.phase import named_phase
 
     types, geometry, (x0, x1, sigma_t), _ = rays(precision)
-    medium = Medium((sigma_t,), types.color(1), Phase(name, g=0.3 if name == "hg" else None))
-    light = Light("point", False, None, None)
+    medium = Medium((sigma_t,), types.color(1), named_phase(name, g=0.3 if name == "hg" else None))
+    light = Light(None, None)
     return np.array(kernel(geometry, x0, x1, medium, light, **parameters), dtype=np.float64)
 
 
+@pytest.mark.claim("errata-of-biri", tolerance="1e-12 relative")
 @pytest.mark.parametrize("name", PRINTED_PHASES)
 def test_printed_coefficients_differ_from_derived_ones_as_listed_and_nowhere_else(name):
     printed = printed_coefficients(A, name)
@@ -80,11 +82,11 @@ def test_differs_from_taylor_by_the_integral_of_the_misprints(variant, name):
 def test_a_colour_is_three_grey_media(variant):
     from realtime.scene.lights import Light
     from realtime.scene.medium import Medium
-    from realtime.scene.phase import Phase
+    from realtime.scene.phase import named_phase
 
     types, geometry, (x0, x1, _), _ = rays("single")
     extinctions = [types.scalar(v) for v in (0.1, 0.5, 0.9)]
-    light, phase = Light("point", False, None, None), Phase("hazy")
+    light, phase = Light(None, None), named_phase("hazy")
     colour = taylor_printed(geometry, x0, x1, Medium(tuple(extinctions), types.color(1), phase), light)
     for channel, sigma_t in zip(np.array(colour), extinctions):
         grey = taylor_printed(geometry, x0, x1, Medium((sigma_t,), types.color(1), phase), light)

@@ -16,7 +16,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 from realtime.errors import InputError
-from realtime.methods.interface.method import Method
+from realtime.methods.interface.layers import Layers
+from realtime.methods.interface.method import Method, always
 from realtime.methods.registry import METHODS
 
 NUMBER = 3
@@ -57,9 +58,11 @@ def unready(view): return 1
 unready.prepare = lambda scene: None
 def wrong_ready(view): return 1
 wrong_ready.prepare = 5
-def full(view, *, kernel): return 2
+def full(view, state, lists, *, kernel, parameters): return Layers(2)
+def bare(view, state, lists, *, kernel, parameters): return 2
 record = Method("theirs", full, "", "", uses_kernel=False)
-lights = Method("lights", full, "", "", uses_kernel=False, lights_surfaces=lambda settings: True)
+unlayered = Method("unlayered", bare, "", "", uses_kernel=False)
+lights = Method("lights", full, "", "", uses_kernel=False, provides_visibility=always)
 """
 
 
@@ -96,17 +99,19 @@ def test_a_built_in_name_gives_the_record_itself():
     assert all(find_method(name) is record for name, record in METHODS.items())
 
 
+@pytest.mark.claim("own-method-parameters")
 def test_the_signature_decides(own):
     found = find_method(f"{own}:calls")
     assert found.uses_kernel
-    assert found.parameters == {"steps": 7, "share": 0.5, "word": "a", "on": True}
+    assert found.defaults == {"steps": 7, "share": 0.5, "word": "a", "on": True}
     assert (found.shadows, found.frozen({}), found.casts_rays({})) == (False, True, True)
     found = find_method(f"{own}:divides")
     assert not found.uses_kernel
-    assert (found.parameters, found.shadows, found.frozen({})) == ({}, True, False)
+    assert (found.defaults, found.shadows, found.frozen({})) == ({}, True, False)
     assert (found.summary, found.source) == ("Divide by zero.", own)
 
 
+@pytest.mark.claim("own-method-results")
 @pytest.mark.parametrize(
     ("name", "wanted"),
     [
@@ -123,11 +128,13 @@ def test_what_is_returned_becomes_an_image(render, name, wanted):
     np.testing.assert_array_equal(render(name), np.broadcast_to(wanted, (12, 16, 3)))
 
 
+@pytest.mark.claim("own-method-parameters")
 def test_parameters_arrive(render):
     assert render("grey", gain=0.75)[0, 0, 0] == 0.75
     assert render("ready", size=5)[3, 4, 1] == 5
 
 
+@pytest.mark.claim("own-method-results")
 @pytest.mark.parametrize(
     ("name", "message"),
     [
@@ -137,7 +144,8 @@ def test_parameters_arrive(render):
         ("turned", "returned an array of shape (3, 192) for 192 pixels"),
         ("short", "returned 2 values for 192 pixels"),
         ("dark", "of 1 of 192 pixels is not finite, first in column 15 of row 11: nan, nan, nan"),
-        ("lights", "returned a int; wanted (radiance, lit by light)"),
+        ("unlayered", "returned a int; wanted realtime.methods.interface.layers.Layers"),
+        ("lights", "returned the visibility of 0 lights, wanted that of 1"),
         ("unready", "`prepare` returned a NoneType; wanted a function of the scene"),
     ],
 )
@@ -147,6 +155,7 @@ def test_a_wrong_result_is_refused_with_the_name_and_what_came(render, own, name
     assert f"method {own}:{name}: " in str(caught.value)
 
 
+@pytest.mark.claim("own-method-faults")
 def test_an_exception_names_file_and_line(render, own):
     lines = SOURCE.splitlines()
     for name, text, kind in (
@@ -164,6 +173,7 @@ def test_its_own_refusal_stays_as_it_is(render):
         render("refuses")
 
 
+@pytest.mark.claim("own-method-parameters")
 @pytest.mark.parametrize(
     ("name", "message"),
     [
@@ -198,6 +208,7 @@ def test_what_is_not_there_is_refused(name, message):
         find_method(name)
 
 
+@pytest.mark.claim("own-method-faults")
 def test_faults_in_the_file_are_told_with_their_line(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "broken_for_tests.py").write_text("def f(view):\n    return (\n")
@@ -221,19 +232,20 @@ def test_a_module_of_the_current_folder_is_found_and_the_path_left_as_it_was(tmp
 
 
 def test_a_file_that_was_changed_is_read_again(own, tmp_path):
-    assert find_method(f"{own}:calls").parameters["steps"] == 7
+    assert find_method(f"{own}:calls").defaults["steps"] == 7
     tmp_path.joinpath("own_for_tests.py").write_text(SOURCE.replace("steps=7", "steps=77"))
-    assert find_method(f"{own}:calls").parameters["steps"] == 77
+    assert find_method(f"{own}:calls").defaults["steps"] == 77
 
 
+@pytest.mark.claim("own-method-frozen")
 def test_only_a_method_that_says_so_is_frozen(own, variant):
     import mitsuba as mi
 
     from realtime.scene.read_scene import read_scene
 
     scene = read_scene(mi.load_dict(tiny_scene()))
-    assert not isinstance(frame_renderer(scene, find_method(f"{own}:constant")).airlight, Frozen)
-    assert isinstance(frame_renderer(scene, find_method(f"{own}:calls"), kernel=print).airlight, Frozen)
+    assert not isinstance(frame_renderer(scene, find_method(f"{own}:constant")).render, Frozen)
+    assert isinstance(frame_renderer(scene, find_method(f"{own}:calls"), kernel=print).render, Frozen)
 
 
 def test_a_record_keeps_what_it_says(tmp_path):

@@ -61,7 +61,7 @@ def ends_of(direction, degrees, precision):
     types = array_types(precision)
     angle = float(np.deg2rad(degrees))
     fields = spot_fields(AXIS, angle, angle, types)
-    light = Light("spot", False, types.vector(*(float(x) for x in LIGHT)), types.color(1), **fields)
+    light = Light(types.vector(*(float(x) for x in LIGHT)), types.color(1), **fields)
     high, low = with_low(direction, types)
     origin = types.vector(*(float(x) for x in CAMERA))
     geometry = ray_geometry(origin, types.vector(high.T), light, low=types.vector(low.T))

@@ -3,6 +3,7 @@ import numpy as np
 import pytest
 
 
+@pytest.mark.claim("pixel-centre", tolerance="5e-7: Mitsuba's float32 matrices")
 @pytest.mark.parametrize("size", [(64, 48), (37, 53)])
 @pytest.mark.parametrize("axis", ["x", "y", "smaller"])
 def test_rays_are_those_of_mitsuba(variant, size, axis):

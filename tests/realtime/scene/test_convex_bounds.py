@@ -43,6 +43,7 @@ def test_many_facets_stay_many_planes():
     assert len(bounds(icosphere(2)).offsets) == 320
 
 
+@pytest.mark.claim("media-refused")
 @pytest.mark.parametrize(
     ("mesh", "message"),
     [

@@ -59,6 +59,7 @@ def test_sound_meshes_are_closed_and_in_silence(name):
     assert len(casters.edges) == 3 * len(casters.triangles) // 2
 
 
+@pytest.mark.claim("flawed-meshes-warn")
 @pytest.mark.parametrize(
     ("name", "closed", "words"),
     [
@@ -146,6 +147,7 @@ def test_triangles_of_mitsuba_shapes(variant):
     assert box == pytest.approx(np.array([[-0.2, -0.2, 0.2], [0.4, 0.6, 1.2]]), abs=1e-6)
 
 
+@pytest.mark.claim("shapes-without-edges-refused")
 def test_shapes_without_triangles_are_refused_by_name(variant):
     import mitsuba as mi
 

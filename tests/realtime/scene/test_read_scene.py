@@ -28,17 +28,18 @@ def test_reads_what_the_scene_holds(variant):
     assert np.array(cone.axis).ravel() == pytest.approx(towards / np.linalg.norm(towards), abs=1e-6)
 
 
+@pytest.mark.claim("not-needed-costs-nothing")
 def test_plan_names_only_what_is_needed(variant):
-    plan = read(ball=None, floor=None).plan
-    assert not plan.shadows
-    assert not plan.surfaces
-    assert plan.extinctions == 1
-    assert plan.isotropic
-    assert (plan.point_lights, plan.spot_lights, plan.soft_spots, plan.vacuum) == (1, 0, False, False)
-    plan = read(spot=spot(beam=20.0)).plan
-    assert plan.shadows
-    assert plan.soft_spots
-    assert not read(spot=spot()).plan.soft_spots
+    features = read(ball=None, floor=None).features
+    assert not features.shadows
+    assert not features.surfaces
+    assert features.extinctions == 1
+    assert features.isotropic
+    assert (features.point_lights, features.spot_lights, features.soft_spots, features.vacuum) == (1, 0, False, False)
+    features = read(spot=spot(beam=20.0)).features
+    assert features.shadows
+    assert features.soft_spots
+    assert not read(spot=spot()).features.soft_spots
 
 
 def test_coloured_extinction_asks_for_three_integrals(variant):
@@ -46,13 +47,14 @@ def test_coloured_extinction_asks_for_three_integrals(variant):
         "sigma_t": {"type": "rgb", "value": [0.1, 0.2, 0.4]},
         "has_spectral_extinction": True,
     }
-    assert read(fog=medium).plan.extinctions == 3
+    assert read(fog=medium).features.extinctions == 3
 
 
 def test_vacuum_and_black_media_are_read(variant):
-    assert read(fog=tiny_scene()["fog"] | {"sigma_t": 0.0}).plan.vacuum
+    assert read(fog=tiny_scene()["fog"] | {"sigma_t": 0.0}).features.vacuum
 
 
+@pytest.mark.claim("scenes-refused-by-name")
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
@@ -79,8 +81,9 @@ def test_camera_outside_the_medium_is_refused(variant):
         read(sensor=sensor)
 
 
+@pytest.mark.claim("glossy-surfaces-noted")
 def test_glossy_surfaces_are_noted(variant):
-    notes = read(ball={"type": "sphere", "bsdf": {"type": "roughplastic"}}).plan.notes
+    notes = read(ball={"type": "sphere", "bsdf": {"type": "roughplastic"}}).features.notes
     assert len(notes) == 1
     assert "not purely diffuse" in notes[0]
-    assert read().plan.notes == ()
+    assert read().features.notes == ()

@@ -9,12 +9,12 @@ def heights_of(size: int, kind: str):
     import mitsuba as mi
 
     from realtime.scene.read_scene import read_scene
-    from realtime.shadow_maps.inverse_depth_field import light_heights
+    from realtime.shadow_maps.inverse_depth_field import inverse_depth_field
     from realtime.shadow_maps.shadow_map import cast_shadow_map
 
     scene = read_scene(mi.load_dict(tiny_scene(**({"lamp": spot()} if kind == "spot" else {}))))
     shadow_map = cast_shadow_map(scene.geometry, scene.lights[0], size)
-    return shadow_map, light_heights(shadow_map)
+    return shadow_map, inverse_depth_field(shadow_map)
 
 
 @pytest.mark.parametrize("kind", ["point", "spot"])
@@ -22,7 +22,7 @@ def test_heights_are_inverse_planar_depths(variant, kind):
     shadow_map, heights = heights_of(16, kind)
     distance = np.array(shadow_map.distance, dtype=float).reshape(shadow_map.faces, 17, 17)
     u = np.linspace(-1, 1, 17)
-    tangent = 1.0 if kind == "point" else np.linalg.norm(np.array(shadow_map.frame[0]))
+    tangent = 1.0 if kind == "point" else np.linalg.norm(np.array(shadow_map.projection.basis[0]))
     # By the angle between the ray and the axis, not by the norm of the direction.
     cosine = np.cos(np.arctan(tangent * np.hypot(u[None, :], u[:, None])))
     expected = 1 / (distance * cosine)
@@ -72,7 +72,7 @@ def test_faces_of_a_cube_meet_with_the_same_values(variant):
     """The mesh of the light volume has no cracks only if rays along a common edge are the same to the last bit."""
     import mitsuba as mi
 
-    from realtime.shadow_maps.shadow_map import cube_direction
+    from realtime.shadow_maps.projection import cube_direction
 
     shadow_map, _ = heights_of(16, "point")
     distance = np.array(shadow_map.distance).reshape(6, 17, 17)

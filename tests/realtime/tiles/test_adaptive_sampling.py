@@ -1,18 +1,24 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Airlight between the corners of tiles, against the airlight of every pixel."""
 
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from realtime.errors import InputError
 from realtime.frame.renderer import frame_renderer, render_frame
 from realtime.kernels.registry import KERNELS
+from realtime.methods.interface.layers import Layers
+from realtime.methods.interface.method import Method, always, never
 from realtime.methods.registry import METHODS
+from realtime.parameters import Parameters
 from realtime.tiles.adaptive_sampling import between_corners, tile_corners
+from realtime.tiles.adaptive_sampling import tolerance as tolerance_parameter
+from realtime.tiles.layout import Layout
 from tests.helpers.scenes import tiny_scene
 
 SIZE = 48, 32
@@ -39,12 +45,12 @@ def image_of(function, tolerance, *, depth=None, lit=None):
     table, light = mi.Float(values), mi.UInt32(lights)
     computed = dr.zeros(mi.UInt32, width * height)
 
-    def sample(pixel, distance, tile):
+    def sample(pixel, distance, tile, layout):
         value = dr.gather(mi.Float, table, pixel)
         dr.scatter(computed, mi.UInt32(1), pixel)
-        return mi.Color3f(value, 2 * value, 0.5 * value), (dr.gather(mi.UInt32, light, pixel) != 0,)
+        return (mi.Color3f(value, 2 * value, 0.5 * value),), (dr.gather(mi.UInt32, light, pixel) != 0,)
 
-    found, (reached,) = between_corners(
+    (found,), (reached,) = between_corners(
         corners, pixel, dr.gather(mi.Float, mi.Float(distance), pixel), sample, width=width, tolerance=tolerance
     )
     order, image = np.array(pixel), np.empty((width * height, 3))
@@ -64,6 +70,7 @@ def test_a_linear_function_is_computed_at_corners_and_along_two_sides(variant):
     assert np.array_equal(computed == 0, inner)
 
 
+@pytest.mark.claim("between-corners")
 @settings(deadline=None, max_examples=60)
 @given(seed=st.integers(0, 2**32 - 1), tolerance=st.sampled_from([1e-3, 5e-3, 0.03]))
 def test_smooth_functions_and_kinks_err_by_the_tolerance_at_most(variant, seed, tolerance):
@@ -78,13 +85,13 @@ def test_smooth_functions_and_kinks_err_by_the_tolerance_at_most(variant, seed, 
         return 4 + smooth + slope[0] * x + slope[1] * y + jump * np.maximum(normal[0] * x + normal[1] * y - place, 0)
 
     wanted = function(*np.meshgrid(np.arange(48), np.arange(32)))
-    if wanted.min() < 0.5:
-        return
+    assume(wanted.min() >= 0.5)
     found, _, computed = image_of(function, tolerance)
     assert np.max(np.abs(found - wanted) / wanted) <= 1.05 * tolerance + 1e-6
     assert np.all(found[computed > 0] == wanted.astype(np.float32)[computed > 0])
 
 
+@pytest.mark.claim("between-corners")
 def test_edges_of_surfaces_and_of_shadows_are_computed(variant):
     """Behind the same airlight: a step in depth, a thin pole between the corners, an edge of the light."""
     columns = np.arange(48)
@@ -96,6 +103,7 @@ def test_edges_of_surfaces_and_of_shadows_are_computed(variant):
     assert {*np.flatnonzero(computed[1] > 0).tolist()} == wanted
 
 
+@pytest.mark.claim("between-corners")
 @pytest.mark.parametrize(
     ("method", "parameters"),
     [("shadow-planes", {}), ("light-volumes", {"map": 64}), ("ray-march", {"steps": 24, "shadow": "ray"})],
@@ -157,3 +165,77 @@ def test_bad_input(variant, parameters, size, message):
 def test_a_mesh_has_no_tiles(variant):
     with pytest.raises(InputError, match="evaluation=mesh and vertex do not"):
         frame("light-volumes", {"tolerance": 0.01, "evaluation": "mesh"})
+
+
+def test_a_method_knows_on_which_rays_it_is_called(variant):
+    """Of 16 x 12 pixels: as squares it is given squares, and the corners of tiles under another name."""
+    import mitsuba as mi
+
+    from realtime.scene.read_scene import read_scene
+
+    seen = []
+
+    def spying(view, state, lists, *, kernel, parameters):
+        branch = view.layout is Layout.SOME  # in which there are no numbers to look at
+        seen.append((view.layout, *(np.zeros(0, int) if branch else np.array(one) for one in (view.pixel, view.tile))))
+        return Layers(mi.Color3f(view.direction.x + 2))
+
+    scene = read_scene(mi.load_dict(tiny_scene(size=(16, 12))))
+    squares, parts = {Layout.SQUARES}, {Layout.CORNERS, Layout.SOME}
+    # While it is recorded there are no numbers to look at: a frozen method is looked at while it is tried.
+    for frozen, tolerance, wanted in (
+        (True, 0.0, squares),
+        (True, 0.01, squares),
+        (False, 0.0, squares),
+        (False, 0.01, parts),
+    ):
+        seen.clear()
+        spy = replace(METHODS["ray-march"], render=spying, prepare=None, frozen=always if frozen else never)
+        renderer = frame_renderer(scene, spy, tolerance=tolerance)
+        if not frozen:
+            render_frame(renderer)
+        assert {layout for layout, *_ in seen} == wanted
+        for layout, pixel, tile in seen:
+            row, column = np.divmod(pixel, 16)
+            if layout is Layout.SQUARES:
+                places = row // 4 * 4 + column // 4
+                assert len(pixel) % 16 == 0
+                assert np.all(places.reshape(-1, 16) == places[::16, None])
+                assert np.array_equal(tile, np.arange(len(pixel)) // 16)
+            elif layout is Layout.CORNERS:
+                assert np.all((row % 4 == 0) & (column % 4 == 0))
+                assert np.array_equal(tile, np.arange(12))
+
+
+@dataclass(frozen=True)
+class LayeredParameters(Parameters):
+    """The parameters of a method of the tests."""
+
+    tolerance: float = tolerance_parameter()
+
+
+def test_every_layer_is_interpolated(variant):
+    """Layers that are smooth over the image, and a mask that is not."""
+    import mitsuba as mi
+
+    from realtime.scene.read_scene import read_scene
+
+    def smooth(view, state, lists, *, kernel, parameters):
+        across, up = view.direction.x, view.direction.z
+        return Layers(
+            mi.Color3f(2 + across, 3 + up, 4 - up),
+            (0.6 + 0.2 * across, up > 0.1),
+            mi.Color3f(0.5 + 0.1 * up),
+            mi.Color3f(1 + 0.3 * across),
+        )
+
+    two = tiny_scene(size=(48, 36)) | {"second": tiny_scene()["lamp"] | {"position": [-1.1, -0.9, 2.3]}}
+    scene = read_scene(mi.load_dict(two))
+    method = Method(
+        "layered", smooth, "", "", LayeredParameters, uses_kernel=False, provides_visibility=always, by_rays=always
+    )
+    whole, parted = (render_frame(frame_renderer(scene, method, tolerance=tolerance)) for tolerance in (0.0, 0.02))
+    for layer in ("airlight", "surface"):
+        found, wanted = getattr(parted, layer), getattr(whole, layer)
+        np.testing.assert_allclose(found, wanted, rtol=0.02)
+        assert np.max(np.abs(found - wanted)) > 0

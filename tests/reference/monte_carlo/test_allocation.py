@@ -34,6 +34,7 @@ def test_a_pilot_without_spread_shares_out_equally():
     assert np.all(allocated(pilot_with(np.zeros(SHAPE)), 17, shape=SHAPE, masks=everywhere()) == 17)
 
 
+@pytest.mark.claim("samples-shared-out")
 def test_more_goes_where_more_spreads_and_the_sum_stays():
     spread = np.full(SHAPE, 0.01)
     spread[:3] = 0.09
@@ -57,6 +58,7 @@ def test_every_pixel_has_a_sample():
     assert allocated(pilot_with(spread), 1, shape=SHAPE, masks=everywhere()).min() == 1
 
 
+@pytest.mark.claim("samples-shared-out")
 @pytest.mark.statistical
 def test_the_mean_is_the_same_and_spreads_less(variant):
     """Rationale: counts that follow the spread leave the mean of every pixel where it was.

@@ -109,6 +109,7 @@ CASES = {
 }
 
 
+@pytest.mark.claim("bounded-media", tolerance="1e-8 relative, 2e-7 in fog: the steps' own")
 @pytest.mark.parametrize("case", CASES)
 def test_airlight_is_the_sum_over_small_steps(variant, case):
     """Rationale: nothing is shared with the estimator but the rays: own chords, own rule, no kinks looked for.
@@ -185,6 +186,7 @@ def test_absorbing_ball_before_a_wall(variant):
     assert not image.airlight.any()
 
 
+@pytest.mark.claim("lit-surface", tolerance="1e-6 relative")
 def test_leg_of_the_surface_is_darkened_too(variant):
     """A lamp above the ball: the floor below it is darker by the chord of the leg and of the view."""
     changes = {"floor": tiny_scene()["floor"], "lamp": tiny_scene()["lamp"] | {"position": [0.6, 0.4, 2.3]}}
@@ -219,6 +221,7 @@ def test_two_media_that_do_not_see_each_other_add_up(variant):
     assert images[2] == pytest.approx(images[0] + images[1], rel=1e-8)
 
 
+@pytest.mark.claim("bounded-media", tolerance="1e-8 relative")
 def test_camera_inside_of_a_body(variant):
     """What the camera in the box sees through its own medium: the same integral with the chord cut at 0."""
     import mitsuba as mi
@@ -237,6 +240,7 @@ def test_camera_inside_of_a_body(variant):
         assert airlight[pixel] == pytest.approx(expected, rel=1e-8)
 
 
+@pytest.mark.claim("infinite-through-the-light")
 def test_ray_through_a_lamp(variant):
     """In a vacuum between two bodies a ray may meet the lamp: the airlight is finite. Inside of one it is infinite."""
     truth, _ = truth_and_image(clear_scene(size=(12, 9), brick=brick()))
@@ -252,6 +256,7 @@ def test_ray_through_a_lamp(variant):
         assert np.all(value > 1e4) if distance > near[pixel] else np.all((value > 0) & (value < 1))
 
 
+@pytest.mark.claim("bounded-media")
 @pytest.mark.statistical
 @pytest.mark.parametrize("inside", [False, True], ids=["camera outside", "camera inside"])
 def test_agrees_with_volpath(variant, inside):

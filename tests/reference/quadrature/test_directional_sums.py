@@ -30,6 +30,7 @@ CASES = {
 }
 
 
+@pytest.mark.claim("directional-truth", tolerance="2e-8 relative, 2e-5 along an axis: the steps' own")
 @pytest.mark.parametrize("case", CASES)
 def test_airlight_is_the_sum_over_small_steps(variant, case):
     """Rationale: nothing is shared with the estimator but the rays: own chords, own rule, no kinks looked for.
@@ -48,6 +49,7 @@ def test_airlight_is_the_sum_over_small_steps(variant, case):
     assert np.all(bound[lit] > 0)
 
 
+@pytest.mark.claim("directional-truth", tolerance="1e-12 relative")
 @pytest.mark.parametrize("way", ["across", "with the ray", "against it"])
 def test_ray_through_a_box_in_closed_form(variant, way):
     """Light that falls on the box's upper face, along the ray's own direction, and against it.
@@ -57,7 +59,7 @@ def test_ray_through_a_box_in_closed_form(variant, way):
     """
     from dataclasses import replace
 
-    from reference.quadrature.image import ray_values
+    from reference.quadrature.ray_values import ray_values
 
     origin, direction = np.array([-0.5, -2.0, 0.71875]), np.array([0.0, 1.0, 0.0])
     directions = {"across": [0.0, 0.0, -1.0], "with the ray": [0.0, 1.0, 0.0], "against it": [0.0, -1.0, 0.0]}
@@ -81,15 +83,16 @@ def test_ray_through_a_box_in_closed_form(variant, way):
     assert np.all(found.bound < 1e-6 * found.airlight)
 
 
+@pytest.mark.claim("directional-truth", tolerance="2e-9 relative")
 def test_panels_give_the_closed_form(variant):
     """Two ways to integrate the same pieces, of a polyhedron: Kronrod's rule and the exponential."""
     import mitsuba as mi
 
     from reference.quadrature.directional_sums import sum_directional
     from reference.quadrature.segments import camera_segments, scattering_range
-    from reference.scene.directional_light import parallel_rays
     from reference.scene.read import read_truth
     from reference.visibility.directional_casting import directional_intervals, edge_scale
+    from reference.visibility.parallel_rays import parallel_rays
 
     caster = {"type": "cube", "to_world": mi.ScalarTransform4f().translate([-0.6, 0.1, 1.4]).scale([0.1, 0.3, 0.05])}
     truth = read_truth(mi.load_dict(sunny(brick=brick((0.71, 0.3, 0.02), scale=9.7), caster=caster, size=(32, 24))))
@@ -198,7 +201,7 @@ def test_mean_over_pixels(variant):
     """The mean over the area against that of 15 x 15 rays: to what these miss at edges of shadows, and the bound."""
     from dataclasses import replace
 
-    from reference.quadrature.image import ray_values
+    from reference.quadrature.ray_values import ray_values
     from reference.scene.camera import film_directions
 
     caster = {"type": "sphere", "center": [-0.71875, 0.25, 1.21875], "radius": 0.1875}

@@ -15,6 +15,7 @@ def truth_of(samples=256, **changes):
     return truth, quadrature_image(truth, samples=samples)
 
 
+@pytest.mark.claim("radiance", "attenuation-and-falloff", tolerance="1e-9 relative")
 def test_unshadowed_pixels_are_the_adaptive_integral(variant):
     """Against scipy's adaptive quadrature of the distance form, pixel by pixel."""
     from scipy.integrate import quad
@@ -34,6 +35,7 @@ def test_unshadowed_pixels_are_the_adaptive_integral(variant):
         assert image.airlight.reshape(-1, 3)[pixel] == pytest.approx(expected, rel=1e-9)
 
 
+@pytest.mark.claim("attenuation-and-falloff", "bound-in-every-pixel", tolerance="3e-5 relative")
 def test_shadow_of_a_ball_against_its_closed_form(variant):
     """The shadow of a sphere is a cone cut by a cap: the lit set of a ray in closed form, sampled finely.
 
@@ -67,6 +69,7 @@ def test_shadow_of_a_ball_against_its_closed_form(variant):
     assert image.transitions > 0
 
 
+@pytest.mark.claim("cast-shadows")
 @pytest.mark.parametrize("lamp", [None, {"lamp": spot}], ids=["point", "spot"])
 def test_more_samples_change_nothing_but_missed_shadows(variant, lamp):
     changes = {} if lamp is None else {"lamp": spot(beam=20.0)}
@@ -78,6 +81,7 @@ def test_more_samples_change_nothing_but_missed_shadows(variant, lamp):
     assert np.abs(coarse.airlight.mean() / fine.airlight.mean() - 1) < 1e-4
 
 
+@pytest.mark.claim("corrected-for-the-epsilon")
 def test_scaled_shadow_leg_brightens_by_the_optical_depth(variant):
     import mitsuba as mi
 
@@ -93,6 +97,7 @@ def test_scaled_shadow_leg_brightens_by_the_optical_depth(variant):
     assert np.all(short.surface[lit] > plain.surface[lit])
 
 
+@pytest.mark.claim("lit-surface", tolerance="1e-5 relative: float32")
 @pytest.mark.parametrize("kind", ["point", "spot"])
 def test_surface_is_mitsubas_direct_integrator(variant, kind):
     """In a vacuum the lit surface is what Mitsuba's `direct` integrator renders at the pixel centres."""

@@ -23,7 +23,7 @@ def brute_force(truth, n, regular=False):
     Regular points would all be wrong the same way where an edge runs along the rows; close to a light they are better,
     where a random one may come too close.
     """
-    from reference.quadrature.image import ray_values
+    from reference.quadrature.ray_values import ray_values
     from reference.scene.camera import film_directions
 
     row, column = np.divmod(np.arange(truth.width * truth.height), truth.width)
@@ -47,10 +47,11 @@ def test_directions_through_the_middles_are_those_of_the_image(variant):
     assert found == pytest.approx(truth.direction, abs=1e-15)
 
 
+@pytest.mark.claim("pixel-area", tolerance="1e-4 relative, the tolerance asked for")
 def test_smooth_fog_is_the_integral_over_the_pixel(variant):
     """Gauss's product rule with 12 x 12 points, converged for what is smooth: the light is out of view."""
-    from reference.quadrature.image import ray_values
     from reference.quadrature.pixel_area import area_image
+    from reference.quadrature.ray_values import ray_values
     from reference.scene.camera import film_directions
 
     lamp = {"type": "point", "position": [3.9, 0.7, 3.9], "intensity": {"type": "rgb", "value": [5.0, 4.0, 3.0]}}
@@ -69,6 +70,7 @@ def test_smooth_fog_is_the_integral_over_the_pixel(variant):
     assert np.all(error < 1e-4 * expected)
 
 
+@pytest.mark.claim("pixel-area", tolerance="2e-3 relative beside the bound")
 @pytest.mark.parametrize("scene", [tiny_scene, box_scene], ids=["ball", "boxes"])
 def test_edges_against_brute_force(variant, scene):
     from reference.quadrature.image import quadrature_image
@@ -91,6 +93,7 @@ def test_edges_against_brute_force(variant, scene):
     assert np.abs(centre.airlight - airlight)[~near].max() > 5 * error.max()  # the centre is another thing
 
 
+@pytest.mark.claim("pixel-area")
 @pytest.mark.slow
 def test_smaller_tolerance_comes_closer(variant):
     from reference.quadrature.pixel_area import area_image

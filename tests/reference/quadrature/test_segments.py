@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from reference.quadrature.segments import AMBIENT, camera_segments, leg_kinks, optical_depth, scattering_range
-from reference.scene.convex_bodies import crossings
+from reference.visibility.line_crossings import crossings
 from tests.helpers.scenes import body, clear_scene, tiny_scene
 
 FOG = {"type": "homogeneous", "id": "fog", "sigma_t": 0.11, "albedo": 0.6, "has_spectral_extinction": False}

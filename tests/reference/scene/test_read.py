@@ -31,6 +31,7 @@ def test_both_sides_read_the_same_scene(variant):
     assert np.rad2deg([cone.cutoff, cone.beam]) == pytest.approx([31, 17])
 
 
+@pytest.mark.claim("pixel-centre", tolerance="5e-7: Mitsuba's float32 matrices")
 def test_rays_are_those_of_mitsuba(variant):
     import mitsuba as mi
 
@@ -44,6 +45,7 @@ def test_rays_are_those_of_mitsuba(variant):
     assert np.max(np.abs(np.array(ray.d).T - truth.direction)) < 5e-7  # float32 matrices on Mitsuba's side
 
 
+@pytest.mark.claim("scenes-refused-by-name")
 @pytest.mark.parametrize(
     ("changes", "message"),
     [({"lamp": None}, "no light"), ({"sky": {"type": "constant"}}, "ConstantBackgroundEmitter")],

@@ -6,53 +6,6 @@ from analytic.errors import InputError
 from tests.helpers.scenes import spot, tiny_scene
 
 
-def test_distance_to_a_plane_is_exact(variant):
-    import mitsuba as mi
-
-    from reference.quadrature.surface import surface_hits
-    from reference.scene.read import read_truth
-    from reference.scene.shapes import exact_distance
-
-    truth = read_truth(mi.load_dict(tiny_scene(ball=None)))
-    hits = surface_hits(truth)
-    distance = exact_distance(truth, hits.interaction, hits.distance)
-    met = np.isfinite(hits.distance)
-    assert met.sum() > 50
-    assert distance[met] == pytest.approx((-truth.origin[2] / truth.direction[:, 2])[met], rel=1e-14)
-    assert np.isinf(distance[~met]).all()
-
-
-@pytest.mark.parametrize("inside", [False, True], ids=["outside", "inside"])
-def test_distance_to_a_ball_is_exact(variant, inside):
-    """The points lie on the sphere in float64, and they are those that were cast."""
-    import mitsuba as mi
-
-    from reference.quadrature.surface import surface_hits
-    from reference.scene.read import read_truth
-    from reference.scene.shapes import exact_distance, read_shapes
-
-    ball = {"type": "sphere", "center": [0.1, -3.9, 1.2], "radius": 1.9} if inside else tiny_scene()["ball"]
-    truth = read_truth(mi.load_dict(tiny_scene(ball=ball, floor=None)))
-    hits = surface_hits(truth)
-    distance = exact_distance(truth, hits.interaction, hits.distance)
-    met = np.isfinite(hits.distance)
-    assert met.all() if inside else 5 < met.sum() < 100
-    shapes = read_shapes(truth.occluders)
-    point = truth.origin + distance[met, None] * truth.direction[met]
-    assert np.linalg.norm(point - shapes.centre, axis=1) == pytest.approx(shapes.radius.item(), rel=1e-14)
-    assert distance[met] == pytest.approx(hits.distance[met], rel=1e-5)
-    assert np.isinf(distance[~met]).all()
-
-
-def test_rays_that_touch_a_ball_keep_the_distance_that_was_cast(variant):
-    from reference.scene.convex_bodies import Ball
-    from reference.scene.shapes import _to_ball
-
-    ball = Ball(np.array([0.0, 0.0, 5.0]), 1.0)
-    direction = np.array([[np.sin(a), 0.0, np.cos(a)] for a in (0.0, np.arcsin(0.2) + 1e-9)])
-    assert _to_ball(ball, np.zeros(3), direction, np.array([4.00001, 4.9])).tolist() == [4.0, 4.9]
-
-
 @pytest.mark.parametrize("scale", [[2.0, 1.0, 1.0], [1.0, 2.0, 0.5], [-1.5, 1.5, 1.5]])
 def test_a_stretched_sphere_is_the_ball_that_mitsuba_makes_of_it(variant, scale):
     """Mitsuba warns of it, and intersects a ball whose radius is the first of the scales."""

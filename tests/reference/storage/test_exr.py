@@ -30,6 +30,7 @@ def write_raw(path, channels, header=None):
     OpenEXR.File(header or {}, channels).write(str(path))
 
 
+@pytest.mark.claim("image-files", tolerance="none: equal")
 def test_round_trip_is_exact(tmp_path, image):
     write_exr(tmp_path / "a.exr", image)
     back = read_exr(tmp_path / "a.exr")
@@ -45,6 +46,7 @@ def test_round_trip_is_exact(tmp_path, image):
     assert (tmp_path / "a.exr").read_bytes() == (tmp_path / "b.exr").read_bytes()
 
 
+@pytest.mark.claim("image-files")
 def test_file_is_single_part_float32_zip_with_plain_names(tmp_path, image):
     import OpenEXR
 

@@ -28,6 +28,7 @@ def test_temporary_file_has_the_suffix_and_the_folder_of_the_final_one(tmp_path)
     assert (tmp_path / "picture.exr").read_bytes() == b"x"
 
 
+@pytest.mark.claim("files-whole-or-not-at-all")
 @pytest.mark.parametrize("kind", [ValueError, KeyboardInterrupt, SystemExit])
 def test_an_exception_leaves_the_old_file_and_nothing_else(tmp_path, kind):
     path = tmp_path / "old.txt"
@@ -44,6 +45,7 @@ def test_an_exception_leaves_the_old_file_and_nothing_else(tmp_path, kind):
     assert list(tmp_path.iterdir()) == [path]
 
 
+@pytest.mark.claim("files-whole-or-not-at-all")
 def test_a_killed_process_leaves_the_old_file(tmp_path):
     path = tmp_path / "old.txt"
     write_text(path, "old")
@@ -119,6 +121,7 @@ def test_refuses_targets_that_are_no_files(tmp_path):
         write_text("a\0b/c", "x")
 
 
+@pytest.mark.claim("files-whole-or-not-at-all")
 def test_a_full_disk_names_the_file_and_leaves_it(tmp_path):
     """A limit on the size of a file stands for the disk; a failed write does not name a file by itself."""
     write_bytes(tmp_path / "a.bin", b"old")

@@ -12,7 +12,8 @@ from tests.helpers.suns import ball_over_floor, brick, sunny
 
 def random_rays(count, seed, towards):
     """Return rays from the origin in all directions, looked at between 0.1 and 5 m."""
-    from reference.scene.directional_light import DirectionalLight, parallel_rays
+    from reference.scene.directional_light import DirectionalLight
+    from reference.visibility.parallel_rays import parallel_rays
 
     direction = np.random.default_rng(seed).normal(size=(count, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
@@ -59,6 +60,7 @@ def hits_balls(point, towards, balls):
     return hit
 
 
+@pytest.mark.claim("directional-truth")
 @pytest.mark.parametrize("towards", [(0.3, -0.5, 0.7), (0.0, 0.0, 1.0), (-0.9, 0.02, 0.0)])
 def test_random_points_by_the_definition(towards):
     """Triangles and balls all around the camera, one ball around it: points far from an edge are lit or not."""
@@ -78,11 +80,13 @@ def test_random_points_by_the_definition(towards):
     assert not np.any((lit == hidden)[gap > 1e-9])
 
 
+@pytest.mark.claim("directional-truth", tolerance="1e-13")
 def test_one_triangle_in_closed_form():
     """Light, triangle and ray in one plane: z - y cot for the corners, the crossing where it goes through the ray."""
-    from reference.scene.directional_light import DirectionalLight, parallel_rays
+    from reference.scene.directional_light import DirectionalLight
     from reference.scene.shapes import Shapes
     from reference.visibility.directional_geometry import parallel_intervals
+    from reference.visibility.parallel_rays import parallel_rays
 
     light = DirectionalLight(unit([-3.0, 0.0, -4.0]), np.ones(3), None)  # cot = 3/4 for a ray along x
     rays = parallel_rays(np.zeros(3), np.array([[1.0, 0, 0]]), light, (np.zeros(1), np.array([10.0])))
@@ -104,9 +108,10 @@ def test_one_triangle_in_closed_form():
 @pytest.mark.parametrize("sign", [1, -1], ids=["towards the light", "away from it"])
 def test_rays_along_the_light(sign):
     """All of such a ray has one leg: what lies behind its end, or behind the camera, hides it all or not at all."""
-    from reference.scene.directional_light import DirectionalLight, parallel_rays
+    from reference.scene.directional_light import DirectionalLight
     from reference.scene.shapes import Shapes
     from reference.visibility.directional_geometry import parallel_intervals
+    from reference.visibility.parallel_rays import parallel_rays
 
     towards = unit([0.3, 0.4, 0.5])
     light = DirectionalLight(-towards, np.ones(3), None)
@@ -140,8 +145,8 @@ def rays_and_truth(scene):
 
     from reference.quadrature.segments import camera_segments, scattering_range
     from reference.quadrature.surface import surface_hits
-    from reference.scene.directional_light import parallel_rays
     from reference.scene.read import read_truth
+    from reference.visibility.parallel_rays import parallel_rays
 
     truth = read_truth(mi.load_dict(scene))
     span = scattering_range(camera_segments(truth, surface_hits(truth).distance))
@@ -156,8 +161,8 @@ def test_cast_rays_find_the_edges_of_the_geometry(variant):
     exact = directional_intervals(truth, rays, edges="geometry")
     cast = directional_intervals(truth, rays, edges="rays")
     assert exact.transitions > 100
-    assert exact.certificate.checked == 32 * np.sum(rays.last > rays.first)
-    assert exact.certificate.left == cast.certificate.left == 0
+    assert exact.random_checks.checked == 32 * np.sum(rays.last > rays.first)
+    assert exact.random_checks.left == cast.random_checks.left == 0
     lit = [lit_lengths(found, rays.ends) * (rays.last - rays.first) for found in (exact, cast)]
     # Legs and their ends are rounded to 2e-6 of some metres. One shadow is so thin that all samples step over it.
     assert np.sum(np.abs(lit[0] - lit[1]) > 2e-5) <= 1
@@ -199,6 +204,6 @@ def test_wrong_geometry_is_left_in_doubt(variant, monkeypatch):
 
     monkeypatch.setattr(module, "parallel_intervals", with_fewer_slats)
     wrong = module.directional_intervals(truth, rays)
-    assert right.certificate.left == 0
-    assert wrong.certificate.left > 5
+    assert right.random_checks.left == 0
+    assert wrong.random_checks.left > 5
     assert wrong.doubt is not None

@@ -3,6 +3,7 @@ import numpy as np
 import pytest
 
 
+@pytest.mark.claim("spot-falloff")
 @pytest.mark.parametrize("degrees", [2.0, 31.0, 78.0, 89.5])
 def test_interval_against_sampling(degrees):
     from reference.scene.read import TruthLight
@@ -38,6 +39,7 @@ def test_normals_point_from_the_light_to_the_foot():
     assert abs(normal[1] @ direction[1]) < 1e-15
 
 
+@pytest.mark.claim("spot-falloff", tolerance="2e-5: acos of a float32 cosine")
 def test_profile_is_that_of_mitsuba(variant):
     import drjit as dr
     import mitsuba as mi

@@ -34,6 +34,7 @@ def on_the_floor(scene, x):
     return scene.ray_intersect(mi.Ray3f(point, mi.Vector3f(0, 0, -1)))
 
 
+@pytest.mark.claim("shadow-rays-start-off-the-surface")
 def test_edges_of_shadows_move(variant):
     scene = half_covered_floor()
     x = -0.5 + np.array([-FAR, NEAR, FAR])
@@ -123,6 +124,7 @@ def test_balls(start, end, blocked):
     assert found.tolist() == [blocked]
 
 
+@pytest.mark.claim("shadow-rays-start-off-the-surface")
 def test_the_truth_of_a_renderer_with_an_epsilon_has_its_edges(variant):
     """A camera that sees nothing but the band between the two edges: lit in the truth, dark for such a renderer."""
     import mitsuba as mi

@@ -8,7 +8,7 @@ from tests.helpers.scenes import spot, tiny_scene
 
 def shadow_rays_disagree(truth, lamp, rays, ends, found, count=400):
     """Return how many random shadow rays contradict the intervals further than 1e-5 rad from an edge."""
-    from reference.visibility.lit_intervals import visibility_test
+    from tests.helpers.visibility import visibility_test
 
     used = np.flatnonzero(ends[1] > ends[0])
     ray = np.repeat(used, count)
@@ -36,6 +36,7 @@ def test_shadow_rays_agree_with_the_geometry_of_boxes(variant, lamp):
     assert shadow_rays_disagree(truth, light, rays, ends, found) == 0
 
 
+@pytest.mark.claim("exact-shadows")
 @pytest.mark.parametrize("name", ["colonnade", "two-pens"])
 def test_shadow_rays_agree_with_the_geometry_of_built_in_scenes(variant, name):
     from reference.scene.read import read_truth
@@ -49,6 +50,7 @@ def test_shadow_rays_agree_with_the_geometry_of_built_in_scenes(variant, name):
     assert shadow_rays_disagree(truth, light, rays, ends, found) == 0
 
 
+@pytest.mark.claim("cast-shadows", tolerance="2e-5, median 1e-6: where shadow rays stop")
 def test_edges_by_geometry_are_those_by_bisection(variant):
     """Two routes that share no code: edge by edge within the rounding of a float32 shadow ray."""
     import mitsuba as mi
@@ -67,13 +69,14 @@ def test_edges_by_geometry_are_those_by_bisection(variant):
     assert np.median(np.abs(lit[0] - lit[1])) < 1e-6
 
 
+@pytest.mark.claim("exact-shadows")
 def test_a_needle_is_found_where_regular_samples_step_over_it(variant):
     """Its shadow in closed form: the two sides of a box that is seen from the light, in one plane."""
     import mitsuba as mi
 
     from reference.scene.read import read_truth
-    from reference.visibility.lit_intervals import visibility_test
     from reference.visibility.triangles import geometric_intervals
+    from tests.helpers.visibility import visibility_test
 
     width = 2e-4
     scene = tiny_scene(ball=None, floor=None, needle=box((0.3, -0.1, 0.9), (width, width, 8.0)))
@@ -103,6 +106,7 @@ def test_a_needle_is_found_where_regular_samples_step_over_it(variant):
     assert visible(ray, high + (high - low)).all()
 
 
+@pytest.mark.claim("exact-shadows", tolerance="1e-12")
 def test_one_triangle_against_its_closed_form(variant):
     """Light, triangle and ray in one plane: the angles of the two corners as seen from the light."""
     import mitsuba as mi

@@ -33,6 +33,7 @@ def test_the_names_that_editors_complete_are_those_of_the_api():
         _ = airlight.no_such
 
 
+@pytest.mark.claim("help-is-light")
 def test_the_import_is_light_and_the_variant_is_chosen_on_first_use():
     code = (
         "import sys, airlight\n"
@@ -58,6 +59,7 @@ def test_every_function_has_parameters_raises_and_an_example(name):
         assert f"{heading}\n    {'-' * len(heading)}\n" in text, heading
 
 
+@pytest.mark.claim("input-errors")
 def test_both_sides_raise_one_exception():
     @one_error
     def refuses():
@@ -115,6 +117,7 @@ def _is_light(value):
     return isinstance(value, dict) and value.get("type") in ("point", "spot")
 
 
+@pytest.mark.claim("input-errors")
 @pytest.mark.parametrize(
     ("scene", "size", "words"),
     [
@@ -165,6 +168,7 @@ def test_a_frame_is_that_of_the_parts_it_is_made_of(variant):
     assert frame.times is None
 
 
+@pytest.mark.claim("one-source-two-precisions")
 def test_precision_decides_the_type(variant):
     single, double = (
         airlight.render("open-fog", "unshadowed", size=TINY, precision=one) for one in ("single", "double")
@@ -191,6 +195,7 @@ def test_a_function_of_ones_own_is_a_method(variant):
         airlight.render("open-fog", gone, size=TINY)
 
 
+@pytest.mark.claim("input-errors")
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

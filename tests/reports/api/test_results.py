@@ -90,6 +90,7 @@ def test_a_notebook_is_given_valid_html_and_a_png(name):
     assert len(repr(result)) < 250
 
 
+@pytest.mark.claim("results-are-frozen")
 @pytest.mark.parametrize("name", RESULTS)
 def test_results_are_frozen_and_so_are_their_arrays(name):
     result = RESULTS[name]()
@@ -122,6 +123,7 @@ def test_layers_are_arrays_of_the_precision_of_what_made_them():
     np.testing.assert_array_equal(frame.total, frame.airlight + np.float32(0.25))
 
 
+@pytest.mark.claim("results-are-frozen")
 def test_numpy_takes_a_result_as_its_total():
     frame = rendering()
     np.testing.assert_array_equal(np.asarray(frame), frame.airlight + frame.surface)
@@ -145,6 +147,7 @@ def test_the_picture_of_a_frame_takes_an_exposure_in_stops():
         frame.picture("fog")
 
 
+@pytest.mark.claim("image-files")
 def test_save_writes_exr_and_png_and_refuses_others(tmp_path):
     frame = rendering()
     read = read_exr(frame.save(tmp_path / "frame.exr"))

@@ -28,6 +28,7 @@ def files(tmp_path):
     return [str(tmp_path / "reference.exr"), str(tmp_path / "test.exr")], str(tmp_path / "mask.exr")
 
 
+@pytest.mark.claim("agreement-inside-the-margin", "exit-status")
 def test_the_margin_decides(files, capsys):
     images, _ = files
     assert run(["compare", *images, "--margin", "0.03", "--json"]) == 0
@@ -63,6 +64,7 @@ def test_wrong_options_are_refused(files, capsys, arguments, message):
     assert message in capsys.readouterr().err
 
 
+@pytest.mark.claim("engine-margin")
 def test_a_file_is_compared_with_the_truth_of_a_scene(tmp_path, capsys):
     """The truth at another size is written by `reference`, and found again; upside down it is suspected."""
     path, turned = tmp_path / "open-fog.exr", tmp_path / "turned.exr"

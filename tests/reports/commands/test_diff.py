@@ -35,6 +35,7 @@ def test_the_same_report_has_no_differences(files, capsys):
     assert "12 configurations, one machine" in out
 
 
+@pytest.mark.claim("diff")
 @pytest.mark.parametrize(("busy", "alarms"), [(0.0, 0), (0.05, 1), (0.2, 1)])
 def test_the_same_code_on_the_same_machine_does_not_fail(busy, alarms):
     """Pairs with other noise: none fails on a quiet machine, hardly any where 5 or 20 % of the timings were hit."""
@@ -42,6 +43,7 @@ def test_the_same_code_on_the_same_machine_does_not_fail(busy, alarms):
     assert sum(bool(compare_reports(*pair).worse) for pair in pairs) <= alarms
 
 
+@pytest.mark.claim("diff")
 def test_twice_the_time_is_found_on_a_quiet_machine():
     for seed in range(0, 40, 2):
         new = report(seed + 1)
@@ -97,6 +99,7 @@ def test_another_version_is_said_and_compared():
     assert found.worse
 
 
+@pytest.mark.claim("diff")
 def test_three_times_the_error_is_found_and_named(files, capsys):
     new = report()
     method(new)["error"] = errors(3e-3)
@@ -116,6 +119,7 @@ def test_the_error_tolerance_decides(files, factor, tolerance, status):
     assert run(["diff", *files(report(), new), "--error-tolerance", tolerance]) == status
 
 
+@pytest.mark.claim("diff")
 def test_rounding_is_no_error():
     old, new = report(), report()
     # The 99 % quantile, three times as large, grows by 1.2e-6, which rounding was seen to do.

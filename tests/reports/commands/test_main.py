@@ -36,6 +36,7 @@ def command_that_raises(monkeypatch):
     return arrange
 
 
+@pytest.mark.claim("exit-status")
 @pytest.mark.parametrize(
     ("error", "status", "words"),
     [
@@ -75,6 +76,7 @@ def test_a_library_missing_at_import_is_named(command_that_raises, capfd, monkey
         cli.run(["scenes"])
 
 
+@pytest.mark.claim("exit-status")
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -97,6 +99,7 @@ def test_no_command_shows_the_help(capfd):
     assert "doctor" in capfd.readouterr().out
 
 
+@pytest.mark.claim("documented-commands")
 @pytest.mark.parametrize("command", [None, *(entry.callback.__name__ for entry in cli.app.registered_commands)])
 def test_every_command_has_help(command, capfd):
     name = {"run_tests": "test"}.get(command, command)
@@ -109,6 +112,7 @@ def test_version(capfd):
     assert capfd.readouterr().out == f"airlight {__version__}\n"
 
 
+@pytest.mark.claim("variant")
 def test_variant_reaches_activate(monkeypatch):
     monkeypatch.setenv("AIRLIGHT_VARIANT", "")
     assert cli.run(["--variant", "llvm_ad_rgb", "scenes"]) == 0
@@ -137,21 +141,32 @@ def test_tests_without_a_checkout_say_so(tmp_path, monkeypatch, capfd):
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
-        (["-x"], ["-m", "not statistical and not slow", "-x"]),
-        (["--all", "-x"], ["-x"]),
+        (["-x"], ["-n", "2", "--dist", "worksteal", "-m", "not statistical and not slow", "-x"]),
+        (["--workers", "0"], ["-m", "not statistical and not slow"]),
+        (["--all", "--workers", "0", "-x"], ["-x"]),
         (
-            ["--all", "--workers", "2", "tests/test_x.py", "-k", "wheel"],
-            ["-n", "2", "tests/test_x.py", "-k", "wheel"],
+            ["--all", "--workers", "3", "tests/test_x.py", "-k", "wheel"],
+            ["-n", "3", "--dist", "worksteal", "tests/test_x.py", "-k", "wheel"],
         ),
     ],
 )
 def test_tests_run_pytest_with_what_is_left(arguments, expected, monkeypatch, tmp_path):
+    monkeypatch.setattr("reports.machine.environment.threads", lambda: 8)
     asked = {}
     monkeypatch.setattr(os, "execv", lambda program, command: asked.update(command=command))
     monkeypatch.chdir(tmp_path)
     assert cli.run(["test", *arguments]) == 0
     assert asked["command"] == [sys.executable, "-m", "pytest", *expected]
     assert Path.cwd() == ROOT
+
+
+def test_one_core_has_no_workers(monkeypatch, tmp_path):
+    monkeypatch.setattr("reports.machine.environment.threads", lambda: 1)
+    asked = {}
+    monkeypatch.setattr(os, "execv", lambda program, command: asked.update(command=command))
+    monkeypatch.chdir(tmp_path)
+    assert cli.run(["test"]) == 0
+    assert asked["command"] == [sys.executable, "-m", "pytest", "-m", "not statistical and not slow"]
 
 
 def test_every_public_name_can_be_imported(variant):

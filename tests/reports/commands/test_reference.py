@@ -34,6 +34,7 @@ def summary(output, capfd, *arguments, **options):
     return json.loads(capfd.readouterr().out)
 
 
+@pytest.mark.claim("runs-go-on", tolerance="none: equal bytes")
 def test_same_samples_and_seed_are_the_same_bytes(variant, tmp_path, monkeypatch, capfd):
     """From an empty cache, from a full one, and from one that holds more."""
     first = summary(tmp_path / "a.exr", capfd, "--spp", "64", "--seed", "3")
@@ -60,6 +61,7 @@ def test_header_and_words_name_the_batches(variant, tmp_path, capfd):
     assert "32 of 40 batches from the cache" in capfd.readouterr().out
 
 
+@pytest.mark.claim("targets-of-a-run")
 def test_target_error_is_reached_and_no_more(variant, tmp_path, capfd):
     found = summary(tmp_path / "a.exr", capfd, "--target-error", "0.03")
     assert found["reached"] is True
@@ -119,6 +121,7 @@ def test_quadrature_needs_no_budget(variant, tmp_path, capfd):
     assert read_exr(tmp_path / "a.exr").attributes["airlight:pixel"] == "centre"
 
 
+@pytest.mark.claim("single-scatter-agrees", tolerance="four to six standard errors")
 @pytest.mark.parametrize("estimator", ["single-scatter"])
 def test_single_scatter_agrees_with_the_quadrature(variant, tmp_path, capfd, estimator):
     exact = summary(tmp_path / "q.exr", capfd, estimator="quadrature")["means"]
@@ -129,6 +132,7 @@ def test_single_scatter_agrees_with_the_quadrature(variant, tmp_path, capfd, est
         np.testing.assert_allclose(found["means"][layer], exact[layer], rtol=tolerance)
 
 
+@pytest.mark.claim("runs-go-on")
 def test_interrupted_run_leaves_the_file_and_says_what_is_kept(variant, tmp_path, capfd, monkeypatch):
     import validation.estimates.monte_carlo
 
@@ -151,6 +155,7 @@ def test_interrupted_run_leaves_the_file_and_says_what_is_kept(variant, tmp_path
     assert "5 of 32 batches from the cache" in capfd.readouterr().out
 
 
+@pytest.mark.claim("damaged-cache")
 def test_damaged_cache_is_said_and_mended(variant, tmp_path, capfd):
     run(tmp_path / "a.exr", "--spp", "64")
     path = next(cache_folder().glob("volpath-*/000008-000015.npz"))
@@ -164,6 +169,7 @@ def test_damaged_cache_is_said_and_mended(variant, tmp_path, capfd):
     assert (tmp_path / "a.exr").read_bytes() == (tmp_path / "b.exr").read_bytes()
 
 
+@pytest.mark.claim("merge")
 def test_merged_files_of_two_machines(variant, tmp_path, monkeypatch, capfd):
     """Each with a cache of its own; together they are what one machine finds with all the seeds."""
     for name, seed in (("a", "0"), ("b", "32")):
@@ -202,6 +208,7 @@ def wait_for_batches(process, cache, number):
     pytest.fail("no batches after a minute")
 
 
+@pytest.mark.claim("runs-go-on")
 @pytest.mark.slow
 @pytest.mark.parametrize("sign", [signal.SIGKILL, signal.SIGINT])
 def test_a_run_that_is_stopped_from_outside_loses_nothing(variant, tmp_path, capfd, own_cache, sign):

@@ -85,6 +85,7 @@ def test_plan_counts_casters_and_warns_of_open_ones(variant, capfd):
     assert err.count("is open") == 2
 
 
+@pytest.mark.claim("flawed-meshes-warn")
 def test_render_warns_of_open_casters_once_each(variant, capfd):
     run("sphere-spot", *SMALL, "--method", "shadow-planes", "--json")
     out, err = capfd.readouterr()

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import copy
 
+import pytest
+
 from reports.data.claims import claims, confirmed, unstudied
 from reports.tables.agreement import verdict
 from tests.helpers.reports import agreement, checked, engine, entry, errors, flip, report_of, scene
@@ -47,6 +49,7 @@ def scenes():
     return copy.deepcopy(SCENES)
 
 
+@pytest.mark.claim("claims-follow")
 def test_claims_on_a_truth_that_is_confirmed():
     trust, *fastest, left_out = texts(scenes())
     assert [one["good"] for one in claims(scenes())] == [True, True, True, None, None]
@@ -73,6 +76,7 @@ def test_each_estimator_that_checked_the_truth_has_a_sentence():
     assert not confirmed(data)
 
 
+@pytest.mark.claim("claims-follow")
 def test_claims_on_a_truth_that_is_not_confirmed():
     data = scenes()
     data[1]["agreement"]["surface"]["statistics"]["equivalent"] = False
@@ -122,6 +126,7 @@ def test_error_of_just_the_target_counts():
     assert "is edge" in fastest_of([method("edge", 0.01, 3.0)], 0.01)
 
 
+@pytest.mark.claim("claims-follow")
 def test_claims_never_name_a_method_with_nonfinite_pixels():
     """Its RMSE leaves out the very pixels that are wrong."""
     data = scenes()[:1]

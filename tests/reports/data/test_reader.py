@@ -57,6 +57,7 @@ def test_a_report_is_read_by_its_file_or_its_folder(folder):
         assert where == folder
 
 
+@pytest.mark.claim("report-drawn-again")
 def test_the_page_is_drawn_again_in_place_and_as_a_whole_elsewhere(folder, tmp_path):
     data, where = load_report(folder)
     redraw_report(data, where, folder)
@@ -114,11 +115,13 @@ def test_files_elsewhere_are_refused(folder, name):
         load_report(folder)
 
 
+@pytest.mark.claim("report-schema")
 def test_keys_of_later_versions_are_passed_over(folder):
     changed(folder, lambda data: data.update(later={"a": 1}) or data["scenes"][0].update(more=[1]))
     assert load_report(folder)[0]["later"] == {"a": 1}
 
 
+@pytest.mark.claim("report-drawn-again")
 def test_the_command_needs_no_mitsuba_to_draw_a_page_again(folder):
     code = (
         "import sys, airlight\n"

@@ -40,7 +40,7 @@ def test_refused_measurement_has_every_entry():
 
 @pytest.mark.parametrize("airlight", [np.zeros((2, 3, 3)), np.full((2, 3, 3), np.inf)])
 def test_truth_without_light_that_is_finite_has_no_numbers_rather_than_nan(airlight):
-    from reference.quadrature.image import TruthImage
+    from reference.quadrature.ray_values import TruthImage
 
     black = np.zeros_like(airlight)
     data = truth_data(TruthImage(airlight, black, black, np.ones((2, 3)), np.ones((2, 3)), 0, float("nan")))

@@ -55,6 +55,7 @@ def built(tmp_path_factory):
     return folder
 
 
+@pytest.mark.claim("docs-without-a-network")
 @pytest.mark.slow
 def test_pages_hold_everything_and_load_nothing_from_a_network(built):
     from realtime.kernels.registry import KERNELS
@@ -127,7 +128,7 @@ def test_every_method_kernel_and_scene_has_its_place(extension):
         assert f"<!-- generated: method {name} -->" in page(name), name
         text = fill(page(name))
         assert f"[`{name}`]({name}.md)" in fill("<!-- generated: methods -->")
-        for parameter, default in record.parameters.items():
+        for parameter, default in record.defaults.items():
             said = f"{default:g}" if isinstance(default, float) else str(default)
             assert re.search(rf"`{parameter}` \| `?{said}\b|`{parameter}={said}`", text), (name, parameter)
     for name in KERNELS:
@@ -166,9 +167,9 @@ def test_a_mark_that_names_nothing_is_an_error(extension):
 
 def test_links_to_source_lead_to_the_page_of_the_module(extension):
     generated = extension("generated")
-    text = ["See [`lit_balls.py`](../reference/lit_balls.py) and [it](../CONTRIBUTING.md)."]
+    text = ["See [`spheres.py`](../reference/visibility/spheres.py) and [it](../CONTRIBUTING.md)."]
     generated._replace(None, "page", text)
-    assert text == ["See {py:mod}`lit_balls.py <reference.visibility.spheres>` and [it](contributing.md)."]
+    assert text == ["See {py:mod}`spheres.py <reference.visibility.spheres>` and [it](contributing.md)."]
 
 
 def test_formulas_are_mathml_and_slips_are_named(extension):
@@ -204,6 +205,7 @@ def test_docstrings_are_shown_as_they_stand(extension):
 # --- what the pages say ----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.claim("errata-of-biri", tolerance="1e-7 relative")
 def test_the_derived_coefficients_of_the_errata_are_those_of_the_program():
     from analytic.phase import PhaseFunction
     from analytic.series import taylor_coefficients
@@ -227,6 +229,7 @@ def _value(formula, a):
     return eval(words, {"a": a})
 
 
+@pytest.mark.claim("kernel-of-the-page")
 def test_the_kernel_of_the_page_on_adding_one(variant, tmp_path, monkeypatch):
     """The snippet is what it says: `equiangular` with twelve steps."""
     import numpy as np

@@ -26,6 +26,7 @@ def fog(tmp_path):
     return tmp_path / "fog.py"
 
 
+@pytest.mark.claim("own-method")
 def test_the_worked_example_is_measured_like_a_built_in_method(fog, variant):
     """Steps in the angle without shifts are `ray-march`; twice as many come closer to the truth."""
     import mitsuba as mi
@@ -63,6 +64,7 @@ def test_the_worked_example_refuses_by_name_what_it_cannot_do(fog, variant):
     assert found.refused == "interleaved: wanted one medium without bounds, and spots without a soft edge"
 
 
+@pytest.mark.claim("own-method")
 def test_the_worked_example_works_in_the_command(fog, capsys, monkeypatch):
     monkeypatch.chdir(fog.parent)
     for name in ("fog.py:interleaved", "fog:interleaved"):
@@ -75,6 +77,7 @@ def test_the_worked_example_works_in_the_command(fog, capsys, monkeypatch):
     assert "did you mean 'steps'?" in capsys.readouterr().err
 
 
+@pytest.mark.claim("own-method")
 def test_the_plain_example_returns_what_it_says(fog, variant):
     import mitsuba as mi
 

@@ -48,6 +48,7 @@ def test_shares_are_counted(folder):
     assert any(float(row["within_1_percent"]) < 0.5 for row in rows if row["kernel"] == "taylor-printed")
 
 
+@pytest.mark.claim("figures-repeat", tolerance="none: equal bytes")
 def test_drawing_again_only_reads_and_gives_the_same_bytes_without_mitsuba(folder, tmp_path):
     """In another process, by the command; and what is embedded are TrueType fonts, no date."""
     program = (

@@ -30,6 +30,7 @@ def lab(hexadecimal: str, sight: str):
     return colour.XYZ_to_Lab(colour.RGB_to_XYZ(linear, "sRGB", apply_cctf_decoding=False))
 
 
+@pytest.mark.claim("colours-of-figures", tolerance="CIEDE2000 above 10")
 @pytest.mark.parametrize("sight", _SIGHTS)
 @pytest.mark.filterwarnings("ignore")  # colour-science warns of optional packages
 def test_any_two_colours_differ_for_every_sight(sight):

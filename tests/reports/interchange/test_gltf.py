@@ -67,6 +67,7 @@ def project(document, points):
     return np.stack([0.5 + 0.5 * x / (-z * half * lens["aspectRatio"]), 0.5 - 0.5 * y / (-z * half)], axis=1)
 
 
+@pytest.mark.claim("gltf", tolerance="1e-6: float32")
 @pytest.mark.parametrize("up", [(0, 0, 1), (0, 1, 0), (0.1, -1, 0.2), (-1, 0, 0.3)])
 def test_vertices_are_in_the_image_where_mitsuba_has_them(variant, tmp_path, up):
     import mitsuba as mi
@@ -89,6 +90,7 @@ def test_vertices_are_in_the_image_where_mitsuba_has_them(variant, tmp_path, up)
     np.testing.assert_allclose(found, wanted, atol=1e-6)
 
 
+@pytest.mark.claim("gltf")
 def test_trimesh_reads_it_back(variant, tmp_path):
     import trimesh
 
@@ -111,6 +113,7 @@ def test_trimesh_reads_it_back(variant, tmp_path):
     np.testing.assert_allclose(back.camera_transform[:3, 3], [0.63, 1.87, 5.31], rtol=1e-6)
 
 
+@pytest.mark.claim("gltf")
 def test_lights_are_those_of_the_scene(variant, tmp_path):
     one = loaded(spot=spot(cutoff=40.0, beam=25.0), hard=spot())
     write_gltf(tmp_path / "tiny.glb", one)
@@ -179,6 +182,7 @@ def test_the_same_scene_gives_the_same_bytes(variant, tmp_path):
     assert (tmp_path / "a.glb").read_bytes() == (tmp_path / "b.glb").read_bytes()
 
 
+@pytest.mark.claim("gltf", tolerance="the sagitta of 128 sides")
 @pytest.mark.parametrize("transform", ["plain", "turned", "mirrored"])
 @pytest.mark.parametrize(
     ("kind", "flipped"),

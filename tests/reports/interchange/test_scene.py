@@ -18,6 +18,7 @@ def described(**changes):
     return describe_scene(LoadedScene("tiny", mi.load_dict(tiny_scene(**changes)), "A tiny scene.", ""))
 
 
+@pytest.mark.claim("pixel-centre", tolerance="5e-7: Mitsuba's float32 matrices")
 def test_camera_is_enough_to_make_mitsubas_rays(variant):
     import mitsuba as mi
 

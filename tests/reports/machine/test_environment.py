@@ -151,6 +151,7 @@ class TestPrepare:
         with pytest.raises(MissingError, match=r"no libLLVM.*libatomic.*apt-get install -y libllvm19 libatomic1"):
             prepare()
 
+    @pytest.mark.claim("variant")
     def test_cuda_is_chosen_where_it_works_and_does_without_llvm(self, only, monkeypatch):
         monkeypatch.setattr(environment, "cuda_problem", lambda: "")
         assert prepare() == environment.Prepared("cuda_ad_rgb", None)
@@ -159,6 +160,7 @@ class TestPrepare:
         with pytest.raises(MissingError, match=r"no GPU; use --variant llvm_ad_rgb"):
             prepare("cuda_ad_rgb")
 
+    @pytest.mark.claim("variant")
     def test_unknown_variant_names_the_nearest(self, only, monkeypatch):
         with pytest.raises(InputError, match=r"'llvm_rgb'.*did you mean llvm_ad_rgb"):
             prepare("llvm_rgb")

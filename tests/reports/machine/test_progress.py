@@ -18,6 +18,7 @@ def clock(monkeypatch):
     return clock
 
 
+@pytest.mark.claim("progress")
 def test_short_work_says_nothing(capsys, clock):
     with progress_bar("report") as progress:
         for step in range(10):
@@ -82,6 +83,7 @@ class Terminal(io.StringIO):
         return True
 
 
+@pytest.mark.claim("progress")
 @pytest.mark.parametrize(("seconds", "shown"), [(0.5, False), (5.0, True)])
 def test_bar_on_a_terminal_appears_after_two_seconds_and_goes_away(monkeypatch, clock, seconds, shown):
     screen = Terminal()

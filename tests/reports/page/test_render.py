@@ -59,6 +59,7 @@ def test_page_shows_the_numbers_of_the_data(page):
     assert "mitsuba 3.9.1" in text
 
 
+@pytest.mark.claim("report-stands-alone")
 def test_page_needs_nothing_but_itself(page):
     """Only the pictures that are named for readers without scripts are other files, and they are not loaded."""
     for tag, attributes in page.tags:

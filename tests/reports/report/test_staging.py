@@ -23,6 +23,7 @@ def test_files_appear_when_the_block_ends(tmp_path):
     assert hidden.exists() is False
 
 
+@pytest.mark.claim("files-whole-or-not-at-all")
 @pytest.mark.parametrize("stop", [KeyboardInterrupt, ValueError])
 def test_an_exception_leaves_everything_as_it_was(tmp_path, stop):
     (tmp_path / "report.html").write_text("old")

@@ -232,6 +232,7 @@ def test_shares_are_in_per_cent_in_html_alone():
     assert latex_rows(latex([row]))[0][1] == r"\num{0.012}"
 
 
+@pytest.mark.claim("latex-tables")
 def test_latex_has_the_rules_of_booktabs_and_says_what_it_needs():
     columns = (Column("a", "name", words=True), Column("b", "time", "ms"))
     drawn = latex(
@@ -277,6 +278,7 @@ def test_powers_of_ten_are_typeset():
     assert (typeset("1.2e-05"), typeset("3e+03"), typeset("-"), typeset("12")) == ("1.2·10⁻⁵", "3·10³", DASH, "12")
 
 
+@pytest.mark.claim("latex-tables")
 def test_a_median_has_the_digits_of_its_quartiles():
     assert with_spread(12.347, 12.123, 12.903) == ("12.35", "0.22", "0.56")
     assert with_spread(144.4, 139.2, 153.7) == ("144.4", "5.2", "9.3")

@@ -58,6 +58,7 @@ def truth_of(scene):
     return truth
 
 
+@pytest.mark.claim("certified-fog")
 def test_the_file_is_whole_and_small(text, certified):
     data = json.loads(text)
     assert data["schema"] == SCHEMA
@@ -86,6 +87,7 @@ def test_bounds_are_worth_ten_digits_and_zero_means_dark(certified, name):
     assert np.all(most[~dark] > 0)
 
 
+@pytest.mark.claim("certified-fog-inputs")
 def test_all_inputs_are_exact_in_float32():
     def numbers(value):
         if isinstance(value, dict):
@@ -105,6 +107,7 @@ def corners(shape):
     return {tuple(map(float, corner)) for corner in np.array(shape.centre) + signs @ np.array(shape.half_edges)}
 
 
+@pytest.mark.claim("certified-fog-inputs")
 def test_corners_are_exact_in_mitsuba(variant):
     import mitsuba as mi
 
@@ -118,12 +121,14 @@ def test_corners_are_exact_in_mitsuba(variant):
         assert boxes <= found <= boxes | screens, scene.name
 
 
+@pytest.mark.claim("certified-fog", tolerance="none: equal digits")
 @pytest.mark.parametrize(("name", "pixel"), SOME.items())
 def test_some_rays_come_out_the_same(certified, name, pixel):
     found = json.loads(json.dumps(asdict(certify_pixel(SCENES[name], directions(SCENES[name])[pixel]))))
     assert found == certified[name]["pixels"][pixel]
 
 
+@pytest.mark.claim("certified-fog", tolerance="none: equal digits")
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_all_rays_come_out_the_same(certified, name):
@@ -131,6 +136,8 @@ def test_all_rays_come_out_the_same(certified, name):
         assert json.loads(json.dumps(asdict(certify_pixel(SCENES[name], direction)))) == expected
 
 
+@pytest.mark.claim("bound-in-every-pixel", tolerance="the bound of the pixel, 1e-9 of the largest at most")
+@pytest.mark.claim("certified-fog", tolerance="the bound of the pixel, 1e-9 of the largest at most")
 @pytest.mark.parametrize("name", NAMES)
 def test_quadrature_agrees_within_its_own_bound(variant, certified, name):
     """The route that shares nothing: lit intervals of triangles and balls in a plane, panels of Kronrod in float64."""
@@ -149,6 +156,7 @@ def test_quadrature_agrees_within_its_own_bound(variant, certified, name):
     np.testing.assert_allclose(image.distance.reshape(-1), distance, rtol=3e-6)
 
 
+@pytest.mark.claim("single-scatter-agrees", tolerance="4.5 standard errors, below 2e-3")
 @pytest.mark.statistical
 @pytest.mark.parametrize("name", NAMES)
 def test_single_scatter_agrees_within_its_noise(variant, certified, name):
@@ -168,6 +176,7 @@ def test_single_scatter_agrees_within_its_noise(variant, certified, name):
     assert np.all(np.abs(totals.mean(axis=0)) < 4.5 * error + 1e-6), (totals.mean(axis=0), error)
 
 
+@pytest.mark.claim("certified-fog-snippet")
 def test_the_page_tells_of_every_scene_and_its_snippet_runs(variant):
     page = (ROOT / "docs" / "certified-fog.md").read_text()
     assert all(f"`{name}`" in page for name in NAMES)

@@ -51,6 +51,7 @@ def write(tmp_path):
     return written
 
 
+@pytest.mark.claim("engine-layers")
 def test_airlight_is_compared_where_there_is_one(scene, truth, write):
     found = compare_scene(scene, write(airlight=truth.airlight, surface=2 * truth.surface))
     assert (found.scene, found.size, found.expected, found.comparison.layer) == ("own", (16, 12), *["airlight"] * 2)
@@ -61,6 +62,7 @@ def test_airlight_is_compared_where_there_is_one(scene, truth, write):
     np.testing.assert_allclose(found.comparison.metrics.relative_bias, 1, rtol=1e-6)
 
 
+@pytest.mark.claim("engine-layers")
 def test_plain_channels_are_compared_with_all_light(scene, truth, write):
     total = truth_layer(truth, "total")
     for layers in ({"total": total}, {"Final__Combined": total}):
@@ -76,6 +78,7 @@ def test_one_kind_of_light_alone_is_recognised(scene, truth, write):
         assert words.startswith(f"the image is the {name} alone")
 
 
+@pytest.mark.claim("engine-margin")
 def test_margin_decides_without_standard_errors(scene, truth, write):
     file = write(airlight=1.01 * truth.airlight)
     assert compare_scene(scene, file, margin=0.011).failures == ()

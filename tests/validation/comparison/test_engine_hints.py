@@ -19,6 +19,7 @@ def srgb(image):
     return np.where(image <= 0.0031308, 12.92 * image, 1.055 * image ** (1 / 2.4) - 0.055)
 
 
+@pytest.mark.claim("engine-suspects")
 def test_the_right_image_raises_no_suspicion(truth):
     noisy = truth * (1 + 0.005 * np.random.default_rng(3).standard_normal(truth.shape))
     for image in (truth, noisy):
@@ -28,6 +29,7 @@ def test_the_right_image_raises_no_suspicion(truth):
     assert find_hints(truth, truth).factor_rmse == 0
 
 
+@pytest.mark.claim("engine-suspects")
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -57,6 +59,7 @@ def relative_rmse(truth, image):
     return np.sqrt(np.mean((image - truth) ** 2)) / truth.mean()
 
 
+@pytest.mark.claim("engine-suspects", tolerance="1e-12 relative")
 def test_best_factor_is_that_of_least_squares(truth):
     noisy = truth + 0.1 * np.random.default_rng(4).standard_normal(truth.shape)
     hints = find_hints(truth, noisy)

@@ -39,7 +39,7 @@ def test_unknown_kernel_is_refused_with_the_nearest():
 def test_unknown_parameter_is_refused_with_the_nearest():
     with refused("did you mean 'steps'?") as caught:
         configuration("ray-march", None, {"step": 7})
-    assert all(name in str(caught.value) for name in METHODS["ray-march"].parameters)
+    assert all(name in str(caught.value) for name in METHODS["ray-march"].defaults)
 
 
 def test_parameter_of_a_method_without_any_is_refused():

@@ -16,6 +16,7 @@ def test_median_is_the_time_of_the_work(variant):
     assert timing.median_ms < 200
 
 
+@pytest.mark.claim("times-are-medians")
 def test_warm_up_is_not_timed(variant):
     calls = []
 
@@ -33,6 +34,7 @@ def test_number_of_repetitions_is_bounded(variant):
     assert time_repeated(lambda: None, seconds=0.0, least=3).repetitions == 3
 
 
+@pytest.mark.claim("times-are-medians")
 def test_one_outlier_does_not_move_the_median(variant):
     calls = []
 
@@ -45,6 +47,7 @@ def test_one_outlier_does_not_move_the_median(variant):
     assert timing.median_ms < 20
 
 
+@pytest.mark.claim("times-are-medians")
 def test_quartiles_are_those_of_the_times(variant, monkeypatch):
     """A clock of our own: repetitions of 1, 2, 3, 4 and 5 ms."""
     # One reading for the end of the time, then: is there time left (not asked below `least`), start, stop.

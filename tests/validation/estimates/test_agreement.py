@@ -30,6 +30,7 @@ def false_truth(monkeypatch, change):
     )
 
 
+@pytest.mark.claim("volpath-agrees")
 def test_volpath_agrees_with_the_truth(scene):
     found = agreement(scene, **BUDGET)
     assert set(found) == {"airlight", "surface"}
@@ -82,6 +83,7 @@ def test_leg_from_the_light_that_is_too_short_does_not_agree(scene, monkeypatch)
     assert found["airlight"].epsilon == 0.1
 
 
+@pytest.mark.claim("corrected-for-the-epsilon")
 def test_correction_for_the_epsilon_is_the_difference_of_the_two_biases(scene):
     """The truth of the shortened leg is brighter by about sigma_t epsilon r = 0.31 * 8.94e-4 * 2."""
     for one in agreement(scene, **BUDGET).values():
@@ -89,6 +91,7 @@ def test_correction_for_the_epsilon_is_the_difference_of_the_two_biases(scene):
         assert shift == pytest.approx(0.31 * one.epsilon * 2, rel=0.5)
 
 
+@pytest.mark.claim("pixels-beside-a-light")
 def test_pixels_near_a_light_are_left_out(scene):
     from validation.estimates.quadrature import truth_image
 

@@ -2,6 +2,7 @@
 """What an estimator is compared with: the quadrature image, for volpath that of its shorter shadow ray."""
 
 import numpy as np
+import pytest
 
 from reference.scene.shadow_epsilon import measure_shadow_epsilon
 from validation.estimates.expected_airlight import estimator_truth
@@ -9,6 +10,7 @@ from validation.estimates.quadrature import truth_image
 from validation.scenes.loading import load_scene
 
 
+@pytest.mark.claim("corrected-for-the-epsilon")
 def test_volpath_should_find_a_little_more_light(variant):
     """exp(-sigma_t r (1 - epsilon)) over exp(-sigma_t r): at most 1 + 2 epsilon where sigma_t r is below 2."""
     scene = load_scene("open-fog", (16, 12)).scene

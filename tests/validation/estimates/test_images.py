@@ -63,11 +63,13 @@ def test_progress_shows_the_error_falling_to_its_target(loaded):
     assert told[-1][1].endswith(" of 0.01")
 
 
+@pytest.mark.claim("targets-of-a-run")
 def test_no_run_stops_on_a_target_before_its_error_is_known(loaded):
     found, _ = run(loaded, Budget(error=0.5))
     assert found.image.attributes["airlight:batches"] == 32
 
 
+@pytest.mark.claim("targets-of-a-run")
 def test_time_budget_never_starts_a_batch_that_would_end_too_late(loaded):
     found, told = run(loaded, Budget(seconds=10.5))
     assert found.image.attributes["airlight:batches"] == 10

@@ -45,6 +45,7 @@ def reference(numbers, words, **changes):
 A, B, C = (range(4), "0-3"), ((4, 5, 9), "4-5,9"), ((6, 7, 8, 10, 11), "6-8,10-11")
 
 
+@pytest.mark.claim("merge")
 def test_moments_are_those_of_all_batches():
     found = merged_references([(words, reference(seeds, words)) for seeds, words in (A, B, C)])
     means = batch_means(range(12))
@@ -78,6 +79,7 @@ def test_files_lose_only_their_rounding(tmp_path):
     np.testing.assert_allclose(found.layers["airlight_se"], means.std(axis=0, ddof=1) / np.sqrt(7), rtol=1e-6)
 
 
+@pytest.mark.claim("merge")
 @pytest.mark.parametrize(
     ("changes", "words"),
     [

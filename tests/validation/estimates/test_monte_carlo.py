@@ -49,6 +49,7 @@ def assert_same(one, two):
         assert type(getattr(one, field.name)) is type(getattr(two, field.name))
 
 
+@pytest.mark.claim("runs-go-on", tolerance="none: equal")
 @pytest.mark.parametrize(("first", "count"), [(0, 2), (0, 8), (0, 21), (5, 2), (5, 3), (5, 20), (8, 8), (1000, 9)])
 def test_the_cache_never_changes_what_is_returned(scene, traced, monkeypatch, tmp_path, first, count):
     """A run from an empty cache, a second one, and one from a cache that holds more on both sides: the same bits."""
@@ -91,6 +92,7 @@ def test_fewer_batches_than_are_kept_trace_at_most_a_part_of_a_block(scene, trac
     assert len(traced) == 2
 
 
+@pytest.mark.claim("runs-go-on")
 @pytest.mark.parametrize("stop", [1, 7, 8, 9, 13])
 def test_an_interrupted_run_goes_on_where_it_stopped(scene, traced, stop):
     def interrupt(done, total, what):
@@ -117,6 +119,7 @@ def test_settings_are_kept_apart(scene, traced):
     assert not np.array_equal(one.batches.mean, fine.batches.mean)
 
 
+@pytest.mark.claim("damaged-cache")
 @pytest.mark.parametrize("damage", ["flipped byte", "truncated", "empty", "of another seed"])
 @pytest.mark.parametrize("name", ["000000-000007", "000009"])
 def test_damage_is_found_counted_and_mended(scene, traced, damage, name):
@@ -282,6 +285,7 @@ def test_more_batches_add_to_those_that_are_there(scene, own_cache):
     np.testing.assert_array_equal(more.totals[:2], few.totals)
 
 
+@pytest.mark.claim("standard-errors")
 def test_mean_and_standard_error_are_those_of_the_batches(scene, own_cache):
     found = volpath(scene, batches=4, first_seed=7).batches
     means = np.stack([volpath_batch(read_truth(scene), seed, 4).mean for seed in range(7, 11)])

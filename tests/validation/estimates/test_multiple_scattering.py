@@ -21,6 +21,7 @@ def layers(albedo, depth):
     return volpath_batch(read_truth(scene(albedo)), 3, 16, max_depth=depth).mean
 
 
+@pytest.mark.claim("left-out-share")
 def test_the_nth_scattering_grows_with_the_nth_power_of_the_albedo(variant):
     """With the same seed the same paths are traced, so this holds path by path, to float32 rounding."""
     full = [layers(0.8, depth)[0] for depth in (2, 3, 4)]
@@ -53,6 +54,7 @@ def test_share_grows_with_the_optical_depth(variant):
     assert (thin.batches, thin.samples, thin.max_depth) == (6, 8, 6)
 
 
+@pytest.mark.claim("left-out-share")
 def test_a_medium_that_only_absorbs_has_no_share(variant):
     found = multiple_scattering_share(scene(albedo=0.0), max_depth=3, batches=2, samples=4)
     assert found.medium.value == 0.0
@@ -64,6 +66,7 @@ def test_one_scattering_is_refused(variant):
         multiple_scattering_share(scene(), max_depth=2)
 
 
+@pytest.mark.claim("left-out-share")
 def test_the_interval_holds_the_share_in_95_of_100_runs():
     """Batches whose parts are correlated, as those of the same seeds are; the true share is 0.2.
 

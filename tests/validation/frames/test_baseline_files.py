@@ -144,7 +144,9 @@ def test_files_are_small_text_with_a_number_on_a_line(tmp_path):
     assert stray_baselines(["hall"], tmp_path) == ["fog"]
 
 
-@pytest.mark.parametrize(("text", "message"), [("{", "no JSON"), ('{"schema": "other/3"}', "the schema is 'other/3'")])
+@pytest.mark.parametrize(
+    ("text", "message"), [("{", "not valid JSON"), ('{"schema": "other/3"}', "the schema is 'other/3'")]
+)
 def test_what_is_no_baseline_is_refused(tmp_path, text, message):
     baseline_path("fog", tmp_path).write_text(text, encoding="utf-8")
     with pytest.raises(InputError, match=message):

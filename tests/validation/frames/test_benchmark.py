@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from realtime.scene.features import Plan
+from realtime.scene.features import SceneFeatures
 from tests.helpers.scenes import tiny_scene
 from validation.configurations.methods import STANDARD, Configuration, configuration
 from validation.frames.benchmark import bench, configurations_for, knows_shadows, measure
@@ -13,7 +13,7 @@ from validation.scenes.loading import LoadedScene
 
 MARCH = Configuration("ray-march", None, (("steps", 200),))
 UNSHADOWED = Configuration("unshadowed", "quadrature")
-PLAN = Plan(
+FEATURES = SceneFeatures(
     shadows=True,
     surfaces=True,
     extinctions=1,
@@ -86,6 +86,7 @@ def test_other_size_is_timed_without_changing_what_is_compared(loaded, measured,
     assert found.times.airlight.median_ms > 2 * measured[MARCH].times.airlight.median_ms
 
 
+@pytest.mark.claim("refusals-stand-in-the-report")
 def test_refusal_is_kept_and_not_raised(variant):
     """What a method cannot do is a line of the table; one bad configuration must not end a report."""
     import mitsuba as mi
@@ -115,11 +116,11 @@ def test_bench_measures_one_after_the_other_and_tells(loaded):
 
 
 def test_variants_of_shadows_are_left_out_where_nothing_casts_one():
-    assert configurations_for(replace(PLAN, bounded=True, clear=True)) == STANDARD
-    unbounded = configurations_for(PLAN)
+    assert configurations_for(replace(FEATURES, bounded=True, clear=True)) == STANDARD
+    unbounded = configurations_for(FEATURES)
     (left_out,) = (one for one in STANDARD if one not in unbounded)
     assert dict(left_out.parameters) == {"media": "paper"}
-    left = configurations_for(replace(PLAN, shadows=False))
+    left = configurations_for(replace(FEATURES, shadows=False))
     assert 0 < len(left) < len(STANDARD)
     assert all(not {"shadow", "map"} & set(dict(one.parameters)) for one in left)
     assert {one.method for one in left} == {one.method for one in STANDARD}

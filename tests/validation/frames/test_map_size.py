@@ -11,7 +11,7 @@ from tests.helpers.scenes import spot, tiny_scene
 from validation.estimates.quadrature import truth_image
 from validation.frames.map_size import fitted_slope, map_errors, map_flicker
 from validation.metrics.errors import error_metrics
-from validation.oracles.light_volume import twin_airlight
+from validation.oracles.light_volume import oracle_airlight
 
 # Steps enough that halving them changes no error below by more than 2 %.
 MARCH = {"steps": 1000, "shadow": "map"}
@@ -47,6 +47,7 @@ def test_what_has_no_logarithm_is_left_out():
     assert math.isnan(fitted_slope([8, 16], [0.0, 0.1]).order)
 
 
+@pytest.mark.claim("error-by-size-of-the-map", tolerance="order 1 within 0.2")
 @pytest.mark.parametrize("lamp", ["point", "spot"])
 def test_errors_of_a_map_are_of_first_order(variant, lamp):
     """The scatter of an order fitted to these 768 pixels is 0.04; grazing rays take up to 0.1 from 1."""
@@ -59,6 +60,7 @@ def test_errors_of_a_map_are_of_first_order(variant, lamp):
     assert all(metrics.nonfinite == 0 for metrics in found.metrics)
 
 
+@pytest.mark.claim("error-by-size-of-the-map", tolerance="order 1 within 0.2")
 def test_errors_of_the_height_field_are_of_first_order(variant):
     from realtime.scene.read_scene import read_scene
     from realtime.shadow_maps.shadow_map import cast_shadow_map
@@ -67,7 +69,7 @@ def test_errors_of_the_height_field_are_of_first_order(variant):
     known, read, truth = read_truth(scene), read_scene(scene), truth_image(scene).airlight
     sizes, errors = (16, 32, 64, 128), []
     for size in sizes:
-        image = twin_airlight(known, [cast_shadow_map(read.geometry, read.lights[0], size)])
+        image = oracle_airlight(known, [cast_shadow_map(read.geometry, read.lights[0], size)])
         errors.append(error_metrics(truth, image).relative_rmse)
     assert fitted_slope(sizes, errors).order == pytest.approx(1, abs=0.2)
 
@@ -78,6 +80,7 @@ def test_too_few_steps_hide_the_order(variant):
     assert found.slope.order < 0.5
 
 
+@pytest.mark.claim("flicker", tolerance="order 1/2 within 0.2")
 @pytest.mark.parametrize("lamp", ["point", "spot"])
 def test_flicker_of_fractions_of_a_texel_is_of_order_one_half(variant, lamp):
     """A share of the edges jumps a frame: the fits of three steps and two lights scatter by 0.06 about 0.5."""
@@ -89,6 +92,7 @@ def test_flicker_of_fractions_of_a_texel_is_of_order_one_half(variant, lamp):
     assert found.nonfinite == 0
 
 
+@pytest.mark.claim("flicker", tolerance="0.8 to 1.1 of sqrt(2)")
 def test_flicker_over_texels_is_that_of_independent_frames(variant):
     """The difference of two independent errors has sqrt(2) of their RMS; the few frames here have much in common."""
     found = map_flicker(small_scene(), "ray-march", parameters=MARCH, sizes=(128, 256), frames=7, step=0.05)

@@ -44,6 +44,7 @@ def test_what_was_computed_is_found_again(own_cache):
     assert (first.measured, first.seconds) == (second.measured, second.seconds)
 
 
+@pytest.mark.claim("report-kept")
 @pytest.mark.parametrize("change", ["scene", "source", "versions", "machine", "fresh"])
 def test_what_was_made_from_something_else_is_computed_again(own_cache, monkeypatch, tmp_path, change):
     calls = []
@@ -78,6 +79,7 @@ def test_a_new_result_replaces_the_old_one_and_another_machine_has_its_own(own_c
     assert len(files()) == 2
 
 
+@pytest.mark.claim("damaged-cache")
 @pytest.mark.parametrize("damage", ["cut", "flipped", "foreign"])
 def test_a_damaged_entry_counts_as_none_and_is_replaced(own_cache, damage):
     cached_result(place(), compute([]))

@@ -62,3 +62,21 @@ def test_the_digest_is_that_of_the_content(variant):
     one, two = (open_study(name, TINY).digest for name in ("open-fog", "sphere-spot"))
     assert one != two
     assert one == open_study("open-fog", TINY).digest
+
+
+def test_without_patience_the_clock_decides_nothing(variant, own_cache, monkeypatch):
+    """Two runs, one of them on a machine so busy that hours pass between two batches: the same samples."""
+    from validation.estimates import agreement
+
+    def checked():
+        return study.check_truth(open_study("open-fog", replace(TINY, margins={"single-scatter": 0.01})))
+
+    hours = iter(range(0, 10**9, 3600))
+    quiet = checked()
+    own_cache.rename(own_cache.with_name("other"))
+    monkeypatch.setattr(agreement, "time", SimpleNamespace(monotonic=lambda: float(next(hours))))
+    busy = checked()
+    assert quiet
+    assert busy == quiet
+    impatient = study.check_truth(open_study("open-fog", replace(TINY, margins={"volpath": 1e-6}, patience=1.0)))
+    assert not any(one.finished for one in impatient.values())

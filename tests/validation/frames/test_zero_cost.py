@@ -6,7 +6,7 @@ import pytest
 
 from realtime.frame.renderer import run_stages
 from validation.configurations.methods import Configuration, prepared
-from validation.frames.zero_cost import needless_costs, sphere_spot_with
+from validation.frames.zero_cost import sphere_spot_with, zero_costs
 
 
 def kernels(renderer):
@@ -21,6 +21,7 @@ def kernels(renderer):
         return [(one["type"], one.get("hash"), one["size"]) for one in dr.kernel_history()]
 
 
+@pytest.mark.claim("without-occluders")
 def test_without_casters_shadow_planes_run_the_kernels_of_unshadowed(variant):
     """No time can say it better: it is the same machine code on the same lanes."""
     from realtime.scene.read_scene import read_scene
@@ -34,6 +35,7 @@ def test_without_casters_shadow_planes_run_the_kernels_of_unshadowed(variant):
     assert found == kernels(replace(plain, pixel=planes.pixel))
 
 
+@pytest.mark.claim("not-needed-costs-nothing")
 def test_unseen_casters_leave_no_plane(variant):
     """41 rings behind the camera: the planes of the frame are those of the sphere and the floor alone."""
     scenes = [sphere_spot_with(unseen, (16, 12)) for unseen in (41, 0)]
@@ -42,8 +44,9 @@ def test_unseen_casters_leave_no_plane(variant):
         np.testing.assert_array_equal(np.array(getattr(more, name)), np.array(getattr(less, name)), err_msg=name)
 
 
+@pytest.mark.claim("not-needed-costs-nothing")
 @pytest.mark.slow
 def test_what_is_not_needed_costs_nothing(variant):
     """Within 3 %; two standard errors of the median of 150 turns are what the machine's other work can add to it."""
-    for cost in needless_costs(size=(400, 300), turns=150):
+    for cost in zero_costs(size=(400, 300), turns=150):
         assert cost.least_ratio < 1.03, cost

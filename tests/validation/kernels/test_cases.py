@@ -20,6 +20,7 @@ def cases(request, data_folder):
     return read_cases(data_folder / request.param)
 
 
+@pytest.mark.claim("quadrature-kernel")
 @pytest.mark.parametrize("precision", ["single", "double"])
 def test_quadrature_kernel_meets_its_claims_on_certified_cases(variant, cases, precision):
     error = relative_error(cases, integrate_cases(cases, "quadrature", precision))
@@ -40,6 +41,7 @@ def test_double_precision_finds_the_limit_of_the_nodes_not_of_rounding(variant, 
     assert np.median(single[chosen]) > 3e-8
 
 
+@pytest.mark.claim("taylor-near-the-foot")
 def test_taylor_kernel_is_right_where_its_series_is(variant, cases, tmp_path):
     """About the foot of the perpendicular; over the certified cases at large it is not, and the summary says so."""
     rows = [f"{phase},1.7,0.9,{1.7 - d},{1.7 + d},0.4" for phase in ("isotropic", "rayleigh") for d in (0.05, 0.09)]

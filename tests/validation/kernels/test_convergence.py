@@ -13,6 +13,7 @@ from validation.kernels.rays import table, with_truth
 BANDS = {"quadrature": 0.04, "quadrature-theta": 0.04, "taylor": 0.02, "uniform": 0.005, "equiangular": 0.005}
 
 
+@pytest.mark.claim("declared-orders")
 @pytest.mark.parametrize("kernel", BANDS)
 def test_measured_rate_is_the_declared_one(variant, kernel):
     found = convergence(kernel)

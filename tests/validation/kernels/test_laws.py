@@ -22,6 +22,7 @@ def accurate(geometry, x0, x1, medium, light):
     return quadrature(geometry, x0, x1, medium, light, nodes=16)
 
 
+@pytest.mark.claim("laws-of-the-integral", tolerance="2e-5 in float32, 1e-13 in float64")
 def test_laws_hold_for_an_accurate_kernel(variant):
     law = by_name(accurate)
     assert law["unit scaling"].single == law["unit scaling"].double == 0

@@ -119,6 +119,7 @@ def test_small_relative_mistake_is_found_where_it_is(variant):
     assert (found.exact, found.broken) == (False, ())
 
 
+@pytest.mark.claim("exact-keeps-its-bar")
 def test_kernel_that_claims_to_be_exact_is_held_to_it(variant):
     found = study(gauss, "exact")
     assert found.exact
@@ -140,6 +141,7 @@ def test_negative_and_missing_values_break_the_claim(variant):
         assert any(precision in one and "NaN" in one for one in words)
 
 
+@pytest.mark.claim("differences-of-gamma")
 def test_differences_of_gamma_lose_what_theory_says(variant):
     """Rounding of the two terms, each to about half an epsilon, over their difference."""
     found = gamma_difference(gauss, slivers(256), "single")
@@ -148,6 +150,7 @@ def test_differences_of_gamma_lose_what_theory_says(variant):
     assert 0.05 < found.median_rounding < 5
 
 
+@pytest.mark.claim("exact-keeps-its-bar")
 @pytest.mark.parametrize("name", ["airlight_integral.csv", "airlight_integral_rays.csv"])
 def test_exact_keeps_its_bar_on_the_certified_values(variant, data_folder, name):
     from validation.configurations.kernel_names import find_kernel

@@ -8,6 +8,7 @@ from validation.known_answers.record import ESTIMATORS
 EXACT_FOR_ALL = ("albedo_linear", "irradiance_linear", "units", "enclosed")
 
 
+@pytest.mark.claim("known-answers")
 @pytest.mark.parametrize("law", ["lights_add_up", "turned", "vertical_light"])
 def test_quadrature_obeys(variant, law):
     found = getattr(directional_answers, law)()
@@ -15,6 +16,7 @@ def test_quadrature_obeys(variant, law):
     assert found.reason
 
 
+@pytest.mark.claim("known-answers")
 @pytest.mark.parametrize("law", EXACT_FOR_ALL)
 @pytest.mark.parametrize(
     "estimator",

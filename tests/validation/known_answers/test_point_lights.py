@@ -25,11 +25,13 @@ def assert_passed(found: KnownAnswer):
     assert found.reason
 
 
+@pytest.mark.claim("known-answers")
 @pytest.mark.parametrize("law", OF_QUADRATURE)
 def test_quadrature_obeys(variant, law):
     assert_passed(getattr(known_answers, law)())
 
 
+@pytest.mark.claim("known-answers")
 @pytest.mark.parametrize("law", EXACT_FOR_ALL)
 @pytest.mark.parametrize(
     "estimator",
@@ -40,6 +42,7 @@ def test_all_estimators_obey(variant, law, estimator):
     assert_passed(getattr(known_answers, law)(estimator))
 
 
+@pytest.mark.claim("known-answers")
 @pytest.mark.parametrize("estimator", ["quadrature", "single-scatter"])
 def test_absorbing_ball(variant, estimator):
     assert_passed(known_answers.absorbing_ball(estimator))

@@ -16,6 +16,7 @@ def test_names_are_those_of_the_design():
     assert [field.name for field in fields(Metrics)] == names.split()
 
 
+@pytest.mark.claim("error-formulas", tolerance="rounding")
 def test_hand_computed_values():
     # mean(r) = 2.5; d = 1, 0, -1, 2: mean 0.5, mean square 6/4; |d|/r = 1, 0, 1/3, 1/2 sorted 0, 1/3, 1/2, 1.
     reference = np.array([[1.0, 2.0], [3.0, 4.0]])
@@ -31,6 +32,7 @@ def test_hand_computed_values():
     assert (metrics.nonfinite, metrics.negative) == (0, 0)
 
 
+@pytest.mark.claim("error-formulas")
 def test_channels_are_values_of_their_own():
     # Two pixels, three channels. mean(r) = 12/6 = 2; d = 3 in one value: bias 0.5, mean square 9/6.
     reference = np.array([[[1.0, 2.0, 3.0], [3.0, 2.0, 1.0]]])
@@ -44,6 +46,7 @@ def test_channels_are_values_of_their_own():
     assert metrics.max == 3.0
 
 
+@pytest.mark.claim("error-formulas")
 def test_dim_values_are_measured_against_a_floor():
     # mean(r) = 1, so the black value has the denominator 0.001 and the dim one its own 0.004.
     reference = np.array([[0.0, 0.004, 2.996]])
@@ -69,6 +72,7 @@ def test_relative_numbers_have_no_unit(factor):
     assert two.rmse == pytest.approx(factor * one.rmse, rel=1e-11)
 
 
+@pytest.mark.claim("not-finite-is-counted")
 def test_nonfinite_pixels_are_counted_and_left_out():
     reference = np.full((2, 3, 3), 2.0)
     test = np.full((2, 3, 3), 3.0)

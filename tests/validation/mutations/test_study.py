@@ -68,6 +68,7 @@ def _change(image, truth) -> float:
     return max(np.abs(one - other).sum() / other.sum() for one, other in pairs if other.any())
 
 
+@pytest.mark.claim("mutations-are-caught")
 @pytest.mark.parametrize("mutation", QUADRATURE, ids=lambda mutation: mutation.name)
 def test_every_mutation_changes_an_image(images, mutation):
     # The least of them is a factor of 1.0001; rounding is worth 1e-10.
@@ -82,6 +83,7 @@ def stage(variant):
     return stage_of("tiny", mi.load_dict(tiny_scene(size=(24, 18))), margin=0.02)
 
 
+@pytest.mark.claim("mutations-are-caught")
 @pytest.mark.statistical
 def test_the_control_agrees(stage):
     control = seen(None, [stage])
@@ -97,6 +99,7 @@ def test_the_control_agrees(stage):
         assert one.true_bias == 0
 
 
+@pytest.mark.claim("mutations-are-caught")
 @pytest.mark.statistical
 @pytest.mark.parametrize(
     ("name", "layer", "bias"),
@@ -165,6 +168,7 @@ def test_a_study_passes_only_if_the_control_agrees_and_nine_in_ten_are_caught(st
     assert not MutationStudy((replace(control[0], agrees=False),), (one,) * 20).passed
 
 
+@pytest.mark.claim("mutations-are-caught")
 @pytest.mark.slow
 @pytest.mark.statistical
 def test_the_standard_run_catches_nine_in_ten(variant):

@@ -5,16 +5,18 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from analytic.geometry import foot_and_height, theta_of_x, x_of_theta
+from analytic.geometry import foot_and_height
 from analytic.panels import airlight_segments
+from realtime.shadow_maps.projection import Projection
 from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map
 from reference.quadrature.unbounded import Rays
 from reference.scene.read import TruthLight, read_truth
 from reference.visibility.spot_cone import perpendicular
+from tests.helpers.changes_of_variables import theta_of_x, x_of_theta
 from tests.helpers.scenes import body, spot, tiny_scene
 from validation.estimates.quadrature import truth_image
 from validation.metrics.errors import error_metrics
-from validation.oracles.light_volume import height_field, twin_airlight, volume_intervals
+from validation.oracles.light_volume import height_field, oracle_airlight, volume_intervals
 
 
 def maps_of(scene, size):
@@ -39,7 +41,7 @@ def twin_error(description, size):
     import mitsuba as mi
 
     scene = mi.load_dict(description)
-    return error_metrics(truth_image(scene).airlight, twin_airlight(read_truth(scene), maps_of(scene, size)))
+    return error_metrics(truth_image(scene).airlight, oracle_airlight(read_truth(scene), maps_of(scene, size)))
 
 
 @pytest.mark.parametrize("lamp", ["point", "soft spot"])
@@ -67,7 +69,7 @@ def plane_below(depth, size):
     down = np.stack([-v, -v, -u, -u, -1 + 0 * u, 1 + 0 * u])
     length = np.sqrt(1 + u**2 + v**2)
     distance = np.divide(length * depth, down, where=down > 0, out=np.full(down.shape, np.inf))
-    return ShadowMap(size, distance.ravel(), None)
+    return ShadowMap(size, distance.ravel(), Projection(None))
 
 
 @pytest.mark.parametrize("level", [0.9, 1.5], ids=["below the camera", "above the camera"])
@@ -78,7 +80,7 @@ def test_shadow_of_a_plane_is_exact(variant, level, surface):
 
     truth = read_truth(mi.load_dict(tiny_scene(size=(24, 18), ball=None, floor=None)))
     light, direction = truth.lights[0], truth.direction
-    found = twin_airlight(
+    found = oracle_airlight(
         truth, [plane_below(light.position[2] - level, 8)], distance=np.full((truth.height, truth.width), surface)
     )
     reaches = (level - truth.origin[2]) / direction[:, 2]
@@ -114,8 +116,8 @@ def test_lit_points_are_before_the_displaced_triangles(kind):
     normal = np.concatenate([perpendicular(o, d[None], light) for o, d in zip(origin, direction, strict=True)], axis=0)
     ends = theta_of_x(0, foot, height), np.full(len(foot), 0.5 * np.pi)
     away, theta = points_on(origin, direction, foot, height, light)
-    lit, known = before_triangles(ShadowMap(size, distance, frame), away)
-    field = height_field(ShadowMap(size, distance, frame))
+    lit, known = before_triangles(ShadowMap(size, distance, Projection(frame)), away)
+    field = height_field(ShadowMap(size, distance, Projection(frame)))
     if kind == "spot":
         # A ray's part in the square face, from the samples that lie there; one straight part each.
         among = known.any(axis=1)
@@ -163,12 +165,12 @@ def points_on(origin, direction, foot, height, light):
 def before_triangles(shadow_map, away):
     """Return whether points lie before the triangles of a map in space, and whether there is a triangle at all."""
     size = shadow_map.size
-    if shadow_map.frame is None:
+    if shadow_map.projection.basis is None:
         k = cube_directions(size)
     else:
         at = np.linspace(-1, 1, size + 1)
         v, u = np.meshgrid(at, at, indexing="ij")
-        across, up, axis = shadow_map.frame
+        across, up, axis = shadow_map.projection.basis
         k = (axis + u[..., None] * across + v[..., None] * up)[None]
     s = np.linalg.norm(k, axis=-1) / shadow_map.distance.reshape(k.shape[:3])
     lit, known = np.zeros(away.shape[:2], bool), np.zeros(away.shape[:2], bool)
@@ -185,6 +187,7 @@ def before_triangles(shadow_map, away):
     return lit, known
 
 
+@pytest.mark.claim("error-by-size-of-the-map")
 @pytest.mark.parametrize("what", ["point", "soft spot", "coloured extinction"])
 def test_errors_fall_with_the_map_size(variant, what):
     """An edge is misplaced by a texel at most, so the error halves with it, give or take where edges fall in texels."""
@@ -200,10 +203,10 @@ def test_lights_add_up(variant):
     scene = mi.load_dict(tiny_scene(second=spot()))
     truth, maps = read_truth(scene), maps_of(scene, 16)
     each = [
-        twin_airlight(replace(truth, lights=(light,)), [one]) for light, one in zip(truth.lights, maps, strict=True)
+        oracle_airlight(replace(truth, lights=(light,)), [one]) for light, one in zip(truth.lights, maps, strict=True)
     ]
     assert all(np.max(image) > 0 for image in each)
-    assert twin_airlight(truth, maps) == pytest.approx(sum(each), rel=1e-14)
+    assert oracle_airlight(truth, maps) == pytest.approx(sum(each), rel=1e-14)
 
 
 def test_what_cannot_be_done_is_refused(variant):
@@ -211,11 +214,11 @@ def test_what_cannot_be_done_is_refused(variant):
 
     scene = mi.load_dict(tiny_scene())
     with pytest.raises(InputError, match="got 0 shadow maps for 1 lights"):
-        twin_airlight(read_truth(scene), [])
+        oracle_airlight(read_truth(scene), [])
     with pytest.raises(InputError, match="got a distance of 0, wanted distances above 0"):
-        height_field(ShadowMap(4, np.zeros(150), None))
+        height_field(ShadowMap(4, np.zeros(150), Projection(None)))
     ball = body({"type": "sphere", "center": [0, 0, 1], "radius": 0.3}, 0.4, (0.9, 0.9, 0.9))
     ball["exterior"] = {"type": "ref", "id": "fog"}
     bounded = mi.load_dict(tiny_scene(ball=ball))
     with pytest.raises(InputError, match="medium 'ball' has bounds"):
-        twin_airlight(read_truth(bounded), maps_of(scene, 4))
+        oracle_airlight(read_truth(bounded), maps_of(scene, 4))

@@ -7,6 +7,7 @@ from reports.commands import main as cli
 from validation.papers.biri import PUBLISHED, STAGES, biri_row, biri_rows
 
 
+@pytest.mark.claim("published-figures")
 def test_published_figures_are_those_of_the_paper():
     rates = {(one.scene, one.size): one.fps for one in PUBLISHED}
     assert [rates[name, (800, 600)] for name in ("two-pens", "three-media", "clutter", "hall")] == [23, 35, 25, 12]

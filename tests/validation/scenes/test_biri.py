@@ -258,6 +258,7 @@ def test_methods_and_truth_can_read_the_scenes_in_unbounded_fog(variant, name):
     np.testing.assert_allclose(np.array(one.medium.albedo).reshape(-1), other.medium.albedo, rtol=3e-7)
 
 
+@pytest.mark.claim("scenes-of-arbitrary-numbers")
 @pytest.mark.parametrize("name", RECORDS)
 def test_no_number_of_the_scenes_is_round(variant, name):
     import mitsuba as mi

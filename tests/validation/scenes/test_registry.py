@@ -124,6 +124,7 @@ def test_methods_and_truth_can_read_every_scene_alike(variant, name):
     np.testing.assert_allclose(np.array(one).reshape(-1), two, rtol=3e-7)
 
 
+@pytest.mark.claim("scenes-of-arbitrary-numbers")
 @pytest.mark.parametrize("name", SCENES)
 def test_no_number_of_a_scene_is_round(variant, name):
     """A constant of the code must not hide behind a 1 or a 2 of the scene."""

@@ -53,9 +53,9 @@ def test_sun_comes_in_by_the_windows_alone(variant):
     """Lit parts of rays lead back to a pane: what the wall's openings let through, in coordinates of the wall."""
     from reference.quadrature.segments import camera_segments, scattering_range
     from reference.quadrature.surface import surface_hits
-    from reference.scene.directional_light import parallel_rays
     from reference.scene.read import read_truth
     from reference.visibility.directional_casting import directional_intervals
+    from reference.visibility.parallel_rays import parallel_rays
     from validation.scenes.windows import _FRONT, _LEFT, _PANES_ALONG, _PANES_UP
 
     truth = read_truth(loaded((40, 30)))
@@ -63,7 +63,7 @@ def test_sun_comes_in_by_the_windows_alone(variant):
     rays = parallel_rays(truth.origin, truth.direction, truth.directional[0], span)
     found = directional_intervals(truth, rays)
     assert found.transitions > 500
-    assert found.certificate.left == 0
+    assert found.random_checks.left == 0
     x = rays.distance(found.ray, 0.5 * (found.low + found.high))
     point = truth.origin + x[:, None] * truth.direction[found.ray]
     towards = -truth.directional[0].direction

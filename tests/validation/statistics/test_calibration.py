@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The statistical tests judged by images with a known truth; see `validation.statistics.calibration` for what they
+"""The statistical tests judged by images with a known truth; see `tests.helpers.calibration` for what they
 should do.
 
 Every share may leave the interval that holds it with probability 1 - 1e-4 by its binomial law. Seeds are fixed.
@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from validation.statistics.calibration import (
+from tests.helpers.calibration import (
     Experiment,
     PowerCheck,
     calibrate,
@@ -33,10 +33,12 @@ def relative_spread(deviation):
 # --- fast ------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.claim("rates-of-the-statistics")
 def test_under_the_null_the_rates_are_the_levels():
     assert calibrate(Experiment(runs=150, seed=21)).problems() == ()
 
 
+@pytest.mark.claim("detectable-bias")
 @pytest.mark.parametrize("bias", BIASES)
 def test_injected_biases_are_found_with_the_printed_power(bias):
     check = check_power(bias, Experiment(runs=150, seed=round(bias * 1e4)))
@@ -81,6 +83,7 @@ def test_problems_name_what_is_wrong():
     assert "coverage is 0.5, expected 0.95" in bad.problems()[1]
 
 
+@pytest.mark.claim("agreement-inside-the-margin")
 def test_a_wrong_prediction_does_not_agree():
     assert PowerCheck(0.01, 0.01, 0.9, 0.88, 100).agrees
     assert not PowerCheck(0.01, 0.01, 0.9, 0.6, 100).agrees

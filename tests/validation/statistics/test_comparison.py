@@ -185,6 +185,7 @@ def test_dependent_channels_do_not_narrow_the_interval():
     assert three.relative_bias_ci == pytest.approx(one.relative_bias_ci, rel=1e-12)
 
 
+@pytest.mark.claim("detectable-bias")
 def test_detectable_bias_is_that_of_the_wider_interval():
     rng = np.random.default_rng(10)
     estimate = monte_carlo(normal(rng, (BATCHES, *SIZE)) * rng.normal(1, 0.1, (BATCHES, 1, 1)))

@@ -12,6 +12,7 @@ def test_power_of_no_effect_is_the_level():
         assert power(0.0, freedom, 0.01) == pytest.approx(0.01, rel=1e-9)
 
 
+@pytest.mark.claim("detectable-bias")
 def test_power_of_the_detectable_effect_is_ninety_percent():
     assert power(1.959964 + 1.281552, np.inf) == pytest.approx(0.9, abs=1e-6)
     assert power(-1.959964 - 1.281552, np.inf) == pytest.approx(0.9, abs=1e-6)

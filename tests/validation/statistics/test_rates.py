@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from tests.helpers.calibration import share_interval
 from tests.helpers.estimates import BATCHES, SIZE, monte_carlo, normal
-from validation.statistics.calibration import share_interval
 from validation.statistics.comparison import Estimate, compare_statistics
 
 pytestmark = pytest.mark.statistical
@@ -59,6 +59,7 @@ def null():
     return repeated(normal, runs=600, margin=0.01)
 
 
+@pytest.mark.claim("rates-of-the-statistics")
 def test_false_alarms_match_their_levels(null):
     assert_rate((s.rejected > 0 for s in null), 0.01)
     assert_rate((s.rejected_blocks > 0 for s in null), 0.01)
@@ -71,6 +72,7 @@ def test_false_alarms_match_their_levels(null):
     assert np.mean([s.exceeding_p < 0.05 for s in null]) > 0.01
 
 
+@pytest.mark.claim("rates-of-the-statistics")
 def test_intervals_cover_the_truth(null):
     for name in ("relative_bias_ci", "relative_bias_ci_batches"):
         assert_rate((getattr(s, name)[0] <= 0 <= getattr(s, name)[1] for s in null), 0.95)
@@ -102,6 +104,7 @@ def test_two_random_images_need_both_variances():
     assert_rate((s.rejected > 0 for s in runs), 0.01)
 
 
+@pytest.mark.claim("rates-of-the-statistics")
 @pytest.mark.parametrize(
     ("bias", "expected"), [(0.0005, 0.06), (0.001, 0.10), (0.002, 0.26), (0.005, 0.90), (-0.005, 0.90), (0.02, 1.0)]
 )
@@ -118,6 +121,7 @@ def test_injected_biases_are_found_with_the_printed_power(bias, expected):
     assert_rate((not s.relative_bias_ci[0] <= 0 <= s.relative_bias_ci[1] for s in runs), power)
 
 
+@pytest.mark.claim("agreement-inside-the-margin")
 def test_equivalence_is_wrong_in_one_of_forty_runs_at_its_margin():
     # At a bias of exactly the margin the upper end of the 95 % interval lies inside with probability 2.5 %.
     # Both intervals must lie inside where there are two, which is rarer still.
@@ -128,6 +132,7 @@ def test_equivalence_is_wrong_in_one_of_forty_runs_at_its_margin():
     assert_rate((s.equivalent for s in runs), 0.025)
 
 
+@pytest.mark.claim("agreement-inside-the-margin")
 def test_few_samples_prove_nothing(null):
     # Half of the width of the interval is 0.6 % here, so that 1 % is proved by most runs and 0.5 % by none.
     assert np.mean([s.equivalent for s in null]) > 0.5

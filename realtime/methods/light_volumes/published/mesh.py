@@ -24,8 +24,7 @@ import numpy as np
 from realtime.errors import InputError
 from realtime.methods.light_volumes.published.tessellation import divide, edges, triangles
 from realtime.scene.lights import Light
-from realtime.shadow_maps.inverse_depth_field import inverse_depth
-from realtime.shadow_maps.shadow_map import ShadowMap
+from realtime.shadow_maps.shadow_map import ShadowMap, inverse_depth
 
 #: Departure of an adaptive mesh from the shadow map that is allowed by default, relative to the depth.
 THRESHOLD = 1e-3
@@ -165,7 +164,7 @@ def _vertices(shadow_map: ShadowMap, light: Light, height, kept):
     """Return the homogeneous coordinates of corners of texels, in ascending order, and of a spot's light."""
     side = shadow_map.size + 1
     place = np.array(light.position, dtype=float).ravel()
-    result = np.empty((len(kept) + (1 if shadow_map.frame else 0), 4))
+    result = np.empty((len(kept) + (1 if shadow_map.projection.basis else 0), 4))
     result[len(kept) :] = (*place, 1)
     starts = np.searchsorted(kept, np.arange(shadow_map.faces + 1) * side**2)
     batch = 2**16  # what is in between stays in the cache
@@ -176,16 +175,16 @@ def _vertices(shadow_map: ShadowMap, light: Light, height, kept):
             row, column = np.divmod(numbers, side)
             u, v = column * (2 / shadow_map.size) - 1, row * (2 / shadow_map.size) - 1
             s = height[face].ravel()[numbers].astype(float)
-            for one, k in enumerate(_directions(shadow_map.frame, face, u, v)):
+            for one, k in enumerate(_directions(shadow_map.projection.basis, face, u, v)):
                 result[some, one] = place[one] * s + k
             result[some, 3] = s
     return result
 
 
-def _directions(frame, face: int, u, v) -> list[Any]:
+def _directions(basis, face: int, u, v) -> list[Any]:
     """Return the coordinates of axis + u across + v up of a face."""
-    if frame:
-        across, up, axis = (np.array(one, dtype=float).ravel() for one in frame)
+    if basis:
+        across, up, axis = (np.array(one, dtype=float).ravel() for one in basis)
         return [axis[one] + u * across[one] + v * up[one] for one in range(3)]
     cyclic = [1.0 - 2 * (face & 1), u, v]  # from the coordinate of the axis onwards
     return [cyclic[(one - (face >> 1)) % 3] for one in range(3)]

@@ -75,6 +75,7 @@ def marched(scene, steps=600):
     return render(scene, "ray-march", steps=steps, shadow="map", map=MAP)
 
 
+@pytest.mark.claim("tree-of-bounds", tolerance="relative RMSE 8e-3")
 @pytest.mark.parametrize("change", ALL)
 def test_every_pixel_is_that_of_the_marcher(variant, change):
     scene = scene_with(change)
@@ -88,6 +89,7 @@ def test_every_pixel_is_that_of_the_marcher(variant, change):
         assert found < 0.2 * bare
 
 
+@pytest.mark.claim("slices-converge", tolerance="relative RMSE 2e-3")
 @pytest.mark.parametrize("change", ALL)
 def test_slices_converge_to_the_light_volume(variant, change):
     """It has the same height field, in another way."""
@@ -103,6 +105,7 @@ def test_slices_converge_to_the_light_volume(variant, change):
     assert errors[1] < max(0.6 * errors[0], 1e-6)
 
 
+@pytest.mark.claim("slices-converge", tolerance="relative RMSE 6e-3")
 @pytest.mark.parametrize("change", ALL)
 def test_samples_converge_to_all_pixels(variant, change):
     scene = scene_with(change)
@@ -130,6 +133,7 @@ def test_bounded_media(variant, sampling):
     assert relative_rmse(render(scene, "unshadowed"), expected) > 0.04
 
 
+@pytest.mark.claim("without-occluders")
 @pytest.mark.parametrize("sampling", ["slices", "pixels"])
 def test_without_casters_it_is_the_unshadowed_frame(variant, sampling):
     scene = scene_with(ball=None, floor=None)
@@ -246,6 +250,7 @@ def test_samples_in_a_medium_bounded_by_a_mesh(variant):
     assert abs(np.mean(images[0]) / np.mean(images[1]) - 1) < 0.01
 
 
+@pytest.mark.claim("memory-before-it-is-taken")
 def test_memory_is_counted_before_it_is_taken(variant, monkeypatch):
     import realtime.memory
 

@@ -80,6 +80,7 @@ def test_a_point_of_a_slice_is_found_there(variant, place):
         assert found == pytest.approx(np.arange(slices.count), abs=2e-3)
 
 
+@pytest.mark.claim("slices-by-the-border", tolerance="1e-4 relative")
 @pytest.mark.parametrize("place", PLACES)
 def test_slices_leave_at_equal_steps_and_reach_every_pixel(variant, place):
     import mitsuba as mi
@@ -112,8 +113,7 @@ def test_slices_leave_at_equal_steps_and_reach_every_pixel(variant, place):
 
 def height_maps(scene, size=32, count=24):
     from realtime.methods.epipolar.min_max_tree import slice_heights
-    from realtime.shadow_maps.inverse_depth_field import inverse_depth
-    from realtime.shadow_maps.shadow_map import cast_shadow_map
+    from realtime.shadow_maps.shadow_map import cast_shadow_map, inverse_depth
 
     light = scene.lights[0]
     shadow_map = cast_shadow_map(scene.geometry, light, size)
@@ -162,6 +162,7 @@ def test_a_plane_is_where_it_is(variant, kind):
         assert np.all(values.ravel()[k[:, 2] > 0.3] == 0)
 
 
+@pytest.mark.claim("tree-of-bounds")
 @pytest.mark.parametrize("kind", ["point", "spot"])
 def test_the_tree_holds_the_bounds(variant, kind):
     heights = height_maps(read((0.4, 1.9, 1.9), kind=kind), size=16)
@@ -175,12 +176,13 @@ def test_the_tree_holds_the_bounds(variant, kind):
             assert np.array_equal(tree[:, heights.leaves // side + node, 1], own.max(axis=1))
 
 
+@pytest.mark.claim("tree-of-bounds", tolerance="4e-3 m: the distance of the points")
 @pytest.mark.parametrize("kind", ["point", "spot"])
 def test_lit_pieces_are_those_of_many_points(variant, kind):
     """A ray of the slice looked at point by point in float64: where is it, and what does the map hold there?"""
     import mitsuba as mi
 
-    from realtime.methods.epipolar.walk import sum_lit_pieces
+    from realtime.methods.epipolar.walk import sum_lit_intervals
     from realtime.rays.ray_light import RayGeometry
 
     scene = read((0.4, 1.9, 1.9), kind=kind)
@@ -224,7 +226,7 @@ def test_lit_pieces_are_those_of_many_points(variant, kind):
     geometry = RayGeometry(mi.Float(-distance * np.cos(angle)), mi.Float(distance * np.sin(angle)), None, None)
     zero = mi.Float(np.zeros(count))
     segment = mi.Float(begin), mi.Float(x1)
-    found = np.array(sum_lit_pieces(heights, mi.UInt32(number), geometry, segment, lambda a, b: b - a, zero))
+    found = np.array(sum_lit_intervals(heights, mi.UInt32(number), geometry, segment, lambda a, b: b - a, zero))
     assert np.mean((total > 0) & (total < inside_all - 1e-2)) > 0.1  # some rays are lit in part
     # The points are 9e-4 m apart at most; few rays have more than two pieces, of two ends each.
     assert found == pytest.approx(total, abs=4e-3)

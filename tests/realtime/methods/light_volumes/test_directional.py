@@ -20,7 +20,7 @@ def cast(scene, size):
 
 def face_of(shadow_map, light):
     """Return position, across, up and axis in NumPy."""
-    vectors = (light.position, *shadow_map.frame)
+    vectors = (light.position, *shadow_map.projection.basis)
     return [np.array(vector, dtype=float).ravel() for vector in vectors]
 
 
@@ -33,12 +33,13 @@ def test_depths_are_measured_along_the_light(variant):
     for one, other in ((across, up), (across, axis), (up, axis)):
         assert abs(one @ other) < 1e-6
     u = np.linspace(-1, 1, 17)
-    start = position + u[None, :, None] * across + u[:, None, None] * up - float(shadow_map.depth[0]) * axis
+    start = position + u[None, :, None] * across + u[:, None, None] * up - float(shadow_map.projection.depth[0]) * axis
     found = np.array(shadow_map.distance, dtype=float).reshape(17, 17)
     # Rays are float32, of lengths of about 10 m.
     assert found == pytest.approx(-start[..., 2] / axis[2], rel=1e-6)
 
 
+@pytest.mark.claim("directional-light-volumes")
 def test_the_face_just_covers_the_media(variant):
     """The corners of the box and the ball fill the rectangle from side to side, and nothing is before or behind it."""
     from realtime.scene.directional_extent import media_balls
@@ -57,7 +58,7 @@ def test_the_face_just_covers_the_media(variant):
         assert (places + balls[:, 3]).max() < half
     depths = (balls[:, :3] - position) @ axis
     assert (depths + balls[:, 3]).max() < 0
-    assert (depths - balls[:, 3]).min() > -float(shadow_map.depth[0])
+    assert (depths - balls[:, 3]).min() > -float(shadow_map.projection.depth[0])
 
 
 def height_field(scene, size):
@@ -66,7 +67,7 @@ def height_field(scene, size):
     position, across, up, axis = face_of(shadow_map, scene.lights[0])
     depth = np.array(shadow_map.distance, dtype=float).reshape(size + 1, size + 1)
     # Where nothing is hit the height is 0 at the plane where the media end, and at any depth behind it the same.
-    height = np.maximum(float(shadow_map.depth[0]) - depth, 0)
+    height = np.maximum(float(shadow_map.projection.depth[0]) - depth, 0)
 
     def lit(point):
         away = point - position
@@ -81,6 +82,7 @@ def height_field(scene, size):
     return lit
 
 
+@pytest.mark.claim("directional-light-volumes", tolerance="relative RMSE 2e-4: the steps' own")
 @pytest.mark.parametrize("size", [8, 64])
 def test_the_walk_against_steps_through_the_height_field(variant, size):
     """The same map, met by a sum over 10 000 steps of every ray in NumPy."""
@@ -190,7 +192,7 @@ def test_one_frame_serves_a_light_that_moves(variant):
 def test_a_plan_counts_the_light(variant):
     from realtime.scene.features import describe
 
-    assert describe(read(shaded()).plan)["lights"] == "1 directional"
+    assert describe(read(shaded()).features)["lights"] == "1 directional"
 
 
 def test_the_map_needs_the_memory_of_one_face(variant):

@@ -52,6 +52,7 @@ def test_a_mesh_is_for_media_without_bounds(variant):
     assert np.max(render(loaded, map=16).airlight) > 0
 
 
+@pytest.mark.claim("memory-before-it-is-taken")
 @pytest.mark.parametrize("evaluation", EVALUATIONS)
 def test_memory_is_counted_before_it_is_taken(variant, monkeypatch, evaluation):
     import realtime.memory
@@ -75,12 +76,12 @@ def test_memory_that_is_needed_is_what_the_arrays_hold(variant):
     import realtime.methods.light_volumes.method
     from realtime.methods.light_volumes.jump_search import with_walls
     from realtime.scene.read_scene import read_scene
-    from realtime.shadow_maps.inverse_depth_field import light_heights
+    from realtime.shadow_maps.inverse_depth_field import inverse_depth_field
     from realtime.shadow_maps.shadow_map import cast_shadow_map
 
     scene = read_scene(loaded_scene())
     shadow_map = cast_shadow_map(scene.geometry, scene.lights[0], 64)
-    heights = with_walls(light_heights(shadow_map), scene.geometry, scene.lights[0])
+    heights = with_walls(inverse_depth_field(shadow_map), scene.geometry, scene.lights[0])
     arrays = heights.texels, heights.bounds, heights.gaps, heights.sides, heights.walls
     held = 4 * (2 * len(shadow_map.distance) + sum(len(array) for array in arrays))
     assert realtime.methods.light_volumes.method._memory_of(scene.lights[0], 64, "walk") == held

@@ -18,11 +18,11 @@ def walled(loaded, size, precision="single"):
     from realtime.methods.light_volumes.jump_search import with_walls
     from realtime.methods.light_volumes.texel_walls import PLACES
     from realtime.scene.read_scene import read_scene
-    from realtime.shadow_maps.inverse_depth_field import light_heights
+    from realtime.shadow_maps.inverse_depth_field import inverse_depth_field
     from realtime.shadow_maps.shadow_map import cast_shadow_map
 
     scene = read_scene(loaded, precision)
-    heights = light_heights(cast_shadow_map(scene.geometry, scene.lights[0], size))
+    heights = inverse_depth_field(cast_shadow_map(scene.geometry, scene.lights[0], size))
     found = with_walls(heights, scene.geometry, scene.lights[0])
     number = np.array(found.walls).reshape(heights.faces, size, size, 1) >> np.arange(0, 32, 8, dtype=np.uint32) & 0xFF
     return found, np.where(number > 0, (number - 0.5) / PLACES, np.nan)
@@ -36,6 +36,7 @@ def plate(x, y, z=1.1, half=0.6):
     return {"type": "rectangle", "to_world": place.scale([half, half, 1])}
 
 
+@pytest.mark.claim("upright-walls", tolerance="half of a 64th of a texel")
 @pytest.mark.parametrize("precision", ["single", "double"])
 @pytest.mark.parametrize("size", [16, 64])
 def test_walls_stand_where_the_edges_of_a_plate_are(variant, size, precision):
@@ -67,6 +68,7 @@ def test_both_texels_of_a_side_see_the_same_wall(variant):
     assert np.sum(np.isfinite(places)) > 100
 
 
+@pytest.mark.claim("upright-walls")
 def test_slopes_are_no_walls(variant):
     """A floor that rays meet at a grazing angle is as steep as a jump between two samples, and bends nowhere."""
     import mitsuba as mi
@@ -89,6 +91,7 @@ def test_nothing_in_the_map_has_no_walls(variant):
         assert np.all(np.isnan(places))
 
 
+@pytest.mark.claim("upright-walls")
 @pytest.mark.parametrize("size", [16, 64])
 def test_a_shadow_of_straight_edges_is_known_to_a_fraction_of_a_texel(variant, size):
     """The frame against the truth: what is left are the corners, and a 64th of a texel."""

@@ -40,6 +40,7 @@ ALL = [
 ]
 
 
+@pytest.mark.claim("exact-for-its-map", tolerance="1e-7 of the largest, in float32 1e-5")
 @pytest.mark.parametrize(("name", "precision"), ALL)
 def test_frames_are_exact_with_respect_to_the_map(variant, name, precision):
     loaded, size = loaded_scene(name), SCENES[name][1]
@@ -57,6 +58,7 @@ def test_frames_are_exact_with_respect_to_the_map(variant, name, precision):
         assert differ(*(frame.airlight for frame in frames)) < 1e-12
 
 
+@pytest.mark.claim("exact-for-its-map", tolerance="1e-7 of the largest, in float32 1e-5")
 @pytest.mark.parametrize(("name", "precision"), ALL)
 def test_frames_with_upright_walls_are_exact_with_respect_to_the_map(variant, name, precision):
     """As above, with the walls that the rays of the map found."""
@@ -150,13 +152,14 @@ def with_heights(shadow_map, heights):
     """Return a map that has these inverse depths at its corners."""
     import mitsuba as mi
 
-    from realtime.shadow_maps.inverse_depth_field import inverse_depth
+    from realtime.shadow_maps.shadow_map import inverse_depth
 
     length = np.array(inverse_depth(replace(shadow_map, distance=mi.Float64(np.ones(len(heights))))))
     with np.errstate(divide="ignore"):
         return replace(shadow_map, distance=mi.Float64(length / heights))
 
 
+@pytest.mark.claim("exact-for-its-map", tolerance="1e-7 of the largest")
 @pytest.mark.parametrize("kind", ["point", pytest.param("spot", marks=pytest.mark.slow)])
 @settings(max_examples=20, deadline=None, derandomize=True, database=None)
 @given(data=st.data())
@@ -164,18 +167,18 @@ def test_any_map(variant, kind, data):
     """Whatever the heights: three routes to the same volume."""
     from realtime.frame.renderer import image_frame, run_stages
     from realtime.methods.light_volumes.published.mesh import volume_mesh
-    from realtime.shadow_maps.inverse_depth_field import light_heights
+    from realtime.shadow_maps.inverse_depth_field import inverse_depth_field
     from reference.scene.read import read_truth
-    from validation.oracles.light_volume import twin_airlight
+    from validation.oracles.light_volume import oracle_airlight
 
     loaded, (walk, mesh), shadow_map = renderers(kind, data.draw(st.integers(0, len(VIEWS) - 1)))
     vertex = vertices_of(shadow_map)
     count = int(np.max(vertex)) + 1
     heights = data.draw(st.lists(st.sampled_from(HEIGHTS), min_size=count, max_size=count))
     found = with_heights(shadow_map, np.array(heights)[vertex])
-    walked = image_frame(walk, run_stages(walk, (light_heights(found),)))
+    walked = image_frame(walk, run_stages(walk, (inverse_depth_field(found),)))
     drawn = image_frame(mesh, run_stages(mesh, (volume_mesh(found, walk.scene.lights[0]),)))
-    wanted = twin_airlight(read_truth(loaded), [found], distance=walked.distance)
+    wanted = oracle_airlight(read_truth(loaded), [found], distance=walked.distance)
     # As in the frames above; what is lit may be next to nothing, so the scale is the light's.
     scale = np.max(np.array(walk.scene.lights[0].intensity))
     assert np.max(np.abs(walked.airlight - drawn.airlight)) < 1e-13 * scale
@@ -193,6 +196,7 @@ def any_walls(rng, faces, share):
     return sum(side << np.uint32(8 * k) for k, side in enumerate(sides)).ravel()
 
 
+@pytest.mark.claim("exact-for-its-map", tolerance="1e-7 of the largest")
 @pytest.mark.parametrize("kind", ["point", pytest.param("spot", marks=pytest.mark.slow)])
 @settings(max_examples=20, deadline=None, derandomize=True, database=None)
 @given(data=st.data())
@@ -202,9 +206,9 @@ def test_any_walls_in_any_map(variant, kind, data):
 
     from realtime.frame.renderer import image_frame, run_stages
     from realtime.methods.light_volumes.texel_walls import walled_heights
-    from realtime.shadow_maps.inverse_depth_field import light_heights
+    from realtime.shadow_maps.inverse_depth_field import inverse_depth_field
     from reference.scene.read import read_truth
-    from validation.oracles.light_volume import twin_airlight
+    from validation.oracles.light_volume import oracle_airlight
 
     loaded, (walk, _), shadow_map = renderers(kind, data.draw(st.integers(0, len(VIEWS) - 1)))
     vertex = vertices_of(shadow_map)
@@ -213,9 +217,9 @@ def test_any_walls_in_any_map(variant, kind, data):
     heights = (rng.choice(HEIGHTS[1:], vertex.max() + 1) * rng.uniform(0.9, 1.1, vertex.max() + 1))[vertex]
     found = with_heights(shadow_map, heights)
     walls = any_walls(rng, found.faces, data.draw(st.sampled_from([0.0, 0.2, 0.5, 1.0])))
-    field = walled_heights(light_heights(found), mi.UInt32(walls), mi.UInt32(np.flatnonzero(walls)))
+    field = walled_heights(inverse_depth_field(found), mi.UInt32(walls), mi.UInt32(np.flatnonzero(walls)))
     walked = image_frame(walk, run_stages(walk, (field,)))
-    wanted = twin_airlight(read_truth(loaded), [found], distance=walked.distance, walls=[walls])
+    wanted = oracle_airlight(read_truth(loaded), [found], distance=walked.distance, walls=[walls])
     scale = np.max(np.array(walk.scene.lights[0].intensity))
     assert np.max(np.abs(walked.airlight - wanted)) < 1e-7 * scale
 
@@ -242,6 +246,7 @@ def test_a_light_that_moves_between_frames(variant):
     assert np.max(np.abs(frames[0] - frames[-1])) > 0.01 * np.max(frames[0])
 
 
+@pytest.mark.claim("tessellation-threshold")
 def test_adaptive_meshes_come_closer_with_the_threshold(variant):
     """In a dome, which is curved everywhere."""
     loaded = loaded_scene(floor={"type": "sphere", "center": [0.3, 0.4, 0.2], "radius": 5.1})
@@ -257,6 +262,7 @@ def test_adaptive_meshes_come_closer_with_the_threshold(variant):
     assert errors[0] > 10 * errors[-1]
 
 
+@pytest.mark.claim("without-occluders")
 def test_a_map_that_sees_nothing_lights_everything(variant):
     """Nothing in the cone of a spot, or between the rays of the map: as without shadows."""
     speck = {"type": "sphere", "center": [0.3, 0.2, -90.0], "radius": 1e-3}
@@ -269,6 +275,7 @@ def test_a_map_that_sees_nothing_lights_everything(variant):
             assert np.all(np.abs(frame.airlight - wanted) <= 1e-5 * wanted)
 
 
+@pytest.mark.claim("enclosed-light")
 @pytest.mark.parametrize("shape", ["sphere", "cube"])
 @pytest.mark.parametrize("kind", ["point", "spot"])
 def test_a_light_inside_a_closed_occluder_lights_nothing_outside(variant, shape, kind):

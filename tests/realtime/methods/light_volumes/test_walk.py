@@ -33,8 +33,8 @@ def test_what_is_lit_across_faces_is_one_piece(variant):
 
     from realtime.methods.light_volumes.cube_faces import NO_FACE
     from realtime.methods.light_volumes.tile_lists import tile_leaves
-    from realtime.methods.light_volumes.walk import sum_lit_pieces
-    from realtime.shadow_maps.inverse_depth_field import light_heights
+    from realtime.methods.light_volumes.walk import sum_lit_intervals
+    from realtime.shadow_maps.inverse_depth_field import inverse_depth_field
     from realtime.shadow_maps.shadow_map import cast_shadow_map
     from realtime.tiles.layout import TILE
 
@@ -42,7 +42,7 @@ def test_what_is_lit_across_faces_is_one_piece(variant):
     scene = read_scene(mi.load_dict(tiny_scene(ball=speck, floor=None, size=(64, 48))))
     light, distance = scene.lights[0], dr.full(mi.Float, dr.inf, 64 * 48)
     pixel = mi.UInt32(tiled_pixels(64, 48))
-    heights = light_heights(cast_shadow_map(scene.geometry, light, 64))
+    heights = inverse_depth_field(cast_shadow_map(scene.geometry, light, 64))
     away = scene.camera.origin - light.position
 
     def rays(lane):
@@ -51,7 +51,7 @@ def test_what_is_lit_across_faces_is_one_piece(variant):
     leaves = tile_leaves(heights, rays, distance, light=-away, square=True)
     way = {"away": away, "direction": rays(dr.arange(mi.UInt32, 64 * 48)), "segment": (mi.Float(0), distance)}
     way["tile"] = dr.arange(mi.UInt32, 64 * 48) // TILE
-    pieces, lit = sum_lit_pieces(
+    pieces, lit = sum_lit_intervals(
         heights,
         leaves,
         **way,

@@ -99,6 +99,7 @@ def surface_differs(frame, image):
     return np.mean(np.any(np.abs(frame.surface - image.surface) > 1e-2 * image.surface.mean(), axis=2))
 
 
+@pytest.mark.claim("planes-are-exact", tolerance="relative RMSE 5e-6: float32")
 @pytest.mark.parametrize("name", ALL)
 def test_every_mesh(variant, name):
     scene = scene_with(ALL[name]())
@@ -108,6 +109,7 @@ def test_every_mesh(variant, name):
     assert surface_differs(frame, image) < 0.005
 
 
+@pytest.mark.claim("planes-are-exact")
 @pytest.mark.parametrize("change", CHANGES)
 def test_every_place_and_light(variant, change):
     scene = scene_with(SOUND["torus"](), **CHANGES[change]())
@@ -116,6 +118,7 @@ def test_every_place_and_light(variant, change):
     assert surface_differs(frame, image) < 0.005
 
 
+@pytest.mark.claim("planes-are-exact")
 @pytest.mark.slow
 @pytest.mark.parametrize("change", CHANGES)
 @pytest.mark.parametrize("name", sorted(set(ALL) - {"torus"}))
@@ -157,6 +160,7 @@ def test_double_precision_is_nearer_to_the_truth(variant):
     assert_is_truth(planes(scene, "double"), image, rmse=5e-7)
 
 
+@pytest.mark.claim("enclosed-light")
 def test_enclosed_light_is_black(variant):
     """No silhouette, and all beyond the caster dark."""
     frame = planes(scene_with(SOUND["sphere"](), lamp=lamp((0.13, -0.07, 1.09))))
@@ -178,6 +182,7 @@ def test_orders_agree_without_shadow_in_shadow(variant, name, order):
     assert np.sqrt(np.mean((exact.airlight - other.airlight) ** 2)) < 1e-4 * exact.airlight.mean()
 
 
+@pytest.mark.claim("orders-of-the-planes")
 def test_order_none_shows_the_artefact(variant):
     """Fig. 4: a ball within a ball takes its share of the light twice."""
     scene = scene_with(SOUND["nested spheres"]())
@@ -196,6 +201,7 @@ def test_what_the_warnings_say_of_order_none_is_true(variant, name):
     assert np.sqrt(np.mean(error**2)) < 1e-4 * image.airlight.mean()
 
 
+@pytest.mark.claim("flawed-meshes-warn")
 @pytest.mark.parametrize("name", ["open cylinder", "mixed winding"])
 def test_folds_of_open_meshes_count_twice_without_an_order(variant, name):
     scene = scene_with(ALL[name]())
@@ -241,6 +247,7 @@ def test_bad_settings_are_refused(variant, setting, words):
         planes(scene_with(SOUND["box"]()), **setting)
 
 
+@pytest.mark.claim("shapes-without-edges-refused")
 def test_shapes_without_triangles_are_refused_by_name(variant):
     import mitsuba as mi
 

@@ -33,11 +33,11 @@ def light_at(types, place, spot=None):
 
     position = types.vector(*(float(x) for x in place))
     if spot is None:
-        return Light("point", False, position, types.color(1))
+        return Light(position, types.color(1))
     axis, cutoff, beam = spot
     axis = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
     fields = spot_fields(axis, np.deg2rad(cutoff), np.deg2rad(beam), types)
-    return Light("spot", beam < cutoff, position, types.color(1), **fields)
+    return Light(position, types.color(1), **fields)
 
 
 def geometries(place, spot=None):

@@ -2,6 +2,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from realtime.methods.shadow_planes.plane_counts import caster_plan, describe_casters
 
@@ -21,6 +22,7 @@ def test_the_sphere_has_32_edges_and_the_floor_4(variant):
     assert "'floor' is open" in plan.warnings[0]
 
 
+@pytest.mark.claim("culled-casters")
 def test_what_is_left_out_is_said(variant):
     """Behind the camera nothing of the pens' shadows can be seen: the light is turned to the other side."""
     import drjit as dr

@@ -101,6 +101,7 @@ def test_bins_hold_what_a_ray_of_their_azimuth_crosses(name):
     assert np.array_equal(np.sort(entries[: len(entries) // 2][firsts != 0] & NUMBER), np.arange(count))
 
 
+@pytest.mark.claim("no-ray-slips-through")
 @pytest.mark.parametrize("name", ALL)
 def test_every_azimuth_gains_as_much_as_it_loses_but_for_the_layers_on_the_axis(name):
     """Along any half plane the layers begin with those between light and camera and end with those behind the light."""
@@ -129,6 +130,7 @@ def test_layers_between_light_and_camera(seed, bodies):
         assert layers_between(casters, light, axes, distance, used=~used) == 0
 
 
+@pytest.mark.claim("no-ray-slips-through")
 def test_axis_through_edges_and_vertices_counts_each_layer_once():
     """The axis runs through edges and vertices of a grid: of the triangles there one counts."""
     from validation.scenes.parts import grid

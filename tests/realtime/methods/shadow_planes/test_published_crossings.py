@@ -44,6 +44,7 @@ def test_orders_agree_where_no_shadow_lies_in_another(variant, order, camera):
     assert not np.all(lit)
 
 
+@pytest.mark.claim("orders-of-the-planes")
 def test_exact_order_is_right_where_shadows_overlap(variant):
     index = index_of(casters_of("torus", "open cylinder", "crossing spheres"))
     ways = bundles(1920, spread=0.003)
@@ -55,6 +56,7 @@ def test_exact_order_is_right_where_shadows_overlap(variant):
     assert wrong.mean() < 0.03
 
 
+@pytest.mark.claim("orders-of-the-planes")
 def test_without_an_order_every_plane_counts(variant):
     """The artefact of Fig. 4, by formula: Gamma at the surface if it is lit, and all planes with their signs."""
     index = index_of(casters_of("torus", "crossing spheres"))
@@ -70,6 +72,7 @@ def test_without_an_order_every_plane_counts(variant):
     assert np.max(np.abs(expected - lit_lengths(index, ways, end, weight=weight)[0])) > 0.1
 
 
+@pytest.mark.claim("orders-of-the-planes")
 def test_order_of_the_paper_is_by_the_stencil_rule(variant):
     """Plane by plane in NumPy, towards the camera by the cosine of the edge's middle."""
     index = index_of(casters_of("torus", "crossing spheres"), precision="double")
@@ -95,6 +98,7 @@ def test_order_of_the_paper_is_by_the_stencil_rule(variant):
     assert np.any(lit)
 
 
+@pytest.mark.claim("buffer-of-eight-bits", tolerance="half a step of 255")
 def test_buffer_of_eight_bits_has_steps_and_clamps(variant):
     import mitsuba as mi
 
@@ -107,6 +111,7 @@ def test_buffer_of_eight_bits_has_steps_and_clamps(variant):
     assert np.max(np.abs(stored - values)[inside]) <= 2 / 255 / 2 + 1e-6
 
 
+@pytest.mark.claim("buffer-of-eight-bits")
 def test_buffer_clamps_after_every_plane(variant):
     """Full at the surface, it forgets what is above, and the planes then take away too much."""
     index = index_of(casters_of("sphere"))

@@ -110,6 +110,7 @@ def loop_from(start, leaving, head):
         edges.append(edge)
 
 
+@pytest.mark.claim("silhouettes-count-layers")
 @pytest.mark.parametrize("light", LIGHTS)
 @pytest.mark.parametrize("name", ALL)
 def test_silhouette_counts_layers(name, light):
@@ -118,6 +119,7 @@ def test_silhouette_counts_layers(name, light):
     assert_is_cycle(silhouette(casters, np.array(LIGHTS[light])))
 
 
+@pytest.mark.claim("silhouettes-count-layers")
 @settings(max_examples=80, deadline=None)
 @given(
     vertices=st.lists(points, min_size=4, max_size=9, unique=True),
@@ -163,6 +165,7 @@ def test_closed_body_has_the_silhouette_of_the_paper(turned):
     assert set(np.abs(found.coefficient).tolist()) == {1}
 
 
+@pytest.mark.claim("silhouettes-count-layers")
 def test_light_in_the_plane_of_a_roof():
     mesh, light = flat_roof()
     casters = casters_of(mesh)

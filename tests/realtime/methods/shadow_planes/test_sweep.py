@@ -14,12 +14,12 @@ def walked(index, lists, ways, end, *, begin=0.0):
     """The sum over lit segments of 1 - exp(-x), and whether the light reaches the end."""
     import drjit as dr
 
-    from realtime.methods.shadow_planes.sweep import sum_lit_segments
+    from realtime.methods.shadow_planes.sweep import sum_lit_intervals
 
     Float = type(index.distance)
     rays = rays_of(index, lists, ways)
     segment = Float(np.full(len(ways), begin)), Float(np.asarray(end, dtype=np.float64))
-    total, lit = sum_lit_segments(
+    total, lit = sum_lit_intervals(
         index, lists, rays, segment, lambda a, b: dr.exp(-a) - dr.exp(-b), dr.zeros(Float, len(ways))
     )
     return np.array(total, dtype=np.float64), np.array(lit)
@@ -35,6 +35,7 @@ def assert_same(found, expected, *, tolerance):
     assert wrong.sum() <= len(wrong) // 1000
 
 
+@pytest.mark.claim("planes-are-exact", tolerance="1e-4: float32 at grazing angles")
 @pytest.mark.parametrize("camera", CAMERAS)
 @pytest.mark.parametrize("name", NAMES)
 def test_lit_segments_are_those_between_the_crossings(variant, name, camera):
@@ -56,6 +57,7 @@ def test_double_precision_is_right_to_more_digits(variant):
     assert_same(walked(index, lists, ways, end), lit_lengths(index, ways, end, weight=weight), tolerance=1e-11)
 
 
+@pytest.mark.claim("rays-notice-a-wrong-order", tolerance="1e-4: float32 at grazing angles")
 @pytest.mark.parametrize(
     "order", ["shuffled", "backwards", "two changed", "five at a time backwards", "said to be unsorted"]
 )
@@ -88,6 +90,7 @@ def test_rays_notice_an_order_that_is_wrong(variant, order):
     assert_same(walked(index, lists, ways, end), expected, tolerance=1e-4)
 
 
+@pytest.mark.claim("rays-notice-a-wrong-order", tolerance="1e-4: float32 at grazing angles")
 def test_wide_tiles_are_out_of_order_and_right(variant):
     """Bundles a quarter of a turn wide: no order is right for all their rays."""
     index = index_of(casters_of("torus", "crossing spheres"))
@@ -115,3 +118,31 @@ def test_empty_segments_are_nothing(variant):
     lists, _ = drawn_lists(index, ways, np.full(len(ways), 2.0))
     total, _ = walked(index, lists, ways, np.full(len(ways), 2.0), begin=2.0)
     assert np.all(total == 0)
+
+
+@pytest.mark.parametrize("in_order", [True, False])
+def test_more_planes_at_one_place_than_a_ray_collects_at_once(variant, in_order):
+    """Beside every plane ten that add a layer there and ten that take it away again: the same segments."""
+    import mitsuba as mi
+
+    from realtime.methods.shadow_planes.plane_table import GAIN_SHIFT, GAIN_ZERO
+    from realtime.methods.shadow_planes.tile_lists import Source
+
+    index = index_of(casters_of("torus", "open cylinder"))
+    ways = bundles(320, spread=0.01)
+    end = np.full(len(ways), np.inf)
+    lists, _ = drawn_lists(index, ways, end)
+    entries = np.array(lists.entries)
+    first, count = np.array(lists.source.first), np.array(lists.source.count)
+    added = np.repeat([1, -1], 10)[None, :] + GAIN_ZERO << GAIN_SHIFT
+    more = (entries & ~np.uint32(63 << GAIN_SHIFT))[:, None] | added.astype(np.uint32)
+    entries = np.concatenate([more, entries[:, None]], axis=1)
+    every = [entries[begin : begin + length].ravel() for begin, length in zip(first, count)]
+    start = np.concatenate([[0], np.cumsum(21 * count)[:-1]])
+    source = Source(mi.UInt32(start), mi.UInt32(21 * count), mi.UInt32(start + 21 * count))
+    lists = replace(
+        lists, entries=mi.UInt32(np.concatenate(every)), source=source, sorted=mi.Bool(np.full(len(count), in_order))
+    )
+    assert count.max() > 3
+    expected = lit_lengths(index, ways, end, weight=weight)
+    assert_same(walked(index, lists, ways, end), expected, tolerance=1e-4)

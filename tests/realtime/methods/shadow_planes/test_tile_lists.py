@@ -20,6 +20,7 @@ def endless(*names, spread):
     return crossings(index, ways)[0], lists
 
 
+@pytest.mark.claim("lists-hold-every-plane")
 @pytest.mark.parametrize("camera", CAMERAS)
 @pytest.mark.parametrize("name", NAMES)
 def test_lists_hold_every_plane_that_a_ray_crosses(variant, name, camera):
@@ -77,6 +78,7 @@ def test_lists_are_in_order(variant, order):
     assert ordered.mean() > 0.9
 
 
+@pytest.mark.claim("lists-hold-every-plane")
 @pytest.mark.parametrize("room", [1, 3, 6])
 def test_tiles_without_room_read_the_list_they_drew_on(variant, monkeypatch, room):
     """The bins or the list of their block: every plane that is crossed is still there, once."""

@@ -40,6 +40,7 @@ def boxes(rng, count):
     return make_casters(meshes)
 
 
+@pytest.mark.claim("culled-casters")
 def test_no_body_is_dropped_whose_shadow_is_seen(variant):
     rng = np.random.default_rng(11)
     dropped = 0

@@ -45,6 +45,21 @@ def _mixture(case):
     return mixture_of(_span(case), [mi.Float64(rate) for rate in SPANS[case][3]])
 
 
+def equi_angular_pdf(y, span):
+    """Return the density of `equi_angular` at y [1/m]."""
+    from reference.monte_carlo.single_scatter.distance_sampling import equi_angular_range
+
+    s = span.start + y
+    return span.height / (equi_angular_range(span) * (span.height * span.height + s * s))
+
+
+def mixture_cdf(y, mixture):
+    """Return the probability that `sample_distance` stays below y."""
+    from reference.monte_carlo.single_scatter.distance_sampling import _terms
+
+    return sum(cdf for cdf, _ in _terms(y, mixture))
+
+
 def _technique(case, name):
     """Return a sampler of u and a density of y of one technique."""
     import mitsuba as mi
@@ -52,7 +67,7 @@ def _technique(case, name):
     from reference.monte_carlo.single_scatter import distance_sampling as ds
 
     if name == "equi-angular":
-        return lambda u: ds.equi_angular(u, _span(case)), lambda y: ds.equi_angular_pdf(y, _span(case))
+        return lambda u: ds.equi_angular(u, _span(case)), lambda y: equi_angular_pdf(y, _span(case))
     if name == "free-flight":
         flight = ds.free_flights(_span(case).length, mi.Float64(SPANS[case][3][-1]))
         return lambda u: ds.free_flight(u, flight), lambda y: ds.free_flight_pdf(y, flight)
@@ -103,6 +118,7 @@ def _p_value(case, name, *, sample=None, density=None, seed=0):
     return chi2.sf(np.sum((observed - expected) ** 2 / expected), len(expected) - 1)
 
 
+@pytest.mark.claim("sampled-distances", tolerance="chi-square, family level 1e-4")
 @pytest.mark.parametrize("name", ["equi-angular", "free-flight", "mixture"])
 def test_samples_follow_the_density(variant, name):
     """Rationale: chi-square tests of 13 spans, Sidak's level for all of them together is 1e-4 with fixed seeds."""
@@ -138,6 +154,7 @@ def test_broken_densities_are_rejected(variant, case):
     assert _p_value(case, "mixture", sample=lambda u: 0.98 * sample(u)) < 1e-4
 
 
+@pytest.mark.claim("sampled-distances", tolerance="1e-8")
 @pytest.mark.parametrize("case", SPANS)
 @pytest.mark.parametrize("name", ["equi-angular", "free-flight", "mixture"])
 def test_densities_integrate_to_one(variant, case, name):
@@ -147,12 +164,13 @@ def test_densities_integrate_to_one(variant, case, name):
     assert total == pytest.approx(1, abs=1e-8)
 
 
+@pytest.mark.claim("sampled-distances")
 @pytest.mark.parametrize("case", SPANS)
 def test_weights_of_both_techniques_add_up(variant, case):
     """Rationale: the balance heuristic's weights sum to 1, and each is its technique's share of the density."""
     import mitsuba as mi
 
-    from reference.monte_carlo.single_scatter.distance_sampling import equi_angular_pdf, mixture_pdfs, sample_distance
+    from reference.monte_carlo.single_scatter.distance_sampling import mixture_pdfs, sample_distance
 
     mixture = _mixture(case)
     y, _, density = (np.array(a, dtype=np.float64) for a in sample_distance(mi.Float64(np.arange(1, 64) / 64), mixture))
@@ -172,7 +190,7 @@ def test_mixture_is_inverted(variant):
     """
     import mitsuba as mi
 
-    from reference.monte_carlo.single_scatter.distance_sampling import Span, mixture_cdf, mixture_of, sample_distance
+    from reference.monte_carlo.single_scatter.distance_sampling import Span, mixture_of, sample_distance
 
     rng = np.random.default_rng(5)
     n = 20000

@@ -84,6 +84,7 @@ def _case(name):
 _FAST = ("ball and floor", "soft spot", "coloured")
 
 
+@pytest.mark.claim("single-scatter-agrees", tolerance="family level 1e-4; bias within four errors below 0.1 %")
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[] if name in _FAST else pytest.mark.statistical) for name in CASES]
 )
@@ -113,6 +114,7 @@ def test_agrees_with_the_quadrature(variant, name):
     assert np.all(batches.standard_error[1] == 0)
 
 
+@pytest.mark.claim("single-scatter-agrees", tolerance="family level 1e-4, errors below 2e-3")
 def test_agrees_with_the_certified_integral_on_random_rays(variant):
     """Rationale: directly against J of the airlight equation, one ray after the other, without a scene's reading.
 
@@ -226,6 +228,7 @@ def _brute_force(lamp, origin, direction, steps=4000):
     return total
 
 
+@pytest.mark.claim("bounded-media", tolerance="family level 1e-4, errors below 1e-3")
 @pytest.mark.parametrize("place", _LAMPS)
 def test_bounded_media_against_a_plain_sum(variant, place):
     """Rationale: boundaries are walked on both legs; slabs and spheres have crossings in closed form.
@@ -294,6 +297,7 @@ def test_camera_in_a_bounded_medium_far_from_its_bounds(variant):
     assert np.median(error / outside[0]) < 2e-3
 
 
+@pytest.mark.claim("enclosed-light")
 def test_enclosed_light_gives_exactly_zero(variant):
     closed = {"type": "sphere", "center": [0.9, 0.7, 1.9], "radius": 0.21}
     batches = _run(_load(shell=closed), batches=2, samples=16)
@@ -363,6 +367,7 @@ def test_one_sample_is_unbiased(variant):
         assert abs(few.mean[0][:, channel].sum() / total - 1) < 4 * error
 
 
+@pytest.mark.claim("scenes-refused-by-name")
 @pytest.mark.parametrize(
     ("changes", "words"),
     [

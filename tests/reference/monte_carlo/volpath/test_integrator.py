@@ -15,6 +15,7 @@ def truth(variant):
     return read_truth(mi.load_dict(tiny_scene()))
 
 
+@pytest.mark.claim("standard-errors")
 def test_batches_merge_to_the_plain_mean_and_error(truth):
     from reference.monte_carlo.batches import merged
     from reference.monte_carlo.volpath.integrator import volpath_batch
@@ -63,6 +64,7 @@ def _distance(truth):
     return surface_hits(truth).distance
 
 
+@pytest.mark.claim("volpath-agrees")
 @pytest.mark.statistical
 @pytest.mark.parametrize("colour", ["grey", "coloured"])
 def test_agrees_with_the_quadrature(variant, colour):

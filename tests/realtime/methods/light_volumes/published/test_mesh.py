@@ -59,8 +59,8 @@ def heights_above(shadow_map, light, points):
     size = shadow_map.size
     distance = np.array(shadow_map.distance, dtype=float).reshape(shadow_map.faces, size + 1, size + 1)
     d = points - np.array(light.position, dtype=float).ravel()
-    if shadow_map.frame:
-        across, up, axis = (np.array(one, dtype=float).ravel() for one in shadow_map.frame)
+    if shadow_map.projection.basis:
+        across, up, axis = (np.array(one, dtype=float).ravel() for one in shadow_map.projection.basis)
         a, b, depth = np.linalg.solve(np.stack([across, up, axis], axis=1), d.T)
         face = np.zeros(len(d), int)
         tangent = float(np.linalg.norm(across))
@@ -84,6 +84,7 @@ def heights_above(shadow_map, light, points):
     return np.where(inside, 1 / np.where(inside, depth, 1), -1), np.where(x >= y, lower, upper)
 
 
+@pytest.mark.claim("closed-mesh")
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("size", [4, 32])
 @pytest.mark.parametrize("tessellation", TESSELLATIONS)
@@ -132,7 +133,8 @@ def test_parity_tells_lit_from_unlit(variant, kind, tessellation, floor):
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_fine_threshold_gives_the_same_surface(variant, kind):
     from realtime.methods.light_volumes.published.mesh import _heights
-    from realtime.methods.light_volumes.published.tessellation import divide, edges, tessellated_heights
+    from realtime.methods.light_volumes.published.tessellation import divide, edges
+    from tests.helpers.tessellated_heights import tessellated_heights
 
     shadow_map, _ = map_of(kind, 64)
     height = _heights(shadow_map)
@@ -157,6 +159,7 @@ def random_cube(size: int, seed: int):
     import mitsuba as mi
 
     from realtime.methods.light_volumes.published.mesh import _welds
+    from realtime.shadow_maps.projection import Projection
     from realtime.shadow_maps.shadow_map import ShadowMap
 
     rng = np.random.default_rng(seed)
@@ -166,9 +169,10 @@ def random_cube(size: int, seed: int):
     distance = np.where(rng.random((6, side, side)) < 3 / size**2, 0.5, distance).ravel()
     twin, original = _welds(size)
     distance[twin] = distance[original]
-    return ShadowMap(size, mi.Float(distance), None)
+    return ShadowMap(size, mi.Float(distance), Projection(None))
 
 
+@pytest.mark.claim("closed-mesh")
 @pytest.mark.parametrize("seed", range(6))
 def test_faces_are_welded_without_cracks_whatever_the_levels(variant, seed):
     from realtime.methods.light_volumes.published.mesh import volume_mesh
@@ -199,6 +203,7 @@ def test_stages_are_timed(variant):
     assert np.array_equal(mesh.triangles, same.triangles)
 
 
+@pytest.mark.claim("memory-before-it-is-taken")
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("tessellation", TESSELLATIONS)
 def test_memory_is_told_before(variant, kind, tessellation):

@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from realtime.methods.light_volumes.published.mesh import VolumeMesh
@@ -60,24 +60,26 @@ points = st.tuples(coordinates, coordinates, coordinates)
 whole = st.integers(-4, 4)
 
 
+@pytest.mark.claim("signs-add-up", tolerance="none: whole numbers")
 @settings(max_examples=60, deadline=None)
 @given(corners=st.lists(points, min_size=4, max_size=4), eye=points)
 def test_signs_add_up_for_tetrahedra(variant, corners, eye):
     corners = np.array(corners)
-    if abs(np.linalg.det(corners[1:] - corners[0])) < 1e-6 or np.linalg.norm(eye) < 1e-3:
-        return
+    assume(abs(np.linalg.det(corners[1:] - corners[0])) >= 1e-6 and np.linalg.norm(eye) >= 1e-3)
     check_signs(tetrahedron(corners), make_camera(eye))
 
 
+@pytest.mark.claim("signs-add-up", tolerance="none: whole numbers")
 @settings(max_examples=60, deadline=None)
 @given(corners=st.lists(st.tuples(whole, whole, whole), min_size=4, max_size=4))
 def test_signs_add_up_where_edges_pass_through_pixel_centres(variant, corners):
     """Corners at whole coordinates before a camera at 0: every edge and plane meets centres, or passes the camera."""
     corners = np.array(corners, dtype=float)
-    if abs(np.linalg.det(corners[1:] - corners[0])) > 0.5:
-        check_signs(tetrahedron(corners), simple_camera())
+    assume(abs(np.linalg.det(corners[1:] - corners[0])) > 0.5)
+    check_signs(tetrahedron(corners), simple_camera())
 
 
+@pytest.mark.claim("signs-add-up", tolerance="none: whole numbers")
 @settings(max_examples=60, deadline=None)
 @given(
     inverse=st.lists(st.sampled_from((0.0, 0.05, 0.2, 0.21, 0.5, 4.0)), min_size=36, max_size=36),
@@ -86,8 +88,7 @@ def test_signs_add_up_where_edges_pass_through_pixel_centres(variant, corners):
 )
 def test_signs_add_up_for_light_volumes(variant, inverse, eye, aim):
     """With vertices at infinity and behind the camera, the camera in the light, in shadow, or beside."""
-    if np.linalg.norm(np.subtract(eye, aim)) < 1e-3:
-        return
+    assume(np.linalg.norm(np.subtract(eye, aim)) >= 1e-3)
     check_signs(light_pyramid(np.reshape(inverse, (6, 6))), make_camera(eye, aim, fov=100.0))
 
 
@@ -101,6 +102,7 @@ def test_a_camera_in_the_light_and_one_outside(variant):
     assert len(beyond[1]) == WIDTH * HEIGHT
 
 
+@pytest.mark.claim("signs-add-up")
 def test_every_pixel_of_a_shared_edge_belongs_to_one_triangle(variant):
     """A square of two triangles with all edges and the diagonal through pixel centres, as rasterizers are tested."""
     square = np.array([(-3, -2, 1, 1), (2, -2, 1, 1), (2, 3, 1, 1), (-3, 3, 1, 1)], dtype=float)

@@ -23,7 +23,7 @@ def test_sum_over_a_convex_volume_is_one_integral(variant, kind, order):
     from realtime.scene.camera import ray_directions, tiled_pixels
     from realtime.scene.lights import Light, spot_fields
     from realtime.scene.medium import Medium
-    from realtime.scene.phase import Phase
+    from realtime.scene.phase import named_phase
 
     corners = np.array([(0.1, 0.2, 1.9), (1.1, -0.8, -0.9), (-1.2, -0.7, -1.1), (0.1, 1.3, -0.8)])
     camera = make_camera((1.9, -2.3, 0.4), size=(32, 24))
@@ -43,8 +43,8 @@ def test_sum_over_a_convex_volume_is_one_integral(variant, kind, order):
     assert np.any((end > begin) & (end == 3.1))
     cone = spot_fields(np.array([0.1, 0.2, -1.0]) / np.sqrt(1.05), 0.45, 0.45, array_types("double"))
     arrays = {"position": mi.Vector3d(0.1, 0.2, 1.9), "intensity": mi.Color3d(1)}
-    light = Light(kind, False, **arrays, **(cone if kind == "spot" else {}))
-    medium = Medium((mi.Float64(0.4),), mi.Color3d(1), Phase("isotropic"))
+    light = Light(**arrays, **(cone if kind == "spot" else {}))
+    medium = Medium((mi.Float64(0.4),), mi.Color3d(1), named_phase("isotropic"))
     geometry = ray_geometry(camera.origin, direction, light, low=low)
     settings: dict[str, Any] = {"medium": medium, "light": light}
     wanted = airlight_integral(exact, geometry, mi.Float64(begin), mi.Float64(np.maximum(begin, end)), **settings)
@@ -68,8 +68,8 @@ def view_of(scene):
     pixel = mi.UInt32(tiled_pixels(camera.width, camera.height))
     direction = ray_directions(camera, pixel)[0]
     distance = cast_rays(scene.geometry, None, camera.origin, direction).distance
-    parts = {"plan": scene.plan, "geometry": scene.geometry, "medium": scene.medium, "lights": scene.lights}
-    return frame_view(camera, pixel, distance, **parts, prepared=())
+    parts = {"features": scene.features, "geometry": scene.geometry, "medium": scene.medium, "lights": scene.lights}
+    return frame_view(camera, pixel, distance, **parts)
 
 
 @pytest.mark.parametrize("kind", ["point", "spot"])
@@ -84,7 +84,7 @@ def test_a_frame_is_that_of_the_height_field(variant, kind, precision):
     from realtime.scene.read_scene import read_scene
     from realtime.shadow_maps.shadow_map import cast_shadow_map
     from reference.scene.read import read_truth
-    from validation.oracles.light_volume import twin_airlight
+    from validation.oracles.light_volume import oracle_airlight
 
     # A kernel in float64 for a beam with a soft edge takes ten seconds to compile.
     lamp = {"lamp": spot(beam=20.0 if precision == "single" else 33.0)} if kind == "spot" else {}
@@ -96,7 +96,7 @@ def test_a_frame_is_that_of_the_height_field(variant, kind, precision):
     lanes = mesh_airlight(view, light, volume_mesh(shadow_map, light), kernel=exact)
     found, distance = np.empty((40 * 28, 3)), np.empty(40 * 28)
     found[np.array(view.pixel)], distance[np.array(view.pixel)] = np.array(lanes).T, np.array(view.distance)
-    wanted = twin_airlight(read_truth(loaded), [shadow_map], distance=distance.reshape(28, 40)).reshape(-1, 3)
+    wanted = oracle_airlight(read_truth(loaded), [shadow_map], distance=distance.reshape(28, 40)).reshape(-1, 3)
     # The scene holds its numbers in float32, 6e-8 each; float32 adds the kernel's 5e-6 and the rounding of the cone.
     tolerance = 3e-7 if precision == "double" else 1e-5
     assert np.max(np.abs(found - wanted)) < tolerance * np.max(wanted)
@@ -112,12 +112,12 @@ def test_light_that_the_rays_pass_closely_leaves_nothing_where_it_is_hidden(vari
     from realtime.rays.ray_light import RayGeometry
     from realtime.scene.lights import Light
     from realtime.scene.medium import Medium
-    from realtime.scene.phase import Phase
+    from realtime.scene.phase import named_phase
 
     found = {}
     for Float, Vector, Color in ((mi.Float, mi.Vector3f, mi.Color3f), (mi.Float64, mi.Vector3d, mi.Color3d)):
-        medium = Medium((Float(0.4),), Color(1), Phase("isotropic"))
-        light = Light("point", False, Vector(0), Color(1))
+        medium = Medium((Float(0.4),), Color(1), named_phase("isotropic"))
+        light = Light(Vector(0), Color(1))
         geometry = RayGeometry(Float([2.0]), Float([1e-5]), None, None)
         x = mi.Float64([0.5, 1.5, 2.5, 3.5, 9.0, 9.0])
         sign = mi.Float64([-1, 1, -1, 1, -1, 1])
@@ -137,11 +137,11 @@ def test_no_crossings_no_light(variant):
     from realtime.rays.ray_light import RayGeometry
     from realtime.scene.lights import Light
     from realtime.scene.medium import Medium
-    from realtime.scene.phase import Phase
+    from realtime.scene.phase import named_phase
 
     settings: dict[str, Any] = {
-        "medium": Medium((mi.Float(0.4),), mi.Color3f(1), Phase("isotropic")),
-        "light": Light("point", False, mi.Vector3f(0), mi.Color3f(1)),
+        "medium": Medium((mi.Float(0.4),), mi.Color3f(1), named_phase("isotropic")),
+        "light": Light(mi.Vector3f(0), mi.Color3f(1)),
         "geometry": RayGeometry(mi.Float([2.0, 3.0]), mi.Float([1.0, 1.0]), None, None),
     }
     assert np.array_equal(crossing_sum([], kernel=exact, distance=mi.Float([5.0, 6.0]), **settings), [0, 0])

@@ -5,15 +5,8 @@ import numpy as np
 import pytest
 
 from realtime.errors import InputError
-from realtime.methods.light_volumes.published.tessellation import (
-    RING,
-    configuration,
-    divide,
-    edges,
-    quads,
-    tessellated_heights,
-    triangles,
-)
+from realtime.methods.light_volumes.published.tessellation import RING, configuration, divide, edges, quads, triangles
+from tests.helpers.tessellated_heights import tessellated_heights
 
 
 def directed_edges(found):
@@ -35,6 +28,7 @@ def random_edges(rng, *, faces: int, levels: int, share: float):
     return [rng.random((faces, 2**level, 2**level)) < share for level in range(levels)]
 
 
+@pytest.mark.claim("no-t-junctions")
 @pytest.mark.parametrize("sides", range(16))
 def test_configuration_covers_its_quad_once(sides):
     found = np.array(configuration(sides))
@@ -59,6 +53,7 @@ def test_configuration_covers_its_quad_once(sides):
     assert np.all(inside == 1)
 
 
+@pytest.mark.claim("no-t-junctions")
 def test_meshes_of_random_divisions_have_no_gaps():
     rng = np.random.default_rng(4)
     configurations = set()
@@ -80,6 +75,7 @@ def test_meshes_of_random_divisions_have_no_gaps():
     assert configurations == set(range(16))
 
 
+@pytest.mark.claim("no-t-junctions")
 def test_divided_sides_differ_by_one_level():
     """Seen through the depth of the quad at every texel, not through the flags."""
     rng = np.random.default_rng(7)
@@ -139,6 +135,7 @@ def test_the_edge_of_infinity_is_found():
     assert np.array_equal(tessellated_heights(height, divide(edges(height, 0.5))), height)
 
 
+@pytest.mark.claim("tessellation-threshold")
 def test_errors_stay_a_small_multiple_of_the_threshold():
     def bumps(u, v):
         return 1 + 0.4 * np.sin(5 * u + 3 * v) * np.cos(7 * v) + (u * u + v * v < 0.3) * 0.5

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from validation.frames.bounded_study import constant_distance_study
+from tests.helpers.bounded_study import constant_distance_study
 
 
 def test_a_thin_medium_does_not_care_for_r(variant):
@@ -13,6 +13,7 @@ def test_a_thin_medium_does_not_care_for_r(variant):
     assert thin.scale == pytest.approx(1, abs=1e-4)
 
 
+@pytest.mark.claim("mean-distance-of-the-paper", tolerance="5 % of the bias")
 def test_a_ball_lit_from_afar_is_too_dark_as_the_mean_leg_says(variant):
     """To first order in sigma_t the bias is that of the mean leg: -sigma_t (1.2 - 0.75) radius."""
     (found,) = constant_distance_study(sizes=(0.01,), optical_depths=(0.02,), image=(48, 36))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Convex bounds of media in float64: polyhedra and balls, read from Mitsuba's shapes and checked.
+"""Convex bounds of media in float64: polyhedra and spheres, read from Mitsuba's shapes and checked.
 
 A polyhedron is what its facets' half spaces n . x <= offset have in common. Vertices are float32 numbers, so a facet of
 four corners is only nearly flat; a mesh counts as convex where no vertex lies further outside any facet's plane than
@@ -25,7 +25,6 @@ Index = NDArray[np.int64]
 
 LARGEST_MESH = 20_000  # triangles: the test of convexity looks at every vertex and every facet
 _FLAT = 1e-6  # relative to the size of the body
-_BLOCK = 1 << 21  # numbers in one block of rays and facets
 
 
 @dataclass(frozen=True)
@@ -38,14 +37,14 @@ class Polyhedron:
 
 
 @dataclass(frozen=True)
-class Ball:
-    """A ball."""
+class Sphere:
+    """A sphere."""
 
     centre: Array  #: [m]
     radius: float  #: [m]
 
 
-Bounds = Polyhedron | Ball
+Bounds = Polyhedron | Sphere
 
 
 def read_bounds(shape: Any) -> Bounds:
@@ -58,7 +57,7 @@ def read_bounds(shape: Any) -> Bounds:
     """
     parameters = mi.traverse(shape)
     if shape.class_name() == "Sphere":
-        return _read_ball(shape, np.array(parameters["to_world"].matrix, dtype=np.float64).reshape(4, 4))
+        return _read_sphere(shape, np.array(parameters["to_world"].matrix, dtype=np.float64).reshape(4, 4))
     if not shape.is_mesh() or "vertex_positions" not in parameters:
         raise _refusal(shape, f"is a {shape.class_name()}", "a sphere, a cube or a closed convex mesh")
     vertices = np.array(parameters["vertex_positions"], dtype=np.float64).reshape(-1, 3)
@@ -68,13 +67,13 @@ def read_bounds(shape: Any) -> Bounds:
     return _read_polyhedron(shape, vertices, faces)
 
 
-def _read_ball(shape: Any, matrix: Array) -> Ball:
+def _read_sphere(shape: Any, matrix: Array) -> Sphere:
     lengths = np.linalg.norm(matrix[:3, :3], axis=0)
     if np.ptp(lengths) > 1e-5 * lengths.max():
         raise _refusal(shape, "is a sphere with different scales along its axes", "one scale, or a mesh")
     if shape.has_flipped_normals():
         raise _refusal(shape, "is inside out", "normals that point outwards: remove flip_normals")
-    return Ball(matrix[:3, 3], float(lengths.mean()))
+    return Sphere(matrix[:3, 3], float(lengths.mean()))
 
 
 def _read_polyhedron(shape: Any, vertices: Array, faces: Index) -> Polyhedron:
@@ -126,90 +125,24 @@ def _refusal(shape: Any, found: str, wanted: str) -> InputError:
     return InputError(f"shape '{shape.id()}' bounds a medium and {found}; wanted {wanted}")
 
 
-def crossings(bounds: Bounds, origin: Array, direction: Array) -> tuple[Array, Array]:
-    """Return where rays enter and leave a body.
-
-    Parameters
-    ----------
-    bounds
-        The body.
-    origin
-        (n, 3), or (3,) for one that all share [m].
-    direction
-        Unit vectors, (n, 3).
-
-    Returns
-    -------
-    enter, leave
-        Distances along the whole straight line, (n,) [m]; leave <= enter where it misses the body.
-    """
-    if isinstance(bounds, Ball):
-        return ball_crossings(np.sum((bounds.centre - origin) * direction, axis=-1), _power(bounds, origin))
-    return crossed_facets(bounds, origin, direction)[2:]
-
-
-def crossed_facets(bounds: Polyhedron, origin: Array, direction: Array) -> tuple[Index, Index, Array, Array]:
-    """Return the facets at which rays enter and leave a polyhedron, and the distances, as `crossings` does."""
-    origin = np.atleast_2d(origin)
-    enter, leave = np.empty(len(direction), np.int64), np.empty(len(direction), np.int64)
-    low, high = np.empty(len(direction)), np.empty(len(direction))
-    step = max(1, _BLOCK // len(bounds.offset))
-    for first in range(0, len(direction), step):
-        block = slice(first, first + step)
-        rate = direction[block] @ bounds.normal.T
-        room = bounds.offset - (origin if len(origin) == 1 else origin[block]) @ bounds.normal.T
-        with np.errstate(divide="ignore", invalid="ignore"):
-            times = room / rate
-        entering, leaving = np.where(rate < 0, times, -np.inf), np.where(rate > 0, times, np.inf)
-        enter[block], leave[block] = np.argmax(entering, axis=1), np.argmin(leaving, axis=1)
-        missed = np.any((rate == 0) & (room < 0), axis=1)  # outside along one of the planes
-        low[block] = np.where(missed, np.inf, np.max(entering, axis=1))
-        high[block] = np.where(missed, -np.inf, np.min(leaving, axis=1))
-    return enter, leave, low, high
-
-
-def ball_crossings(along: Array, power: Array | float) -> tuple[Array, Array]:
-    """Return where lines enter and leave a ball: the roots of t^2 - 2 along t + power, `along` = d . (centre - origin).
-
-    power = |centre - origin|^2 - radius^2 is the power of the origin. The smaller root in size is taken from the
-    product of both, which is the power, so that nothing cancels.
-    """
-    inner = along * along - power
-    root = np.sqrt(np.maximum(inner, 0.0))
-    far = np.where(along >= 0, along + root, along - root)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        near = np.where(far != 0, power / far, 0.0)
-    low, high = np.where(along >= 0, near, far), np.where(along >= 0, far, near)
-    return np.where(inner > 0, low, np.inf), np.where(inner > 0, high, -np.inf)
-
-
-def _power(ball: Ball, origin: Array) -> Array:
-    return np.sum((ball.centre - origin) ** 2, axis=-1) - ball.radius**2
-
-
-def half_chord(radius: Array | float, distance: Array) -> Array:
-    """Return half of the chord at a distance from the centre of a disk, sqrt(radius^2 - distance^2); 0 beyond it."""
-    return np.sqrt(np.maximum(radius - distance, 0) * (radius + distance))
-
-
 def holds(bounds: Bounds, point: Array) -> bool:
     """Return whether a point lies inside a body."""
-    if isinstance(bounds, Ball):
+    if isinstance(bounds, Sphere):
         return bool(np.linalg.norm(point - bounds.centre) < bounds.radius)
     return bool(np.all(bounds.normal @ point < bounds.offset))
 
 
 def overlap(one: Bounds, other: Bounds) -> bool:
     """Return whether two bodies share more than their boundaries, to 1e-6 of their sizes."""
-    if isinstance(one, Ball) and isinstance(other, Ball):
+    if isinstance(one, Sphere) and isinstance(other, Sphere):
         gap = float(np.linalg.norm(one.centre - other.centre))
         return gap < (one.radius + other.radius) * (1 - _FLAT)
-    if isinstance(one, Ball):
+    if isinstance(one, Sphere):
         assert isinstance(other, Polyhedron)
         return _distance(other, one.centre) < one.radius * (1 - _FLAT)
-    if isinstance(other, Ball):
+    if isinstance(other, Sphere):
         return overlap(other, one)
-    # The largest ball in what both have in common: maximise its radius t under n . x + t <= offset.
+    # The largest sphere in what both have in common: maximise its radius t under n . x + t <= offset.
     planes = np.concatenate([one.normal, other.normal])
     result = linprog(
         [0.0, 0.0, 0.0, -1.0],

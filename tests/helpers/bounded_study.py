@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How wrong is the constant R of Biri 2006, section 4.2, as a function of a medium's size and optical depth?
 
-A ball of one medium in clear air stands before the camera, lit from above by a lamp outside of it. Two numbers matter:
-its radius over the distance of the lamp, which says how much 1/r^2 varies in it, and the optical depth of its diameter,
-which says what the exponent is worth. Every pair is rendered with ``media=paper`` and with ``media=exact``, in float64,
-and the first judged by the second, which the tests hold to the truth; on request the truth itself is the judge.
+The camera looks at a sphere of one medium in clear air, which a lamp outside the sphere lights from above. Two numbers
+matter: the radius over the distance of the lamp, which determines how much 1/r^2 varies in the sphere, and the optical
+depth of the diameter, which determines how much the attenuation varies. Every pair is rendered with ``media=paper`` and
+with ``media=exact``, in float64. The study compares the first image with the second, which tests compare with the
+truth; on request it compares with the truth itself.
 
-R, the average distance between a point of the boundary and one of the medium, is 1.2 radii in a ball. What a leg from
-far away has within the ball is on average 0.75 radii (the mean of half a chord over the volume): R is 60 % too long,
+R, the mean distance between a point of the boundary and a point of the medium, is 1.2 radii in a sphere. A leg from far
+away has a mean length of 0.75 radii within the sphere (the mean of half a chord over the volume): R is 60 % too long,
 and the airlight too dark by about exp(-0.45 sigma_t radius). `scale` is the factor that brings the paper's image
-closest to the exact one, and `shape` the error that is left with it: what no choice of R could mend.
+closest to the exact one. `shape` is the error that remains after this scaling: no choice of R could remove it.
 """
 
 from collections.abc import Callable, Sequence
@@ -39,10 +40,10 @@ class ConstantDistance:
 
     size: float  #: radius over the distance of the lamp
     optical_depth: float  #: of the diameter
-    relative_rmse: float  #: over the pixels of the body
+    relative_rmse: float  #: over the pixels that see the medium
     relative_bias: float
     scale: float  #: factor that brings the image closest to the exact one
-    shape: float  #: relative RMSE that is left with that factor
+    shape: float  #: relative RMSE that remains after scaling by this factor
 
 
 def constant_distance_study(
@@ -53,12 +54,12 @@ def constant_distance_study(
     against: str = "exact",
     progress: Callable[[int, int, str], None] | None = None,
 ) -> tuple[ConstantDistance, ...]:
-    """Measure the constant R for bodies of several sizes and optical depths.
+    """Measure the error of the constant R for media of several sizes and optical depths.
 
     Parameters
     ----------
     sizes
-        Radii over the distance of the lamp, above 0 and below 1: the lamp is outside.
+        Radii over the distance of the lamp, above 0 and below 1, so that the lamp is outside the medium.
     optical_depths
         Optical depths of the diameter, above 0.
     image
@@ -66,7 +67,7 @@ def constant_distance_study(
     against
         'exact' (media=exact in float64) or 'truth' (the quadrature estimator).
     progress
-        Called with (done, of, what).
+        Callback with the number done, the total and a description of the next step, or None.
 
     Returns
     -------
@@ -76,7 +77,7 @@ def constant_distance_study(
     Raises
     ------
     InputError
-        For a size or an optical depth out of range, or another judge.
+        For a size or an optical depth out of range, or another value of `against`.
     """
     if against not in ("exact", "truth"):
         raise InputError(f"against: got {against!r}, wanted exact or truth")
@@ -95,8 +96,8 @@ def constant_distance_study(
     return tuple(results)
 
 
-def ball_in_clear_air(size: float, optical_depth: float, image: tuple[int, int]) -> dict[str, Any]:
-    """Return a ball of fog that fills the view's height, and a lamp at radius/size from its centre."""
+def sphere_in_clear_air(size: float, optical_depth: float, image: tuple[int, int]) -> dict[str, Any]:
+    """Return a sphere of fog as high as the view, and a lamp at radius/size from its centre."""
     lamp = _LAMP / np.linalg.norm(_LAMP) * (_RADIUS / size)
     medium = {
         "type": "homogeneous",
@@ -114,21 +115,21 @@ def ball_in_clear_air(size: float, optical_depth: float, image: tuple[int, int])
 
 
 def _judged(size: float, depth: float, image: tuple[int, int], against: str) -> ConstantDistance:
-    loaded = mi.load_dict(ball_in_clear_air(size, depth, image))
+    loaded = mi.load_dict(sphere_in_clear_air(size, depth, image))
     scene = read_scene(loaded, "double")
     exact = truth_image(loaded).airlight if against == "truth" else _airlight(scene, "exact")
     paper = _airlight(scene, "paper")
-    body = exact[..., 1] > 0
-    test, reference = paper[body], exact[body]
+    in_medium = exact[..., 1] > 0
+    test, reference = paper[in_medium], exact[in_medium]
     scale = float(np.sum(test * reference) / np.sum(test * test))
-    error = error_metrics(exact, paper, mask=body)
+    error = error_metrics(exact, paper, mask=in_medium)
     return ConstantDistance(
         size=size,
         optical_depth=depth,
         relative_rmse=error.relative_rmse,
         relative_bias=error.relative_bias,
         scale=scale,
-        shape=error_metrics(exact, scale * paper, mask=body).relative_rmse,
+        shape=error_metrics(exact, scale * paper, mask=in_medium).relative_rmse,
     )
 
 

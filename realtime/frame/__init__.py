@@ -1,0 +1,16 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A frame: camera rays are cast and shaded, a method adds its layers, passes go over the image, all is composed.
+
+Read in this order:
+
+- `renderer.py`: the stages of a frame and how they follow one another.
+- `surface.py`: camera rays, and the light that surfaces send back through the medium.
+- `surface_stages.py`: these as two recorded functions, one that casts and one that shades what was cast before.
+- `frame_view.py`: the view that a method is given.
+- `layers.py`: adaptive sampling around a method, passes over its image, and the composition.
+- `incremental.py`: the next frame of an animation, and the cache of what stood still.
+- `recorded.py`: functions that Dr.Jit records once and replays.
+
+May import: `realtime.bounded_media`, `realtime.errors`, `realtime.kernels`, `realtime.methods.interface`,
+`realtime.numerics`, `realtime.parameters`, `realtime.rays`, `realtime.scene`, `realtime.tiles`.
+"""

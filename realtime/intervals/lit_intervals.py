@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""Sums over the lit intervals of rays, as a walk along them finds their ends.
+
+A walk comes to the boundaries of shadow in the order of a ray. At each the light comes back, or ends, or nothing
+changes (two shadows overlap). With :math:`[a_i, b_i]` the intervals between, the sum is
+
+.. math:: \sum_i \int_{a_i}^{b_i} f(x) dx :
+
+of positive terms, one for each interval, where a sum of :math:`\pm F(x_n)` over the boundaries loses digits.
+
+Of each ray the last interval is kept, from `begin` to `end`, and whether it `waits` to be added to the sum:
+
+- the light comes back: the interval opens here (`open_interval`), and nothing may wait;
+- the light ends: the interval closes here and waits (`close_interval`), and no other may have waited;
+- the ray ends: what waits is added, and what is lit up to there (`sum_at_end`).
+
+A walk that lets an interval wait until another one closes keeps itself where that one opened.
+
+That an ended interval waits is what makes walks fast. Sixteen rays and more go in step, and what one of them does all
+of them wait for; an integral costs as much as many steps. So each method chooses when to call `add_waiting`, and rays
+whose intervals end a few steps apart are served at once: `realtime.methods.shadow_planes.sweep` does it at every fourth
+plane, `realtime.methods.epipolar.walk` when every ray has an interval or is at its end, and
+`realtime.methods.light_volumes.walk` when an interval does not go on in the next face of the map.
+
+Places are whatever rises or falls along a ray, distances or quotients D/x; `integral` takes them as they are.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+
+@dataclass
+class LitIntervals:
+    """The sum over the lit intervals of rays, and the last one of each."""
+
+    total: Any  #: the sum
+    begin: Any  #: of the last interval
+    end: Any
+    waits: Any  #: whether it has ended and is not in the sum yet
+
+
+def no_intervals(zero, start) -> LitIntervals:
+    """Return what rays have at their start.
+
+    Parameters
+    ----------
+    zero
+        The sum of nothing, one for each ray.
+    start
+        Where rays start, one for each: there an interval opens if they are lit.
+    """
+    return LitIntervals(zero, start, +start, dr.full(mi.Bool, False, dr.width(zero)))
+
+
+def open_interval(intervals: LitIntervals, begin, opens) -> LitIntervals:
+    """Return intervals behind a place where the light comes back if it `opens` one; nothing may wait there."""
+    return replace(intervals, begin=dr.select(opens, begin, intervals.begin))
+
+
+def close_interval(intervals: LitIntervals, end, closes, *, begin=None) -> LitIntervals:
+    """Return intervals behind a place where the light ends if it `closes` one; no other may have waited.
+
+    `begin` is where it began, None for where `open_interval` was told.
+    """
+    if begin is not None:
+        intervals = open_interval(intervals, begin, closes)
+    return replace(intervals, end=dr.select(closes, end, intervals.end), waits=intervals.waits | closes)
+
+
+def add_waiting(intervals: LitIntervals, integral: Callable[[Any, Any], Any], due=True) -> LitIntervals:
+    """Return intervals with what waits added to the sum where it is `due`.
+
+    `integral` is a function (begin, end) -> value of one interval; rays that add nothing step over it.
+    """
+    total = dr.if_stmt(
+        args=(intervals.total, intervals.begin, intervals.end),
+        cond=intervals.waits & due,
+        true_fn=lambda total, begin, end: total + integral(begin, end),
+        false_fn=lambda total, begin, end: total,
+    )
+    return replace(intervals, total=total, waits=intervals.waits & ~mi.Bool(due))
+
+
+def sum_at_end(intervals: LitIntervals, integral: Callable[[Any, Any], Any], end, *, opened, lit, active):
+    """Return the sum at the end of rays that are `active`: with what waits, and where `lit` what is open up to there.
+
+    `opened` is where that began. A loop, not two branches: most rays have one of the two and are served at once.
+    """
+
+    def body(total, waits, lit):
+        begin, until = dr.select(waits, intervals.begin, opened), dr.select(waits, intervals.end, end)
+        return total + integral(begin, until), waits & False, waits & lit
+
+    total, _, _ = dr.while_loop(
+        state=(intervals.total, intervals.waits & active, lit & active),
+        cond=lambda total, waits, lit: waits | lit,
+        body=body,
+        labels=("total", "waits", "lit"),
+    )
+    return total

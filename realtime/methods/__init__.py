@@ -1,0 +1,19 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The methods under test, each a record of its stages, and a user's own.
+
+A method answers one question: which radiance do the lit media scatter into each camera ray? `unshadowed` and
+`ray_march` are one file each; what needs more has a folder, and none of these imports another.
+
+Read in this order:
+
+- `unshadowed.py`: one integral a ray and light, the shortest method there is.
+- `ray_march.py`: the baseline, steps with a visibility test each.
+- `registry.py`: the records by name, and how a name becomes a record.
+- `user_method.py`: a user's plain function or record, made a method with its errors named.
+- `user_result.py`: what that returned, checked.
+
+May import: `realtime.bounded_media`, `realtime.errors`, `realtime.kernels`, `realtime.memory`,
+`realtime.methods.epipolar`, `realtime.methods.interface`, `realtime.methods.light_volumes`,
+`realtime.methods.shadow_planes`, `realtime.parameters`, `realtime.rays`, `realtime.scene`, `realtime.shadow_maps`,
+`realtime.tiles`.
+"""

@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Typed parameters: each stands once, with its default, its choices or range, its unit and a sentence of help.
+
+A method has a frozen dataclass of them, derived from `Parameters`, whose fields are made by `parameter`. Conversion of
+words, checks, their messages, `airlight methods` and the tables of the documentation all follow from the fields.
+
+>>> from dataclasses import dataclass
+>>> @dataclass(frozen=True)
+... class Steps(Parameters):
+...     steps: int = parameter(16, "steps of every ray", least=1)
+>>> read_parameters("mine", Steps, {"steps": "24"})
+Steps(steps=24)
+>>> Steps(steps=0)
+Traceback (most recent call last):
+realtime.errors.InputError: steps: got 0, wanted a whole number of at least 1
+"""
+
+import difflib
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import Field, dataclass, field, fields
+from typing import Any
+
+from realtime.errors import InputError
+
+_TRUE, _FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """The values of a method's parameters; a method without any has this class itself.
+
+    Raises
+    ------
+    InputError
+        When it is made, for a value outside its choices or range, and for values that contradict one another.
+    """
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            _check_value(item, getattr(self, item.name))
+        self._check_together()
+
+    def _check_together(self) -> None:
+        """Refuse values that contradict one another, by `InputError`."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What is said of a parameter beside its default: the metadata of its field."""
+
+    help: str
+    choices: tuple[Any, ...] = ()
+    least: float | None = None  #: smallest value
+    most: float | None = None  #: largest value
+    above: float | None = None  #: values are larger than this
+    below: float | None = None  #: values are smaller than this
+    also: tuple[Any, ...] = ()  #: values outside that range that have a meaning of their own
+    unit: str = ""
+    wanted: str = ""  #: what a message asks for, where the range alone would not say it well
+    check: Callable[[Any], None] | None = None  #: refuses what no range describes
+
+
+def parameter(default: Any, help: str, **limits: Any) -> Any:
+    """Return the field of a parameter; `limits` are the other fields of `Limits`."""
+    return field(default=default, metadata={"limits": Limits(help, **limits)})
+
+
+def limits_of(item: Field) -> Limits:
+    """Return what is said of a parameter; of one that was made without `parameter`, nothing."""
+    return item.metadata.get("limits", Limits(""))
+
+
+def defaults(kind: type[Parameters]) -> dict[str, Any]:
+    """Return the defaults of parameters by their names."""
+    return {item.name: item.default for item in fields(kind)}
+
+
+def values(parameters: Parameters) -> dict[str, Any]:
+    """Return the values of parameters by their names."""
+    return {item.name: getattr(parameters, item.name) for item in fields(parameters)}
+
+
+def read_parameters(method: str, kind: type[Parameters], given: Mapping[str, Any]) -> Any:
+    """Return the parameters of a method from values or words, the others with their defaults.
+
+    Parameters
+    ----------
+    method
+        Its name, for messages.
+    kind
+        The class of its parameters.
+    given
+        Values by name; a word is converted to the type of the default.
+
+    Raises
+    ------
+    InputError
+        For an unknown name (the nearest is named), a value of the wrong type, and what `Parameters` refuses.
+    """
+    known = defaults(kind)
+    converted = {}
+    for name, value in given.items():
+        if name not in known:
+            wanted = ", ".join(known) or "none"
+            raise InputError(
+                f"method {method}: got a parameter {name!r}, wanted one of: {wanted}{nearest(name, known)}"
+            )
+        converted[name] = _converted(f"method {method}: {name}", value, known[name])
+    return kind(**converted)
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """Return '; did you mean X?' or an empty string."""
+    close = difflib.get_close_matches(word, list(known), n=1, cutoff=0.4)
+    return f"; did you mean {close[0]!r}?" if close else ""
+
+
+def wanted_values(item: Field) -> str:
+    """Return in words which values a parameter may have."""
+    limits = limits_of(item)
+    if limits.choices:
+        return "one of " + ", ".join(str(choice) for choice in limits.choices)
+    return limits.wanted or _range(limits, item.default) + (f" [{limits.unit}]" if limits.unit else "")
+
+
+def _range(limits: Limits, default: Any) -> str:
+    words = "a whole number" if isinstance(default, int) else "a finite number"
+    if limits.least is not None:
+        words += f" of at least {limits.least:g}" if limits.most is None else f" from {limits.least:g}"
+    if limits.above is not None:
+        words += f" above {limits.above:g}"
+    if limits.most is not None:
+        words += f" to {limits.most:g}"
+    if limits.below is not None:
+        words += f" up to, but not, {limits.below:g}"
+    return words
+
+
+def _check_value(item: Field, value: Any) -> None:
+    limits = limits_of(item)
+    if limits.check is not None:
+        limits.check(value)
+    elif not _allowed(limits, item.default, value):
+        hint = nearest(value, limits.choices) if limits.choices and isinstance(value, str) else ""
+        raise InputError(f"{item.name}: got {value!r}, wanted {wanted_values(item)}{hint}")
+
+
+def _allowed(limits: Limits, default: Any, value: Any) -> bool:
+    if limits.choices:
+        return value in limits.choices
+    if not isinstance(value, int | float) or isinstance(default, bool | str):
+        return True
+    if isinstance(default, int) and (isinstance(value, bool) or not isinstance(value, int)):
+        return False
+    if value in limits.also:
+        return True
+    if not math.isfinite(value):
+        return limits == Limits(limits.help)  # nothing is said of it, so anything may be
+    return (
+        (limits.least is None or value >= limits.least)
+        and (limits.most is None or value <= limits.most)
+        and (limits.above is None or value > limits.above)
+        and (limits.below is None or value < limits.below)
+    )
+
+
+def _converted(what: str, value: Any, default: Any) -> int | float | str:
+    """Return a value in the type of the default."""
+    if isinstance(default, bool):
+        word = str(value).strip().lower()
+        if word not in _TRUE + _FALSE:
+            raise InputError(f"{what} got {value!r}, wanted true or false")
+        return word in _TRUE
+    if isinstance(default, float):
+        try:
+            return float(value)
+        except (TypeError, ValueError):
+            raise InputError(f"{what} got {value!r}, wanted a number") from None
+    if isinstance(default, int):
+        try:
+            # int() would cut off what stands behind the point, and take True for 1.
+            if isinstance(value, float | bool):
+                raise TypeError
+            return int(value)
+        except (TypeError, ValueError):
+            raise InputError(f"{what} got {value!r}, wanted a whole number") from None
+    return str(value)

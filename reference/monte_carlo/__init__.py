@@ -1,0 +1,12 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The truth by random samples: what both Monte Carlo estimators need to count, and their folders.
+
+Read in this order:
+
+- `batches.py`: means of batches and the spread between them;
+- `allocation.py`: where the samples of a path tracer go;
+- `single_scatter`: an integrator of our own for Mitsuba;
+- `volpath`: Mitsuba's volumetric path tracer.
+
+May import: nothing of ours.
+"""

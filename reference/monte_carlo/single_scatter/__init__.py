@@ -1,0 +1,14 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`single-scatter`: an integrator for Mitsuba that estimates exactly one scattering.
+
+Read in this order:
+
+- `distance_sampling.py`: distances along a ray: equi-angular and free-flight sampling combined;
+- `directional_sampling.py`: distances for directional lights: uniform and free-flight;
+- `boundary_walk.py`: optical depth and visibility through the boundaries of media;
+- `scene_data.py`: what the integrator must know of a scene, read on its own;
+- `estimator.py`: the estimate of one camera ray;
+- `integrator.py`: the plugin, and its batches.
+
+May import: `analytic.errors`, `reference.monte_carlo`, `reference.scene`.
+"""

@@ -1,0 +1,9 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`volpath`: Mitsuba's volumetric path tracer as a check by code that nobody here wrote.
+
+Read in this order:
+
+- `integrator.py`: runs it in batches, airlight and surface apart.
+
+May import: `reference.monte_carlo`, `reference.scene`.
+"""

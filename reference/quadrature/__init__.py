@@ -1,0 +1,19 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The truth by quadrature: airlight integrals over lit intervals, added up in float64, with a bound for each pixel.
+
+Read in this order:
+
+- `unbounded.py`: sums over lit intervals in one medium without bounds;
+- `segments.py`: media in convex bounds along rays;
+- `pieces.py`: smooth pieces of lit intervals in bounded media;
+- `adaptive_panels.py`: panels that are halved until a sum meets its tolerance;
+- `bounded.py`: sums over lit intervals in bounded media;
+- `directional_sums.py`: the same for directional lights;
+- `directional_airlight.py`: the airlight of one directional light;
+- `surface.py`: the lit surface behind the medium;
+- `ray_values.py`: all of this along every ray;
+- `pixel_area.py`: means over the areas of pixels;
+- `image.py`: the image.
+
+May import: `analytic`, `reference.scene`, `reference.visibility`.
+"""

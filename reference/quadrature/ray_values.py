@@ -1,0 +1,205 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The truth along camera rays: certified airlight integrals summed over the lit intervals of every ray.
+
+For each light and each ray, in float64:
+
+1. the visible surface ends the ray (cast in float32, as by every method, so that all share the same surface; where that
+   is a polygon or a sphere its distance is computed again in float64);
+2. the cone of a spot and the visible surface bound the angle theta at the light (`reference.visibility.spot_cone`);
+3. that range is cut into lit intervals, by exact geometry or by ray casting, which random shadow rays then check
+   (`reference.visibility.lit_intervals`);
+4. the intervals are integrated and added up, with an error estimate (`reference.quadrature.unbounded`).
+
+The bound of a ray adds the estimates, what the rounding of each edge between light and shadow is worth, and what the
+shadow rays left in doubt. For directional lights the share of a ray takes the place of the angle
+(`reference.visibility.parallel_rays`).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analytic.geometry import foot_and_height
+from reference.quadrature.bounded import sum_media
+from reference.quadrature.directional_airlight import directional_airlight
+from reference.quadrature.segments import camera_segments, scattering_range
+from reference.quadrature.surface import lit_surface, surface_hits
+from reference.quadrature.unbounded import Rays, sum_intervals
+from reference.scene.read import TruthLight, TruthScene
+from reference.scene.shapes import Shapes, read_shapes
+from reference.visibility.exact_distance import exact_distance
+from reference.visibility.intervals import LitIntervals, RandomChecks
+from reference.visibility.lit_intervals import lit_intervals
+from reference.visibility.spot_cone import cone_interval, perpendicular
+from reference.visibility.surface_shadows import reached_by_shadow_rays
+
+Array = NDArray[np.float64]
+Progress = Callable[[int, int, str], None]
+
+
+@dataclass(frozen=True)
+class TruthImage:
+    """Radiance of every pixel; arrays of shape (height, width[, 3])."""
+
+    airlight: Array  #: in-scattered radiance [W/(m^2 sr)]
+    airlight_bound: Array  #: bound of its error; over a pixel's area an estimate [W/(m^2 sr)]
+    surface: Array  #: radiance of the lit surface through the medium [W/(m^2 sr)]
+    distance: Array  #: to the visible surface at the pixel's centre, infinite where there is none [m]
+    light_angle: Array  #: smallest angle between the centre's ray and the direction to a light before the surface [rad]
+    transitions: int  #: edges between light and shadow
+    missed: float  #: share of the first random shadow rays that contradicted the lit intervals
+    checked: int = 0  #: random shadow rays that checked the lit intervals
+    disagreements: int = 0  #: of these, how many contradicted them
+    refined: int = 0  #: contradictions that were settled, by mending the intervals or by a float64 test
+    left: int = 0  #: contradictions that were not: their worth is in the bound
+
+
+@dataclass(frozen=True)
+class RayValues:
+    """What is found along the rays of a scene."""
+
+    airlight: Array  #: (rays, 3) [W/(m^2 sr)]
+    bound: Array  #: (rays, 3) [W/(m^2 sr)]
+    surface: Array  #: (rays, 3) [W/(m^2 sr)]
+    distance: Array  #: as it was cast, in float32, (rays,) [m]
+    light_angle: Array  #: (rays,) [rad]
+    intervals: NDArray[np.int64]  #: how many lit intervals a ray has, those of all lights together, (rays,)
+    transitions: int
+    random_checks: RandomChecks
+
+
+def image_of(truth: TruthScene, centre: RayValues, airlight: Array, bound: Array, surface: Array) -> TruthImage:
+    """Return the image with these layers, (pixels, 3), and what else is known of the rays through the centres."""
+    shape, known = (truth.height, truth.width), centre.random_checks
+    return TruthImage(
+        airlight.reshape(*shape, 3),
+        bound.reshape(*shape, 3),
+        surface.reshape(*shape, 3),
+        centre.distance.reshape(shape),
+        centre.light_angle.reshape(shape),
+        centre.transitions,
+        known.missed,
+        known.checked,
+        known.disagreements,
+        known.refined,
+        known.left,
+    )
+
+
+def ray_values(
+    truth: TruthScene,
+    *,
+    samples: int = 256,
+    shadow_scale: float = 1.0,
+    edges: str = "auto",
+    progress: Progress | None = None,
+    shapes: Shapes | None = None,
+) -> RayValues:
+    """Compute what is found along every ray of `truth.direction`.
+
+    The parameters are those of `quadrature_image`, and what `reference.scene.shapes.read_shapes` returned for the
+    occluders, if that is known.
+    """
+    shapes = read_shapes(truth.occluders) if shapes is None else shapes
+    hits = surface_hits(truth)
+    cast = hits.distance
+    hits = replace(hits, distance=exact_distance(truth, hits.interaction, cast, shapes))
+    count = len(truth.direction)
+    airlight, bound, light_angle = np.zeros((count, 3)), np.zeros((count, 3)), np.full(count, np.pi)
+    intervals, transitions, checks = np.zeros(count, np.int64), 0, []
+    reached: list[NDArray[np.bool_] | None] = []
+    how = {"samples": samples, "edges": edges, "shapes": shapes}
+    total = len(truth.lights) + len(truth.directional)
+    for number, light in enumerate(truth.lights):
+        found = _light_airlight(truth, light, hits.distance, shadow_scale=shadow_scale, how=how)
+        airlight += found.radiance
+        bound += found.bound
+        light_angle = np.minimum(light_angle, found.angle)
+        intervals += np.bincount(found.lit.ray, minlength=count)
+        transitions += found.lit.transitions
+        checks.append(found.lit.random_checks)
+        seen = found.reached
+        if seen is not None and shadow_scale != 1:
+            what = {"scene": truth.occluders, "shapes": shapes}
+            seen = reached_by_shadow_rays(hits.interaction, light.position, seen, **what)
+        reached.append(seen)
+        if progress is not None:
+            progress(number + 1, total, "quadrature")
+    for number, far in enumerate(truth.directional, start=len(truth.lights)):
+        sent = directional_airlight(truth, far, hits.distance, how)
+        if sent is not None:
+            airlight += sent.radiance
+            bound += sent.bound
+            intervals += np.bincount(sent.lit.ray, minlength=count)
+            transitions += sent.lit.transitions
+            checks.append(sent.lit.random_checks)
+        if progress is not None:
+            progress(number + 1, total, "quadrature")
+    surface = lit_surface(truth, hits, reached=reached, shadow_scale=shadow_scale)
+    return RayValues(airlight, bound, surface, cast, light_angle, intervals, transitions, RandomChecks.of_all(checks))
+
+
+@dataclass(frozen=True)
+class _LightAirlight:
+    radiance: Array
+    bound: Array
+    angle: Array
+    lit: LitIntervals
+    reached: NDArray[np.bool_] | None  #: whether the light reaches the end of the ray; None if that was not looked at
+
+
+def _light_airlight(
+    truth: TruthScene, light: TruthLight, distance: Array, *, shadow_scale: float, how: dict[str, Any]
+) -> _LightAirlight:
+    """Compute the airlight of one light; `how` the lit intervals are found is what `lit_intervals` takes for it."""
+    direction = truth.direction
+    foot, height = foot_and_height(np.broadcast_to(truth.origin, direction.shape), direction, light.position)
+    normal = perpendicular(truth.origin, direction, light)
+    theta0 = np.arctan2(-foot, height)
+    ended = np.isfinite(distance)
+    theta1 = np.where(ended, np.arctan2(np.where(ended, distance, 0) - foot, height), np.pi / 2)
+    cone = cone_interval(direction, normal, light, light.cutoff)
+    ends = np.maximum(theta0, cone[0]), np.minimum(theta1, cone[1])
+    segments = camera_segments(truth, distance) if truth.media else None
+    if segments is not None:
+        first, last = (np.arctan2(x - foot, height) for x in scattering_range(segments))
+        ends = np.maximum(ends[0], first), np.minimum(ends[1], last)
+    lit = lit_intervals(truth, light, (direction, normal, height), ends=ends, **how)
+    rays = Rays(direction, normal, foot, height)
+    if segments is None:
+        radiance, bound = sum_intervals(truth.medium, light, rays, lit, shadow_scale)
+    else:
+        radiance, bound = sum_media(truth, light, rays, lit, segments, shadow_scale=shadow_scale)
+    in_front = (foot > 0) & (foot < distance)
+    angle = np.where(in_front, np.arctan2(height, foot), np.pi)
+    bound += _worth_of_doubt(light, rays, lit, truth)
+    # Intervals end at a bound of the media, not at the surface, where there are any.
+    reached = None if segments is not None else _reach(lit, theta1)
+    return _LightAirlight(radiance, bound, angle, lit, reached)
+
+
+def _reach(lit: LitIntervals, end: Array) -> NDArray[np.bool_]:
+    """Return by ray whether its last lit interval goes on to an angle."""
+    last = np.full(len(end), -np.inf)
+    np.maximum.at(last, lit.ray, lit.high)
+    return last >= end - 1e-12
+
+
+def _worth_of_doubt(light: TruthLight, rays: Rays, lit: LitIntervals, truth: TruthScene) -> Array:
+    """Return the most that the angles which the shadow rays left in doubt can be worth, (rays, 3).
+
+    In theta the integrand of J is exp(-sigma_t (x + r)) p / height; the exponential is at most one, and the phase
+    function at most its largest value.
+    """
+    worth = np.zeros((len(rays.foot), 3))
+    if lit.doubt is None:
+        return worth
+    ray, _, width = lit.doubt
+    for medium in (truth.medium, *truth.media):
+        strongest = medium.phase(np.linspace(-1, 1, 1001)).max()
+        factor = medium.albedo * medium.sigma_t * light.intensity / (4 * np.pi) * strongest
+        np.add.at(worth, ray, (width / rays.height[ray])[:, None] * factor)
+    return worth

@@ -1,0 +1,16 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A Mitsuba scene as numbers in float64: what all estimators of the truth may share.
+
+These are facts that Mitsuba gives when it is asked. What follows from them along a ray is derived elsewhere.
+
+Read in this order:
+
+- `camera.py`: directions of rays through positions on the film;
+- `convex_bounds.py`: convex bounds of media, read and checked;
+- `directional_light.py`: directional lights: direction and irradiance;
+- `read.py`: the whole scene: lights, media, camera rays;
+- `shapes.py`: opaque shapes as triangles and spheres;
+- `shadow_epsilon.py`: how far short of the light Mitsuba's shadow rays end.
+
+May import: `analytic`.
+"""

@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The full run of all tests: what continuous integration runs, and what takes too long for it.
+
+`./airlight test --all` runs the parts one after the other, each in a process of its own, and writes its record for the
+page of verification when all have ended. A run that was interrupted leaves the record of the last one.
+"""
+
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+from reports.docs.verification import RECORD, duration, redraw
+
+#: Tests that two other parts repeat.
+REPEATED = (
+    "tests/test_regression.py::test_errors_are_those_of_the_baseline",
+    "tests/validation/mutations/test_study.py::test_the_standard_run_catches_nine_in_ten",
+)
+#: Mutations below the margin of the comparison, which it must not catch.
+BELOW_THE_MARGIN = ("one-in-ten-thousand",)
+
+
+@dataclass(frozen=True)
+class Counts:
+    """What a part found."""
+
+    passed: int = 0
+    failed: int = 0
+    skipped: int = 0
+    remark: str = ""  #: what failed, or was expected not to pass
+
+
+@dataclass(frozen=True)
+class Part:
+    """A command, and how its file is counted."""
+
+    name: str
+    command: Sequence[str]  #: arguments of Python
+    result: str  #: "argument": the command writes the file that its last argument names; "output": what it prints
+    count: Callable[[bytes], Counts]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A part that has ended."""
+
+    name: str
+    passed: int
+    failed: int
+    skipped: int
+    remark: str
+    seconds: float
+
+
+def all_parts(workers: Sequence[str]) -> tuple[Part, ...]:
+    """Return the parts of a full run; `workers` are pytest's arguments for tests that other processes may disturb."""
+    airlight = str(Path(__file__).resolve().parents[2] / "airlight.py")
+    tests = ["-m", "pytest", *(word for test in REPEATED for word in ("--deselect", test))]
+    return (
+        Part("unit", _pytest(tests[:2], workers, "not statistical and not slow"), "argument", count_tests),
+        Part("statistical", _pytest(tests, workers, "statistical and not slow"), "argument", count_tests),
+        # Some of the slow tests compare times: they have the machine for themselves.
+        Part("slow", _pytest(tests, (), "slow"), "argument", count_tests),
+        Part("mutations", [airlight, "mutations", "--json"], "output", count_mutations),
+        Part("baselines", [airlight, "baselines", "--no-times", "--json"], "output", count_baselines),
+    )
+
+
+def _pytest(command: Sequence[str], workers: Sequence[str], tier: str) -> list[str]:
+    return [*command, *workers, "-m", tier, "--junit-xml"]
+
+
+def count_tests(content: bytes) -> Counts:
+    """Count the tests in what pytest writes for `--junit-xml`."""
+    suites = list(ElementTree.fromstring(content).iter("testsuite"))
+    tests, failures, errors, skipped = (
+        sum(int(suite.get(name, 0)) for suite in suites) for name in ("tests", "failures", "errors", "skipped")
+    )
+    return Counts(tests - failures - errors - skipped, failures + errors, skipped)
+
+
+def count_mutations(content: bytes) -> Counts:
+    """Count the mutations in what `airlight mutations --json` prints."""
+    data = json.loads(content)
+    missed = [result["name"] for result in data["results"] if not result["caught"]]
+    failed = [name for name in missed if name not in BELOW_THE_MARGIN]
+    failed += [f"{one['scene']}, {one['layer']}, without a mutation" for one in data["control"] if not one["agrees"]]
+    remark = f"not caught: {', '.join(missed)}" if missed else ""
+    return Counts(data["caught"], len(failed), len(missed) - len(set(missed) & set(failed)), remark)
+
+
+def count_baselines(content: bytes) -> Counts:
+    """Count the scenes in what `airlight baselines --json` prints."""
+    data = json.loads(content)
+    moved = [*(name for name, moves in data["moves"].items() if moves), *data["stray"]]
+    kept = len(data["moves"]) - sum(bool(moves) for moves in data["moves"].values())
+    return Counts(kept, len(moved), remark=f"moved: {', '.join(moved)}" if moved else "")
+
+
+def run_part(part: Part, root: Path) -> Outcome:
+    """Run one part; a command that ends without the file that it should have written has failed."""
+    start = time.monotonic()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "result"
+        command = [sys.executable, *part.command]
+        if part.result == "argument":
+            status = subprocess.run([*command, str(path)], cwd=root, check=False).returncode
+        else:
+            with path.open("wb") as output:
+                status = subprocess.run(command, cwd=root, check=False, stdout=output).returncode
+        try:
+            counts = part.count(path.read_bytes())
+        except (OSError, ValueError, KeyError, ElementTree.ParseError):
+            counts = Counts(failed=1, remark=f"ended with status {status} and no result")
+    if status and not counts.failed:
+        counts = Counts(counts.passed, 1, counts.skipped, f"ended with status {status}")
+    return Outcome(part.name, **asdict(counts), seconds=round(time.monotonic() - start, 1))
+
+
+def run_all(parts: Sequence[Part], root: Path, *, machine: str) -> bool:
+    """Run all parts, print what they found, write the record, and return whether none failed.
+
+    Parameters
+    ----------
+    parts
+        What to run.
+    root
+        The checkout.
+    machine
+        Processor, threads and variant in words.
+    """
+    date, commit, changed = time.strftime("%Y-%m-%d %H:%M:%S %z"), *_commit(root)
+    start = time.monotonic()
+    outcomes = []
+    for part in parts:
+        print(f"--- {part.name}", flush=True)
+        outcomes.append(run_part(part, root))
+    seconds = round(time.monotonic() - start, 1)
+    print("--- all parts")
+    for one in outcomes:
+        words = f"{one.passed} passed, {one.failed} failed, {one.skipped} skipped, {duration(one.seconds)}"
+        print(f"{one.name}: {words}{f' ({one.remark})' if one.remark else ''}")
+    record = {"date": date, "machine": machine, "commit": commit, "changed": changed, "seconds": seconds}
+    _write_record(root, record | {"parts": [asdict(one) for one in outcomes]})
+    return not any(one.failed for one in outcomes)
+
+
+def _write_record(root: Path, record: dict[str, Any]) -> None:
+    from reference.storage.files import write_text
+
+    write_text(root / RECORD, json.dumps(record, indent=1, ensure_ascii=False) + "\n")
+    print(f"written: {root / RECORD}, {redraw(root)}")
+
+
+def _commit(root: Path) -> tuple[str, bool]:
+    """Return the short name of the commit, and whether files were changed since, those of this run left out."""
+    try:
+        name = _git(root, "rev-parse", "--short", "HEAD")
+        changed = _git(root, "status", "--porcelain", "--", ".", f":!{RECORD}", ":!docs/verification.md")
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown", False
+    return name, bool(changed)
+
+
+def _git(root: Path, *arguments: str) -> str:
+    ran = subprocess.run(["git", *arguments], cwd=root, check=True, capture_output=True, text=True)
+    return ran.stdout.strip()

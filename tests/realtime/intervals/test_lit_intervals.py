@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Claim: whatever the boundaries and whenever intervals are added, the sum is that over the lit intervals."""
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+RAYS, STEPS = 24, 7
+GAINS = arrays(np.int64, (RAYS, STEPS), elements=st.integers(-2, 2))
+WAITS = arrays(np.bool_, (RAYS, STEPS))
+PLACES = arrays(np.int64, (RAYS, STEPS + 2), elements=st.integers(0, 40)).map(lambda places: np.sort(places, axis=1))
+
+
+def expected(layers, places, gains):
+    """Sums of b - a and of b^2 - a^2 over the lit intervals of a ray, how many they are, and whether its end is lit."""
+    length = square = count = 0
+    opened = places[0] if layers <= 0 else None
+    for place, gain in zip(places[1:-1], gains):
+        layers += gain
+        if opened is None and layers <= 0:
+            opened = place
+        elif opened is not None and layers > 0:
+            length, square, count = length + place - opened, square + place**2 - opened**2, count + 1
+            opened = None
+    if opened is not None:
+        length, square, count = length + places[-1] - opened, square + places[-1] ** 2 - opened**2, count + 1
+    return length, square, count, opened is not None
+
+
+def integral(a, b):
+    import mitsuba as mi
+
+    return mi.Vector3f(b - a, b * b - a * a, 1)
+
+
+def start(layers, places):
+    import drjit as dr
+    import mitsuba as mi
+
+    from realtime.intervals.lit_intervals import no_intervals
+
+    columns = [mi.Float(column.astype(np.float64)) for column in places.T]
+    return mi.Float(layers.astype(np.float64)), columns, no_intervals(dr.zeros(mi.Vector3f, RAYS), columns[0])
+
+
+def check(total, layers, places, gains):
+    found = np.array(total, dtype=np.float64).T
+    wanted = [expected(*ray) for ray in zip(layers, places, gains)]
+    np.testing.assert_array_equal(found, [one[:3] for one in wanted])  # small integers: exact
+
+
+@settings(deadline=None, max_examples=50)
+@given(layers=arrays(np.int64, RAYS, elements=st.integers(-1, 2)), places=PLACES, gains=GAINS, due=WAITS)
+def test_intervals_that_wait_as_long_as_they_may(variant, layers, places, gains, due):
+    """As shadow planes use it: until another one closes, or until it is due; the rest at the end of the ray."""
+    import drjit as dr
+    import mitsuba as mi
+
+    from realtime.intervals.lit_intervals import add_waiting, close_interval, sum_at_end
+
+    over, columns, intervals = start(layers, places)
+    opened = columns[0]
+    for step in range(STEPS):
+        behind = over + mi.Float(gains[:, step].astype(np.float64))
+        opens, closes = (over > 0) & (behind <= 0), (over <= 0) & (behind > 0)
+        intervals = add_waiting(intervals, integral, closes | mi.Bool(due[:, step]))
+        intervals = close_interval(intervals, columns[step + 1], closes, begin=opened)
+        over, opened = behind, dr.select(opens, columns[step + 1], opened)
+    ends = {"opened": opened, "lit": over <= 0, "active": mi.Bool(True)}
+    check(sum_at_end(intervals, integral, columns[-1], **ends), layers, places, gains)
+
+
+@settings(deadline=None, max_examples=50)
+@given(layers=arrays(np.int64, RAYS, elements=st.integers(-1, 2)), places=PLACES, gains=GAINS)
+def test_intervals_that_are_added_at_once(variant, layers, places, gains):
+    """As min-max uses it: what is lit to the end closes there."""
+    import mitsuba as mi
+
+    from realtime.intervals.lit_intervals import add_waiting, close_interval, open_interval
+
+    over, columns, intervals = start(layers, places)
+    for step in range(STEPS):
+        behind = over + mi.Float(gains[:, step].astype(np.float64))
+        intervals = open_interval(intervals, columns[step + 1], (over > 0) & (behind <= 0))
+        intervals = close_interval(intervals, columns[step + 1], (over <= 0) & (behind > 0))
+        intervals, over = add_waiting(intervals, integral), behind
+    intervals = close_interval(intervals, columns[-1], over <= 0)
+    check(add_waiting(intervals, integral).total, layers, places, gains)
+
+
+@settings(deadline=None, max_examples=20)
+@given(lit=arrays(np.bool_, RAYS), active=arrays(np.bool_, RAYS))
+def test_nothing_is_integrated_where_nothing_waits(variant, lit, active):
+    """An integral that is no number where no interval is does no harm."""
+    import drjit as dr
+    import mitsuba as mi
+
+    from realtime.intervals.lit_intervals import add_waiting, close_interval, no_intervals, sum_at_end
+
+    def integral(a, b):
+        return (b - a) / dr.select(b > a, 1, 0)
+
+    zero, one = dr.zeros(mi.Float, RAYS), dr.full(mi.Float, 1, RAYS)
+    intervals = close_interval(no_intervals(zero, zero), one, mi.Bool(lit))
+    np.testing.assert_array_equal(np.array(add_waiting(intervals, integral, mi.Bool(active)).total), lit & active)
+    ends = {"opened": +zero, "lit": mi.Bool(lit), "active": mi.Bool(active)}
+    total = sum_at_end(no_intervals(zero, zero), integral, one, **ends)
+    np.testing.assert_array_equal(np.array(total), lit & active)

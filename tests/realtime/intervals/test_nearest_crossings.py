@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Claim: the queue holds the nearest crossings in order, whatever comes: ties, infinities, too many."""
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+RAYS, COUNT, PLACES = 16, 9, 4
+# Few values, so that many are equal; 0 and infinity stand for no crossing.
+KEYS = arrays(np.float32, (RAYS, COUNT), elements=st.sampled_from([0.0, 0.25, 1.5, 1.75, 2.0, 1e30, np.inf]))
+LARGER = pytest.mark.parametrize("larger", [True, False])
+
+
+def in_order(keys, *, larger):
+    """Places of the keys of every ray, nearest first, those of one key as they came."""
+    return np.argsort(-keys if larger else keys, axis=1, kind="stable")
+
+
+def columns(keys):
+    import mitsuba as mi
+
+    return [mi.Float(np.ascontiguousarray(column)) for column in keys.T]
+
+
+def rows(values):
+    return np.stack([np.array(value) for value in values], axis=1)
+
+
+@LARGER
+@settings(deadline=None, max_examples=50)
+@given(keys=KEYS)
+def test_the_nearest_are_kept_in_order_and_the_others_come_out(variant, larger, keys):
+    import mitsuba as mi
+
+    from realtime.intervals.nearest_crossings import filled, insert
+
+    none = 0.0 if larger else np.inf
+    queue, out = filled(none, PLACES, mi.Float, RAYS), []
+    for number, key in enumerate(columns(keys)):
+        queue, *left = insert(queue, key, mi.Float(number + 1), larger_is_nearer=larger)
+        out.append(left)
+    order = in_order(keys, larger=larger)
+    wanted = np.take_along_axis(keys, order, axis=1)
+    kept, gains = rows(queue.key), rows(queue.gain)
+    np.testing.assert_array_equal(kept, wanted[:, :PLACES])
+    real = kept != none
+    np.testing.assert_array_equal(gains[real], order[:, :PLACES][real] + 1)
+    # Nothing is lost in secret: what is not in the queue came out.
+    others = np.sort(np.concatenate([rows(queue.key), rows([key for key, _ in out])], axis=1), axis=1)
+    padding = np.full((RAYS, PLACES), none, dtype=np.float32)
+    np.testing.assert_array_equal(others, np.sort(np.concatenate([keys, padding], axis=1), axis=1))
+
+
+@settings(deadline=None, max_examples=50)
+@given(keys=KEYS)
+def test_a_queue_without_gains_holds_the_same_keys(variant, keys):
+    import mitsuba as mi
+
+    from realtime.intervals.nearest_crossings import filled, insert
+
+    queue = filled(np.inf, PLACES, mi.Float, RAYS, gains=False)
+    for key in columns(keys):
+        queue, farthest, _ = insert(queue, key, larger_is_nearer=False)
+        assert not np.isnan(np.array(farthest)).any()
+    np.testing.assert_array_equal(rows(queue.key), np.sort(keys, axis=1)[:, :PLACES])
+    assert queue.gain == []
+
+
+@LARGER
+@settings(deadline=None, max_examples=50)
+@given(keys=KEYS, shift=arrays(np.int64, (RAYS, COUNT), elements=st.integers(0, PLACES)))
+def test_exchange_mends_an_order_that_is_wrong_by_no_more_than_its_places(variant, larger, keys, shift):
+    import mitsuba as mi
+
+    from realtime.intervals.nearest_crossings import exchange, filled
+
+    keys = np.take_along_axis(keys, in_order(keys, larger=larger), axis=1)
+    # Each comes at most PLACES later than in order, so none waits for more than these.
+    late = np.argsort(np.arange(COUNT) + shift, axis=1, kind="stable")
+    assume((late != np.arange(COUNT)).any())
+    first, last = (np.inf, 0.0) if larger else (0.0, np.inf)
+    queue, out = filled(first, PLACES, mi.Float, RAYS), []
+    for key in columns(np.take_along_axis(keys, late, axis=1)) + [mi.Float(last)] * PLACES:
+        queue, nearest, _ = exchange(queue, key, mi.Float(0), larger_is_nearer=larger)
+        out.append(nearest)
+    np.testing.assert_array_equal(rows(out[PLACES:]), keys)
+
+
+@settings(deadline=None, max_examples=20)
+@given(keys=KEYS, active=arrays(np.bool_, RAYS))
+def test_pop_takes_the_nearest_out_where_it_is_told_to(variant, keys, active):
+    import mitsuba as mi
+
+    from realtime.intervals.nearest_crossings import filled, insert, pop
+
+    queue = filled(0.0, PLACES, mi.Float, RAYS)
+    for number, key in enumerate(columns(keys)):
+        queue, *_ = insert(queue, key, mi.Float(number), larger_is_nearer=True)
+    before, gains = rows(queue.key), rows(queue.gain)
+    queue, key, gain = pop(queue, 0.0, mi.Bool(active))
+    np.testing.assert_array_equal(np.array(key), before[:, 0])
+    np.testing.assert_array_equal(np.array(gain), gains[:, 0])
+    behind = np.concatenate([before[:, 1:], np.zeros((RAYS, 1))], axis=1)
+    np.testing.assert_array_equal(rows(queue.key), np.where(active[:, None], behind, before))

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Parameters say once what they are: conversion, checks and messages follow from their fields."""
+
+import re
+from dataclasses import dataclass, fields
+
+import pytest
+
+from realtime.errors import InputError
+from realtime.methods.registry import METHODS
+from realtime.parameters import Parameters, defaults, limits_of, parameter, read_parameters, values, wanted_values
+
+
+@dataclass(frozen=True)
+class Fog(Parameters):
+    """One parameter of each kind."""
+
+    steps: int = parameter(16, "steps of every ray", least=1, most=64, also=(0,))
+    share: float = parameter(0.5, "share of the light", above=0, below=1, unit="1/m")
+    word: str = parameter("even", "spacing", choices=("even", "uneven"))
+    on: bool = parameter(True, "whether at all")
+    free: float = parameter(2.0, "anything")
+
+    def _check_together(self):
+        if self.on and self.free < 0:
+            raise InputError("free: wanted on=false with a value below 0")
+
+
+def refused(words):
+    return pytest.raises(InputError, match=re.escape(words))
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"steps": -1}, "steps: got -1, wanted a whole number from 1 to 64"),
+        ({"steps": 65}, "steps: got 65, wanted a whole number from 1 to 64"),
+        ({"share": 0.0}, "share: got 0.0, wanted a finite number above 0 up to, but not, 1 [1/m]"),
+        ({"share": 1.0}, "share: got 1.0, wanted"),
+        ({"share": float("nan")}, "share: got nan, wanted"),
+        ({"share": float("inf")}, "share: got inf, wanted"),
+        ({"word": "unevn"}, "word: got 'unevn', wanted one of even, uneven; did you mean 'uneven'?"),
+        ({"free": -1.0}, "free: wanted on=false with a value below 0"),
+        ({"step": 3}, "method fog: got a parameter 'step', wanted one of: steps, share, word, on, free; did you mean"),
+        ({"steps": "1.5"}, "method fog: steps got '1.5', wanted a whole number"),
+        ({"steps": True}, "method fog: steps got True, wanted a whole number"),
+        ({"share": "much"}, "method fog: share got 'much', wanted a number"),
+        ({"on": "maybe"}, "method fog: on got 'maybe', wanted true or false"),
+    ],
+)
+def test_what_cannot_be_used_is_refused_with_what_is_wanted(given, words):
+    with refused(words):
+        read_parameters("fog", Fog, given)
+
+
+def test_words_become_values():
+    found = read_parameters("fog", Fog, {"steps": " 0 ", "share": "0.25", "word": "uneven", "on": "no", "free": -1})
+    assert values(found) == {"steps": 0, "share": 0.25, "word": "uneven", "on": False, "free": -1.0}
+    assert values(read_parameters("fog", Fog, {})) == defaults(Fog)
+
+
+def test_a_record_that_is_made_in_python_is_checked_too():
+    with refused("steps: got 1.5, wanted a whole number from 1 to 64"):
+        Fog(steps=1.5)
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_every_parameter_of_a_method_says_what_it_does_and_what_it_wants(name):
+    for item in fields(METHODS[name].parameters):
+        assert limits_of(item).help, item.name
+        assert wanted_values(item), item.name
+        assert type(item.default) is item.type, item.name

@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Claim: the distance to a visible triangle or sphere is exact to float64, whatever rays were cast in float32."""
+
+import numpy as np
+import pytest
+
+from tests.helpers.scenes import tiny_scene
+
+
+def test_distance_to_a_plane_is_exact(variant):
+    import mitsuba as mi
+
+    from reference.quadrature.surface import surface_hits
+    from reference.scene.read import read_truth
+    from reference.visibility.exact_distance import exact_distance
+
+    truth = read_truth(mi.load_dict(tiny_scene(ball=None)))
+    hits = surface_hits(truth)
+    distance = exact_distance(truth, hits.interaction, hits.distance)
+    met = np.isfinite(hits.distance)
+    assert met.sum() > 50
+    assert distance[met] == pytest.approx((-truth.origin[2] / truth.direction[:, 2])[met], rel=1e-14)
+    assert np.isinf(distance[~met]).all()
+
+
+@pytest.mark.parametrize("inside", [False, True], ids=["outside", "inside"])
+def test_distance_to_a_ball_is_exact(variant, inside):
+    """The points lie on the sphere in float64, and they are those that were cast."""
+    import mitsuba as mi
+
+    from reference.quadrature.surface import surface_hits
+    from reference.scene.read import read_truth
+    from reference.scene.shapes import read_shapes
+    from reference.visibility.exact_distance import exact_distance
+
+    ball = {"type": "sphere", "center": [0.1, -3.9, 1.2], "radius": 1.9} if inside else tiny_scene()["ball"]
+    truth = read_truth(mi.load_dict(tiny_scene(ball=ball, floor=None)))
+    hits = surface_hits(truth)
+    distance = exact_distance(truth, hits.interaction, hits.distance)
+    met = np.isfinite(hits.distance)
+    assert met.all() if inside else 5 < met.sum() < 100
+    shapes = read_shapes(truth.occluders)
+    point = truth.origin + distance[met, None] * truth.direction[met]
+    assert np.linalg.norm(point - shapes.centre, axis=1) == pytest.approx(shapes.radius.item(), rel=1e-14)
+    assert distance[met] == pytest.approx(hits.distance[met], rel=1e-5)
+    assert np.isinf(distance[~met]).all()
+
+
+def test_rays_that_touch_a_ball_keep_the_distance_that_was_cast(variant):
+    from reference.scene.convex_bounds import Sphere
+    from reference.visibility.exact_distance import _to_sphere
+
+    ball = Sphere(np.array([0.0, 0.0, 5.0]), 1.0)
+    direction = np.array([[np.sin(a), 0.0, np.cos(a)] for a in (0.0, np.arcsin(0.2) + 1e-9)])
+    assert _to_sphere(ball, np.zeros(3), direction, np.array([4.00001, 4.9])).tolist() == [4.0, 4.9]

@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`airlight test --all`: what each part counts, the record, and what becomes of it when a run is interrupted."""
+
+import json
+import shutil
+import subprocess
+
+import pytest
+
+from reports.commands import main as cli
+from reports.docs import full_run
+from reports.docs.full_run import BELOW_THE_MARGIN, REPEATED, Part, all_parts, run_all, run_part
+from reports.docs.verification import RECORD, ROOT
+
+XML = '<testsuites><testsuite tests="{}" failures="{}" errors="0" skipped="1"/></testsuites>'
+WRITES = "import sys; open(sys.argv[1], 'w').write({!r})"
+
+
+def pytest_part(name="unit", *, tests=5, failures=0):
+    code = WRITES.format(XML.format(tests, failures)) + f"; sys.exit({int(failures > 0)})"
+    return Part(name, ["-c", code], "argument", full_run.count_tests)
+
+
+def output_part(data, count, status=0):
+    return Part("other", ["-c", f"import sys; print({json.dumps(data)!r}); sys.exit({status})"], "output", count)
+
+
+@pytest.fixture
+def checkout(tmp_path):
+    """A checkout with a page of verification and one test."""
+    for name in ("docs/claims.toml", "docs/verification.md"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        shutil.copy(ROOT / name, tmp_path / name)
+    (tmp_path / "tests").mkdir()
+    for command in (["init", "-q"], ["add", "."], [*_AUTHOR, "commit", "-qm", "x"]):
+        subprocess.run(["git", *command], cwd=tmp_path, check=True, capture_output=True)
+    return tmp_path
+
+
+_AUTHOR = ["-c", "user.name=x", "-c", "user.email=x"]
+
+
+def test_a_run_is_recorded_and_shown(checkout, capfd):
+    assert run_all([pytest_part(), pytest_part("slow", tests=3)], checkout, machine="a processor")
+    record = json.loads((checkout / RECORD).read_text())
+    assert record["machine"] == "a processor"
+    assert record["changed"] is False
+    assert [(part["name"], part["passed"], part["failed"], part["skipped"]) for part in record["parts"]] == [
+        ("unit", 4, 0, 1),
+        ("slow", 2, 0, 1),
+    ]
+    page = (checkout / "docs/verification.md").read_text()
+    assert f"a processor, commit {record['commit']}: " in page
+    assert "| slow | 2 | 0 | 1 | 0 s |" in page
+    assert "slow: 2 passed, 0 failed, 1 skipped" in capfd.readouterr().out
+    # A second run does not take the first one's record for a change, but what else has changed.
+    assert run_all([pytest_part()], checkout, machine="a processor")
+    assert json.loads((checkout / RECORD).read_text())["changed"] is False
+    (checkout / "new.py").touch()
+    assert run_all([pytest_part()], checkout, machine="a processor")
+    assert json.loads((checkout / RECORD).read_text())["changed"] is True
+
+
+def test_one_failure_fails_the_run_and_the_other_parts_still_run(checkout):
+    assert not run_all([pytest_part(failures=2), pytest_part("slow")], checkout, machine="")
+    parts = json.loads((checkout / RECORD).read_text())["parts"]
+    assert [(part["passed"], part["failed"]) for part in parts] == [(2, 2), (4, 0)]
+
+
+@pytest.mark.parametrize(
+    ("code", "failed", "remark"),
+    [
+        ("import sys; sys.exit(4)", 1, "ended with status 4 and no result"),
+        (WRITES.format("<no") + "; sys.exit(3)", 1, "ended with status 3 and no result"),
+        (WRITES.format(XML.format(5, 0)) + "; sys.exit(3)", 1, "ended with status 3"),
+    ],
+)
+def test_a_part_that_dies_has_failed(tmp_path, code, failed, remark):
+    found = run_part(Part("unit", ["-c", code], "argument", full_run.count_tests), tmp_path)
+    assert (found.failed, found.remark) == (failed, remark)
+
+
+def mutation_data(caught, control=True):
+    results = [{"name": name, "caught": name in caught} for name in ("no-four-pi", *BELOW_THE_MARGIN)]
+    agreement = {"scene": "hall", "layer": "airlight", "agrees": control}
+    return {"caught": len(caught), "results": results, "control": [agreement]}
+
+
+def test_mutations_are_counted(tmp_path):
+    def counted(data, status=0):
+        found = run_part(output_part(data, full_run.count_mutations, status), tmp_path)
+        return found.passed, found.failed, found.skipped, found.remark
+
+    below = BELOW_THE_MARGIN[0]
+    assert counted(mutation_data(["no-four-pi"])) == (1, 0, 1, f"not caught: {below}")
+    assert counted(mutation_data([])) == (0, 1, 1, f"not caught: no-four-pi, {below}")
+    assert counted(mutation_data(["no-four-pi"], control=False), 1)[1] == 1
+
+
+def test_baselines_are_counted(tmp_path):
+    found = run_part(
+        output_part({"moves": {"hall": [], "windows": []}, "stray": []}, full_run.count_baselines), tmp_path
+    )
+    assert (found.passed, found.failed, found.remark) == (2, 0, "")
+    data = {"moves": {"hall": [], "windows": [{"label": "exact"}]}, "stray": ["attic"]}
+    found = run_part(output_part(data, full_run.count_baselines, 1), tmp_path)
+    assert (found.passed, found.failed, found.remark) == (1, 2, "moved: windows, attic")
+
+
+def test_the_command_runs_every_part_and_its_status_is_theirs(checkout, monkeypatch):
+    monkeypatch.setattr("reports.commands.test.__file__", str(checkout / "reports/commands/test.py"))
+    monkeypatch.chdir(checkout)
+    for failures, status in ((0, 0), (1, 1)):
+        parts = [pytest_part(failures=failures)]
+        monkeypatch.setattr(full_run, "all_parts", lambda sharing, parts=parts: parts)
+        assert cli.run(["test", "--all"]) == status
+        assert "threads" in json.loads((checkout / RECORD).read_text())["machine"]
+
+
+def test_ctrl_c_leaves_the_record_of_the_last_run(checkout, monkeypatch, capfd):
+    run_all([pytest_part()], checkout, machine="the last run")
+    kept = (checkout / RECORD).read_text(), (checkout / "docs/verification.md").read_text()
+    interrupt = Part("slow", ["-c", "import os, signal; os.kill(os.getppid(), signal.SIGINT)"], "argument", None)
+    monkeypatch.setattr("reports.commands.test.__file__", str(checkout / "reports/commands/test.py"))
+    monkeypatch.chdir(checkout)
+    monkeypatch.setattr(full_run, "all_parts", lambda sharing: [pytest_part(), interrupt])
+    assert cli.run(["test", "--all"]) == 130
+    assert ((checkout / RECORD).read_text(), (checkout / "docs/verification.md").read_text()) == kept
+    assert "interrupted" in capfd.readouterr().err
+
+
+def test_parts_are_what_continuous_integration_runs_and_all_else():
+    parts = {part.name: " ".join(part.command) for part in all_parts(["-n", "2"])}
+    assert list(parts) == ["unit", "statistical", "slow", "mutations", "baselines"]
+    assert "-n 2 -m not statistical and not slow" in parts["unit"]
+    assert "-n 2 -m statistical and not slow" in parts["statistical"]
+    assert "-m slow" in parts["slow"]
+    assert "-n 2" not in parts["slow"]
+    for test in REPEATED:
+        path, _, name = test.partition("::")
+        assert f"def {name}(" in (ROOT / path).read_text()
+    for command in ("mutations --json", "baselines --no-times --json"):
+        assert any(words.endswith(command) for words in parts.values())
+    from validation.mutations.catalogue import MUTATIONS
+
+    assert set(BELOW_THE_MARGIN) < {mutation.name for mutation in MUTATIONS}

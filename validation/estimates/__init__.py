@@ -1,0 +1,18 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Estimates of the truth, computed or taken from the cache, and held against each other.
+
+Read in this order:
+
+- `quadrature.py`: the quadrature image of a scene;
+- `monte_carlo.py`: batches of a Monte Carlo estimator;
+- `budget.py`: when a Monte Carlo run ends;
+- `images.py`: references as layered images;
+- `merge.py`: references of several machines as one;
+- `agreement.py`: Monte Carlo estimators against the quadrature image;
+- `efficiency.py`: what two estimators cost at equal error;
+- `multiple_scattering.py`: the share of light that single scattering leaves out;
+- `expected_airlight.py`: the airlight that an estimator with a shadow-ray epsilon converges to.
+
+May import: `analytic`, `realtime.frame`, `reference.monte_carlo`, `reference.quadrature`, `reference.scene`,
+`reference.storage`, `validation.configurations`, `validation.scenes`, `validation.statistics`.
+"""

@@ -1,0 +1,18 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Studies of whole frames: what a method costs, how wrong it is, and whether either changed.
+
+Read in this order:
+
+- `benchmark.py`: the time and the error of one configuration in one scene;
+- `scene_study.py`: all that a report asks of one scene, by effort;
+- `result_cache.py`: results on disk, so that a report computes only what changed;
+- `baseline_runs.py`: measures the errors that baselines keep;
+- `baseline_files.py`: baselines as files, their comparison and their revisions;
+- `map_size.py`: error against the size of the shadow map, and the flicker of a light that moves;
+- `plane_stability.py`: hard cases for sums over shadow planes;
+- `zero_cost.py`: checks that what a scene does not need costs nothing.
+
+May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.kernels`, `realtime.methods`, `realtime.scene`,
+`reference.quadrature`, `reference.scene`, `reference.storage`, `validation.configurations`, `validation.estimates`,
+`validation.metrics`, `validation.scenes`, `validation.statistics`.
+"""

@@ -1,0 +1,18 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Studies of kernels: how wrong, how fast, how soon they converge and where they break.
+
+Read in this order:
+
+- `errors.py`: relative errors on rays with a known J;
+- `values.py`: values of a kernel on tables of cases;
+- `cases.py`: kernels on certified cases;
+- `rays.py`: quasi-random rays with their truth;
+- `laws.py`: exact laws of the airlight integral;
+- `convergence.py`: orders and rates of convergence;
+- `biri_misprints.py`: what the misprints of Biri 2006 cost;
+- `stability.py`: where kernels break;
+- `benchmark.py`: time against error.
+
+May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.kernels`, `realtime.numerics`, `realtime.rays`,
+`realtime.scene`, `reference.storage`, `validation.configurations`.
+"""

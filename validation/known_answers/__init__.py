@@ -1,0 +1,12 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Scenes and laws whose answer is known, and how far each estimator is from it.
+
+Read in this order:
+
+- `record.py`: one known answer, and how an estimator is held against it;
+- `point_lights.py`: answers and laws for point and spot lights;
+- `directional.py`: the same for directional lights.
+
+May import: `analytic`, `reference.monte_carlo.single_scatter`, `reference.monte_carlo.volpath`, `reference.quadrature`,
+`reference.scene`, `validation.certified`.
+"""

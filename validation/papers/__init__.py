@@ -1,0 +1,14 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The results of papers measured again, beside the published figures.
+
+Read in this order:
+
+- `biri.py`: Tables 1 and 2 of Biri, Arques, Michelin 2006;
+- `billeter_images.py`: Figures 6 and 7 of Billeter, Sintorn, Assarsson 2010;
+- `billeter_tessellation.py`: their Table 1;
+- `billeter_conclusions.py`: which of their conclusions hold here.
+
+May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.methods`, `realtime.scene`,
+`realtime.shadow_maps`, `realtime.tiles`, `reference.quadrature`, `reference.scene`, `validation.configurations`,
+`validation.estimates`, `validation.metrics`, `validation.oracles`, `validation.scenes`.
+"""

@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The built-in scenes, their animations, and the loading of scenes by name or by file.
+
+A scene is a Mitsuba dictionary that a function builds from arbitrary, never round numbers. The registry lists the
+scenes for commands, reports and tests.
+
+Read in this order:
+
+- `record.py`: the entry of a scene in the registry, and what moves in its animation;
+- `registry.py`: the scenes by name;
+- `parts.py`: meshes, materials, cameras and media that scenes are made of;
+- `solids.py`: closed meshes of standard shapes, and walls with openings;
+- `open_fog.py`: a lamp in fog, without a shadow;
+- `sphere_spot.py`: one sphere in the cone of a spot light;
+- `two_pens.py`: two smooth objects whose shadows cross;
+- `three_media.py`: three bounded media of coloured fog;
+- `clutter.py`: many small objects about a lamp;
+- `hall.py`: a great hall lit through a wheel window;
+- `colonnade.py`: a hall of fluted columns;
+- `omni_box.py`: a lamp amid bars and posts;
+- `tangle.py`: uneven tubes before a spot light;
+- `windows.py`: a directional light through the windows of a room;
+- `probes.py`: small scenes for what the built-in ones lack, used by checks of the checks;
+- `loading.py`: a scene by its name or from a Mitsuba XML file;
+- `animation.py`: the scenes of the frames of an animation.
+
+May import: `analytic`, `realtime.scene`.
+"""
