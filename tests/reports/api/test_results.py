@@ -126,7 +126,7 @@ def test_layers_are_arrays_of_the_precision_of_what_made_them():
 @pytest.mark.claim("results-are-frozen")
 def test_numpy_takes_a_result_as_its_total():
     frame = rendering()
-    assert np.asarray(frame) is not None
+    np.testing.assert_array_equal(np.asarray(frame), frame.airlight + frame.surface)
     assert np.shares_memory(np.asarray(frame), frame.total)
     assert not np.shares_memory(np.array(frame), frame.total)
     assert np.asarray(frame, dtype=np.float64).dtype == np.float64
