@@ -51,7 +51,6 @@ from realtime.numerics.array_types import PerMetre, bytes_of
 from realtime.parameters import Parameters, parameter
 from realtime.rays.ray_light import distance_to_light
 from realtime.scene.camera import Camera
-from realtime.scene.features import check_places
 from realtime.scene.lights import Light
 from realtime.scene.medium import transmittance
 from realtime.scene.read_scene import Scene
@@ -119,8 +118,8 @@ def min_max(view: View, state: tuple[EpipolarMap, ...], lists, *, kernel, parame
 
     Notes
     -----
-    Valid for point and spot lights anywhere; the epipole may lie in the image, where the pixels next to the light are
-    the least accurate. Shadows are those of the map, sampled once more along the slices.
+    Valid for lights anywhere; the epipole may lie in the image, where the pixels next to the light are the least
+    accurate. Shadows are those of the map, sampled once more along the slices.
 
     References
     ----------
@@ -153,9 +152,8 @@ def prepare_min_max(scene: Scene, parameters: MinMaxParameters) -> Callable[[Sce
     Raises
     ------
     InputError
-        For directional lights, and more memory than the machine has.
+        For more memory than the machine has.
     """
-    check_places(scene.features, "min-max")
     map, slices, samples = parameters.map, parameters.slices, parameters.samples
     if scene.features.shadows:
         held = sum(2 * map_memory(light, map) for light in scene.lights)
