@@ -5,7 +5,9 @@ Read in this order:
 
 - `files.py`: writes a file whole or not at all;
 - `exr.py`: reads and writes layered OpenEXR images;
-- `cache.py`: keeps finished references on disk.
+- `scene_digest.py`: a digest of everything that decides the numbers of a reference;
+- `cache.py`: keeps finished references on disk;
+- `cache_size.py`: the size of the cache, its limit, and what is dropped.
 
 May import: `analytic.errors`.
 """

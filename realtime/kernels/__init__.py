@@ -1,0 +1,22 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Airlight kernels: the airlight integral between two distances along a ray, for a whole array of rays.
+
+Read in this order:
+
+- `registry.py`: what a kernel is, and the kernels by name;
+- `preparation.py`: tables that a kernel needs on the device before a frame is recorded;
+- `quadrature.py`: Gauss-Legendre nodes in w = asinh(q/h);
+- `exact.py`: the default: as few nodes as a segment needs;
+- `short_segments.py`: its rule for segments that are short compared with their distance from the light;
+- `panels.py`: its rule for all others;
+- `quadrature_theta.py`: nodes in the angle at the light;
+- `marching.py`: the midpoint rule, uniform in the distance or in the angle;
+- `taylor.py`: the polynomial of Biri 2006 with derived coefficients;
+- `taylor_printed.py`: the same with the coefficients as printed;
+- `polynomial.py`: a Chebyshev polynomial fitted to the range of each ray;
+- `polynomial_piece.py`: a piece of a ray in the variable of that polynomial;
+- `table.py`: tables of the integral;
+- `closed_form.py`: the closed form of Pegoraro and Parker 2009.
+
+May import: `realtime.errors`, `realtime.numerics`, `realtime.rays`, `realtime.scene`.
+"""

@@ -1,0 +1,20 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The scene as methods see it: camera, lights, media, phase functions and meshes, read from Mitsuba once.
+
+Read in this order:
+
+- `camera.py`: from a pixel to a ray;
+- `phase.py`: phase functions, which say their values, widths and series;
+- `medium.py`: homogeneous media, one without bounds or several with;
+- `lights.py`: point, spot and directional lights as homogeneous positions;
+- `convex_bounds.py`: the convex bounds of media;
+- `directional_extent.py`: the smallest rectangle across a directional light through which all light of the media comes;
+- `triangle_table.py`: what shading needs of every triangle;
+- `mesh_adjacency.py`: triangles that cast shadows, and their neighbours;
+- `features.py`: what the scene needs of a method;
+- `read_media.py`: reads the media of a Mitsuba scene;
+- `read_scene.py`: reads a Mitsuba scene;
+- `animate.py`: the scene after lights, the medium or objects moved.
+
+May import: `realtime.errors`, `realtime.numerics`.
+"""

@@ -1,0 +1,11 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Shadow maps of all lights, by cast rays, and the height field over them.
+
+Read in this order:
+
+- `projection.py`: perspective and orthographic projections as one homogeneous map;
+- `shadow_map.py`: casts the rays of a map: one face for a spot or a directional light, six for a point light;
+- `inverse_depth_field.py`: the light volume as a height field of inverse depth.
+
+May import: `realtime.errors`, `realtime.memory`, `realtime.numerics`, `realtime.parameters`, `realtime.scene`.
+"""
