@@ -193,7 +193,7 @@ def test_what_would_take_too_long_is_left_out_with_what_it_would_take(loaded, mo
     found = probed(loaded, monkeypatch, MARCH, seconds=0.05, limit=0.1)
     assert found.left_out
     assert found.frame is found.times is found.error is None
-    assert "by one of 8 x 6 pixels" in found.refused
+    assert "by a frame of 8 x 6 pixels" in found.refused
     assert "more than the limit of 0.1 s" in found.refused
 
 
