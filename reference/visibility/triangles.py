@@ -219,8 +219,8 @@ def _shadows(
     corners: Array, rays: tuple[Array, Array, Array], pairs: tuple[Index, Index]
 ) -> tuple[Index, Array, Array]:
     """Return the rays and the intervals of theta that triangles hide."""
-    row, one, other = plane_sections(corners, rays[:2], pairs)
-    return _clipped(row, one, other, rays[2][row])
+    row, first, second = plane_sections(corners, rays[:2], pairs)
+    return _clipped(row, first, second, rays[2][row])
 
 
 def plane_sections(
@@ -241,8 +241,8 @@ def plane_sections(
     # The corner that is alone on its side of the plane: both edges that the plane cuts start there.
     alone = np.argmax(above[:, cut] == (count[cut] == 1), axis=0)
     y, z = _components(chosen, normal[row]), _components(chosen, direction[row])
-    one, other = (_crossing(alone, (alone + k) % 3, side, (y, z)) for k in (1, 2))
-    return row, one, other
+    first, second = (_crossing(alone, (alone + k) % 3, side, (y, z)) for k in (1, 2))
+    return row, first, second
 
 
 def _components(chosen: Array, vector: Array) -> Array:

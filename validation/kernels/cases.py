@@ -41,17 +41,17 @@ def integrate_cases(cases: Cases, kernel: str, precision: str) -> Array:
 
 def summary(cases: Cases, results: Array) -> dict[str, Any]:
     """Return quantiles of the relative error against the certified values, where there are any."""
-    found: dict[str, Any] = {"rows": len(results), "compared": 0, "nonfinite": int(np.sum(~np.isfinite(results)))}
+    quantiles: dict[str, Any] = {"rows": len(results), "compared": 0, "nonfinite": int(np.sum(~np.isfinite(results)))}
     if cases.value is None:
-        return found
+        return quantiles
     error = np.abs(results - cases.value) / np.maximum(np.abs(cases.value), _TINY)
     finite = np.isfinite(error)
     if not finite.any():
-        return found
+        return quantiles
     p50, p99, largest = np.percentile(error[finite], [50, 99, 100])
     worst = int(np.flatnonzero(finite)[np.argmax(error[finite])])
     # Row 1 of the file is its header.
-    return found | {"compared": int(finite.sum()), "p50": p50, "p99": p99, "max": largest, "worst_row": worst + 2}
+    return quantiles | {"compared": int(finite.sum()), "p50": p50, "p99": p99, "max": largest, "worst_row": worst + 2}
 
 
 def write_results(cases: Cases, results: Array, target: Path) -> None:

@@ -38,12 +38,12 @@ class Errors:
 
 def groups(cases: Cases) -> dict[str, Rows]:
     """Return which rows belong to 'all', to each tag and to each phase function (as 'phase NAME')."""
-    found = {"all": np.ones(len(cases.phase), dtype=bool)}
+    groups = {"all": np.ones(len(cases.phase), dtype=bool)}
     if cases.tag is not None:
         tags = np.asarray(cases.tag)
-        found |= {tag: tags == tag for tag in sorted(set(cases.tag))}
+        groups |= {tag: tags == tag for tag in sorted(set(cases.tag))}
     phases = np.asarray(cases.phase)
-    return found | {f"phase {name}": phases == name for name in sorted(set(cases.phase))}
+    return groups | {f"phase {name}": phases == name for name in sorted(set(cases.phase))}
 
 
 def relative_error(results: Array, expected: Array, precision: str) -> Array:

@@ -73,26 +73,26 @@ def stage_of(name: str, scene, *, margin: float) -> Stage:
     masks = layer_masks(read_truth(scene), truth)
     masks = {layer: mask for layer, mask in masks.items() if np.any(getattr(truth, layer) > 0)}
 
-    def volpath(found: Batches) -> Opponent:
-        return Opponent("volpath", found, shortened, shadow_scale, margin)
+    def volpath(traced: Batches) -> Opponent:
+        return Opponent("volpath", traced, shortened, shadow_scale, margin)
 
-    def single_scatter(found: Batches) -> Opponent:
-        return Opponent("single-scatter", found, truth, 1.0, margin / SHARPER)
+    def single_scatter(traced: Batches) -> Opponent:
+        return Opponent("single-scatter", traced, truth, 1.0, margin / SHARPER)
 
     def enough(opponent: Opponent) -> bool:
         if len(opponent.batches.seeds) < _LEAST:
             return False
         compared = (image_statistics(opponent, layer, getattr(truth, layer), mask) for layer, mask in masks.items())
-        return all(width_to_reach(one, opponent.margin) < 1 for one in compared)
+        return all(width_to_reach(statistics, opponent.margin) < 1 for statistics in compared)
 
     shadow_scale = 1 - measure_shadow_epsilon()
     shortened = truth_image(scene, shadow_scale=shadow_scale)
 
     def run(name: str, samples: int, opponent: Callable[[Batches], Opponent]) -> Opponent:
-        found = monte_carlo_batches(
+        traced = monte_carlo_batches(
             scene, name, batches=_MOST, samples=samples, enough=lambda batches: enough(opponent(batches))
         )
-        return opponent(found.batches)
+        return opponent(traced.batches)
 
     opponents = run("volpath", _SAMPLES, volpath), run("single-scatter", _DISTANCES, single_scatter)
     return Stage(name, scene, masks, opponents)

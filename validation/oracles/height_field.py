@@ -63,7 +63,7 @@ def height_field(shadow_map: ShadowMap, walls: NDArray[np.uint32] | None = None)
 def _frames(shadow_map: ShadowMap) -> Array:
     """Return across, up and axis of every face as rows, (faces, 3, 3)."""
     if basis := shadow_map.projection.basis:
-        return np.array([np.array(one, dtype=np.float64).reshape(3) for one in basis])[None]
+        return np.array([np.array(vector, dtype=np.float64).reshape(3) for vector in basis])[None]
     frames = np.zeros((6, 3, 3))
     for face in range(6):
         axis = face // 2
@@ -81,9 +81,9 @@ class Path:
     height: Array  #: (rays,) [m]
 
 
-def by_ray(one: Index, one_angle: Array, other: Index, other_angle: Array) -> tuple[Index, Array]:
+def by_ray(first: Index, first_angle: Array, second: Index, second_angle: Array) -> tuple[Index, Array]:
     """Join two lists of angles of rays and sort them by ray and angle."""
-    ray, angle = np.concatenate([one, other]), np.concatenate([one_angle, other_angle])
+    ray, angle = np.concatenate([first, second]), np.concatenate([first_angle, second_angle])
     order = np.lexsort((angle, ray))
     return ray[order], angle[order]
 
