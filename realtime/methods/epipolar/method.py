@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One-dimensional min/max mipmaps in epipolar slices: the lit pieces of rays by steps of 2^k texels of a shadow map.
+"""One-dimensional min/max mipmaps in epipolar slices: lit intervals by steps of 2^k texels of a shadow map.
 
 All rays of an epipolar slice see the same line of the shadow map. So a binary tree of the bounds along it, one for each
-slice, tells a ray at once of long pieces that are lit or dark as a whole (Chen, Baran, Durand, Jarosz 2011). Airlight
-is computed at samples of the slices, at intervals and at breaks of the depth, and interpolated to the pixels
-(Engelhardt and Dachsbacher 2010; Yusov 2013).
+slice, tells a ray at once of long intervals that are lit or dark as a whole (Chen, Baran, Durand, Jarosz 2011).
+Airlight is computed at samples of the slices, at regular distances and at breaks of the depth, and interpolated to the
+pixels (Engelhardt and Dachsbacher 2010; Yusov 2013).
 
-Three things differ from what is published, all to the good of the method: each lit piece is integrated by a kernel and
-not marched; a leaf of the tree is linear and not constant, see `realtime.methods.epipolar.min_max_tree`; and what is
-interpolated is not the airlight but its quotient by a simple estimate, see `_yardstick`: the published scenes are lit
-by the sun, and near a point light the airlight itself goes as 1 / distance.
+Three things differ from what is published, all to the good of the method: each lit interval is integrated by a kernel
+and not marched; a leaf of the tree is linear and not constant, see `realtime.methods.epipolar.min_max_tree`; and what
+is interpolated is not the airlight but its quotient by a simple estimate, see `_yardstick`: the published scenes are
+lit by the sun, and near a point light the airlight itself goes as 1 / distance.
 
 The sampling is no wrapper around other methods, as `realtime.tiles.adaptive_sampling` is. Slices are cut for one light
 and hold its tree, by which samples and pixels alike are walked, and samples lie between the centres of pixels, where
@@ -18,7 +18,6 @@ lists of tiles, which bound the sixteen rays of a tile alone, miss what concerns
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -48,11 +47,10 @@ from realtime.methods.epipolar.walk import sum_lit_intervals
 from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.light_airlight import RayAirlight, integral_type, ray_airlight
 from realtime.methods.interface.view import View, rays_in_media
-from realtime.numerics.array_types import bytes_of
+from realtime.numerics.array_types import PerMetre, bytes_of
 from realtime.parameters import Parameters, parameter
 from realtime.rays.ray_light import distance_to_light
 from realtime.scene.camera import Camera
-from realtime.scene.features import check_places
 from realtime.scene.lights import Light
 from realtime.scene.medium import transmittance
 from realtime.scene.read_scene import Scene
@@ -99,7 +97,7 @@ class EpipolarMap:
     """What the method needs beyond the view, for one light."""
 
     shadow_map: ShadowMap
-    heights: Any  #: inverse planar depths at the corners of its texels [1/m]
+    heights: PerMetre  #: inverse planar depths at the corners of its texels [1/m]
 
 
 def min_max(view: View, state: tuple[EpipolarMap, ...], lists, *, kernel, parameters: MinMaxParameters) -> Layers:
@@ -120,8 +118,8 @@ def min_max(view: View, state: tuple[EpipolarMap, ...], lists, *, kernel, parame
 
     Notes
     -----
-    Valid for point and spot lights anywhere; the epipole may lie in the image, where the pixels next to the light are
-    the least accurate. Shadows are those of the map, sampled once more along the slices.
+    Valid for lights anywhere; the epipole may lie in the image, where the pixels next to the light are the least
+    accurate. Shadows are those of the map, sampled once more along the slices.
 
     References
     ----------
@@ -154,9 +152,8 @@ def prepare_min_max(scene: Scene, parameters: MinMaxParameters) -> Callable[[Sce
     Raises
     ------
     InputError
-        For directional lights, and more memory than the machine has.
+        For more memory than the machine has.
     """
-    check_places(scene.features, "min-max")
     map, slices, samples = parameters.map, parameters.slices, parameters.samples
     if scene.features.shadows:
         held = sum(2 * map_memory(light, map) for light in scene.lights)
@@ -199,7 +196,7 @@ def _ray_airlight(view: View, number: int, kernel) -> RayAirlight:
 
 
 def _lit_integral(airlight: RayAirlight, heights: SliceHeights, number, active=True):
-    """Return the integral over the lit pieces of rays, each in a slice; 0 where not `active`."""
+    """Return the integral over the lit intervals of rays, each in a slice; 0 where not `active`."""
     x0, x1 = airlight.segment
     zero = dr.zeros(integral_type(airlight.view), dr.width(airlight.view.distance))
     ends = x0, dr.select(active, x1, x0)

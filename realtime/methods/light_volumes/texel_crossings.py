@@ -105,8 +105,8 @@ def texel_crossings(line: Line, over: Passage) -> TexelCrossings:
     walled = over.walls != 0
     plain = middle, over.excess[0], before, before, over.excess[1]
     middle, *excess = (dr.select(walled, *pair) for pair in zip(_on_wall(line, over), plain))
-    lit = [from_light, *(one > 0 for one in excess), to_light]
-    enters, first, jumps, last, _ = (one != other for one, other in pairwise(lit))
+    lit = [from_light, *(value > 0 for value in excess), to_light]
+    enters, first, jumps, last, _ = (before != behind for before, behind in pairwise(lit))
     early, late = _zeros((begin, middle, end), excess[:2], excess[2:])
     some = enters | first | jumps | last
     two = (enters & (first | jumps | last)) | (first & (jumps | last)) | (jumps & last)
@@ -148,9 +148,9 @@ def _on_wall(line: Line, over: Passage):
     ray, (begin, end) = line.ray, over.t
     parts = parts_of(over.four, over.walls, type(ray.begin))
     x, y = ([at_line(pair, t) - low for t in over.t] for pair, low in zip((ray.u, ray.v), over.place))
-    one, other = (value_at(parts.line, *point) for point in zip(x, y))
-    from_second, to_second = one > 0, other > 0
-    share = dr.select(from_second ^ to_second, one / (one - other), 1)
+    at_begin, at_end = (value_at(parts.line, *point) for point in zip(x, y))
+    from_second, to_second = at_begin > 0, at_end > 0
+    share = dr.select(from_second ^ to_second, at_begin / (at_begin - at_end), 1)
     middle = dr.fma(share, end - begin, begin)
     x.insert(1, dr.fma(share, x[1] - x[0], x[0]))
     y.insert(1, dr.fma(share, y[1] - y[0], y[0]))

@@ -51,7 +51,7 @@ class BeamPlanes:
 
     u: list[Any]
     v: list[Any]
-    one: list[Any]
+    constant: list[Any]
     s: list[Any]
     slack: list[Any]
 
@@ -84,9 +84,9 @@ def make_beam(directions, end, light, axis=None) -> Beam:
     corners, sides = _rectangle(directions, middle, across, up)
     # Planes through the light bound the footprint of the beam on the map, planes across them its heights.
     toward = light if axis is None else axis
-    (left, right), found = _pair_about(corners, toward)
+    (left, right), bounded = _pair_about(corners, toward)
     above, below = _pair_about(corners, dr.cross(toward, middle))[0]
-    normals = [dr.select(found, one, side) for one, side in zip((left, right, above, below), sides)]
+    normals = [dr.select(bounded, plane, side) for plane, side in zip((left, right, above, below), sides)]
     return Beam(normals, middle, end, light, axis is not None)
 
 
@@ -135,11 +135,11 @@ def _with_lines(planes, slack, start) -> BeamPlanes:
     A box that is long in s lies on both sides of every plane that is not steep, also behind the camera or beyond the
     end. A sum of two planes with positive weights bounds the beam too; one of those above and below it takes s away.
     """
-    lines = [_line(one, slack[4], planes[2:4], slack[2:4]) for one in (start, planes[4])]
+    lines = [_line(plane, slack[4], planes[2:4], slack[2:4]) for plane in (start, planes[4])]
     planes = [*planes, *(line for line, _ in lines)]
     slack = [*slack, *(reach for _, reach in lines)]
-    u, v, one, s = ([plane[k] for plane in planes] for k in range(4))
-    return BeamPlanes(u, v, one, s, slack)
+    u, v, constant, s = ([plane[k] for plane in planes] for k in range(4))
+    return BeamPlanes(u, v, constant, s, slack)
 
 
 def _line(plane, slack, others, slacks):
@@ -176,7 +176,7 @@ def over_square(planes: BeamPlanes, centre, half):
     u, v = centre
     return [
         dr.fma(gu, u, dr.fma(gv, v, dr.fma(dr.abs(gu) + dr.abs(gv), half, g0 + slack)))
-        for gu, gv, g0, slack in zip(planes.u, planes.v, planes.one, planes.slack)
+        for gu, gv, g0, slack in zip(planes.u, planes.v, planes.constant, planes.slack)
     ]
 
 

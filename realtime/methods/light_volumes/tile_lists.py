@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which texels of a shadow map concern a tile of the image: short lists, so that a ray looks at little else.
+"""Which texels of a shadow map concern a tile of the image: lists of candidates (`realtime.tiles.candidate_lists`).
 
-A tile is sixteen rays that follow one another (4 x 4 pixels), a block sixteen tiles. Where a beam of rays (see
-`realtime.methods.light_volumes.tile_beams`) misses the box of a node of the pyramid of heights, no ray of it meets the
-height field there: all of the node that they pass is lit, or all is dark. Blocks walk the pyramid from its top down to
-leaves, the last level, and tiles choose from those of their block. Of a leaf they list only the texels that the beam
-passes, and of those below or above the gap in the leaf's heights (see `realtime.shadow_maps.inverse_depth_field`)
-only what it may meet. Lists have a fixed length: a tile whose leaves do not fit takes nodes of twice the size, without
-telling texels apart, and the whole face if need be.
+Where a beam of rays (see `realtime.methods.light_volumes.tile_beams`) misses the box of a node of the pyramid of
+heights, no ray of it meets the height field there: all of the node that they pass is lit, or all is dark. Blocks walk
+the pyramid from its top down to leaves, the last level, and tiles choose from those of their block. Of a leaf they list
+only the texels that the beam passes, and of those below or above the gap in the leaf's heights (see
+`realtime.shadow_maps.inverse_depth_field`) only what it may meet. Lists have a fixed length: a tile whose leaves have
+no room, or whose block has none, takes nodes of twice the size, without telling texels apart, and the whole face if
+need be.
 """
 
 from dataclasses import dataclass
-from functools import partial, reduce
+from functools import partial
 from typing import Any
 
 import drjit as dr
@@ -23,6 +23,7 @@ from realtime.methods.light_volumes.ray_lines import face_ray, in_face
 from realtime.methods.light_volumes.texel_lines import line_of
 from realtime.methods.light_volumes.tile_beams import Beam, BeamPlanes, beam_planes, make_beam, may_meet, parts_within
 from realtime.shadow_maps.inverse_depth_field import InverseDepthField, leaf_sides
+from realtime.tiles.candidate_lists import bounding, farthest, members, over_lists
 from realtime.tiles.layout import TILE
 
 CHUNK = 4  #: leaves that a ray looks at together
@@ -30,7 +31,6 @@ LARGER = 1 << 31  #: added to the first place of a list of nodes that are no lea
 LIT = 1 << 30  #: added to that of an empty list where all is lit that the tile's rays pass of the face
 _BLOCK_ROOM = 256  # entries of the list of a block and face
 _TILE_ROOM = 96  # of a tile, for all faces together
-_CORNERS = (0, 3, 12, 15)  # lanes of a square tile at its corners
 
 
 @dataclass
@@ -60,25 +60,20 @@ def tile_leaves(heights: InverseDepthField, rays, distance, *, light, square: bo
     square
         Whether every tile is a square of 4 x 4 pixels: then its corners bound it.
     """
-    Float, Vector = type(distance), type(light)
-    count = dr.width(distance)
-    tiles = -(-count // TILE)
-    tile = dr.arange(mi.UInt32, tiles)
-    lanes = [dr.minimum(tile * TILE + k, count - 1) for k in range(TILE)]
-    directions = [rays(lanes[k]) for k in (_CORNERS if square else range(TILE))]
-    ends = dr.gather(Float, distance, lanes[0])
-    for lane in lanes[1:]:
-        ends = dr.maximum(ends, dr.gather(Float, distance, lane))
+    lanes = members(dr.width(distance))
+    directions = [rays(lane) for lane in bounding(lanes, square=square)]
+    ends = farthest(distance, lanes)
     dr.eval(directions, ends)
 
+    tiles = dr.width(ends)
     blocks = -(-tiles // TILE)
     lane = dr.arange(mi.UInt32, blocks * heights.faces)
     face, block = lane // blocks, lane % blocks  # neighbours look at one face
-    members = [dr.minimum(block * TILE + k, tiles - 1) for k in range(TILE)]
-    about = [dr.gather(Vector, direction, member) for direction in directions for member in members]
-    end = reduce(dr.maximum, (dr.gather(Float, ends, member) for member in members))
-    lists = _block_lists(heights, make_beam(about, end, light, heights.projection.parallel_axis), face)
-    beam = make_beam(directions, ends, light, heights.projection.parallel_axis)
+    of_block = [dr.minimum(block * TILE + k, tiles - 1) for k in range(TILE)]
+    about = [dr.gather(type(light), direction, tile) for direction in directions for tile in of_block]
+    axis = heights.projection.parallel_axis
+    lists = _block_lists(heights, make_beam(about, farthest(ends, of_block), light, axis), face)
+    beam = make_beam(directions, ends, light, axis)
     faces = mi.UInt32(1) if heights.faces == 1 else faces_passed(directions, beam.middle, ends, -light)
     return _tile_lists(heights, beam, faces, *lists)
 
@@ -95,12 +90,12 @@ def _block_lists(heights: InverseDepthField, beam: Beam, face):
     return entries, count
 
 
-def _tile_lists(heights: InverseDepthField, beam: Beam, passed, entries, found) -> Leaves:
+def _tile_lists(heights: InverseDepthField, beam: Beam, passed, entries, of_block) -> Leaves:
     """Return the leaves that beams may meet, drawn from the lists of their blocks, and which of their texels."""
     tiles = dr.width(beam.end)
     tile = dr.arange(mi.UInt32, tiles)
     faces = heights.faces
-    blocks = dr.width(found) // faces
+    blocks = dr.width(of_block) // faces
     leaves, texels = (dr.empty(mi.UInt32, tiles * _TILE_ROOM + CHUNK) for _ in range(2))
     first, last = dr.empty(mi.UInt32, tiles * faces), dr.empty(mi.UInt32, tiles * faces)
 
@@ -110,21 +105,16 @@ def _tile_lists(heights: InverseDepthField, beam: Beam, passed, entries, found) 
         room = _TILE_ROOM - (faces - 1 - face)  # a place is left for every face to come
         write = _leaf_writer(heights, planes, face, (leaves, texels), tile * _TILE_ROOM, room)
         source = face * blocks + tile // TILE
-        listed = dr.gather(mi.UInt32, found, source)
+        listed = dr.gather(mi.UInt32, of_block, source)
         whole = listed > _BLOCK_ROOM  # the block has no list
         listed = dr.select(whole, 0, listed)
 
-        def of_entry(k, count):
+        def look(k, count):
             node = unpacked(dr.gather(mi.UInt32, entries, source * _BLOCK_ROOM + k))
             met, box = meets(heights, planes, face, node, k < listed)
-            return k + 1, write(node, box, count, met)
+            return write(node, box, count, met)
 
-        _, count = dr.while_loop(
-            state=(dr.zeros(mi.UInt32, tiles), total + 0),
-            cond=lambda k, count: k < listed,
-            body=of_entry,
-            labels=("k", "count"),
-        )
+        count = over_lists(listed, look, total + 0)
 
         def of_level(level, count, again):
             count = dr.select(again, total, count)

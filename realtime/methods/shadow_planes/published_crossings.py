@@ -20,6 +20,7 @@ import mitsuba as mi
 from realtime.methods.shadow_planes.plane_table import PlaneIndex
 from realtime.methods.shadow_planes.sweep import RayPlanes, read_plane
 from realtime.methods.shadow_planes.tile_lists import Lists
+from realtime.tiles.candidate_lists import over_lists
 
 
 @dataclass(frozen=True)
@@ -109,8 +110,8 @@ def sum_crossings(
 
 def _next(index: PlaneIndex, lists: Lists, ray: RayPlanes, ray_end, draw: _Draw, order: str) -> _Draw:
     """Read one plane: the next of the list, or the next crossing of a list without order."""
-    found, key = _sought(index, lists, ray, ray_end, draw, order)
-    place = dr.select(ray.sorted, draw.place, found)
+    place, key = _sought(index, lists, ray, ray_end, draw, order)
+    place = dr.select(ray.sorted, draw.place, place)
     quotient, crossed, gain, number = read_plane(index, lists, ray, place, place < ray.source.count)
     crossed &= quotient > ray_end
     if order == "none":
@@ -144,35 +145,24 @@ def _sought(index: PlaneIndex, lists: Lists, ray: RayPlanes, ray_end, draw: _Dra
     Float, width = type(ray.x), dr.width(ray.x)
     count = dr.select(ray.sorted, 0, ray.source.count)
 
-    def body(k, place, key):
+    def look(k, nearest):
+        place, key = nearest
         quotient, crossed, _, number = read_plane(index, lists, ray, k, k < count)
         crossed &= quotient > ray_end
         own = -dr.gather(Float, index.spans, number * 4 + 3, crossed) if order == "paper" else quotient
         waits = (own < draw.key) | ((own == draw.key) & (k > draw.place))
         nearer = crossed & waits & (own > key)
-        return k + 1, dr.select(nearer, k, place), dr.select(nearer, own, key)
+        return dr.select(nearer, k, place), dr.select(nearer, own, key)
 
-    _, place, key = dr.while_loop(
-        state=(dr.zeros(mi.UInt32, width), count + dr.zeros(mi.UInt32, width), dr.full(Float, -dr.inf, width)),
-        cond=lambda k, place, key: k < count,
-        body=body,
-        labels=("k", "place", "key"),
-    )
-    return place, key
+    return over_lists(count, look, (count + dr.zeros(mi.UInt32, width), dr.full(Float, -dr.inf, width)))
 
 
 def _layers_at_end(index: PlaneIndex, lists: Lists, ray: RayPlanes, ray_end):
     """Return the layers over the visible surface."""
     Float, width = type(ray.x), dr.width(ray.x)
 
-    def body(place, layers):
-        quotient, crossed, gain, _ = read_plane(index, lists, ray, place, place < ray.source.count)
-        return place + 1, layers + dr.select(crossed & (quotient > ray_end), gain, 0)
+    def look(k, layers):
+        quotient, crossed, gain, _ = read_plane(index, lists, ray, k, k < ray.source.count)
+        return layers + dr.select(crossed & (quotient > ray_end), gain, 0)
 
-    _, layers = dr.while_loop(
-        state=(dr.zeros(mi.UInt32, width), dr.zeros(Float, width) + Float(index.layers)),
-        cond=lambda place, layers: place < ray.source.count,
-        body=body,
-        labels=("place", "layers"),
-    )
-    return layers
+    return over_lists(ray.source.count, look, dr.zeros(Float, width) + Float(index.layers))

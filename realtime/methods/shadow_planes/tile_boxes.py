@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Boxes about the directions of tiles and blocks of rays, and which shadow planes can touch them.
 
-A tile is sixteen rays that follow one another (4 x 4 pixels), a block sixteen tiles. Each has a box about the
+Tiles and blocks: `realtime.tiles.candidate_lists`. Each has a box about the
 directions of its rays in the frame of the light, and the least quotient 1/x at which one of them ends. What decides
 whether a ray crosses a plane, D/x = A wx + B wy - wz and its like (`realtime.methods.shadow_planes.plane_table`), is
-linear in the direction, so its largest value over the box is the value at the centre plus |A| ex + |B| ey + ez.
+linear in the direction, so its largest value over the box is the value at the centre plus |A| ex + |B| ey + ez. So are
+1/x = P wx + Q wy and the margin wz - A wx - B wy of a light at infinity.
 """
 
 from collections.abc import Callable
@@ -13,12 +14,11 @@ from functools import reduce
 from typing import Any
 
 import drjit as dr
-import mitsuba as mi
 
 from realtime.methods.shadow_planes.plane_table import NUMBER, TURN, PlaneIndex
 from realtime.numerics.array_types import four_numbers, two_numbers
 from realtime.numerics.diamond_angle import diamond_angle
-from realtime.tiles.layout import SIDE, TILE
+from realtime.tiles.candidate_lists import bounding, farthest, members
 
 _SLACK = 1e-5  # of the terms of a sum: float32 rounding, with room to spare
 
@@ -53,44 +53,30 @@ def tile_boxes(index: PlaneIndex, rays: Callable[[Any], tuple[Any, Any, Any]], d
         Whether every tile is a square of 4 x 4 pixels: then its corners bound it, but for the curvature of the sphere
         of directions.
     """
-    count = dr.width(distance)
-    tiles = -(-count // TILE)
-    tile = dr.arange(mi.UInt32, tiles)
-
-    def lane(k):
-        # Beyond the last ray: the first of the tile again.
-        lane = tile * TILE + k
-        return dr.select(lane < count, lane, tile * TILE)
-
-    corners = (0, SIDE - 1, TILE - SIDE, TILE - 1) if square else range(TILE)
-    directions = [rays(lane(k)) for k in corners]
-    ends = [dr.gather(type(distance), distance, lane(k)) for k in range(TILE)]
+    lanes = members(dr.width(distance))
+    directions = [rays(lane) for lane in bounding(lanes, square=square)]
     low = [reduce(dr.minimum, [w[axis] for w in directions]) for axis in range(3)]
     high = [reduce(dr.maximum, [w[axis] for w in directions]) for axis in range(3)]
     if square:
         # Between two directions at the angle a the sphere stands out by 1 - cos(a/2) < a^2/8.
         bulge = 0.125 * sum(dr.square(b - a) for a, b in zip(low, high))
         low, high = [a - bulge for a in low], [b + bulge for b in high]
-    return _box(low, high, index.distance / reduce(dr.maximum, ends))
+    return _box(low, high, index.distance / farthest(distance, lanes))
 
 
 def block_boxes(tile: Box) -> Box:
     """Return the boxes of the blocks of tiles."""
-    count = dr.width(tile.x)
-    block = dr.arange(mi.UInt32, -(-count // TILE))
 
-    def bounds(k):
-        number = block * TILE + k
-        number = dr.select(number < count, number, block * TILE)
+    def bounds(number):
         box = dr.gather(Box, tile, number)
         centre, half = (box.x, box.y, box.z), (box.x_half, box.y_half, box.z_half)
         low, high = [c - h for c, h in zip(centre, half)], [c + h for c, h in zip(centre, half)]
         return low, high, box.ray_end
 
-    members = [bounds(k) for k in range(TILE)]
-    low = [reduce(dr.minimum, [member[0][axis] for member in members]) for axis in range(3)]
-    high = [reduce(dr.maximum, [member[1][axis] for member in members]) for axis in range(3)]
-    return _box(low, high, reduce(dr.minimum, [member[2] for member in members]))
+    lows, highs, ray_ends = zip(*(bounds(number) for number in members(dr.width(tile.x))))
+    low = [reduce(dr.minimum, along_axis) for along_axis in zip(*lows)]
+    high = [reduce(dr.maximum, along_axis) for along_axis in zip(*highs)]
+    return _box(low, high, reduce(dr.minimum, ray_ends))
 
 
 def _box(low, high, ray_end) -> Box:
@@ -121,13 +107,21 @@ def touches(index: PlaneIndex, box: Box, entry, active):
     number = entry & NUMBER
     a, b, p, q = dr.gather(four_numbers(Float), index.lines, number, active)
     first, last = dr.gather(two_numbers(Float), index.spans, 2 * number, active)
-    quotient = dr.fma(a, box.x, dr.fma(b, box.y, -box.z))
-    reach = dr.fma(dr.abs(a), box.x_half, dr.fma(dr.abs(b), box.y_half, box.z_half))
-    reach += _SLACK * (dr.abs(a * box.x) + dr.abs(b * box.y) + 1)
-    pd, qd = p * index.distance, q * index.distance
-    margin = dr.fma(pd, box.x, qd * box.y) - quotient
-    margin_reach = dr.fma(dr.abs(pd - a), box.x_half, dr.fma(dr.abs(qd - b), box.y_half, box.z_half))
-    margin_reach += _SLACK * (dr.abs(a * box.x) + dr.abs(b * box.y) + dr.abs(pd * box.x) + dr.abs(qd * box.y) + 1)
+    if index.w:
+        quotient = dr.fma(a, box.x, dr.fma(b, box.y, -box.z))
+        reach = dr.fma(dr.abs(a), box.x_half, dr.fma(dr.abs(b), box.y_half, box.z_half))
+        reach += _SLACK * (dr.abs(a * box.x) + dr.abs(b * box.y) + 1)
+        pd, qd = p * index.distance, q * index.distance
+        margin = dr.fma(pd, box.x, qd * box.y) - quotient
+        margin_reach = dr.fma(dr.abs(pd - a), box.x_half, dr.fma(dr.abs(qd - b), box.y_half, box.z_half))
+        margin_reach += _SLACK * (dr.abs(a * box.x) + dr.abs(b * box.y) + dr.abs(pd * box.x) + dr.abs(qd * box.y) + 1)
+    else:
+        quotient = dr.fma(a, box.x, b * box.y)
+        reach = dr.fma(dr.abs(a), box.x_half, dr.abs(b) * box.y_half)
+        reach += _SLACK * (dr.abs(a * box.x) + dr.abs(b * box.y))
+        margin = box.z - dr.fma(p, box.x, q * box.y)
+        margin_reach = dr.fma(dr.abs(p), box.x_half, dr.fma(dr.abs(q), box.y_half, box.z_half))
+        margin_reach += _SLACK * (dr.abs(p * box.x) + dr.abs(q * box.y) + 1)
     low, high = box.azimuth - box.azimuth_half, box.azimuth + box.azimuth_half
     overlaps = (first <= high) & (last >= low)
     overlaps |= (first <= high - TURN) & (last >= low - TURN)

@@ -1,12 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which shadow planes can concern a tile of the image: short lists, so that a ray reads what it crosses and little
-else.
+"""Which shadow planes can concern a tile of the image: lists of candidates (`realtime.tiles.candidate_lists`).
 
 A plane stays on the list of a tile or block if some direction of its box could cross it
-(`realtime.methods.shadow_planes.tile_boxes`); whether a ray does, the ray finds out. Blocks draw on the bins of
-azimuth, tiles on their block. Lists are counted, their places added up, then written; where the room for all of them
-is used up, a block or tile keeps the longer list that it drew on. The planes of a tile are put in the order in which
-its middle ray crosses them, or in that of the paper.
+(`realtime.methods.shadow_planes.tile_boxes`). Blocks draw on the bins of azimuth, tiles on their block. Lists are
+counted, their places added up, then written; one that has no room gives way to that which it would have been drawn on.
+The planes of a tile are put in the order in which its middle ray crosses them, or in that of the paper.
 """
 
 from dataclasses import dataclass
@@ -18,6 +16,7 @@ import mitsuba as mi
 from realtime.methods.shadow_planes.plane_table import BINS, FIRST, FULL, NUMBER, TURN, PlaneIndex
 from realtime.methods.shadow_planes.tile_boxes import Box, block_boxes, tile_boxes, touches
 from realtime.numerics.array_types import four_numbers
+from realtime.tiles.candidate_lists import over_lists
 from realtime.tiles.layout import TILE
 
 ROOM = 32  #: entries for each tile and, fourfold, for each block, on average
@@ -124,12 +123,8 @@ def listed(
     dr.scatter(pool, entries, dr.arange(mi.UInt32, behind))
     first, end = _of_box(offset, lanes, 0), _of_box(offset + count, lanes, lanes - 1)
     fits = end <= room
-    found = Source(
-        dr.select(fits, first + behind, source.first),
-        dr.select(fits, end - first, source.count),
-        dr.select(fits, end + behind, source.all_before),
-    )
-    dr.eval(pool, count, offset, found, fits)
+    source_of_list = dr.select(fits, Source(first + behind, end - first, end + behind), source)
+    dr.eval(pool, count, offset, source_of_list, fits)
     if order is None:
         has_room = dr.repeat(fits, lanes)
 
@@ -138,7 +133,7 @@ def listed(
 
         _visit(index, box, entries, source, write, lanes=lanes)
         dr.eval(pool)
-        return Lists(pool, found, fits)
+        return Lists(pool, source_of_list, fits)
 
     fours = (room + 3) // 4
     unsorted = _Unsorted(dr.empty(mi.UInt32, room), dr.empty(type(box.x), 4 * fours), dr.empty(mi.UInt32, fours))
@@ -154,8 +149,8 @@ def listed(
 
     _visit(index, box, entries, source, write_unsorted)
     dr.eval(unsorted)
-    _write_sorted(pool, unsorted, found, behind, dr.max(dr.select(fits, offset + count, 0)))
-    return Lists(pool, found, fits)
+    _write_sorted(pool, unsorted, source_of_list, behind, dr.max(dr.select(fits, offset + count, 0)))
+    return Lists(pool, source_of_list, fits)
 
 
 @dataclass
@@ -185,21 +180,15 @@ def _visit(index: PlaneIndex, box: Box, entries, source: Source, write, *, lanes
         begin = dr.minimum(lane % lanes * run, source.count)
         source = Source(source.first + begin, dr.minimum(run, source.count - begin), source.all_before)
 
-    def body(k, found):
+    def look(k, drawn):
         entry, counts = entry_at(entries, source, k, dr.full(mi.Bool, True, width))
         hit, full, quotient = touches(index, box, entry, counts)
         if write is not None:
             marked = (entry & (FULL - 1)) | FIRST | dr.select(full, mi.UInt32(FULL), 0)
-            write(found, marked, quotient, hit)
-        return k + 1, found + dr.select(hit, mi.UInt32(1), mi.UInt32(0))
+            write(drawn, marked, quotient, hit)
+        return drawn + dr.select(hit, mi.UInt32(1), mi.UInt32(0))
 
-    _, found = dr.while_loop(
-        state=(dr.zeros(mi.UInt32, width), dr.zeros(mi.UInt32, width)),
-        cond=lambda k, found: k < source.count,
-        body=body,
-        labels=("k", "found"),
-    )
-    return found
+    return over_lists(source.count, look, dr.zeros(mi.UInt32, width))
 
 
 def _write_sorted(pool, unsorted: _Unsorted, source: Source, behind: int, total) -> None:

@@ -1,0 +1,13 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The light volume as a closed mesh, rasterised with signs, as published (Billeter, Sintorn, Assarsson 2010).
+
+Read in this order:
+
+- `mesh.py`: the displaced grid of a shadow map, joined to the light.
+- `tessellation.py`: fewer triangles where the map is flat.
+- `raster.py`: every triangle against every pixel that it covers, with the sign of each crossing.
+- `signed_sum.py`: the airlight as a sum over the crossings in any order.
+
+May import: `realtime.errors`, `realtime.kernels`, `realtime.methods.interface`, `realtime.rays`, `realtime.scene`,
+`realtime.shadow_maps`.
+"""

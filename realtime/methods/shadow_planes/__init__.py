@@ -1,0 +1,25 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Shadow planes: volumetric shadows from the silhouettes of casters, without shadow rays and shadow maps.
+
+Silhouettes become planes through the light when the light or casters move; tiles of rays draw lists of the planes that
+they may cross when the camera moves; each ray then adds up the lit intervals between the planes that it crosses.
+
+Read in this order:
+
+- `method.py`: the method, its parameters and what the paper does otherwise.
+- `silhouettes.py`: the edges of casters that bound their shadows, as a light sees them.
+- `view_culling.py`: which casters can cast a shadow into the view.
+- `spot_pyramid.py`: planes about the cone of a spot, as the paper has them.
+- `plane_table.py`: planes as four numbers, in bins of azimuth.
+- `pixel_rays.py`: camera rays in the frame of the light.
+- `tile_boxes.py`: boxes about the rays of tiles and blocks, and which planes they may cross.
+- `tile_lists.py`: the planes of each tile, in order.
+- `sweep.py`: the lit intervals of a ray, along the planes of its tile.
+- `published_crossings.py`: the sum of the paper, plane by plane with a stencil.
+- `published_mesh.py`: its Gamma at the vertices of meshes.
+- `plane_counts.py`: how many casters, edges and planes there are, for `--plan`.
+
+May import: `realtime.bounded_media`, `realtime.errors`, `realtime.intervals`, `realtime.kernels`,
+`realtime.methods.interface`, `realtime.numerics`, `realtime.parameters`, `realtime.rays`, `realtime.scene`,
+`realtime.tiles`.
+"""
