@@ -36,18 +36,40 @@ class Batches:
 
 
 def check_samples(samples: int) -> None:
-    """Raise ValueError for more samples a pixel than a batch can add up, or none."""
+    """Check the number of samples a pixel of a batch.
+
+    Raises
+    ------
+    ValueError
+        For none, or for more than a batch can add up, `LARGEST_BATCH`.
+    """
     if not 1 <= samples <= LARGEST_BATCH:
         raise ValueError(f"samples: got {samples}, wanted 1 to {LARGEST_BATCH}")
 
 
 def single_batch(seed: int, samples: int, mean: Array) -> Batches:
-    """Return one batch, given its radiance of every pixel, (layers, pixels, 3)."""
+    """Return one batch, given its radiance of every pixel, (layers, pixels, 3).
+
+    Parameters
+    ----------
+    seed
+        Of the batch.
+    samples
+        Samples a pixel in it.
+    mean
+        Its radiance of every pixel, (layers, pixels, 3) [W/(m^2 sr)].
+    """
     return Batches((seed,), samples, mean, np.zeros_like(mean), mean.mean(axis=1)[None])
 
 
 def merged(first: Batches, second: Batches) -> Batches:
-    """Add up two sets of batches."""
+    """Add up two sets of batches.
+
+    Raises
+    ------
+    ValueError
+        For batches with other samples a pixel, or with a seed that both hold.
+    """
     if first.samples != second.samples or set(first.seeds) & set(second.seeds):
         raise ValueError("batches to merge need the same samples a pixel and different seeds")
     mean, squares = combined_moments(

@@ -72,7 +72,17 @@ class RayValues:
 
 
 def image_of(truth: TruthScene, centre: RayValues, airlight: Array, bound: Array, surface: Array) -> TruthImage:
-    """Return the image with these layers, (pixels, 3), and what else is known of the rays through the centres."""
+    """Return the image with these layers, and what else is known of the rays through the centres.
+
+    Parameters
+    ----------
+    truth
+        The scene.
+    centre
+        The values of the rays through the centres of the pixels.
+    airlight, bound, surface
+        Radiances and the bound of the first one's error, (pixels, 3) [W/(m^2 sr)].
+    """
     shape, known = (truth.height, truth.width), centre.random_checks
     return TruthImage(
         airlight.reshape(*shape, 3),

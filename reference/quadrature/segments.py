@@ -138,7 +138,22 @@ def leg_kinks(bounds: Bounds, light: Array, axes: tuple[Array, Array], height: A
 
 
 def polygon_corners(body: Polyhedron, light: Array, along: Array, away: Array) -> tuple[Index, Array, Array]:
-    """Return where the edges of a polyhedron meet the planes of rays and light: ray, p_1, p_2."""
+    """Return where the edges of a polyhedron meet the planes of rays and light.
+
+    Parameters
+    ----------
+    body
+        The polyhedron.
+    light
+        Position [m], (3,).
+    along, away
+        Unit vectors along the rays and from the light to the foot points, (rays, 3) each.
+
+    Returns
+    -------
+    ray, p_1, p_2
+        Number of the ray and components along both vectors, from the light [m], (corners,) each.
+    """
     ends = body.edge - light
     normal = np.cross(along, away)
     at_start, at_end = normal @ ends[:, 0].T, normal @ ends[:, 1].T

@@ -126,7 +126,7 @@ def _refusal(shape: Any, fault: str, wanted: str) -> InputError:
 
 
 def holds(bounds: Bounds, point: Array) -> bool:
-    """Return whether a point lies inside a body."""
+    """Return whether a point, (3,) [m], lies inside of bounds, off their surface."""
     if isinstance(bounds, Sphere):
         return bool(np.linalg.norm(point - bounds.centre) < bounds.radius)
     return bool(np.all(bounds.normal @ point < bounds.offset))

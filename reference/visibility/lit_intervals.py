@@ -133,7 +133,24 @@ def point_leg(position: Array, rays: tuple[Array, Array, Array]) -> Leg:
 def found_intervals(
     truth: TruthScene, legs: Legs, *, ends: tuple[Array, Array], samples: int, edges: str, shapes: Shapes | None
 ) -> LitIntervals:
-    """Find and check the lit intervals of rays for any light; the parameters are those of `lit_intervals`."""
+    """Find and check the lit intervals of rays for any light.
+
+    Parameters
+    ----------
+    truth
+        The scene.
+    legs
+        The legs from the light to points of the rays.
+    ends
+        Between which the rays are looked at, (rays,) each, in the variable of the legs: an angle [rad], or a share.
+    samples, edges, shapes
+        As in `lit_intervals`.
+
+    Raises
+    ------
+    InputError
+        For another word in `edges`; for `edges` 'geometry' with shapes whose shadows are not exact.
+    """
     if edges not in ("auto", "geometry", "rays"):
         raise InputError(f"edges is '{edges}'; wanted 'geometry', 'rays' or 'auto'")
     low, high = ends

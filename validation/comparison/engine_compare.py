@@ -159,7 +159,7 @@ def compare_scene(
 
 
 def truth_layer(truth: TruthImage, name: str) -> NDArray[np.float64]:
-    """Return 'airlight', 'surface' or their sum, 'total'."""
+    """Return 'airlight', 'surface' or their sum, 'total', (height, width, 3) [W/(m^2 sr)]."""
     return truth.airlight + truth.surface if name == TOTAL else getattr(truth, name)
 
 

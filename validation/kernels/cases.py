@@ -40,7 +40,15 @@ def integrate_cases(cases: Cases, kernel: str, precision: str) -> Array:
 
 
 def summary(cases: Cases, results: Array) -> dict[str, Any]:
-    """Return quantiles of the relative error against the certified values, where there are any."""
+    """Return quantiles of the relative error against the certified values, where there are any.
+
+    Parameters
+    ----------
+    cases
+        The cases; with values, or there are no quantiles.
+    results
+        J of every case [1/m], (n,).
+    """
     quantiles: dict[str, Any] = {"rows": len(results), "compared": 0, "nonfinite": int(np.sum(~np.isfinite(results)))}
     if cases.value is None:
         return quantiles
@@ -55,7 +63,17 @@ def summary(cases: Cases, results: Array) -> dict[str, Any]:
 
 
 def write_results(cases: Cases, results: Array, target: Path) -> None:
-    """Write the rows of a file with a column `result`, whole or not at all."""
+    """Write the rows of a file with a column `result`, whole or not at all.
+
+    Parameters
+    ----------
+    cases
+        As they were read.
+    results
+        J of every case [1/m], (n,).
+    target
+        The file to write.
+    """
     kept = [k for k, name in enumerate(cases.header) if name != "result"]
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")

@@ -47,7 +47,15 @@ def groups(cases: Cases) -> dict[str, Rows]:
 
 
 def relative_error(results: Array, expected: Array, precision: str) -> Array:
-    """Return |results - expected| / |expected|, NaN where either is not finite."""
+    """Return |results - expected| / |expected| [1], NaN where either is not finite.
+
+    Parameters
+    ----------
+    results, expected
+        J [1/m], (n,) each.
+    precision
+        'single' or 'double', of the results.
+    """
     with np.errstate(invalid="ignore", over="ignore"):
         error = np.abs(results - expected) / np.maximum(np.abs(expected), TINY[precision])
     return np.where(np.isfinite(results) & np.isfinite(expected), error, np.nan)

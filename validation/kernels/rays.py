@@ -96,7 +96,19 @@ def wide_rays(count: int, phase: str = "isotropic", g: float = 0.0, *, truth: bo
 
 
 def table(phase, g, *, foot: Array, height: Array, x0: Array, x1: Array, sigma_t: Array, tags) -> Cases:
-    """Return columns as cases without values."""
+    """Return columns as cases without values.
+
+    Parameters
+    ----------
+    phase, tags
+        Names of phase functions and kinds of cases, n each.
+    g
+        Mean cosines, (n,).
+    foot, height, x0, x1
+        (n,) each [m].
+    sigma_t
+        Extinction, (n,) [1/m].
+    """
     names, words = (tuple(str(cell) for cell in column) for column in (phase, tags))
     return Cases(names, np.asarray(g), foot, height, x0, x1, sigma_t, None, words, None, None, None, COLUMNS, ())
 

@@ -45,5 +45,5 @@ def layers(truth: TruthScene, estimator: str) -> Array:
 
 
 def largest_difference(computed: Array, expected: Array) -> float:
-    """Return the largest difference of two images over the largest value of the second."""
+    """Return the largest difference of two images of one shape over the largest value of the second [1]."""
     return float(np.abs(computed - expected).max() / np.abs(expected).max())

@@ -114,13 +114,37 @@ def distance_batches(batch: Batch, truth: TruthScene, count: int) -> Batches:
 
 
 def image_statistics(opponent: Opponent, layer: str, image: Array, mask: NDArray[np.bool_]) -> Statistics:
-    """Compare a quadrature image that may be changed with the batches of an opponent."""
+    """Compare a quadrature image that may be changed with the batches of an opponent.
+
+    Parameters
+    ----------
+    opponent
+        The batches, unchanged.
+    layer
+        'airlight' or 'surface'.
+    image
+        The layer of the quadrature image, (height, width, 3) [W/(m^2 sr)].
+    mask
+        Pixels to compare, (height, width).
+    """
     estimate = batch_estimate(opponent.batches, layer, mask)
     return compare_statistics(estimate, Estimate(image), mask=mask, margin=opponent.margin)
 
 
 def batch_statistics(opponent: Opponent, layer: str, batches: Batches, mask: NDArray[np.bool_]) -> Statistics:
-    """Compare batches that may be changed with the quadrature image of an opponent."""
+    """Compare batches that may be changed with the quadrature image of an opponent.
+
+    Parameters
+    ----------
+    opponent
+        The quadrature image, unchanged.
+    layer
+        'airlight' or 'surface'.
+    batches
+        What may be changed.
+    mask
+        Pixels to compare, (height, width).
+    """
     image = getattr(opponent.image, layer)
     estimate = batch_estimate(batches, layer, mask)
     return compare_statistics(Estimate(image), estimate, mask=mask, margin=opponent.margin)

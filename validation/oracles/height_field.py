@@ -82,12 +82,25 @@ class Path:
 
 
 def by_ray(first: Index, first_angle: Array, second: Index, second_angle: Array) -> tuple[Index, Array]:
-    """Join two lists of angles of rays and sort them by ray and angle."""
+    """Join two lists of angles of rays and sort them by ray and angle.
+
+    Parameters
+    ----------
+    first, second
+        Numbers of rays, (n,) and (m,).
+    first_angle, second_angle
+        Angles at the light, in their order [rad].
+
+    Returns
+    -------
+    ray, angle
+        (n + m,) each, the angle in [rad].
+    """
     ray, angle = np.concatenate([first, second]), np.concatenate([first_angle, second_angle])
     order = np.lexsort((angle, ray))
     return ray[order], angle[order]
 
 
 def zero_angle(cosine: Array, sine: Array) -> Array:
-    """Return where cosine cos(theta) + sine sin(theta) = 0, from -pi/2 to pi/2."""
+    """Return where cosine cos(theta) + sine sin(theta) = 0, from -pi/2 to pi/2 [rad]."""
     return np.arctan2(np.where(sine < 0, cosine, -cosine), np.abs(sine))

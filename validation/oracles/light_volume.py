@@ -60,7 +60,14 @@ _CHUNK = 1 << 20  # crossings of rays and lines looked at together: 8 MB an arra
 
 
 def traced_walls(scene: Scene, shadow_maps: Sequence[ShadowMap]) -> list[NDArray[np.uint32]]:
-    """Return by light the walls that its rays find between the samples of its map, for `oracle_airlight`."""
+    """Return by light the walls that its rays find between the samples of its map, for `oracle_airlight`.
+
+    Returns
+    -------
+    list
+        For each light the numbers of the walls of its map's texels, as `realtime.methods.light_volumes.jump_search`
+        gives them.
+    """
     pairs = zip(shadow_maps, scene.lights, strict=True)
     return [
         np.array(with_walls(inverse_depth_field(shadow_map), scene.geometry, light).walls)

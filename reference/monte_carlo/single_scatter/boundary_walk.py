@@ -79,7 +79,13 @@ def _is_null(shape) -> bool:
 
 
 def require_homogeneous(medium) -> None:
-    """Raise InputError for a medium that is not homogeneous."""
+    """Refuse a medium that is not homogeneous.
+
+    Raises
+    ------
+    InputError
+        For such a medium, with its class.
+    """
     if not medium.is_homogeneous():
         raise InputError(f"single-scatter: got a {medium.class_name()}; wanted media of type 'homogeneous'")
 
