@@ -80,7 +80,7 @@ class _Columns(Table):
         return self.rows
 
     def require(self, *names: str) -> None:
-        missing = [one for one in names if one not in self.arrays]
+        missing = [name for name in names if name not in self.arrays]
         if missing:
             wanted = {key: word for word, key in _NAMES.items()}.get(missing[0], missing[0])
             raise InputError(

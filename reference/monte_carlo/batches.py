@@ -36,32 +36,56 @@ class Batches:
 
 
 def check_samples(samples: int) -> None:
-    """Raise ValueError for more samples a pixel than a batch can add up, or none."""
+    """Check the number of samples a pixel of a batch.
+
+    Raises
+    ------
+    ValueError
+        For none, or for more than a batch can add up, `LARGEST_BATCH`.
+    """
     if not 1 <= samples <= LARGEST_BATCH:
         raise ValueError(f"samples: got {samples}, wanted 1 to {LARGEST_BATCH}")
 
 
 def single_batch(seed: int, samples: int, mean: Array) -> Batches:
-    """Return one batch, given its radiance of every pixel, (layers, pixels, 3)."""
+    """Return one batch, given its radiance of every pixel, (layers, pixels, 3).
+
+    Parameters
+    ----------
+    seed
+        Of the batch.
+    samples
+        Samples a pixel in it.
+    mean
+        Its radiance of every pixel, (layers, pixels, 3) [W/(m^2 sr)].
+    """
     return Batches((seed,), samples, mean, np.zeros_like(mean), mean.mean(axis=1)[None])
 
 
-def merged(one: Batches, other: Batches) -> Batches:
-    """Add up two sets of batches."""
-    if one.samples != other.samples or set(one.seeds) & set(other.seeds):
+def merged(first: Batches, second: Batches) -> Batches:
+    """Add up two sets of batches.
+
+    Raises
+    ------
+    ValueError
+        For batches with other samples a pixel, or with a seed that both hold.
+    """
+    if first.samples != second.samples or set(first.seeds) & set(second.seeds):
         raise ValueError("batches to merge need the same samples a pixel and different seeds")
     mean, squares = combined_moments(
-        (len(one.seeds), one.mean, one.squares), (len(other.seeds), other.mean, other.squares)
+        (len(first.seeds), first.mean, first.squares), (len(second.seeds), second.mean, second.squares)
     )
-    return Batches(one.seeds + other.seeds, one.samples, mean, squares, np.concatenate([one.totals, other.totals]))
+    return Batches(
+        first.seeds + second.seeds, first.samples, mean, squares, np.concatenate([first.totals, second.totals])
+    )
 
 
-def combined_moments(one: tuple[int, Array, Array], other: tuple[int, Array, Array]) -> tuple[Array, Array]:
+def combined_moments(first: tuple[int, Array, Array], second: tuple[int, Array, Array]) -> tuple[Array, Array]:
     """Return mean and sum of squared deviations of two sets together, each given as (count, mean, squares).
 
     The squares are those within each set and those between their means (Chan, Golub and LeVeque 1983, eq. 2.1).
     """
-    (n, mean, squares), (m, other_mean, other_squares) = one, other
+    (n, mean, squares), (m, other_mean, other_squares) = first, second
     difference = other_mean - mean
     return mean + difference * (m / (n + m)), squares + other_squares + difference**2 * (n * m / (n + m))
 

@@ -32,7 +32,20 @@ class Panels:
 
 
 def first_panels(start: Array, width: Array, widest: float) -> tuple[Index, Array, Array]:
-    """Cut pieces into equal panels no wider than `widest`: numbers of the pieces, starts and widths."""
+    """Cut pieces into equal panels no wider than `widest`.
+
+    Parameters
+    ----------
+    start, width
+        Where the pieces begin and how wide they are, (pieces,), in the variable of the integral.
+    widest
+        In the same unit.
+
+    Returns
+    -------
+    piece, start, width
+        Of every panel: the number of its piece, where it begins, and how wide it is, (panels,) each.
+    """
     count = np.maximum(np.ceil(width / widest), 1).astype(np.int64)
     piece = np.repeat(np.arange(len(count)), count)
     number = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)

@@ -152,7 +152,9 @@ class _Sum:
             chosen = numbers == number
             self.factor[chosen] *= setup.medium(int(number)).phase(np.clip(cosine[chosen], -1, 1))[:, None]
         bodies = [medium.bounds for medium in setup.truth.media]
-        self.lengths = [_planes(self, one) if isinstance(one, Polyhedron) else _chords(self, one) for one in bodies]
+        self.lengths = [
+            _planes(self, bounds) if isinstance(bounds, Polyhedron) else _chords(self, bounds) for bounds in bodies
+        ]
 
     def depth(self, rows: Index, x: Array) -> Array:
         """Return the optical depth from the camera to points x of pieces, (m, k), and on to the light, (m, k, 3)."""

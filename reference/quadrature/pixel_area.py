@@ -117,7 +117,7 @@ def area_image(
     pixels = truth.width * truth.height
     middle = pixel_centres((truth.width, truth.height))
     angle = _pixel_angle(truth)
-    film, found = _on_grid(None, trace, (np.arange(pixels), middle, np.ones(pixels)), angle)
+    film, newest = _on_grid(None, trace, (np.arange(pixels), middle, np.ones(pixels)), angle)
     centre = film.rays
     at_centre = np.searchsorted(film.key, _keys(middle))
     floor = _floor(centre, at_centre)
@@ -125,23 +125,23 @@ def area_image(
     for level in range(1, _DEEPEST + 1):
         if progress is not None:
             progress(level, _DEEPEST + 1, "sub-pixels")
-        cut = np.ones(pixels, bool) if level == 1 else _to_cut(_joined([*finished, found]), found, floor, tolerance)
+        cut = np.ones(pixels, bool) if level == 1 else _to_cut(_joined([*finished, newest]), newest, floor, tolerance)
         if not cut.any():
             break
-        last = cut & found.edge & ~found.light & (level >= _LEVELS)
-        finished.append(_chosen(found, ~cut))
+        last = cut & newest.edge & ~newest.light & (level >= _LEVELS)
+        finished.append(_chosen(newest, ~cut))
         if last.any():
-            squares, rays = _at_random(trace, *_quarters(found, last))
+            squares, rays = _at_random(trace, *_quarters(newest, last))
             finished.append(squares)
             film = replace(film, rays=replace(film.rays, random_checks=_both(film.rays, rays)))
         rest = cut & ~last
         if not rest.any():
-            found = _chosen(found, rest)
+            newest = _chosen(newest, rest)
             break
-        film, found = _on_grid(film, trace, _quarters(found, rest), angle)
+        film, newest = _on_grid(film, trace, _quarters(newest, rest), angle)
     if progress is not None:
         progress(_DEEPEST + 1, _DEEPEST + 1, "sub-pixels")
-    value, error, bound = _summed(_joined([*finished, found]), pixels)
+    value, error, bound = _summed(_joined([*finished, newest]), pixels)
     centre = replace(
         centre,
         distance=centre.distance[at_centre],
@@ -168,8 +168,8 @@ def _pixel_angle(truth: TruthScene) -> float:
     return float(np.linalg.norm(right - left))
 
 
-def _both(one: RayValues, other: RayValues) -> RandomChecks:
-    return RandomChecks.of_all([one.random_checks, other.random_checks])
+def _both(first: RayValues, second: RayValues) -> RandomChecks:
+    return RandomChecks.of_all([first.random_checks, second.random_checks])
 
 
 def _quarters(squares: _Squares, which: Bools) -> tuple[Index, Array, Array]:
@@ -252,15 +252,15 @@ def _differ(rays: RayValues, of_point: Index) -> Bools:
     return np.asarray(differ | (lit.any(axis=0) & ~lit.all(axis=0)), dtype=np.bool_)
 
 
-def _to_cut(all_squares: _Squares, found: _Squares, floor: Array, tolerance: float) -> Bools:
+def _to_cut(all_squares: _Squares, newest: _Squares, floor: Array, tolerance: float) -> Bools:
     """Return which of the squares found last carry more than their share of an error that is too large."""
     pixels = int(all_squares.pixel.max()) + 1
     value, error, _ = _summed(all_squares, pixels)
     allowed = tolerance * np.maximum(np.abs(value), floor)
-    count = np.bincount(all_squares.pixel, minlength=pixels)[found.pixel, None]
-    share = np.where(found.edge[:, None], 1 / (_SIGMAS * np.sqrt(count)), 1 / count)
-    above = (error > allowed)[found.pixel] & (found.error > share * allowed[found.pixel])
-    return np.asarray(above.any(axis=1) & (found.light | (found.size > 0.5**_LEVELS)), dtype=np.bool_)
+    count = np.bincount(all_squares.pixel, minlength=pixels)[newest.pixel, None]
+    share = np.where(newest.edge[:, None], 1 / (_SIGMAS * np.sqrt(count)), 1 / count)
+    above = (error > allowed)[newest.pixel] & (newest.error > share * allowed[newest.pixel])
+    return np.asarray(above.any(axis=1) & (newest.light | (newest.size > 0.5**_LEVELS)), dtype=np.bool_)
 
 
 def _summed(squares: _Squares, pixels: int) -> tuple[Array, Array, Array]:

@@ -72,7 +72,17 @@ class RayValues:
 
 
 def image_of(truth: TruthScene, centre: RayValues, airlight: Array, bound: Array, surface: Array) -> TruthImage:
-    """Return the image with these layers, (pixels, 3), and what else is known of the rays through the centres."""
+    """Return the image with these layers, and what else is known of the rays through the centres.
+
+    Parameters
+    ----------
+    truth
+        The scene.
+    centre
+        The values of the rays through the centres of the pixels.
+    airlight, bound, surface
+        Radiances and the bound of the first one's error, (pixels, 3) [W/(m^2 sr)].
+    """
     shape, known = (truth.height, truth.width), centre.random_checks
     return TruthImage(
         airlight.reshape(*shape, 3),
@@ -114,14 +124,14 @@ def ray_values(
     how = {"samples": samples, "edges": edges, "shapes": shapes}
     total = len(truth.lights) + len(truth.directional)
     for number, light in enumerate(truth.lights):
-        found = _light_airlight(truth, light, hits.distance, shadow_scale=shadow_scale, how=how)
-        airlight += found.radiance
-        bound += found.bound
-        light_angle = np.minimum(light_angle, found.angle)
-        intervals += np.bincount(found.lit.ray, minlength=count)
-        transitions += found.lit.transitions
-        checks.append(found.lit.random_checks)
-        seen = found.reached
+        received = _light_airlight(truth, light, hits.distance, shadow_scale=shadow_scale, how=how)
+        airlight += received.radiance
+        bound += received.bound
+        light_angle = np.minimum(light_angle, received.angle)
+        intervals += np.bincount(received.lit.ray, minlength=count)
+        transitions += received.lit.transitions
+        checks.append(received.lit.random_checks)
+        seen = received.reached
         if seen is not None and shadow_scale != 1:
             what = {"scene": truth.occluders, "shapes": shapes}
             seen = reached_by_shadow_rays(hits.interaction, light.position, seen, **what)

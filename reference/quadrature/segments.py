@@ -79,9 +79,9 @@ def camera_segments(truth: TruthScene, distance: Array) -> Segments:
 
     The slots of a ray hold the bodies in the order in which it passes them, and what lies before, between and behind.
     """
-    found = [crossings(medium.bounds, truth.origin, truth.direction) for medium in truth.media]
-    enter = np.maximum(np.stack([low for low, _ in found]), 0.0)
-    leave = np.minimum(np.stack([high for _, high in found]), distance)
+    spans = [crossings(medium.bounds, truth.origin, truth.direction) for medium in truth.media]
+    enter = np.maximum(np.stack([low for low, _ in spans]), 0.0)
+    leave = np.minimum(np.stack([high for _, high in spans]), distance)
     # Bodies that a ray misses come last, as nothing at the end of the ray.
     enter, leave = np.where(enter < leave, enter, distance), np.where(enter < leave, leave, distance)
     order = np.argsort(enter, axis=0, kind="stable")
@@ -138,12 +138,27 @@ def leg_kinks(bounds: Bounds, light: Array, axes: tuple[Array, Array], height: A
 
 
 def polygon_corners(body: Polyhedron, light: Array, along: Array, away: Array) -> tuple[Index, Array, Array]:
-    """Return where the edges of a polyhedron meet the planes of rays and light: ray, p_1, p_2."""
+    """Return where the edges of a polyhedron meet the planes of rays and light.
+
+    Parameters
+    ----------
+    body
+        The polyhedron.
+    light
+        Position [m], (3,).
+    along, away
+        Unit vectors along the rays and from the light to the foot points, (rays, 3) each.
+
+    Returns
+    -------
+    ray, p_1, p_2
+        Number of the ray and components along both vectors, from the light [m], (corners,) each.
+    """
     ends = body.edge - light
     normal = np.cross(along, away)
-    one, two = normal @ ends[:, 0].T, normal @ ends[:, 1].T
-    ray, edge = np.nonzero((one * two <= 0) & (one != two))
-    share = (one[ray, edge] / (one[ray, edge] - two[ray, edge]))[:, None]
+    at_start, at_end = normal @ ends[:, 0].T, normal @ ends[:, 1].T
+    ray, edge = np.nonzero((at_start * at_end <= 0) & (at_start != at_end))
+    share = (at_start[ray, edge] / (at_start[ray, edge] - at_end[ray, edge]))[:, None]
     point = ends[edge, 0] + share * (ends[edge, 1] - ends[edge, 0])
     return ray, np.sum(point * along[ray], axis=1), np.sum(point * away[ray], axis=1)
 

@@ -27,7 +27,26 @@ class Rays:
 def sum_intervals(
     medium: TruthMedium, light: TruthLight, rays: Rays, lit: LitIntervals, shadow_scale: float
 ) -> tuple[Array, Array]:
-    """Integrate every lit interval and add up the intervals of each ray."""
+    """Integrate every lit interval and add up the intervals of each ray.
+
+    Parameters
+    ----------
+    medium
+        The medium without bounds.
+    light
+        A point or spot light.
+    rays
+        The camera rays as the light sees them.
+    lit
+        Their lit intervals, in angles at the light [rad].
+    shadow_scale
+        The share of the leg from the light that is attenuated over.
+
+    Returns
+    -------
+    radiance, bound
+        And the bound of its error, (rays, 3) each [W/(m^2 sr)].
+    """
     ray, x0, x1 = lit_stretches(light, rays, lit)
 
     def profile(x: Array, index: NDArray[np.int64]) -> Array:
@@ -71,12 +90,42 @@ def _edge_worth(
 
 
 def sums_of(owner: NDArray[np.int64], values: Array, count: int) -> Array:
-    """Add up the rows of values, (n, columns), that belong to each of so many owners, (count, columns)."""
+    """Add up the rows that belong to each owner.
+
+    Parameters
+    ----------
+    owner
+        Of each row, from 0 on, (n,).
+    values
+        (n, columns), in any unit.
+    count
+        Number of owners.
+
+    Returns
+    -------
+    numpy.ndarray
+        (count, columns), in the unit of the values.
+    """
     return np.stack([np.bincount(owner, column, count) for column in values.T], axis=1)
 
 
 def lit_stretches(light: TruthLight, rays: Rays, lit: LitIntervals) -> tuple[NDArray[np.int64], Array, Array]:
-    """Return rays and distances of both ends of the lit intervals [m], cut where a soft spot has kinks."""
+    """Return lit intervals by distance, cut where a soft spot has kinks.
+
+    Parameters
+    ----------
+    light
+        A point or spot light.
+    rays
+        The camera rays as the light sees them.
+    lit
+        Their lit intervals, in angles at the light [rad].
+
+    Returns
+    -------
+    ray, x0, x1
+        Number of the ray and distances of both ends [m], x1 may be infinite, (parts,) each.
+    """
     ray, low, high = _cut_at_beam(light, rays, lit)
     foot, height = rays.foot[ray], rays.height[ray]
     x0 = np.maximum(foot + height * np.tan(low), 0.0)

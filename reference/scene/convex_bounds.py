@@ -121,36 +121,36 @@ def _edges(shape: Any, faces: Index) -> tuple[Index, Index]:
     return ends[::2], np.stack([face[::2], face[1::2]], axis=1)
 
 
-def _refusal(shape: Any, found: str, wanted: str) -> InputError:
-    return InputError(f"shape '{shape.id()}' bounds a medium and {found}; wanted {wanted}")
+def _refusal(shape: Any, fault: str, wanted: str) -> InputError:
+    return InputError(f"shape '{shape.id()}' bounds a medium and {fault}; wanted {wanted}")
 
 
 def holds(bounds: Bounds, point: Array) -> bool:
-    """Return whether a point lies inside a body."""
+    """Return whether a point, (3,) [m], lies inside of bounds, off their surface."""
     if isinstance(bounds, Sphere):
         return bool(np.linalg.norm(point - bounds.centre) < bounds.radius)
     return bool(np.all(bounds.normal @ point < bounds.offset))
 
 
-def overlap(one: Bounds, other: Bounds) -> bool:
+def overlap(first: Bounds, second: Bounds) -> bool:
     """Return whether two bodies share more than their boundaries, to 1e-6 of their sizes."""
-    if isinstance(one, Sphere) and isinstance(other, Sphere):
-        gap = float(np.linalg.norm(one.centre - other.centre))
-        return gap < (one.radius + other.radius) * (1 - _FLAT)
-    if isinstance(one, Sphere):
-        assert isinstance(other, Polyhedron)
-        return _distance(other, one.centre) < one.radius * (1 - _FLAT)
-    if isinstance(other, Sphere):
-        return overlap(other, one)
+    if isinstance(first, Sphere) and isinstance(second, Sphere):
+        gap = float(np.linalg.norm(first.centre - second.centre))
+        return gap < (first.radius + second.radius) * (1 - _FLAT)
+    if isinstance(first, Sphere):
+        assert isinstance(second, Polyhedron)
+        return _distance(second, first.centre) < first.radius * (1 - _FLAT)
+    if isinstance(second, Sphere):
+        return overlap(second, first)
     # The largest sphere in what both have in common: maximise its radius t under n . x + t <= offset.
-    planes = np.concatenate([one.normal, other.normal])
+    planes = np.concatenate([first.normal, second.normal])
     result = linprog(
         [0.0, 0.0, 0.0, -1.0],
         A_ub=np.column_stack([planes, np.ones(len(planes))]),
-        b_ub=np.concatenate([one.offset, other.offset]),
+        b_ub=np.concatenate([first.offset, second.offset]),
         bounds=[(None, None)] * 4,
     )
-    size = min(float(np.linalg.norm(np.ptp(body.edge.reshape(-1, 3), axis=0))) for body in (one, other))
+    size = min(float(np.linalg.norm(np.ptp(body.edge.reshape(-1, 3), axis=0))) for body in (first, second))
     return bool(result.status == 0 and -result.fun > _FLAT * size)
 
 

@@ -85,7 +85,9 @@ def read_truth(scene) -> TruthScene:
         raise InputError("the scene has no camera; wanted a sensor of type 'perspective'")
     sensor = scene.sensors()[0]
     width, height = (int(n) for n in sensor.film().size())
-    far, near = (tuple(one for one in scene.emitters() if is_directional(one) == kind) for kind in (True, False))
+    far, near = (
+        tuple(emitter for emitter in scene.emitters() if is_directional(emitter) == kind) for kind in (True, False)
+    )
     if not far + near:
         raise InputError("the scene has no light; wanted at least one emitter of type 'point', 'spot' or 'directional'")
     lights = tuple(_read_light(emitter) for emitter in near)
@@ -145,11 +147,11 @@ def scene_of(shapes: list[Any], whole):
 
 
 def _check_disjoint(media: tuple[BoundedMedium, ...]) -> None:
-    for number, one in enumerate(media):
+    for number, medium in enumerate(media):
         for other in media[:number]:
-            if overlap(one.bounds, other.bounds):
+            if overlap(medium.bounds, other.bounds):
                 raise InputError(
-                    f"the media of shapes '{other.name}' and '{one.name}' overlap or one holds the other; wanted "
+                    f"the media of shapes '{other.name}' and '{medium.name}' overlap or one holds the other; wanted "
                     "disjoint bounds"
                 )
 

@@ -62,7 +62,9 @@ def refuse_others(shapes: Shapes) -> None:
         For a shape that is neither a mesh nor a rectangle nor a sphere, with its name.
     """
     if shapes.others is not None:
-        shape = next(one for one in shapes.others.shapes() if not is_polygonal(one) and one.class_name() != "Sphere")
+        shape = next(
+            each for each in shapes.others.shapes() if not is_polygonal(each) and each.class_name() != "Sphere"
+        )
         raise InputError(
             f"shape '{shape.id()}' is a {shape.class_name()}; wanted meshes, rectangles and spheres, whose lit "
             "intervals are exact: replace it by a mesh, or take edges='auto'"

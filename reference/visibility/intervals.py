@@ -56,26 +56,32 @@ def joined_doubt(*parts: Doubt | None) -> Doubt | None:
     return ray, angle, width
 
 
-def intersected(one: LitIntervals, other: LitIntervals, ends: tuple[Array, Array]) -> LitIntervals:
+def intersected(first: LitIntervals, second: LitIntervals, ends: tuple[Array, Array]) -> LitIntervals:
     """Return what is lit in both; the edges are as uncertain as the worse of the two, and doubt and checks add up.
 
     Parameters
     ----------
-    one, other
+    first, second
         The intervals; those of one ray neither overlap nor touch.
     ends
         Angles at the light between which the rays are looked at [rad].
     """
-    count = len(one.ray), len(other.ray)
-    ray = np.concatenate([one.ray, one.ray, other.ray, other.ray])
-    angle = np.concatenate([one.low, one.high, other.low, other.high])
+    count = len(first.ray), len(second.ray)
+    ray = np.concatenate([first.ray, first.ray, second.ray, second.ray])
+    angle = np.concatenate([first.low, first.high, second.low, second.high])
     step = np.repeat([1, -1, 1, -1], [count[0], count[0], count[1], count[1]])
     order = np.lexsort((step, angle, ray))  # what closes comes before what opens at the same angle
     ray, angle = ray[order], angle[order]
     both = np.flatnonzero(np.cumsum(step[order]) == 2)
     ray, low, high = ray[both], angle[both], angle[both + 1]
     transitions = int(np.sum(low > ends[0][ray]) + np.sum(high < ends[1][ray]))
-    random_checks = RandomChecks.of_all([one.random_checks, other.random_checks])
+    random_checks = RandomChecks.of_all([first.random_checks, second.random_checks])
     return LitIntervals(
-        ray, low, high, transitions, max(one.edge, other.edge), random_checks, joined_doubt(one.doubt, other.doubt)
+        ray,
+        low,
+        high,
+        transitions,
+        max(first.edge, second.edge),
+        random_checks,
+        joined_doubt(first.doubt, second.doubt),
     )

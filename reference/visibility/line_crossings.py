@@ -35,7 +35,22 @@ def crossings(bounds: Bounds, origin: Array, direction: Array) -> tuple[Array, A
 
 
 def crossed_facets(bounds: Polyhedron, origin: Array, direction: Array) -> tuple[Index, Index, Array, Array]:
-    """Return the facets at which rays enter and leave a polyhedron, and the distances, as `crossings` does."""
+    """Return the facets at which rays enter and leave a polyhedron, and the distances, as `crossings` does.
+
+    Parameters
+    ----------
+    bounds
+        The polyhedron.
+    origin, direction
+        As in `crossings`.
+
+    Returns
+    -------
+    entered, left
+        Numbers of the facets, (n,) each.
+    enter, leave
+        Distances along the whole straight line, (n,) each [m]; leave <= enter where it misses the polyhedron.
+    """
     origin = np.atleast_2d(origin)
     enter, leave = np.empty(len(direction), np.int64), np.empty(len(direction), np.int64)
     low, high = np.empty(len(direction)), np.empty(len(direction))
@@ -74,5 +89,5 @@ def _power(sphere: Sphere, origin: Array) -> Array:
 
 
 def half_chord(radius: Array | float, distance: Array) -> Array:
-    """Return half of the chord at a distance from the centre of a disk, sqrt(radius^2 - distance^2); 0 beyond it."""
+    """Return half of the chord at a distance from a disk's centre, sqrt(radius^2 - distance^2) [m]; 0 beyond it."""
     return np.sqrt(np.maximum(radius - distance, 0) * (radius + distance))

@@ -133,7 +133,24 @@ def point_leg(position: Array, rays: tuple[Array, Array, Array]) -> Leg:
 def found_intervals(
     truth: TruthScene, legs: Legs, *, ends: tuple[Array, Array], samples: int, edges: str, shapes: Shapes | None
 ) -> LitIntervals:
-    """Find and check the lit intervals of rays for any light; the parameters are those of `lit_intervals`."""
+    """Find and check the lit intervals of rays for any light.
+
+    Parameters
+    ----------
+    truth
+        The scene.
+    legs
+        The legs from the light to points of the rays.
+    ends
+        Between which the rays are looked at, (rays,) each, in the variable of the legs: an angle [rad], or a share.
+    samples, edges, shapes
+        As in `lit_intervals`.
+
+    Raises
+    ------
+    InputError
+        For another word in `edges`; for `edges` 'geometry' with shapes whose shadows are not exact.
+    """
     if edges not in ("auto", "geometry", "rays"):
         raise InputError(f"edges is '{edges}'; wanted 'geometry', 'rays' or 'auto'")
     low, high = ends
@@ -206,11 +223,11 @@ def _first_hits(scene, legs: Legs) -> Callable:
         shadow_ray = legs.shadow(ray, theta)
         length = mi.Float(shadow_ray.maxt)
         shadow_ray.maxt = dr.inf
-        found = scene.ray_intersect_preliminary(shadow_ray, coherent=True)
-        valid = found.is_valid()
-        lit = ~(valid & (found.t < length))
-        shape = dr.select(valid, dr.reinterpret_array(mi.UInt32, found.shape), 0)
-        distance = np.array(dr.select(valid, found.t, 1.0), dtype=np.float64)
+        hit = scene.ray_intersect_preliminary(shadow_ray, coherent=True)
+        valid = hit.is_valid()
+        lit = ~(valid & (hit.t < length))
+        shape = dr.select(valid, dr.reinterpret_array(mi.UInt32, hit.shape), 0)
+        distance = np.array(dr.select(valid, hit.t, 1.0), dtype=np.float64)
         return np.array(lit, dtype=bool), legs.depth(ray, distance), np.array(shape, dtype=np.int64)
 
     return hits
@@ -232,10 +249,10 @@ def _toggles(visible: Visible, hits: Callable, ends: tuple[Array, Array], used: 
         share = np.arange(1, _PARTS) / _PARTS
         more = (theta[cells, None] + (theta[cells + 1] - theta[cells])[:, None] * share).ravel()
         more_row = np.repeat(row[cells], _PARTS - 1)
-        found = hits(used[more_row], more)
+        added = hits(used[more_row], more)
         at = np.repeat(cells + 1, _PARTS - 1)
         row, theta = np.insert(row, at, more_row), np.insert(theta, at, more)
-        lit, distance, shape = (np.insert(old, at, new) for old, new in zip((lit, distance, shape), found, strict=True))
+        lit, distance, shape = (np.insert(old, at, new) for old, new in zip((lit, distance, shape), added, strict=True))
     cells = np.flatnonzero((row[1:] == row[:-1]) & (lit[1:] != lit[:-1]))
     edge = _bisect(visible, used[row[cells]], (theta[cells], theta[cells + 1]), lit[cells])
     first = np.flatnonzero(np.append(True, row[1:] != row[:-1]))

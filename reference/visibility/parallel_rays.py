@@ -58,6 +58,17 @@ class ParallelRays:
 def parallel_rays(origin: Array, direction: Array, light: DirectionalLight, ends: tuple[Array, Array]) -> ParallelRays:
     """Return camera rays in their planes with a light, to be looked at between two distances [m].
 
+    Parameters
+    ----------
+    origin
+        Where all rays begin [m], (3,).
+    direction
+        Unit vectors, (n, 3).
+    light
+        The directional light.
+    ends
+        Distances between which the rays are looked at, (n,) each [m].
+
     Notes
     -----
     Valid for all directions. A ray towards the light or away from it lies in many planes: any is as good.

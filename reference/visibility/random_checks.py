@@ -186,8 +186,8 @@ def _neighbours(toggles: Toggles, ray: Index, before: Index, outside: tuple[Arra
 def _mended(toggles: Toggles, ray: Index, theta: Array, found_by: Rounding, ends: tuple[Array, Array]) -> Toggles:
     """Turn one contradicting sample of each interval into two edges."""
     before = _edges_before(toggles, ray, theta)
-    _, one = np.unique(np.stack([ray, before]), axis=1, return_index=True)
-    ray, theta, before = ray[one], theta[one], before[one]
+    _, distinct = np.unique(np.stack([ray, before]), axis=1, return_index=True)
+    ray, theta, before = ray[distinct], theta[distinct], before[distinct]
     lit, _ = _predicted(toggles, ray, theta)
     left, right = _neighbours(toggles, ray, before, (ends[0][ray], ends[1][ray]))
     opening = found_by.bisect(found_by.visible, ray, (left, theta), lit)

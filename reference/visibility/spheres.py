@@ -73,10 +73,10 @@ def sphere_shadows(spheres: tuple[Array, Array], direction: Array, normal: Array
     tangent = half_chord(distance, radius)[sphere]  # T^2 = |C|^2 - R^2: the same product, with both swapped
 
     outside = ~inside
-    found = [_hidden_behind(ray[outside], *(part[outside] for part in (c_y, c_z, disk, height[ray], tangent)))]
+    hidden = [_hidden_behind(ray[outside], *(part[outside] for part in (c_y, c_z, disk, height[ray], tangent)))]
     if inside.any():
-        found += _hidden_from_inside(ray[inside], *(part[inside] for part in (c_y, c_z, disk, height[ray])))
-    rows, low, high = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        hidden += _hidden_from_inside(ray[inside], *(part[inside] for part in (c_y, c_z, disk, height[ray])))
+    rows, low, high = (np.concatenate(parts) for parts in zip(*hidden, strict=True))
     return rows, low, high
 
 

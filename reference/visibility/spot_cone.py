@@ -22,7 +22,22 @@ Array = NDArray[np.float64]
 
 
 def perpendicular(origin: Array, direction: Array, light: TruthLight) -> Array:
-    """Return the unit vectors from the light to the foot points, (pixels, 3); any normal if a ray meets the light."""
+    """Return the unit vectors from the light to the foot points; any normal if a ray meets the light.
+
+    Parameters
+    ----------
+    origin
+        Where all rays begin [m], (3,).
+    direction
+        Unit vectors, (rays, 3).
+    light
+        The light.
+
+    Returns
+    -------
+    numpy.ndarray
+        (rays, 3).
+    """
     offset = origin - light.position
     foot = -(direction @ offset)
     n = offset + foot[:, None] * direction
@@ -32,7 +47,22 @@ def perpendicular(origin: Array, direction: Array, light: TruthLight) -> Array:
 
 
 def cone_interval(direction: Array, normal: Array, light: TruthLight, angle: float) -> tuple[Array, Array]:
-    """Return the interval of theta inside a cone about the light's axis [rad]; empty intervals have low > high."""
+    """Return the interval of theta inside a cone about the light's axis.
+
+    Parameters
+    ----------
+    direction, normal
+        Unit vectors along the rays, and from the light to the foot points, (rays, 3) each.
+    light
+        The light; for a point light the interval is that of the whole line.
+    angle
+        Half angle of the cone [rad].
+
+    Returns
+    -------
+    low, high
+        (rays,) each [rad]; low > high where the ray misses the cone.
+    """
     if light.axis is None:
         half_pi = np.full(len(direction), 0.5 * np.pi)
         return -half_pi, half_pi
@@ -45,7 +75,22 @@ def cone_interval(direction: Array, normal: Array, light: TruthLight, angle: flo
 
 
 def falloff(theta: Array, direction: Array, normal: Array, light: TruthLight) -> Array:
-    """Return Mitsuba's spot profile at theta, (rays, angles): one in the beam, then linear down to the cut-off."""
+    """Return Mitsuba's spot profile: one in the beam, then linear in the angle down to the cut-off.
+
+    Parameters
+    ----------
+    theta
+        Angles at the light, (rays, angles) [rad].
+    direction, normal
+        Unit vectors along the rays, and from the light to the foot points, (rays, 3) each.
+    light
+        The light.
+
+    Returns
+    -------
+    numpy.ndarray
+        Intensity over that on the axis [1], (rays, angles).
+    """
     if light.axis is None or light.beam >= light.cutoff:
         return np.ones_like(theta)
     axial, across = (direction @ light.axis)[:, None], (normal @ light.axis)[:, None]

@@ -57,9 +57,9 @@ def reached_by_shadow_rays(interaction: Any, light: Array, reached: Bools, *, sc
     blocked = segments_blocked(start, start + (light - start) * _share(ray, start, light, differs), shapes)
     if shapes.others is not None:
         blocked |= np.array(shapes.others.ray_test(ray, interaction.is_valid()), dtype=bool)[differs]
-    found = reached.copy()
-    found[differs] = ~blocked
-    return found
+    confirmed = reached.copy()
+    confirmed[differs] = ~blocked
+    return confirmed
 
 
 def _share(ray: Any, start: Array, light: Array, chosen: NDArray[np.int64]) -> Array:
@@ -137,15 +137,15 @@ def _from_line(point: Array, place: Array, direction: Array) -> Array:
 
 def _meets_triangle(start: Array, way: Array, corner: Array, edges: tuple[Array, Array]) -> Bools:
     """Solve start + s way = corner + u e1 + v e2 for every pair; the scalar products share the determinant."""
-    one, other = edges
-    across = np.cross(way, other)
-    determinant = np.sum(one * across, axis=-1)
+    first_edge, second_edge = edges
+    across = np.cross(way, second_edge)
+    determinant = np.sum(first_edge * across, axis=-1)
     from_corner = start - corner
-    beside = np.cross(from_corner, one)
+    beside = np.cross(from_corner, first_edge)
     with np.errstate(divide="ignore", invalid="ignore"):
         u = np.sum(from_corner * across, axis=-1) / determinant
         v = np.sum(way * beside, axis=-1) / determinant
-        s = np.sum(other * beside, axis=-1) / determinant
+        s = np.sum(second_edge * beside, axis=-1) / determinant
         return (u >= 0) & (v >= 0) & (u + v <= 1) & (s > 0) & (s < 1)
 
 

@@ -108,7 +108,7 @@ def geometric_intervals(
 
 
 def axis_frame(to_light: Array) -> Array:
-    """Return three unit vectors as rows: along the way from the camera to the light, and two across."""
+    """Return unit vectors as rows, (3, 3): along the way from the camera to the light, (3,) [m], and two across."""
     length = np.linalg.norm(to_light)
     axis = to_light / length if length > 0 else np.array([0.0, 0.0, 1.0])
     across = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
@@ -143,13 +143,26 @@ def azimuths(corners: Array, frame: Array) -> tuple[Array, Array]:
 
 
 def spheres_around(corners: Array) -> tuple[Array, Array]:
-    """Return the centres and radii of spheres that hold the triangles."""
+    """Return centres, (n, 3) [m], and radii, (n,) [m], of spheres that hold triangles, (n, 3, 3) [m]."""
     centre = corners.mean(axis=1)
     return centre, np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1, initial=0)
 
 
 def angle_below(centre: Array, radius: Array, axis: Array) -> Array:
-    """Return a lower bound of the angle between an axis and the points of spheres around `centre`."""
+    """Return a lower bound of the angle between an axis and the points of spheres.
+
+    Parameters
+    ----------
+    centre, radius
+        Of the spheres, (n, 3) and (n,) [m].
+    axis
+        Unit vector, (3,).
+
+    Returns
+    -------
+    numpy.ndarray
+        (n,) [rad].
+    """
     distance = np.linalg.norm(centre, axis=1)
     along = centre @ axis
     angle = np.arctan2(np.linalg.norm(centre - along[:, None] * axis, axis=1), along)
@@ -186,7 +199,22 @@ def near_pairs(azimuth: Array, reach: tuple[Array, Array], cones: Reaches) -> tu
 
 
 def lit_of_chunk(shadows: Shadows, ends: tuple[Array, Array], used: Index) -> tuple[Array, Array, Array]:
-    """Return rays, beginnings and ends of the lit intervals of a chunk of rays, given what is hidden."""
+    """Return the lit intervals of a chunk of rays, given what is hidden.
+
+    Parameters
+    ----------
+    shadows
+        Rows of `used`, and where hidden intervals begin and end, in any order.
+    ends
+        Between which all rays are looked at, (rays,) each.
+    used
+        Numbers of the rays of the chunk.
+
+    Returns
+    -------
+    ray, low, high
+        Of every lit interval, (intervals,) each, in the unit of the ends.
+    """
     low, high = ends[0][used], ends[1][used]
     row, begin, end = shadows
     begin, end = np.maximum(begin, low[row]), np.minimum(end, high[row])
@@ -219,16 +247,28 @@ def _shadows(
     corners: Array, rays: tuple[Array, Array, Array], pairs: tuple[Index, Index]
 ) -> tuple[Index, Array, Array]:
     """Return the rays and the intervals of theta that triangles hide."""
-    row, one, other = plane_sections(corners, rays[:2], pairs)
-    return _clipped(row, one, other, rays[2][row])
+    row, first, second = plane_sections(corners, rays[:2], pairs)
+    return _clipped(row, first, second, rays[2][row])
 
 
 def plane_sections(
     corners: Array, axes: tuple[Array, Array], pairs: tuple[Index, Index]
 ) -> tuple[Index, tuple[Array, Array], tuple[Array, Array]]:
-    """Return the segments in which triangles meet the planes of rays: number of the ray, (y, z) of both ends.
+    """Return the segments in which triangles meet the planes of rays.
 
-    The corners are relative to a point of all planes, which `axes` span: unit vectors along z and along y, (rays, 3).
+    Parameters
+    ----------
+    corners
+        Relative to a point of all planes, (triangles, 3, 3) [m].
+    axes
+        Unit vectors along z and along y, which span the planes, (rays, 3) each.
+    pairs
+        Numbers of the rays and triangles to look at.
+
+    Returns
+    -------
+    row, first, second
+        Number of the ray, and (y, z) of both ends [m], (segments,) each.
     """
     row, triangle = pairs
     direction, normal = axes
@@ -241,8 +281,8 @@ def plane_sections(
     # The corner that is alone on its side of the plane: both edges that the plane cuts start there.
     alone = np.argmax(above[:, cut] == (count[cut] == 1), axis=0)
     y, z = _components(chosen, normal[row]), _components(chosen, direction[row])
-    one, other = (_crossing(alone, (alone + k) % 3, side, (y, z)) for k in (1, 2))
-    return row, one, other
+    first, second = (_crossing(alone, (alone + k) % 3, side, (y, z)) for k in (1, 2))
+    return row, first, second
 
 
 def _components(chosen: Array, vector: Array) -> Array:

@@ -104,15 +104,15 @@ def directions(scene: FogScene) -> tuple[tuple[float, ...], ...]:
     with mp.workdps(_GEOMETRY):
         width = 2 * mp.tan(mp.radians(mpf(scene.fov)) / 2) / SIZE
         rows = [vector(row[:3]) for row in scene.camera[:3]]
-        found = []
+        unit_directions = []
         for pixel in range(SIZE * SIZE):
             row, column = divmod(pixel, SIZE)
             half = mpf(SIZE - 1) / 2
             own = ((half - column) * width, (half - row) * width, mpf(1))
-            found.append(
+            unit_directions.append(
                 tuple(float(value) for value in unit((dot(rows[0], own), dot(rows[1], own), dot(rows[2], own))))
             )
-    return tuple(found)
+    return tuple(unit_directions)
 
 
 def certify_pixel(scene: FogScene, direction: Sequence[float]) -> CertifiedPixel:
@@ -146,7 +146,9 @@ def certify_pixel(scene: FogScene, direction: Sequence[float]) -> CertifiedPixel
                 factor = mp.mpf(scene.albedo[channel]) * scene.sigma_t[channel] * light.intensity[channel] / (4 * mp.pi)
                 total[channel] += factor * integral
         words = [_rounded(value) for value in total]
-        intervals = tuple(tuple((_word(low), _word(high)) for low, high in one) for one in lit)
+        intervals = tuple(
+            tuple((_word(low), _word(high)) for low, high in intervals_of_light) for intervals_of_light in lit
+        )
         return CertifiedPixel(_word(end), tuple(w for w, _ in words), tuple(b for _, b in words), intervals)
 
 
@@ -168,17 +170,17 @@ def _integrals(scene: FogScene, light: FogLight, ray: tuple[Vector, Vector], par
             across=dot(axis, normal) / height,
             angles=(light.beam, light.cutoff),
         )
-    found: list[Number] = []
+    integrals: list[Number] = []
     for channel, sigma_t in enumerate(scene.sigma_t):
         if channel and sigma_t == scene.sigma_t[0]:
-            found.append(found[0])
+            integrals.append(integrals[0])
             continue
         terms = [
             integrate_certified(foot, height, low, high, sigma_t, faint if dim else plain, digits=_INTEGRAL)
             for low, high, dim in parts
         ]
-        found.append(mp.fsum(terms))
-    return found
+        integrals.append(mp.fsum(terms))
+    return integrals
 
 
 def _joined(parts: list) -> list[tuple[Number, Number]]:
@@ -210,7 +212,7 @@ def certified_data(scenes: Sequence[FogScene] | None = None, *, progress: Progre
     """Certify all pixels of the scenes, by default of all twelve, and return the data of the file."""
     chosen = fog_scenes() if scenes is None else scenes
     count, done = len(chosen) * SIZE * SIZE, 0
-    found = []
+    scenes_data = []
     for scene in chosen:
         rays, pixels = directions(scene), []
         for direction in rays:
@@ -218,8 +220,8 @@ def certified_data(scenes: Sequence[FogScene] | None = None, *, progress: Progre
             done += 1
             if progress is not None:
                 progress(done / count, scene.name)
-        found.append(scene_data(scene, rays) | {"pixels": pixels})
-    return {"schema": SCHEMA, "conventions": _CONVENTIONS, "scenes": found}
+        scenes_data.append(scene_data(scene, rays) | {"pixels": pixels})
+    return {"schema": SCHEMA, "conventions": _CONVENTIONS, "scenes": scenes_data}
 
 
 def scene_data(scene: FogScene, rays: Sequence[Sequence[float]]) -> dict[str, Any]:

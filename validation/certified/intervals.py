@@ -49,9 +49,9 @@ def vector(values: Sequence[float]) -> Vector:
     return x, y, z
 
 
-def minus(one: Vector, other: Vector) -> Vector:
+def minus(a: Vector, b: Vector) -> Vector:
     """Return the difference of two vectors."""
-    return one[0] - other[0], one[1] - other[1], one[2] - other[2]
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 def along(start: Vector, x: Number, direction: Vector) -> Vector:
@@ -59,24 +59,24 @@ def along(start: Vector, x: Number, direction: Vector) -> Vector:
     return start[0] + x * direction[0], start[1] + x * direction[1], start[2] + x * direction[2]
 
 
-def dot(one: Vector, other: Vector) -> Number:
+def dot(a: Vector, b: Vector) -> Number:
     """Return the scalar product."""
-    return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-def cross(one: Vector, other: Vector) -> Vector:
+def cross(a: Vector, b: Vector) -> Vector:
     """Return the vector product."""
     return (
-        one[1] * other[2] - one[2] * other[1],
-        one[2] * other[0] - one[0] * other[2],
-        one[0] * other[1] - one[1] * other[0],
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
     )
 
 
-def unit(one: Vector) -> Vector:
+def unit(v: Vector) -> Vector:
     """Return the vector of length 1."""
-    length = mp.sqrt(dot(one, one))
-    return one[0] / length, one[1] / length, one[2] / length
+    length = mp.sqrt(dot(v, v))
+    return v[0] / length, v[1] / length, v[2] / length
 
 
 def ray_end(origin: Vector, direction: Vector, occluders: Sequence[Occluder]) -> Number:
@@ -186,13 +186,13 @@ def _shadow_crossings(shape: Occluder, place: Vector, start: Vector, direction: 
     if isinstance(shape, FogSphere):
         v = minus(vector(shape.centre), place)
         return _cone_crossings(start, direction, v, dot(v, v) - mpf(shape.radius) ** 2)
-    found = []
-    for one, other in _edges(shape, place):
-        normal = cross(one, other)
+    crossings = []
+    for first, second in _edges(shape, place):
+        normal = cross(first, second)
         rate = dot(direction, normal)
         if rate != 0:
-            found.append(-dot(start, normal) / rate)
-    return found
+            crossings.append(-dot(start, normal) / rate)
+    return crossings
 
 
 def _edges(shape: FogBox | FogScreen, place: Vector) -> list[tuple[Vector, Vector]]:

@@ -76,7 +76,7 @@ def mitsuba_dict(scene: FogScene) -> dict[str, Any]:
     while max(scene.sigma_t) > scale:
         scale *= 4
     phase: dict[str, Any] = {"type": scene.phase} | ({"g": scene.g} if scene.phase == "hg" else {})
-    found: dict[str, Any] = {
+    entries: dict[str, Any] = {
         "type": "scene",
         "fog": {
             "type": "homogeneous",
@@ -96,8 +96,8 @@ def mitsuba_dict(scene: FogScene) -> dict[str, Any]:
             "film": {"type": "hdrfilm", "width": SIZE, "height": SIZE, "rfilter": {"type": "box"}},
         },
     }
-    found |= {f"light{number}": _light_dict(light) for number, light in enumerate(scene.lights)}
-    return found | {f"occluder{number}": _shape_dict(shape) for number, shape in enumerate(scene.occluders)}
+    entries |= {f"light{number}": _light_dict(light) for number, light in enumerate(scene.lights)}
+    return entries | {f"occluder{number}": _shape_dict(shape) for number, shape in enumerate(scene.occluders)}
 
 
 def load_fog(scene: dict[str, Any]) -> Any:

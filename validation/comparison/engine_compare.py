@@ -159,7 +159,7 @@ def compare_scene(
 
 
 def truth_layer(truth: TruthImage, name: str) -> NDArray[np.float64]:
-    """Return 'airlight', 'surface' or their sum, 'total'."""
+    """Return 'airlight', 'surface' or their sum, 'total', (height, width, 3) [W/(m^2 sr)]."""
     return truth.airlight + truth.surface if name == TOTAL else getattr(truth, name)
 
 
@@ -186,10 +186,10 @@ def _chosen_layer(image: Image, name: str | None, path: str | os.PathLike[str]) 
     if name is not None:
         layer(image, name, path)
         return name or TOTAL
-    colours = [one for one in image.layers if not one.endswith("_se")]
-    for one in ("airlight", TOTAL):
-        if one in colours:
-            return one
+    colours = [each for each in image.layers if not each.endswith("_se")]
+    for usual in ("airlight", TOTAL):
+        if usual in colours:
+            return usual
     if len(colours) != 1:
         raise InputError(
             f"{path} has no channels R, G, B and no layer 'airlight'; it has "

@@ -75,10 +75,10 @@ def find_hints(reference: ArrayLike, test: ArrayLike) -> Hints:
 def _suspects(ref: Array, tst: Array, mean: float) -> tuple[str, ...]:
     """Name the faults without which the error is ten times smaller."""
     first = smallest = _rmse(ref, tst)
-    found: tuple[str, ...] = ()
+    hints: tuple[str, ...] = ()
     if first < LEAST * mean:
-        return found
-    combinations = sorted(product(_TURNS, _ORDERS, _CURVES, (False, True)), key=lambda one: sum(map(bool, one)))
+        return hints
+    combinations = sorted(product(_TURNS, _ORDERS, _CURVES, (False, True)), key=lambda changes: sum(map(bool, changes)))
     for turn, order, curve, scaled in combinations:
         changed = _TURNS[turn](_ORDERS[order](_CURVES[curve](tst)))
         factor, error = _fitted(ref, changed) if scaled else (1.0, _rmse(ref, changed))
@@ -86,9 +86,9 @@ def _suspects(ref: Array, tst: Array, mean: float) -> tuple[str, ...]:
             continue
         smallest = error
         words = [f"the image is {fault}" for fault in (turn, order, curve) if fault]
-        found = (*words, f"the image is {_brightness(factor)}") if scaled else tuple(words)
-    fall = f"; without {'it' if len(found) == 1 else 'all that'} the relative rmse is {smallest / mean:.3g} instead of "
-    return (*found[:-1], found[-1] + fall + f"{first / mean:.3g}") if found else ()
+        hints = (*words, f"the image is {_brightness(factor)}") if scaled else tuple(words)
+    fall = f"; without {'it' if len(hints) == 1 else 'all that'} the relative rmse is {smallest / mean:.3g} instead of "
+    return (*hints[:-1], hints[-1] + fall + f"{first / mean:.3g}") if hints else ()
 
 
 def _fitted(ref: Array, tst: Array) -> tuple[float, float]:

@@ -71,12 +71,12 @@ def find_images(folder: Path | str, scenes: Mapping[str, str]) -> dict[str, tupl
     files = sorted(path for path in place.iterdir() if path.suffix.lower() == ".exr" and not path.name.startswith("."))
     if not files:
         raise InputError(f"--images: the folder {folder} has no EXR file; wanted SCENE.exr or SCENE.NAME.exr in it")
-    found: dict[str, tuple[EngineImage, ...]] = {}
+    by_scene: dict[str, tuple[EngineImage, ...]] = {}
     for path in files:
         scene = _scene_of(path, scenes)
         label = path.stem[len(scene) + 1 :] or place.resolve().name or "image"
-        found[scene] = (*found.get(scene, ()), EngineImage(scene, label, path))
-    return found
+        by_scene[scene] = (*by_scene.get(scene, ()), EngineImage(scene, label, path))
+    return by_scene
 
 
 def images_size(images: tuple[EngineImage, ...]) -> tuple[int, int]:
@@ -87,7 +87,7 @@ def images_size(images: tuple[EngineImage, ...]) -> tuple[int, int]:
     InputError
         If two sizes differ, or a file cannot be read.
     """
-    sizes = {one.path: _size(read_exr(one.path)) for one in images}
+    sizes = {image.path: _size(read_exr(image.path)) for image in images}
     first = images[0]
     for path, size in sizes.items():
         if size != sizes[first.path]:

@@ -147,9 +147,9 @@ def compare_files(
     InputError
         Also if a file is missing, broken or of a kind that is not read.
     """
-    one, two = read_exr(reference), read_exr(test)
+    reference_image, test_image = read_exr(reference), read_exr(test)
     chosen = None if mask is None else read_mask(mask)
-    names = (str(reference), one), (str(test), two)
+    names = (str(reference), reference_image), (str(test), test_image)
     return _compare(*names, name=layer, mask=chosen, margin=margin, extras=_Extras(all_metrics, flip, exposure))
 
 
@@ -163,8 +163,8 @@ class _Extras:
 
 
 def _compare(
-    one: tuple[str, Image],
-    two: tuple[str, Image],
+    reference_image: tuple[str, Image],
+    test_image: tuple[str, Image],
     *,
     name: str,
     mask: ArrayLike | None,
@@ -174,15 +174,15 @@ def _compare(
     """Compare a layer of two images that have names."""
     if extras.exposure is not None and not (extras.all_metrics or extras.flip):
         raise InputError("an exposure is for the colour differences and FLIP; ask for all metrics or for FLIP too")
-    reference, test = (_estimate(path, image, name) for path, image in (one, two))
+    reference, test = (_estimate(path, image, name) for path, image in (reference_image, test_image))
     metrics = error_metrics(reference.mean, test.mean, mask=mask)
     statistics = None
     if reference.standard_error is not None or test.standard_error is not None:
         statistics = compare_statistics(reference, test, mask=mask, margin=margin)
     elif margin is not None:
         raise InputError(
-            f"a margin wants standard errors, and neither {one[0]} nor {two[0]} has a layer '{name}_se'; "
-            "leave the margin out, or make the reference by Monte Carlo"
+            f"a margin wants standard errors, and neither {reference_image[0]} nor {test_image[0]} has a layer "
+            f"'{name}_se'; leave the margin out, or make the reference by Monte Carlo"
         )
     images: tuple[ArrayLike, ArrayLike] = (reference.mean, test.mean)
     wanted = extras.all_metrics

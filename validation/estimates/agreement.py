@@ -97,9 +97,9 @@ def agreement(
     masks = layer_masks(read_truth(scene), plain)
     layers = [layer for layer in LAYERS if np.any(getattr(plain, layer) > 0)]
 
-    def compared(found: Batches, layer: str) -> Statistics:
+    def compared(traced: Batches, layer: str) -> Statistics:
         mask = masks[layer]
-        test = batch_estimate(found, layer, mask)
+        test = batch_estimate(traced, layer, mask)
         return compare_statistics(Estimate(getattr(shortened, layer)), test, mask=mask, margin=margin)
 
     start = time.monotonic()
@@ -110,12 +110,12 @@ def agreement(
     go_on = None if seconds is None else (lambda done: time.monotonic() - start <= seconds)
     expected = least = _LEAST_BATCHES[estimator]
 
-    def enough(found: Batches) -> bool:
+    def enough(so_far: Batches) -> bool:
         nonlocal expected
         if not layers:
             return True
-        widest = max(width_to_reach(compared(found, layer), margin) for layer in layers)
-        done = len(found.seeds)
+        widest = max(width_to_reach(compared(so_far, layer), margin) for layer in layers)
+        done = len(so_far.seeds)
         # The width falls with the square root of the batches: that is when this will be over.
         expected = max(least, round(done * widest**2) if np.isfinite(widest) else batches)
         return done >= least and widest < 1
@@ -124,7 +124,7 @@ def agreement(
         if progress is not None:
             progress(min(done, expected), min(total, expected), what)
 
-    found = monte_carlo_batches(
+    traced = monte_carlo_batches(
         scene,
         estimator,
         batches=batches,
@@ -134,19 +134,19 @@ def agreement(
         go_on=go_on,
         progress=tell,
     ).batches
-    results = {layer: compared(found, layer) for layer in layers}
+    results = {layer: compared(traced, layer) for layer in layers}
     return {
         layer: Agreement(
             estimator,
             layer,
             plain.distance.shape[1],
             plain.distance.shape[0],
-            len(found.seeds),
-            found.samples,
+            len(traced.seeds),
+            traced.samples,
             epsilon,
             int((~masks[layer]).sum()),
             results[layer],
-            _bias(getattr(plain, layer), found, layer, masks[layer]),
+            _bias(getattr(plain, layer), traced, layer, masks[layer]),
             width_to_reach(results[layer], margin) < 1,
         )
         for layer in layers
@@ -183,7 +183,7 @@ def agreements(
         By estimator and layer, as in 'volpath airlight'.
     """
     tell = progress or (lambda share, what: None)
-    found: dict[str, Agreement] = {}
+    by_name: dict[str, Agreement] = {}
     for number, (estimator, margin) in enumerate(margins.items()):
 
         def told(done: int, total: int, what: str, first: int = number) -> None:
@@ -198,12 +198,12 @@ def agreements(
             seconds=seconds,
             progress=told,
         )
-        found |= {f"{estimator} {layer}": one for layer, one in by_layer.items()}
-    return found
+        by_name |= {f"{estimator} {layer}": result for layer, result in by_layer.items()}
+    return by_name
 
 
-def _bias(expected: Array, found: Batches, layer: str, mask: Mask) -> float:
-    return float(layer_mean(found, layer, mask)[mask].sum() / expected[mask].sum() - 1)
+def _bias(expected: Array, batches: Batches, layer: str, mask: Mask) -> float:
+    return float(layer_mean(batches, layer, mask)[mask].sum() / expected[mask].sum() - 1)
 
 
 def layer_masks(truth: TruthScene, image: TruthImage) -> dict[str, Mask]:
@@ -229,15 +229,15 @@ def batch_estimate(batches: Batches, layer: str, mask: Mask) -> Estimate:
     )
 
 
-def widest_interval(found: Statistics) -> tuple[float, float]:
+def widest_interval(statistics: Statistics) -> tuple[float, float]:
     """Return the wider of the 95 % intervals of the relative bias."""
-    intervals = [found.relative_bias_ci, found.relative_bias_ci_batches]
+    intervals = [statistics.relative_bias_ci, statistics.relative_bias_ci_batches]
     return max((pair for pair in intervals if pair is not None), key=lambda pair: pair[1] - pair[0])
 
 
-def width_to_reach(found: Statistics, margin: float) -> float:
+def width_to_reach(statistics: Statistics, margin: float) -> float:
     """Return the half width of the wider interval over 0.4 times the margin: runs stop where it is below 1."""
-    low, high = widest_interval(found)
+    low, high = widest_interval(statistics)
     return 0.5 * (high - low) / (0.4 * margin)
 
 

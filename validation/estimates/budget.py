@@ -86,12 +86,12 @@ class RelativeErrors:
     worst: float
 
 
-def relative_errors(found: Batches, near: NDArray[np.bool_]) -> RelativeErrors:
+def relative_errors(batches: Batches, near: NDArray[np.bool_]) -> RelativeErrors:
     """Return the errors of some batches; `near` are the pixels beside a light, (pixels,)."""
     pooled = worst = 0.0
     for number, layer in enumerate(LAYERS):
         keep = ~near if layer == "airlight" else np.ones_like(near)
-        mean, error = found.mean[number][keep], found.standard_error[number][keep]
+        mean, error = batches.mean[number][keep], batches.standard_error[number][keep]
         total = mean.sum(axis=0)
         lit = total > 0
         if not lit.any():

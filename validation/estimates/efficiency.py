@@ -165,17 +165,17 @@ def _variance(runs: list[Batches], where: tuple[int, Array, NDArray[np.bool_]]) 
     return float(np.mean(squares / expected[lit] ** 2))
 
 
-def efficiency_lines(found: Efficiency) -> list[str]:
+def efficiency_lines(efficiency: Efficiency) -> list[str]:
     """Return what was measured, for people: a line for each estimator and one for the ratio."""
     lines = [
-        f"{one.name:16s} {one.samples:4d} samples x {one.batches} batches   {1e3 * one.seconds:9.2f} ms a batch   "
-        f"relative variance {one.variance:.3g} (+- {100 * one.variance_error:.0f} %)   "
-        f"time x variance {one.cost:.3g} s"
-        for one in (found.fast, found.slow)
+        f"{each.name:16s} {each.samples:4d} samples x {each.batches} batches   {1e3 * each.seconds:9.2f} ms a batch   "
+        f"relative variance {each.variance:.3g} (+- {100 * each.variance_error:.0f} %)   "
+        f"time x variance {each.cost:.3g} s"
+        for each in (efficiency.fast, efficiency.slow)
     ]
-    left_out = f", {found.masked} next to a light left out" if found.masked else ""
+    left_out = f", {efficiency.masked} next to a light left out" if efficiency.masked else ""
     lines.append(
-        f"{found.fast.name} reaches the error of {found.slow.name} {found.ratio:.0f} times faster "
-        f"({found.layer}, {found.pixels} pixels{left_out})"
+        f"{efficiency.fast.name} reaches the error of {efficiency.slow.name} {efficiency.ratio:.0f} times faster "
+        f"({efficiency.layer}, {efficiency.pixels} pixels{left_out})"
     )
     return lines

@@ -130,11 +130,11 @@ class _Watch:
         self._start = self._last = time.monotonic()
         self._step = 0.0
 
-    def enough(self, found: Batches) -> bool:
+    def enough(self, batches: Batches) -> bool:
         """Say whether the target is reached; expect the error to fall with the square root of the batches."""
         assert self._budget.error is not None
-        error = getattr(relative_errors(found, self._near), self._budget.target)
-        done = len(found.seeds)
+        error = getattr(relative_errors(batches, self._near), self._budget.target)
+        done = len(batches.seeds)
         self._expected = max(LEAST_BATCHES, math.ceil(done * min(1e6, error / self._budget.error) ** 2))
         self._words = f", {self._budget.target} error {error:.3g} of {self._budget.error:.3g}"
         return done >= LEAST_BATCHES and error <= self._budget.error
@@ -158,21 +158,21 @@ class _Watch:
         self._progress(min(1.0, share), f"{estimator}, {done} batches{self._words}")
 
 
-def _layered_batches(loaded: LoadedScene, estimator: str, found: Batches, *, distance: NDArray[np.float64]) -> Image:
+def _layered_batches(loaded: LoadedScene, estimator: str, batches: Batches, *, distance: NDArray[np.float64]) -> Image:
     shape = (*distance.shape, 3)
     layers = {}
     for number, name in enumerate(LAYERS):
-        layers[name] = found.mean[number].reshape(shape)
-        layers[f"{name}_se"] = found.standard_error[number].reshape(shape)
+        layers[name] = batches.mean[number].reshape(shape)
+        layers[f"{name}_se"] = batches.standard_error[number].reshape(shape)
     attributes: dict[str, str | int | float] = {
         "airlight:scene": loaded.name,
         "airlight:scene_digest": scene_digest(loaded.scene),
         "airlight:estimator": estimator,
-        "airlight:spp": found.samples * len(found.seeds),
-        "airlight:batch_spp": found.samples,
-        "airlight:batches": len(found.seeds),
-        "airlight:seed": found.seeds[0],
-        "airlight:seeds": seed_ranges(found.seeds),
+        "airlight:spp": batches.samples * len(batches.seeds),
+        "airlight:batch_spp": batches.samples,
+        "airlight:batches": len(batches.seeds),
+        "airlight:seed": batches.seeds[0],
+        "airlight:seeds": seed_ranges(batches.seeds),
     }
     return Image(layers, distance, attributes)
 

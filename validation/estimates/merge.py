@@ -110,18 +110,18 @@ def _of(header: Mapping[str, Attribute], key: str) -> str:
     return str(header.get(f"airlight:{key}", ""))
 
 
-def _check_same(one: _Part, other: _Part) -> None:
+def _check_same(first: _Part, second: _Part) -> None:
     for key, meaning in _SAME.items():
-        values = [_of(part.image.attributes, key) for part in (one, other)]
+        values = [_of(part.image.attributes, key) for part in (first, second)]
         if values[0] != values[1]:
             raise InputError(
-                f"{one.name} and {other.name} differ in {meaning} ({values[0][:24]} and {values[1][:24]}); "
+                f"{first.name} and {second.name} differ in {meaning} ({values[0][:24]} and {values[1][:24]}); "
                 "merge references that were made alike"
             )
-    shapes = [part.image.layers[LAYERS[0]].shape for part in (one, other)]
+    shapes = [part.image.layers[LAYERS[0]].shape for part in (first, second)]
     if shapes[0] != shapes[1]:
         raise InputError(
-            f"{one.name} and {other.name} have images of two sizes, {shapes[0][1::-1]} and {shapes[1][1::-1]}"
+            f"{first.name} and {second.name} have images of two sizes, {shapes[0][1::-1]} and {shapes[1][1::-1]}"
         )
 
 

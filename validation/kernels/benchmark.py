@@ -195,14 +195,14 @@ def speed_against_error(costs: Sequence[KernelCost]) -> tuple[Level, ...]:
 
     Kernels that gave values that are not finite reach no level.
     """
-    found = []
+    levels = []
     for phase in dict.fromkeys(cost.phase for cost in costs):
         for statistic in ("max", "p99"):
             for level in LEVELS:
                 good = [cost for cost in costs if cost.phase == phase and _reaches(cost, statistic, level)]
                 best = _cheapest(good)
                 rivals = {name: _cheapest([cost for cost in good if cost.family == name]) for name in RIVALS}
-                found.append(
+                levels.append(
                     Level(
                         phase,
                         statistic,
@@ -213,7 +213,7 @@ def speed_against_error(costs: Sequence[KernelCost]) -> tuple[Level, ...]:
                         {name: _ratio(rival, best) for name, rival in rivals.items()},
                     )
                 )
-    return tuple(found)
+    return tuple(levels)
 
 
 def _reaches(cost: KernelCost, statistic: str, level: float) -> bool:

@@ -68,18 +68,18 @@ def printed_against_derived(count: int = 100_000, *, kernels: Mapping[str, Kerne
     Valid for kernels that do the four phase functions. The rays are the same on every machine; their true J is kept in
     the cache.
     """
-    found = []
+    accuracies = []
     for phase in PRINTED_PHASES:
         cases = wide_rays(count, phase)
         regions = {"all": np.ones(count, dtype=bool), "moderate": _moderate(cases), "near-foot": _near_foot(cases)}
         errors = {name: relative_errors(cases, function) for name, function in kernels.items()}
         for region, chosen in regions.items():
-            found += [_accuracy(phase, name, region, error[chosen]) for name, error in errors.items()]
-    return found
+            accuracies += [_accuracy(phase, name, region, error[chosen]) for name, error in errors.items()]
+    return accuracies
 
 
 def relative_errors(cases: Cases, function: Kernel) -> Array:
-    """Return |value / J - 1| of every case in float64; inf where the value is not finite."""
+    """Return |value / J - 1| of every case [1], (n,), in float64; inf where the value is not finite."""
     assert cases.value is not None
     values = evaluate_cases(cases, function, "double").J
     with np.errstate(invalid="ignore", over="ignore"):

@@ -40,22 +40,40 @@ def integrate_cases(cases: Cases, kernel: str, precision: str) -> Array:
 
 
 def summary(cases: Cases, results: Array) -> dict[str, Any]:
-    """Return quantiles of the relative error against the certified values, where there are any."""
-    found: dict[str, Any] = {"rows": len(results), "compared": 0, "nonfinite": int(np.sum(~np.isfinite(results)))}
+    """Return quantiles of the relative error against the certified values, where there are any.
+
+    Parameters
+    ----------
+    cases
+        The cases; with values, or there are no quantiles.
+    results
+        J of every case [1/m], (n,).
+    """
+    quantiles: dict[str, Any] = {"rows": len(results), "compared": 0, "nonfinite": int(np.sum(~np.isfinite(results)))}
     if cases.value is None:
-        return found
+        return quantiles
     error = np.abs(results - cases.value) / np.maximum(np.abs(cases.value), _TINY)
     finite = np.isfinite(error)
     if not finite.any():
-        return found
+        return quantiles
     p50, p99, largest = np.percentile(error[finite], [50, 99, 100])
     worst = int(np.flatnonzero(finite)[np.argmax(error[finite])])
     # Row 1 of the file is its header.
-    return found | {"compared": int(finite.sum()), "p50": p50, "p99": p99, "max": largest, "worst_row": worst + 2}
+    return quantiles | {"compared": int(finite.sum()), "p50": p50, "p99": p99, "max": largest, "worst_row": worst + 2}
 
 
 def write_results(cases: Cases, results: Array, target: Path) -> None:
-    """Write the rows of a file with a column `result`, whole or not at all."""
+    """Write the rows of a file with a column `result`, whole or not at all.
+
+    Parameters
+    ----------
+    cases
+        As they were read.
+    results
+        J of every case [1/m], (n,).
+    target
+        The file to write.
+    """
     kept = [k for k, name in enumerate(cases.header) if name != "result"]
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")

@@ -157,9 +157,11 @@ def _angles(
 ) -> Cases:
     """Return segments between angles at a light that is 1 m from the ray, its foot 4 m from the camera."""
     x0, x1 = 4 + np.tan(theta0), 4 + np.tan(theta1)
-    one = np.ones(len(x0))
-    names, tags = [phase] * len(one), ["angle"] * len(one)
-    return with_truth(table(names, g * one, foot=4 * one, height=one, x0=x0, x1=x1, sigma_t=sigma_t * one, tags=tags))
+    ones = np.ones(len(x0))
+    names, tags = [phase] * len(ones), ["angle"] * len(ones)
+    return with_truth(
+        table(names, g * ones, foot=4 * ones, height=ones, x0=x0, x1=x1, sigma_t=sigma_t * ones, tags=tags)
+    )
 
 
 def _many_angles() -> Cases:

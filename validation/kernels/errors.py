@@ -38,16 +38,24 @@ class Errors:
 
 def groups(cases: Cases) -> dict[str, Rows]:
     """Return which rows belong to 'all', to each tag and to each phase function (as 'phase NAME')."""
-    found = {"all": np.ones(len(cases.phase), dtype=bool)}
+    groups = {"all": np.ones(len(cases.phase), dtype=bool)}
     if cases.tag is not None:
         tags = np.asarray(cases.tag)
-        found |= {tag: tags == tag for tag in sorted(set(cases.tag))}
+        groups |= {tag: tags == tag for tag in sorted(set(cases.tag))}
     phases = np.asarray(cases.phase)
-    return found | {f"phase {name}": phases == name for name in sorted(set(cases.phase))}
+    return groups | {f"phase {name}": phases == name for name in sorted(set(cases.phase))}
 
 
 def relative_error(results: Array, expected: Array, precision: str) -> Array:
-    """Return |results - expected| / |expected|, NaN where either is not finite."""
+    """Return |results - expected| / |expected| [1], NaN where either is not finite.
+
+    Parameters
+    ----------
+    results, expected
+        J [1/m], (n,) each.
+    precision
+        'single' or 'double', of the results.
+    """
     with np.errstate(invalid="ignore", over="ignore"):
         error = np.abs(results - expected) / np.maximum(np.abs(expected), TINY[precision])
     return np.where(np.isfinite(results) & np.isfinite(expected), error, np.nan)

@@ -78,24 +78,24 @@ def laws(function: Kernel, cases: Cases, names: Sequence[str] | None = None) -> 
         Which laws; all by default.
     """
     J = {precision: evaluate_cases(cases, function, precision).J for precision in ("single", "double")}
-    found = []
+    laws = []
     for name in names or _LAWS:
         law = _LAWS[name]
         worst = {precision: _largest(*law(_Tried(function, cases, precision, J[precision]))) for precision in J}
-        found.append(Law(name, worst["double"][1], worst["single"][0], worst["double"][0]))
-    return found
+        laws.append(Law(name, worst["double"][1], worst["single"][0], worst["double"][0]))
+    return laws
 
 
-def _largest(one: Array, other: Array) -> tuple[float | None, int]:
+def _largest(first: Array, second: Array) -> tuple[float | None, int]:
     """Return the largest relative deviation and the number of rows; infinite where one side is not finite."""
-    compared = ~(np.isnan(one) & np.isnan(other))
-    one, other = one[compared], other[compared]
-    size = np.maximum(np.abs(one), np.abs(other))
+    compared = ~(np.isnan(first) & np.isnan(second))
+    first, second = first[compared], second[compared]
+    size = np.maximum(np.abs(first), np.abs(second))
     large = ~(size < _SMALL)
     if not large.any():
         return None, 0
     with np.errstate(invalid="ignore"):
-        deviation = np.abs(one[large] - other[large]) / size[large]
+        deviation = np.abs(first[large] - second[large]) / size[large]
     return float(np.max(np.where(np.isfinite(deviation), deviation, np.inf))), int(large.sum())
 
 
@@ -165,8 +165,8 @@ def _phase(tried: _Tried) -> tuple[Array, Array]:
     cases = tried.cases
     cases = _with_phase(cases, "tabulated")
     tables = np.array([TABLE, TABLE[::-1]])
-    one, other = (tried.evaluate(cases, table=each) for each in tables)
-    return 0.5 * (one + other), tried.evaluate(cases, table=tables.mean(axis=0))
+    first, second = (tried.evaluate(cases, table=each) for each in tables)
+    return 0.5 * (first + second), tried.evaluate(cases, table=tables.mean(axis=0))
 
 
 def _same_phase(tried: _Tried) -> tuple[Array, Array]:

@@ -90,14 +90,26 @@ def wide_rays(count: int, phase: str = "isotropic", g: float = 0.0, *, truth: bo
     x1 = _rounded(distance * _log(u[:, 2], 1e-3, 100.0))
     names = np.full(count, phase)
     g_exact = np.full(count, float(np.float32(g)))
-    zero, one = np.zeros(count), np.ones(count)
-    cases = table(names, g_exact, foot=foot, height=height, x0=zero, x1=x1, sigma_t=one, tags=np.full(count, "wide"))
+    zeros, ones = np.zeros(count), np.ones(count)
+    cases = table(names, g_exact, foot=foot, height=height, x0=zeros, x1=x1, sigma_t=ones, tags=np.full(count, "wide"))
     return with_truth(cases) if truth else cases
 
 
 def table(phase, g, *, foot: Array, height: Array, x0: Array, x1: Array, sigma_t: Array, tags) -> Cases:
-    """Return columns as cases without values."""
-    names, words = (tuple(str(one) for one in column) for column in (phase, tags))
+    """Return columns as cases without values.
+
+    Parameters
+    ----------
+    phase, tags
+        Names of phase functions and kinds of cases, n each.
+    g
+        Mean cosines, (n,).
+    foot, height, x0, x1
+        (n,) each [m].
+    sigma_t
+        Extinction, (n,) [1/m].
+    """
+    names, words = (tuple(str(cell) for cell in column) for column in (phase, tags))
     return Cases(names, np.asarray(g), foot, height, x0, x1, sigma_t, None, words, None, None, None, COLUMNS, ())
 
 

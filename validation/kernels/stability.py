@@ -103,12 +103,12 @@ def stability(
     chosen = [(name, find_kernel(name)) for name in names or KERNELS]  # refuse a wrong name before any work
     sets = {path.name: read_cases(path) for path in certified_files()} | {GENERATED: hard_rays(count)}
     thin = slivers()
-    found = []
+    results = []
     for number, (name, function) in enumerate(chosen):
         if progress is not None:
             progress(number, len(chosen), name)
-        found.append(kernel_stability(name, function, sets, thin))
-    return found
+        results.append(kernel_stability(name, function, sets, thin))
+    return results
 
 
 def kernel_stability(name: str, function: Kernel, sets: dict[str, Cases], thin: Cases) -> KernelStability:
@@ -181,13 +181,13 @@ def _broken(bar: Bar, name: str, cases: Cases, values: dict[str, Values]) -> lis
             ("float32 99 %", single["smooth"], "p99", bar.single_p99),
             ("float32 median", single["smooth"], "median", bar.single_median),
         ]
-    found = []
+    faults = []
     for what, errors, quantile, limit in limits:
         value = getattr(errors, quantile)
         if value is not None and value > limit:
             at = f" at {errors.worst}" if quantile == "max" else ""
-            found.append(f"{name}: {what} {value:.3g} > {limit:g}{at}")
+            faults.append(f"{name}: {what} {value:.3g} > {limit:g}{at}")
     for precision, errors in (("float32", single["all"]), ("float64", double["all"])):
         counts = {"NaN": errors.nan, "infinite": errors.infinite, "negative": errors.negative}
-        found += [f"{name}: {precision}: {number} {what}" for what, number in counts.items() if number]
-    return found
+        faults += [f"{name}: {precision}: {number} {what}" for what, number in counts.items() if number]
+    return faults

@@ -36,8 +36,10 @@ _AWAY = [[0.48, 0.6, 0.64, 0.0], [-0.36, 0.8, -0.48, 0.0], [-0.8, 0.0, 0.6, 0.0]
 
 def directional_answers() -> list[KnownAnswer]:
     """Return all known answers, for each estimator as far as the law is exact for it."""
-    found = [law(one) for law in (albedo_linear, irradiance_linear, units, enclosed) for one in ESTIMATORS]
-    return [*found, lights_add_up(), turned(), vertical_light()]
+    answers = [
+        law(estimator) for law in (albedo_linear, irradiance_linear, units, enclosed) for estimator in ESTIMATORS
+    ]
+    return [*answers, lights_add_up(), turned(), vertical_light()]
 
 
 def base_scene() -> Scene:
@@ -79,8 +81,8 @@ def _cube(centre, half_edges) -> Scene:
 
 def _down(rotation: list[list[float]]) -> list[list[float]]:
     """Turn the third axis of a rotation downwards, if it is not."""
-    found = np.array(rotation)
-    return (found if found[2, 2] < 0 else found @ np.diag([1.0, -1.0, -1.0, 1.0])).tolist()
+    matrix = np.array(rotation)
+    return (matrix if matrix[2, 2] < 0 else matrix @ np.diag([1.0, -1.0, -1.0, 1.0])).tolist()
 
 
 def _lamp() -> Scene:
@@ -149,16 +151,16 @@ def vertical_light() -> KnownAnswer:
     truth = read_truth(load_fog(scene))
     (medium,), (light,) = truth.media, truth.directional
     with np.errstate(divide="ignore"):
-        one, two = ((_BOX[0] + sign * _BOX[1] - truth.origin) / truth.direction for sign in (-1, 1))
-    low, high = np.minimum(one, two).max(axis=1), np.maximum(one, two).min(axis=1)
+        lower, upper = ((_BOX[0] + sign * _BOX[1] - truth.origin) / truth.direction for sign in (-1, 1))
+    low, high = np.minimum(lower, upper).max(axis=1), np.maximum(lower, upper).min(axis=1)
     length = np.maximum(high - low, 0.0)[:, None]
     rise = truth.direction[:, 2:]
     above = _BOX[0][2] + _BOX[1][2] - truth.origin[2] - low[:, None] * rise
     p = (1 - _G**2) / (1 + _G**2 - 2 * _G * rise) ** 1.5
     integral = np.exp(-medium.sigma_t * above) * -np.expm1(-medium.sigma_t * (1 - rise) * length) / (1 - rise)
     expected = medium.albedo * light.irradiance * p / (4 * math.pi) * np.where(length > 0, integral, 0.0)
-    found = layers(truth, "quadrature")[0]
-    difference = largest_difference(found, expected)
+    airlight = layers(truth, "quadrature")[0]
+    difference = largest_difference(airlight, expected)
     return KnownAnswer("a box of fog under vertical light", "quadrature", difference, 1e-13, "float64 rounding")
 
 
@@ -170,8 +172,8 @@ def enclosed(estimator: str = "quadrature") -> KnownAnswer:
     return KnownAnswer("no sun in a closed box", estimator, most, 0.0, "exactly zero, surfaces included")
 
 
-def _compared(name: str, estimator: str, one: Scene, other: Scene, *, factor: float = 1.0) -> KnownAnswer:
-    difference = largest_difference(_airlight(other, estimator), factor * _airlight(one, estimator))
+def _compared(name: str, estimator: str, scene: Scene, changed: Scene, *, factor: float = 1.0) -> KnownAnswer:
+    difference = largest_difference(_airlight(changed, estimator), factor * _airlight(scene, estimator))
     return KnownAnswer(name, estimator, difference, *(EXACT if estimator == "quadrature" else FLOAT32))
 
 

@@ -68,11 +68,11 @@ def base_scene() -> FogScene:
 
 def known_answers() -> list[KnownAnswer]:
     """Return all known answers, for each estimator as far as the law is exact for it."""
-    found = [law(estimator) for law in (albedo_linear, intensity_linear, units, enclosed) for estimator in ESTIMATORS]
+    answers = [law(estimator) for law in (albedo_linear, intensity_linear, units, enclosed) for estimator in ESTIMATORS]
     quadrature = (lights_add_up, turned, moved, mirrored, vacuum_limit, vacuum, fluence, absorbing_medium)
-    found += [law() for law in quadrature]
-    found += [absorbing_ball(estimator) for estimator in ("quadrature", "single-scatter")]
-    return found + directional_answers()
+    answers += [law() for law in quadrature]
+    answers += [absorbing_ball(estimator) for estimator in ("quadrature", "single-scatter")]
+    return answers + directional_answers()
 
 
 def albedo_linear(estimator: str = "quadrature") -> KnownAnswer:
@@ -95,7 +95,7 @@ def units(estimator: str = "quadrature") -> KnownAnswer:
     scene = base_scene()
     scaled = _mapped(scene, np.diag([k, k, k, 1.0]))
     scaled = replace(scaled, camera=_rescaled(scaled.camera, k), sigma_t=tuple(value / k for value in scene.sigma_t))
-    lights = tuple(replace(one, matrix=one.matrix and _rescaled(one.matrix, k)) for one in scaled.lights)
+    lights = tuple(replace(light, matrix=light.matrix and _rescaled(light.matrix, k)) for light in scaled.lights)
     return _compared("airlight falls as k^-2", estimator, scene, replace(scaled, lights=lights), factor=1 / k**2)
 
 
@@ -132,7 +132,7 @@ def mirrored() -> KnownAnswer:
     image = replace(
         image,
         camera=_handed(image.camera),
-        lights=tuple(replace(one, matrix=one.matrix and _handed(one.matrix)) for one in image.lights),
+        lights=tuple(replace(light, matrix=light.matrix and _handed(light.matrix)) for light in image.lights),
     )
     expected = _airlight(scene, "quadrature").reshape(SIZE, SIZE, 3)[:, ::-1]
     difference = largest_difference(_airlight(image, "quadrature"), expected.reshape(-1, 3))
@@ -181,13 +181,13 @@ def fluence() -> KnownAnswer:
     for r in (0.25, 1.0, 3.0):
         around = replace(truth, origin=np.array([0.0, 0.0, -r]), direction=directions, width=len(psi), height=1)
         values = ray_values(around).airlight[:, 0] / truth.lights[0].intensity[0] / (4 * math.pi)
-        found = 2 * math.pi * float(np.sum(values * np.sin(psi) * weights * math.pi * t))
+        flux = 2 * math.pi * float(np.sum(values * np.sin(psi) * weights * math.pi * t))
 
         def integrand(v: float, r: float = r) -> float:  # u = r (1 + v^2) takes the logarithm off the end
             return math.exp(-sigma_t * r * (1 + v * v)) * math.log((2 + v * v) / (v * v)) / (1 + v * v) * 2 * v
 
         integral = quad(integrand, 0, 1, epsrel=1e-12)[0] + quad(integrand, 1, np.inf, epsrel=1e-12)[0]
-        worst = max(worst, abs(found / (albedo * sigma_t / (4 * math.pi * r) * integral) - 1))
+        worst = max(worst, abs(flux / (albedo * sigma_t / (4 * math.pi * r) * integral) - 1))
     return KnownAnswer("fluence of first order", "quadrature", worst, 1e-6, "relative: 96 directions")
 
 
@@ -219,8 +219,8 @@ def absorbing_ball(estimator: str = "quadrature") -> KnownAnswer:
     ball = {"type": "sphere", "center": centre.tolist(), "radius": radius, "bsdf": {"type": "null"}, "interior": medium}
     empty = ball | {"interior": medium | {"sigma_t": {"type": "rgb", "value": [0.0, 0.0, 0.0]}}}
     images = []
-    for one in (empty, ball):
-        truth = read_truth(load_fog(clear | {"ball": one}))
+    for sphere in (empty, ball):
+        truth = read_truth(load_fog(clear | {"ball": sphere}))
         images.append(layers(truth, estimator)[1])
     towards = centre - truth.origin
     closest = np.linalg.norm(np.cross(towards, truth.direction), axis=1)
@@ -239,8 +239,8 @@ def enclosed(estimator: str = "quadrature") -> KnownAnswer:
     return KnownAnswer("a light in a closed box", estimator, float(most), 0.0, "exactly zero, surfaces included")
 
 
-def _compared(name: str, estimator: str, one: FogScene, other: FogScene, *, factor: float = 1.0) -> KnownAnswer:
-    difference = largest_difference(_airlight(other, estimator), factor * _airlight(one, estimator))
+def _compared(name: str, estimator: str, scene: FogScene, changed: FogScene, *, factor: float = 1.0) -> KnownAnswer:
+    difference = largest_difference(_airlight(changed, estimator), factor * _airlight(scene, estimator))
     return KnownAnswer(name, estimator, difference, *(EXACT if estimator == "quadrature" else FLOAT32))
 
 
@@ -263,11 +263,11 @@ def _mapped(scene: FogScene, matrix: Array) -> FogScene:
         return replace(shape, centre=point(shape.centre), half_edges=edges(shape.half_edges))
 
     lights = tuple(
-        replace(one, position=point(one.position), matrix=one.matrix and _rows(matrix @ np.array(one.matrix)))
-        for one in scene.lights
+        replace(light, position=point(light.position), matrix=light.matrix and _rows(matrix @ np.array(light.matrix)))
+        for light in scene.lights
     )
     camera = _rows(matrix @ np.array(scene.camera))
-    return replace(scene, camera=camera, lights=lights, occluders=tuple(placed(one) for one in scene.occluders))
+    return replace(scene, camera=camera, lights=lights, occluders=tuple(placed(shape) for shape in scene.occluders))
 
 
 def _rows(matrix: Array) -> Matrix:
@@ -276,16 +276,16 @@ def _rows(matrix: Array) -> Matrix:
 
 def _rescaled(matrix: Matrix, k: float) -> Matrix:
     """Take the scale out of the rotation of a camera or a spot."""
-    found = np.array(matrix)
-    found[:3, :3] /= k
-    return _rows(found)
+    changed = np.array(matrix)
+    changed[:3, :3] /= k
+    return _rows(changed)
 
 
 def _handed(matrix: Matrix) -> Matrix:
     """Turn the first axis of a mirrored camera or spot, so that it is a rotation again."""
-    found = np.array(matrix)
-    found[:3, 0] *= -1
-    return _rows(found)
+    changed = np.array(matrix)
+    changed[:3, 0] *= -1
+    return _rows(changed)
 
 
 def _floor_distance(truth: TruthScene) -> Array:

@@ -44,6 +44,6 @@ def layers(truth: TruthScene, estimator: str) -> Array:
     return batch(truth, 1, _SAMPLES).mean
 
 
-def largest_difference(found: Array, expected: Array) -> float:
-    """Return the largest difference of two images over the largest value of the second."""
-    return float(np.abs(found - expected).max() / np.abs(expected).max())
+def largest_difference(computed: Array, expected: Array) -> float:
+    """Return the largest difference of two images of one shape over the largest value of the second [1]."""
+    return float(np.abs(computed - expected).max() / np.abs(expected).max())

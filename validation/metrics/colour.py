@@ -140,14 +140,14 @@ def auto_exposure(reference: ArrayLike) -> float:
     return float(np.log2(0.9) - np.log2(bright)) if bright > 0 else 0.0
 
 
-def ciede2000(one: Array, two: Array) -> Array:
+def ciede2000(reference: Array, test: Array) -> Array:
     """Return the CIEDE2000 difference of colours in CIE L*a*b*, (..., 3)."""
-    return np.asarray(colour.delta_E(one, two, method="CIE 2000"))
+    return np.asarray(colour.delta_E(reference, test, method="CIE 2000"))
 
 
-def delta_e_itp(one: Array, two: Array) -> Array:
+def delta_e_itp(reference: Array, test: Array) -> Array:
     """Return Delta E ITP of colours in IC_TC_P, (..., 3): 720 sqrt(dI^2 + (dT/2)^2 + dP^2), BT.2124 annex 1."""
-    return np.asarray(colour.delta_E(one, two, method="ITP"))
+    return np.asarray(colour.delta_E(reference, test, method="ITP"))
 
 
 def _lab(linear: Array) -> Array:

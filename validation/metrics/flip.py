@@ -134,12 +134,19 @@ def flip_hdr(
     # A power of two brings any unit into the range of float32; exposures are then counted from there.
     shift = int(np.frexp(float(ref[chosen].max()))[1])
     with np.errstate(over="ignore"):
-        one, two = (np.ldexp(image, -shift).astype(np.float32) for image in (ref, tst))
-    if not np.isfinite(two).all():
+        scaled_reference, scaled_test = (np.ldexp(image, -shift).astype(np.float32) for image in (ref, tst))
+    if not np.isfinite(scaled_test).all():
         return Flip(None, "the test image is brighter than the reference by more than float32 holds")
-    start, stop = exposure_range(one[chosen]) if exposure is None else (exposure + shift,) * 2
+    start, stop = exposure_range(scaled_reference[chosen]) if exposure is None else (exposure + shift,) * 2
     count = max(2, int(np.ceil(stop - start)))
-    inputs = {"start": start, "stop": stop, "count": count, "ppd": pixels_per_degree, "reference": one, "test": two}
+    inputs = {
+        "start": start,
+        "stop": stop,
+        "count": count,
+        "ppd": pixels_per_degree,
+        "reference": scaled_reference,
+        "test": scaled_test,
+    }
     answer = _in_child(inputs, timeout)
     if isinstance(answer, str):
         return Flip(None, answer)
@@ -182,12 +189,12 @@ def _unanswerable(ref: NDArray[np.float64], tst: NDArray[np.float64]) -> str:
 def _in_child(inputs: dict[str, Any], timeout: float) -> NDArray[np.float32] | str:
     """Run FLIP in a process of its own; return its map, or what went wrong."""
     with tempfile.TemporaryDirectory(prefix="airlight-flip-") as folder:
-        given, found = Path(folder, "inputs.npz"), Path(folder, "map.npy")
-        np.savez(given, **inputs)
+        input_file, map_file = Path(folder, "inputs.npz"), Path(folder, "map.npy")
+        np.savez(input_file, **inputs)
         try:
             # -P: a file of that name in the current folder is not the package.
             ran = subprocess.run(
-                [sys.executable, "-P", "-c", _CHILD, str(given), str(found)],
+                [sys.executable, "-P", "-c", _CHILD, str(input_file), str(map_file)],
                 capture_output=True,
                 text=True,
                 errors="replace",
@@ -205,6 +212,6 @@ def _in_child(inputs: dict[str, Any], timeout: float) -> NDArray[np.float32] | s
         if ran.returncode or not ran.stdout.strip().endswith("finished"):
             return f"flip-evaluator died with exit status {ran.returncode}: {last}"
         try:
-            return np.load(found, allow_pickle=False)
+            return np.load(map_file, allow_pickle=False)
         except (OSError, ValueError) as error:
             return f"flip-evaluator left no map that can be read: {error}"

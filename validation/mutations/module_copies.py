@@ -40,9 +40,9 @@ def replaced_once(name: str, old: str, new: str) -> str:
         If the text does not occur exactly once: the module was written anew, and the replacement must follow.
     """
     source = module_source(name)
-    found = source.count(old)
-    if found != 1:
-        raise ValueError(f"{name} holds the text {old!r} {found} times; wanted exactly once")
+    times = source.count(old)
+    if times != 1:
+        raise ValueError(f"{name} holds the text {old!r} {times} times; wanted exactly once")
     return source.replace(old, new)
 
 

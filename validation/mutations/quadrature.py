@@ -181,8 +181,8 @@ _LIGHTS = (
         "first-light-only",
         "all lights but the first ignored",
         "reference.quadrature.ray_values",
-        "airlight += found.radiance",
-        "airlight += found.radiance * (number == 0)",
+        "airlight += received.radiance",
+        "airlight += received.radiance * (number == 0)",
         "the built-in scenes have one light each",
     ),
     _quadrature(

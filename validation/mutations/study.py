@@ -90,7 +90,7 @@ class MutationStudy:
     @property
     def passed(self) -> bool:
         """Whether the control agrees everywhere and enough mutations were caught."""
-        return all(one.agrees for one in self.control) and self.caught >= LEAST_CAUGHT * len(self.results)
+        return all(sighting.agrees for sighting in self.control) and self.caught >= LEAST_CAUGHT * len(self.results)
 
 
 def study_mutations(
@@ -153,13 +153,13 @@ def _quadrature_seen(copies: ModuleCopies, stage: Stage) -> Iterator[Sighting]:
         images = copies["reference.quadrature.image"].quadrature_image(truth, shadow_scale=opponent.shadow_scale)
         for layer, mask in stage.masks.items():
             image, unchanged = getattr(images, layer), getattr(opponent.image, layer)
-            found = image_statistics(opponent, layer, image, mask)
-            yield _sighting(stage, layer, opponent.estimator, found, _change(image, unchanged, mask))
+            statistics = image_statistics(opponent, layer, image, mask)
+            yield _sighting(stage, layer, opponent.estimator, statistics, _change(image, unchanged, mask))
 
 
 def _single_scatter_seen(copies: ModuleCopies, stage: Stage) -> Iterator[Sighting]:
     """Compare a changed single-scatter with the quadrature, by as many batches as the unchanged one has."""
-    opponent = next(one for one in stage.opponents if one.estimator == "single-scatter")
+    opponent = next(each for each in stage.opponents if each.estimator == "single-scatter")
     truth = copies["reference.scene.read"].read_truth(stage.scene)
     batch = copies["reference.monte_carlo.single_scatter.integrator"].single_scatter_batch
     batches = distance_batches(batch, truth, len(opponent.batches.seeds))
@@ -176,8 +176,8 @@ def _change(image: Array, unchanged: Array, mask: NDArray[np.bool_]) -> tuple[fl
     return change, int(mask.sum() - finite.sum())
 
 
-def _sighting(stage: Stage, layer: str, against: str, found: Statistics, change: tuple[float, int]) -> Sighting:
-    (true_bias, nonfinite), interval, margin = change, widest_interval(found), found.margin or 0.0
+def _sighting(stage: Stage, layer: str, against: str, statistics: Statistics, change: tuple[float, int]) -> Sighting:
+    (true_bias, nonfinite), interval, margin = change, widest_interval(statistics), statistics.margin or 0.0
     return Sighting(
         scene=stage.name,
         built_in=stage.name in SCENES,
@@ -185,14 +185,14 @@ def _sighting(stage: Stage, layer: str, against: str, found: Statistics, change:
         against=against,
         margin=margin,
         true_bias=true_bias,
-        relative_bias=found.relative_bias,
+        relative_bias=statistics.relative_bias,
         interval=interval,
-        detectable_bias=found.detectable_bias,
+        detectable_bias=statistics.detectable_bias,
         chance=1.0 if nonfinite else _chance(true_bias, interval, margin),
         nonfinite=nonfinite,
-        rejected=found.rejected,
-        expected_rejections=found.expected_rejections,
-        agrees=bool(found.equivalent) and nonfinite == 0,
+        rejected=statistics.rejected,
+        expected_rejections=statistics.expected_rejections,
+        agrees=bool(statistics.equivalent) and nonfinite == 0,
     )
 
 
@@ -212,10 +212,14 @@ def _chance(bias: float, interval: tuple[float, float], margin: float) -> float:
 
 def judged(mutation: Mutation, sightings: Sequence[Sighting]) -> MutationResult:
     """Sum up what was seen of one mutation."""
-    by_built_in = any(not one.agrees for one in sightings if one.built_in)
-    caught = any(not one.agrees for one in sightings)
+    by_built_in = any(not sighting.agrees for sighting in sightings if sighting.built_in)
+    caught = any(not sighting.agrees for sighting in sightings)
     clearest = max(sightings, key=_clearness)
-    reason = "" if by_built_in else _reason(mutation, [one for one in sightings if one.built_in] or list(sightings))
+    reason = (
+        ""
+        if by_built_in
+        else _reason(mutation, [sighting for sighting in sightings if sighting.built_in] or list(sightings))
+    )
     return MutationResult(
         mutation.name,
         mutation.meaning,
@@ -224,25 +228,25 @@ def judged(mutation: Mutation, sightings: Sequence[Sighting]) -> MutationResult:
         caught,
         by_built_in,
         # The scenes have seeds of their own; so have the two layers of one.
-        float(1 - np.prod([1 - one.chance for one in sightings])),
+        float(1 - np.prod([1 - sighting.chance for sighting in sightings])),
         clearest,
         tuple(sightings),
         reason,
     )
 
 
-def _clearness(one: Sighting) -> tuple[bool, bool, float]:
+def _clearness(sighting: Sighting) -> tuple[bool, bool, float]:
     """Return a key that puts the clearest failure last, and one in a built-in scene behind those in probes.
 
     Its third entry says how many margins the nearer end of the interval is away from zero.
     """
-    low, high = one.interval
-    away = max(low, -high) / one.margin
-    return (not one.agrees, one.built_in, np.inf if one.nonfinite or not np.isfinite(away) else away)
+    low, high = sighting.interval
+    away = max(low, -high) / sighting.margin
+    return (not sighting.agrees, sighting.built_in, np.inf if sighting.nonfinite or not np.isfinite(away) else away)
 
 
 def _reason(mutation: Mutation, sightings: Sequence[Sighting]) -> str:
-    most = max(sightings, key=lambda one: abs(one.true_bias) / one.margin)
+    most = max(sightings, key=lambda sighting: abs(sighting.true_bias) / sighting.margin)
     measured = (
         f"the fault changes {most.scene}, {most.layer}, by {100 * most.true_bias:+.3g} %, no other more; "
         f"its margin there is ±{100 * most.margin:g} %"

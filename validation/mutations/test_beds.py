@@ -73,26 +73,26 @@ def stage_of(name: str, scene, *, margin: float) -> Stage:
     masks = layer_masks(read_truth(scene), truth)
     masks = {layer: mask for layer, mask in masks.items() if np.any(getattr(truth, layer) > 0)}
 
-    def volpath(found: Batches) -> Opponent:
-        return Opponent("volpath", found, shortened, shadow_scale, margin)
+    def volpath(traced: Batches) -> Opponent:
+        return Opponent("volpath", traced, shortened, shadow_scale, margin)
 
-    def single_scatter(found: Batches) -> Opponent:
-        return Opponent("single-scatter", found, truth, 1.0, margin / SHARPER)
+    def single_scatter(traced: Batches) -> Opponent:
+        return Opponent("single-scatter", traced, truth, 1.0, margin / SHARPER)
 
     def enough(opponent: Opponent) -> bool:
         if len(opponent.batches.seeds) < _LEAST:
             return False
         compared = (image_statistics(opponent, layer, getattr(truth, layer), mask) for layer, mask in masks.items())
-        return all(width_to_reach(one, opponent.margin) < 1 for one in compared)
+        return all(width_to_reach(statistics, opponent.margin) < 1 for statistics in compared)
 
     shadow_scale = 1 - measure_shadow_epsilon()
     shortened = truth_image(scene, shadow_scale=shadow_scale)
 
     def run(name: str, samples: int, opponent: Callable[[Batches], Opponent]) -> Opponent:
-        found = monte_carlo_batches(
+        traced = monte_carlo_batches(
             scene, name, batches=_MOST, samples=samples, enough=lambda batches: enough(opponent(batches))
         )
-        return opponent(found.batches)
+        return opponent(traced.batches)
 
     opponents = run("volpath", _SAMPLES, volpath), run("single-scatter", _DISTANCES, single_scatter)
     return Stage(name, scene, masks, opponents)
@@ -114,13 +114,37 @@ def distance_batches(batch: Batch, truth: TruthScene, count: int) -> Batches:
 
 
 def image_statistics(opponent: Opponent, layer: str, image: Array, mask: NDArray[np.bool_]) -> Statistics:
-    """Compare a quadrature image that may be changed with the batches of an opponent."""
+    """Compare a quadrature image that may be changed with the batches of an opponent.
+
+    Parameters
+    ----------
+    opponent
+        The batches, unchanged.
+    layer
+        'airlight' or 'surface'.
+    image
+        The layer of the quadrature image, (height, width, 3) [W/(m^2 sr)].
+    mask
+        Pixels to compare, (height, width).
+    """
     estimate = batch_estimate(opponent.batches, layer, mask)
     return compare_statistics(estimate, Estimate(image), mask=mask, margin=opponent.margin)
 
 
 def batch_statistics(opponent: Opponent, layer: str, batches: Batches, mask: NDArray[np.bool_]) -> Statistics:
-    """Compare batches that may be changed with the quadrature image of an opponent."""
+    """Compare batches that may be changed with the quadrature image of an opponent.
+
+    Parameters
+    ----------
+    opponent
+        The quadrature image, unchanged.
+    layer
+        'airlight' or 'surface'.
+    batches
+        What may be changed.
+    mask
+        Pixels to compare, (height, width).
+    """
     image = getattr(opponent.image, layer)
     estimate = batch_estimate(batches, layer, mask)
     return compare_statistics(Estimate(image), estimate, mask=mask, margin=opponent.margin)

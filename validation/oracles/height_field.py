@@ -63,7 +63,7 @@ def height_field(shadow_map: ShadowMap, walls: NDArray[np.uint32] | None = None)
 def _frames(shadow_map: ShadowMap) -> Array:
     """Return across, up and axis of every face as rows, (faces, 3, 3)."""
     if basis := shadow_map.projection.basis:
-        return np.array([np.array(one, dtype=np.float64).reshape(3) for one in basis])[None]
+        return np.array([np.array(vector, dtype=np.float64).reshape(3) for vector in basis])[None]
     frames = np.zeros((6, 3, 3))
     for face in range(6):
         axis = face // 2
@@ -81,13 +81,26 @@ class Path:
     height: Array  #: (rays,) [m]
 
 
-def by_ray(one: Index, one_angle: Array, other: Index, other_angle: Array) -> tuple[Index, Array]:
-    """Join two lists of angles of rays and sort them by ray and angle."""
-    ray, angle = np.concatenate([one, other]), np.concatenate([one_angle, other_angle])
+def by_ray(first: Index, first_angle: Array, second: Index, second_angle: Array) -> tuple[Index, Array]:
+    """Join two lists of angles of rays and sort them by ray and angle.
+
+    Parameters
+    ----------
+    first, second
+        Numbers of rays, (n,) and (m,).
+    first_angle, second_angle
+        Angles at the light, in their order [rad].
+
+    Returns
+    -------
+    ray, angle
+        (n + m,) each, the angle in [rad].
+    """
+    ray, angle = np.concatenate([first, second]), np.concatenate([first_angle, second_angle])
     order = np.lexsort((angle, ray))
     return ray[order], angle[order]
 
 
 def zero_angle(cosine: Array, sine: Array) -> Array:
-    """Return where cosine cos(theta) + sine sin(theta) = 0, from -pi/2 to pi/2."""
+    """Return where cosine cos(theta) + sine sin(theta) = 0, from -pi/2 to pi/2 [rad]."""
     return np.arctan2(np.where(sine < 0, cosine, -cosine), np.abs(sine))

@@ -60,9 +60,19 @@ _CHUNK = 1 << 20  # crossings of rays and lines looked at together: 8 MB an arra
 
 
 def traced_walls(scene: Scene, shadow_maps: Sequence[ShadowMap]) -> list[NDArray[np.uint32]]:
-    """Return by light the walls that its rays find between the samples of its map, for `oracle_airlight`."""
+    """Return by light the walls that its rays find between the samples of its map, for `oracle_airlight`.
+
+    Returns
+    -------
+    list
+        For each light the numbers of the walls of its map's texels, as `realtime.methods.light_volumes.jump_search`
+        gives them.
+    """
     pairs = zip(shadow_maps, scene.lights, strict=True)
-    return [np.array(with_walls(inverse_depth_field(one), scene.geometry, light).walls) for one, light in pairs]
+    return [
+        np.array(with_walls(inverse_depth_field(shadow_map), scene.geometry, light).walls)
+        for shadow_map, light in pairs
+    ]
 
 
 def oracle_airlight(
@@ -166,12 +176,15 @@ def _within_face(face: int, normal: Array, direction: Array, ends: tuple[Array, 
     """
     axis = face // 2
     low, high = ends
-    for one in (0, 1):
+    for across_axis in (0, 1):
         for sign in (-1.0, 1.0):
-            across, along = normal[:, 2] + sign * normal[:, one], direction[:, 2] + sign * direction[:, one]
+            across, along = (
+                normal[:, 2] + sign * normal[:, across_axis],
+                direction[:, 2] + sign * direction[:, across_axis],
+            )
             middle = np.arctan2(along, across)
             low, high = np.maximum(low, middle - 0.5 * np.pi), np.minimum(high, middle + 0.5 * np.pi)
-            if (axis + 1 + one) % 3 < axis:
+            if (axis + 1 + across_axis) % 3 < axis:
                 high = np.where((across == 0) & (along == 0), low, high)
     return low, high
 
@@ -214,8 +227,8 @@ def _above(field: HeightField, face: int, path: Path, theta: Array) -> Array:
     size = field.size
     cosine, sine = np.cos(theta), np.sin(theta)
     a, b, c = (cosine * path.normal[:, i, None] + sine * path.direction[:, i, None] for i in range(3))
-    x, y = (0.5 * size * (one / c + 1) for one in (a, b))
-    column, row = (np.clip(np.floor(one), 0, size - 1).astype(np.int64) for one in (x, y))
+    x, y = (0.5 * size * (coordinate / c + 1) for coordinate in (a, b))
+    column, row = (np.clip(np.floor(coordinate), 0, size - 1).astype(np.int64) for coordinate in (x, y))
     x, y = x - column, y - row
     corner = row * (size + 1) + column
     s00, s10, s01, s11 = (np.take(field.heights[face], corner + step) for step in (0, 1, size + 1, size + 2))

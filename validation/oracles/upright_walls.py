@@ -35,9 +35,23 @@ class _Texels:
 def walled_parts(
     field: HeightField, face: int, path: Path, ends: tuple[Array, Array], stops: NDArray[np.bool_]
 ) -> tuple[Index, Array, Array]:
-    """Return the rays and the angles at both ends of what is lit between two angles within a face.
+    """Return what is lit between two angles within a face.
 
-    `stops` says which rays end there, and do not go on in another face.
+    Parameters
+    ----------
+    field, face
+        The height field, and which of its faces.
+    path
+        The rays.
+    ends
+        Angles at the light, (rays,) each [rad].
+    stops
+        Which rays end there, and do not go on in another face, (rays,).
+
+    Returns
+    -------
+    ray, begin, end
+        Number of the ray and the angles at both ends [rad], (intervals,) each.
     """
     low, high = ends[0][:, None], ends[1][:, None]
     lines = _borders(field.size).T
@@ -62,24 +76,24 @@ def walled_parts(
 
 def _crossings(field: HeightField, face: int, path: Path, theta: Array, f: Array, stops: NDArray[np.bool_]):
     """Return the rays of all crossings, in order, and the angles."""
-    one, other = theta[:, :-1], theta[:, 1:]
-    texels = _texels_at(field, face, *_texel_of(field.size, _at(path, 0.5 * (one + other))))
+    start, end = theta[:, :-1], theta[:, 1:]
+    texels = _texels_at(field, face, *_texel_of(field.size, _at(path, 0.5 * (start + end))))
     # c0 + cx x + cy y, times c, is linear in the direction.
     half = 0.5 * field.size
     c0, cx, cy = texels.line
     rows = half * cx, half * cy, c0 + half * (cx + cy)
     cosine, sine = (sum(p * v[:, i, None] for i, p in enumerate(rows)) for v in (path.normal, path.direction))
     middle = zero_angle(cosine, sine)
-    passes = (middle > one) & (middle < other)
-    middle = np.where(passes, middle, other)
-    side = np.cos(0.5 * (one + middle)) * cosine + np.sin(0.5 * (one + middle)) * sine > 0
+    passes = (middle > start) & (middle < end)
+    middle = np.where(passes, middle, end)
+    side = np.cos(0.5 * (start + middle)) * cosine + np.sin(0.5 * (start + middle)) * sine > 0
     behind_side = side ^ passes
 
     def f_at(angle: Array, second: NDArray[np.bool_]) -> Array:
         return _f(path, angle, texels.height(second, *_place(field.size, _at(path, angle))))
 
     walled = texels.walled
-    values = [f_at(one, side), f_at(middle, side), f_at(middle, behind_side), f_at(other, behind_side)]
+    values = [f_at(start, side), f_at(middle, side), f_at(middle, behind_side), f_at(end, behind_side)]
     lit = [value >= 0 for value in (f[:, :-1], *values, f[:, 1:])]
     enters, early, jump, late, leaves = (a != b for a, b in pairwise(lit))
     # A ray crosses a texel with walls at its first change if it is lit at one end only, and at the first two if it ends
@@ -88,24 +102,24 @@ def _crossings(field: HeightField, face: int, path: Path, theta: Array, f: Array
     first = changes & (np.cumsum(changes, axis=0) == 1)
     changes[4] = False
     two = changes & (np.cumsum(changes, axis=0) <= 2)
-    taken = np.where((other >= theta[:, -1:]) & stops[:, None], two, first & (lit[0] != lit[-1]))
+    taken = np.where((end >= theta[:, -1:]) & stops[:, None], two, first & (lit[0] != lit[-1]))
     # Without walls the two triangles meet, and the values on the borders are theirs.
     smooth = np.stack([np.zeros_like(early), early, np.zeros_like(early), late, np.zeros_like(early)])
     taken = np.where(walled, taken, smooth)
-    angles = one, _zero_between(one, middle, *values[:2]), middle, _zero_between(middle, other, *values[2:]), other
+    angles = start, _zero_between(start, middle, *values[:2]), middle, _zero_between(middle, end, *values[2:]), end
     parts = []
     for which, angle in zip(taken, angles, strict=True):
         row, column = np.nonzero(which)
         parts.append((row, column, angle[row, column]))
-    row, column, angle = (np.concatenate(one) for one in zip(*parts, strict=True))
+    row, column, angle = (np.concatenate(columns) for columns in zip(*parts, strict=True))
     order = np.lexsort((angle, column, row))
     return row[order], angle[order]
 
 
-def _zero_between(one: Array, other: Array, f1: Array, f2: Array) -> Array:
+def _zero_between(start: Array, end: Array, f1: Array, f2: Array) -> Array:
     """Return where f is 0 between two angles."""
-    f1, f2, delta = np.abs(f1), np.abs(f2), other - one
-    return np.asarray(one + np.arctan2(f1 * np.sin(delta), f1 * np.cos(delta) + f2))
+    f1, f2, delta = np.abs(f1), np.abs(f2), end - start
+    return np.asarray(start + np.arctan2(f1 * np.sin(delta), f1 * np.cos(delta) + f2))
 
 
 def _borders(size: int) -> Array:
@@ -129,7 +143,7 @@ def _place(size: int, at: tuple[Array, Array, Array]) -> tuple[Array, Array]:
 
 
 def _texel_of(size: int, at: tuple[Array, Array, Array]) -> tuple[Index, Index]:
-    column, row = (np.clip(np.floor(one), 0, size - 1).astype(np.int64) for one in _place(size, at))
+    column, row = (np.clip(np.floor(coordinate), 0, size - 1).astype(np.int64) for coordinate in _place(size, at))
     return column, row
 
 
@@ -177,17 +191,17 @@ def _texels_at(field: HeightField, face: int, column: Index, row: Index) -> _Tex
     walls = np.moveaxis(field.walls[face][row, column], -1, 0)
     bottom, top, left, right = walls
     has = ~np.isnan(walls)
-    one, zero = np.ones_like(s00), np.zeros_like(s00)
+    ones, zeros = np.ones_like(s00), np.zeros_like(s00)
     corners = {(0, 0): s00, (1, 0): s10, (0, 1): s01, (1, 1): s11}
     # In local coordinates from 0 to 1: no wall or one, then two across from each other, then two that meet.
-    line, first, second = _through((0, one, -one), (s00, s11 - s01, s01 - s00), (s00, s10 - s00, s11 - s10))
+    line, first, second = _through((0, ones, -ones), (s00, s11 - s01, s01 - s00), (s00, s10 - s00, s11 - s10))
     across = has[2] & has[3]
     line, first, second = _replace(
-        across, (line, first, second), ((-left, left - right, one), (s00, s10 - s00, zero), (s01, s11 - s01, zero))
+        across, (line, first, second), ((-left, left - right, ones), (s00, s10 - s00, zeros), (s01, s11 - s01, zeros))
     )
     across = has[0] & has[1]
     line, first, second = _replace(
-        across, (line, first, second), ((-bottom, one, bottom - top), (s00, zero, s01 - s00), (s10, zero, s11 - s10))
+        across, (line, first, second), ((-bottom, ones, bottom - top), (s00, zeros, s01 - s00), (s10, zeros, s11 - s10))
     )
     for i, j in corners:
         x, y = (bottom, top)[j], (left, right)[i]
@@ -197,7 +211,7 @@ def _texels_at(field: HeightField, face: int, column: Index, row: Index) -> _Tex
         other, beside, over = corners[1 - i, 1 - j], corners[i, 1 - j], corners[1 - i, j]
         run, rise = (other - beside) * (1 - 2 * i), (other - over) * (1 - 2 * j)
         plane = other - run * (1 - i) - rise * (1 - j), run, rise
-        new = (-1 - i * per_x - j * per_y, per_x, per_y), (corners[i, j], zero, zero), plane
+        new = (-1 - i * per_x - j * per_y, per_x, per_y), (corners[i, j], zeros, zeros), plane
         line, first, second = _replace(meet, (line, first, second), new)
     line, first, second = (np.stack([c[0] - c[1] * column - c[2] * row, c[1], c[2]]) for c in (line, first, second))
     return _Texels(has.any(axis=0), line, first, second)

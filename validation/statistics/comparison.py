@@ -193,13 +193,13 @@ def compare_statistics(
     # Free of units from here on. A power of two leaves every digit as it is; squares stay in range.
     largest = max(float(np.abs(image[chosen]).max(initial=0.0)) for image in (ref, tst))
     scale = float(2.0 ** np.frexp(largest)[1]) if largest > 0 else 1.0
-    one = _side("reference", reference, chosen, scale=scale, with_batches=whole)
-    two = _side("test", test, chosen, scale=scale, with_batches=whole)
-    bias = relative_bias(one, two, int(chosen.sum()))
+    expected = _side("reference", reference, chosen, scale=scale, with_batches=whole)
+    tested = _side("test", test, chosen, scale=scale, with_batches=whole)
+    bias = relative_bias(expected, tested, int(chosen.sum()))
     return Statistics(
         masked=int((~asked).sum()),
-        **_value_tests(one, two, chosen, family_level, plain_level),
-        **_block_tests(one, two, family_level),
+        **_value_tests(expected, tested, chosen, family_level, plain_level),
+        **_block_tests(expected, tested, family_level),
         relative_bias=bias.value,
         relative_bias_ci=bias.interval,
         relative_bias_ci_batches=bias.interval_batches,
@@ -217,21 +217,21 @@ def compare_statistics(
 
 
 def _value_tests(
-    one: Side, two: Side, chosen: NDArray[np.bool_], family_level: float, plain_level: float
+    expected: Side, tested: Side, chosen: NDArray[np.bool_], family_level: float, plain_level: float
 ) -> dict[str, Any]:
     """Test every value by itself."""
-    difference, error = two.mean - one.mean, np.hypot(one.error, two.error)
+    difference, error = tested.mean - expected.mean, np.hypot(expected.error, tested.error)
     random = chosen[:, :, None] & (error > 0)
     fixed = chosen[:, :, None] & ~random
     z = difference[random] / error[random]
-    spread = one.spread(one.error**2) + two.spread(two.error**2)
+    spread = expected.spread(expected.error**2) + tested.spread(tested.error**2)
     p = two_sided_p(z, satterthwaite(error**2, spread)[random])
     channel = np.nonzero(random)[2]
     by_channel = [p[channel == c] for c in np.unique(channel)]
     small = np.zeros(random.shape, dtype=bool)
     small[random] = p < sidak(family_level, z.size)
-    dark = chosen[:, :, None] & (one.mean == 0)
-    mean = float(one.mean[chosen].mean()) if chosen.any() else 0.0
+    dark = chosen[:, :, None] & (expected.mean == 0)
+    mean = float(expected.mean[chosen].mean()) if chosen.any() else 0.0
     return {
         "tested": z.size,
         "zero_reference": int(dark.sum()),
@@ -254,11 +254,11 @@ def _largest(difference: Array, mean: float) -> float:
     return float(np.abs(difference).max(initial=0.0)) / mean if mean > 0 else float("nan")
 
 
-def _block_tests(one: Side, two: Side, family_level: float) -> dict[str, int]:
+def _block_tests(expected: Side, tested: Side, family_level: float) -> dict[str, int]:
     """Test the sums over blocks of pixels."""
-    difference = _block_sums(np.where(np.hypot(one.error, two.error) > 0, two.mean - one.mean, 0.0))
-    variance = _block_sums(one.error**2 + two.error**2)
-    spread = _block_sums(one.spread(one.error**2) + two.spread(two.error**2))
+    difference = _block_sums(np.where(np.hypot(expected.error, tested.error) > 0, tested.mean - expected.mean, 0.0))
+    variance = _block_sums(expected.error**2 + tested.error**2)
+    spread = _block_sums(expected.spread(expected.error**2) + tested.spread(tested.error**2))
     random = variance > 0
     z = difference[random] / np.sqrt(variance[random])
     p = two_sided_p(z, satterthwaite(variance, spread)[random])

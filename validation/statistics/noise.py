@@ -155,7 +155,7 @@ def _slower(stage: str, old: Times, new: Times, least: float) -> bool:
         power = max(2, power)
     if growth < SHORTEST or after["median_ms"] < least**power * before["median_ms"]:
         return False
-    return after["low_ms"] > before["high_ms"] and all(one >= 0.5 * growth for one in witnesses)
+    return after["low_ms"] > before["high_ms"] and all(witness >= 0.5 * growth for witness in witnesses)
 
 
 def _known(times: Times, stage: str) -> bool:

@@ -79,7 +79,13 @@ def _is_null(shape) -> bool:
 
 
 def require_homogeneous(medium) -> None:
-    """Raise InputError for a medium that is not homogeneous."""
+    """Refuse a medium that is not homogeneous.
+
+    Raises
+    ------
+    InputError
+        For such a medium, with its class.
+    """
     if not medium.is_homogeneous():
         raise InputError(f"single-scatter: got a {medium.class_name()}; wanted media of type 'homogeneous'")
 
@@ -114,10 +120,10 @@ def medium_at(around: Surroundings, position, known_position, known_medium, acti
         ray = mi.Ray3f(position + direction * done, direction, distance - done, 0.0, [])
         hit = around.scene.ray_intersect(ray, walking)
         met = walking & hit.is_valid()
-        found = met & hit.is_medium_transition()
-        medium = dr.select(found, hit.target_medium(-direction), medium)
+        at_boundary = met & hit.is_medium_transition()
+        medium = dr.select(at_boundary, hit.target_medium(-direction), medium)
         done = dr.select(met, done + hit.t + step_beyond(hit.p), done)
-        return met & ~found & (done < distance), done, medium
+        return met & ~at_boundary & (done < distance), done, medium
 
     state = (
         mi.Bool(active),
