@@ -2,6 +2,7 @@
 """Fixtures shared by all tests."""
 
 import gc
+import os
 from pathlib import Path
 
 import pytest
@@ -18,13 +19,19 @@ def variant() -> str:
     """The best Mitsuba variant that works on this machine, made current."""
     from reports.machine.environment import activate
 
-    return activate()
+    chosen = activate()
+    # What was imported stays: `_nothing_left_behind` need not look through it after every module.
+    gc.collect()
+    gc.freeze()
+    return chosen
 
 
 @pytest.fixture(autouse=True)
 def _shared_cache(tmp_path_factory, monkeypatch):
-    """Keep the tests away from the user's cache, and let them share one of their own."""
-    monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path_factory.getbasetemp() / "airlight-cache"))
+    """Keep the tests away from the user's cache, and let them share one of their own, with all workers of the run."""
+    folder = tmp_path_factory.getbasetemp()
+    folder = folder.parent if "PYTEST_XDIST_WORKER" in os.environ else folder
+    monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(folder / "airlight-cache"))
 
 
 @pytest.fixture

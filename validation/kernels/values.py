@@ -3,6 +3,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import drjit as dr
@@ -23,6 +24,8 @@ Kernel = Callable[..., Any]
 
 #: The phase function of cases called 'tabulated': float32 numbers whose mean over the sphere is exactly 1.
 TABLE = (0.5, 0.25, 0.25, 0.5, 0.5, 0.75, 1.0, 2.0, 5.0)
+
+_ALIGNMENT = 64  # bytes, of memory that Dr.Jit allocates
 
 
 @dataclass(frozen=True)
@@ -86,15 +89,16 @@ def evaluate_rows(
     """
     types = array_types(precision)
     name = cases.phase[rows[0]]
+    column = partial(aligned_array, types.scalar)
     phase = named_phase(
         name,
-        g=types.scalar(cases.g[rows]) if name == "hg" else None,
-        values=types.scalar(np.asarray(table)) if name == "tabulated" else None,
+        g=column(cases.g[rows]) if name == "hg" else None,
+        values=column(np.asarray(table)) if name == "tabulated" else None,
     )
-    medium = Medium((types.scalar(cases.sigma_t[rows]),), types.color(1), phase)
+    medium = Medium((column(cases.sigma_t[rows]),), types.color(1), phase)
     if cases.light is None or cases.origin is None or cases.direction is None:
         light = Light(types.vector(0), types.color(intensity))
-        geometry = RayGeometry(types.scalar(cases.foot[rows]), types.scalar(cases.height[rows]), None, None)
+        geometry = RayGeometry(column(cases.foot[rows]), column(cases.height[rows]), None, None)
     else:
         light = Light(types.vector(cases.light[rows].T), types.color(intensity))
         # A file's directions have unit length to the digits they are written with.
@@ -103,8 +107,22 @@ def evaluate_rows(
         direction = given * scale
         low = dr.fma(given, scale, -direction)
         geometry = ray_geometry(types.vector(cases.origin[rows].T), direction, light, low=low)
-    x0, x1 = types.scalar(cases.x0[rows]), types.scalar(cases.x1[rows])
+    x0, x1 = column(cases.x0[rows]), column(cases.x1[rows])
     return np.array(function(geometry, x0, x1, medium, light), dtype=np.float64)
+
+
+def aligned_array(scalar: Any, numbers: NDArray[Any]) -> Any:
+    """Return numbers as a Dr.Jit array in memory that is aligned as Dr.Jit's own is.
+
+    A Dr.Jit array of NumPy's memory uses it as it stands, and a kernel is compiled for the alignment of each of its
+    arrays: where NumPy puts them by chance, the same kernel is compiled again and again.
+    """
+    dtype = np.dtype(np.float32 if dr.type_v(scalar) == dr.VarType.Float32 else np.float64)
+    memory = np.empty(numbers.size * dtype.itemsize + _ALIGNMENT, dtype=np.uint8)
+    begin = -memory.ctypes.data % _ALIGNMENT
+    aligned = memory[begin : begin + numbers.size * dtype.itemsize].view(dtype)
+    aligned[:] = numbers
+    return scalar(aligned)
 
 
 def take(cases: Cases, rows: NDArray[Any]) -> Cases:

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from realtime.scene.convex_bounds import mesh_bounds
+from validation.kernels.values import aligned_array
 from validation.scenes.parts import placed, rotation, scaled
 from validation.scenes.solids import box, gem, icosphere, prism
 
@@ -72,8 +73,8 @@ def test_a_walk_meets_the_least_of_all_planes_everywhere(variant, name, light, p
     seen, types = seen_body(name, light, precision)
     start, direction, low, high = lines_in(name, light)
     planes = entry_planes(seen)
-    v0, d = types.vector(*start.T), types.vector(*direction.T)
-    entry = first_entry(planes, v0, d, types.scalar(low))
+    v0, d = (types.vector(*(aligned_array(types.scalar, c) for c in v.T)) for v in (start, direction))
+    entry = first_entry(planes, v0, d, aligned_array(types.scalar, low))
     x, bends = low, 0
     for _ in range(60):
         if np.all(x == high):
@@ -89,7 +90,7 @@ def test_a_walk_meets_the_least_of_all_planes_everywhere(variant, name, light, p
             # the plane.
             assert found == pytest.approx(expected, rel=2e-4 if precision == "single" else 1e-9)
         bends += np.sum(end < high)
-        x, entry = end, dr.select(types.scalar(end) < types.scalar(high), beyond, entry)
+        x, entry = end, dr.select(aligned_array(types.scalar, end) < aligned_array(types.scalar, high), beyond, entry)
     assert np.all(x == high)
     assert bends > 10
 

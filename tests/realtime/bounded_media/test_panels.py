@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from tests.realtime.bounded_media.test_facet_walk import CENTRE, lines_in, seen_body
+from validation.kernels.values import aligned_array
 
 PHASES = [
     ("isotropic", 0.0),
@@ -31,9 +32,10 @@ def segments(name, light, phase, *, sigma_t, precision="double"):
         (types.scalar(sigma_t),), types.color(1.0), named_phase(kind, g=types.scalar(g) if kind == "hg" else None)
     )
     lamp = Light(types.vector(*(float(c) for c in light)), types.color(1.0))
-    v0, d = types.vector(*start.T), types.vector(*direction.T)
+    v0, d = (types.vector(*(aligned_array(types.scalar, c) for c in v.T)) for v in (start, direction))
     from realtime.bounded_media.facet_walk import entry_planes
 
+    x0 = aligned_array(types.scalar, low)
     one = BodySegment(
         medium=medium,
         around=None,
@@ -41,12 +43,12 @@ def segments(name, light, phase, *, sigma_t, precision="double"):
         geometry=ray_geometry(lamp.position + v0, d, lamp),
         start=v0,
         direction=d,
-        begin=types.scalar(low),
+        begin=x0,
         before=(types.scalar(0.0),),
         seen=seen,
         planes=entry_planes(seen),
     )
-    return one, types.scalar(low), types.scalar(low + part)
+    return one, x0, aligned_array(types.scalar, low + part)
 
 
 def integral(one, x0, x1):

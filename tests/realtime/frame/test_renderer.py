@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -43,14 +45,22 @@ SCENES = {
 }
 
 
+def without_shadows(name):
+    return tiny_scene(ball=None, floor=None, **SCENES[name]())
+
+
+@cache
+def marched_without_shadows(name):
+    return render("ray-march", precision="double", scene=without_shadows(name), steps=4000)
+
+
 @pytest.mark.claim("unshadowed-integral")
 @pytest.mark.parametrize("kernel", ["quadrature", "exact"])
 @pytest.mark.parametrize("name", SCENES)
 def test_integral_without_shadows_is_what_marching_converges_to(variant, name, kernel):
     """Two routes that share the phase function and the falloff only: nodes in w against steps in theta."""
-    scene = tiny_scene(ball=None, floor=None, **SCENES[name]())
-    marched = render("ray-march", precision="double", scene=scene, steps=4000)
-    integral = render("unshadowed", kernel=kernel, precision="double", scene=scene)
+    marched = marched_without_shadows(name)
+    integral = render("unshadowed", kernel=kernel, precision="double", scene=without_shadows(name))
     # 4000 midpoint steps leave 1e-5 where the falloff has kinks, and less elsewhere. Sixteen nodes a panel know nothing
     # of the kinks of a coarse phase table: 1e-3.
     assert relative_rmse(integral.airlight, marched.airlight) < (3e-3 if name == "tabulated" else 2e-5)

@@ -8,6 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from validation.kernels.values import aligned_array
+
 #: Rounding left aside, the rule leaves 5e-7, 8e-7 of cos^64; it was tuned on other rays.
 LEFT = 1e-6
 PHASES = [
@@ -38,7 +40,7 @@ def kernel_values(rays, name, g, *, precision="single"):
     from realtime.scene.medium import Medium
 
     types = array_types(precision)
-    foot, height, x0, x1, sigma_t = (types.scalar(np.atleast_1d(column)) for column in rays)
+    foot, height, x0, x1, sigma_t = (aligned_array(types.scalar, np.atleast_1d(column)) for column in rays)
     medium = Medium((sigma_t,), types.color(1), phase_of(name, g, types))
     value = exact(RayGeometry(foot, height), x0, x1, medium, Light(None, None))
     return np.array(value, dtype=np.float64)
@@ -69,7 +71,7 @@ def rule_and_truth(rays, name, g):
     from realtime.rays.ray_light import RayGeometry
 
     types = array_types("double")
-    foot, height, x0, x1, sigma_t = (types.scalar(column) for column in rays)
+    foot, height, x0, x1, sigma_t = (aligned_array(types.scalar, column) for column in rays)
     phase = phase_of(name, g, types)
     scale, tail = phase.lobe_scales(types.scalar)
     h, e0, e1, _ = path_interval(RayGeometry(foot, height), x0, x1, sigma_t, tail=tail)
@@ -107,9 +109,9 @@ def test_segments_as_wide_and_as_deep_as_their_panels_may_be(variant, name, g, p
     widest = widths[counts(name, g, widths, np.zeros(9901)) <= panels].max()
     depths = np.linspace(1, 40, 3901)
     deepest = depths[counts(name, g, np.full(3901, 1e-3), depths) <= panels].max()
-    start = types.scalar(10 ** rng.uniform(-3, 2.5, 30_000))
-    width = types.scalar(widest * rng.uniform(0.6, 1, 30_000))
-    depth = types.scalar(deepest * np.where(rng.random(30_000) < 0.3, 0, rng.uniform(0.3, 1, 30_000)))
+    start = aligned_array(types.scalar, 10 ** rng.uniform(-3, 2.5, 30_000))
+    width = aligned_array(types.scalar, widest * rng.uniform(0.6, 1, 30_000))
+    depth = aligned_array(types.scalar, deepest * np.where(rng.random(30_000) < 0.3, 0, rng.uniform(0.3, 1, 30_000)))
     cosh = dr.sqrt(start * start + 1)
     decay = depth / (scale * cosh * width)
     parts = (phase, (start, cosh), scale, width, [decay], None)
@@ -251,7 +253,9 @@ def test_soft_spots_against_the_truth(variant, cutoff, beam):
     direction = (target - origin) / np.linalg.norm(target - origin, axis=0)
     types = array_types("double")
     light = soft_spot(types, cutoff, beam)
-    rays = ray_geometry(*(types.vector(*(types.scalar(row) for row in v)) for v in (origin, direction)), light)
+    rays = ray_geometry(
+        *(types.vector(*(aligned_array(types.scalar, row) for row in v)) for v in (origin, direction)), light
+    )
     medium = Medium((types.scalar(0.3),), types.color(1), phase_of("rayleigh", 0, types))
     double = np.array(airlight_integral(exact, rays, types.scalar(0), types.scalar(9.0), medium=medium, light=light))
 
@@ -276,7 +280,7 @@ def test_soft_spots_against_the_truth(variant, cutoff, beam):
     assert np.max(np.abs(double[lit] / expected[lit] - 1)) < 1e-6
     single = array_types("single")
     light = soft_spot(single, cutoff, beam)
-    vectors = (single.vector(*(single.scalar(row) for row in v)) for v in (origin, direction))
+    vectors = (single.vector(*(aligned_array(single.scalar, row) for row in v)) for v in (origin, direction))
     rays = ray_geometry(*vectors, light)
     medium = Medium((single.scalar(0.3),), single.color(1), phase_of("rayleigh", 0, single))
     value = np.array(airlight_integral(exact, rays, single.scalar(0), single.scalar(9.0), medium=medium, light=light))

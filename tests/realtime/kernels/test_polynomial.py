@@ -9,6 +9,7 @@ from analytic.phase import PhaseFunction
 from realtime.errors import InputError
 from realtime.kernels.polynomial import _nodes, polynomial
 from tests.helpers.ray_polynomial import _antiderivative, evaluate, evaluate_segment, polynomial_coefficients
+from validation.kernels.values import aligned_array
 
 PHASES = ("isotropic", "rayleigh", "hazy", "murky", "hg")
 RAY = {"foot": 1.3, "height": 0.7, "x0": 0.0, "x1": 2.9, "sigma_t": 0.43}
@@ -29,7 +30,7 @@ def arguments(columns, phase="isotropic", precision="double", *, g=None, values=
     from realtime.scene.phase import named_phase
 
     types = array_types(precision)
-    c = {key: types.scalar(np.atleast_1d(columns[key]).astype(np.float64)) for key in RAY}
+    c = {key: aligned_array(types.scalar, np.atleast_1d(columns[key])) for key in RAY}
     phase = named_phase(
         phase, g=None if g is None else types.scalar(g), values=None if values is None else values(types)
     )

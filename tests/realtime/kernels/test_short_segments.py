@@ -4,6 +4,8 @@
 import numpy as np
 import pytest
 
+from validation.kernels.values import aligned_array
+
 PHASES = [
     ("isotropic", 0.0),
     ("rayleigh", 0.0),
@@ -52,7 +54,7 @@ def of_rule(rays, name, g, rule, precision):
     from realtime.scene.phase import named_phase
 
     types = array_types(precision)
-    foot, height, x0, x1, sigma_t = (types.scalar(column) for column in rays)
+    foot, height, x0, x1, sigma_t = (aligned_array(types.scalar, column) for column in rays)
     phase = named_phase(name, g=types.scalar(g) if name == "hg" else None)
     geometry = RayGeometry(foot, height)
     (value,) = short_segment(geometry, x0, x1, phase, (sigma_t,), rule=rule)
