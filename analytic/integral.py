@@ -21,7 +21,7 @@ dx = (1 + h^2/q^2)/2 dq = r/q dq, dx/r^2 = dq/(q r) = 2 dq/(q^2 + h^2), and cos 
     J = int_{q0}^{q1} exp(-sigma_t (foot + q)) p((h^2 - q^2)/(h^2 + q^2)) 2/(h^2 + q^2) dq                      (path)
       = (1/h) int_{w0}^{w1} exp(-sigma_t (foot + h e^w)) p(-tanh w) / cosh w dw,          q = h e^w.
 
-The first two are integrated by QUADPACK's Gauss-Kronrod rules, the third by tanh-sinh. Slow twins of `analytic.panels`:
+The first two are integrated by QUADPACK's Gauss-Kronrod rules, the third by tanh-sinh. Oracles of `analytic.panels`:
 a call takes milliseconds.
 """
 

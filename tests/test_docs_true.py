@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parent.parent
 DOCUMENTS = sorted(path.relative_to(ROOT) for path in [*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")])
 PACKAGES = ("analytic", "realtime", "reference", "validation", "reports", "tests")
 #: Files that a reader of the documents writes, or might.
-THE_READERS = {"fog.py", "twelve.py", "path/to/file.py", "docs/NAME.md"}
+THE_READERS = {"fog.py", "twelve.py", "file.py", "path/to/file.py", "docs/NAME.md"}
 
 
 def missing_files(text: str, folder: Path) -> list[str]:

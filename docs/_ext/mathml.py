@@ -1,14 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Formulas as MathML, which browsers draw without scripts, fonts or a network."""
+"""Formulas as MathML, which browsers draw without scripts, fonts or a network, by docutils' converter."""
 
-import re
+from xml.etree import ElementTree
 
 from docutils import nodes
+from docutils.utils.math.latex2mathml import tex2mathml
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
 
-_FUNCTION = "<mi>(?:arctan|cosh|cos|sinh|sin|tanh|tan|log|max)</mi>"
-_SPACE = '<mspace width="0.1667em"/>'  # MathML knows no space about a function's name
+_CHILDREN = {"mfrac": 2, "msub": 2, "msup": 2, "mover": 2, "munder": 2, "mroot": 2, "msubsup": 3, "munderover": 3}
+_ROWS = ("math", "mrow", "mtd", "msqrt")
+_APPLIED = "\u2061"  # docutils' mark between a function's name and what it is applied to
+_WIDTH = "0.1667em"  # of the space about the name, which browsers do not put there
 
 
 def markup(latex: str, *, block: bool) -> str:
@@ -26,16 +29,32 @@ def markup(latex: str, *, block: bool) -> str:
     ExtensionError
         If the formula cannot be read.
     """
-    from latex2mathml.converter import convert
-
     try:
-        found = convert(latex, display="block" if block else "inline")
-    except Exception as error:  # every slip in a formula has a class of its own
-        raise ExtensionError(f"formula {latex!r}: {error or type(error).__name__}") from error
-    if "\\" in found:  # an unknown command is handed on as a name
-        raise ExtensionError(f"formula {latex!r}: unknown command, found in {found!r}")
-    spaced = re.sub(rf"(?<=</mi>)(?={_FUNCTION})", _SPACE, found)
-    return re.sub(rf"({_FUNCTION})(?=<mi>)", rf"\1{_SPACE}", spaced)
+        formula = tex2mathml(latex, as_block=block).replace("&ApplyFunction;", _APPLIED)
+    except Exception as error:  # a MathError, or what docutils itself stumbles over
+        raise ExtensionError(f"formula {latex!r}: {error}") from error
+    root = ElementTree.fromstring(formula.replace(' xmlns="http://www.w3.org/1998/Math/MathML"', ""))
+    for element in root.iter():
+        # docutils closes a brace that is left open: a fraction without denominator, an index without anything in it.
+        if len(element) != _CHILDREN.get(element.tag, len(element)) or (element.tag == "mrow" and not len(element)):
+            raise ExtensionError(f"formula {latex!r}: something is missing, is a brace left open?")
+        if element.tag in _ROWS:
+            element[:] = _spaced(list(element))
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def _spaced(row: list[ElementTree.Element]) -> list[ElementTree.Element]:
+    """Return the children of a row with thin spaces about the names of functions, as TeX sets them."""
+    spaced: list[ElementTree.Element] = []
+    for element, following in zip(row, [*row[1:], None]):
+        if element.text == _APPLIED:
+            if following is not None and following.tag != "mo":
+                spaced.append(ElementTree.Element("mspace", width=_WIDTH))
+            continue
+        if following is not None and following.text == _APPLIED and spaced and spaced[-1].tag not in ("mo", "mspace"):
+            spaced.append(ElementTree.Element("mspace", width=_WIDTH))
+        spaced.append(element)
+    return spaced
 
 
 def _inline(writer, node: nodes.math) -> None:

@@ -50,11 +50,13 @@ def merged(one: Batches, other: Batches) -> Batches:
     """Add up two sets of batches."""
     if one.samples != other.samples or set(one.seeds) & set(other.seeds):
         raise ValueError("batches to merge need the same samples a pixel and different seeds")
-    mean, squares = pooled((len(one.seeds), one.mean, one.squares), (len(other.seeds), other.mean, other.squares))
+    mean, squares = combined_moments(
+        (len(one.seeds), one.mean, one.squares), (len(other.seeds), other.mean, other.squares)
+    )
     return Batches(one.seeds + other.seeds, one.samples, mean, squares, np.concatenate([one.totals, other.totals]))
 
 
-def pooled(one: tuple[int, Array, Array], other: tuple[int, Array, Array]) -> tuple[Array, Array]:
+def combined_moments(one: tuple[int, Array, Array], other: tuple[int, Array, Array]) -> tuple[Array, Array]:
     """Return mean and sum of squared deviations of two sets together, each given as (count, mean, squares).
 
     The squares are those within each set and those between their means (Chan, Golub and LeVeque 1983, eq. 2.1).

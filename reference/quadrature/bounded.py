@@ -26,10 +26,10 @@ from reference.quadrature.adaptive_panels import Panels, first_panels, sum_panel
 from reference.quadrature.pieces import Pieces, Setup, cut_pieces
 from reference.quadrature.segments import Segments, leg_kinks
 from reference.quadrature.unbounded import Rays, lit_stretches, sums_of
-from reference.scene.convex_bounds import Ball
+from reference.scene.convex_bounds import Sphere
 from reference.scene.read import BoundedMedium, TruthLight, TruthScene
 from reference.visibility.intervals import LitIntervals
-from reference.visibility.line_crossings import ball_crossings, crossed_facets
+from reference.visibility.line_crossings import crossed_facets, sphere_crossings
 from reference.visibility.spot_cone import falloff
 
 Array = NDArray[np.float64]
@@ -175,7 +175,7 @@ class _Sum:
         numbers = self.pieces.medium[rows]
         for number in np.unique(numbers):
             phase = self.setup.medium(int(number)).phase
-            if phase.name != "isotropic":
+            if not phase.is_constant:
                 chosen = numbers == number
                 result[chosen] = phase(-sine[chosen])
         light = self.setup.light
@@ -198,10 +198,10 @@ def _chord(block: _Sum, medium: BoundedMedium) -> Chord:
     bounds, light = medium.bounds, block.setup.light.position
     every = np.arange(len(block.width))
     along, away = block.axes(every)
-    if isinstance(bounds, Ball):
+    if isinstance(bounds, Sphere):
         centre = bounds.centre - light
         c1, c2, power = along @ centre, away @ centre, float(centre @ centre - bounds.radius**2)
-        return lambda rows, sine, cosine: ball_crossings(c1[rows, None] * sine + c2[rows, None] * cosine, power)
+        return lambda rows, sine, cosine: sphere_crossings(c1[rows, None] * sine + c2[rows, None] * cosine, power)
     middle = block.start + 0.5 * block.width
     leg = np.tanh(middle)[:, None] * along + (1 / np.cosh(middle))[:, None] * away
     r = block.height * np.cosh(middle)

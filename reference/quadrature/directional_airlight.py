@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The airlight of one light at infinity along the camera rays of a scene, in bodies of media."""
+"""The airlight of one directional light along the camera rays of a scene, in bounded media."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class DirectionalAirlight:
-    """What a light at infinity sends along rays."""
+    """What a directional light sends along rays."""
 
     radiance: Array  #: (rays, 3) [W/(m^2 sr)]
     bound: Array  #: of its error, (rays, 3) [W/(m^2 sr)]

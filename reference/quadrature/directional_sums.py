@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The airlight of a light at infinity in bodies of media, added up for every ray, with an error bound.
+"""The airlight of a directional light in bounded media, added up for every ray, with an error bound.
 
 With the names of `reference.visibility.parallel_rays` the single scattering of a piece [x0, x1] of a ray in a medium m
 is
@@ -19,9 +19,10 @@ way from x = z - y c/s. Pieces are cut there, so tau is linear on each, and with
 
     int exp(-tau) dx = (x1 - x0) exp(-min tau) (1 - exp(-|tau_1 - tau_0|)) / |tau_1 - tau_0|
 
-in closed form. A ball, a disk of the centre (c_z, c_y) and the radius rho in that plane, holds
+in closed form. A sphere, a disk of the centre (c_z, c_y) and the radius rho in that plane, holds
 2 sqrt(rho^2 - (x s - q_c)^2) of the leg, q_c = c_z s - c_y c, or what is left of it behind the ray. That is smooth
-between the x of both tangents, (q_c +- rho)/s; where a scene has balls of media, panels are summed as for other lights.
+between the x of both tangents, (q_c +- rho)/s; where a scene has spheres of media, panels are summed as for
+other lights.
 """
 
 from collections.abc import Callable
@@ -35,7 +36,7 @@ from reference.quadrature.adaptive_panels import Panels, first_panels, sum_panel
 from reference.quadrature.pieces import Crossed, Pieces, cut_pieces
 from reference.quadrature.segments import Segments, polygon_corners
 from reference.quadrature.unbounded import sums_of
-from reference.scene.convex_bounds import Ball, Polyhedron
+from reference.scene.convex_bounds import Polyhedron, Sphere
 from reference.scene.directional_light import DirectionalLight
 from reference.scene.read import TruthScene
 from reference.visibility.intervals import LitIntervals
@@ -66,7 +67,7 @@ def sum_directional(
     Parameters
     ----------
     truth, light, rays
-        The scene, one of its lights at infinity, and the camera rays in the planes with that light.
+        The scene, one of its directional lights, and the camera rays in the planes with that light.
     lit
         Lit intervals of the rays, as shares.
     segments
@@ -75,7 +76,7 @@ def sum_directional(
         What the relative uncertainty of coordinates is worth on each ray (`reference.visibility.directional_casting`),
         (n,) [m].
     closed
-        Take the closed form where no body is a ball; False sums panels there too.
+        Take the closed form where no body is a sphere; False sums panels there too.
 
     Returns
     -------
@@ -83,7 +84,7 @@ def sum_directional(
         Airlight [W/(m^2 sr)] and a bound of its error, (rays, 3) each.
     """
     setup = Crossed(truth, rays.direction, segments)
-    closed = closed and not any(isinstance(medium.bounds, Ball) for medium in truth.media)
+    closed = closed and not any(isinstance(medium.bounds, Sphere) for medium in truth.media)
     count = len(rays.direction)
     total, bound = np.zeros((count, 3)), np.zeros((count, 3))
     x0, x1 = rays.distance(lit.ray, lit.low), rays.distance(lit.ray, lit.high)
@@ -124,11 +125,11 @@ def _kinks(truth: TruthScene, rays: ParallelRays, used: Index) -> tuple[Index, A
     return np.concatenate(numbers), np.concatenate(places)
 
 
-def _disks(ball: Ball, rays: ParallelRays, ray: Index) -> tuple[Array, Array, Array]:
-    """Return the disks in which the planes of rays cut a ball: c_z, c_y, radius, 0 where they miss it."""
-    centre = ball.centre - rays.origin
+def _disks(sphere: Sphere, rays: ParallelRays, ray: Index) -> tuple[Array, Array, Array]:
+    """Return the disks in which the planes of rays cut a sphere: c_z, c_y, radius, 0 where they miss it."""
+    centre = sphere.centre - rays.origin
     along, across = rays.direction[ray], rays.across[ray]
-    return along @ centre, across @ centre, half_chord(ball.radius, np.abs(np.cross(along, across) @ centre))
+    return along @ centre, across @ centre, half_chord(sphere.radius, np.abs(np.cross(along, across) @ centre))
 
 
 @dataclass
@@ -227,10 +228,10 @@ def _planes(block: _Sum, body: Polyhedron) -> Length:
     return length
 
 
-def _chords(block: _Sum, ball: Ball) -> Length:
-    """Return a function (pieces, x) -> length of the legs in a ball."""
+def _chords(block: _Sum, sphere: Sphere) -> Length:
+    """Return a function (pieces, x) -> length of the legs in a sphere."""
     ray = block.pieces.ray
-    c_z, c_y, disk = _disks(ball, block.rays, ray)
+    c_z, c_y, disk = _disks(sphere, block.rays, ray)
     sine, cosine = block.rays.sine[ray], block.rays.cosine[ray]
 
     def length(rows: Index, x: Array) -> Array:

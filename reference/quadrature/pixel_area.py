@@ -37,7 +37,7 @@ from reference.quadrature.unbounded import sums_of
 from reference.scene.camera import film_directions, pixel_centres
 from reference.scene.read import TruthScene
 from reference.scene.shapes import read_shapes
-from reference.visibility.intervals import Certificate
+from reference.visibility.intervals import RandomChecks
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -133,7 +133,7 @@ def area_image(
         if last.any():
             squares, rays = _at_random(trace, *_quarters(found, last))
             finished.append(squares)
-            film = replace(film, rays=replace(film.rays, certificate=_both(film.rays, rays)))
+            film = replace(film, rays=replace(film.rays, random_checks=_both(film.rays, rays)))
         rest = cut & ~last
         if not rest.any():
             found = _chosen(found, rest)
@@ -146,7 +146,7 @@ def area_image(
         centre,
         distance=centre.distance[at_centre],
         light_angle=centre.light_angle[at_centre],
-        certificate=film.rays.certificate,
+        random_checks=film.rays.random_checks,
     )
     return image_of(truth, centre, value[:, :3], error[:, :3] + bound, value[:, 3:])
 
@@ -168,8 +168,8 @@ def _pixel_angle(truth: TruthScene) -> float:
     return float(np.linalg.norm(right - left))
 
 
-def _both(one: RayValues, other: RayValues) -> Certificate:
-    return Certificate.of_all([one.certificate, other.certificate])
+def _both(one: RayValues, other: RayValues) -> RandomChecks:
+    return RandomChecks.of_all([one.random_checks, other.random_checks])
 
 
 def _quarters(squares: _Squares, which: Bools) -> tuple[Index, Array, Array]:
@@ -282,5 +282,5 @@ def _joined(parts: Sequence[_Squares]) -> _Squares:
 
 def _joined_rays(parts: Sequence[RayValues]) -> RayValues:
     arrays = {name: np.concatenate([getattr(part, name) for part in parts]) for name in _LAYERS}
-    certificate = Certificate.of_all([part.certificate for part in parts])
-    return RayValues(**arrays, transitions=sum(part.transitions for part in parts), certificate=certificate)
+    random_checks = RandomChecks.of_all([part.random_checks for part in parts])
+    return RayValues(**arrays, transitions=sum(part.transitions for part in parts), random_checks=random_checks)

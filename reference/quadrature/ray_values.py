@@ -4,14 +4,14 @@
 For each light and each ray, in float64:
 
 1. the visible surface ends the ray (cast in float32, as by every method, so that all share the same surface; where that
-   is a polygon or a ball its distance is computed again in float64);
+   is a polygon or a sphere its distance is computed again in float64);
 2. the cone of a spot and the visible surface bound the angle theta at the light (`reference.visibility.spot_cone`);
 3. that range is cut into lit intervals, by exact geometry or by ray casting, which random shadow rays then check
    (`reference.visibility.lit_intervals`);
 4. the intervals are integrated and added up, with an error estimate (`reference.quadrature.unbounded`).
 
 The bound of a ray adds the estimates, what the rounding of each edge between light and shadow is worth, and what the
-shadow rays left in doubt. For lights at infinity the share of a ray takes the place of the angle
+shadow rays left in doubt. For directional lights the share of a ray takes the place of the angle
 (`reference.visibility.parallel_rays`).
 """
 
@@ -31,7 +31,7 @@ from reference.quadrature.unbounded import Rays, sum_intervals
 from reference.scene.read import TruthLight, TruthScene
 from reference.scene.shapes import Shapes, read_shapes
 from reference.visibility.exact_distance import exact_distance
-from reference.visibility.intervals import Certificate, LitIntervals
+from reference.visibility.intervals import LitIntervals, RandomChecks
 from reference.visibility.lit_intervals import lit_intervals
 from reference.visibility.spot_cone import cone_interval, perpendicular
 from reference.visibility.surface_shadows import reached_by_shadow_rays
@@ -68,12 +68,12 @@ class RayValues:
     light_angle: Array  #: (rays,) [rad]
     intervals: NDArray[np.int64]  #: how many lit intervals a ray has, those of all lights together, (rays,)
     transitions: int
-    certificate: Certificate
+    random_checks: RandomChecks
 
 
 def image_of(truth: TruthScene, centre: RayValues, airlight: Array, bound: Array, surface: Array) -> TruthImage:
     """Return the image with these layers, (pixels, 3), and what else is known of the rays through the centres."""
-    shape, known = (truth.height, truth.width), centre.certificate
+    shape, known = (truth.height, truth.width), centre.random_checks
     return TruthImage(
         airlight.reshape(*shape, 3),
         bound.reshape(*shape, 3),
@@ -109,7 +109,7 @@ def ray_values(
     hits = replace(hits, distance=exact_distance(truth, hits.interaction, cast, shapes))
     count = len(truth.direction)
     airlight, bound, light_angle = np.zeros((count, 3)), np.zeros((count, 3)), np.full(count, np.pi)
-    intervals, transitions, certificates = np.zeros(count, np.int64), 0, []
+    intervals, transitions, checks = np.zeros(count, np.int64), 0, []
     reached: list[NDArray[np.bool_] | None] = []
     how = {"samples": samples, "edges": edges, "shapes": shapes}
     total = len(truth.lights) + len(truth.directional)
@@ -120,7 +120,7 @@ def ray_values(
         light_angle = np.minimum(light_angle, found.angle)
         intervals += np.bincount(found.lit.ray, minlength=count)
         transitions += found.lit.transitions
-        certificates.append(found.lit.certificate)
+        checks.append(found.lit.random_checks)
         seen = found.reached
         if seen is not None and shadow_scale != 1:
             what = {"scene": truth.occluders, "shapes": shapes}
@@ -135,13 +135,11 @@ def ray_values(
             bound += sent.bound
             intervals += np.bincount(sent.lit.ray, minlength=count)
             transitions += sent.lit.transitions
-            certificates.append(sent.lit.certificate)
+            checks.append(sent.lit.random_checks)
         if progress is not None:
             progress(number + 1, total, "quadrature")
     surface = lit_surface(truth, hits, reached=reached, shadow_scale=shadow_scale)
-    return RayValues(
-        airlight, bound, surface, cast, light_angle, intervals, transitions, Certificate.of_all(certificates)
-    )
+    return RayValues(airlight, bound, surface, cast, light_angle, intervals, transitions, RandomChecks.of_all(checks))
 
 
 @dataclass(frozen=True)

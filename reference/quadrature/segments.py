@@ -23,7 +23,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.scene.convex_bounds import Ball, Bounds, Polyhedron
+from reference.scene.convex_bounds import Bounds, Polyhedron, Sphere
 from reference.scene.read import TruthScene
 from reference.visibility.line_crossings import crossings
 
@@ -121,8 +121,8 @@ def leg_kinks(bounds: Bounds, light: Array, axes: tuple[Array, Array], height: A
     ray, offset
         Number of the ray and x - foot of each kink [m], in no particular order.
     """
-    if isinstance(bounds, Ball):
-        find, step = partial(_ball_corners, bounds), _BLOCK
+    if isinstance(bounds, Sphere):
+        find, step = partial(_sphere_corners, bounds), _BLOCK
     else:
         find, step = partial(polygon_corners, bounds), max(1, _BLOCK // max(1, len(bounds.edge)))
     rays, offsets = [np.empty(0, np.int64)], [np.empty(0)]
@@ -148,12 +148,12 @@ def polygon_corners(body: Polyhedron, light: Array, along: Array, away: Array) -
     return ray, np.sum(point * along[ray], axis=1), np.sum(point * away[ray], axis=1)
 
 
-def _ball_corners(ball: Ball, light: Array, along: Array, away: Array) -> tuple[Index, Array, Array]:
+def _sphere_corners(sphere: Sphere, light: Array, along: Array, away: Array) -> tuple[Index, Array, Array]:
     """Return the points at which tangents from the light touch the discs in the planes of rays and light."""
-    centre = ball.centre - light
+    centre = sphere.centre - light
     beside = np.cross(along, away) @ centre
     c1, c2 = along @ centre, away @ centre
-    square, power = ball.radius**2 - beside**2, c1**2 + c2**2 - (ball.radius**2 - beside**2)
+    square, power = sphere.radius**2 - beside**2, c1**2 + c2**2 - (sphere.radius**2 - beside**2)
     ray = np.flatnonzero((square > 0) & (power > 0))
     c1, c2, radius, reach = c1[ray], c2[ray], np.sqrt(square[ray]), np.sqrt(power[ray])
     distance = np.hypot(c1, c2)

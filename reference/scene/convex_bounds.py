@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Convex bounds of media in float64: polyhedra and balls, read from Mitsuba's shapes and checked.
+"""Convex bounds of media in float64: polyhedra and spheres, read from Mitsuba's shapes and checked.
 
 A polyhedron is what its facets' half spaces n . x <= offset have in common. Vertices are float32 numbers, so a facet of
 four corners is only nearly flat; a mesh counts as convex where no vertex lies further outside any facet's plane than
@@ -37,14 +37,14 @@ class Polyhedron:
 
 
 @dataclass(frozen=True)
-class Ball:
-    """A ball."""
+class Sphere:
+    """A sphere."""
 
     centre: Array  #: [m]
     radius: float  #: [m]
 
 
-Bounds = Polyhedron | Ball
+Bounds = Polyhedron | Sphere
 
 
 def read_bounds(shape: Any) -> Bounds:
@@ -57,7 +57,7 @@ def read_bounds(shape: Any) -> Bounds:
     """
     parameters = mi.traverse(shape)
     if shape.class_name() == "Sphere":
-        return _read_ball(shape, np.array(parameters["to_world"].matrix, dtype=np.float64).reshape(4, 4))
+        return _read_sphere(shape, np.array(parameters["to_world"].matrix, dtype=np.float64).reshape(4, 4))
     if not shape.is_mesh() or "vertex_positions" not in parameters:
         raise _refusal(shape, f"is a {shape.class_name()}", "a sphere, a cube or a closed convex mesh")
     vertices = np.array(parameters["vertex_positions"], dtype=np.float64).reshape(-1, 3)
@@ -67,13 +67,13 @@ def read_bounds(shape: Any) -> Bounds:
     return _read_polyhedron(shape, vertices, faces)
 
 
-def _read_ball(shape: Any, matrix: Array) -> Ball:
+def _read_sphere(shape: Any, matrix: Array) -> Sphere:
     lengths = np.linalg.norm(matrix[:3, :3], axis=0)
     if np.ptp(lengths) > 1e-5 * lengths.max():
         raise _refusal(shape, "is a sphere with different scales along its axes", "one scale, or a mesh")
     if shape.has_flipped_normals():
         raise _refusal(shape, "is inside out", "normals that point outwards: remove flip_normals")
-    return Ball(matrix[:3, 3], float(lengths.mean()))
+    return Sphere(matrix[:3, 3], float(lengths.mean()))
 
 
 def _read_polyhedron(shape: Any, vertices: Array, faces: Index) -> Polyhedron:
@@ -127,22 +127,22 @@ def _refusal(shape: Any, found: str, wanted: str) -> InputError:
 
 def holds(bounds: Bounds, point: Array) -> bool:
     """Return whether a point lies inside a body."""
-    if isinstance(bounds, Ball):
+    if isinstance(bounds, Sphere):
         return bool(np.linalg.norm(point - bounds.centre) < bounds.radius)
     return bool(np.all(bounds.normal @ point < bounds.offset))
 
 
 def overlap(one: Bounds, other: Bounds) -> bool:
     """Return whether two bodies share more than their boundaries, to 1e-6 of their sizes."""
-    if isinstance(one, Ball) and isinstance(other, Ball):
+    if isinstance(one, Sphere) and isinstance(other, Sphere):
         gap = float(np.linalg.norm(one.centre - other.centre))
         return gap < (one.radius + other.radius) * (1 - _FLAT)
-    if isinstance(one, Ball):
+    if isinstance(one, Sphere):
         assert isinstance(other, Polyhedron)
         return _distance(other, one.centre) < one.radius * (1 - _FLAT)
-    if isinstance(other, Ball):
+    if isinstance(other, Sphere):
         return overlap(other, one)
-    # The largest ball in what both have in common: maximise its radius t under n . x + t <= offset.
+    # The largest sphere in what both have in common: maximise its radius t under n . x + t <= offset.
     planes = np.concatenate([one.normal, other.normal])
     result = linprog(
         [0.0, 0.0, 0.0, -1.0],

@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class DirectionalLight:
-    """A light at infinity."""
+    """A directional light."""
 
     direction: Array  #: unit vector in which its light travels
     irradiance: Array  #: on a surface that faces it [W/m^2], RGB

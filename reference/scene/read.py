@@ -70,7 +70,7 @@ class TruthScene:
     medium: TruthMedium  #: the medium without bounds, a vacuum of extinction 0 where there is none
     lights: tuple[TruthLight, ...]  #: point and spot lights
     media: tuple[BoundedMedium, ...] = ()  #: the media with bounds, disjoint
-    directional: tuple[DirectionalLight, ...] = ()  #: lights at infinity; all media then have bounds
+    directional: tuple[DirectionalLight, ...] = ()  #: directional lights; all media then have bounds
 
 
 def read_truth(scene) -> TruthScene:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What hides lights, as numbers: triangles of the polygons, balls, and the shapes that only casting rays can tell of.
+"""What hides lights, as numbers: triangles of the polygons, spheres, and the shapes that only casting rays can tell of.
 
-Mitsuba takes a `sphere` for the ball around the image of its centre whose radius is the length of the image of its
+Mitsuba takes a `sphere` for the sphere around the image of its centre whose radius is the length of the image of its
 first axis, whatever else the transform does to it: so does this module. Which side its normals point to matters to no
 shadow.
 """
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
-from reference.scene.convex_bounds import Ball
+from reference.scene.convex_bounds import Sphere
 from reference.scene.read import scene_of
 
 Array = NDArray[np.float64]
@@ -25,29 +25,29 @@ class Shapes:
     """The opaque shapes of a scene."""
 
     triangles: Array  #: those of meshes and rectangles, (triangles, 3, 3) [m]
-    centre: Array = field(default_factory=lambda: np.empty((0, 3)))  #: of the balls, (balls, 3) [m]
-    radius: Array = field(default_factory=lambda: np.empty(0))  #: of the balls, (balls,) [m]
+    centre: Array = field(default_factory=lambda: np.empty((0, 3)))  #: of the spheres, (spheres, 3) [m]
+    radius: Array = field(default_factory=lambda: np.empty(0))  #: of the spheres, (spheres,) [m]
     others: Any = None  #: an `mi.Scene` of all other shapes, None where there are none
-    single: tuple[tuple[Any, Array | Ball], ...] = ()  #: meshes, rectangles and spheres one by one, each as numbers
+    single: tuple[tuple[Any, Array | Sphere], ...] = ()  #: meshes, rectangles and spheres one by one, each as numbers
 
 
 def read_shapes(scene) -> Shapes:
     """Read the shapes of a Mitsuba scene, all of them opaque."""
-    single: list[tuple[Any, Array | Ball]] = []
+    single: list[tuple[Any, Array | Sphere]] = []
     others = []
     for shape in scene.shapes():
         if is_polygonal(shape):
             single.append((shape, _shape_triangles(shape)))
         elif shape.class_name() == "Sphere":
-            single.append((shape, _ball(shape)))
+            single.append((shape, _sphere(shape)))
         else:
             others.append(shape)
-    triangles = [part for _, part in single if not isinstance(part, Ball)]
-    balls = [part for _, part in single if isinstance(part, Ball)]
+    triangles = [part for _, part in single if not isinstance(part, Sphere)]
+    spheres = [part for _, part in single if isinstance(part, Sphere)]
     return Shapes(
         np.concatenate([np.empty((0, 3, 3)), *triangles]),
-        np.array([ball.centre for ball in balls]).reshape(-1, 3),
-        np.array([ball.radius for ball in balls]),
+        np.array([sphere.centre for sphere in spheres]).reshape(-1, 3),
+        np.array([sphere.radius for sphere in spheres]),
         scene_of(others, scene) if others else None,
         tuple(single),
     )
@@ -88,9 +88,9 @@ def _shape_triangles(shape) -> Array:
     return vertices[np.array(parameters["faces"], dtype=np.int64).reshape(-1, 3)]
 
 
-def _ball(shape) -> Ball:
+def _sphere(shape) -> Sphere:
     matrix = _matrix(shape)
-    return Ball(matrix[:3, 3], float(np.linalg.norm(matrix[:3, 0])))
+    return Sphere(matrix[:3, 3], float(np.linalg.norm(matrix[:3, 0])))
 
 
 def _matrix(shape) -> Array:

@@ -74,7 +74,10 @@ def store_arrays(key: str, arrays: Mapping[str, Any]) -> None:
     content: dict[str, Any] = {name: np.asarray(value) for name, value in arrays.items()}
     buffer = BytesIO()
     np.savez(buffer, **(content | {_DIGEST: np.asarray(_content_digest(key, content))}))
-    write_bytes(_path(key), buffer.getvalue())
+    try:
+        write_bytes(_path(key), buffer.getvalue())
+    except FileNotFoundError:  # the folder was empty, and another process has just dropped it
+        write_bytes(_path(key), buffer.getvalue())
 
 
 def drop_arrays(key: str) -> None:

@@ -101,7 +101,8 @@ def _entries_in(folder: Path) -> Iterator[Entry]:
         name = _NAME.fullmatch(path.name)
         if name is None or path.is_symlink():
             continue
-        files = tuple(path.glob("*.npz")) if path.is_dir() else (path,)
+        # What another process has half written begins with a dot.
+        files = tuple(path.glob("[!.]*.npz")) if path.is_dir() else (path,)
         states = []
         for file in files:
             with suppress(OSError):  # another process has just dropped it

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The legs from a light at infinity to points of camera rays, for the routes of `reference.visibility.lit_intervals`.
+"""The legs from a directional light to points of camera rays, for the routes of `reference.visibility.lit_intervals`.
 
 A leg begins where it has passed all opaque shapes: at the plane across the light's direction that touches the box
 around them from the light's side. Its point is told by the share of the way from `first` to `last`. A smooth surface

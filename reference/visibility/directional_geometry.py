@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lit intervals of camera rays by exact geometry for a light at infinity: the twin of `lit_geometry` and `lit_balls`.
+"""Lit intervals of camera rays by exact geometry for a directional light: as `triangles` and `spheres` do for others.
 
 In the plane of a ray and the direction to the light (`reference.visibility.parallel_rays`) what lies at (z, y), y >= 0,
 is on the leg of the point x = z - y c/s of the ray, and what lies at y < 0 is on none.
@@ -7,7 +7,7 @@ is on the leg of the point x = z - y c/s of the ray, and what lies at y < 0 is o
 **Triangles** cut the plane in segments. The map is linear: a segment, clipped to y >= 0, hides from the light what lies
 between the images of its ends.
 
-**Balls** cut it in disks, of the centre (c_z, c_y) and the radius rho. What the disk hides is all from which a leg
+**Spheres** cut it in disks, of the centre (c_z, c_y) and the radius rho. What the disk hides is all from which a leg
 meets it; the part of the disk in y >= 0 is convex, and so is its image, one interval. Legs keep their distance
 q = z s - y c from the one through the camera, x = q/s. The largest q of the disk, q_c + rho, is that of the tangent,
 which touches at y = c_y - rho c, the smallest, q_c - rho, at y = c_y + rho c. Each counts if it touches at y > 0;
@@ -35,10 +35,10 @@ from reference.visibility.triangles import (
     angle_below,
     axis_frame,
     azimuths,
-    balls_around,
     lit_of_chunk,
     near_pairs,
     plane_sections,
+    spheres_around,
 )
 
 Array = NDArray[np.float64]
@@ -53,7 +53,7 @@ def parallel_intervals(rays: ParallelRays, shapes: Shapes) -> LitIntervals:
     rays
         The rays and between which distances they are looked at.
     shapes
-        What hides the light; only triangles and balls are looked at.
+        What hides the light; only triangles and spheres are looked at.
 
     Returns
     -------
@@ -62,10 +62,11 @@ def parallel_intervals(rays: ParallelRays, shapes: Shapes) -> LitIntervals:
 
     Notes
     -----
-    Valid for opaque triangles and balls, wherever they are; touching triangles share the coordinates of their vertices.
+    Valid for opaque triangles and spheres, wherever they are; touching triangles share the coordinates of their
+    vertices.
     """
     corners = shapes.triangles - rays.origin
-    balls = shapes.centre - rays.origin, shapes.radius
+    spheres = shapes.centre - rays.origin, shapes.radius
     used = np.flatnonzero(rays.last > rays.first)
     if not len(used):
         return LitIntervals(used, np.empty(0), np.empty(0), 0, edge=EXACT_EDGE)
@@ -81,7 +82,7 @@ def parallel_intervals(rays: ParallelRays, shapes: Shapes) -> LitIntervals:
         at_camera = np.arctan2(rays.sine[mine], rays.cosine[mine]) + SLACK
         at_end = rays.last[mine] * rays.sine[mine]
         pairs = near_pairs(azimuth[chosen], (at_camera, at_end), reaches)
-        hidden = _triangle_shadows(corners, rays, mine, pairs), _ball_shadows(balls, rays, mine)
+        hidden = _triangle_shadows(corners, rays, mine, pairs), _sphere_shadows(spheres, rays, mine)
         row, begin, end = (np.concatenate(both) for both in zip(*hidden, strict=True))
         parts.append(lit_of_chunk((row, begin, end), (rays.first, rays.last), mine))
     ray, low, high = (np.concatenate([part[i] for part in parts]) for i in range(3))
@@ -95,7 +96,7 @@ def parallel_intervals(rays: ParallelRays, shapes: Shapes) -> LitIntervals:
 
 def _reaches(corners: Array, frame: Array) -> Reaches:
     """Bound triangles, given relative to the camera, in azimuth, angle from the light, and distance from the axis."""
-    centre, radius = balls_around(corners)
+    centre, radius = spheres_around(corners)
     distance = np.linalg.norm(centre @ frame[1:].T, axis=1)
     slack = SLACK * (np.abs(corners).max(axis=(1, 2), initial=0) + 1)
     return Reaches(*azimuths(corners, frame), angle_below(centre, radius, frame[0]) - SLACK, distance - radius - slack)
@@ -114,14 +115,14 @@ def _triangle_shadows(corners: Array, rays: ParallelRays, mine: Index, pairs: tu
     return row, np.minimum(begin, end), np.maximum(begin, end)
 
 
-def _ball_shadows(balls: tuple[Array, Array], rays: ParallelRays, mine: Index) -> Shadows:
-    """Return rows of `mine` and the intervals of the distance that balls hide there; centres relative to the camera."""
-    centre, radius = balls
+def _sphere_shadows(spheres: tuple[Array, Array], rays: ParallelRays, mine: Index) -> Shadows:
+    """Return rows of `mine` and the intervals of distance that spheres hide there; centres relative to the camera."""
+    centre, radius = spheres
     side = np.cross(rays.direction[mine], rays.across[mine]) @ centre.T
-    row, ball = np.nonzero(np.abs(side) < radius)
-    disk = half_chord(radius[ball], np.abs(side[row, ball]))
-    c_z = np.einsum("ij,ij->i", rays.direction[mine][row], centre[ball])
-    c_y = np.einsum("ij,ij->i", rays.across[mine][row], centre[ball])
+    row, sphere = np.nonzero(np.abs(side) < radius)
+    disk = half_chord(radius[sphere], np.abs(side[row, sphere]))
+    c_z = np.einsum("ij,ij->i", rays.direction[mine][row], centre[sphere])
+    c_y = np.einsum("ij,ij->i", rays.across[mine][row], centre[sphere])
     dark = np.flatnonzero(c_y + disk > 0)
     row, disk, c_z, c_y = row[dark], disk[dark], c_z[dark], c_y[dark]
     sine, cosine = rays.sine[mine][row], rays.cosine[mine][row]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Distances to the visible surface in float64, from the triangle or ball that a ray cast in float32 has met."""
+"""Distances to the visible surface in float64, from the triangle or sphere that a ray cast in float32 has met."""
 
 from typing import Any
 
@@ -8,7 +8,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.scene.convex_bounds import Ball
+from reference.scene.convex_bounds import Sphere
 from reference.scene.read import TruthScene
 from reference.scene.shapes import Shapes, is_rectangle, read_shapes
 from reference.visibility.line_crossings import half_chord
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 
 def exact_distance(truth: TruthScene, interaction: Any, distance: Array, shapes: Shapes | None = None) -> Array:
-    """Return the distances to the visible surface again in float64, where that is a polygon or a ball.
+    """Return the distances to the visible surface again in float64, where that is a polygon or a sphere.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def exact_distance(truth: TruthScene, interaction: Any, distance: Array, shapes:
     Notes
     -----
     Valid where the plane of the triangle is met within 1e-4 of the distance; elsewhere, on triangles seen edge-on, the
-    distance stays what it was. So it does on balls that a ray misses in float64, which happens where it touches them,
+    distance stays what it was. So it does on spheres that a ray misses in float64, which happens where it touches them,
     and on other shapes.
     """
     hit = np.isfinite(distance)
@@ -45,8 +45,8 @@ def exact_distance(truth: TruthScene, interaction: Any, distance: Array, shapes:
         mine = np.flatnonzero(hit & (shape_of_hit == number))
         if not len(mine):
             continue
-        if isinstance(part, Ball):
-            refined[mine] = _to_ball(part, truth.origin, truth.direction[mine], distance[mine])
+        if isinstance(part, Sphere):
+            refined[mine] = _to_sphere(part, truth.origin, truth.direction[mine], distance[mine])
             continue
         # A rectangle counts as one primitive; both its triangles lie in one plane.
         number_in_shape = 0 * mine if is_rectangle(shape) else primitive[mine]
@@ -62,11 +62,11 @@ def _to_plane(corner: Array, direction: Array, distance: Array) -> Array:
     return np.where(np.abs(exact - distance) < 1e-4 * distance, exact, distance)
 
 
-def _to_ball(ball: Ball, origin: Array, direction: Array, distance: Array) -> Array:
-    """Return how far rays go to where they enter a ball, or leave it if they start inside."""
-    centre = ball.centre - origin
+def _to_sphere(sphere: Sphere, origin: Array, direction: Array, distance: Array) -> Array:
+    """Return how far rays go to where they enter a sphere, or leave it if they start inside."""
+    centre = sphere.centre - origin
     middle = direction @ centre
     miss = np.linalg.norm(centre - middle[:, None] * direction, axis=1)
-    half = half_chord(ball.radius, miss)
-    inside = np.linalg.norm(centre) < ball.radius
-    return np.where(miss < ball.radius, middle + half if inside else middle - half, distance)
+    half = half_chord(sphere.radius, miss)
+    inside = np.linalg.norm(centre) < sphere.radius
+    return np.where(miss < sphere.radius, middle + half if inside else middle - half, distance)

@@ -13,7 +13,7 @@ Doubt = tuple[Index, Array, Array]
 
 
 @dataclass(frozen=True)
-class Certificate:
+class RandomChecks:
     """What fresh random shadow rays said of lit intervals."""
 
     checked: int = 0  #: shadow rays cast
@@ -23,9 +23,9 @@ class Certificate:
     missed: float = 0.0  #: share of the first round's shadow rays that contradicted the intervals
 
     @staticmethod
-    def of_all(parts: "Sequence[Certificate]") -> "Certificate":
+    def of_all(parts: "Sequence[RandomChecks]") -> "RandomChecks":
         """Add up what was said of several lights or chunks of rays; of the shares the worst counts."""
-        return Certificate(
+        return RandomChecks(
             sum(part.checked for part in parts),
             sum(part.disagreements for part in parts),
             sum(part.refined for part in parts),
@@ -43,7 +43,7 @@ class LitIntervals:
     high: Array  #: where it ends [rad]
     transitions: int  #: edges between light and shadow
     edge: float = 2e-6  #: relative uncertainty of the distance of an edge; the default is that of a float32 shadow ray
-    certificate: Certificate = field(default_factory=Certificate)
+    random_checks: RandomChecks = field(default_factory=RandomChecks)
     doubt: Doubt | None = None  #: what was left in doubt: rays, angles, widths [rad]
 
 
@@ -75,7 +75,7 @@ def intersected(one: LitIntervals, other: LitIntervals, ends: tuple[Array, Array
     both = np.flatnonzero(np.cumsum(step[order]) == 2)
     ray, low, high = ray[both], angle[both], angle[both + 1]
     transitions = int(np.sum(low > ends[0][ray]) + np.sum(high < ends[1][ray]))
-    certificate = Certificate.of_all([one.certificate, other.certificate])
+    random_checks = RandomChecks.of_all([one.random_checks, other.random_checks])
     return LitIntervals(
-        ray, low, high, transitions, max(one.edge, other.edge), certificate, joined_doubt(one.doubt, other.doubt)
+        ray, low, high, transitions, max(one.edge, other.edge), random_checks, joined_doubt(one.doubt, other.doubt)
     )

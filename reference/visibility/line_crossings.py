@@ -4,7 +4,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.scene.convex_bounds import Ball, Bounds, Polyhedron
+from reference.scene.convex_bounds import Bounds, Polyhedron, Sphere
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -29,8 +29,8 @@ def crossings(bounds: Bounds, origin: Array, direction: Array) -> tuple[Array, A
     enter, leave
         Distances along the whole straight line, (n,) [m]; leave <= enter where it misses the body.
     """
-    if isinstance(bounds, Ball):
-        return ball_crossings(np.sum((bounds.centre - origin) * direction, axis=-1), _power(bounds, origin))
+    if isinstance(bounds, Sphere):
+        return sphere_crossings(np.sum((bounds.centre - origin) * direction, axis=-1), _power(bounds, origin))
     return crossed_facets(bounds, origin, direction)[2:]
 
 
@@ -54,11 +54,11 @@ def crossed_facets(bounds: Polyhedron, origin: Array, direction: Array) -> tuple
     return enter, leave, low, high
 
 
-def ball_crossings(along: Array, power: Array | float) -> tuple[Array, Array]:
-    """Return where lines enter and leave a ball: the roots of t^2 - 2 along t + power, `along` = d . (centre - origin).
+def sphere_crossings(along: Array, power: Array | float) -> tuple[Array, Array]:
+    """Return where lines enter and leave a sphere, the roots of t^2 - 2 along t + power, +-inf where they miss it [m].
 
-    power = |centre - origin|^2 - radius^2 is the power of the origin. The smaller root in size is taken from the
-    product of both, which is the power, so that nothing cancels.
+    along = d . (centre - origin), and power = |centre - origin|^2 - radius^2 is the power of the origin. The smaller
+    root in size is taken from the product of both, which is the power, so that nothing cancels.
     """
     inner = along * along - power
     root = np.sqrt(np.maximum(inner, 0.0))
@@ -69,8 +69,8 @@ def ball_crossings(along: Array, power: Array | float) -> tuple[Array, Array]:
     return np.where(inner > 0, low, np.inf), np.where(inner > 0, high, -np.inf)
 
 
-def _power(ball: Ball, origin: Array) -> Array:
-    return np.sum((ball.centre - origin) ** 2, axis=-1) - ball.radius**2
+def _power(sphere: Sphere, origin: Array) -> Array:
+    return np.sum((sphere.centre - origin) ** 2, axis=-1) - sphere.radius**2
 
 
 def half_chord(radius: Array | float, distance: Array) -> Array:

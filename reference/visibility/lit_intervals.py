@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lit intervals of camera rays: by exact geometry from polygons and balls, by ray casting from all other shapes.
+"""Lit intervals of camera rays: by exact geometry from polygons and spheres, by ray casting from all other shapes.
 
 Along a ray the angle theta at the light is the natural variable: the airlight integrand is bounded in it, an endless
 ray ends at pi/2, and the direction from the light to the point is simply ``sin(theta) direction + cos(theta) n`` (n the
@@ -14,7 +14,7 @@ bisected to rounding.
 
 Whatever the route, fresh random shadow rays then check the intervals (`reference.visibility.random_checks`).
 
-What is done is the same for a light at infinity (`reference.visibility.directional_casting`); there a point of a ray
+What is done is the same for a directional light (`reference.visibility.directional_casting`); there a point of a ray
 is told by its share of the way, not by an angle. `Legs` is what differs.
 """
 
@@ -37,8 +37,8 @@ from reference.visibility.random_checks import (
     Rounding,
     Toggles,
     Visible,
-    certified_cast,
-    certified_geometry,
+    checked_cast,
+    checked_geometry,
 )
 from reference.visibility.triangles import geometric_intervals
 
@@ -91,7 +91,7 @@ def lit_intervals(
     samples
         Regular samples of each ray if rays are cast; an eighth as many random ones check either route, at least one.
     edges
-        "geometry": exactly, from triangles and balls. "rays": by casting rays. "auto": by geometry where it can be.
+        "geometry": exactly, from triangles and spheres. "rays": by casting rays. "auto": by geometry where it can be.
     shapes
         What `reference.scene.shapes.read_shapes` returned for the occluders, if known.
 
@@ -103,7 +103,7 @@ def lit_intervals(
     Notes
     -----
     By geometry, valid for all scenes of opaque meshes, rectangles and spheres. By casting rays, valid where shadows
-    along a ray are wider than (high - low)/samples in theta; the certificate measures what is not.
+    along a ray are wider than (high - low)/samples in theta; the random checks measure what is not.
     """
     return found_intervals(
         truth, _point_legs(truth, light, rays, ends), ends=ends, samples=samples, edges=edges, shapes=shapes
@@ -152,7 +152,7 @@ def found_intervals(
     if shapes.others is not None:
         others = _visible(shapes.others, legs.shadow)
         exact = intersected(exact, _cast_intervals(shapes.others, legs, ends, samples), ends)
-    return certified_geometry(
+    return checked_geometry(
         exact,
         _visible(truth.occluders, legs.shadow),
         (legs.single, shapes),
@@ -174,7 +174,7 @@ def _cast_intervals(scene, legs: Legs, ends: tuple[Array, Array], samples: int) 
         for start in range(0, len(used), per_chunk)
     ]
     checks = max(1, samples // 8)
-    return certified_cast(Toggles.joined(chunks), Rounding(visible, _bisect), ends=ends, checks=checks)
+    return checked_cast(Toggles.joined(chunks), Rounding(visible, _bisect), ends=ends, checks=checks)
 
 
 def _visible(scene, shadow: Callable[[Index, Array], Any]) -> Visible:

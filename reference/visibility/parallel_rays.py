@@ -29,7 +29,7 @@ _SMALLEST_SINE = 1e-12  # a ray this close to the light's direction [rad] is as 
 
 @dataclass(frozen=True)
 class ParallelRays:
-    """Camera rays from one point in the planes that they span with the direction of a light at infinity."""
+    """Camera rays from one point in the planes that they span with the direction of a directional light."""
 
     origin: Array  #: where all begin [m], (3,)
     direction: Array  #: unit, (n, 3)

@@ -8,7 +8,7 @@ finds nothing, or `_ROUNDS` have passed.
 Intervals that come from exact geometry need no mending, but a proof that they are right: they share no code with the
 shadow rays. Within float32 rounding of an edge the rays cannot be asked. Elsewhere a contradiction is judged by a third
 way, a float64 test of that one shadow ray against every triangle (Moeller and Trumbore 1997, Fast, minimum storage
-ray-triangle intersection, J. Graphics Tools 2(1)) and every ball; of other shapes a ray that is cast at them alone
+ray-triangle intersection, J. Graphics Tools 2(1)) and every sphere; of other shapes a ray that is cast at them alone
 tells.
 """
 
@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.scene.shapes import Shapes
-from reference.visibility.intervals import Certificate, LitIntervals, joined_doubt
+from reference.visibility.intervals import LitIntervals, RandomChecks, joined_doubt
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -58,7 +58,7 @@ class Rounding:
     bisect: Bisect
 
 
-def certified_cast(toggles: Toggles, found_by: Rounding, *, ends: tuple[Array, Array], checks: int) -> LitIntervals:
+def checked_cast(toggles: Toggles, found_by: Rounding, *, ends: tuple[Array, Array], checks: int) -> LitIntervals:
     """Check intervals from cast rays, and mend them until a round of random samples contradicts none.
 
     Parameters
@@ -91,12 +91,12 @@ def certified_cast(toggles: Toggles, found_by: Rounding, *, ends: tuple[Array, A
         toggles = _mended(toggles, ray[wrong], theta[wrong], found_by, ends)
         wrong = lit != _predicted(toggles, ray, theta)[0]
     left = int(wrong.sum())
-    certificate = Certificate(checked, disagreements, disagreements - left, left, missed)
-    intervals = replace(_intervals(toggles, ends), certificate=certificate)
+    random_checks = RandomChecks(checked, disagreements, disagreements - left, left, missed)
+    intervals = replace(_intervals(toggles, ends), random_checks=random_checks)
     return _with_doubt(intervals, ray[wrong], theta[wrong], ends, checks)
 
 
-def certified_geometry(
+def checked_geometry(
     exact: LitIntervals,
     visible: Visible,
     geometry: tuple[Leg, Shapes],
@@ -122,7 +122,7 @@ def certified_geometry(
     checks
         Random samples of each ray.
     others
-        Shadow rays among the shapes that are neither triangles nor balls, if there are any.
+        Shadow rays among the shapes that are neither triangles nor spheres, if there are any.
     rounding
         How close to an edge the shadow rays cannot be asked [rad], one number or one for each ray.
     """
@@ -138,11 +138,11 @@ def certified_geometry(
     if others is not None:
         lit &= _cast(others, ray[judged], theta[judged])
     unsettled = np.append(judged[lit != predicted[judged]], wrong[_JUDGED:])
-    certificate = Certificate(
+    random_checks = RandomChecks(
         len(ray), len(wrong), len(wrong) - len(unsettled), len(unsettled), len(wrong) / max(len(ray), 1)
     )
-    certificate = Certificate.of_all([exact.certificate, certificate])
-    return _with_doubt(replace(exact, certificate=certificate), ray[unsettled], theta[unsettled], ends, checks)
+    random_checks = RandomChecks.of_all([exact.random_checks, random_checks])
+    return _with_doubt(replace(exact, random_checks=random_checks), ray[unsettled], theta[unsettled], ends, checks)
 
 
 def _random_samples(ray: Index, ends: tuple[Array, Array], checks: int, number: int) -> tuple[Index, Array]:
@@ -232,7 +232,7 @@ def _with_doubt(
 
 
 def _lit_by_all_shapes(geometry: tuple[Leg, Shapes], ray: np.int64, theta: np.float64) -> bool:
-    """Test one shadow ray against every triangle and every ball in float64."""
+    """Test one shadow ray against every triangle and every sphere in float64."""
     leg, shapes = geometry
     triangles = shapes.triangles
     position, way = leg(ray, theta)
@@ -246,17 +246,17 @@ def _lit_by_all_shapes(geometry: tuple[Leg, Shapes], ray: np.int64, theta: np.fl
         v = q @ way / determinant
         t = np.einsum("ij,ij->i", edge2, q) / determinant
     hidden = bool(np.any((u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0) & (t < 1)))
-    return not (hidden or _meets_balls(position, way, (shapes.centre, shapes.radius)))
+    return not (hidden or _meets_spheres(position, way, (shapes.centre, shapes.radius)))
 
 
-def _meets_balls(position: Array, way: Array, balls: tuple[Array, Array]) -> bool:
-    """Return whether the surface of a ball lies between a point and the point `way` further on.
+def _meets_spheres(position: Array, way: Array, spheres: tuple[Array, Array]) -> bool:
+    """Return whether the surface of a sphere lies between a point and the point `way` further on.
 
     The ways to the surface are the roots of |position + t way - centre|^2 = R^2.
     """
-    from_centre = position - balls[0]
+    from_centre = position - spheres[0]
     square, half = way @ way, from_centre @ way
-    discriminant = half**2 - square * (np.sum(from_centre**2, axis=1) - balls[1] ** 2)
+    discriminant = half**2 - square * (np.sum(from_centre**2, axis=1) - spheres[1] ** 2)
     root = np.sqrt(np.maximum(discriminant, 0))
     ways = (np.stack([-root, root]) - half) / square
     return bool(np.any((discriminant > 0) & (ways > 0) & (ways < 1)))

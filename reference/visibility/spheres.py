@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What balls take from the light of camera rays, in closed form.
+"""What spheres take from the light of camera rays, in closed form.
 
 In the plane of a ray and a light, as in `reference.visibility.triangles`, y is the component along n (from the light
 to the foot point) and z that along the direction of the ray: the ray is y = h, and theta = atan2(z, y). The plane cuts
-a ball of centre C and radius R, at the signed distance c_s of the centre from the plane, in a disk of the centre (c_y,
-c_z) and the radius
+a sphere of centre C and radius R, at the signed distance c_s of the centre from the plane, in a disk of the centre
+(c_y, c_z) and the radius
 
     rho = sqrt(R^2 - c_s^2).
 
-**The light outside of the ball.** What the disk hides is all that lies behind it, S = {t p : p in the disk, t >= 1}.
+**The light outside of the sphere.** What the disk hides is all that lies behind it, S = {t p : p in the disk, t >= 1}.
 S is convex (a mean of t_1 p_1 and t_2 p_2 is a number >= 1 times a mean of p_1 and p_2), so it hides one interval of
 the ray. The interval is what the part of the disk in the strip 0 < y <= h spans in theta. The disk as a whole spans
 
@@ -25,8 +25,8 @@ y = T cos(phi -+ alpha). For each of the two:
 Nothing is hidden where the disk has no part in the strip: c_y - rho > h or c_y + rho <= 0. Since alpha < pi/2, phi -+
 alpha lies within 3 pi/2 of zero: no angle is one of the other side in disguise.
 
-**The light inside of the ball.** It sees what is inside, and nothing else: hidden is all of the ray but its part in the
-disk, which lies between the two angles of the first case, if it meets the disk at all.
+**The light inside of the sphere.** It sees what is inside, and nothing else: hidden is all of the ray but its part in
+the disk, which lies between the two angles of the first case, if it meets the disk at all.
 """
 
 import numpy as np
@@ -40,13 +40,13 @@ Index = NDArray[np.int64]
 Shadows = tuple[Index, Array, Array]
 
 
-def ball_shadows(balls: tuple[Array, Array], direction: Array, normal: Array, height: Array) -> Shadows:
-    """Return the intervals of the angle at the light that balls hide.
+def sphere_shadows(spheres: tuple[Array, Array], direction: Array, normal: Array, height: Array) -> Shadows:
+    """Return the intervals of the angle at the light that spheres hide.
 
     Parameters
     ----------
-    balls
-        Their centres relative to the light, (balls, 3), and radii, (balls,) [m].
+    spheres
+        Their centres relative to the light, (spheres, 3), and radii, (spheres,) [m].
     direction, normal, height
         The rays: unit directions (n, 3), unit normals from the light to the foot points (n, 3), heights (n,) [m].
 
@@ -57,20 +57,20 @@ def ball_shadows(balls: tuple[Array, Array], direction: Array, normal: Array, he
 
     Notes
     -----
-    Valid for balls that are opaque surfaces: a light or camera inside sees what is inside. Where the plane touches a
-    ball within a share e of its radius, the width sqrt(8 e) R of the disk has lost digits: its relative error is 1e-16
-    |C|/(R e), beyond `reference.visibility.triangles.EXACT_EDGE` for e below 1e-5, where the shadow is that of a
+    Valid for spheres that are opaque surfaces: a light or camera inside sees what is inside. Where the plane touches a
+    sphere within a share e of its radius, the width sqrt(8 e) R of the disk has lost digits: its relative error is
+    1e-16 |C|/(R e), beyond `reference.visibility.triangles.EXACT_EDGE` for e below 1e-5, where the shadow is that of a
     sliver.
     """
-    centre, radius = balls
+    centre, radius = spheres
     side = np.cross(direction, normal) @ centre.T
-    ray, ball = np.nonzero(np.abs(side) < radius)
-    disk = half_chord(radius[ball], np.abs(side[ray, ball]))
-    c_y = np.einsum("ij,ij->i", normal[ray], centre[ball])
-    c_z = np.einsum("ij,ij->i", direction[ray], centre[ball])
+    ray, sphere = np.nonzero(np.abs(side) < radius)
+    disk = half_chord(radius[sphere], np.abs(side[ray, sphere]))
+    c_y = np.einsum("ij,ij->i", normal[ray], centre[sphere])
+    c_z = np.einsum("ij,ij->i", direction[ray], centre[sphere])
     distance = np.linalg.norm(centre, axis=1)
-    inside = (distance < radius)[ball]
-    tangent = half_chord(distance, radius)[ball]  # T^2 = |C|^2 - R^2: the same product, with both swapped
+    inside = (distance < radius)[sphere]
+    tangent = half_chord(distance, radius)[sphere]  # T^2 = |C|^2 - R^2: the same product, with both swapped
 
     outside = ~inside
     found = [_hidden_behind(ray[outside], *(part[outside] for part in (c_y, c_z, disk, height[ray], tangent)))]

@@ -9,7 +9,7 @@ moved edges, as it does to the shortened leg of `reference.scene.shadow_epsilon`
 enough to be seen in the sum over an image.
 
 Where Mitsuba's ray and the exact lit intervals differ, the ray is tested again: in float64, against every triangle and
-ball, from where Mitsuba starts it. What that says holds. So a fault of the lit intervals is still found by the
+sphere, from where Mitsuba starts it. What that says holds. So a fault of the lit intervals is still found by the
 comparison, for the exact test from the moved start contradicts it then.
 """
 
@@ -69,7 +69,7 @@ def _share(ray: Any, start: Array, light: Array, chosen: NDArray[np.int64]) -> A
 
 
 def segments_blocked(start: Array, end: Array, shapes: Shapes) -> Bools:
-    """Return which segments meet a triangle or the surface of a ball.
+    """Return which segments meet a triangle or the surface of a sphere.
 
     Segments are tested one by one, against the triangles that come close to those that start beside them.
 
@@ -78,7 +78,7 @@ def segments_blocked(start: Array, end: Array, shapes: Shapes) -> Bools:
     start, end
         The ends of the segments, (segments, 3) [m].
     shapes
-        The triangles and balls.
+        The triangles and spheres.
 
     References
     ----------
@@ -88,7 +88,7 @@ def segments_blocked(start: Array, end: Array, shapes: Shapes) -> Bools:
     blocked = np.zeros(len(start), dtype=bool)
     corner = shapes.triangles[:, 0]
     edges = shapes.triangles[:, 1] - corner, shapes.triangles[:, 2] - corner
-    # Balls about the first corners; nothing of this is shared with the search for lit intervals, which it judges.
+    # Spheres about the first corners; nothing of this is shared with the search for lit intervals, which it judges.
     longest = np.sqrt(np.maximum(*(np.sum(edge * edge, axis=1) for edge in edges)))
     for group in _groups(start):
         near = _near_triangles(start[group], end[group], corner, longest)
@@ -116,7 +116,7 @@ def _groups(point: Array) -> Iterator[Index]:
 
 
 def _near_triangles(start: Array, end: Array, centre: Array, radius: Array) -> Index:
-    """Return the triangles that some of the segments may meet, given balls that hold the triangles.
+    """Return the triangles that some of the segments may meet, given spheres that hold the triangles.
 
     The distance from a line is convex along a segment, so the tube about any line that holds all ends holds all
     segments.
@@ -150,7 +150,7 @@ def _meets_triangle(start: Array, way: Array, corner: Array, edges: tuple[Array,
 
 
 def _meets_sphere(from_centre: Array, way: Array, radius: float) -> Bools:
-    """Return which segments cross the surface of a ball, from outside or from within."""
+    """Return which segments cross the surface of a sphere, from outside or from within."""
     square = np.sum(way * way, axis=1)
     half = np.sum(from_centre * way, axis=1)
     outside = np.sum(from_centre * from_centre, axis=1) - radius**2

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lit intervals of camera rays by exact geometry: what every triangle and ball takes from the light of every ray.
+"""Lit intervals of camera rays by exact geometry: what every triangle and sphere takes from the light of every ray.
 
 A camera ray and a light span a plane. A triangle cuts that plane in a segment, and the segment hides from the light one
 interval of the angle theta along the ray. In the plane, relative to the light, let y be the component along n (towards
@@ -8,8 +8,8 @@ behind (y, z) as seen from the light is the one at theta = atan2(z, y), provided
 
     shadow of a segment = [atan2(z_a, y_a), atan2(z_b, y_b)],   the segment clipped to 0 < y <= height,
 
-and what is lit is what neither a triangle nor a ball (`reference.visibility.spheres`) hides. No sampling, no rays cast,
-everything in float64: however thin a shadow, it is found. It shares nothing with the ray-traced visibility of
+and what is lit is what neither a triangle nor a sphere (`reference.visibility.spheres`) hides. No sampling, no rays
+cast, everything in float64: however thin a shadow, it is found. It shares nothing with the ray-traced visibility of
 `reference.visibility.lit_intervals`, which checks it.
 
 All camera rays start in one point, so their planes turn about one axis, from the camera to the light. A triangle can
@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from reference.scene.read import TruthLight, TruthScene
 from reference.scene.shapes import Shapes, read_shapes
 from reference.visibility.intervals import LitIntervals
-from reference.visibility.spheres import Shadows, ball_shadows
+from reference.visibility.spheres import Shadows, sphere_shadows
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -76,12 +76,12 @@ def geometric_intervals(
 
     Notes
     -----
-    Valid for opaque triangles and balls; what else hides the light is left out. Touching triangles are assumed to share
-    the coordinates of their vertices: a crack between them is light.
+    Valid for opaque triangles and spheres; what else hides the light is left out. Touching triangles are assumed to
+    share the coordinates of their vertices: a crack between them is light.
     """
     shapes = read_shapes(truth.occluders) if shapes is None else shapes
     corners = shapes.triangles - light.position
-    balls = shapes.centre - light.position, shapes.radius
+    spheres = shapes.centre - light.position, shapes.radius
     used = np.flatnonzero(ends[1] > ends[0])
     frame = axis_frame(light.position - truth.origin)
     cones = _cones(corners, truth.origin - light.position, frame)
@@ -97,7 +97,7 @@ def geometric_intervals(
         at_light = 0.5 * np.pi + ends[1][mine] - at_camera + 3 * SLACK
         pairs = near_pairs(azimuth[chosen], (at_camera, at_light), cones)
         lines = rays[0][mine], rays[1][mine], rays[2][mine]
-        hidden = _shadows(corners, lines, pairs), ball_shadows(balls, *lines)
+        hidden = _shadows(corners, lines, pairs), sphere_shadows(spheres, *lines)
         row, begin, end = (np.concatenate(both) for both in zip(*hidden, strict=True))
         parts.append(lit_of_chunk((row, begin, end), ends, mine))
     ray, low, high = (np.concatenate([part[i] for part in parts] or [np.empty(0)]) for i in range(3))
@@ -119,7 +119,7 @@ def axis_frame(to_light: Array) -> Array:
 def _cones(corners: Array, camera: Array, frame: Array) -> Reaches:
     """Bound every triangle, given relative to the light, in azimuth and in the angles at the camera and the light."""
     begin, width = azimuths(corners, frame)
-    centre, radius = balls_around(corners)
+    centre, radius = spheres_around(corners)
     at_camera = angle_below(centre - camera, radius, frame[0])
     at_light = angle_below(centre, radius, -frame[0])
     return Reaches(begin, width, at_camera - SLACK, at_light - SLACK)
@@ -142,14 +142,14 @@ def azimuths(corners: Array, frame: Array) -> tuple[Array, Array]:
     return begin, np.where((width > np.pi - 1e-6) | near_axis, 2 * np.pi, width)
 
 
-def balls_around(corners: Array) -> tuple[Array, Array]:
-    """Return the centres and radii of balls that hold the triangles."""
+def spheres_around(corners: Array) -> tuple[Array, Array]:
+    """Return the centres and radii of spheres that hold the triangles."""
     centre = corners.mean(axis=1)
     return centre, np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1, initial=0)
 
 
 def angle_below(centre: Array, radius: Array, axis: Array) -> Array:
-    """Return a lower bound of the angle between an axis and the points of balls around `centre`."""
+    """Return a lower bound of the angle between an axis and the points of spheres around `centre`."""
     distance = np.linalg.norm(centre, axis=1)
     along = centre @ axis
     angle = np.arctan2(np.linalg.norm(centre - along[:, None] * axis, axis=1), along)

@@ -4,7 +4,7 @@
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Literal
 
-from analytic.errors import InputError
+from analytic.errors import InputError, nearest
 from reports.api.inputs import OpenScene, Progress, SceneLike, Size, one_error, opened, telling
 
 if TYPE_CHECKING:
@@ -66,8 +66,6 @@ def reference(
     >>> traced.standard_error.shape
     (24, 32, 3)
     """
-    from validation.scenes.loading import nearest
-
     known = ("quadrature", "single-scatter", "volpath")
     if estimator not in known:
         raise InputError(f"estimator: got {estimator!r}, wanted one of {', '.join(known)}" + nearest(estimator, known))

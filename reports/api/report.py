@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from analytic.errors import InputError
+from analytic.errors import InputError, nearest
 from reports.api.inputs import Progress, one_error, opened, telling
 from reports.api.studies import MethodLike, chosen_methods, several
 
@@ -66,7 +66,6 @@ def report(
     from reports.report.measure import write_report
     from validation.configurations.methods import QUICK, STANDARD
     from validation.frames.scene_study import EFFORTS
-    from validation.scenes.loading import nearest
 
     if effort not in EFFORTS:
         raise InputError(f"effort: got {effort!r}, wanted one of {', '.join(EFFORTS)}" + nearest(effort, EFFORTS))

@@ -28,7 +28,7 @@ def baselines(
     has no baseline, and a baseline without its configuration, fails too. Exit status 1 if anything moved. With --update
     what moved is written, with a new revision, which CHANGELOG.md must name.
     """
-    from analytic.errors import InputError
+    from analytic.errors import InputError, nearest
     from reports.machine.environment import activate
     from reports.machine.progress import part_of, progress_bar
     from reports.tables.terminal import print_json
@@ -41,7 +41,6 @@ def baselines(
         write_baseline,
     )
     from validation.frames.baseline_runs import measure_baseline
-    from validation.scenes.loading import nearest
     from validation.scenes.registry import SCENES
 
     names = list(dict.fromkeys(scenes or SCENES))

@@ -29,7 +29,8 @@ def diff(
     beside the median of all are compared. Exit status 1 if anything is worse, or gone, or newly refused or not finite,
     or the truth is no longer confirmed; so a run after each change guards a project.
     """
-    from reports.diff.compare import compare_reports, read_report
+    from reports.data.reader import read_report
+    from reports.diff.compare import compare_reports
     from reports.diff.table import print_difference
     from reports.tables.terminal import print_json
 

@@ -61,11 +61,10 @@ def figures(
     Computing writes the data, drawing only reads them: the same data give the same bytes. Figures of whole frames and
     images are made from a report (`airlight report`); the others are measured here.
     """
-    from analytic.errors import InputError
+    from analytic.errors import InputError, nearest
     from reference.storage.files import ensure_folder
     from reports.machine.progress import part_of, progress_bar
     from reports.plotting.style import WIDTHS
-    from validation.scenes.loading import nearest
 
     for name in names or ():
         if name not in FIGURES:
@@ -99,7 +98,8 @@ def _module(name: str) -> "ModuleType":
 
 def _report_folder(report: Path | None) -> Path | None:
     """Return the folder of the report that was asked for, or of the usual one if it is there."""
-    from reports.figures.report import FOLDER, read_report
+    from reports.data.reader import read_report
+    from reports.figures.report import FOLDER
 
     if report is not None:
         read_report(report)
@@ -110,7 +110,8 @@ def _report_folder(report: Path | None) -> Path | None:
 def _chosen(names: list[str] | None, report: Path | None) -> list[str]:
     """Return the figures to make: those named, else all but those that need a report that is not there."""
     from analytic.errors import InputError
-    from reports.figures.report import FOLDER, read_report
+    from reports.data.reader import read_report
+    from reports.figures.report import FOLDER
 
     need = [] if report else [name for name in names or FIGURES if "report" in FIGURES[name][1]]
     reason = f"made from a report: write one with `airlight report -o {FOLDER}`, or name its folder by --report"

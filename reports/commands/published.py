@@ -140,7 +140,7 @@ def _billeter(
         return {}
     share = len(images) / (len(images) + 3 * len(maps) * len(views))
     size = (max(1, round(scale * SIZE[0])), max(1, round(scale * SIZE[1])))
-    told = part_of(progress, 0.0, share), part_of(progress, share, 1.0)
-    figures = figure_rows(images, kernel=kernel, size=size, limit=limit, progress=told[0])
-    table = table_rows(views, maps=maps, kernel=kernel, size=size, limit=limit, progress=told[1])
+    step = part_of(progress, 0.0, share), part_of(progress, share, 1.0)
+    figures = figure_rows(images, kernel=kernel, size=size, limit=limit, progress=step[0])
+    table = table_rows(views, maps=maps, kernel=kernel, size=size, limit=limit, progress=step[1])
     return {"billeter": billeter_data(figures, table)}

@@ -21,11 +21,11 @@ def read_json(path: Path, wanted: str) -> Any:
     Raises
     ------
     InputError
-        If it cannot be read or is no JSON.
+        If it cannot be read or is not valid JSON.
     """
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError(f"cannot read {path}: {error.strerror}; wanted {wanted}") from error
     except ValueError as error:
-        raise InputError(f"{path} is no JSON ({error}); wanted {wanted}") from error
+        raise InputError(f"{path} is not valid JSON ({error}); wanted {wanted}") from error

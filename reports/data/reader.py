@@ -9,13 +9,38 @@ from typing import Any
 
 from analytic.errors import InputError
 from reports.data.json_files import read_json
-from reports.data.schema_check import first_fault
 
+SCHEMA = "airlight-report/2"
 SCHEMA_FILE = Path(__file__).parent / "schema" / "report-2.json"
 
 
+def read_report(path: Path | str) -> dict[str, Any]:
+    """Read a report.json whose schema is the one that is known here; every key at its top is there.
+
+    Parameters
+    ----------
+    path
+        Of report.json, or of the folder that holds it.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or it is not a report of this schema.
+    """
+    file = _report_file(path)
+    data = read_json(file, f"what `airlight report -o {file.parent}` writes")
+    given = data.get("schema") if isinstance(data, dict) else None
+    if given != SCHEMA:
+        got = f"the schema {given!r}" if given is not None else "no schema"
+        raise InputError(f"{file} has {got}, wanted {SCHEMA!r}; make the report again with this version of airlight")
+    missing = [key for key in _schema()["required"] if key not in data]
+    if missing:
+        raise InputError(f"{file} does not keep to {SCHEMA}: {missing[0]!r} is missing; make the report again")
+    return data
+
+
 def load_report(path: Path | str) -> tuple[dict[str, Any], Path]:
-    """Read a report.
+    """Read a report of which every key and every file is needed.
 
     Parameters
     ----------
@@ -30,27 +55,40 @@ def load_report(path: Path | str) -> tuple[dict[str, Any], Path]:
     Raises
     ------
     InputError
-        If there is no such file, it is no JSON, has another schema or does not keep to its own, or a file that it names
-        is missing.
+        If there is no such file, it does not keep to the schema, or a file that it names is missing.
     """
-    file = Path(path)
-    file = file / "report.json" if file.is_dir() else file
-    data = read_json(file, "report.json of an airlight report")
-    schema = json.loads(SCHEMA_FILE.read_text(encoding="utf-8"))
-    wanted = schema["properties"]["schema"]["const"]
-    given = data.get("schema") if isinstance(data, dict) else None
-    if given != wanted:
-        got = f"the schema {given!r}" if given is not None else "no schema"
-        raise InputError(f"{file} has {got}, wanted {wanted!r}; make the report again with this version of airlight")
-    fault = first_fault(data, schema)
+    data, file = read_report(path), _report_file(path)
+    fault = _fault(data, _schema())
     if fault:
-        raise InputError(f"{file} does not keep to {wanted}: {fault}; make the report again")
+        raise InputError(f"{file} does not keep to {SCHEMA}: {fault}; make the report again")
     for name in named_files(data):
         if Path(name).is_absolute() or ".." in Path(name).parts:
             raise InputError(f"{file} names {name}, which is not in its folder; make the report again")
         if not (file.parent / name).is_file():
             raise InputError(f"{file} names {name}, which is not beside it; move a report with its whole folder")
     return data, file.parent
+
+
+def _report_file(path: Path | str) -> Path:
+    file = Path(path)
+    return file / "report.json" if file.is_dir() or file.suffix != ".json" else file
+
+
+def _schema() -> dict[str, Any]:
+    return json.loads(SCHEMA_FILE.read_text(encoding="utf-8"))
+
+
+def _fault(data: Any, schema: Mapping[str, Any]) -> str | None:
+    """Return what is wrong with a report, the place and the words; None if nothing is."""
+    from jsonschema import Draft202012Validator
+    from jsonschema.exceptions import best_match
+
+    error = best_match(Draft202012Validator(schema).iter_errors(data))
+    if error is None:
+        return None
+    words = " ".join(error.message.split())
+    # The message begins with what was found, which may be a whole scene.
+    return f"{error.json_path.replace('$', 'report', 1)}: {words if len(words) < 200 else f'.. {words[-160:]}'}"
 
 
 def redraw_report(data: Mapping[str, Any], folder: Path, target: Path) -> None:

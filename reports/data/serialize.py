@@ -14,8 +14,6 @@ from validation.frames.benchmark import Measurement, knows_shadows
 from validation.frames.scene_study import SceneStudy
 from validation.metrics.errors import plain as plain
 
-SCHEMA = "airlight-report/2"
-
 
 def scene_facts(study: SceneStudy) -> dict[str, Any]:
     """Return what a scene is, before anything is measured in it."""

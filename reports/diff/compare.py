@@ -5,9 +5,7 @@ What counts as noise is derived in `validation.statistics.noise`. A finding is w
 makes the comparison fail, and so does what disappeared: a method that is no longer measured is no longer guarded.
 """
 
-import json
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
 from analytic.errors import InputError
@@ -16,9 +14,6 @@ from reports.diff.finding import Finding, Report
 from reports.diff.times import TimeComparison, compare_times
 from reports.diff.truth_and_claims import compare_claims, compare_truth, compare_winners
 from validation.statistics.noise import ERROR_TOLERANCE, TIME_TOLERANCE
-
-#: Schemas that are understood; of the first, claims are plain sentences and are not compared.
-SCHEMAS = ("airlight-report/1", "airlight-report/2")
 
 
 @dataclass(frozen=True)
@@ -41,31 +36,6 @@ class Difference:
         return found | {"errors_compared": self.errors, "times": times}
 
 
-def read_report(path: Path | str) -> dict[str, Any]:
-    """Read a report.json, given itself or by its folder.
-
-    Raises
-    ------
-    InputError
-        If there is none, it is no JSON, or its schema is not known.
-    """
-    given = Path(path)
-    file = given / "report.json" if given.is_dir() else given
-    if not file.is_file():
-        raise InputError(f"report: there is no file {file}; wanted a report.json or the folder that holds it")
-    try:
-        data = json.loads(file.read_text(encoding="utf-8"))
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"report {file}: no JSON ({error}); wanted what `airlight report` wrote") from error
-    schema = data.get("schema") if isinstance(data, dict) else None
-    if schema not in SCHEMAS:
-        raise InputError(f"report {file}: the schema is {schema!r}, wanted one of {', '.join(SCHEMAS)}; measure again")
-    missing = sorted({"scenes", "settings", "environment"} - set(data))
-    if missing:
-        raise InputError(f"report {file}: {missing[0]!r} is missing; measure again")
-    return data
-
-
 def compare_reports(
     old: Report,
     new: Report,
@@ -79,7 +49,7 @@ def compare_reports(
     Parameters
     ----------
     old, new
-        From `read_report`.
+        From `reports.data.reader.read_report`.
     error_tolerance
         Relative band of errors.
     time_tolerance

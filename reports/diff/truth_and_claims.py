@@ -2,7 +2,6 @@
 """What two reports claim, compared: truth, verdicts, kernels that break, faults that nothing catches, the fastest."""
 
 from collections.abc import Iterator, Mapping
-from typing import Any
 
 from reports.data.claims import TARGETS, confirmed
 from reports.diff.finding import Finding, Report
@@ -38,10 +37,7 @@ def compare_claims(old: Report, new: Report) -> Iterator[Finding]:
 
 def _claims(old: Report, new: Report) -> Iterator[Finding]:
     """Compare the verdicts at the top: of each kind, how many are bad."""
-    before, after = (report.get("claims", []) for report in (old, new))
-    if any(isinstance(one, str) for one in (*before, *after)):
-        yield Finding("note", "", "", "claims not compared: those of schema airlight-report/1 are plain sentences")
-        return
+    before, after = old["claims"], new["claims"]
     for kind in dict.fromkeys(one["kind"] for one in (*before, *after)):
         bad = [
             [one["text"] for one in claims if one["kind"] == kind and one["good"] is False]
@@ -55,17 +51,12 @@ def _claims(old: Report, new: Report) -> Iterator[Finding]:
 
 def _stability(old: Report, new: Report) -> Iterator[Finding]:
     """Compare which kernels break their bars."""
-    before, after = ({one["kernel"]: one["broken"] for one in _kernels(report)} for report in (old, new))
+    before, after = ({one["kernel"]: one["broken"] for one in report["stability"]} for report in (old, new))
     for kernel in before:
         if kernel in after and after[kernel] and not before[kernel]:
             yield Finding("worse", "", kernel, f"breaks its bar: {after[kernel][0]}")
         elif kernel in after and before[kernel] and not after[kernel]:
             yield Finding("better", "", kernel, "keeps its bars again")
-
-
-def _kernels(report: Report) -> list[Mapping[str, Any]]:
-    found = report.get("stability") or report.get("kernels") or []
-    return [one for one in found if isinstance(one, Mapping) and {"kernel", "broken"} <= set(one)]
 
 
 def _mutations(old: Report, new: Report) -> Iterator[Finding]:

@@ -11,7 +11,7 @@ from pathlib import Path
 from reports.machine.environment import MissingError
 from reports.machine.progress import progress_bar
 
-_NEEDED = {"sphinx": "sphinx", "myst_parser": "myst-parser", "furo": "furo", "latex2mathml": "latex2mathml"}
+_NEEDED = {"sphinx": "sphinx", "myst_parser": "myst-parser", "furo": "furo"}
 _PARTS = {"reading sources": (0.0, 0.5), "writing output": (0.5, 0.3), "highlighting module code": (0.8, 0.2)}
 _PROGRESS = re.compile(r"(" + "|".join(_PARTS) + r")\.\.\. \[\s*(\d+)%\] (\S+)")
 

@@ -17,9 +17,9 @@ from typing import Any
 from analytic.errors import InputError
 from reference.storage.files import ensure_folder, write_bytes, write_text
 from reports.data.json_files import read_json
+from reports.data.reader import read_report
 
 SCHEMA = "airlight-docs/1"
-REPORTS = ("airlight-report/1", "airlight-report/2")
 #: The scene whose frames show a method: the first of these that the report holds, else its first scene.
 SHOWN = ("colonnade", "two-pens", "sphere-spot")
 WIDTH, LARGEST = 480, 60_000  # pixels, bytes: of a picture
@@ -52,10 +52,7 @@ def refresh(data: Path, *, report: Path | None = None, kernels: Path | None = No
         found = _read_object(path, "the data of the documentation")
     pictures: dict[str, bytes] = {}
     if report is not None:
-        content = _read_object(report / "report.json", "the folder of a report")
-        if content.get("schema") not in REPORTS:
-            wanted = " or ".join(REPORTS)
-            raise InputError(f"{report / 'report.json'}: schema {content.get('schema')!r}, wanted {wanted}")
+        content = read_report(report)
         found |= kept_of_report(content)
         pictures = pictures_of(report, content, found)
     if kernels is not None:
@@ -90,13 +87,13 @@ def kept_of_report(report: dict[str, Any]) -> dict[str, Any]:
             "variant": environment["variant"],
             "versions": environment["versions"],
         },
-        "claims": [claim if isinstance(claim, str) else claim["text"] for claim in report["claims"]],
+        "claims": [claim["text"] for claim in report["claims"]],
         "scenes": [_kept_scene(scene) for scene in report["scenes"] if scene["path"] is None],
     }
 
 
 def _kept_scene(scene: dict[str, Any]) -> dict[str, Any]:
-    built_in = [one for one in scene["methods"] if one.get("kind", "built-in") == "built-in"]
+    built_in = [one for one in scene["methods"] if one["kind"] == "built-in"]
     return {
         "name": scene["name"],
         "size": scene["size"],

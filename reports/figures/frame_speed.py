@@ -5,8 +5,9 @@ from pathlib import Path
 from typing import Any
 
 from reference.storage.files import ensure_folder
+from reports.data.reader import read_report
 from reports.figures.files import draw_figure, new_figure, read_csv, read_data, value, write_csv, write_data
-from reports.figures.report import measured, read_report, report_origin
+from reports.figures.report import measured, report_origin
 from reports.plotting.style import WIDTHS, report_styles
 
 NAME = "frame-speed"

@@ -5,8 +5,9 @@ from pathlib import Path
 from typing import Any
 
 from reference.storage.files import ensure_folder
+from reports.data.reader import read_report
 from reports.figures.files import pixels, value, write_data, write_table
-from reports.figures.report import read_report, report_origin
+from reports.figures.report import report_origin
 from reports.tables.drawing import latex
 from reports.tables.methods import rows_table
 from reports.tables.table import Measured, Row, Table, Value, number

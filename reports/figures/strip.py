@@ -9,10 +9,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from analytic.errors import InputError
+from analytic.errors import InputError, nearest
 from reference.storage.files import ensure_folder
+from reports.data.reader import read_report
 from reports.figures.files import draw_figure, new_figure, read_data, value, write_data
-from reports.figures.report import measured, read_report, report_origin
+from reports.figures.report import measured, report_origin
 from reports.plotting.style import COLOURS, WIDTHS
 
 NAME = "strip"
@@ -74,7 +75,6 @@ def compute(
 
 
 def _scene(data: dict[str, Any], name: str | None) -> dict[str, Any]:
-    from validation.scenes.loading import nearest
 
     scenes = {one["name"]: one for one in data["scenes"] if _shown(one, "airlight") or _shown(one, "total")}
     if name is not None and name not in scenes:
@@ -87,8 +87,6 @@ def _scene(data: dict[str, Any], name: str | None) -> dict[str, Any]:
 
 def _methods(scene: dict[str, Any], wanted: str | Sequence[str] | None) -> list[dict[str, Any]]:
     """Return the methods to show: those that were asked for, or the most accurate of each."""
-    from validation.scenes.loading import nearest
-
     known = {one["label"]: one for layer in ("airlight", "total") for one in _shown(scene, layer)}
     if wanted is None:
         best: dict[str, dict[str, Any]] = {}

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Whether CUDA and OptiX work here, each with the reason: asked of the driver, without Dr.Jit.
 
+Dr.Jit knows whether (`dr.has_backend`), but not why not, and it loads OptiX when the first ray is cast.
+
 The rules are those of drjit-core 1.5 (`src/cuda_core.cpp`, `src/optix_api.cpp`): CUDA 12.2, which is driver 535, or
 newer; for OptiX not CUDA 12.7 (drivers 565 to 569, refused as miscompiling); compute capability 7.5 for the kernels
 that it ships.

@@ -5,7 +5,8 @@ The map of signed errors is made here: dark blue, over white in the middle, to d
 curve in CAM16-UCS (Li et al. 2017), a space in which the distance of two colours is about how different they look,
 walked in equal steps of length. The arms are as long as one another within a few per cent, so that an error looks as
 large on either side. What has no sign uses viridis, HDR-FLIP magma, as its authors do; both are even by construction
-(van der Walt and Smith 2015).
+(van der Walt and Smith 2015). Of the ready-made maps that end as dark, colorcet's CET-D1A (Kovesi 2015) is the nearest:
+its steps differ by up to 34 % of their mean in CAM16-UCS, those here by 5 %, and its middle is not white.
 """
 
 import functools

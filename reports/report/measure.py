@@ -20,7 +20,8 @@ from typing import Any
 from analytic.errors import InputError
 from reference.storage.files import ensure_folder
 from reports.data.claims import claims, unstudied
-from reports.data.serialize import SCHEMA, plain
+from reports.data.reader import SCHEMA
+from reports.data.serialize import plain
 from reports.machine.environment import describe_environment
 from reports.machine.progress import Interrupted, Progress, part_of
 from reports.page.render import render_page

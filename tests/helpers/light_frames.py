@@ -115,9 +115,9 @@ def twin_of(loaded, frame, size, precision="single", *, walls="slanted"):
     from realtime.scene.read_scene import read_scene
     from realtime.shadow_maps.shadow_map import cast_shadow_map
     from reference.scene.read import read_truth
-    from validation.oracles.light_volume import traced_walls, twin_airlight
+    from validation.oracles.light_volume import oracle_airlight, traced_walls
 
     scene = read_scene(loaded, precision)
     maps = [cast_shadow_map(scene.geometry, light, size) for light in scene.lights]
     numbers = traced_walls(scene, maps) if walls == "upright" else None
-    return twin_airlight(read_truth(loaded), maps, distance=frame.distance, walls=numbers)
+    return oracle_airlight(read_truth(loaded), maps, distance=frame.distance, walls=numbers)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from reference.storage.exr import Image, write_exr
+from tests.helpers.reports import agreement, checked, engine, entry, errors, flip, report_of, scene, settings
 
 WIDTH, HEIGHT = 32, 24
 VOID = {"meta", "img", "br", "hr", "link", "input"}
@@ -79,109 +80,56 @@ def table_of(page, caption):
     return page.tables[next(place for place, words in enumerate(page.captions) if words.startswith(caption))]
 
 
-def timing(median):
-    return {"median_ms": median, "low_ms": 0.9 * median, "high_ms": 1.2 * median, "repetitions": 7}
-
-
 def method(label, **changes):
-    error = {"relative_rmse": 0.0123, "relative_bias": -0.0045, "p50": 0.0011, "p99": 0.0555, "nonfinite": 0}
-    return {
-        "label": label,
-        "kind": "built-in",
-        "layer": "airlight",
-        "method": label.split(" ")[0],
-        "refused": None,
-        "left_out": False,
-        "note": None,
-        "knows_shadows": True,
-        "times": {name: timing(3.21) for name in ("frame", "surface", "airlight", "light_moved")},
-        "error": error,
-        "flip": {"value": 0.0321, "note": ""},
-        "files": {"picture": "s/good.png", "error": "s/good-error.png", "exr": "s/good.exr"},
-    } | changes
+    files = {"picture": "s/good.png", "error": "s/good-error.png", "exr": "s/good.exr"}
+    error = errors(0.0123, relative_bias=-0.0045, p50=0.0011, p99=0.0555)
+    return entry(label, 0.0123, 3.21, error=error, flip=flip(0.0321), files=files) | changes
 
 
-def refused(label, why, **changes):
-    return method(label, refused=why, times=None, error=None, flip=None, files={}, **changes)
-
-
-STATISTICS = {
-    "relative_bias": 0.00017,
-    "relative_bias_ci": [-0.0011, 0.0014],
-    "margin": 0.005,
-    "equivalent": True,
-    "detectable_bias": 0.0021,
-    "z_mean": 0.013,
-    "z_std": 1.021,
-    "rejected": 3,
-    "expected_rejections": 0.01,
-}
-AGREEMENT = {
-    "estimator": "volpath",
-    "layer": "airlight",
-    "width": 160,
-    "height": 120,
-    "batches": 48,
-    "samples": 64,
-    "epsilon": 8.94e-4,
-    "masked": 11,
-    "uncorrected_bias": 0.0013,
-    "statistics": STATISTICS,
-}
-DATA: dict[str, Any] = {
-    "schema": "airlight-report/2",
-    "created": "2026-11-21 12:34:56 +0000",
-    "command": "airlight report --quick",
-    "seconds": 12.3,
-    "kept": 0,
-    "computed": 9,
-    "settings": {"name": "quick", "image": [WIDTH, HEIGHT], "timed": [64, 48]},
-    "environment": {"versions": {"airlight": "0.1.0", "mitsuba": "3.9.1"}, "variant": "llvm_ad_rgb", "threads": 2},
-    "claims": [
-        {"kind": "truth", "text": "The truth is confirmed.", "good": True},
-        {"kind": "fastest", "text": "hall: the fastest method is good.", "good": None},
-    ],
-    "scenes": [
-        {
-            "name": "hall",
-            "purpose": "A hall.",
-            "published": "Billeter 2010",
-            "path": None,
-            "size": [WIDTH, HEIGHT],
-            "plan": {"shadows": "visibility tests", "medium": "unbounded"},
-            "notes": [],
-            "truth": {
-                "mean": 0.98765,
-                "relative_bound": 1.2e-6,
-                "transitions": 4321,
-                "missed": 0.0007,
-                "checked": 98765,
-                "disagreements": 12,
-                "refined": 11,
-                "left": 1,
-            },
-            "multiple": {
-                "medium": {"value": 0.123, "interval": [0.12, 0.126]},
-                "everything": {"value": 0.21, "interval": [0.2, 0.22]},
-                "max_depth": 64,
-            },
-            "agreement": {"airlight": AGREEMENT, "surface": AGREEMENT | {"layer": "surface"}},
-            "methods": [
-                method("good (k)"),
-                method(
-                    "flat",
-                    knows_shadows=False,
-                    files={"picture": "s/flat.png", "error": "s/flat-error.png", "exr": "s/flat.exr"},
-                ),
-            ],
-            "exposure": 2.5,
-            "files": {"picture": "s/reference.png", "exr": "s/reference.exr"},
-        }
-    ],
-    "stability": [],
-    "mutations": None,
-    "published": None,
-}
+AGREEMENT = agreement(margin=0.005, detectable=0.0021, relative_bias_ci=[-0.0011, 0.0014])
+DATA: dict[str, Any] = checked(
+    report_of(
+        [
+            scene(
+                "hall",
+                [
+                    method("good (k)"),
+                    method(
+                        "flat",
+                        knows_shadows=False,
+                        files={"picture": "s/flat.png", "error": "s/flat-error.png", "exr": "s/flat.exr"},
+                    ),
+                ],
+                purpose="A hall.",
+                published="Billeter 2010",
+                size=[WIDTH, HEIGHT],
+                plan={"shadows": "visibility tests", "medium": "unbounded"},
+                truth={
+                    "mean": 0.98765,
+                    "relative_bound": 1.2e-6,
+                    "transitions": 4321,
+                    "missed": 0.0007,
+                    "checked": 98765,
+                    "disagreements": 12,
+                    "refined": 11,
+                    "left": 1,
+                },
+                agreement={"airlight": AGREEMENT, "surface": AGREEMENT | {"layer": "surface"}},
+                exposure=2.5,
+                files={"picture": "s/reference.png", "exr": "s/reference.exr", "airlight": "s/reference-airlight.png"},
+            )
+        ],
+        created="2026-11-21 12:34:56 +0000",
+        command="airlight report --quick",
+        seconds=12.3,
+        computed=9,
+        settings=settings(image=[WIDTH, HEIGHT], timed=[64, 48]),
+        claims=[
+            {"kind": "truth", "text": "The truth is confirmed.", "good": True},
+            {"kind": "fastest", "text": "hall: the fastest method is good.", "good": None},
+        ],
+    )
+)
 
 
 def images() -> dict[str, dict[str, np.ndarray]]:
@@ -218,9 +166,7 @@ def report_data() -> dict[str, Any]:
 
 def engine_image() -> dict[str, Any]:
     """The entry of an engine's image: judged by its total, without times."""
-    return method(
-        "engine", kind="image", layer="total", method="engine", times=None, flip=None, files={"exr": "s/engine.exr"}
-    )
+    return engine("engine", 0.0123, method="engine", files={"exr": "s/engine.exr"})
 
 
 def write_large_report(folder: Path, *, scenes: int, methods: int, size: tuple[int, int]) -> dict[str, Any]:

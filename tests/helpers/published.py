@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What a report says besides its scenes, by hand: papers' tables, stability of kernels, faults of the physics."""
 
-from tests.helpers.page import timing
+from tests.helpers.reports import timing
 
 BIRI = {
     "stages": ["silhouettes", "scene", "airlight of the scene", "sorting", "shadow planes"],

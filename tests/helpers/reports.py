@@ -1,25 +1,221 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reports by hand: a few scenes and methods with errors, and times that are as noisy as a machine."""
+"""Content of report.json by hand: one builder for all tests, whose parts have every key that the schema asks for.
+
+`timing`, `errors`, `entry`, `scene`, `report_of` and their likes make the parts, with arguments for what a test is
+about; `checked` holds a whole report to the schema. `report` makes reports for comparisons, with times that are as
+noisy as a machine.
+"""
 
 import copy
+import functools
+import json
 from typing import Any
 
 import numpy as np
+from jsonschema import Draft202012Validator
+
+from reports.data.reader import SCHEMA_FILE
 
 LABELS = ("unshadowed (exact)", "ray-march (steps=100)", "shadow-planes (exact)", "light-volumes (exact)")
 SCENES = ("fog", "hall", "pens")
+WHEN = "2026-11-21 12:00:00 +0000"
 
-_STAGES = {
-    "surface": 0.3,
-    "airlight": 0.7,
-    "frame": 1.0,
-    "light_moved": 1.4,
-    "objects_moved": 1.9,
-}  # of the work of a frame
+_STAGES = {"surface": 0.3, "airlight": 0.7, "frame": 1.0, "light_moved": 1.4, "objects_moved": 1.9}  # of a frame's work
 
 
-def timing(samples) -> dict[str, float]:
-    low, median, high = np.percentile(samples, [25, 50, 75])
+@functools.cache
+def _validator() -> Draft202012Validator:
+    return Draft202012Validator(json.loads(SCHEMA_FILE.read_text(encoding="utf-8")))
+
+
+def checked(data: dict[str, Any]) -> dict[str, Any]:
+    """Return the content of a report that keeps to the schema; a fake that does not is a fault of its test."""
+    _validator().validate(data)
+    return data
+
+
+def timing(median: float) -> dict[str, Any]:
+    """Return a timing with its quartiles [ms]."""
+    return {"median_ms": median, "low_ms": 0.9 * median, "high_ms": 1.2 * median, "repetitions": 7}
+
+
+def errors(relative_rmse: float | None, **changes: Any) -> dict[str, Any]:
+    """Return the errors of an image, all in proportion; no number where there is none."""
+    shares = {"relative_bias": 0.1, "rmse": 0.1, "relative_rmse": 1.0, "p50": 0.5, "p99": 3.0, "max": 10.0}
+    scaled = {name: None if relative_rmse is None else share * relative_rmse for name, share in shares.items()}
+    return {"pixels": 76800, "bias": 1e-4, "nonfinite": 0, "negative": 0} | scaled | changes
+
+
+def flip(value: float | None, note: str = "") -> dict[str, Any]:
+    """Return an HDR-FLIP."""
+    exposures = {"start_exposure": -1.0, "stop_exposure": 2.0, "exposures": 4, "pixels_per_degree": 67.0}
+    return {"value": value, "note": note} | exposures
+
+
+def entry(label: str, relative_rmse: float | None = 0.01, median: float = 2.0, **changes: Any) -> dict[str, Any]:
+    """Return what a report says of a configuration, which takes so many milliseconds a frame."""
+    name, _, inside = label.partition(" (")
+    kernel = inside.rstrip(")").split(", ")[0]
+    return {
+        "label": label,
+        "kind": "built-in",
+        "layer": "airlight",
+        "method": name,
+        "kernel": kernel if kernel and "=" not in kernel else None,
+        "parameters": {},
+        "knows_shadows": True,
+        "refused": None,
+        "left_out": False,
+        "note": None,
+        "times": {stage: timing(share * median) for stage, share in _STAGES.items()},
+        "error": errors(relative_rmse),
+        "surface_error": None,
+        "flip": None,
+        "files": {},
+        "measured": WHEN,
+        "seconds": 1.5,
+        "kept": False,
+    } | changes
+
+
+def refused(label: str, why: str, **changes: Any) -> dict[str, Any]:
+    """Return what a report says of a configuration that was refused."""
+    return entry(label, refused=why, times=None, error=None) | changes
+
+
+def engine(label: str, relative_rmse: float = 0.1, **changes: Any) -> dict[str, Any]:
+    """Return what a report says of an engine's image: judged by its total, without times."""
+    return entry(label, relative_rmse, kind="image", layer="total", method="image", kernel=None, times=None) | changes
+
+
+def agreement(
+    equivalent: bool | None = True,
+    estimator: str = "volpath",
+    *,
+    layer: str = "airlight",
+    detectable: float | None = 0.002,
+    margin: float = 0.01,
+    finished: bool = True,
+    **statistics: Any,
+) -> dict[str, Any]:
+    """Return the comparison of the truth with an estimator."""
+    known = {
+        "relative_bias": 1.7e-4,
+        "relative_bias_ci": [0.0 if equivalent else -0.02, 0.001],
+        "relative_bias_ci_batches": None,
+        "margin": margin,
+        "equivalent": equivalent,
+        "detectable_bias": detectable,
+        "z_mean": 0.013,
+        "z_std": 1.021,
+        "rejected": 3,
+        "expected_rejections": 0.01,
+    }
+    run = {"width": 160, "height": 120, "batches": 48, "samples": 64, "epsilon": 8.94e-4, "masked": 11}
+    run |= {"uncorrected_bias": 0.0013, "finished": finished}
+    return {"estimator": estimator, "layer": layer, "statistics": known | statistics} | run
+
+
+def truth(**changes: Any) -> dict[str, Any]:
+    """Return how exact the truth of a scene is."""
+    counts = dict.fromkeys(("transitions", "checked", "disagreements", "refined", "left"), 0)
+    return {"mean": 1.0, "relative_bound": 1e-10, "missed": 0.0} | counts | changes
+
+
+def share(value: float) -> dict[str, Any]:
+    """Return a share of the light with its interval."""
+    return {"value": value, "interval": [value - 0.003, value + 0.003]}
+
+
+def scene(name: str, methods: list[dict[str, Any]], **changes: Any) -> dict[str, Any]:
+    """Return what a report says of a scene."""
+    return {
+        "name": name,
+        "purpose": f"A {name}.",
+        "published": "",
+        "path": None,
+        "baseline": None,
+        "size": [320, 240],
+        "timed": [320, 240],
+        "plan": {"shadows": "visibility tests", "medium": "unbounded", "lights": "1 point", "extinction": "one"},
+        "notes": [],
+        "truth": truth(),
+        "exposure": 1.0,
+        "agreement": {"volpath airlight": agreement()},
+        "multiple": {"medium": share(0.123), "everything": share(0.21), "max_depth": 64, "batches": 4, "samples": 1},
+        "files": {
+            "exr": f"{name}/reference.exr",
+            "picture": f"{name}/reference.png",
+            "airlight": f"{name}/reference-airlight.png",
+        },
+        "methods": methods,
+        "seconds": {"truth": 0.5},
+    } | changes
+
+
+def settings(**changes: Any) -> dict[str, Any]:
+    """Return an effort."""
+    return {
+        "name": "quick",
+        "scenes": [],
+        "image": [320, 240],
+        "timed": [320, 240],
+        "checked": [64, 48],
+        "margins": {"volpath": 0.01},
+        "seconds": 0.1,
+        "samples": 4,
+        "batches": 8,
+        "multiple": [4, 1],
+        "patience": 1.0,
+        "slow": 1.0,
+        "limit": 1.0,
+        "flip": "none",
+        "mutations": False,
+        "rays": 0,
+        "papers": [],
+        "paper_kernels": ["exact"],
+    } | changes
+
+
+def environment(**changes: Any) -> dict[str, Any]:
+    """Return a machine."""
+    versions = {"airlight": "0.1.0", "mitsuba": "3.9.1", "drjit": "1.5.0"}
+    known = {"versions": versions, "platform": "none", "processor": "abacus", "threads": 2, "variant": "llvm_ad_rgb"}
+    return known | changes
+
+
+def stable(kernel: str, *broken: str) -> dict[str, Any]:
+    """Return the stability of a kernel, which breaks some of its bars."""
+    return {"kernel": kernel, "exact": True, "refused": {}, "sets": [], "gamma": {}, "laws": [], "broken": [*broken]}
+
+
+def report_of(scenes: list[dict[str, Any]], **changes: Any) -> dict[str, Any]:
+    """Return the content of a report."""
+    return {
+        "schema": "airlight-report/2",
+        "created": "2026-11-21 12:00:01 +0000",
+        "command": "airlight report",
+        "seconds": 2.0,
+        "parts": {"scenes": 2.0},
+        "kept": 0,
+        "computed": 4,
+        "measured": {"first": WHEN, "last": WHEN},
+        "settings": settings(),
+        "environment": environment(),
+        "claims": [{"kind": "truth", "text": "The truth is confirmed by volpath.", "good": True}],
+        "scenes": scenes,
+        "stability": [],
+        "mutations": None,
+        "published": None,
+    } | changes
+
+
+# --- reports to compare ----------------------------------------------------------------------------------------------
+
+
+def sampled(samples) -> dict[str, Any]:
+    """Return the timing that repetitions give [ms]."""
+    low, median, high = np.percentile(samples, [25, 50, 75]).tolist()
     return {"median_ms": median, "low_ms": low, "high_ms": high, "repetitions": len(samples)}
 
 
@@ -39,65 +235,28 @@ def times(frame_ms: float, rng: np.random.Generator | None = None, *, busy: floa
                 samples *= 1 + rng.uniform(0.3, 1.0)
             hit = rng.random(count) < busy * rng.uniform(0.5, 2.0)
             samples += hit * frame_ms * share * rng.uniform(0.5, 3.0, size=count)
-        found[stage] = timing(samples)
+        found[stage] = sampled(samples)
     return found
 
 
-def errors(relative_rmse: float) -> dict[str, Any]:
-    return {
-        "pixels": 76800,
-        "bias": 1e-4,
-        "relative_bias": 0.1 * relative_rmse,
-        "rmse": 0.1 * relative_rmse,
-        "relative_rmse": relative_rmse,
-        "p50": 0.5 * relative_rmse,
-        "p99": 3 * relative_rmse,
-        "max": 10 * relative_rmse,
-        "nonfinite": 0,
-        "negative": 0,
-    }
-
-
-def agreement(equivalent: bool = True, estimator: str = "volpath") -> dict[str, Any]:
-    statistics = {
-        "equivalent": equivalent,
-        "margin": 0.01,
-        "relative_bias_ci": [-0.02 if not equivalent else 0.0, 0.001],
-    }
-    return {"estimator": estimator, "layer": "airlight", "statistics": statistics}
-
-
 def report(seed: int | None = None, *, busy: float = 0.0, machine: float = 1.0) -> dict[str, Any]:
-    """Return a report of schema 2; the times of a seed, on a machine that takes `machine` times as long."""
+    """Return a report; the times of a seed, on a machine that takes `machine` times as long."""
     rng = None if seed is None else np.random.default_rng(seed)
     scenes = []
     for number, name in enumerate(SCENES):
         methods = [
-            {
-                "label": label,
-                "kind": "built-in",
-                "layer": "airlight",
-                "refused": None,
-                "note": None,
-                "times": times(machine * (0.7 + number) * (1 + 3 * place), rng, busy=busy),
-                "error": errors(10.0 ** -(1 + place)),
-                "surface_error": errors(1e-6),
-                "flip": {"value": 0.01 * (place + 1), "note": None},
-            }
+            entry(
+                label,
+                10.0 ** -(1 + place),
+                times=times(machine * (0.7 + number) * (1 + 3 * place), rng, busy=busy),
+                surface_error=errors(1e-6),
+                flip=flip(0.01 * (place + 1)),
+            )
             for place, label in enumerate(LABELS)
         ]
-        truth = {"mean": 0.127 + number, "relative_bound": 1e-10, "disagreements": 0, "left": 0}
-        known = {"volpath airlight": agreement()}
-        scenes.append({"name": name, "size": [320, 240], "truth": truth, "agreement": known, "methods": methods})
-    return {
-        "schema": "airlight-report/2",
-        "settings": {"name": "quick", "timed": [320, 240]},
-        "environment": {"processor": "one", "threads": 2, "variant": "llvm_ad_rgb", "versions": {"drjit": "1.5.0"}},
-        "claims": [{"kind": "truth", "text": "The truth is confirmed by volpath.", "good": True}],
-        "scenes": copy.deepcopy(scenes),
-        "stability": [{"kernel": "exact", "broken": []}],
-        "mutations": {"count": 20, "caught": 20, "passed": True},
-    }
+        scenes.append(scene(name, methods, truth=truth(mean=0.127 + number)))
+    mutations = {"count": 20, "caught": 20, "passed": True, "results": []}
+    return report_of(copy.deepcopy(scenes), stability=[stable("exact")], mutations=mutations)
 
 
 def method(data: dict[str, Any], scene: str = "hall", label: str = "shadow-planes (exact)") -> dict[str, Any]:

@@ -39,7 +39,7 @@ from validation.certified.intervals import (
     unit,
     vector,
 )
-from validation.certified.model import SIZE, FogBall, FogBox, FogLight, FogScene, FogScreen, mitsuba_dict
+from validation.certified.model import SIZE, FogBox, FogLight, FogScene, FogScreen, FogSphere, mitsuba_dict
 from validation.certified.scenes import fog_scenes
 
 SCHEMA = "airlight-certified-fog/1"
@@ -244,8 +244,8 @@ def _light_data(light: FogLight) -> dict[str, Any]:
     return data | {"type": "spot", "axis": axis, "cutoff": light.cutoff, "beam": light.beam}
 
 
-def _occluder_data(shape: FogBall | FogBox | FogScreen) -> dict[str, Any]:
-    names = {FogBall: "ball", FogBox: "box", FogScreen: "screen"}
+def _occluder_data(shape: FogSphere | FogBox | FogScreen) -> dict[str, Any]:
+    names = {FogSphere: "ball", FogBox: "box", FogScreen: "screen"}
     return {"type": names[type(shape)]} | asdict(shape)
 
 

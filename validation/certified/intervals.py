@@ -5,8 +5,8 @@ A point X(x) = origin + x d of a ray is lit where the open segment from the ligh
 spot, X lies in the cone. As x grows this can only change at the distances below, all in closed form. Write
 u(x) = X - L = a + x d with a = origin - L; the ray ends where it enters the first occluder.
 
-**Ball** of centre C and radius R. With v = C - L and T^2 = |v|^2 - R^2, the squared length of the tangents from L, the
-tangents make the angle acos(T/|v|) with v: u lies on their cone where u . v = |u| T, hence on the roots of
+**Sphere** of centre C and radius R. With v = C - L and T^2 = |v|^2 - R^2, the squared length of the tangents from L,
+the tangents make the angle acos(T/|v|) with v: u lies on their cone where u . v = |u| T, hence on the roots of
 
     (u . v)^2 = T^2 |u|^2.                                                                                      (cone)
 
@@ -34,11 +34,11 @@ from typing import Any
 
 from mpmath import mp, mpf
 
-from validation.certified.model import FogBall, FogBox, FogLight, FogScreen
+from validation.certified.model import FogBox, FogLight, FogScreen, FogSphere
 
 Number = Any  # mpmath.mpf
 Vector = tuple[Number, Number, Number]
-Occluder = FogBall | FogBox | FogScreen
+Occluder = FogSphere | FogBox | FogScreen
 
 _SAME = 1e-25  # distances closer than this are one [m]: they come with 40 digits
 
@@ -146,7 +146,7 @@ def _crossed(shape: Occluder, start: Vector, step: Vector, longest: Number) -> t
 
     None unless it enters between 0 and `longest`: both ends of the segment are outside of the shape.
     """
-    if isinstance(shape, FogBall):
+    if isinstance(shape, FogSphere):
         towards = minus(start, vector(shape.centre))
         half, length = dot(towards, step), dot(step, step)
         inner = half * half - length * (dot(towards, towards) - mp.mpf(shape.radius) ** 2)
@@ -183,7 +183,7 @@ def _coordinates(edges: Sequence[Vector], point: Vector) -> list[Number]:
 
 def _shadow_crossings(shape: Occluder, place: Vector, start: Vector, direction: Vector) -> list[Number]:
     """Return where a ray crosses the cone or the planes that bound a shadow; `start` is its origin from the light."""
-    if isinstance(shape, FogBall):
+    if isinstance(shape, FogSphere):
         v = minus(vector(shape.centre), place)
         return _cone_crossings(start, direction, v, dot(v, v) - mpf(shape.radius) ** 2)
     found = []

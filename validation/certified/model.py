@@ -17,7 +17,7 @@ _BLACK = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.0, 0.0, 
 
 
 @dataclass(frozen=True)
-class FogBall:
+class FogSphere:
     """A ball."""
 
     centre: Point  #: [m]
@@ -64,7 +64,7 @@ class FogScene:
     phase: str  #: 'isotropic', 'hg' or 'rayleigh'
     g: float  #: mean cosine of 'hg'
     lights: tuple[FogLight, ...]
-    occluders: tuple[FogBall | FogBox | FogScreen, ...] = ()
+    occluders: tuple[FogSphere | FogBox | FogScreen, ...] = ()
 
 
 def mitsuba_dict(scene: FogScene) -> dict[str, Any]:
@@ -121,8 +121,8 @@ def _light_dict(light: FogLight) -> dict[str, Any]:
     return {"type": "spot", "to_world": _transform(light.matrix), "intensity": intensity} | angles
 
 
-def _shape_dict(shape: FogBall | FogBox | FogScreen) -> dict[str, Any]:
-    if isinstance(shape, FogBall):
+def _shape_dict(shape: FogSphere | FogBox | FogScreen) -> dict[str, Any]:
+    if isinstance(shape, FogSphere):
         return {"type": "sphere", "center": list(shape.centre), "radius": shape.radius, "bsdf": _BLACK}
     columns = [*shape.half_edges, shape.centre]
     if isinstance(shape, FogScreen):

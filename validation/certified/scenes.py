@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from validation.certified.model import FogBall, FogBox, FogLight, FogScene, FogScreen, Matrix, unit
+from validation.certified.model import FogBox, FogLight, FogScene, FogScreen, FogSphere, Matrix, unit
 
 _GRID = 1024  # coordinates are multiples of its reciprocal
 _WIDE = 52.0  # degrees
@@ -32,8 +32,8 @@ def _look(origin: Sequence[float], target: Sequence[float]) -> Matrix:
     return (*(tuple(row) for row in rows), (0.0, 0.0, 0.0, 1.0))
 
 
-def _ball(centre: Sequence[float], radius: float) -> FogBall:
-    return FogBall(_grid(centre), _grid([radius])[0])
+def _ball(centre: Sequence[float], radius: float) -> FogSphere:
+    return FogSphere(_grid(centre), _grid([radius])[0])
 
 
 def _box(centre: Sequence[float], *half_edges: Sequence[float]) -> FogBox:
@@ -69,7 +69,7 @@ def _scene(
     sigma_t: Sequence[float],
     albedo: Sequence[float],
     lights: Sequence[FogLight],
-    occluders: Sequence[FogBall | FogBox | FogScreen] = (),
+    occluders: Sequence[FogSphere | FogBox | FogScreen] = (),
     phase: str = "isotropic",
     g: float = 0.0,
     fov: float = _WIDE,

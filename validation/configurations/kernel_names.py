@@ -6,9 +6,8 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from analytic.errors import InputError
+from analytic.errors import InputError, nearest
 from realtime.kernels.registry import KERNELS, Kernel
-from validation.scenes.loading import nearest
 
 
 def find_kernel(name: str) -> Callable[..., Any]:

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 r"""References of several machines as one.
 
-A file holds for each value the mean m of its K batches and their standard error s, so the sum of squared deviations
-is K (K - 1) s^2, and files add up as batches do: the spread within each and that between their means
-(`reference.monte_carlo.batches.pooled`). What merging loses is the rounding of files to single precision: the mean
-keeps a relative 2^-24 = 6e-8 or so, the standard error likewise. The spread between two means that differ by rounding
-alone shows as a relative standard error of the order of 6e-8, where the estimator has no noise at all.
+A file holds for each value the mean m of its K batches and their standard error s, so the sum of squared deviations is
+K (K - 1) s^2, and files add up as batches do: the spread within each and that between their means
+(`reference.monte_carlo.batches.combined_moments`). What merging loses is the rounding of files to single precision:
+the mean keeps a relative 2^-24 = 6e-8 or so, the standard error likewise. The spread between two means that differ by
+rounding alone shows as a relative standard error of the order of 6e-8, where the estimator has no noise at all.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
-from reference.monte_carlo.batches import LAYERS, parse_seed_ranges, pooled, seed_ranges
+from reference.monte_carlo.batches import LAYERS, combined_moments, parse_seed_ranges, seed_ranges
 from reference.storage.exr import Attribute, Image
 
 Array = NDArray[np.float64]
@@ -68,7 +68,7 @@ def merged_references(files: Sequence[tuple[str, Image]]) -> Image:
         count, mean, squares = parts[0].moments(layer)
         for part in parts[1:]:
             other = part.moments(layer)
-            mean, squares = pooled((count, mean, squares), other)
+            mean, squares = combined_moments((count, mean, squares), other)
             count += other[0]
         layers[layer] = mean
         layers[f"{layer}_se"] = np.sqrt(squares / (count * (count - 1)))

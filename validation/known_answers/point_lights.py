@@ -43,11 +43,11 @@ from reference.quadrature.ray_values import ray_values
 from reference.scene.read import TruthScene, read_truth
 from validation.certified.model import (
     SIZE,
-    FogBall,
     FogBox,
     FogLight,
     FogScene,
     FogScreen,
+    FogSphere,
     Matrix,
     load_fog,
     mitsuba_dict,
@@ -257,8 +257,8 @@ def _mapped(scene: FogScene, matrix: Array) -> FogScene:
     def edges(values: Sequence[Sequence[float]]) -> Any:
         return tuple(tuple(float(v) for v in matrix[:3, :3] @ edge) for edge in values)
 
-    def placed(shape: FogBall | FogBox | FogScreen) -> FogBall | FogBox | FogScreen:
-        if isinstance(shape, FogBall):
+    def placed(shape: FogSphere | FogBox | FogScreen) -> FogSphere | FogBox | FogScreen:
+        if isinstance(shape, FogSphere):
             raise TypeError("balls are met in float32; the laws are tried on polygons")
         return replace(shape, centre=point(shape.centre), half_edges=edges(shape.half_edges))
 

@@ -7,12 +7,11 @@ formula moves its mutation too.
 
 from collections.abc import Sequence
 
-from analytic.errors import InputError
+from analytic.errors import InputError, nearest
 from validation.mutations import directional as directional_mutations
 from validation.mutations import quadrature as quadrature_mutations
 from validation.mutations import single_scatter as single_scatter_mutations
 from validation.mutations.record import Mutation
-from validation.scenes.loading import nearest
 
 QUADRATURE = quadrature_mutations.MUTATIONS + directional_mutations.QUADRATURE
 SINGLE_SCATTER = single_scatter_mutations.MUTATIONS + directional_mutations.SINGLE_SCATTER

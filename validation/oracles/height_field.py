@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the slow twin of light volumes is made of: the height field of a shadow map in float64, and rays over a face.
+"""What the oracle of light volumes is made of: the height field of a shadow map in float64, and rays over a face.
 
 See `validation.oracles.light_volume` for the derivation.
 """

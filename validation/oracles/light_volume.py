@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The slow twin of light volumes: the same height field met by the same rays, in float64, one line after the other.
+"""An oracle of light volumes: the same height field met by the same rays, in float64, one line after the other.
 
 `realtime.shadow_maps.shadow_map` says what a shadow map holds and `realtime.shadow_maps.inverse_depth_field` what
 height field it makes: linear in s = 1 / planar depth over the halves of the texels of a face, lit where the s of a
-point is above it. Of these two the twin takes the distances as they are; the rest is done again here, in other
+point is above it. Of these two the oracle takes the distances as they are; the rest is done again here, in other
 variables than those of the methods.
 
 **The ray.** Let n be the unit vector from the light to the foot point of a ray, w its direction, theta the angle at the
@@ -33,7 +33,7 @@ is one sum of cos(theta) and sin(theta). From f1 and f2 at theta1 and theta1 + d
 which changes sign once at most, where tan(e) = f1 sin(delta) / (f1 cos(delta) - f2).
 
 What is lit of a ray, faces and cones of spots taken into account, is integrated like the lit intervals of the truth
-(`reference.quadrature.unbounded`): the twin differs from that by what the shadow map leaves out, and by nothing else.
+(`reference.quadrature.unbounded`): the oracle differs from that by what the shadow map leaves out, and by nothing else.
 """
 
 from collections.abc import Sequence
@@ -60,12 +60,12 @@ _CHUNK = 1 << 20  # crossings of rays and lines looked at together: 8 MB an arra
 
 
 def traced_walls(scene: Scene, shadow_maps: Sequence[ShadowMap]) -> list[NDArray[np.uint32]]:
-    """Return by light the walls that its rays find between the samples of its map, for `twin_airlight`."""
+    """Return by light the walls that its rays find between the samples of its map, for `oracle_airlight`."""
     pairs = zip(shadow_maps, scene.lights, strict=True)
     return [np.array(with_walls(inverse_depth_field(one), scene.geometry, light).walls) for one, light in pairs]
 
 
-def twin_airlight(
+def oracle_airlight(
     truth: TruthScene,
     shadow_maps: Sequence[ShadowMap],
     *,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The slow twin of light volumes with upright walls: `validation.oracles.light_volume` for the height fields of
+"""An oracle of light volumes with upright walls: `validation.oracles.light_volume` for the height fields of
 `realtime.methods.light_volumes.texel_walls`, in the same variables.
 
 The borders of texels cut a ray into pieces of one texel each. On a border the height is a step, where the side has a

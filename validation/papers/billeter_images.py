@@ -37,7 +37,7 @@ from validation.configurations.timing import (
     time_in_turns,
 )
 from validation.metrics.errors import Metrics, error_metrics
-from validation.oracles.light_volume import traced_walls, twin_airlight
+from validation.oracles.light_volume import oracle_airlight, traced_walls
 from validation.scenes.loading import load_scene
 
 Array = NDArray[np.float64]
@@ -224,7 +224,7 @@ def _twin(entry: FigureEntry, stage: _Stage, distance: Array) -> Array:
     scene = stage.scene
     maps = [cast_shadow_map(scene.geometry, light, entry.map) for light in scene.lights]
     walls = traced_walls(scene, maps) if entry.upright else None
-    return twin_airlight(stage.truth, maps, distance=distance, walls=walls)
+    return oracle_airlight(stage.truth, maps, distance=distance, walls=walls)
 
 
 def frame_within(renderer: FrameRenderer, limit: float) -> Frame:

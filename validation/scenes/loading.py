@@ -1,17 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Loading of scenes by name or by path; input is checked before any work is done."""
 
-import difflib
 import os
 import re
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import mitsuba as mi
 
-from analytic.errors import InputError
+from analytic.errors import InputError, nearest
 from validation.scenes.record import Animation
 from validation.scenes.registry import SCENES
 
@@ -71,12 +69,6 @@ def parse_size(text: str) -> tuple[int, int]:
     if not match:
         raise InputError(f"size: got {text!r}, wanted WIDTHxHEIGHT in pixels, for example 800x600")
     return int(match[1]), int(match[2])
-
-
-def nearest(word: str, known: Iterable[str]) -> str:
-    """Return '; did you mean X?' for the known word that is closest, or an empty string if none is close."""
-    close = difflib.get_close_matches(word, list(known), n=1, cutoff=0.4)
-    return f"; did you mean {close[0]!r}?" if close else ""
 
 
 def _existing(name_or_path: str) -> Path:

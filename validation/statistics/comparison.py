@@ -195,22 +195,22 @@ def compare_statistics(
     scale = float(2.0 ** np.frexp(largest)[1]) if largest > 0 else 1.0
     one = _side("reference", reference, chosen, scale=scale, with_batches=whole)
     two = _side("test", test, chosen, scale=scale, with_batches=whole)
-    pooled = relative_bias(one, two, int(chosen.sum()))
+    bias = relative_bias(one, two, int(chosen.sum()))
     return Statistics(
         masked=int((~asked).sum()),
         **_value_tests(one, two, chosen, family_level, plain_level),
         **_block_tests(one, two, family_level),
-        relative_bias=pooled.value,
-        relative_bias_ci=pooled.interval,
-        relative_bias_ci_batches=pooled.interval_batches,
-        relative_bias_se=pooled.error,
-        relative_bias_freedom=pooled.freedom,
-        relative_bias_p=pooled.p,
-        reference_variance_share=pooled.reference_share,
-        largest_share=pooled.largest_share,
-        detectable_bias=pooled.detectable,
+        relative_bias=bias.value,
+        relative_bias_ci=bias.interval,
+        relative_bias_ci_batches=bias.interval_batches,
+        relative_bias_se=bias.error,
+        relative_bias_freedom=bias.freedom,
+        relative_bias_p=bias.p,
+        reference_variance_share=bias.reference_share,
+        largest_share=bias.largest_share,
+        detectable_bias=bias.detectable,
         margin=margin,
-        equivalent=None if margin is None else pooled.within(margin),
+        equivalent=None if margin is None else bias.within(margin),
         family_level=family_level,
         plain_level=plain_level,
     )
@@ -303,10 +303,10 @@ def _side(name: str, estimate: Estimate, chosen: NDArray[np.bool_], *, scale: fl
     means = np.asarray(estimate.batch_means, dtype=np.float64) / scale
     means = means.reshape(len(means), -1).mean(axis=1)
     # Means of a mask, or of other pixels, would give an interval for something else; float32 sums agree to 1e-4.
-    pooled = float(mean[chosen].mean())
-    if len(means) < 2 or not np.isclose(means.mean(), pooled, rtol=1e-4, atol=0):
+    bias = float(mean[chosen].mean())
+    if len(means) < 2 or not np.isclose(means.mean(), bias, rtol=1e-4, atol=0):
         raise InputError(
             f"the {len(means)} batch means of the {name} have the mean {means.mean() * scale:.6g}, the pixels compared "
-            f"{pooled * scale:.6g}; give two or more, taken over the same pixels"
+            f"{bias * scale:.6g}; give two or more, taken over the same pixels"
         )
     return Side(mean, error, estimate.batches, means)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Sampling distances along a camera ray for lights at infinity, in Dr.Jit: uniform and free-flight, combined.
+"""Sampling distances along a camera ray for directional lights, in Dr.Jit: uniform and free-flight, combined.
 
 Nothing falls with the distance to such a light: what varies along a stretch of length d is exp(-sigma y) of the camera
 ray, the transmittance of the leg, which may fall or rise, and shadows. The density is the mean of the uniform one, 1/d,

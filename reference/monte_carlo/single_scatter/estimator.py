@@ -183,7 +183,7 @@ def _light_airlight(task: Task, number: int, sampler, ray: Ray, stretch: _Stretc
 
 
 def _directional_airlight(task: Task, emitter, sampler, ray: Ray, stretch: _Stretch, active):
-    """Estimate what a light at infinity sends from a stretch of the ray, likewise."""
+    """Estimate what a directional light sends from a stretch of the ray, likewise."""
     length = stretch.end - stretch.start
     active = active & (length > 0) & (length < dr.inf)
     length = dr.select(active, length, 1)

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reference.monte_carlo.batches import LARGEST_SEED, parse_seed_ranges, pooled, seed_ranges
+from reference.monte_carlo.batches import LARGEST_SEED, combined_moments, parse_seed_ranges, seed_ranges
 
 
 @pytest.mark.parametrize(
@@ -31,7 +31,7 @@ def test_pooled_moments_are_those_of_all_numbers(n, m, seed):
     rng = np.random.default_rng(seed)
     one, other = rng.normal(3.0, 1.0, (n, 5)), rng.normal(4.0, 2.0, (m, 5))
     parts = [(len(x), x.mean(axis=0), ((x - x.mean(axis=0)) ** 2).sum(axis=0)) for x in (one, other)]
-    mean, squares = pooled(*parts)
+    mean, squares = combined_moments(*parts)
     together = np.concatenate([one, other])
     # Sums of at most 18 numbers of order 1 to 10: roundings of 1e-16 each.
     np.testing.assert_allclose(mean, together.mean(axis=0), rtol=1e-13, atol=1e-13)

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from reference.scene.convex_bounds import Ball, Polyhedron, overlap, read_bounds
+from reference.scene.convex_bounds import Polyhedron, Sphere, overlap, read_bounds
 from tests.helpers.scenes import body, clear_scene, tiny_scene
 from tests.helpers.shapes import ball, bounds_of, box
 
@@ -39,7 +39,7 @@ def test_sphere_is_read_in_the_world(variant):
 
     turned = mi.ScalarTransform4f().translate([1.0, 2.0, 3.0]).rotate([0.6, 0.8, 0], 31).scale(0.5)
     bounds = bounds_of({"type": "sphere", "center": [0.2, 0.0, 0.0], "radius": 0.7, "to_world": turned})
-    assert isinstance(bounds, Ball)
+    assert isinstance(bounds, Sphere)
     assert bounds.radius == pytest.approx(0.35, rel=1e-6)
     assert bounds.centre == pytest.approx(np.array(turned @ mi.ScalarPoint3f(0.2, 0, 0)).ravel(), rel=1e-6)
 

@@ -161,8 +161,8 @@ def test_cast_rays_find_the_edges_of_the_geometry(variant):
     exact = directional_intervals(truth, rays, edges="geometry")
     cast = directional_intervals(truth, rays, edges="rays")
     assert exact.transitions > 100
-    assert exact.certificate.checked == 32 * np.sum(rays.last > rays.first)
-    assert exact.certificate.left == cast.certificate.left == 0
+    assert exact.random_checks.checked == 32 * np.sum(rays.last > rays.first)
+    assert exact.random_checks.left == cast.random_checks.left == 0
     lit = [lit_lengths(found, rays.ends) * (rays.last - rays.first) for found in (exact, cast)]
     # Legs and their ends are rounded to 2e-6 of some metres. One shadow is so thin that all samples step over it.
     assert np.sum(np.abs(lit[0] - lit[1]) > 2e-5) <= 1
@@ -204,6 +204,6 @@ def test_wrong_geometry_is_left_in_doubt(variant, monkeypatch):
 
     monkeypatch.setattr(module, "parallel_intervals", with_fewer_slats)
     wrong = module.directional_intervals(truth, rays)
-    assert right.certificate.left == 0
-    assert wrong.certificate.left > 5
+    assert right.random_checks.left == 0
+    assert wrong.random_checks.left > 5
     assert wrong.doubt is not None

@@ -47,9 +47,9 @@ def test_distance_to_a_ball_is_exact(variant, inside):
 
 
 def test_rays_that_touch_a_ball_keep_the_distance_that_was_cast(variant):
-    from reference.scene.convex_bounds import Ball
-    from reference.visibility.exact_distance import _to_ball
+    from reference.scene.convex_bounds import Sphere
+    from reference.visibility.exact_distance import _to_sphere
 
-    ball = Ball(np.array([0.0, 0.0, 5.0]), 1.0)
+    ball = Sphere(np.array([0.0, 0.0, 5.0]), 1.0)
     direction = np.array([[np.sin(a), 0.0, np.cos(a)] for a in (0.0, np.arcsin(0.2) + 1e-9)])
-    assert _to_ball(ball, np.zeros(3), direction, np.array([4.00001, 4.9])).tolist() == [4.0, 4.9]
+    assert _to_sphere(ball, np.zeros(3), direction, np.array([4.00001, 4.9])).tolist() == [4.0, 4.9]

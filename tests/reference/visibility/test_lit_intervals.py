@@ -47,7 +47,7 @@ def test_mixed_scenes_keep_needles_exact_beside_shapes_that_are_cast(variant):
     needle = box((0.5, -0.3, 0.9), (2e-4, 2e-4, 8.0))
     truth, light, rays, ends = setup(tiny_scene(pipe=cylinder(), needle=needle))
     found = lit_intervals(truth, light, rays, ends=ends, samples=32)
-    assert found.certificate.left == 0
+    assert found.random_checks.left == 0
     assert found.doubt is None
     # Cast densely, without the needle, whose shadow is narrower than what edges of cast rays leave open.
     bare, *_ = setup(tiny_scene(pipe=cylinder()))
@@ -75,21 +75,21 @@ def test_only_shapes_that_are_cast(variant):
 
 def test_what_is_lit_in_both(variant):
     """Two sets of intervals by hand: overlapping, nested, touching, missing; doubt and checks add up."""
-    from reference.visibility.intervals import Certificate, LitIntervals, intersected
+    from reference.visibility.intervals import LitIntervals, RandomChecks, intersected
 
     ends = np.zeros(5), np.ones(5)
     ray, low, high = np.array([0, 0, 1, 2, 4]), np.array([0.0, 0.5, 0.2, 0.0, 0.0]), np.array([0.4, 1, 0.8, 0.5, 1])
     doubt = np.array([1]), np.array([0.3]), np.array([0.01])
     one = LitIntervals(ray, low, high, 5, edge=1e-11, doubt=doubt)
     ray, low, high = np.array([0, 1, 1, 2, 3]), np.array([0.3, 0.0, 0.6, 0.5, 0.0]), np.array([0.6, 0.4, 1.0, 1, 1])
-    other = LitIntervals(ray, low, high, 5, certificate=Certificate(7, 2, 1, 1, 0.1))
+    other = LitIntervals(ray, low, high, 5, random_checks=RandomChecks(7, 2, 1, 1, 0.1))
     for pair in ((one, other), (other, one)):
         found = intersected(*pair, ends)
         assert found.ray.tolist() == [0, 0, 1, 1]
         assert found.low.tolist() == [0.3, 0.5, 0.2, 0.6]
         assert found.high.tolist() == [0.4, 0.6, 0.4, 0.8]
         assert (found.transitions, found.edge) == (8, 2e-6)
-        assert found.certificate == Certificate(7, 2, 1, 1, 0.1)
+        assert found.random_checks == RandomChecks(7, 2, 1, 1, 0.1)
         assert [part.tolist() for part in found.doubt] == [[1], [0.3], [0.01]]
 
 
@@ -100,7 +100,7 @@ def test_certificate_of_both_routes_is_clean(variant):
     truth, light, rays, ends = setup(box_scene())
     rays_used = int(np.sum(ends[1] > ends[0]))
     for edges in ("geometry", "rays"):
-        known = lit_intervals(truth, light, rays, ends=ends, samples=256, edges=edges).certificate
+        known = lit_intervals(truth, light, rays, ends=ends, samples=256, edges=edges).random_checks
         assert known.checked >= 32 * rays_used
         assert known.left == 0
         assert known.missed < 1e-3
@@ -110,7 +110,7 @@ def test_certificate_of_both_routes_is_clean(variant):
 def test_slivers_that_random_samples_meet_are_mended(variant):
     """From rays that are taken to be lit from end to end, random samples alone find the shadows of a row of posts."""
     from reference.visibility.lit_intervals import _bisect
-    from reference.visibility.random_checks import Rounding, Toggles, certified_cast
+    from reference.visibility.random_checks import Rounding, Toggles, checked_cast
     from reference.visibility.triangles import geometric_intervals
     from tests.helpers.visibility import visibility_test
 
@@ -120,8 +120,8 @@ def test_slivers_that_random_samples_meet_are_mended(variant):
     used = np.flatnonzero(ends[1] > ends[0])
     nothing = Toggles(used, np.ones(len(used), bool), np.empty(0, np.int64), np.empty(0))
     found_by = Rounding(visibility_test(truth.occluders, light.position, rays), _bisect)
-    found = certified_cast(nothing, found_by, ends=ends, checks=128)
-    known = found.certificate
+    found = checked_cast(nothing, found_by, ends=ends, checks=128)
+    known = found.random_checks
     assert known.disagreements > 1000
     assert known.refined == known.disagreements - known.left
     assert known.left < 0.05 * known.disagreements  # rays with more slivers than rounds
@@ -147,7 +147,7 @@ def test_wrong_geometry_is_found_and_left_in_doubt(variant):
     """Intervals from which one box is missing contradict the shadow rays, and the test of all triangles."""
     from reference.scene.shapes import Shapes, read_shapes
     from reference.visibility.lit_intervals import point_leg
-    from reference.visibility.random_checks import certified_geometry
+    from reference.visibility.random_checks import checked_geometry
     from reference.visibility.triangles import geometric_intervals
     from tests.helpers.visibility import visibility_test
 
@@ -155,10 +155,10 @@ def test_wrong_geometry_is_found_and_left_in_doubt(variant):
     shapes = read_shapes(truth.occluders)
     wrong = geometric_intervals(truth, light, rays, ends=ends, shapes=Shapes(shapes.triangles[12:]))
     visible = visibility_test(truth.occluders, light.position, rays)
-    found = certified_geometry(wrong, visible, (point_leg(light.position, rays), shapes), ends=ends, checks=16)
-    assert found.certificate.left > 20
+    found = checked_geometry(wrong, visible, (point_leg(light.position, rays), shapes), ends=ends, checks=16)
+    assert found.random_checks.left > 20
     assert found.doubt is not None
-    assert len(found.doubt[0]) == found.certificate.left
+    assert len(found.doubt[0]) == found.random_checks.left
     # Shadow rays that are wrong themselves are overruled by the float64 test.
     right = geometric_intervals(truth, light, rays, ends=ends, shapes=shapes)
 
@@ -167,9 +167,9 @@ def test_wrong_geometry_is_found_and_left_in_doubt(variant):
         lit[::701] ^= True
         return lit
 
-    found = certified_geometry(right, unreliable, (point_leg(light.position, rays), shapes), ends=ends, checks=4)
-    assert found.certificate.disagreements > 0
-    assert found.certificate.left == 0
+    found = checked_geometry(right, unreliable, (point_leg(light.position, rays), shapes), ends=ends, checks=4)
+    assert found.random_checks.disagreements > 0
+    assert found.random_checks.left == 0
     assert found.doubt is None
 
 

@@ -32,11 +32,11 @@ def surface_crossed(point, centre, radius):
 @pytest.mark.parametrize("radius", [0.02, 0.7, 1.69, 1.71, 3.0], ids=["small", "plain", "close", "inside", "large"])
 def test_samples_against_the_definition(radius):
     """Random points of random rays; the light is 1.7 from the centre, so in the last two it is inside of the ball."""
-    from reference.visibility.spheres import ball_shadows
+    from reference.visibility.spheres import sphere_shadows
 
     centre = np.array([0.5, 1.5, np.sqrt(1.7**2 - 2.5)])
     direction, normal, height = random_rays(3000, 5)
-    ray, low, high = ball_shadows((centre[None], np.array([radius])), direction, normal, height)
+    ray, low, high = sphere_shadows((centre[None], np.array([radius])), direction, normal, height)
     assert len(ray) > 10
     assert np.all(low <= high)
     assert np.all(np.abs(np.stack([low, high])) <= 0.5 * np.pi)
@@ -55,19 +55,19 @@ def test_samples_against_the_definition(radius):
 
 def test_in_the_plane_of_the_centre():
     """Ball, ray and light in one plane: tangents at asin(R/D), and a ray through the ball enters where it should."""
-    from reference.visibility.spheres import ball_shadows
+    from reference.visibility.spheres import sphere_shadows
 
     direction, normal = np.array([[0.0, 0.0, 1.0]]), np.array([[0.0, 1.0, 0.0]])
     centre = np.array([[0.0, 1.0, 0.5]])
-    ray, low, high = ball_shadows((centre, np.array([0.3])), direction, normal, np.array([5.0]))
+    ray, low, high = sphere_shadows((centre, np.array([0.3])), direction, normal, np.array([5.0]))
     middle, half = np.arctan2(0.5, 1.0), np.arcsin(0.3 / np.hypot(1, 0.5))
     assert (ray.tolist(), low, high) == ([0], pytest.approx([middle - half]), pytest.approx([middle + half]))
-    _, low, high = ball_shadows((centre, np.array([0.3])), direction, normal, np.array([0.75]))
+    _, low, high = sphere_shadows((centre, np.array([0.3])), direction, normal, np.array([0.75]))
     chord = np.sqrt(0.3**2 - 0.25**2)
     assert low == pytest.approx(np.arctan2([0.5 - chord], 0.75), rel=1e-14)
     assert high == pytest.approx(np.arctan2([0.5 + chord], 0.75), rel=1e-14)
     for hidden_from in (np.array([0.6]), np.array([0.699])):
-        assert not len(ball_shadows((centre, np.array([0.3])), direction, normal, hidden_from)[0])
+        assert not len(sphere_shadows((centre, np.array([0.3])), direction, normal, hidden_from)[0])
 
 
 def test_a_ball_against_a_mesh_of_it(variant):
@@ -110,7 +110,7 @@ def test_random_shadow_rays_contradict_nothing(variant, place):
     from reference.scene.read import read_truth
     from reference.scene.shapes import read_shapes
     from reference.visibility.lit_intervals import lit_intervals, point_leg
-    from reference.visibility.random_checks import certified_geometry
+    from reference.visibility.random_checks import checked_geometry
     from reference.visibility.triangles import EXACT_EDGE, geometric_intervals
     from tests.helpers.visibility import visibility_test
 
@@ -125,9 +125,9 @@ def test_random_shadow_rays_contradict_nothing(variant, place):
     light, rays, ends = rays_of(truth)
     found = lit_intervals(truth, light, rays, ends=ends, samples=800)
     assert found.edge == EXACT_EDGE
-    assert found.certificate.checked == 100 * np.sum(ends[1] > ends[0])
-    assert found.certificate.left == 0
-    assert found.certificate.missed < 1e-4  # float32 rays where a plane grazes a ball, settled in float64
+    assert found.random_checks.checked == 100 * np.sum(ends[1] > ends[0])
+    assert found.random_checks.left == 0
+    assert found.random_checks.missed < 1e-4  # float32 rays where a plane grazes a ball, settled in float64
     assert (found.transitions > 100) == (place in ("outside", "both"))
     # Were the second ball forgotten, the check would tell.
     shapes = read_shapes(truth.occluders)
@@ -135,7 +135,7 @@ def test_random_shadow_rays_contradict_nothing(variant, place):
     fewer = replace(shapes, centre=shapes.centre[keep], radius=shapes.radius[keep])
     wrong = geometric_intervals(truth, light, rays, ends=ends, shapes=fewer)
     visible = visibility_test(truth.occluders, light.position, rays)
-    left = certified_geometry(
+    left = checked_geometry(
         wrong, visible, (point_leg(light.position, rays), shapes), ends=ends, checks=100
-    ).certificate.left
+    ).random_checks.left
     assert (left > 50) == (place in ("outside", "both"))

@@ -191,7 +191,7 @@ def test_a_function_of_ones_own_is_a_method(variant):
     assert airlight.render("open-fog", own.method, size=TINY).kernel == "exact"
     thirds = airlight.render("open-fog", brighter, third, size=TINY)
     np.testing.assert_allclose(thirds.airlight, 2 / 3 * usual.airlight, rtol=1e-6)
-    with pytest.raises(airlight.InputError, match=r"test_api\.py, line \d+: ZeroDivisionError: nothing there"):
+    with pytest.raises(airlight.InputError, match=r"test_images\.py, line \d+: ZeroDivisionError: nothing there"):
         airlight.render("open-fog", gone, size=TINY)
 
 

@@ -126,7 +126,7 @@ def test_layers_are_arrays_of_the_precision_of_what_made_them():
 @pytest.mark.claim("results-are-frozen")
 def test_numpy_takes_a_result_as_its_total():
     frame = rendering()
-    assert np.asarray(frame) is not None
+    np.testing.assert_array_equal(np.asarray(frame), frame.airlight + frame.surface)
     assert np.shares_memory(np.asarray(frame), frame.total)
     assert not np.shares_memory(np.array(frame), frame.total)
     assert np.asarray(frame, dtype=np.float64).dtype == np.float64
@@ -210,6 +210,7 @@ def test_pieces_of_html_escape_what_they_are_given():
 
 def row(label, frame_ms, error, **more):
     made = {"scene": "fog", "width": 8, "height": 6, "label": label, "frame_ms": frame_ms, "airlight_ms": 1.0}
+    made |= {"frame_low_ms": frame_ms, "frame_high_ms": frame_ms}
     made |= {"light_moved_ms": 2.0, "relative_rmse": error, "relative_bias": 0.0, "p99": 0.1, "nonfinite": 0}
     return MappingProxyType(made | {"refused": None, "note": None} | more)
 

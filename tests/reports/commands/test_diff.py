@@ -5,8 +5,9 @@ import json
 import pytest
 
 from reports.commands.main import run
-from reports.diff.compare import compare_reports, read_report
-from tests.helpers.reports import agreement, errors, method, report, slow_down
+from reports.data.reader import read_report
+from reports.diff.compare import compare_reports
+from tests.helpers.reports import agreement, checked, errors, method, report, slow_down
 
 
 def words(difference, verdict="worse"):
@@ -245,7 +246,8 @@ def test_other_sizes_are_not_compared_and_said():
     new = report()
     new["scenes"][0]["size"] = [640, 480]
     method(new, "fog")["error"] = errors(0.9)
-    new["settings"]["timed"] = [640, 480]
+    for scene in new["scenes"]:
+        scene["timed"] = [640, 480]
     slow_down(method(new), 9.0)
     found = compare_reports(report(), new)
     assert words(found) == []
@@ -290,28 +292,19 @@ def test_results_that_were_kept_are_named():
     assert any("3 results" in one for one in words(compare_reports(report(), report() | {"kept": 3}), "note"))
 
 
-def test_the_first_schema_is_read(files, capsys):
-    old = report()
-    old |= {"schema": "airlight-report/1", "claims": ["The truth is confirmed."], "kernels": old.pop("stability")}
-    for scene in old["scenes"]:
-        for one in scene["methods"]:
-            del one["kind"], one["layer"]
-    new = report()
-    method(new)["error"] = errors(3e-3)
-    assert run(["diff", *files(old, new)]) == 1
-    out = capsys.readouterr().out
-    assert "claims not compared" in out
-    assert "relative_rmse" in out
+def test_the_reports_of_these_tests_keep_to_the_schema():
+    for data in (report(), report(3, busy=0.2, machine=2.0)):
+        assert checked(data) is data
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (None, "there is no file"),
-        ("{", "no JSON"),
-        ("[]", "the schema is None"),
-        ('{"schema": "airlight-report/9"}', "the schema is 'airlight-report/9'"),
-        ('{"schema": "airlight-report/2", "scenes": []}', "'environment' is missing"),
+        (None, "No such file or directory; wanted what `airlight report"),
+        ("{", "is not valid JSON"),
+        ("[]", "has no schema, wanted 'airlight-report/2'"),
+        ('{"schema": "airlight-report/9"}', "has the schema 'airlight-report/9', wanted 'airlight-report/2'"),
+        ('{"schema": "airlight-report/2", "scenes": []}', "'created' is missing"),
     ],
 )
 def test_what_is_no_report_is_refused(tmp_path, capsys, text, message):

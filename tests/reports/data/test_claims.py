@@ -5,53 +5,44 @@ import pytest
 
 from reports.data.claims import claims, confirmed, unstudied
 from reports.tables.agreement import verdict
-
-
-def timing(median):
-    return {"median_ms": median, "low_ms": 0.9 * median, "high_ms": 1.2 * median, "repetitions": 7}
+from tests.helpers.reports import agreement, checked, engine, entry, errors, flip, report_of, scene
+from tests.helpers.reports import refused as refused_entry
 
 
 def method(label, rmse, median, *, refused=None):
-    """What a report says of a configuration, by hand."""
-    if refused:
-        return {"label": label, "refused": refused, "error": None, "times": None}
-    times = {name: timing(median) for name in ("frame", "surface", "airlight", "light_moved")}
-    return {"label": label, "refused": None, "error": {"relative_rmse": rmse}, "times": times}
+    """What a report says of a configuration."""
+    return refused_entry(label, refused) if refused else entry(label, rmse, median)
 
 
 def agreed(equivalent, detectable, *, layer="airlight", margin=0.005, estimator="volpath"):
-    return {
-        "estimator": estimator,
-        "layer": layer,
-        "statistics": {"equivalent": equivalent, "detectable_bias": detectable, "margin": margin},
-    }
+    return agreement(equivalent, estimator, layer=layer, detectable=detectable, margin=margin)
 
 
 def texts(scenes):
     return [one["text"] for one in claims(scenes)]
 
 
-def fastest_of(scene, target):
-    (found,) = [t for t in texts([{"agreement": {}, "multiple": MULTIPLE} | scene]) if f" {100 * target:g} %" in t]
+def fastest_of(methods, target):
+    (found,) = [t for t in texts([scene("x", methods, agreement={})]) if f" {100 * target:g} %" in t]
     return found
 
 
-MULTIPLE = {"medium": {"value": 0.123, "interval": [0.12, 0.126]}, "everything": {"value": 0.2, "interval": [0.1, 0.3]}}
-
-SCENES = [
-    {
-        "name": "fog",
-        "agreement": {"airlight": agreed(True, 0.0031)},
-        "multiple": MULTIPLE,
-        "methods": [method("fast", 0.02, 1.0), method("good", 0.004, 2.0), method("slow", 0.0001, 8.0)],
-    },
-    {
-        "name": "hall",
-        "agreement": {"airlight": agreed(True, 0.0042), "surface": agreed(True, 0.0007, layer="surface")},
-        "multiple": MULTIPLE,
-        "methods": [method("fast", 0.2, 1.0), method("good", 0.005, 40.0), method("slow", 0.004, 80.0)],
-    },
-]
+SCENES = checked(
+    report_of(
+        [
+            scene(
+                "fog",
+                [method("fast", 0.02, 1.0), method("good", 0.004, 2.0), method("slow", 0.0001, 8.0)],
+                agreement={"airlight": agreed(True, 0.0031)},
+            ),
+            scene(
+                "hall",
+                [method("fast", 0.2, 1.0), method("good", 0.005, 40.0), method("slow", 0.004, 80.0)],
+                agreement={"airlight": agreed(True, 0.0042), "surface": agreed(True, 0.0007, layer="surface")},
+            ),
+        ]
+    )
+)["scenes"]
 
 
 def scenes():
@@ -97,7 +88,7 @@ def test_claims_on_a_truth_that_is_not_confirmed():
 def test_claims_when_equivalence_could_not_be_decided():
     """None (a black layer, no variance) is not a yes."""
     data = scenes()
-    data[0]["agreement"]["airlight"]["statistics"] = {"equivalent": None, "detectable_bias": None, "margin": 0.005}
+    data[0]["agreement"]["airlight"] = agreed(None, None)
     assert "NOT confirmed" in texts(data)[0]
     assert "fog (airlight)" in texts(data)[0]
 
@@ -105,8 +96,8 @@ def test_claims_when_equivalence_could_not_be_decided():
 def test_claims_without_any_comparison_confirm_nothing():
     """A scene that is black has no layer to compare."""
     data = scenes()
-    for scene in data:
-        scene["agreement"] = {}
+    for black in data:
+        black["agreement"] = {}
     trust = texts(data)[0]
     assert trust.startswith("There is no light to compare with Mitsuba's volpath")
 
@@ -125,19 +116,14 @@ def test_claims_on_nothing():
 
 def test_fastest_passes_over_methods_without_an_error():
     """A black truth has no relative error; nor has what was refused."""
-    scene = {
-        "name": "x",
-        "methods": [method("none", None, 0.1), method("no", 0, 0, refused="x"), method("best", 0.009, 3.0)],
-    }
-    assert fastest_of(scene, 0.01).startswith("x: the fastest method within 1 % relative RMSE is best: 3 ms")
-    scene["methods"].pop()
-    assert fastest_of(scene, 0.01) == "x: no method reaches a relative RMSE of 1 %."
-    assert fastest_of({"name": "x", "methods": []}, 0.01) == "x: no method reaches a relative RMSE of 1 %."
+    methods = [method("none", None, 0.1), method("no", 0, 0, refused="x"), method("best", 0.009, 3.0)]
+    assert fastest_of(methods, 0.01).startswith("x: the fastest method within 1 % relative RMSE is best: 3 ms")
+    assert fastest_of(methods[:-1], 0.01) == "x: no method reaches a relative RMSE of 1 %."
+    assert fastest_of([], 0.01) == "x: no method reaches a relative RMSE of 1 %."
 
 
 def test_error_of_just_the_target_counts():
-    scene = {"name": "x", "methods": [method("edge", 0.01, 3.0)]}
-    assert "is edge" in fastest_of(scene, 0.01)
+    assert "is edge" in fastest_of([method("edge", 0.01, 3.0)], 0.01)
 
 
 @pytest.mark.claim("claims-follow")
@@ -147,7 +133,7 @@ def test_claims_never_name_a_method_with_nonfinite_pixels():
     for one in data[0]["methods"]:
         one["error"]["nonfinite"] = 0
     data[0]["methods"][1]["error"]["nonfinite"] = 3
-    assert "is slow" in fastest_of(data[0], 0.01)
+    assert "is slow" in fastest_of(data[0]["methods"], 0.01)
 
 
 def test_one_scene_or_different_winners_have_a_sentence_each():
@@ -206,7 +192,7 @@ def test_a_finished_comparison_without_equivalence_is_against_the_truth():
 def test_what_failed_is_named_with_its_pixels():
     data = scenes()
     data[0]["methods"][0]["error"] |= {"nonfinite": 3, "negative": 2}
-    data[1]["truth"] = {"left": 7}
+    data[1]["truth"]["left"] = 7
     failed = [one for one in claims(data) if one["kind"] == "failed"]
     assert [one["good"] for one in failed] == [False] * 3
     assert failed[0]["text"] == "Images with values that are not finite: fast in fog (3 pixels)."
@@ -216,9 +202,7 @@ def test_what_failed_is_named_with_its_pixels():
 
 def test_images_of_an_engine_are_judged_and_never_the_fastest():
     data = scenes()[:1]
-    image = method("engine", 0.001, 0.1) | {"kind": "image", "layer": "total", "times": None}
-    image["error"]["relative_bias"] = -0.02
-    data[0]["methods"].append(image)
+    data[0]["methods"].append(engine("engine", error=errors(0.001, relative_bias=-0.02)))
     found = claims(data)
     (judged,) = [one["text"] for one in found if one["kind"] == "image"]
     assert judged == (
@@ -230,7 +214,7 @@ def test_images_of_an_engine_are_judged_and_never_the_fastest():
 def test_missing_flip_is_said_once_for_each_reason():
     data = scenes()
     for one in data[0]["methods"]:
-        one["flip"] = {"value": None, "note": "flip-evaluator is not installed"}
+        one["flip"] = flip(None, "flip-evaluator is not installed")
     (found,) = [one["text"] for one in claims(data) if one["kind"] == "not-measured"]
     assert found == ("No HDR-FLIP (flip-evaluator is not installed): fast in fog; good in fog; slow in fog.")
 
@@ -238,7 +222,7 @@ def test_missing_flip_is_said_once_for_each_reason():
 def test_missing_flip_of_different_counts_is_one_reason():
     data = scenes()
     for count, one in zip((3, 185), data[0]["methods"]):
-        one["flip"] = {"value": None, "note": f"{count} pixels of the test image are negative: FLIP is not defined"}
+        one["flip"] = flip(None, f"{count} pixels of the test image are negative: FLIP is not defined")
     (found,) = [one["text"] for one in claims(data) if one["kind"] == "not-measured"]
     assert found == (
         "No HDR-FLIP (pixels of the test image are negative: FLIP is not defined): fast in fog; good in fog."

@@ -12,115 +12,17 @@ from analytic.errors import InputError
 from reference.storage.exr import Image, write_exr
 from reports.data.reader import load_report, redraw_report
 from reports.plotting.pictures import write_png
+from tests.helpers.reports import checked, entry, report_of, scene, settings
 
 ROOT = Path(__file__).resolve().parents[3]
 
 
-def timing(median):
-    return {"median_ms": median, "low_ms": 0.9 * median, "high_ms": 1.1 * median, "repetitions": 5}
-
-
-def error(rmse):
-    numbers = {name: rmse for name in ("bias", "relative_bias", "rmse", "relative_rmse", "p50", "p99", "max")}
-    return {"pixels": 12, **numbers, "nonfinite": 0, "negative": 0}
-
-
 def small_report():
-    """The content of a report of one scene and one method, by hand."""
-    share = {"value": 0.1, "interval": [0.05, 0.15]}
-    method = {
-        "label": "unshadowed (exact)",
-        "kind": "built-in",
-        "layer": "airlight",
-        "method": "unshadowed",
-        "kernel": "exact",
-        "parameters": {},
-        "knows_shadows": False,
-        "refused": None,
-        "left_out": False,
-        "note": None,
-        "times": {name: timing(2.0) for name in ("frame", "surface", "airlight", "light_moved", "objects_moved")},
-        "error": error(0.002),
-        "surface_error": None,
-        "flip": None,
-        "files": {"exr": "fog/unshadowed-exact.exr"},
-        "measured": "2026-11-21 12:00:00 +0000",
-        "seconds": 1.5,
-        "kept": False,
-    }
-    scene = {
-        "name": "fog",
-        "purpose": "A test.",
-        "published": "",
-        "path": None,
-        "size": [4, 3],
-        "timed": [4, 3],
-        "plan": {"shadows": "none"},
-        "notes": [],
-        "truth": {
-            "mean": 1.0,
-            "relative_bound": 1e-9,
-            "transitions": 0,
-            "missed": 0.0,
-            "checked": 0,
-            "disagreements": 0,
-            "refined": 0,
-            "left": 0,
-        },
-        "exposure": 1.0,
-        "agreement": {},
-        "multiple": {"medium": share, "everything": share, "max_depth": 64, "batches": 4, "samples": 1},
-        "files": {
-            "exr": "fog/reference.exr",
-            "picture": "fog/reference.png",
-            "airlight": "fog/reference-airlight.png",
-        },
-        "methods": [method],
-        "seconds": {"truth": 0.5},
-    }
-    settings = {
-        "name": "tiny",
-        "scenes": [],
-        "image": [4, 3],
-        "timed": [4, 3],
-        "checked": [4, 3],
-        "margins": {"volpath": 0.01},
-        "seconds": 0.1,
-        "samples": 4,
-        "batches": 8,
-        "multiple": [4, 1],
-        "patience": 1.0,
-        "slow": 1.0,
-        "limit": 1.0,
-        "flip": "none",
-        "mutations": False,
-        "rays": 0,
-        "papers": [],
-        "paper_kernels": ["exact"],
-    }
-    return {
-        "schema": "airlight-report/2",
-        "created": "2026-11-21 12:00:01 +0000",
-        "command": "airlight report",
-        "seconds": 2.0,
-        "parts": {"scenes": 2.0},
-        "kept": 0,
-        "computed": 4,
-        "measured": {"first": "2026-11-21 12:00:00 +0000", "last": "2026-11-21 12:00:00 +0000"},
-        "settings": settings,
-        "environment": {
-            "versions": {"airlight": "0", "mitsuba": "0", "drjit": "0"},
-            "platform": "none",
-            "processor": "abacus",
-            "threads": 1,
-            "variant": "none",
-        },
-        "claims": [{"kind": "truth", "text": "It is so.", "good": True}],
-        "scenes": [scene],
-        "stability": [],
-        "mutations": None,
-        "published": None,
-    }
+    """The content of a report of one scene and one method."""
+    methods = [entry("unshadowed (exact)", knows_shadows=False, files={"exr": "fog/unshadowed-exact.exr"})]
+    claim = {"kind": "truth", "text": "It is so.", "good": True}
+    fog = scene("fog", methods, size=[4, 3], timed=[4, 3], agreement={})
+    return checked(report_of([fog], settings=settings(image=[4, 3], timed=[4, 3]), claims=[claim]))
 
 
 @pytest.fixture
@@ -172,10 +74,13 @@ def test_the_page_is_drawn_again_in_place_and_as_a_whole_elsewhere(folder, tmp_p
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("{", "is no JSON"),
+        ("{", "is not valid JSON"),
         ("[]", "has no schema, wanted 'airlight-report/2'"),
         ('{"schema": "airlight-report/1"}', "the schema 'airlight-report/1', wanted 'airlight-report/2'; make the"),
-        ('{"schema": "airlight-report/2"}', "does not keep to airlight-report/2: report: has no 'created'"),
+        (
+            '{"schema": "airlight-report/2"}',
+            "does not keep to airlight-report/2: 'created' is missing",
+        ),
     ],
 )
 def test_what_is_no_report_is_refused(folder, text, message):
@@ -186,10 +91,10 @@ def test_what_is_no_report_is_refused(folder, text, message):
 
 def test_a_damaged_report_is_refused_with_the_place(folder):
     changed(folder, lambda data: data["scenes"][0]["methods"][0]["times"].pop("frame"))
-    with pytest.raises(InputError, match=r"report\.scenes\.0\.methods\.0\.times: has no 'frame'"):
+    with pytest.raises(InputError, match=r"report\.scenes\[0\]\.methods\[0\]\.times: 'frame' is a required property"):
         load_report(folder)
     changed(folder, lambda data: data["scenes"][0]["methods"][0].update(kind="magic"))
-    with pytest.raises(InputError, match=r"methods\.0\.kind: got 'magic', wanted one of 'built-in'"):
+    with pytest.raises(InputError, match=r"methods\[0\]\.kind: 'magic' is not one of \['built-in'"):
         load_report(folder)
 
 

@@ -100,7 +100,7 @@ def test_what_is_missing_is_named_with_the_line_that_installs_it(monkeypatch, tm
     from reports.docs import build as docs_build
 
     monkeypatch.setattr(docs_build.importlib.util, "find_spec", lambda name: None)
-    with pytest.raises(MissingError, match=r"sphinx, myst-parser, furo, latex2mathml.*pip install"):
+    with pytest.raises(MissingError, match=r"sphinx, myst-parser, furo.*pip install"):
         build_docs(DOCS, tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
@@ -177,9 +177,11 @@ def test_formulas_are_mathml_and_slips_are_named(extension):
 
     markup = extension("mathml").markup
     assert markup(r"h \tan\theta", block=False).count("<mspace") == 2
+    assert "<mspace" not in markup(r"\exp(-a)", block=False)
     assert 'display="block"' in markup(r"\frac{a}{b}", block=True)
-    with pytest.raises(ExtensionError, match="formula"):
-        markup(r"\fraction{a}{b}", block=False)
+    for slip in (r"\fraction{a}{b}", r"\frac{a}", r"\frac{a", "x_{", "x^", "a & b", r"\sqrt"):
+        with pytest.raises(ExtensionError, match="formula"):
+            markup(slip, block=False)
 
 
 def test_docstrings_are_shown_as_they_stand(extension):

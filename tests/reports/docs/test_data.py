@@ -12,55 +12,28 @@ from PIL import Image
 
 from analytic.errors import InputError
 from reports.docs.data import LARGEST, WIDTH, refresh, small, stale_scenes
+from tests.helpers.reports import checked, entry, refused, report_of, scene, timing
 from validation.frames.baseline_files import read_baseline
 
 ROOT = Path(__file__).resolve().parents[3]
 
-TIMES = {"median_ms": 2.0, "low_ms": 1.9, "high_ms": 2.2, "repetitions": 9}
-ERROR = {name: 0.01 for name in ("relative_rmse", "relative_bias", "p50", "p99", "max", "rmse", "bias")} | {
-    "nonfinite": 0,
-    "negative": 0,
-    "pixels": 4,
-}
 
-
-def method(name, kernel=None, parameters=None, **changes):
-    label = f"{name} ({kernel})" if kernel else name
+def method(label, relative_rmse=0.01, **changes):
     files = {"picture": "open-fog/a.png", "error": "open-fog/b.png"}
-    times = {key: TIMES for key in ("frame", "surface", "airlight", "light_moved", "objects_moved")}
-    found = {"label": label, "method": name, "kernel": kernel, "parameters": parameters or {}, "knows_shadows": True}
-    found |= {"refused": None, "note": None, "times": times, "error": ERROR, "files": files, "flip": None}
-    return found | changes
+    return entry(label, relative_rmse, files=files) | changes
 
 
 def report(**changes):
-    share = {"value": 0.4, "interval": [0.3, 0.5]}
-    scene = {
-        "name": "open-fog",
-        "path": None,
-        "size": [4, 1],
-        "baseline": 7,
-        "plan": {"lights": "1 point", "medium": "unbounded", "extinction": "one"},
-        "truth": {"mean": 0.1, "relative_bound": 1e-10},
-        "multiple": {"medium": share, "everything": share},
-        "files": {"picture": "open-fog/a.png"},
-        "methods": [
-            method("unshadowed", "taylor"),
-            method("unshadowed", "exact", error=ERROR | {"relative_rmse": 1e-6}),
-            method("min-max", "exact", refused="not in this fog", times=None, error=None, files={}),
-            method("mine.py:march", kind="function"),
-        ],
-    }
-    found = {
-        "schema": "airlight-report/2",
-        "created": "2026-11-21 12:00:00 +0000",
-        "command": "airlight report",
-        "settings": {"name": "quick", "timed": [8, 6]},
-        "environment": {"processor": "P", "threads": 2, "variant": "llvm_ad_rgb", "versions": {"mitsuba": "3.9.1"}},
-        "claims": [{"kind": "truth", "text": "All is well.", "good": True}],
-        "scenes": [scene, {**scene, "name": "own", "path": "own.xml"}],
-    }
-    return found | changes
+    methods = [
+        method("unshadowed (taylor)"),
+        method("unshadowed (exact)", 1e-6),
+        refused("min-max (exact)", "not in this fog"),
+        method("mine.py:march", kind="function"),
+    ]
+    files = {"picture": "open-fog/a.png", "exr": "open-fog/a.exr", "airlight": "open-fog/b.png"}
+    fog = scene("open-fog", methods, size=[4, 1], baseline=7, files=files)
+    claims = [{"kind": "truth", "text": "All is well.", "good": True}]
+    return checked(report_of([fog, {**fog, "name": "own", "path": "own.xml"}], claims=claims)) | changes
 
 
 def noise(height, width):
@@ -99,7 +72,15 @@ def test_a_report_is_kept_without_what_is_not_shown(variant, folder, tmp_path):
 def test_costs_of_kernels_come_and_stay(variant, folder, tmp_path):
     data, costs = tmp_path / "data", tmp_path / "kernels.json"
     row = {"kernel": "taylor-4", "family": "taylor", "size": 4, "phase": "isotropic", "g": 0.0, "rays": 9}
-    row |= {"device": None, "wall": TIMES, "median": 1e-3, "p99": 1.0, "max": 9.0, "nonfinite": 0, "refused": None}
+    row |= {
+        "device": None,
+        "wall": timing(2.0),
+        "median": 1e-3,
+        "p99": 1.0,
+        "max": 9.0,
+        "nonfinite": 0,
+        "refused": None,
+    }
     content = {"environment": report()["environment"], "kernels": {"costs": [row], "levels": []}, "convergence": []}
     costs.write_text(json.dumps(content))
     refresh(data, kernels=costs)
@@ -114,9 +95,9 @@ def test_costs_of_kernels_come_and_stay(variant, folder, tmp_path):
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        ('{"schema": "airlight-report/9"}', "wanted airlight-report/1 or airlight-report/2"),
-        ("[1]", "wanted the folder of a report"),
-        ("{", "is no JSON"),
+        ('{"schema": "airlight-report/9"}', "wanted 'airlight-report/2'"),
+        ("[1]", "has no schema"),
+        ("{", "is not valid JSON"),
     ],
 )
 def test_what_is_no_report_is_refused(content, words, folder, tmp_path):

@@ -14,6 +14,7 @@ from realtime.parameters import limits_of
 DOCS = Path(__file__).resolve().parents[3] / "docs"
 
 
+@pytest.mark.claim("parameters-of-shadow-planes", "parameters-of-light-volumes")
 @pytest.mark.parametrize("name", METHODS)
 def test_a_page_lists_every_parameter_with_its_values_the_default_first(name, monkeypatch):
     monkeypatch.setattr(sys, "path", [str(DOCS / "_ext"), *sys.path])

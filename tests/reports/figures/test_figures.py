@@ -100,7 +100,7 @@ def test_a_figure_of_a_report_without_one_says_what_to_run(tmp_path, monkeypatch
     monkeypatch.chdir(tmp_path)
     with pytest.raises(InputError, match="frame-speed, strip: made from a report: write one with `airlight report -o"):
         figures(["frame-speed", "strip"], output=tmp_path)
-    with pytest.raises(InputError, match=r"report\.json is missing; write a report with `airlight report -o"):
+    with pytest.raises(InputError, match=r"report\.json: No such file or directory; wanted what `airlight report -o"):
         figures(["frame-speed"], output=tmp_path, report=tmp_path / "nowhere")
     assert not list(tmp_path.iterdir())
 

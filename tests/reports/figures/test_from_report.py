@@ -14,28 +14,28 @@ from reports.figures import methods_table as figure_methods_table
 from reports.figures import published as figure_published
 from reports.figures import stages as figure_stages
 from reports.figures import strip as figure_strip
+from tests.helpers.reports import (
+    checked,
+    engine,
+    entry,
+    environment,
+    errors,
+    refused,
+    report_of,
+    scene,
+    settings,
+    timing,
+)
+from tests.helpers.reports import truth as truth_of
 
 _SIZE = (24, 32)  # height, width
 _WRONG = {"sound": 1e-6, "march (steps=8)": 0.02}
 
 
-def timing(median):
-    return {"median_ms": median, "low_ms": 0.9 * median, "high_ms": 1.2 * median, "repetitions": 7}
-
-
-def method(label, error, *, layer="airlight", files=None):
-    metrics = {"relative_rmse": error, "relative_bias": -error, "p99": 3 * error, "nonfinite": 0}
-    return {
-        "label": label,
-        "method": label.split(" ")[0],
-        "refused": None,
-        "layer": layer,
-        "times": {"frame": timing(12.5), "light_moved": timing(20.0), "objects_moved": timing(25.0)}
-        if layer == "airlight"
-        else None,
-        "error": metrics,
-        "files": files or {},
-    }
+def method(label, error, **changes):
+    times = {stage: timing(12.5) for stage in ("frame", "surface", "airlight")}
+    times |= {"light_moved": timing(20.0), "objects_moved": timing(25.0)}
+    return entry(label, error=errors(error, relative_bias=-error), times=times) | changes
 
 
 def published():
@@ -58,9 +58,10 @@ def published():
         "shares": [5.0, 10.0, 15.0, 20.0, 50.0],
         "light_moved": timing(20.0),
         "static": timing(10.0),
-        "error": {"relative_rmse": 8e-7},
+        "error": errors(8e-7),
+        "error_size": [160, 120],
     }
-    entry = {
+    image_of = {
         "where": "Fig. 6a",
         "scene": "omni-box",
         "map": 32,
@@ -68,7 +69,7 @@ def published():
         "parameters": [["evaluation", "mesh"]],
         "fps": 230,
     }
-    image = {"entry": entry, "size": [512, 512], "light_moved": timing(50.0), "error": {"relative_rmse": 0.04}}
+    image = {"entry": image_of, "size": [512, 512], "light_moved": timing(50.0), "error": {"relative_rmse": 0.04}}
     view = {
         "published": {"what": "Sponza", "fps": 86, "passes": {}},
         "scene": "colonnade",
@@ -81,7 +82,7 @@ def published():
     stages = ["silhouettes", "scene", "airlight of the scene", "sorting", "shadow planes"]
     return {
         "biri": {"stages": stages, "rows": [row], "needless": []},
-        "billeter": {"figures": [image], "table": [view]},
+        "billeter": {"figures": [image], "table": [view], "conclusions": []},
     }
 
 
@@ -96,25 +97,17 @@ def report(tmp_path_factory):
         wrong[2:6, 20:24] *= 1.5 if error > 1e-3 else 1.0
         write_exr(folder / f"{label[:5]}.exr", Image({"airlight": wrong}))
         methods.append(method(label, error, files={"exr": f"{label[:5]}.exr"}))
-    methods.append(method("engine", 0.1, layer="total"))
-    refused = method("refused_one", 0.1) | {"refused": "no such media", "error": None, "times": None}
-    scene = {
-        "name": "a_scene",
-        "size": [32, 24],
-        "plan": {"shadows": "visibility tests"},
-        "truth": {"relative_bound": 4e-11},
-        "files": {"exr": "reference.exr"},
-        "methods": [*methods, refused],
-    }
-    data = {
-        "schema": "airlight-report/2",
-        "created": "2031-01-02 03:04:05 +0000",
-        "command": "airlight report",
-        "settings": {"image": [32, 24], "timed": [32, 24]},
-        "environment": {"processor": "a slide rule"},
-        "scenes": [scene],
-        "published": published(),
-    }
+    methods += [engine("engine", 0.1), refused("refused_one", "no such media")]
+    files = {"exr": "reference.exr", "picture": "reference.png", "airlight": "reference-airlight.png"}
+    studied = scene("a_scene", methods, size=[32, 24], truth=truth_of(relative_bound=4e-11), files=files)
+    data = report_of(
+        [studied],
+        created="2031-01-02 03:04:05 +0000",
+        settings=settings(image=[32, 24], timed=[32, 24]),
+        environment=environment(processor="a slide rule"),
+        published=published(),
+    )
+    checked(data)
     (folder / "report.json").write_text(json.dumps(data))
     return folder
 
@@ -144,7 +137,7 @@ def test_frame_speed_keeps_medians_quartiles_and_errors(report, tmp_path):
     assert shown == {"frame_ms": 12.5, "frame_ms_low": 11.25, "frame_ms_high": 15.0, "relative_rmse": 0.02}
     origin = json.loads((tmp_path / "frame-speed.json").read_text())
     assert origin["report"]["created"].startswith("2031-01-02")
-    assert origin["environment"] == {"processor": "a slide rule"}  # the machine that measured, not this one
+    assert origin["environment"]["processor"] == "a slide rule"  # the machine that measured, not this one
     assert drawn(figure_frame_speed, tmp_path) == drawn(figure_frame_speed, tmp_path)
 
 

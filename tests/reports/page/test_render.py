@@ -6,7 +6,7 @@ import pytest
 
 from analytic.errors import InputError
 from reports.page.chart import speed_error_chart
-from reports.page.filters import DASH, first_sentence, kept_words, number, percent, words
+from reports.page.filters import DASH, kept_words, number, percent, words
 from reports.page.render import SCRIPTS, render_page
 from reports.plotting.pictures import png_bytes
 from tests.helpers.page import (
@@ -14,14 +14,13 @@ from tests.helpers.page import (
     Page,
     engine_image,
     method,
-    refused,
     report_data,
     table_of,
-    timing,
     widths,
     write_files,
 )
 from tests.helpers.published import MUTATIONS, STABILITY
+from tests.helpers.reports import refused, timing
 
 
 @pytest.fixture
@@ -87,8 +86,8 @@ def test_images_are_data_and_every_canvas_has_words(page):
 
 
 def test_tables_have_headers_and_captions(page):
-    # Probe, methods, agreement, multiple scattering, environment, settings, keys.
-    assert len(page.tables) == 7
+    # Probe, methods, agreement, multiple scattering, environment, times of parts, settings, keys.
+    assert len(page.tables) == 8
     for table in page.tables:
         assert any(tag == "caption" for tag, _ in table)
         headers = [attributes for tag, attributes in table if tag == "th"]
@@ -171,7 +170,7 @@ def test_missing_values_are_dashes(data, folder):
 def test_scene_without_agreement_and_published_figure(data, folder):
     data["scenes"][0] |= {"agreement": {}, "published": ""}
     page = render(data, folder)
-    assert len(page.tables) == 6
+    assert len(page.tables) == 7
     assert "Answers to" not in page.text
 
 
@@ -296,7 +295,6 @@ def test_percent_and_words():
     assert percent(0.01234) == "1.23 %"
     assert words({"a": [1, 2, 3], "b": True, "c": []}) == f"a 1, 2, 3, b yes, c {DASH}"
     assert words([320, 240]) == "320 \N{MULTIPLICATION SIGN} 240"
-    assert first_sentence("One. Two.") == first_sentence("One.") == "One"
 
 
 def test_page_says_what_came_from_earlier_runs(data, folder):

@@ -16,7 +16,7 @@ from tests.helpers.changes_of_variables import theta_of_x, x_of_theta
 from tests.helpers.scenes import body, spot, tiny_scene
 from validation.estimates.quadrature import truth_image
 from validation.metrics.errors import error_metrics
-from validation.oracles.light_volume import height_field, twin_airlight, volume_intervals
+from validation.oracles.light_volume import height_field, oracle_airlight, volume_intervals
 
 
 def maps_of(scene, size):
@@ -41,7 +41,7 @@ def twin_error(description, size):
     import mitsuba as mi
 
     scene = mi.load_dict(description)
-    return error_metrics(truth_image(scene).airlight, twin_airlight(read_truth(scene), maps_of(scene, size)))
+    return error_metrics(truth_image(scene).airlight, oracle_airlight(read_truth(scene), maps_of(scene, size)))
 
 
 @pytest.mark.parametrize("lamp", ["point", "soft spot"])
@@ -80,7 +80,7 @@ def test_shadow_of_a_plane_is_exact(variant, level, surface):
 
     truth = read_truth(mi.load_dict(tiny_scene(size=(24, 18), ball=None, floor=None)))
     light, direction = truth.lights[0], truth.direction
-    found = twin_airlight(
+    found = oracle_airlight(
         truth, [plane_below(light.position[2] - level, 8)], distance=np.full((truth.height, truth.width), surface)
     )
     reaches = (level - truth.origin[2]) / direction[:, 2]
@@ -203,10 +203,10 @@ def test_lights_add_up(variant):
     scene = mi.load_dict(tiny_scene(second=spot()))
     truth, maps = read_truth(scene), maps_of(scene, 16)
     each = [
-        twin_airlight(replace(truth, lights=(light,)), [one]) for light, one in zip(truth.lights, maps, strict=True)
+        oracle_airlight(replace(truth, lights=(light,)), [one]) for light, one in zip(truth.lights, maps, strict=True)
     ]
     assert all(np.max(image) > 0 for image in each)
-    assert twin_airlight(truth, maps) == pytest.approx(sum(each), rel=1e-14)
+    assert oracle_airlight(truth, maps) == pytest.approx(sum(each), rel=1e-14)
 
 
 def test_what_cannot_be_done_is_refused(variant):
@@ -214,11 +214,11 @@ def test_what_cannot_be_done_is_refused(variant):
 
     scene = mi.load_dict(tiny_scene())
     with pytest.raises(InputError, match="got 0 shadow maps for 1 lights"):
-        twin_airlight(read_truth(scene), [])
+        oracle_airlight(read_truth(scene), [])
     with pytest.raises(InputError, match="got a distance of 0, wanted distances above 0"):
         height_field(ShadowMap(4, np.zeros(150), Projection(None)))
     ball = body({"type": "sphere", "center": [0, 0, 1], "radius": 0.3}, 0.4, (0.9, 0.9, 0.9))
     ball["exterior"] = {"type": "ref", "id": "fog"}
     bounded = mi.load_dict(tiny_scene(ball=ball))
     with pytest.raises(InputError, match="medium 'ball' has bounds"):
-        twin_airlight(read_truth(bounded), maps_of(scene, 4))
+        oracle_airlight(read_truth(bounded), maps_of(scene, 4))

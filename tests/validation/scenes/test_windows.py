@@ -63,7 +63,7 @@ def test_sun_comes_in_by_the_windows_alone(variant):
     rays = parallel_rays(truth.origin, truth.direction, truth.directional[0], span)
     found = directional_intervals(truth, rays)
     assert found.transitions > 500
-    assert found.certificate.left == 0
+    assert found.random_checks.left == 0
     x = rays.distance(found.ray, 0.5 * (found.low + found.high))
     point = truth.origin + x[:, None] * truth.direction[found.ray]
     towards = -truth.directional[0].direction

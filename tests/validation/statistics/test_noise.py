@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import pytest
 
-from tests.helpers.reports import report, times, timing
+from tests.helpers.reports import report, sampled, times
 from validation.statistics.noise import (
     ERROR_TOLERANCE,
     FLOORS,
@@ -65,7 +65,7 @@ def test_least_ratio_grows_with_the_noise_and_between_machines():
 def test_more_work_is_seen_in_all_that_contains_it():
     old, new = times(1.0), times(1.0)
     for stage in ("airlight", "frame", "light_moved", "objects_moved"):
-        new[stage] = timing([old[stage]["median_ms"] + 0.7] * 20)
+        new[stage] = sampled([old[stage]["median_ms"] + 0.7] * 20)
     assert slower_stages(old, new, least=1.25, scale=1.0) == ["airlight", "frame"]
     assert slower_stages(old, new, least=1.1, scale=1.0) == ["airlight", "frame", "light_moved", "objects_moved"]
     assert slower_stages(new, old, least=1.1, scale=1.0) == []
@@ -74,7 +74,7 @@ def test_more_work_is_seen_in_all_that_contains_it():
 @pytest.mark.parametrize("stage", ["airlight", "frame", "light_moved"])
 def test_a_burst_over_one_timing_has_no_witness(stage):
     old, new = times(1.0), times(1.0)
-    new[stage] = timing([3 * old[stage]["median_ms"]] * 20)
+    new[stage] = sampled([3 * old[stage]["median_ms"]] * 20)
     assert slower_stages(old, new, least=1.25, scale=1.0) == []
 
 
@@ -92,7 +92,7 @@ def test_the_fewer_witnesses_the_more_is_needed():
 
 def test_a_single_repetition_needs_the_square():
     old, new = (
-        {"frame": timing([ms]), "objects_moved": timing([ms]), "light_moved": timing([ms])} for ms in (9e3, 1.4e4)
+        {"frame": sampled([ms]), "objects_moved": sampled([ms]), "light_moved": sampled([ms])} for ms in (9e3, 1.4e4)
     )
     assert slower_stages(old, new, least=1.24, scale=1.0) == ["frame", "light_moved"]  # 1.56 times
     assert slower_stages(old, new, least=1.26, scale=1.0) == []

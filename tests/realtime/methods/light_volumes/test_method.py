@@ -170,7 +170,7 @@ def test_any_map(variant, kind, data):
     from realtime.methods.light_volumes.published.mesh import volume_mesh
     from realtime.shadow_maps.inverse_depth_field import inverse_depth_field
     from reference.scene.read import read_truth
-    from validation.oracles.light_volume import twin_airlight
+    from validation.oracles.light_volume import oracle_airlight
 
     loaded, (walk, mesh), shadow_map = renderers(kind, data.draw(st.integers(0, len(VIEWS) - 1)))
     vertex = vertices_of(shadow_map)
@@ -179,7 +179,7 @@ def test_any_map(variant, kind, data):
     found = with_heights(shadow_map, np.array(heights)[vertex])
     walked = image_frame(walk, run_stages(walk, (inverse_depth_field(found),)))
     drawn = image_frame(mesh, run_stages(mesh, (volume_mesh(found, walk.scene.lights[0]),)))
-    wanted = twin_airlight(read_truth(loaded), [found], distance=walked.distance)
+    wanted = oracle_airlight(read_truth(loaded), [found], distance=walked.distance)
     # As in the frames above; what is lit may be next to nothing, so the scale is the light's.
     scale = np.max(np.array(walk.scene.lights[0].intensity))
     assert np.max(np.abs(walked.airlight - drawn.airlight)) < 1e-13 * scale
@@ -209,7 +209,7 @@ def test_any_walls_in_any_map(variant, kind, data):
     from realtime.methods.light_volumes.texel_walls import walled_heights
     from realtime.shadow_maps.inverse_depth_field import inverse_depth_field
     from reference.scene.read import read_truth
-    from validation.oracles.light_volume import twin_airlight
+    from validation.oracles.light_volume import oracle_airlight
 
     loaded, (walk, _), shadow_map = renderers(kind, data.draw(st.integers(0, len(VIEWS) - 1)))
     vertex = vertices_of(shadow_map)
@@ -220,7 +220,7 @@ def test_any_walls_in_any_map(variant, kind, data):
     walls = any_walls(rng, found.faces, data.draw(st.sampled_from([0.0, 0.2, 0.5, 1.0])))
     field = walled_heights(inverse_depth_field(found), mi.UInt32(walls), mi.UInt32(np.flatnonzero(walls)))
     walked = image_frame(walk, run_stages(walk, (field,)))
-    wanted = twin_airlight(read_truth(loaded), [found], distance=walked.distance, walls=[walls])
+    wanted = oracle_airlight(read_truth(loaded), [found], distance=walked.distance, walls=[walls])
     scale = np.max(np.array(walk.scene.lights[0].intensity))
     assert np.max(np.abs(walked.airlight - wanted)) < 1e-7 * scale
 

@@ -84,7 +84,7 @@ def test_a_frame_is_that_of_the_height_field(variant, kind, precision):
     from realtime.scene.read_scene import read_scene
     from realtime.shadow_maps.shadow_map import cast_shadow_map
     from reference.scene.read import read_truth
-    from validation.oracles.light_volume import twin_airlight
+    from validation.oracles.light_volume import oracle_airlight
 
     # A kernel in float64 for a beam with a soft edge takes ten seconds to compile.
     lamp = {"lamp": spot(beam=20.0 if precision == "single" else 33.0)} if kind == "spot" else {}
@@ -96,7 +96,7 @@ def test_a_frame_is_that_of_the_height_field(variant, kind, precision):
     lanes = mesh_airlight(view, light, volume_mesh(shadow_map, light), kernel=exact)
     found, distance = np.empty((40 * 28, 3)), np.empty(40 * 28)
     found[np.array(view.pixel)], distance[np.array(view.pixel)] = np.array(lanes).T, np.array(view.distance)
-    wanted = twin_airlight(read_truth(loaded), [shadow_map], distance=distance.reshape(28, 40)).reshape(-1, 3)
+    wanted = oracle_airlight(read_truth(loaded), [shadow_map], distance=distance.reshape(28, 40)).reshape(-1, 3)
     # The scene holds its numbers in float32, 6e-8 each; float32 adds the kernel's 5e-6 and the rounding of the cone.
     tolerance = 3e-7 if precision == "double" else 1e-5
     assert np.max(np.abs(found - wanted)) < tolerance * np.max(wanted)
