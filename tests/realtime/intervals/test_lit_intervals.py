@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: whatever the boundaries and whenever intervals are added, the sum is that over the lit intervals."""
+"""Whatever the boundaries and whenever intervals are added, the sum is that over the lit intervals."""
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -47,9 +48,10 @@ def start(layers, places):
 def check(total, layers, places, gains):
     found = np.array(total, dtype=np.float64).T
     wanted = [expected(*ray) for ray in zip(layers, places, gains)]
-    np.testing.assert_array_equal(found, [one[:3] for one in wanted])  # small integers: exact
+    np.testing.assert_array_equal(found, [sums[:3] for sums in wanted])  # small integers: exact
 
 
+@pytest.mark.claim("sum-over-lit-intervals", tolerance="none: whole numbers")
 @settings(deadline=None, max_examples=50)
 @given(layers=arrays(np.int64, RAYS, elements=st.integers(-1, 2)), places=PLACES, gains=GAINS, due=WAITS)
 def test_intervals_that_wait_as_long_as_they_may(variant, layers, places, gains, due):
@@ -71,6 +73,7 @@ def test_intervals_that_wait_as_long_as_they_may(variant, layers, places, gains,
     check(sum_at_end(intervals, integral, columns[-1], **ends), layers, places, gains)
 
 
+@pytest.mark.claim("sum-over-lit-intervals", tolerance="none: whole numbers")
 @settings(deadline=None, max_examples=50)
 @given(layers=arrays(np.int64, RAYS, elements=st.integers(-1, 2)), places=PLACES, gains=GAINS)
 def test_intervals_that_are_added_at_once(variant, layers, places, gains):
@@ -89,6 +92,7 @@ def test_intervals_that_are_added_at_once(variant, layers, places, gains):
     check(add_waiting(intervals, integral).total, layers, places, gains)
 
 
+@pytest.mark.claim("sum-over-lit-intervals")
 @settings(deadline=None, max_examples=20)
 @given(lit=arrays(np.bool_, RAYS), active=arrays(np.bool_, RAYS))
 def test_nothing_is_integrated_where_nothing_waits(variant, lit, active):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: the queue holds the nearest crossings in order, whatever comes: ties, infinities, too many."""
+"""The queue holds the nearest crossings in order, whatever comes: ties, infinities, too many."""
 
 import numpy as np
 import pytest
@@ -28,6 +28,7 @@ def rows(values):
     return np.stack([np.array(value) for value in values], axis=1)
 
 
+@pytest.mark.claim("nearest-crossings-in-order", tolerance="none: the same bits")
 @LARGER
 @settings(deadline=None, max_examples=50)
 @given(keys=KEYS)
@@ -53,6 +54,7 @@ def test_the_nearest_are_kept_in_order_and_the_others_come_out(variant, larger, 
     np.testing.assert_array_equal(others, np.sort(np.concatenate([keys, padding], axis=1), axis=1))
 
 
+@pytest.mark.claim("nearest-crossings-in-order", tolerance="none: the same bits")
 @settings(deadline=None, max_examples=50)
 @given(keys=KEYS)
 def test_a_queue_without_gains_holds_the_same_keys(variant, keys):
@@ -68,6 +70,7 @@ def test_a_queue_without_gains_holds_the_same_keys(variant, keys):
     assert queue.gain == []
 
 
+@pytest.mark.claim("nearest-crossings-in-order", tolerance="none: the same bits")
 @LARGER
 @settings(deadline=None, max_examples=50)
 @given(keys=KEYS, shift=arrays(np.int64, (RAYS, COUNT), elements=st.integers(0, PLACES)))
@@ -88,6 +91,7 @@ def test_exchange_mends_an_order_that_is_wrong_by_no_more_than_its_places(varian
     np.testing.assert_array_equal(rows(out[PLACES:]), keys)
 
 
+@pytest.mark.claim("nearest-crossings-in-order", tolerance="none: the same bits")
 @settings(deadline=None, max_examples=20)
 @given(keys=KEYS, active=arrays(np.bool_, RAYS))
 def test_pop_takes_the_nearest_out_where_it_is_told_to(variant, keys, active):

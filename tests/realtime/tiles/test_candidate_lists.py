@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: lists hold every candidate whatever their room; one without room gives way to a cover of it."""
+"""Lists hold every candidate whatever their room; one without room gives way to a cover of it."""
 
 import numpy as np
 import pytest
@@ -22,6 +22,7 @@ def test_every_ray_is_in_its_tile(variant, count):
     np.testing.assert_array_equal(lanes.ravel(), np.minimum(np.arange(lanes.size), count - 1))
 
 
+@pytest.mark.claim("lists-in-any-room")
 @settings(deadline=None, max_examples=50)
 @given(
     length=arrays(np.uint32, BOXES, elements=st.integers(0, LONGEST)),
@@ -76,6 +77,7 @@ def planes(variant):
     return index, box, [set(np.flatnonzero(tile.any(axis=0)).tolist()) for tile in np.split(crossed, len(ways) // 16)]
 
 
+@pytest.mark.claim("lists-in-any-room")
 # The fixture is the same for every example.
 @settings(deadline=None, max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(room=st.integers(1, 3000), order=st.sampled_from([None, "exact", "paper"]))
@@ -113,6 +115,7 @@ def texels_of(leaves, faces, size, side):
     return dict(tiles)
 
 
+@pytest.mark.claim("lists-in-any-room")
 def test_lists_of_nodes_cover_what_is_looked_at_in_any_room(variant, monkeypatch):
     """Their cover is of larger nodes."""
     import drjit as dr

@@ -124,6 +124,7 @@ def test_shadows_on_surfaces_end_where_walls_stand(variant):
     assert wrong["upright"] < 0.2 * wrong["slanted"]
 
 
+@pytest.mark.claim("lists-in-any-room", tolerance="2e-6 of the largest")
 def test_lists_that_overflow_change_nothing_beside_walls(variant, monkeypatch):
     """Squares of many texels are gone through one after the other, from wherever the line enters them."""
     import realtime.methods.light_volumes.tile_lists

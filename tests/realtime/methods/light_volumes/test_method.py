@@ -95,6 +95,7 @@ def test_any_size_of_image(variant, size):
         assert differ(frame.airlight, wanted) < 1e-5
 
 
+@pytest.mark.claim("lists-in-any-room", tolerance="2e-6 of the largest")
 @pytest.mark.parametrize("rooms", [(6, 1), (8, 3), (24, 9)])
 def test_lists_that_overflow_change_nothing(variant, monkeypatch, rooms):
     import realtime.methods.light_volumes.tile_lists

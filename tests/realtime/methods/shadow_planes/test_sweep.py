@@ -120,6 +120,7 @@ def test_empty_segments_are_nothing(variant):
     assert np.all(total == 0)
 
 
+@pytest.mark.claim("rays-notice-a-wrong-order", tolerance="1e-4 in 999 of 1000 rays")
 @pytest.mark.parametrize("in_order", [True, False])
 def test_more_planes_at_one_place_than_a_ray_collects_at_once(variant, in_order):
     """Beside every plane ten that add a layer there and ten that take it away again: the same segments."""
