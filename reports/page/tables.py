@@ -10,7 +10,7 @@ from reports.papers.biri import biri_notes, biri_tables
 from reports.tables.agreement import agreement_table
 from reports.tables.checks import left_out_table, mutation_table
 from reports.tables.drawing import html
-from reports.tables.methods import method_row, rows_table
+from reports.tables.methods import method_row, methods_table
 from reports.tables.stability import summary_table
 from reports.tables.table import Column, Row, Table, table
 
@@ -35,7 +35,9 @@ def methods(scene: Data, timed: Sequence[int]) -> Table:
         "layers (total). A method that knows no shadows is marked; its error is then the light that shadows take away."
     )
     rows = [method_row(one, shadows=shadows) for one in scene["methods"]]
-    return rows_table(f"Times and errors of the methods in {scene['name']}", rows, *_METHODS, explanation=explanation)
+    return methods_table(
+        f"Times and errors of the methods in {scene['name']}", rows, *_METHODS, explanation=explanation
+    )
 
 
 def agreement(scene: Data) -> Table:
