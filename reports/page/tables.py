@@ -2,6 +2,7 @@
 """The tables of the page, from the data of a report."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from reports.page.filters import words
@@ -49,7 +50,10 @@ def agreement(scene: Data) -> Table:
         "masked are pixels whose ray passes close to a light."
     )
     title = f"Monte Carlo estimators against the quadrature in {scene['name']}"
-    return agreement_table(title, scene["agreement"].items(), *_AGREEMENT, explanation=explanation)
+    shown = agreement_table(title, scene["agreement"].items(), *_AGREEMENT, explanation=explanation)
+    # A terminal rounds a bias to 0.001 %; the page has every number of report.json.
+    columns = (replace(one, places=None) if one.key.endswith("bias") else one for one in shown.columns)
+    return replace(shown, columns=tuple(columns))
 
 
 def mutations(results: Iterable[Data]) -> Table:
