@@ -132,13 +132,13 @@ class BenchTable:
     def _repr_html_(self) -> str:
         from reports.api.html import block
         from reports.tables.drawing import html
-        from reports.tables.methods import rows_table
+        from reports.tables.methods import methods_table
 
         keys = ("label", "frame", "frame_rate", "airlight", "light_moved", "relative_rmse", "relative_bias", "p99")
         parts: dict[str, list[Row]] = {}
         for row in self.rows:
             parts.setdefault("{scene}, {width} x {height}".format_map(row), []).append(_bench_row(row))
-        return block(self._title(), *(html(rows_table(title, rows, *keys)) for title, rows in parts.items()))
+        return block(self._title(), *(html(methods_table(title, rows, *keys)) for title, rows in parts.items()))
 
     def _title(self) -> str:
         from reports.machine.environment import machine_in_words

@@ -9,7 +9,7 @@ from reports.data.reader import read_report
 from reports.figures.files import pixels, value, write_data, write_table
 from reports.figures.report import report_origin
 from reports.tables.drawing import latex
-from reports.tables.methods import rows_table
+from reports.tables.methods import methods_table
 from reports.tables.table import Measured, Row, Table, Value, number
 
 NAME = "methods-table"
@@ -68,7 +68,7 @@ def _scene(rows: list[dict[str, str]]) -> Table:
     bound = value(rows[0], "truth_bound")
     truth = f", truth known to {number(bound, 2, zeros=True)}" if bound else ""
     keys = ("label", *_TIMES, *_ERRORS)
-    return rows_table(rows[0]["scene"], [_row(row) for row in rows], *keys, explanation=pixels(rows[0]) + truth)
+    return methods_table(rows[0]["scene"], [_row(row) for row in rows], *keys, explanation=pixels(rows[0]) + truth)
 
 
 def _row(row: dict[str, str]) -> Row:

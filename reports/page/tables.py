@@ -2,6 +2,7 @@
 """The tables of the page, from the data of a report."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from reports.page.filters import words
@@ -10,7 +11,7 @@ from reports.papers.biri import biri_notes, biri_tables
 from reports.tables.agreement import agreement_table
 from reports.tables.checks import left_out_table, mutation_table
 from reports.tables.drawing import html
-from reports.tables.methods import method_row, rows_table
+from reports.tables.methods import method_row, methods_table
 from reports.tables.stability import summary_table
 from reports.tables.table import Column, Row, Table, table
 
@@ -35,7 +36,9 @@ def methods(scene: Data, timed: Sequence[int]) -> Table:
         "layers (total). A method that knows no shadows is marked; its error is then the light that shadows take away."
     )
     rows = [method_row(one, shadows=shadows) for one in scene["methods"]]
-    return rows_table(f"Times and errors of the methods in {scene['name']}", rows, *_METHODS, explanation=explanation)
+    return methods_table(
+        f"Times and errors of the methods in {scene['name']}", rows, *_METHODS, explanation=explanation
+    )
 
 
 def agreement(scene: Data) -> Table:
@@ -47,7 +50,10 @@ def agreement(scene: Data) -> Table:
         "masked are pixels whose ray passes close to a light."
     )
     title = f"Monte Carlo estimators against the quadrature in {scene['name']}"
-    return agreement_table(title, scene["agreement"].items(), *_AGREEMENT, explanation=explanation)
+    shown = agreement_table(title, scene["agreement"].items(), *_AGREEMENT, explanation=explanation)
+    # A terminal rounds a bias to 0.001 %; the page has every number of report.json.
+    columns = (replace(one, places=None) if one.key.endswith("bias") else one for one in shown.columns)
+    return replace(shown, columns=tuple(columns))
 
 
 def mutations(results: Iterable[Data]) -> Table:

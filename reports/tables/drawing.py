@@ -46,7 +46,7 @@ class _Style:
     zeros: bool = False  #: at the end of numbers are kept: they say how exact a number is
 
 
-def text(table: Table, *, width: int | None = None) -> str:
+def text(table: Table, *, width: int | None = None, styled: bool = False) -> str:
     """Return a table for a terminal.
 
     Parameters
@@ -54,21 +54,22 @@ def text(table: Table, *, width: int | None = None) -> str:
     table
         What to draw.
     width
-        Of the terminal [characters], for which headings are bold and cells folded. Plain by default, and as wide as the
-        table needs.
+        Of the terminal [characters], to which cells are folded; as wide as the table needs by default.
+    styled
+        Whether headings are bold, by the codes of terminals.
     """
     from rich import box
     from rich.console import Console
     from rich.table import Table as Grid
 
-    grid = Grid(box=box.SIMPLE_HEAD, pad_edge=False)
+    headed = any(column.title for column in table.columns)
+    grid = Grid(box=box.SIMPLE_HEAD if headed else None, pad_edge=False, show_header=headed)
     for column in _with_spreads(table.columns):
         grid.add_column(column.title, justify="left" if column.words else "right", overflow="fold")
     for cells in _open_rows(table, _Style(str)):
         grid.add_row(*cells)
     drawn = io.StringIO()
-    known = width is not None
-    Console(file=drawn, highlight=False, markup=False, width=width or 10_000, force_terminal=known).print(grid)
+    Console(file=drawn, highlight=False, markup=False, width=width or 10_000, force_terminal=styled).print(grid)
     lines = [line.rstrip() for line in drawn.getvalue().splitlines()]
     return "\n".join([*([table.title] if table.title else []), *lines, *_below(table)]) + "\n"
 

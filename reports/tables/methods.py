@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What methods cost and how wrong they are: the table of `airlight bench`, the page, the documentation and papers."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from reports.tables.table import Measured, Row, Table, Value, digits_of, measured, numbers, words
@@ -34,26 +34,20 @@ BENCH = (
 )
 
 
-def methods_table(title: str, entries: Iterable[Entry], *keys: str, explanation: str = "") -> Table:
+def methods_table(title: str, methods: Iterable[Entry | Row], *keys: str, explanation: str = "") -> Table:
     """Return the table of the methods in a scene.
 
     Parameters
     ----------
-    title
-        Of the table.
-    entries
-        The `methods` of a scene of report.json.
+    title, explanation
+        See `reports.tables.table.Table`.
+    methods
+        The `methods` of a scene of report.json, or rows that have some of `COLUMNS`.
     keys
         Of `COLUMNS`; `BENCH` by default.
-    explanation
-        See `reports.tables.table.Table`.
     """
-    return rows_table(title, [method_row(one) for one in entries], *keys, explanation=explanation)
-
-
-def rows_table(title: str, rows: Sequence[Row], *keys: str, explanation: str = "") -> Table:
-    """Return the table of rows that have some of `COLUMNS`."""
-    return Table(title, tuple(COLUMNS.values()), tuple(rows), explanation).only(*(keys or BENCH))
+    rows = tuple(one if isinstance(one, Row) else method_row(one) for one in methods)
+    return Table(title, tuple(COLUMNS.values()), rows, explanation).only(*(keys or BENCH))
 
 
 def method_row(entry: Entry, *, shadows: bool = False) -> Row:
@@ -76,16 +70,11 @@ def method_row(entry: Entry, *, shadows: bool = False) -> Row:
         why = "left out" if entry.get("left_out") else "refused"
         return Row(values, f"{why}: {entry['refused']}", tuple(remarks))
     times, error = entry["times"] or {}, entry["error"] or {}
-    values |= times_values({name: measured(times.get(name)) for name in TIMES})
+    values |= {name: measured(times.get(name)) for name in TIMES}
+    values |= {f"{name}_rate": per_second(measured(times.get(name))) for name in ("frame", "airlight")}
     values |= {name: error.get(name) for name in ERRORS}
     values["flip"] = (entry.get("flip") or {}).get("value")
     return Row(values, remarks=tuple(remarks))
-
-
-def times_values(times: Mapping[str, Measured | None]) -> dict[str, Value]:
-    """Return times [ms] and the rates of those that are shown as rates [1/s]."""
-    rates = {f"{name}_rate": per_second(times.get(name)) for name in ("frame", "airlight")}
-    return {**times, **rates}
 
 
 def per_second(time: Measured | None) -> float | None:

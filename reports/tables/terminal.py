@@ -20,5 +20,6 @@ def print_table(table: Table, *, as_markdown: bool = False) -> None:
     if as_markdown:
         print(f"\n{markdown(table)}", end="")
         return
-    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
-    print(text(table, width=width), end="")
+    terminal = sys.stdout.isatty()
+    width = shutil.get_terminal_size().columns if terminal else None
+    print(text(table, width=width, styled=terminal), end="")
