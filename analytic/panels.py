@@ -267,7 +267,7 @@ def _evaluate_block(
         exponent -= (0.5 * (1 - s) * sigma_t * height)[:, None] * inverse
     f = np.exp(np.negative(exponent, out=exponent), out=exponent)
     f *= kernel
-    if integrand.phase.name != "isotropic":
+    if not integrand.phase.is_constant:
         kernel *= 0.5
         f *= integrand.phase.from_half(e * kernel, inverse * kernel)
     if integrand.weight is not None:

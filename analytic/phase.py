@@ -132,6 +132,36 @@ class PhaseFunction:
         return (values[cell] * (1 - share) + values[cell + 1] * share) / mean
 
     @property
+    def is_constant(self) -> bool:
+        """Whether it is 1 in all directions, so that integrands leave it out."""
+        return self.name == "isotropic"
+
+    def series(self, degree: int) -> list[float] | None:
+        """Return the coefficients of p(-sin theta) in powers of theta up to a degree; None for one with kinks.
+
+        With c = -sin theta the lobes are powers of U = (1 + c)/2 (hazy 8, murky 32) and of 1 + g^2 - 2 g c
+        (Henyey-Greenstein, -3/2), by the recurrence of J. C. P. Miller (Knuth, Seminumerical Algorithms, 4.7): U P' = n
+        U' P for P = U^n, any real n, so k U_0 P_k = sum_{i=1}^{k} (n i - (k - i)) U_i P_{k-i}. U_0 = 1/2 and 1 + g^2
+        are never zero.
+        """
+        if self.table is not None:
+            return None
+        # c = -sin theta: 0, -1, 0, 1/3!, 0, -1/5!, ...
+        c = [0.0 if k % 2 == 0 else (-1.0) ** ((k + 1) // 2) / math.factorial(k) for k in range(degree + 1)]
+        if self.is_constant:
+            return _scaled_plus([0.0] * (degree + 1), 0.0, 1.0)
+        if self.name == "rayleigh":
+            square = [math.fsum(c[i] * c[k - i] for i in range(k + 1)) for k in range(degree + 1)]
+            return _scaled_plus(square, 0.75, 0.75)
+        if self.name == "hg":
+            g = self.g
+            return [(1 - g * g) * p for p in _power_series(_scaled_plus(c, -2 * g, 1 + g * g), -1.5)]
+        up = _scaled_plus(c, 0.5, 0.5)
+        if self.name == "hazy":
+            return _scaled_plus(_power_series(up, 8), 9 / 2, 1 / 2)
+        return _scaled_plus(_power_series(up, 32), 50 * 33 / 83, 33 / 83)
+
+    @property
     def kinks(self) -> Array:
         """Cosines strictly between -1 and 1 at which the slope jumps, in increasing order; empty if smooth."""
         if self.table is None:
@@ -144,6 +174,19 @@ def unknown_phase(name: object) -> str:
     near = difflib.get_close_matches(str(name), PHASE_NAMES, n=1, cutoff=0.3)
     hint = f"did you mean '{near[0]}'? " if near else ""
     return f"no phase function is called '{name}'; {hint}Use one of {', '.join(PHASE_NAMES)}"
+
+
+def _power_series(u: list[float], n: float) -> list[float]:
+    """Return the series of U^n by Miller's recurrence."""
+    p = [u[0] ** n]
+    for k in range(1, len(u)):
+        p.append(math.fsum((n * i - (k - i)) * u[i] * p[k - i] for i in range(1, k + 1)) / (k * u[0]))
+    return p
+
+
+def _scaled_plus(series: list[float], factor: float, constant: float) -> list[float]:
+    """Return factor times a series plus a constant."""
+    return [factor * value + (constant if k == 0 else 0.0) for k, value in enumerate(series)]
 
 
 def _power_of_two(base: Array, squarings: int) -> Array:

@@ -7,12 +7,9 @@ one before by its differential equation:
 
     T = tan(theta/2 + pi/4)     T' = (1 + T^2)/2,   T_0 = 1:     (k+1) T_{k+1} = (delta_{k0} + sum_i T_i T_{k-i})/2
     F = exp(-a (T - 1))         F' = -a T' F,       F_0 = 1:     (k+1) F_{k+1} = -a sum_i (i+1) T_{i+1} F_{k-i}
-    P = U^n, any real n         U P' = n U' P:                   k U_0 P_k = sum_{i=1}^{k} (n i - (k - i)) U_i P_{k-i}
 
-The last one (J. C. P. Miller; Knuth, Seminumerical Algorithms, 4.7) serves the lobes: with c = -sin theta the base is
-U = (1 + c)/2 for hazy (n = 8) and murky (n = 32), U = 1 + g^2 - 2 g c for Henyey-Greenstein (n = -3/2); U_0 = 1/2 and
-1 + g^2 are never zero. The coefficients returned are those of the product F p: the common factor exp(-a) of exp(-a T)
-is left out, as in the table of DESIGN section 3.
+The phase function knows its own (`analytic.phase.PhaseFunction.series`). The coefficients returned are those of the
+product F p: the common factor exp(-a) of exp(-a T) is left out, as in the table of DESIGN section 3.
 """
 
 import math
@@ -54,16 +51,16 @@ def taylor_coefficients(a: ArrayLike, phase: PhaseFunction, degree: int = 4) -> 
     1 + g^2 + 2 g sin theta has its zeros), and a few terms are only useful where a theta is small.
     """
     thickness = np.asarray(a, dtype=np.float64)
-    if phase.name == "tabulated":
-        raise InputError(
-            "the phase function is 'tabulated', which has no power series; use a smooth one or a quadrature"
-        )
     if degree < 0:
         raise InputError(f"degree is {degree}; wanted a number >= 0")
     if not np.all(np.isfinite(thickness) & (thickness >= 0)):
         raise InputError("a holds a number that is negative or not finite; wanted optical thicknesses >= 0")
     exponential = _exponential_series(thickness, degree)
-    lobe = _phase_series(phase, degree)
+    lobe = phase.series(degree)
+    if lobe is None:
+        raise InputError(
+            f"the phase function is '{phase.name}', which has no power series; use a smooth one or a quadrature"
+        )
     columns = [sum(exponential[i] * lobe[k - i] for i in range(k + 1)) for k in range(degree + 1)]
     return np.stack([np.broadcast_to(c, thickness.shape) for c in columns], axis=-1)
 
@@ -85,34 +82,3 @@ def _exponential_series(a: Array, degree: int) -> list[Array]:
         total = sum(((i + 1) * t[i + 1]) * f[k - i] for i in range(k + 1))
         f.append(-a * total / (k + 1))
     return f
-
-
-def _phase_series(phase: PhaseFunction, degree: int) -> list[float]:
-    """Return the coefficients of p(-sin theta)."""
-    # c = -sin theta: 0, -1, 0, 1/3!, 0, -1/5!, ...
-    c = [0.0 if k % 2 == 0 else (-1.0) ** ((k + 1) // 2) / math.factorial(k) for k in range(degree + 1)]
-    if phase.name == "isotropic":
-        return _scaled_plus([0.0] * (degree + 1), 0.0, 1.0)
-    if phase.name == "rayleigh":
-        square = [math.fsum(c[i] * c[k - i] for i in range(k + 1)) for k in range(degree + 1)]
-        return _scaled_plus(square, 0.75, 0.75)
-    if phase.name == "hg":
-        g = phase.g
-        return [(1 - g * g) * p for p in _power_series(_scaled_plus(c, -2 * g, 1 + g * g), -1.5)]
-    up = _scaled_plus(c, 0.5, 0.5)
-    if phase.name == "hazy":
-        return _scaled_plus(_power_series(up, 8), 9 / 2, 1 / 2)
-    return _scaled_plus(_power_series(up, 32), 50 * 33 / 83, 33 / 83)
-
-
-def _power_series(u: list[float], n: float) -> list[float]:
-    """Return the series of U^n by Miller's recurrence."""
-    p = [u[0] ** n]
-    for k in range(1, len(u)):
-        p.append(math.fsum((n * i - (k - i)) * u[i] * p[k - i] for i in range(1, k + 1)) / (k * u[0]))
-    return p
-
-
-def _scaled_plus(series: list[float], factor: float, constant: float) -> list[float]:
-    """Return factor times a series plus a constant."""
-    return [factor * value + (constant if k == 0 else 0.0) for k, value in enumerate(series)]

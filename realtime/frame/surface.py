@@ -17,6 +17,7 @@ import drjit as dr
 import mitsuba as mi
 
 from realtime.bounded_media.ray_segments import path_transmittance
+from realtime.numerics.array_types import Metres, PerRay
 from realtime.rays.ray_light import falloff, ray_geometry
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium, transmittance
@@ -27,22 +28,22 @@ from realtime.scene.triangle_table import Facets, facet_at, facet_number
 class Cast:
     """What camera rays meet first: all of a frame that depends on the camera and the geometry alone."""
 
-    distance: Any  #: infinite where there is nothing [m]
-    triangle: Any = None  #: its number in the table of facets, where there is one
-    uv: Any = None  #: barycentric coordinates in it, where its normals are interpolated
+    distance: Metres  #: infinite where there is nothing [m]
+    triangle: PerRay | None = None  #: its number in the table of facets, where there is one
+    uv: PerRay | None = None  #: barycentric coordinates in it, where its normals are interpolated
     hit: Any = None  #: without a table, Mitsuba's preliminary intersection
-    insides: tuple[Any, ...] = ()  #: what of the ray up to there lies in each bounded medium [m]
+    insides: tuple[Metres, ...] = ()  #: what of the ray up to there lies in each bounded medium [m]
 
 
 @dataclass
 class VisibleSurface:
     """What camera rays meet first, with all that its shading needs."""
 
-    distance: Any  #: infinite where there is nothing [m]
-    point: Any  #: [m]
-    normal: Any  #: unit normal, on the side of the camera where the surface is lit from both
-    albedo: Any  #: diffuse reflectance
-    seen: Any  #: whether there is a surface, seen from a side that reflects
+    distance: Metres  #: infinite where there is nothing [m]
+    point: Metres  #: [m]
+    normal: PerRay  #: unit normal, on the side of the camera where the surface is lit from both
+    albedo: PerRay  #: diffuse reflectance
+    seen: PerRay  #: whether there is a surface, seen from a side that reflects
     interaction: Any  #: Mitsuba's, for shadow rays
 
 

@@ -14,7 +14,7 @@ import inspect
 import os
 import sys
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import field, make_dataclass, replace
 from functools import partial
@@ -27,6 +27,7 @@ from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.method import Method, always, never
 from realtime.methods.user_result import check_finite, checked_layers, checked_radiance
 from realtime.parameters import Parameters, values
+from realtime.tiles.adaptive_sampling import tolerance
 
 _WANTED = "wanted 'module:function' or 'path/to/file.py:function'"
 _TYPES = (bool, int, float, str)
@@ -58,15 +59,19 @@ def own_method(name: str) -> Method:
         raise InputError(f"method {name}: this is a {kind}; wanted a function of the view")
     takes_kernel, parameters = _signature(found, name)
     fields = [(key, type(default), field(default=default)) for key, default in parameters.items()]
+    by_rays = bool(getattr(found, "by_rays", False))
+    if by_rays:
+        fields = [*(one for one in fields if one[0] != "tolerance"), ("tolerance", float, tolerance())]
     return Method(
         name,
-        _guarded(found, name, takes_kernel=takes_kernel),
+        _guarded(found, name, takes_kernel=takes_kernel, takes=parameters),
         _summary(found),
         _file(found) or "one's own",
         uses_kernel=takes_kernel,
         prepare=_guarded_prepare(getattr(found, "prepare", None), name),
         casts_rays=always,
         frozen=always if getattr(found, "frozen", False) else never,
+        by_rays=always if by_rays else None,
         shadows=bool(getattr(found, "shadows", True)),
         parameters=make_dataclass("OwnParameters", fields, bases=(Parameters,), frozen=True),
         check=partial(check_finite, name=name),
@@ -170,11 +175,14 @@ def _signature(function: Callable[..., Any], name: str) -> tuple[bool, dict[str,
     return takes_kernel, parameters
 
 
-def _guarded(function: Callable[..., Any], name: str, *, takes_kernel: bool) -> Callable[..., Layers]:
+def _guarded(
+    function: Callable[..., Any], name: str, *, takes_kernel: bool, takes: Collection[str]
+) -> Callable[..., Layers]:
     """Return a plain function as what renders a method, with its errors named and its result checked."""
 
     def render(view, state, lists, *, kernel, parameters):
-        given = values(parameters) | ({"kernel": kernel} if takes_kernel else {})
+        given = {key: value for key, value in values(parameters).items() if key in takes}
+        given |= {"kernel": kernel} if takes_kernel else {}
         with _own_errors(f"method {name}", _file(function)):
             found = function(replace(view, prepared=state), **given)
         return Layers(checked_radiance(found, view, name))

@@ -3,8 +3,6 @@
 
 from dataclasses import dataclass
 
-from realtime.errors import InputError
-
 
 @dataclass(frozen=True)
 class SceneFeatures:
@@ -22,15 +20,6 @@ class SceneFeatures:
     directional_lights: int = 0
     clear: bool = False  #: bounded: nothing fills the space between the media
     notes: tuple[str, ...] = ()  #: what the user should know of this scene
-
-
-def check_places(features: SceneFeatures, method: str) -> None:
-    """Refuse a directional light for a method whose planes or slices go through the place of a light."""
-    if features.directional_lights:
-        raise InputError(
-            f"{method}: the scene has a directional light, wanted lights that have a place (point, spot); use "
-            "--method light-volumes or ray-march"
-        )
 
 
 def describe(features: SceneFeatures) -> dict[str, str]:

@@ -116,25 +116,20 @@ class Light:
         return Light(self.position, self.intensity)
 
 
-@dataclass(frozen=True)
-class HostPosition:
-    """The homogeneous position of a light on the host, in float64."""
-
-    l: Array  # noqa: E741  #: (3,), a place [m] or a unit direction towards the light
-    w: int
-
-    def toward(self, points: Array) -> Array:
-        """Return l - w P for points (..., 3)."""
-        return self.l - self.w * points
+def host_position(light: Light) -> Array:
+    """Return the homogeneous position of a light on the host: l [m for w = 1] and w, (4,), in float64."""
+    if light.w:
+        return np.append(_on_host(light.position), 1.0)
+    return np.append(-(_on_host(light.axis) + _on_host(light.axis_low)), 0.0)
 
 
-def host_position(light: Light) -> HostPosition:
-    """Bring the homogeneous position of a light to the host, in float64."""
+def place_and_weight(position: Array) -> tuple[Array, int]:
+    """Return l and w of a homogeneous position (4,), or of a place (3,), whose w is 1."""
+    return position[:3], int(position[3]) if len(position) == 4 else 1
 
-    def of(vector) -> Array:
-        return np.array(vector, dtype=np.float64).ravel()
 
-    return HostPosition(of(light.position), 1) if light.w else HostPosition(-(of(light.axis) + of(light.axis_low)), 0)
+def _on_host(vector) -> Array:
+    return np.array(vector, dtype=np.float64).ravel()
 
 
 def spot_fields(axis, cutoff: float, beam: float, types: ArrayTypes) -> dict[str, Any]:

@@ -175,7 +175,7 @@ class _Sum:
         numbers = self.pieces.medium[rows]
         for number in np.unique(numbers):
             phase = self.setup.medium(int(number)).phase
-            if phase.name != "isotropic":
+            if not phase.is_constant:
                 chosen = numbers == number
                 result[chosen] = phase(-sine[chosen])
         light = self.setup.light

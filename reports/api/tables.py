@@ -194,14 +194,13 @@ def _address(page: Path) -> str:
 
 
 def _bench_row(row: Mapping[str, Any]) -> "Row":
-    from reports.tables.methods import ERRORS, times_values
+    from reports.tables.methods import ERRORS, per_second
     from reports.tables.table import Measured, Row
 
+    remarks = (row["note"],) if row["note"] else ()
     if row["refused"]:
-        return Row({"label": row["label"]}, f"refused: {row['refused']}")
-    times: dict[str, Measured | None] = {}
-    for name in ("frame", "airlight", "light_moved"):
-        median = row[f"{name}_ms"]
-        ends = (row.get(f"{name}_low_ms", median), row.get(f"{name}_high_ms", median))
-        times[name] = None if median is None else Measured(median, *ends)
-    return Row({"label": row["label"], **times_values(times), **{name: row.get(name) for name in ERRORS}})
+        return Row({"label": row["label"]}, f"refused: {row['refused']}", remarks)
+    frame = Measured(row["frame_ms"], row["frame_low_ms"], row["frame_high_ms"])
+    times = {"frame": frame, "frame_rate": per_second(frame)}
+    times |= {name: row[f"{name}_ms"] for name in ("airlight", "light_moved")}
+    return Row({"label": row["label"], **times, **{name: row.get(name) for name in ERRORS}}, remarks=remarks)

@@ -17,6 +17,8 @@ from typing import TYPE_CHECKING, Any
 from analytic.errors import InputError
 from reference.storage.files import write_bytes, write_text
 from reports.plotting.style import figure_style
+from reports.tables.drawing import csv as draw_csv
+from reports.tables.table import Column, table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -107,11 +109,7 @@ def read_data(folder: Path | str, name: str) -> list[dict[str, str]]:
 
 def write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
     """Write a table: nine digits of every number, nothing for None."""
-    buffer = io.StringIO()
-    writer = csv.writer(buffer, lineterminator="\n")
-    writer.writerow(header)
-    writer.writerows([_cell(value) for value in row] for row in rows)
-    write_text(path, buffer.getvalue())
+    write_text(path, draw_csv(table("", (Column(name, name) for name in header), rows)))
 
 
 def read_csv(path: Path, figure: str) -> list[dict[str, str]]:
@@ -161,11 +159,3 @@ def _write_provenance(folder: Path, name: str, **made_by: Any) -> None:
     }
     text = json.dumps(content, indent=1, ensure_ascii=False, default=str)
     write_text(folder / f"{name}.json", text + "\n")
-
-
-def _cell(value: Any) -> Any:
-    if value is None or value != value:  # not-a-number differs from itself
-        return ""
-    if isinstance(value, float):
-        return f"{value:.9g}"
-    return value

@@ -61,11 +61,6 @@ def words(value: Any) -> str:
     return str(value)
 
 
-def first_sentence(text: str) -> str:
-    """Return a text up to its first full stop."""
-    return text.partition(". ")[0].removesuffix(".")
-
-
 def sentence(text: str) -> str:
     """Return a text with a capital at its beginning."""
     return text[:1].upper() + text[1:]
@@ -110,7 +105,6 @@ FILTERS: Mapping[str, Callable[..., str]] = {
     "number": number,
     "percent": percent,
     "words": words,
-    "first_sentence": first_sentence,
     "sentence": sentence,
     "unbroken": unbroken,
 }

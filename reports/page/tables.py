@@ -21,8 +21,8 @@ _METHODS = (
     *("relative_rmse", "relative_bias", "p50", "p99", "flip", "nonfinite"),
 )
 _AGREEMENT = (
-    *("name", "agrees", "margin", "bias", "interval", "detectable", "epsilon", "uncorrected"),
-    *("z_mean", "z_std", "rejected", "expected", "masked", "effort"),
+    *("name", "agrees", "margin", "relative_bias", "interval", "detectable_bias", "epsilon", "uncorrected_bias"),
+    *("z_mean", "z_std", "rejected", "expected_rejections", "masked", "effort"),
 )
 
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from reports.papers.rates import COLUMNS, rates, size_words
-from reports.tables.table import Column, Row, Table, Value, table
+from reports.tables.table import Row, Table, Value, numbers, table, words
 
 Data = Mapping[str, Any]
 
@@ -73,33 +73,23 @@ def _not_measured(row: Data) -> str:
 
 
 def _image_table(rows: Sequence[Data]) -> Table:
-    errors = (("error", ""), ("map_error", "against the map"))
-    columns = [Column("name", "frames a second", words=True), *COLUMNS]
-    for key, against in errors:
-        columns.append(Column(f"{key}_rmse", against or "rel. RMSE", digits=2, share=True))
-        columns.append(Column(f"{key}_p99", "p99", digits=2, share=True))
+    named = {"error_rmse": "rel. RMSE", "error_p99": "p99", "map_error_rmse": "against the map", "map_error_p99": "p99"}
+    columns = (*words(name="frames a second"), *COLUMNS, *numbers(**named, how={"digits": 2, "share": True}))
     found = []
     for row in rows:
         values: dict[str, Value] = {"name": _image(row), **_rates(row, row["entry"]["fps"])}
-        for key, _ in errors:
+        for key in ("error", "map_error"):
             error = row.get(key) or {}
             values |= {f"{key}_rmse": error.get("relative_rmse"), f"{key}_p99": error.get("p99")}
         found.append(Row(values, _not_measured(row)))
-    return table(
-        "Figures 6 and 7 of Billeter 2010 again: frames a second, and the error of the airlight",
-        columns,
-        found,
-        explanation="The error is against the truth, and against what the shadow map stands for.",
-    )
+    title = "Figures 6 and 7 of Billeter 2010 again: frames a second, and the error of the airlight"
+    explanation = "The error is against the truth, and against what the shadow map stands for."
+    return table(title, columns, found, explanation=explanation)
 
 
 def _view_table(rows: Sequence[Data]) -> Table:
-    columns = (
-        Column("name", "frames a second", words=True),
-        Column("triangles", "triangles"),
-        *COLUMNS,
-        Column("relative_rmse", "rel. RMSE to the static mesh", digits=2, share=True),
-    )
+    error = numbers(relative_rmse="rel. RMSE to the static mesh", how={"digits": 2, "share": True})
+    columns = (*words(name="frames a second"), *numbers("triangles"), *COLUMNS, *error)
     found = []
     for row in rows:
         values: dict[str, Value] = {"name": _view(row), "triangles": row["triangles"] or None}
@@ -111,7 +101,7 @@ def _view_table(rows: Sequence[Data]) -> Table:
 
 
 def _pass_table(rows: Sequence[Data]) -> Table:
-    columns = (Column("name", "ms of each pass", words=True), *(Column(one, one) for one in PASSES))
+    columns = (*words(name="ms of each pass"), *numbers(*PASSES))
     found = []
     for row in rows:
         published = row["published"]["passes"]

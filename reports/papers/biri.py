@@ -9,7 +9,7 @@ from typing import Any
 
 from reports.papers.rates import COLUMNS, rates, size_words
 from reports.tables.methods import per_second
-from reports.tables.table import Column, Interval, Row, Table, Value, measured, table
+from reports.tables.table import Interval, Row, Table, measured, numbers, table, words
 
 Data = Mapping[str, Any]
 
@@ -57,12 +57,9 @@ def _name(row: Data) -> str:
 
 def _share_table(data: Data) -> Table:
     stages = [f"stage_{place}" for place in range(1, len(data["stages"]) + 1)]
-    columns = [Column("name", "share of a frame", words=True)]
-    columns += [
-        Column(key, f"{place} {name}", percent=True)
-        for place, (key, name) in enumerate(zip(stages, data["stages"]), start=1)
-    ]
-    columns.append(Column("sum", "sum", "ms"))
+    headings = {key: f"{place} {name}" for place, (key, name) in enumerate(zip(stages, data["stages"]), start=1)}
+    shown = numbers(**headings, how={"percent": True})
+    columns = (*words(name="share of a frame"), *shown, *numbers("sum", how={"unit": "ms"}))
     rows: list[Row] = []
     for row, published in _with_published(data["rows"]):
         if published:
@@ -86,35 +83,27 @@ def _with_published(rows: Sequence[Data]) -> Iterator[tuple[Data, Data | None]]:
 
 def _rate_table(rows: Sequence[Data]) -> Table:
     columns = (
-        Column("name", "frames a second", words=True),
-        Column("triangles", "triangles"),
+        *words(name="frames a second"),
+        *numbers("triangles"),
         *COLUMNS,
-        Column("rays", "camera rays alone", whole=True),
-        Column("relative_rmse", "rel. RMSE", digits=2, share=True),
-        Column("relative_bias", "rel. bias", digits=2, share=True),
-        Column("p99", "p99", digits=2, share=True),
+        *numbers(rays="camera rays alone", how={"whole": True}),
+        *numbers(relative_rmse="rel. RMSE", relative_bias="rel. bias", p99="", how={"digits": 2, "share": True}),
     )
     found = []
     for row in rows:
-        published, error = row["published"], row["error"]
-        values: dict[str, Value] = {"name": _name(row), "triangles": row["triangles"]}
-        values |= rates(row, published["fps"], comparable=list(row["size"]) == list(published["size"]))
-        values |= {"rays": per_second(measured(row.get("rays")))}
-        found.append(Row(values | {name: error[name] for name in ("relative_rmse", "relative_bias", "p99")}))
+        published = row["published"]
+        beside = rates(row, published["fps"], comparable=list(row["size"]) == list(published["size"]))
+        alone = per_second(measured(row.get("rays")))
+        found.append({**row["error"], **beside, "name": _name(row), "triangles": row["triangles"], "rays": alone})
     return table("Table 2 of Biri 2006 again: frames a second, and the error of the airlight", columns, found)
 
 
 def _cost_table(costs: Sequence[Data]) -> Table:
     columns = (
-        Column("what", "what is not needed", words=True),
-        Column("with", "with", "ms"),
-        Column("without", "without", "ms"),
-        Column("ratio", "ratio", places=3),
-        Column("quartiles", "quartiles", places=3),
-        Column("turns", "turns"),
+        *words(what="what is not needed"),
+        *numbers(with_ms="with ms", without_ms="without ms"),
+        *numbers("ratio", "quartiles", how={"places": 3}),
+        *numbers("turns"),
     )
-    rows = [
-        (one["what"], one["with_ms"], one["without_ms"], one["ratio"], Interval(one["low"], one["high"]), one["turns"])
-        for one in costs
-    ]
+    rows = [{**one, "quartiles": Interval(one["low"], one["high"])} for one in costs]
     return table("What is not needed: a frame with it against one without, in turns", columns, rows)

@@ -5,15 +5,16 @@ from collections.abc import Mapping
 from typing import Any
 
 from reports.tables.methods import per_second
-from reports.tables.table import Column, Interval, Value, measured
+from reports.tables.table import Interval, Value, measured, numbers
 
+_WHOLE = {"whole": True}
 COLUMNS = (
-    Column("published", "published"),
-    Column("light_moved", "light moved: all anew", whole=True),
-    Column("of_published", "of published", digits=2, after=" x"),
-    Column("light_moved_camera_kept", "light moved: camera rays kept", whole=True),
-    Column("colours_changed", "colours changed: surface and airlight anew", whole=True),
-    Column("quartiles", "quartiles ms of all anew"),
+    *numbers("published"),
+    *numbers(light_moved="light moved: all anew", how=_WHOLE),
+    *numbers(of_published="of published", how={"digits": 2, "after": " x"}),
+    *numbers(light_moved_camera_kept="light moved: camera rays kept", how=_WHOLE),
+    *numbers(colours_changed="colours changed: surface and airlight anew", how=_WHOLE),
+    *numbers(quartiles="quartiles ms of all anew"),
 )
 
 

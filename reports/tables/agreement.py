@@ -4,27 +4,24 @@
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from reports.tables.table import Column, Interval, Row, Table, Value, Verdict
+from reports.tables.table import Interval, Table, Verdict, numbers, table, words
 
+_PERCENT = {"percent": True, "sign": True, "places": 3}
 COLUMNS = (
-    Column("name", "the truth of", words=True),
-    Column("estimator", "checked by", words=True),
-    Column("samples", "samples", after=" M", places=0),
-    Column("bias", "bias", percent=True, sign=True, places=3),
-    Column("interval", "95 % interval", percent=True, sign=True, places=3),
-    Column("margin", "margin \N{PLUS-MINUS SIGN}", percent=True),
-    Column("detectable", "detectable", percent=True, digits=2),
-    Column("epsilon", "shadow-ray epsilon"),
-    Column("uncorrected", "uncorrected", percent=True, sign=True, places=3),
-    Column("z_mean", "z: mean", sign=True),
-    Column("z_std", "z: st. deviation"),
-    Column("rejected", "rejected"),
-    Column("expected", "expected", digits=2),
-    Column("masked", "masked"),
-    Column("effort", "effort", words=True),
-    Column("agrees", "agree"),
+    *words(name="the truth of", estimator="checked by"),
+    *numbers("samples", how={"after": " M", "places": 0}),
+    *numbers(relative_bias="bias", interval="95 % interval", uncorrected_bias="uncorrected", how=_PERCENT),
+    *numbers("margin", how={"percent": True}),
+    *numbers(detectable_bias="detectable", how={"percent": True, "digits": 2}),
+    *numbers("rejected", "masked", epsilon="shadow-ray epsilon", z_mean="z: mean", z_std="z: st. deviation"),
+    *numbers(expected_rejections="expected", how={"digits": 2}),
+    *words("effort"),
+    *numbers(agrees="agree"),
 )
-BENCH = ("name", "estimator", "samples", "bias", "interval", "margin", "detectable", "uncorrected", "agrees")
+BENCH = (
+    *("name", "estimator", "samples", "relative_bias", "interval", "margin"),
+    *("detectable_bias", "uncorrected_bias", "agrees"),
+)
 
 
 def verdict(compared: Mapping[str, Any]) -> bool | None:
@@ -57,29 +54,18 @@ def agreement_table(
     keys
         Of `COLUMNS`; `BENCH` by default.
     """
-    rows = tuple(Row(_values(name, one)) for name, one in compared)
-    return Table(title, COLUMNS, rows, explanation).only(*(keys or BENCH))
+    rows = (_values(name, one) for name, one in compared)
+    return table(title, COLUMNS, rows, explanation=explanation).only(*(keys or BENCH))
 
 
-def _values(name: str, one: Mapping[str, Any]) -> dict[str, Value]:
-    statistics = one["statistics"]
-    interval = statistics["relative_bias_ci"]
+def _values(name: str, one: Mapping[str, Any]) -> Mapping[str, Any]:
+    width, height, batches, samples = (one[key] for key in ("width", "height", "batches", "samples"))
     return {
+        **one,
+        **one["statistics"],
         "name": name,
-        "estimator": one["estimator"],
-        "samples": one["width"] * one["height"] * one["batches"] * one["samples"] / 1e6,
-        "bias": statistics["relative_bias"],
-        "interval": None if interval is None or None in interval else Interval(*interval),
-        "margin": statistics["margin"],
-        "detectable": statistics["detectable_bias"],
-        "epsilon": one.get("epsilon"),
-        "uncorrected": one["uncorrected_bias"],
-        "z_mean": statistics.get("z_mean"),
-        "z_std": statistics.get("z_std"),
-        "rejected": statistics.get("rejected"),
-        "expected": statistics.get("expected_rejections"),
-        "masked": one.get("masked"),
-        "effort": f"{one['width']} \N{MULTIPLICATION SIGN} {one['height']} pixels, {one['batches']} "
-        f"\N{MULTIPLICATION SIGN} {one['samples']} spp",
+        "samples": width * height * batches * samples / 1e6,
+        "interval": Interval.of(one["statistics"]["relative_bias_ci"]),
+        "effort": f"{width} x {height} pixels, {batches} x {samples} spp",
         "agrees": Verdict(verdict(one)),
     }

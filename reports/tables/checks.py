@@ -4,26 +4,20 @@
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from reports.tables.table import Column, Interval, Name, Row, Table, Value, Verdict, table, words
+from reports.tables.table import Interval, Name, Row, Table, Value, Verdict, numbers, table, words
 
 Entry = Mapping[str, Any]
 
 
 def move_table(moves: Iterable[Any]) -> Table:
     """Return what is not as the baselines say; of `validation.frames.baseline_files.Move`."""
-    columns = (
-        *words("scene", "configuration", "what"),
-        Column("baseline", "baseline", digits=6),
-        Column("now", "now", digits=6),
-        Column("allowed", "allowed", digits=2),
-    )
-    return table("", columns, [(one.scene, one.label, one.what, one.old, one.new, one.allowed) for one in moves])
+    six, two = numbers(old="baseline", new="now", how={"digits": 6}), numbers("allowed", how={"digits": 2})
+    return table("", (*words(scene="", label="configuration", what=""), *six, *two), map(vars, moves))
 
 
 _SEEN = (
-    Column("bias", "bias seen", percent=True, sign=True),
-    Column("interval", "95 % interval", percent=True, sign=True),
-    Column("margin", "margin", percent=True),
+    *numbers(bias="bias seen", interval="95 % interval", how={"percent": True, "sign": True}),
+    *numbers("margin", how={"percent": True}),
 )
 
 
@@ -36,43 +30,35 @@ def mutation_table(results: Iterable[Entry]) -> Table:
         As `airlight mutations --json` prints them. Those of a report may lack the comparisons.
     """
     columns = (
-        Column("name", "mutation", words=True),
-        Column("caught", "caught"),
-        Column("chance", "chance", percent=True, places=0),
-        Column("by", "by", words=True),
-        Column("true_bias", "true bias", percent=True, sign=True),
+        *words(name="mutation"),
+        *numbers("caught"),
+        *numbers("chance", how={"percent": True, "places": 0}),
+        *words("by"),
+        *numbers(true_bias="true bias", how={"percent": True, "sign": True}),
         *_SEEN,
-        Column("estimator", "estimator", words=True),
-        Column("meaning", "what it stands for", words=True, long=True),
-        Column("reason", "why not, or by a probe alone", words=True, long=True),
+        *words("estimator"),
+        *words(meaning="what it stands for", reason="why not, or by a probe alone", how={"long": True}),
     )
-    return table("Faults, and the comparison that shows each most clearly", columns, [_fault(one) for one in results])
+    return table("Faults, and the comparison that shows each most clearly", columns, map(_fault, results))
 
 
-def _fault(result: Entry) -> Row:
-    values: dict[str, Value] = {"name": result["name"], "caught": Verdict(result["caught"])}
-    values |= {key: result.get(key) for key in ("estimator", "meaning")}
-    values["reason"] = result.get("reason") or ""
+def _fault(result: Entry) -> Entry:
     clearest = result.get("clearest")
+    row = {**result, "caught": Verdict(result["caught"]), "reason": result.get("reason") or ""}
     if clearest:
-        values |= _seen(clearest) | {"chance": result["chance"], "true_bias": clearest["true_bias"]}
-        values["by"] = _comparison(clearest) if result["caught"] else ""
-    return Row(values)
+        row |= {**_seen(clearest), "true_bias": clearest["true_bias"]}
+        row["by"] = _comparison(clearest) if result["caught"] else ""
+    return row
 
 
 def control_table(controls: Iterable[Entry]) -> Table:
     """Return what the same comparisons find without a fault."""
-    columns = (
-        Column("control", "control", words=True),
-        *_SEEN,
-        Column("chance", "false alarms", percent=True, digits=2),
-        Column("agrees", "agrees"),
-    )
-    rows = [
-        Row(_seen(one) | {"control": _comparison(one), "chance": one["chance"], "agrees": Verdict(one["agrees"])})
+    alarms = numbers(chance="false alarms", how={"percent": True, "digits": 2})
+    rows = (
+        {**_seen(one), "control": _comparison(one), "chance": one["chance"], "agrees": Verdict(one["agrees"])}
         for one in controls
-    ]
-    return table("without a mutation", columns, rows)
+    )
+    return table("without a mutation", (*words("control"), *_SEEN, *alarms, *numbers("agrees")), rows)
 
 
 def _seen(one: Entry) -> dict[str, Value]:
@@ -85,27 +71,26 @@ def _comparison(one: Entry) -> str:
 
 def left_out_table(scenes: Iterable[Entry], *, code: bool = False) -> Table:
     """Return for every scene of a report the shares of light that single scattering leaves out."""
+    share = {"percent": True}
     columns = (
-        Column("scene", "scene", words=True),
-        Column("medium", "of the airlight", percent=True),
-        Column("medium_interval", "95 % interval", percent=True),
-        Column("everything", "of all light", percent=True),
-        Column("everything_interval", "95 % interval", percent=True),
-        Column("max_depth", "max. edges"),
+        *words("scene"),
+        *numbers(medium="of the airlight", medium_interval="95 % interval", how=share),
+        *numbers(everything="of all light", everything_interval="95 % interval", how=share),
+        *numbers(max_depth="max. edges"),
     )
-    rows = []
-    for scene in scenes:
-        multiple = scene["multiple"]
-        values: dict[str, Value] = {"scene": Name(scene["name"]) if code else scene["name"]}
-        if multiple:
-            values["max_depth"] = multiple.get("max_depth")
-            for key in ("medium", "everything"):
-                ends = multiple[key]["interval"]
-                values[key] = multiple[key]["value"]
-                values[f"{key}_interval"] = None if ends is None or None in ends else Interval(*ends)
-        rows.append(Row(values, "" if multiple else "not measured"))
     explanation = (
         "Shares of all light that paths of up to max. edges bring, with 95 % intervals; the second adds surfaces that "
         "light one another."
     )
+    rows = (_left_out(scene, Name(scene["name"]) if code else scene["name"]) for scene in scenes)
     return table("Multiple scattering", columns, rows, explanation=explanation)
+
+
+def _left_out(scene: Entry, name: Value) -> Row:
+    multiple = scene["multiple"]
+    if not multiple:
+        return Row({"scene": name}, "not measured")
+    values: dict[str, Value] = {"scene": name, "max_depth": multiple.get("max_depth")}
+    for key in ("medium", "everything"):
+        values |= {key: multiple[key]["value"], f"{key}_interval": Interval.of(multiple[key]["interval"])}
+    return Row(values)

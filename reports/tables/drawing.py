@@ -13,53 +13,37 @@ import csv as comma_separated
 import io
 import math
 import re
-from collections.abc import Callable, Iterator, Sequence
-from html import escape as html_escape
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from html import escape
 
-from reports.tables.table import (
-    Column,
-    Interval,
-    Measured,
-    Name,
-    Row,
-    Table,
-    Value,
-    Verdict,
-    digits_of,
-    heading,
-    is_number,
-    with_spread,
-)
+from reports.tables.table import Column, Interval, Measured, Name, Row, Table, Value, Verdict, digits_of, with_spread
 
 #: What LaTeX needs before the document begins.
 PREAMBLE = r"\usepackage{booktabs,siunitx}"
 
 DASH = "\N{EN DASH}"
-_VERDICTS = {True: "yes", False: "NO", None: "not decided in time"}
-_CLASSES = {True: "good", False: "bad", None: "quiet"}
-_SUPERSCRIPTS = str.maketrans("-+0123456789", "⁻⁺⁰¹²³⁴⁵⁶⁷⁸⁹")
-_LATEX = str.maketrans(
-    {
-        "\\": r"\textbackslash{}",
-        "{": r"\{",
-        "}": r"\}",
-        "$": r"\$",
-        "&": r"\&",
-        "%": r"\%",
-        "#": r"\#",
-        "_": r"\_",
-        "~": r"\textasciitilde{}",
-        "^": r"\textasciicircum{}",
-        "<": r"\textless{}",
-        ">": r"\textgreater{}",
-        '"': r"\textquotedbl{}",
-        "\u00d7": r"$\times$",
-        "\u00b1": r"$\pm$",
-        "\u03b5": r"$\varepsilon$",
-        "\u2013": "--",
-        "\n": " ",
-    }
-)
+_VERDICTS = {True: ("yes", "good"), False: ("NO", "bad"), None: ("not decided in time", "quiet")}
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_MARKS = {sign: f"\\{sign}" for sign in "{}$&%#_"}
+_MARKS |= {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", '"': r"\textquotedbl{}"}
+_MARKS |= {"<": r"\textless{}", ">": r"\textgreater{}", "\n": " ", "\N{EN DASH}": "--"}
+_MARKS |= {"\N{MULTIPLICATION SIGN}": r"$\times$", "\N{PLUS-MINUS SIGN}": r"$\pm$", "ε": r"$\varepsilon$"}
+_LATEX = {ord(sign): written for sign, written in _MARKS.items()}
+
+
+@dataclass(frozen=True)
+class _Style:
+    """How a format writes values."""
+
+    words: Callable[[str], str]
+    digits: Callable[[str], str] = str  #: from ASCII digits
+    name: Callable[[Name], str] = lambda name: name.text
+    dash: str = "-"
+    between: str = ".."  #: the ends of an interval
+    percent: str = " %"
+    shares: bool = False  #: in per cent
+    zeros: bool = False  #: at the end of numbers are kept: they say how exact a number is
 
 
 def text(table: Table, *, width: int | None = None) -> str:
@@ -78,9 +62,9 @@ def text(table: Table, *, width: int | None = None) -> str:
     from rich.table import Table as Grid
 
     grid = Grid(box=box.SIMPLE_HEAD, pad_edge=False)
-    for column, _ in _spread_out(table):
-        grid.add_column(heading(column), justify="left" if column.words else "right", overflow="fold")
-    for cells in _plain_rows(table):
+    for column in _with_spreads(table.columns):
+        grid.add_column(column.title, justify="left" if column.words else "right", overflow="fold")
+    for cells in _open_rows(table, _Style(str)):
         grid.add_row(*cells)
     drawn = io.StringIO()
     known = width is not None
@@ -91,37 +75,39 @@ def text(table: Table, *, width: int | None = None) -> str:
 
 def markdown(table: Table) -> str:
     """Return a table as Markdown of GitHub's kind, its title in bold above it."""
+
+    def bar(cells: Iterable[str]) -> str:
+        return f"| {' | '.join(cells)} |"
+
+    columns, below = _with_spreads(table.columns), _below(table)
     lines = [f"**{_in_markdown(table.title)}**", ""] if table.title else []
-    columns = [column for column, _ in _spread_out(table)]
-    lines.append(_bar(_in_markdown(heading(column)) for column in columns))
-    lines.append(_bar("---" if column.words else "---:" for column in columns))
-    lines += [_bar(cells) for cells in _plain_rows(table, _in_markdown)]
-    below = _below(table)
+    lines.append(bar(_in_markdown(column.title) for column in columns))
+    lines.append(bar("---" if column.words else "---:" for column in columns))
+    lines += [bar(cells) for cells in _open_rows(table, _Style(_in_markdown, name=_name_in_markdown))]
     lines += ["", *(f"- {_in_markdown(line)}" for line in below)] if below else []
     return "\n".join(lines) + "\n"
 
 
 def html(table: Table) -> str:
     """Return a table as HTML, in a box that scrolls sideways; shares are in per cent."""
-    head = "".join(f'<th scope="col"{_layout(column)}>{_escaped(heading(column))}</th>' for column in table.columns)
-    named = f' role="group" aria-label="{_escaped(table.title)}"' if table.title else ""
+    head = "".join(f'<th scope="col"{_layout(column)}>{_in_html(column.title)}</th>' for column in table.columns)
+    named = f' role="group" aria-label="{_in_html(table.title)}"' if table.title else ""
     lines = [f'<div class="scroll"{named}><table>']
     caption = ". ".join(part for part in (table.title, table.explanation) if part)
-    lines += [f"<caption>{_escaped(caption)}</caption>"] if caption else []
+    lines += [f"<caption>{_in_html(caption)}</caption>"] if caption else []
     lines += [f"<thead><tr>{head}</tr></thead>"] if any(column.heading for column in table.columns) else []
     lines.append("<tbody>")
     for row in table.rows:
         shown, left = _until_reason(row, table.columns)
         cells = [_html_cell(row, column, first=not place) for place, column in enumerate(shown)]
-        if left:
-            cells.append(f'<td class="words" colspan="{left}">{_escaped(row.reason)}</td>')
+        cells += [f'<td class="words" colspan="{left}">{_in_html(row.reason)}</td>'] if left else []
         marked = ' class="published"' if row.published else ""
         lines.append(f"<tr{marked}>{''.join(cells)}</tr>")
     return "\n".join([*lines, "</tbody></table></div>"]) + "\n"
 
 
 def latex(tables: Sequence[Table], *, comment: Sequence[str] = ()) -> str:
-    r"""Return tables with the same columns as one `tabular`, each under its title if there are several.
+    r"""Return tables with the same columns as one `tabular`, each under its title if it has one.
 
     Parameters
     ----------
@@ -130,120 +116,136 @@ def latex(tables: Sequence[Table], *, comment: Sequence[str] = ()) -> str:
     comment
         Lines of comment at the top, after the one that says what the preamble needs.
     """
+
+    def line(cells: Iterable[str]) -> str:
+        return " & ".join(cells) + r" \\"
+
     columns = tables[0].columns
-    lines = [f"% {line}" for line in (f"Needs {PREAMBLE}.", *comment)]
+    lines = [f"% {words}" for words in (f"Needs {PREAMBLE}.", *comment)]
     lines += [r"\begin{tabular}{" + "".join("l" if column.words else "r" for column in columns) + "}", r"\toprule"]
-    lines.append(_line(_in_latex(column.heading) for column in columns))
+    lines.append(line(_in_latex(column.heading) for column in columns))
     if any(column.unit for column in columns):
-        lines.append(_line(f"[{_in_latex(column.unit)}]" if column.unit else "" for column in columns))
+        lines.append(line(f"[{_in_latex(column.unit)}]" if column.unit else "" for column in columns))
     lines.append(r"\midrule")
     for place, table in enumerate(tables):
-        if len(tables) > 1 or table.explanation:
-            lines += [r"\addlinespace"] if place else []
+        lines += [r"\addlinespace"] if place else []
+        if table.title:
             about = re.sub(r"\b([\d.]+e-?\d+)\b", lambda found: _num(found[1]), _in_latex(table.explanation))
-            about = f", {about}" if about else ""
-            title = rf"\textit{{{_in_latex(table.title)}}}{about}"
+            title = rf"\textit{{{_in_latex(table.title)}}}{f', {about}' if about else ''}"
             lines.append(rf"\multicolumn{{{len(columns)}}}{{l}}{{{title}}} \\")
         for row in table.rows:
             shown, left = _until_reason(row, columns)
-            cells = [_latex_cell(row.values.get(column.key), column, zeros=not row.published) for column in shown]
+            cells = [_latex_cell(row, column) for column in shown]
             cells[0] += "".join(f" ({_in_latex(remark)})" for remark in row.remarks)
             cells += [rf"\multicolumn{{{left}}}{{l}}{{{_in_latex(row.reason)}}}"] if left else []
-            lines.append(_line(cells))
+            lines.append(line(cells))
     return "\n".join([*lines, r"\bottomrule", r"\end{tabular}"]) + "\n"
 
 
 def csv(table: Table) -> str:
     """Return a table as CSV: keys above, nine digits of every number, nothing for None and what is not a number."""
-    keys: list[str] = []
+    rows: list[dict[str, str]] = []
+    keys: dict[str, None] = {}
     for column in table.columns:
-        values = [row.values.get(column.key) for row in table.rows]
-        ends = [f"{column.key}_low", f"{column.key}_high"]
-        if any(isinstance(value, Interval) for value in values):
-            keys += ends
-        else:
-            keys += [column.key, *(ends if any(isinstance(value, Measured) for value in values) else [])]
-    keys += ["reason"] if any(row.reason for row in table.rows) else []
-    keys += ["remarks"] if any(row.remarks for row in table.rows) else []
-    buffer = io.StringIO()
-    writer = comma_separated.DictWriter(buffer, keys, restval="", lineterminator="\n")
-    writer.writeheader()
+        kinds = {type(row.values.get(column.key)) for row in table.rows}
+        keys |= {} if Interval in kinds else {column.key: None}
+        keys |= dict.fromkeys((f"{column.key}_low", f"{column.key}_high")) if kinds & {Interval, Measured} else {}
     for row in table.rows:
         said = {"reason": row.reason, "remarks": "; ".join(row.remarks)}
-        cells = {key: value for key, value in said.items() if value}
-        for key, value in row.values.items():
-            cells |= _csv_cells(key, value)
-        writer.writerow(cells)
+        rows.append({key: cell for key, value in row.values.items() for key, cell in _csv_cells(key, value)})
+        rows[-1] |= {key: words for key, words in said.items() if words}
+        keys |= dict.fromkeys(key for key in said if said[key])
+    buffer = io.StringIO()
+    writer = comma_separated.DictWriter(buffer, list(keys), restval="", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
     return buffer.getvalue()
 
 
 def typeset(digits: str) -> str:
     """Return ASCII digits as a reader of HTML sees them: an en dash for none, 1.2e-05 as a power of ten."""
-    if digits == "-":
-        return DASH
     mantissa, letter, exponent = digits.partition("e")
-    return f"{mantissa}·10{str(int(exponent)).translate(_SUPERSCRIPTS)}" if letter else mantissa
-
-
-# Columns and rows for renderers whose cells have no room for quartiles.
-
-
-def _spread_out(table: Table) -> Iterator[tuple[Column, bool]]:
-    """Yield every column, and after one whose quartiles are shown a column of these."""
-    for column in table.columns:
-        yield column, False
-        if column.spread:
-            yield Column(column.key, column.spread, digits=column.digits, places=column.places), True
-
-
-def _plain_rows(table: Table, escape: Callable[[str], str] = str) -> Iterator[list[str]]:
-    for row in table.rows:
-        if row.reason and not any(value is not None for value in list(row.values.values())[1:]):
-            continue  # nothing but a name: the line below the table says it
-        yield [
-            _plain_cell(_quartiles(row.values.get(column.key)) if ends else row.values.get(column.key), column, escape)
-            for column, ends in _spread_out(table)
-        ]
-
-
-def _quartiles(value: Value) -> Interval | None:
-    return Interval(value.low, value.high) if isinstance(value, Measured) else None
-
-
-def _plain_cell(value: Value, column: Column, escape: Callable[[str], str]) -> str:
-    if isinstance(value, Name) and escape is not str:
-        code = f"`` {value.text} ``" if "`" in value.text else f"`{value.text}`".replace("|", "\\|")
-        return f"[{code}]({value.target})" if value.target else code
-    if isinstance(value, Measured):
-        return ("~" if value.about else "") + digits_of(value.median, column) + column.after
-    if isinstance(value, Interval):
-        return f"{digits_of(value.low, column)}..{digits_of(value.high, column)}" + _unit_in_cell(column)
-    if isinstance(value, int | float) and is_number(value):
-        return digits_of(value, column) + _unit_in_cell(column)
-    return escape(text_of(value)) if value is not None else "-"
-
-
-def _unit_in_cell(column: Column) -> str:
-    return " %" if column.percent else column.after
+    if letter:
+        return f"{mantissa}·10{str(int(exponent)).translate(_SUPERSCRIPTS)}"
+    return DASH if digits == "-" else digits
 
 
 def text_of(value: Value) -> str:
-    """Return what is no number in words."""
+    """Return a value that is no number in words."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, Verdict):
-        return ", ".join([_VERDICTS[value.good], *([value.words] if value.words else [])])
+        return ", ".join([_VERDICTS[value.good][0], *([value.words] if value.words else [])])
     return value.text if isinstance(value, Name) else str(value)
 
 
+def _cell(value: Value, column: Column, style: _Style) -> str:
+    """Return a value as a format writes it; of what was measured the median alone."""
+    percent = column.percent or (column.share and style.shares)
+
+    def written(number: float) -> str:
+        return style.digits(digits_of(number, column, zeros=style.zeros, percent=percent))
+
+    after = style.percent if percent else style.words(column.after)
+    if value is None:
+        return style.dash
+    if isinstance(value, Measured):
+        return ("~" if value.about else "") + written(value.median) + after
+    if isinstance(value, Interval):
+        return f"{written(value.low)}{style.between}{written(value.high)}{after}"
+    if isinstance(value, Name):
+        return style.name(value)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return style.words(text_of(value))
+    return written(value) + after
+
+
+# Text and Markdown: quartiles in a column of their own, reasons below the table.
+
+
+def _with_spreads(columns: Iterable[Column]) -> list[Column]:
+    """Return the columns, and after each whose quartiles are shown a column of these."""
+    shown: list[Column] = []
+    for column in columns:
+        shown.append(column)
+        if column.spread:
+            shown.append(replace(column, heading=column.spread, unit="", spread=""))
+    return shown
+
+
+def _open_rows(table: Table, style: _Style) -> Iterator[list[str]]:
+    for row in table.rows:
+        if row.reason and all(row.values.get(column.key) is None for column in table.columns[1:]):
+            continue  # nothing but a name: the line below the table says it
+        cells = []
+        for column in table.columns:
+            value = row.values.get(column.key)
+            cells.append(_cell(value, column, style))
+            if column.spread:
+                ends = Interval(value.low, value.high) if isinstance(value, Measured) else None
+                cells.append(_cell(ends, column, style))
+        yield cells
+
+
 def _below(table: Table) -> list[str]:
-    """Return why rows end early and the remarks on them, a line each."""
-    first = table.columns[0]
+    """Return the remarks on rows and why they end early, a line each."""
+    key = table.columns[0].key
     return [
-        f"{text_of(row.values.get(first.key))}: {said}"
-        for row in table.rows
-        for said in [*row.remarks, *([row.reason] if row.reason else [])]
+        f"{text_of(row.values.get(key))}: {said}" for row in table.rows for said in (*row.remarks, row.reason) if said
     ]
+
+
+def _in_markdown(words: str) -> str:
+    """Return text in which nothing is a mark of Markdown or the end of a cell."""
+    return re.sub(r"([\\|`*_<&\[\]])", r"\\\1", re.sub(r"\s*\n\s*", " ", words))
+
+
+def _name_in_markdown(name: Name) -> str:
+    code = "`{}`".format(name.text.replace("|", "\\|"))
+    return f"[{code}]({name.target})" if name.target else code
+
+
+# HTML and LaTeX: quartiles in the cell, reasons over the rest of the row.
 
 
 def _until_reason(row: Row, columns: Sequence[Column]) -> tuple[Sequence[Column], int]:
@@ -255,75 +257,39 @@ def _until_reason(row: Row, columns: Sequence[Column]) -> tuple[Sequence[Column]
     return columns[:filled], len(columns) - filled
 
 
-# Markdown.
-
-
-def _bar(cells: Iterator[str] | Sequence[str]) -> str:
-    return "| " + " | ".join(cells) + " |"
-
-
-def _in_markdown(words: str) -> str:
-    """Return text in which nothing is a mark of Markdown or the end of a cell."""
-    return "".join(f"\\{sign}" if sign in "\\|`*_<&[]" else sign for sign in " ".join(words.split()))
-
-
-# HTML.
-
-
-def _escaped(words: str) -> str:
+def _in_html(words: str) -> str:
     """Return text in which nothing is a mark of HTML, with the sign of multiplication in sizes of images."""
-    return html_escape(re.sub(r"(?<=\d) x(?= \d|$)", " \N{MULTIPLICATION SIGN}", words))
+    return escape(re.sub(r"(?<=\d) x(?= \d|$)|^ x$", " \N{MULTIPLICATION SIGN}", words))
+
+
+def _name_in_html(name: Name) -> str:
+    code = f"<code>{_in_html(name.text)}</code>"
+    return f'<a href="{_in_html(name.target)}">{code}</a>' if name.target else code
+
+
+_HTML = _Style(_in_html, typeset, _name_in_html, DASH, " … ", shares=True)
 
 
 def _layout(column: Column) -> str:
     """Return the attributes of a cell; the style is for notebooks, which do not know the classes of the page."""
-    if column.long:
-        return ' class="words"'
-    return ' style="text-align:left"' if column.words else ""
+    return ' class="words"' if column.long else ' style="text-align:left"' if column.words else ""
 
 
 def _html_cell(row: Row, column: Column, *, first: bool) -> str:
     value = row.values.get(column.key)
-    shown = _in_html(value, column)
+    shown = _cell(value, column, _HTML)
     if first:
-        remarks = "".join(f' <span class="quiet">({_escaped(remark)})</span>' for remark in row.remarks)
+        remarks = "".join(f' <span class="quiet">({_in_html(remark)})</span>' for remark in row.remarks)
         return f'<th scope="row"{_layout(column)}>{shown}{remarks}</th>'
-    if isinstance(value, Verdict):
-        return f'<td class="{_CLASSES[value.good]}">{shown}</td>'
-    if column.alarm and value:
-        return f'<td class="bad">{shown}</td>'
+    if isinstance(value, Verdict) or (column.alarm and value):
+        kind = _VERDICTS[value.good][1] if isinstance(value, Verdict) else "bad"
+        return f'<td class="{kind}">{shown}</td>'
     title = ""
     if isinstance(value, Measured):
-        ends = [typeset(digits_of(end, column)) for end in (value.low, value.high)]
-        if column.spread:
-            shown += f' <span class="spread">{" … ".join(ends)}</span>'
-        else:
-            title = f' title="quartiles {ends[0]} to {ends[1]} {_escaped(column.unit)}"'
+        ends = _cell(Interval(value.low, value.high), column, _HTML)
+        shown += f' <span class="spread">{ends}</span>' if column.spread else ""
+        title = "" if column.spread else f' title="quartiles {ends} {_in_html(column.unit)}"'
     return f"<td{_layout(column)}{title}>{shown}</td>"
-
-
-def _in_html(value: Value, column: Column) -> str:
-    percent = column.share or column.percent
-    after = " %" if percent else column.after.replace(" x", " \N{MULTIPLICATION SIGN}")
-    if isinstance(value, Measured):
-        return ("~" if value.about else "") + typeset(digits_of(value.median, column)) + after
-    if isinstance(value, Interval):
-        return " … ".join(typeset(digits_of(end, column, percent=percent)) for end in (value.low, value.high)) + after
-    if isinstance(value, int | float) and is_number(value):
-        # A share of 1 has no unit to lose digits to; three of them are what per cent are read with.
-        wide = Column(column.key, "", digits=max(column.digits, 3)) if column.share else column
-        return typeset(digits_of(value, wide, percent=percent)) + after
-    if isinstance(value, Name):
-        code = f"<code>{_escaped(value.text)}</code>"
-        return f'<a href="{_escaped(value.target)}">{code}</a>' if value.target else code
-    return DASH if value is None else _escaped(text_of(value))
-
-
-# LaTeX.
-
-
-def _line(cells: Iterator[str] | Sequence[str]) -> str:
-    return " & ".join(cells) + r" \\"
 
 
 def _in_latex(words: str) -> str:
@@ -331,40 +297,35 @@ def _in_latex(words: str) -> str:
 
 
 def _num(digits: str) -> str:
-    if digits in ("inf", "-inf", "nan", "+inf"):
-        return {"inf": r"$\infty$", "+inf": r"$\infty$", "-inf": r"$-\infty$", "nan": "nan"}[digits]
+    if digits.endswith(("inf", "nan")):
+        return digits if digits == "nan" else digits.replace("inf", r"$\infty$").replace("-$", "$-")
     mantissa, letter, exponent = digits.partition("e")
     return rf"\num{{{mantissa}{letter}{int(exponent) if letter else ''}}}"
 
 
-def _latex_cell(value: Value, column: Column, *, zeros: bool) -> str:
-    """Return a cell; zeros at the end say how exact a measured number is, a published one has those of its paper."""
-    after = r"\,\%" if column.percent else _in_latex(column.after)
+def _latex_cell(row: Row, column: Column) -> str:
+    """Return a cell; what is published has the digits of its paper."""
+    value = row.values.get(column.key)
     if isinstance(value, Measured):
-        median, below, above = with_spread(value.median, value.low, value.high)
+        median, below, above = map(_num, with_spread(value.median, value.low, value.high))
         about = r"\sim" if value.about else ""
-        return rf"${about}{_num(median)}_{{-{_num(below)}}}^{{+{_num(above)}}}$"
-    if isinstance(value, Interval):
-        return "--".join(_num(digits_of(end, column, zeros=zeros)) for end in (value.low, value.high)) + after
-    if isinstance(value, int | float) and is_number(value):
-        return _num(digits_of(value, column, zeros=zeros)) + after
-    if isinstance(value, Name):
-        return rf"\texttt{{{_in_latex(value.text)}}}"
-    return "--" if value is None else _in_latex(text_of(value))
+        return rf"${about}{median}_{{-{below}}}^{{+{above}}}$"
+    return _cell(value, column, replace(_LATEX_STYLE, zeros=not row.published))
 
 
-# CSV.
+def _name_in_latex(name: Name) -> str:
+    return rf"\texttt{{{_in_latex(name.text)}}}"
 
 
-def _csv_cells(key: str, value: Value) -> dict[str, str]:
-    if isinstance(value, Interval):
-        return {f"{key}_low": _nine(value.low), f"{key}_high": _nine(value.high)}
+_LATEX_STYLE = _Style(_in_latex, _num, _name_in_latex, "--", "--", r"\,\%")
+
+
+def _csv_cells(key: str, value: Value) -> Iterator[tuple[str, str]]:
     if isinstance(value, Measured):
-        return {key: _nine(value.median), f"{key}_low": _nine(value.low), f"{key}_high": _nine(value.high)}
-    if isinstance(value, float):
-        return {key: _nine(value)}
-    return {key: "" if value is None else text_of(value)}
-
-
-def _nine(value: float) -> str:
-    return "" if math.isnan(value) else f"{value:.9g}"
+        yield from _csv_cells(key, value.median)
+    if isinstance(value, Measured | Interval):
+        yield from (*_csv_cells(f"{key}_low", value.low), *_csv_cells(f"{key}_high", value.high))
+    elif isinstance(value, float):
+        yield key, "" if math.isnan(value) else f"{value:.9g}"
+    else:
+        yield key, "" if value is None else text_of(value)

@@ -7,19 +7,17 @@ The data are those that `airlight bench --kernels --json` prints.
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from reports.tables.table import Column, Interval, Measured, Name, Row, Table, Value, table
+from reports.tables.table import Column, Interval, Measured, Name, Row, Table, Value, numbers, table, words
 
 Entry = Mapping[str, Any]
 
 COSTS = (
-    Column("kernel", "kernel", words=True),
+    *words("kernel"),
     Column("device", "", "ns/ray", spread="quartiles"),
     Column("wall", "wall", "ns/ray", spread="quartiles"),
-    Column("rays", "rays"),
-    Column("median", "median", digits=2),
-    Column("p99", "99 %", digits=2),
-    Column("max", "max", digits=2),
-    Column("nonfinite", "not finite", alarm=True),
+    *numbers("rays"),
+    *numbers("median", p99="99 %", max="", how={"digits": 2}),
+    *numbers(nonfinite="not finite", how={"alarm": True}),
 )
 _STATISTICS = {"max": "maximum error", "p99": "99 % of the rays"}
 _FAMILIES = ("uniform", "table")
@@ -32,9 +30,9 @@ def kernel_tables(costs: Iterable[Entry], levels: Iterable[Entry]) -> Iterator[T
         chosen = [cost for cost in costs if cost["phase"] == phase]
         g = f", g = {chosen[0]['g']:g}" if phase == "hg" else ""
         yield cost_table(f"{phase}{g}, float32, wide rays", chosen)
-        for statistic, words in _STATISTICS.items():
+        for statistic, phrase in _STATISTICS.items():
             rows = [level for level in levels if (level["phase"], level["statistic"]) == (phase, statistic)]
-            yield level_table(f"{phase}: speed against error, {words}", rows)
+            yield level_table(f"{phase}: speed against error, {phrase}", rows)
 
 
 def cost_table(title: str, costs: Iterable[Entry], *, code: bool = False) -> Table:
@@ -58,13 +56,10 @@ def _spread(spread: Mapping[str, float] | None, about: bool) -> Measured | None:
 
 def level_table(title: str, levels: Iterable[Entry]) -> Table:
     """Return which kernel is cheapest at each error, and how much more others cost."""
-    columns = [
-        Column("level", "error", digits=6),
-        Column("cheapest", "cheapest", words=True),
-        Column("ns", "", "ns/ray"),
-    ]
+    columns = [Column("level", "error", digits=6), *words("cheapest"), Column("ns", "", "ns/ray")]
     for family in _FAMILIES:
-        columns += [Column(family, f"cheapest {family}", words=True), Column(f"{family}_ratio", "costs", after=" x")]
+        columns.append(Column(family, f"cheapest {family}", words=True))
+        columns.append(Column(f"{family}_ratio", "costs", after=" x"))
     rows = []
     for level in levels:
         rivals = [
@@ -76,19 +71,13 @@ def level_table(title: str, levels: Iterable[Entry]) -> Table:
 
 def order_table(convergences: Iterable[Entry], *, code: bool = False) -> Table:
     """Return the declared and the measured order of convergence."""
-    columns = (
-        Column("kernel", "kernel", words=True),
-        Column("law", "law", words=True),
-        Column("declared", "declared"),
-        Column("measured", "measured"),
-        Column("sizes", "sizes"),
-    )
     rows = []
     for one in convergences:
         declared = one["declared"] or {}
         name = Name(one["kernel"]) if code else one["kernel"]
         sizes = Interval(one["sizes"][0], one["sizes"][-1])
         rows.append((name, declared.get("kind"), declared.get("value"), one["measured"], sizes))
+    columns = (*words("kernel", "law"), *numbers("declared", "measured", "sizes"))
     return table("convergence in float64", columns, rows)
 
 

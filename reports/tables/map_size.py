@@ -1,39 +1,28 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The tables of `airlight maps`: error and flicker against the size of the shadow map."""
 
+import math
 from typing import TYPE_CHECKING
 
-from reports.tables.table import Column, Table, number, table
+from reports.tables.table import Table, number, numbers, table
 
 if TYPE_CHECKING:
     from validation.frames.map_size import MapErrors, MapFlicker, Slope
 
+_SHARES = {"digits": 2, "share": True}
+
 
 def error_table(title: str, errors: "MapErrors") -> Table:
     """Return the errors by size of the map."""
-    columns = (
-        Column("map", "map"),
-        Column("relative_rmse", "rel. RMSE", digits=2, share=True),
-        Column("relative_bias", "rel. bias", digits=2, share=True),
-        Column("p50", "p50", digits=2, share=True),
-        Column("p99", "p99", digits=2, share=True),
-        Column("max", "max", digits=2, share=True),
-    )
-    rows = [
-        (size, one.relative_rmse, one.relative_bias, one.p50, one.p99, one.max)
-        for size, one in zip(errors.sizes, errors.metrics, strict=True)
-    ]
-    return table(f"{title}: error", columns, rows)
+    shares = numbers(relative_rmse="rel. RMSE", relative_bias="rel. bias", p50="", p99="", max="", how=_SHARES)
+    rows = ({"map": size, **vars(one)} for size, one in zip(errors.sizes, errors.metrics, strict=True))
+    return table(f"{title}: error", (*numbers("map"), *shares), rows)
 
 
 def flicker_table(title: str, flicker: "MapFlicker") -> Table:
     """Return how much the image flickers by size of the map."""
-    columns = (
-        Column("map", "map"),
-        Column("texels", "texels a frame", digits=2),
-        Column("flicker", "flicker", digits=2, share=True),
-        Column("relative_rmse", "rel. RMSE", digits=2, share=True),
-    )
+    texels = numbers(texels="texels a frame", how={"digits": 2})
+    columns = (*numbers("map"), *texels, *numbers("flicker", relative_rmse="rel. RMSE", how=_SHARES))
     rows = zip(flicker.sizes, flicker.texels, flicker.flicker, flicker.errors, strict=True)
     return table(f"{title}: flicker of a moving light", columns, rows)
 
@@ -50,11 +39,9 @@ def flicker_sentence(flicker: "MapFlicker") -> str:
 
 def _trend(slope: "Slope") -> str:
     """Return how errors change with the size of the map, as the predicate of a sentence."""
-    from math import isnan
-
-    if isnan(slope.order):
+    if math.isnan(slope.order):
         return "follows no law: too few errors above 0"
-    spread = "" if isnan(slope.standard_error) else f" +- {slope.standard_error:.1g}"
+    spread = "" if math.isnan(slope.standard_error) else f" +- {slope.standard_error:.1g}"
     if abs(slope.order) < 0.01:
         return "does not depend on the size"
     if slope.order < 0:

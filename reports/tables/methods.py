@@ -4,7 +4,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from reports.tables.table import Column, Measured, Row, Table, Value, digits_of, measured
+from reports.tables.table import Measured, Row, Table, Value, digits_of, measured, numbers, words
 
 Entry = Mapping[str, Any]  #: of a method in a scene, as in report.json
 
@@ -12,40 +12,25 @@ Entry = Mapping[str, Any]  #: of a method in a scene, as in report.json
 TIMES = ("frame", "airlight", "surface", "light_moved", "objects_moved", "light_moved_camera_kept", "colours_changed")
 ERRORS = ("relative_rmse", "relative_bias", "p50", "p99", "max", "nonfinite")
 
+_MS, _RATE, _SHARE = {"unit": "ms"}, {"whole": True}, {"digits": 2, "share": True}
 COLUMNS = {
     column.key: column
     for column in (
-        Column("label", "method", words=True),
-        Column("frame", "frame", "ms", spread="quartiles"),
-        Column("frame_rate", "frames/s", whole=True),
-        Column("airlight", "airlight", "ms"),
-        Column("airlight_rate", "airlight/s", whole=True),
-        Column("surface", "rays + surface", "ms"),
-        Column("light_moved", "light moved", "ms"),
-        Column("objects_moved", "objects moved", "ms"),
-        Column("light_moved_camera_kept", "light moved, camera rays kept", "ms"),
-        Column("colours_changed", "colours changed", "ms"),
-        Column("relative_rmse", "rel. RMSE", digits=2, share=True),
-        Column("relative_bias", "rel. bias", digits=2, share=True),
-        Column("p50", "median error", digits=2, share=True),
-        Column("p99", "p99", digits=2, share=True),
-        Column("max", "max", digits=2, share=True),
-        Column("flip", "HDR-FLIP"),
-        Column("nonfinite", "not finite", alarm=True),
+        *words(label="method"),
+        *numbers("frame", how={**_MS, "spread": "quartiles"}),
+        *numbers(frame_rate="frames/s", airlight_rate="airlight/s", how=_RATE),
+        *numbers("airlight", surface="rays + surface", how=_MS),
+        *numbers(light_moved="light moved", objects_moved="objects moved", how=_MS),
+        *numbers(light_moved_camera_kept="light moved, camera rays kept", colours_changed="colours changed", how=_MS),
+        *numbers("p99", "max", relative_rmse="rel. RMSE", relative_bias="rel. bias", p50="median error", how=_SHARE),
+        *numbers(flip="HDR-FLIP"),
+        *numbers(nonfinite="not finite", how={"alarm": True}),
     )
 }
 #: Columns of what `bench` prints.
 BENCH = (
-    "label",
-    "frame",
-    "frame_rate",
-    "airlight",
-    "airlight_rate",
-    "light_moved",
-    "relative_rmse",
-    "relative_bias",
-    "p99",
-    "max",
+    *("label", "frame", "frame_rate", "airlight", "airlight_rate", "light_moved"),
+    *("relative_rmse", "relative_bias", "p99", "max"),
 )
 
 

@@ -4,15 +4,16 @@
 The data are those that `airlight stability --json` prints.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
-from reports.tables.table import Column, Row, Table, number, table
+from reports.tables.table import Table, number, numbers, table, words
 from reports.tables.terminal import print_table
 
 Entry = Mapping[str, Any]
 
 _EPSILON = {"single": 2.0**-23, "double": 2.0**-52}
+_ALARM = {"alarm": True}
 
 
 def print_stability(kernels: Sequence[Entry], *, certified: bool) -> None:
@@ -33,15 +34,15 @@ def print_stability(kernels: Sequence[Entry], *, certified: bool) -> None:
     for kernel in kernels:
         claim = ", claims to be exact" if kernel["exact"] else ""
         print(f"\n=== {kernel['kernel']}{claim} ===")
-        for phase, words in kernel["refused"].items():
-            print(f"refuses {phase}: {words}")
+        for phase, reason in kernel["refused"].items():
+            print(f"refuses {phase}: {reason}")
         for one in kernel["sets"]:
             print_table(set_table(one))
             _print_worst(one)
         print_table(gamma_table(kernel["gamma"]))
         print_table(law_table(kernel["laws"]))
-        for words in kernel["broken"]:
-            print(f"BROKEN: {kernel['kernel']}, {words}")
+        for reason in kernel["broken"]:
+            print(f"BROKEN: {kernel['kernel']}, {reason}")
 
 
 def print_plane_stability(cases: Iterable[Entry], broken: Iterable[str]) -> None:
@@ -52,55 +53,49 @@ def print_plane_stability(cases: Iterable[Entry], broken: Iterable[str]) -> None
         "segments: J of each lit segment (the default); gamma: differences of Gamma a segment; planes: Gamma plane by\n"
         "plane as published, float32 against float64 (its negative pixels are the artefact of Fig. 4)"
     )
-    for words in broken:
-        print(f"BROKEN: shadow planes, {words}")
+    for reason in broken:
+        print(f"BROKEN: shadow planes, {reason}")
 
 
 def summary_table(kernels: Iterable[Entry]) -> Table:
     """Return a row for each kernel and each set of rays, all of these together."""
     columns = (
-        Column("kernel", "kernel", words=True),
-        Column("set", "rays", words=True),
-        Column("rays", "measured"),
-        Column("refused", "refused"),
-        Column("median", "float32 median", digits=2),
-        Column("p99", "99 %", digits=2),
-        Column("max", "largest", digits=2),
-        Column("odd", "not finite or negative", alarm=True),
-        Column("double", "float64 largest", digits=2),
+        *words("kernel", set="rays"),
+        *numbers(rays="measured", refused=""),
+        *numbers(median="float32 median", p99="99 %", max="largest", how={"digits": 2}),
+        *numbers(odd="not finite or negative", how=_ALARM),
+        *numbers(double="float64 largest", how={"digits": 2}),
     )
-    rows = []
-    for kernel in kernels:
-        for one in kernel["sets"]:
-            single, double = one["single"]["all"], one["double"]["all"]
-            odd = single["nan"] + single["infinite"] + single["negative"]
-            errors = (single["median"], single["p99"], single["max"])
-            rows.append((kernel["kernel"], one["name"], single["rays"], single["refused"], *errors, odd, double["max"]))
+
+    def row(kernel: Entry, one: Entry) -> Entry:
+        single = one["single"]["all"]
+        odd = single["nan"] + single["infinite"] + single["negative"]
+        largest = one["double"]["all"]["max"]
+        return {**single, "kernel": kernel["kernel"], "set": one["name"], "odd": odd, "double": largest}
+
+    rows = (row(kernel, one) for kernel in kernels for one in kernel["sets"])
     return table("Stability of the kernels", columns, rows, explanation="All rays of each set together.")
 
 
 def set_table(one: Entry) -> Table:
     """Return the errors of a kernel on one set of rays, by group."""
     columns = (
-        Column("group", "rays", words=True),
-        Column("count", "count"),
-        Column("refused", "refused"),
-        Column("single", "float32", words=True),
-        Column("median", "median"),
-        Column("p99", "99 %"),
-        Column("single_odd", "NaN/Inf/<0"),
-        Column("double", "float64", words=True),
-        Column("double_odd", "NaN/Inf/<0"),
-        Column("precisions", "32 vs 64"),
+        *words(group="rays"),
+        *numbers(rays="count", refused=""),
+        *words(single="float32"),
+        *numbers("median", p99="99 %", odd="NaN/Inf/<0"),
+        *words(double="float64"),
+        *numbers(double_odd="NaN/Inf/<0", both="32 vs 64"),
     )
-    rows = []
-    for group, single in one["single"].items():
-        double = one["double"][group]
-        first = (group, single["rays"], single["refused"] or "", boost(single, "single"))
-        quantiles = (single["median"], single["p99"], _odd(single))
-        both = one["single_against_double"][group]["max"]
-        rows.append((*first, *quantiles, boost(double, "double"), _odd(double), both))
-    return table(one["name"], columns, rows)
+
+    def rows() -> Iterator[Entry]:
+        for group, single in one["single"].items():
+            double, both = one["double"][group], one["single_against_double"][group]["max"]
+            written = {"single": boost(single, "single"), "double": boost(double, "double")}
+            odd = {"odd": _odd(single), "double_odd": _odd(double)}
+            yield {**single, **written, **odd, "group": group, "refused": single["refused"] or "", "both": both}
+
+    return table(one["name"], columns, rows())
 
 
 def boost(errors: Entry, precision: str) -> str:
@@ -126,22 +121,19 @@ def _print_worst(one: Entry) -> None:
 def gamma_table(by_precision: Mapping[str, Entry]) -> Table:
     """Return what is lost to cancellation where J is a difference of two Gammas."""
     columns = (
-        Column("precision", "slivers", words=True),
-        Column("direct", "J(x0, x1)", words=True),
-        Column("difference", "J(0, x1) - J(0, x0)", words=True),
-        Column("median", "median"),
-        Column("negative", "negative", alarm=True),
-        Column("rounding", "in ε (J(0, x0) + J(0, x1))", words=True),
+        *words(precision="slivers", direct="J(x0, x1)", difference="J(0, x1) - J(0, x0)"),
+        *numbers("median"),
+        *numbers("negative", how=_ALARM),
+        *words(rounding="in ε (J(0, x0) + J(0, x1))"),
     )
     rows = [
-        (
-            precision,
-            boost(one["direct"], precision),
-            boost(one["difference"], precision),
-            one["difference"]["median"],
-            one["difference"]["negative"],
-            f"Max = {number(one['max_rounding'])} (Median = {number(one['median_rounding'])})",
-        )
+        {
+            **one["difference"],
+            "precision": precision,
+            "direct": boost(one["direct"], precision),
+            "difference": boost(one["difference"], precision),
+            "rounding": f"Max = {number(one['max_rounding'])} (Median = {number(one['median_rounding'])})",
+        }
         for precision, one in by_precision.items()
     ]
     return table("cancellation: thin lit slivers far from the light", columns, rows)
@@ -149,29 +141,16 @@ def gamma_table(by_precision: Mapping[str, Entry]) -> Table:
 
 def law_table(laws: Iterable[Entry]) -> Table:
     """Return how far a kernel is off laws that hold exactly."""
-    columns = (
-        Column("law", "law", words=True),
-        Column("rays", "rays"),
-        Column("single", "float32"),
-        Column("double", "float64"),
-    )
-    rows = [(law["name"], law["rows"], law["single"], law["double"]) for law in laws]
-    return table("exact laws: largest relative deviation", columns, rows)
+    columns = (*words(name="law"), *numbers(rows="rays", single="float32", double="float64"))
+    return table("exact laws: largest relative deviation", columns, laws)
 
 
 def plane_table(cases: Iterable[Entry]) -> Table:
     """Return the errors of shadow planes in hard cases."""
     columns = (
-        Column("case", "shadow planes", words=True),
-        Column("sum", "sum", words=True),
-        Column("precision", "precision", words=True),
-        Column("median", "median"),
-        Column("p99", "99 %"),
-        Column("max", "max"),
-        Column("beyond", "beyond 1e-4"),
-        Column("negative", "negative", alarm=True),
-        Column("nonfinite", "NaN/Inf", alarm=True),
+        *words(case="shadow planes", sum="", precision=""),
+        *numbers(median="", p99="99 %", max="", beyond="beyond 1e-4"),
+        *numbers("negative", nonfinite="NaN/Inf", how=_ALARM),
     )
-    keys = [column.key for column in columns]
-    rows = [Row({key: one[key] for key in keys}) for one in cases]
-    return table("cancellation between shadow planes: errors relative to each pixel's true value", columns, rows)
+    title = "cancellation between shadow planes: errors relative to each pixel's true value"
+    return table(title, columns, cases)

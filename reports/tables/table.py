@@ -7,6 +7,7 @@ are here: which columns there are, and how a number becomes digits.
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,12 @@ class Interval:
 
     low: float
     high: float
+
+    @classmethod
+    def of(cls, ends: "Sequence[float | None] | None") -> "Interval | None":
+        """Return the interval of a pair of report.json, None where an end is not known."""
+        low, high = ends or (None, None)
+        return None if low is None or high is None else cls(low, high)
 
 
 @dataclass(frozen=True)
@@ -64,6 +71,11 @@ class Column:
     after: str = ""  #: behind every number, such as a multiplication sign
     spread: str = ""  #: heading of the quartiles of `Measured`, in a column of their own where cells have no room
     alarm: bool = False  #: anything but zero is bad
+
+    @property
+    def title(self) -> str:
+        """The heading with its unit."""
+        return f"{self.heading} {self.unit}".strip()
 
 
 @dataclass(frozen=True)
@@ -106,22 +118,44 @@ class Table:
 
 
 def table(
-    title: str, columns: Iterable[Column], rows: Iterable[Row | Sequence[Value]], *, explanation: str = ""
+    title: str,
+    columns: Iterable[Column],
+    rows: Iterable[Row | Sequence[Value] | Mapping[str, Any]],
+    *,
+    explanation: str = "",
 ) -> Table:
-    """Return a table; a row may be its values in the order of the columns."""
+    """Return a table.
+
+    Parameters
+    ----------
+    title, explanation
+        See `Table`.
+    columns
+        Of the table.
+    rows
+        A row may be its values in the order of the columns, or a mapping that has them among others by key.
+    """
     known = tuple(columns)
-    return Table(title, known, tuple(_row(row, known) for row in rows), explanation)
+
+    def row(given: Row | Sequence[Value] | Mapping[str, Any]) -> Row:
+        if isinstance(given, Row):
+            return given
+        if isinstance(given, Mapping):
+            return Row({column.key: given.get(column.key) for column in known})
+        return Row({column.key: value for column, value in zip(known, given, strict=True)})
+
+    return Table(title, known, tuple(map(row, rows)), explanation)
 
 
-def _row(row: Row | Sequence[Value], columns: Sequence[Column]) -> Row:
-    if isinstance(row, Row):
-        return row
-    return Row({column.key: value for column, value in zip(columns, row, strict=True)})
+def words(*keys: str, how: Mapping[str, Any] | None = None, **headings: str) -> tuple[Column, ...]:
+    """Return columns of text: keys that are their own headings, then keys with their headings."""
+    return numbers(*keys, how={"words": True, **(how or {})}, **headings)
 
 
-def words(*headings: str) -> tuple[Column, ...]:
-    """Return columns of text whose keys are their headings."""
-    return tuple(Column(heading, heading, words=True) for heading in headings)
+def numbers(*keys: str, how: Mapping[str, Any] | None = None, **headings: str) -> tuple[Column, ...]:
+    """Return columns that are written alike, named as those of `words`; `how` are the other fields of `Column`."""
+    named = dict.fromkeys(keys, "") | headings
+    return tuple(Column(key, heading or key, **(how or {})) for key, heading in named.items())
 
 
 def number(value: float | None, digits: int = 3, *, zeros: bool = False) -> str:
@@ -166,7 +200,8 @@ def digits_of(value: float, column: Column, *, zeros: bool = False, percent: boo
     elif column.whole:
         text = f"{shown:.0f}" if abs(shown) >= 10 else f"{shown:.1f}"
     else:
-        text = number(shown, column.digits, zeros=zeros)
+        # A share in per cent is read with three digits at least.
+        text = number(shown, max(column.digits, 3) if percent and column.share else column.digits, zeros=zeros)
     return f"+{text}" if column.sign and shown > 0 else text
 
 
@@ -177,16 +212,6 @@ def with_spread(median: float, low: float, high: float) -> tuple[str, str, str]:
     widest = max(high - median, median - low, abs(median) * 1e-3)
     places = max(0, 1 - floor(log10(widest))) if widest > 0 else 1
     return f"{median:.{places}f}", f"{median - low:.{places}f}", f"{high - median:.{places}f}"
-
-
-def is_number(value: Value) -> bool:
-    """Return whether a value is a plain number: true and false are none."""
-    return isinstance(value, int | float) and not isinstance(value, bool)
-
-
-def heading(column: Column) -> str:
-    """Return the heading of a column with its unit."""
-    return f"{column.heading} {column.unit}".strip()
 
 
 def measured(timing: Mapping[str, float] | None) -> Measured | None:

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from realtime.methods.shadow_planes.plane_table import index_planes, light_frame
+from realtime.methods.shadow_planes.plane_table import index_planes, light_basis
 from realtime.numerics.diamond_angle import host_diamond_angle
 from realtime.scene.mesh_adjacency import make_casters
 from tests.helpers.casters import ALL
@@ -41,7 +41,7 @@ def bundles(count, *, spread, light=LIGHT, camera=CAMERA, seed=1):
     aim[1::8] = -axis + 0.01 * np.linalg.norm(axis) * rng.normal(size=aim[1::8].shape)
     ways = aim[:, None] / np.linalg.norm(aim, axis=1)[:, None, None]
     ways = (ways + spread * rng.uniform(-1, 1, (tiles, 16, 3))).reshape(-1, 3)
-    axes, _ = light_frame(np.asarray(light, dtype=float), np.asarray(camera, dtype=float))
+    axes = light_basis(np.asarray(light, dtype=float), np.asarray(camera, dtype=float)).axes
     return ways / np.linalg.norm(ways, axis=1)[:, None] @ axes.T
 
 

@@ -20,7 +20,7 @@ import drjit as dr
 
 from realtime.kernels.polynomial import _nodes
 from realtime.kernels.polynomial_piece import Piece, integrand, offset, piece_of, place, with_limits
-from realtime.rays.ray_light import RayGeometry, stretches
+from realtime.rays.ray_light import RayGeometry, smooth_subsegments
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium
 
@@ -52,7 +52,7 @@ def polynomial_coefficients(
         values = [integrand(piece, (0.5 + 0.5 * y) * piece.width, geometry, medium, light) for y, _ in nodes]
         return piece, _antiderivative(values)
 
-    ends = stretches(geometry, light, x0, x1)
+    ends = smooth_subsegments(geometry, light, x0, x1)
     pieces = tuple(tuple(fitted(begin, end, sigma_t) for begin, end in ends) for sigma_t in medium.sigma_t)
     return RayPolynomial(pieces, type(medium.albedo))
 

@@ -31,6 +31,7 @@ from realtime.errors import InputError as RealtimeError
 from realtime.frame.renderer import Frame, FrameRenderer, run_cast_and_shade, run_method
 from realtime.methods.light_volumes.published.mesh import tessellation_stages
 from realtime.scene.read_scene import Scene, read_scene
+from realtime.shadow_maps.projection import light_faces
 from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map
 from validation.configurations.methods import configuration, prepared
 from validation.configurations.timing import Timing, time_repeated
@@ -141,7 +142,7 @@ def table_rows(
             for evaluation in EVALUATIONS:
                 if progress is not None:
                     progress(len(rows) / total, f"Table 1, {table.scene}, map {texels}, {evaluation}")
-                empty = TableRow(table, texels, evaluation, size, 1 if scene.lights[0].kind == "spot" else 6)
+                empty = TableRow(table, texels, evaluation, size, light_faces(scene.lights[0]))
                 row = _expected_missing(empty, last.get(evaluation), limit)
                 if row is None:
                     row = _measured(empty, scene, frames, kernel=kernel, seconds=seconds, limit=limit)

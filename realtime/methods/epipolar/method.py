@@ -18,7 +18,6 @@ lists of tiles, which bound the sixteen rays of a tile alone, miss what concerns
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -48,11 +47,10 @@ from realtime.methods.epipolar.walk import sum_lit_intervals
 from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.light_airlight import RayAirlight, integral_type, ray_airlight
 from realtime.methods.interface.view import View, rays_in_media
-from realtime.numerics.array_types import bytes_of
+from realtime.numerics.array_types import PerMetre, bytes_of
 from realtime.parameters import Parameters, parameter
 from realtime.rays.ray_light import distance_to_light
 from realtime.scene.camera import Camera
-from realtime.scene.features import check_places
 from realtime.scene.lights import Light
 from realtime.scene.medium import transmittance
 from realtime.scene.read_scene import Scene
@@ -99,7 +97,7 @@ class EpipolarMap:
     """What the method needs beyond the view, for one light."""
 
     shadow_map: ShadowMap
-    heights: Any  #: inverse planar depths at the corners of its texels [1/m]
+    heights: PerMetre  #: inverse planar depths at the corners of its texels [1/m]
 
 
 def min_max(view: View, state: tuple[EpipolarMap, ...], lists, *, kernel, parameters: MinMaxParameters) -> Layers:
@@ -120,8 +118,8 @@ def min_max(view: View, state: tuple[EpipolarMap, ...], lists, *, kernel, parame
 
     Notes
     -----
-    Valid for point and spot lights anywhere; the epipole may lie in the image, where the pixels next to the light are
-    the least accurate. Shadows are those of the map, sampled once more along the slices.
+    Valid for lights anywhere; the epipole may lie in the image, where the pixels next to the light are the least
+    accurate. Shadows are those of the map, sampled once more along the slices.
 
     References
     ----------
@@ -154,9 +152,8 @@ def prepare_min_max(scene: Scene, parameters: MinMaxParameters) -> Callable[[Sce
     Raises
     ------
     InputError
-        For directional lights, and more memory than the machine has.
+        For more memory than the machine has.
     """
-    check_places(scene.features, "min-max")
     map, slices, samples = parameters.map, parameters.slices, parameters.samples
     if scene.features.shadows:
         held = sum(2 * map_memory(light, map) for light in scene.lights)

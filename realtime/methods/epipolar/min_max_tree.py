@@ -5,7 +5,11 @@ In the plane of a slice (`realtime.methods.epipolar.slices`) the light is at the
 directions from the light are taken along a polygonal line k(q): of a point light the corners (1, 0), (0, 1), (-1, 0),
 so that it is seen all round; of a spot the chord between the two ends of its cone in the slice. A point is P = k / s;
 with k linear along an edge of the line, (q, s) are projective coordinates and a camera ray is straight in them
-(`realtime.shadow_maps.inverse_depth_field` has the same with one dimension more).
+(`realtime.shadow_maps.projection` has the same with one dimension more).
+
+Of a light at infinity a slice holds parallel rays, at distances Y from the axis e1 through the camera, between the two
+Y0 and Y1 where it enters and leaves the rectangle of the shadow map. With s_O the height of the camera in the map, the
+point (X, Y) has s = s_O - X. Here k(q) = (s_O, Y) with Y linear in q, and everything below is the same.
 
 The map of a slice holds S = D s of the surfaces at equal steps in q, read from the height field of the shadow map. A
 leaf lies between two of them, and a node of 2^l leaves holds the least and the greatest S over it. Published is one
@@ -31,9 +35,9 @@ class SliceHeights:
     """The height maps of slices with their trees."""
 
     size: int  #: leaves of an edge of k(q), a power of two
-    edges: int  #: 2 of a point light, 1 of a spot
+    edges: int  #: 2 of a point light, 1 of others
     slices: Slices
-    chord: tuple[Any, Any, Any, Any] | None  #: of a spot: k at both ends, by slice
+    chord: tuple[Any, Any, Any, Any] | None  #: of a spot or directional light: k at both ends, by slice
     tree: (
         Any  #: by slice a heap of pairs: 2 nodes of 2^(m-1) leaves from the second place on, ..., the leaves at the end
     )
@@ -68,9 +72,10 @@ def slice_heights(shadow_map: ShadowMap, heights, slices: Slices, light: Light) 
     ----------
     Chen, Baran, Durand, Jarosz 2011, *Real-time volumetric shadows using 1D min-max mipmaps*.
     """
-    one = light_faces(light) == 1
-    edges = 1 if one else 2
-    chord = _chord(slices, light, shadow_map.size) if one else None
+    edges = 1 if light_faces(light) == 1 else 2
+    chord = None
+    if edges == 1:
+        chord = _chord(slices, light, shadow_map.size) if light.w else _band(slices, shadow_map)
     Float = type(heights)
     empty = SliceHeights(shadow_map.size, edges, slices, chord, None)
     samples = empty.leaves + 1
@@ -78,7 +83,8 @@ def slice_heights(shadow_map: ShadowMap, heights, slices: Slices, light: Light) 
     number = index // samples
     kx, ky = line_point(empty, number, Float(index - number * samples))
     across = dr.gather(type(slices.across), slices.across, number)
-    value = slices.distance * _height(shadow_map, heights, slices.towards * kx + across * ky)
+    vector = slices.towards * kx + across * ky if slices.w else slices.away + across * ky
+    value = slices.distance * _height(shadow_map, heights, vector)
     dr.eval(value, chord)
     index = dr.arange(mi.UInt32, slices.count * empty.leaves)
     at = index + index // empty.leaves  # a map has one sample more than leaves
@@ -118,10 +124,13 @@ def _tree(heights: SliceHeights, one, other):
 
 
 def _height(shadow_map: ShadowMap, heights, direction):
-    """Return s of the surface in a direction k: it is hit at k / s [1/m times |k|]."""
-    size = shadow_map.size
-    if shadow_map.projection.basis:
-        a, b, _, depth = shadow_map.projection.homogeneous(mi.UInt32(0), direction, 0)
+    """Return s of the surface in a direction k: it is hit at k / s [1/m times |k|].
+
+    Of a light at infinity k is a point less the light's position [m], and s the height of the surface before it [m].
+    """
+    size, projection = shadow_map.size, shadow_map.projection
+    if projection.basis:
+        a, b, _, depth = projection.homogeneous(mi.UInt32(0), direction, 1 - projection.w)
         face, u, v = mi.UInt32(0), a / depth, b / depth
     else:
         face, u, v = cube_coordinates(direction)
@@ -151,6 +160,27 @@ def _chord(slices: Slices, light: Light, size: int):
     begin = dr.clip(middle - half, 0, dr.pi - margin)
     end = dr.clip(middle + half, begin + margin, dr.pi)
     return dr.cos(begin), dr.sin(begin), dr.cos(end), dr.sin(end)
+
+
+def _band(slices: Slices, shadow_map: ShadowMap):
+    """Return k at both ends of where slices lie in the map of a directional light, a texel wider on both sides.
+
+    In a slice u and v are linear in Y, and the map holds -1 to 1 of both.
+    """
+    projection, Float = shadow_map.projection, type(slices.distance)
+    a0, b0, height, _ = projection.homogeneous(mi.UInt32(0), slices.away, 1)
+    a, b, _, _ = projection.homogeneous(mi.UInt32(0), slices.across, 0)
+    begin, end = Float(0), Float(dr.inf)
+    for start, slope in ((a0, a), (b0, b)):
+        side = dr.mulsign(Float(1), slope)
+        begin = dr.select(slope == 0, begin, dr.maximum(begin, (-side - start) / slope))
+        end = dr.select(slope == 0, end, dr.minimum(end, (side - start) / slope))
+    margin = (2 / shadow_map.size) * dr.rcp(dr.maximum(dr.abs(a), dr.abs(b)))
+    # A slice that misses the map has a band of no use, beside it.
+    begin = dr.maximum(begin - margin, 0)
+    end = dr.maximum(end + margin, begin + margin)
+    height = height + dr.zeros(Float, slices.count)
+    return height, begin, height, end
 
 
 def node_pair(heights: SliceHeights, number, place, level):

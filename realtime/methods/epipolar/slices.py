@@ -2,7 +2,8 @@
 """Epipolar slices: half planes bounded by the line through camera and light, which cut the image in straight lines.
 
 With (i, j) counted in pixels to the left and up from the centre of the image, the ray through (i, j) has the direction
-forward + i left + j up. The light, at v from the camera, has the homogeneous image point
+forward + i left + j up. The light, at v = l - w O from the camera O (`realtime.scene.lights`: for w = 0 the direction
+to a light at infinity), has the homogeneous image point
 
     (a, b, c) = (v . left / |left|^2,  v . up / |up|^2,  v . forward),
 
@@ -12,9 +13,10 @@ image "faces away" from E if E lies on the inner side of it. The sides that do a
 four where E is in the image, one to three otherwise. Slices leave the image at equal steps of length along them (Yusov
 2013), and so each pixel lies on one half line from E, which leaves the image at a place along the border.
 
-In a slice the light is at the origin, e1 = the unit vector to the camera and e2 is at right angles to it, on the side
-of the rays. The rays of a slice start at (D, 0), D = distance of camera and light, and the angle of their points about
-the light grows from 0 to less than pi.
+In a slice e1 = -v/|v| leads from the light to the camera, or along the light, and e2 is at right angles to it, on the
+side of the rays. With the light at the origin the rays of a slice start at (D, 0), D = |v|, and the angle of their
+points about the light grows from 0 to less than pi. Where the light is at infinity the camera is the origin, D = 1, and
+the distance of their points from the axis e1 grows from 0.
 """
 
 from dataclasses import dataclass, replace
@@ -40,7 +42,9 @@ class Slices:
     length: Any  #: of those sides [pixels], one entry
     closed: Any  #: whether they are all four: after the last slice comes the first; one entry
     towards: Any  #: e1, one entry
-    distance: Any  #: D [m], one entry
+    distance: Any  #: D [m], one entry; w = 0: 1
+    away: Any  #: w = 0: from the position that stands for the light's to the camera [m], one entry
+    w: int  #: last coordinate of the light's homogeneous position
     across: Any  #: e2
     ends: Any  #: i and j where a slice enters, or of E, and where it leaves: four numbers a slice [pixels]
 
@@ -53,8 +57,7 @@ def image_slices(camera: Camera, light: Light, count: int) -> Slices:
     camera
         The camera.
     light
-        A point or spot light, anywhere. Where it is in the pinhole, all half planes hold it; E is then the centre of
-        the image.
+        Any light, anywhere. Where it is in the pinhole, all half planes hold it; E is then the centre of the image.
     count
         How many slices.
 
@@ -65,17 +68,30 @@ def image_slices(camera: Camera, light: Light, count: int) -> Slices:
     1D min/max binary trees*.
     """
     Float = type(camera.origin.x)
-    v = light.position - camera.origin
-    distance = dr.norm(v)
-    away = distance == 0
-    v = dr.select(away, camera.forward, v)
+    v = light.toward(camera.origin)
+    distance = dr.norm(v) if light.w else Float(1)
+    v = dr.select(distance == 0, camera.forward, v)
     towards = -dr.normalize(v)
     a = dr.dot(v, camera.left) / dr.squared_norm(camera.left)
     b = dr.dot(v, camera.up) / dr.squared_norm(camera.up)
     c = dr.dot(v, camera.forward)
     epipole = tuple(dr.select(c < 0, -one, one) for one in (a, b, c))
     sides, length, closed = _border(camera.width, camera.height, epipole)
-    found = Slices(count, camera.width, camera.height, epipole, sides, length, closed, towards, distance, None, None)
+    found = Slices(
+        count,
+        camera.width,
+        camera.height,
+        epipole,
+        sides,
+        length,
+        closed,
+        towards,
+        distance,
+        away=None if light.w else camera.origin - light.position,
+        w=light.w,
+        across=None,
+        ends=None,
+    )
     place = (Float(dr.arange(mi.UInt32, count)) + 0.5) * (length / count)
     leave = _at_border(found, place)
     enter = _entry(found, *leave)

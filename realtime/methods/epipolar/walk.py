@@ -14,6 +14,10 @@ without a quotient. At a crossing G = h S, thus x = D^2 k_y / (h S); between the
 = G - h S at one and d1 at the other, k and S are those at the ends in the ratio |d1| : |d0|. Nothing cancels, wherever
 the ray goes.
 
+With a light at infinity foot and height are the cosine and the sine of the ray's angle with it, D = 1 and k = (s_O, Y).
+The point of the ray over Y is x = Y / h = k_y / h, and the height of the ray less S is G / h - S: G(q) >= h S(q) again.
+Only x has another divisor: at a crossing within a leaf h (|d1| + d0) instead of h (S |d1| + ...).
+
 A ray that at both ends of a node is above its greatest S is lit all over it, one that is below the least is dark (Chen
 et al. 2011): a long step.
 """
@@ -121,7 +125,10 @@ def _step(heights: SliceHeights, number, ray, segment, stop, walk: _Walk) -> _Wa
     lit = dr.select(passed, lit, walk.lit)
     # Where a whole node differs from what was before it, by rounding, the change is at its beginning.
     ky = dr.select(whole, ky0, ky0 * dr.abs(d1) + ky1 * d0)
-    divisor = dr.select(whole, g0, height * (s0 * dr.abs(d1) + s1 * d0))
+    if heights.slices.w:
+        divisor = dr.select(whole, g0, height * (s0 * dr.abs(d1) + s1 * d0))
+    else:
+        divisor = height * dr.select(whole, 1, dr.abs(d1) + d0)
     x = dr.select(divisor > 0, square * ky / divisor, dr.inf)
     x = dr.clip(x, segment[0], segment[1])
     over = passed & (after > last)
@@ -147,6 +154,9 @@ def _line_value(heights: SliceHeights, number, ray, q):
 def _position(heights: SliceHeights, number, ray, x):
     """Return where the point at x lies along k(q), in leaves."""
     foot, height, square = ray
+    if heights.chord is not None and not heights.slices.w:
+        y0, y1 = (dr.gather(type(x), heights.chord[end], number) for end in (1, 3))
+        return dr.clip((x * height - y0) / (y1 - y0), 0, 1) * heights.size
     finite = dr.isfinite(x)
     at = dr.select(finite, x, 1)
     px = dr.fma(-at, foot, dr.select(finite, square, 0))

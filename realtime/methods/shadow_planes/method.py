@@ -45,8 +45,7 @@ from realtime.methods.shadow_planes.view_culling import bodies_in_view
 from realtime.numerics.array_types import ArrayTypes, types_of
 from realtime.parameters import Parameters, parameter
 from realtime.scene.camera import HostCamera, read_camera
-from realtime.scene.features import check_places
-from realtime.scene.lights import Light
+from realtime.scene.lights import Light, host_position
 from realtime.scene.mesh_adjacency import Casters, read_casters, with_positions
 from realtime.scene.read_scene import Scene
 from realtime.tiles.adaptive_sampling import tolerance
@@ -153,9 +152,8 @@ def prepare_shadow_planes(scene: Scene, parameters: ShadowPlaneParameters) -> Pl
     Raises
     ------
     InputError
-        For casters without triangles and directional lights.
+        For casters without triangles.
     """
-    check_places(scene.features, "shadow-planes")
     return PlanePreparation(read_casters(scene.geometry), parameters.cone)
 
 
@@ -166,7 +164,7 @@ def plane_finder(
 
     All that is on the device is read here, and nothing else done: until then the device stands still.
     """
-    position = np.array(light.position, dtype=np.float64).ravel()
+    position = host_position(light)
     ring = None
     if cone and light.cone is not None:
         ring = cone_ring(np.array(light.axis, dtype=np.float64).ravel(), float(light.cos_cutoff[0]), cone)
@@ -205,7 +203,7 @@ def shadow_planes(
 
     Notes
     -----
-    Valid for casters that are triangle meshes, closed or not. Shadows are those of the
+    Valid for all lights and casters that are triangle meshes, closed or not. Shadows are those of the
     triangles, exact to rounding, with order=exact. Bounded media have nodes of their own, the kernel is not asked;
     they are for evaluation=pixel.
 
@@ -244,7 +242,8 @@ def shadow_planes(
                 index, lists[number], rays, view.distance, gammas, order=parameters.order, buffer=levels
             )
         total += value
-        lit.append(reached)
+        # Frames cast rays for the shadows of a light at infinity on surfaces.
+        lit.append(reached if light.w else True)
     ambient = parameters.ambient
     if ambient and in_media:
         total += ambient_radiance(in_media[0].pieces, view.distance, ambient)

@@ -3,13 +3,11 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from realtime.methods.shadow_planes.plane_table import light_frame, shadow_planes
+from realtime.methods.shadow_planes.plane_table import light_basis, shadow_planes
 from realtime.methods.shadow_planes.silhouettes import silhouette
 from realtime.methods.shadow_planes.view_culling import bodies_in_view
 from realtime.scene.camera import HostCamera, read_camera
-from realtime.scene.features import check_places
+from realtime.scene.lights import host_position
 from realtime.scene.mesh_adjacency import Casters, read_casters, with_positions
 from realtime.scene.read_scene import Scene
 
@@ -41,9 +39,8 @@ def caster_plan(scene: Scene) -> CasterPlan:
     Raises
     ------
     InputError
-        For a caster without triangles, and a directional light.
+        For a caster without triangles.
     """
-    check_places(scene.features, "shadow-planes")
     casters = with_positions(read_casters(scene.geometry), scene.positions)
     camera = read_camera(scene.camera)
     lights = tuple(_light_plan(casters, camera, light) for light in scene.lights)
@@ -74,9 +71,10 @@ def describe_casters(plan: CasterPlan) -> dict[str, str]:
 
 
 def _light_plan(casters: Casters, camera: HostCamera, light) -> LightPlan:
-    position = np.array(light.position, dtype=np.float64).ravel()
+    position = host_position(light)
     used = bodies_in_view(casters, camera, position)
-    axes, _ = light_frame(position, camera.origin)
     seen = silhouette(casters, position, used=used)
     every = len(silhouette(casters, position).edges)
-    return LightPlan(every, int(used.sum()), len(shadow_planes(casters, seen, position, axes).first))
+    return LightPlan(
+        every, int(used.sum()), len(shadow_planes(casters, seen, light_basis(position, camera.origin)).first)
+    )

@@ -15,6 +15,22 @@ point O + x w lies on the half line (c, z) where (x sin g, D + x cos g) is paral
 
     x = D / (sin g cot(psi) - cos g),     and it is beyond the edge, so in its shadow plane, if x sin g / c > 1.
 
+**A light at infinity.** With the light in the direction -a the axis through the camera along a takes the place of the
+line from the light to the camera: put the camera O at the origin and a on the z axis. A shadow plane contains the
+direction a, so in the half plane phi it is a half line parallel to the axis, at the radius c of its edge, from the
+edge's height z on. With P, Q, A and B of the edge as above, but heights from the camera on, the ray point x w lies on
+it where x sin g = c,
+
+    1/x = P w_x + Q w_y,     and it is beyond the edge if x cos g > z, thus w_z > A w_x + B w_y.
+
+It is the limit of the above as D goes to infinity, where z is D more and both sides of 1/x are divided by D. Along the
+ray the radius c grows from 0 as psi does: so c takes the place of psi, in the order of azimuths, in the layers gained
+and, in the order of the paper, in that of the middles of edges (cos psi = 1 - c^2/(2 D^2) + ...). An edge along the
+light is a point there, without azimuths to span, and no plane; a ray along the light crosses none.
+
+In both cases a plane has four numbers, two of which give the quotient q, D/x or 1/x, that is positive ahead of the
+camera and falls along the ray. `plane_crossing` is the one place where they differ on the device.
+
 Four numbers an edge, no division but one, and no test of depth against a triangle. Only edges whose azimuths hold phi
 count, so they are kept in `BINS` bins of azimuth, from which the tiles of the image draw their lists
 (`realtime.methods.shadow_planes.tile_lists`).
@@ -35,8 +51,9 @@ from numpy.typing import NDArray
 
 from realtime.methods.shadow_planes.silhouettes import Silhouette, silhouette
 from realtime.methods.shadow_planes.spot_pyramid import NEARNESS, is_outside, ring_edges
-from realtime.numerics.array_types import is_single
+from realtime.numerics.array_types import four_numbers, is_single
 from realtime.numerics.diamond_angle import TURN, host_diamond_angle
+from realtime.scene.lights import place_and_weight
 from realtime.scene.mesh_adjacency import Casters
 
 Array = NDArray[np.float64]
@@ -54,17 +71,18 @@ FIRST = 1 << 31  #: the first bin that holds the plane
 class PlaneIndex:
     """The shadow planes of one light as a frame needs them; Dr.Jit arrays, padded so that their sizes seldom change."""
 
-    x_axis: Any  #: axes of the frame in which the light is the origin and the camera lies on the z axis
+    x_axis: Any  #: axes of the frame of `LightBasis`
     y_axis: Any
     z_axis: Any
-    distance: Any  #: D, from the light to the camera [m]
+    distance: Any  #: D, from the light to the camera [m]; w = 0: 1
     start: Any  #: first place in `entries` of every bin of two turns, (2 bins + 1,)
     entries: Any  #: the planes bin by bin, two turns of them
-    lines: Any  #: A, B, P [1/m], Q [1/m] of every plane, flat
+    lines: Any  #: A, B, P [1/m], Q [1/m] of every plane, flat; w = 0: P, Q, A, B
     spans: Any  #: first and last azimuth, layers gained when psi grows past it, Biri's cosine of every plane; flat
     ends: Any  #: ends of the edge of every plane in the frame [m], six numbers each, flat
     layers: Any  #: layers between the light and the camera
     aim: Any = None  #: where the pixels of the camera aim in the frame, see `realtime.methods.shadow_planes.pixel_rays`
+    w: int = 1  #: last coordinate of the light's homogeneous position
 
 
 @dataclass(frozen=True)
@@ -76,26 +94,41 @@ class Planes:
     last: NDArray[np.float32]
     gain: NDArray[np.int8]
     ends: Array  #: of the edge [m], (planes, 6)
-    centre: Array  #: cosine between the axis and the middle of the edge, Biri section 5.1.4
+    centre: Array  #: cosine between the axis and the middle of the edge, Biri section 5.1.4; w = 0: -c of the middle
 
 
-def light_frame(light: Array, camera: Array) -> tuple[Array, float]:
-    """Return the axes of the frame of a light and a camera (rows) and the distance between the two [m]."""
-    axis = camera - light
+@dataclass(frozen=True)
+class LightBasis:
+    """The frame of a light and a camera: the z axis leads from the light to the camera, or along the light."""
+
+    axes: Array  #: x, y and z as rows, (3, 3)
+    distance: float  #: D, between light and camera [m]; w = 0: 1
+    origin: Array  #: of the frame: the light, or the camera where the light is at infinity [m]
+    w: int  #: last coordinate of the light's homogeneous position
+
+    def coordinates(self, points: Array) -> Array:
+        """Return points (..., 3) in the frame [m]."""
+        return (points - self.origin) @ self.axes.T
+
+
+def light_basis(light: Array, camera: Array) -> LightBasis:
+    """Return the frame of a light, a homogeneous position (4,) or a place (3,), and a camera [m]."""
+    l, w = place_and_weight(light)  # noqa: E741
+    axis = w * camera - l
     distance = float(np.linalg.norm(axis))
     z = axis / distance if distance > 0 else np.array([0.0, 0.0, 1.0])
     helper = np.eye(3)[np.argmin(np.abs(z))]
     x = np.cross(helper, z)
     x /= np.linalg.norm(x)
-    return np.stack([x, np.cross(z, x), z]), distance
+    return LightBasis(np.stack([x, np.cross(z, x), z]), distance if w else 1.0, l if w else camera, w)
 
 
-def shadow_planes(casters: Casters, found: Silhouette, light: Array, axes: Array) -> Planes:
+def shadow_planes(casters: Casters, edges: Silhouette, basis: LightBasis) -> Planes:
     """Return the shadow planes of silhouette edges in the frame of a light and a camera."""
-    return edge_planes((casters.vertices[found.edges] - light) @ axes.T, found.coefficient)
+    return edge_planes(basis.coordinates(casters.vertices[edges.edges]), edges.coefficient, w=basis.w)
 
 
-def edge_planes(vertices: Array, coefficient: NDArray[np.int8]) -> Planes:
+def edge_planes(vertices: Array, coefficient: NDArray[np.int8], *, w: int = 1) -> Planes:
     """Return the shadow planes of edges in the frame, ends (edges, 2, 3), with their coefficients."""
     a, b = vertices[:, 0], vertices[:, 1]
     azimuth = host_diamond_angle(vertices[..., 0].astype(np.float32), vertices[..., 1].astype(np.float32))
@@ -121,7 +154,11 @@ def edge_planes(vertices: Array, coefficient: NDArray[np.int8]) -> Planes:
             axis=1,
         )
     middle = 0.5 * (a + b)
-    centre = middle[:, 2] / np.maximum(np.linalg.norm(middle, axis=1), np.finfo(float).tiny)
+    if w:
+        centre = middle[:, 2] / np.maximum(np.linalg.norm(middle, axis=1), np.finfo(float).tiny)
+    else:
+        lines = lines[:, [2, 3, 0, 1]]
+        centre = -np.linalg.norm(middle[:, :2], axis=1)
     kept = (first != last) & np.all(np.isfinite(lines), axis=1)
     return _chosen(Planes(lines, first, last, gain, vertices.reshape(-1, 6), centre), kept)
 
@@ -168,53 +205,63 @@ def _joined(one: Planes, other: Planes) -> Planes:
     return Planes(*(np.concatenate([getattr(part, field.name) for part in (one, other)]) for field in fields(Planes)))
 
 
-def layers_between(casters: Casters, light: Array, axes: Array, distance: float, *, used: NDArray[np.bool_]) -> int:
-    """Return how many layers lie between a light and a camera at a distance along the last of some axes.
+def layers_between(casters: Casters, light: Array, basis: LightBasis, *, used: NDArray[np.bool_]) -> int:
+    """Return how many layers lie between a light and the camera of their basis.
 
     A closed body counts the larger number of its triangles that face the light and that are averted: the two differ
     where the light or the camera is inside, and then all beyond is dark.
     """
-    camera = light + distance * axes[2]
+    l, w = place_and_weight(light)  # noqa: E741
+    axes = basis.axes
+    if w:
+        # From the light at u = 0 to the camera at u = 1.
+        start, camera = l, l + basis.distance * axes[2]
+        direction, reach, far = camera - start, (0.0, 1.0), l
+    else:
+        # From the light at u = -infinity to the camera at u = 0.
+        start = camera = basis.origin
+        direction, reach = axes[2], (-np.inf, 0.0)
+        far = np.where(direction == 0, camera, -np.copysign(np.inf, direction))
     low, high = casters.boxes[:, 0], casters.boxes[:, 1]
-    near = used & np.all((low <= np.maximum(light, camera)) & (high >= np.minimum(light, camera)), axis=1)
+    near = used & np.all((low <= np.maximum(far, camera)) & (high >= np.minimum(far, camera)), axis=1)
     if not near.any():
         return 0
     # The axis runs through x = y = 0: most triangles lie aside, all three corners beyond it on one of four sides.
-    x, y = axes[:2] @ casters.vertices.T - (axes[:2] @ light)[:, None]
+    x, y = axes[:2] @ casters.vertices.T - (axes[:2] @ start)[:, None]
     sides = (x > 0) | (x < 0).view(np.uint8) << 1 | (y > 0).view(np.uint8) << 2 | (y < 0).view(np.uint8) << 3
     number = np.flatnonzero(near[casters.body])
     one, other, third = casters.triangles[number].T
     number = number[sides[one] & sides[other] & sides[third] == 0]
     if not len(number):
         return 0
-    crossed = number[_crosses(casters, number, light, camera)]
-    sign = np.sign(casters.normals[crossed] @ light - casters.offsets[crossed])
+    crossed = number[_crosses(casters, number, (start, direction), reach)]
+    sign = np.sign(casters.normals[crossed] @ l - w * casters.offsets[crossed])
     body = casters.body[crossed]
     bodies = len(casters.closed)
     front, back = np.bincount(body[sign > 0], minlength=bodies), np.bincount(body[sign < 0], minlength=bodies)
     return int(np.where(casters.closed, np.maximum(front, back), front + back).sum())
 
 
-def _crosses(casters: Casters, number, light: Array, camera: Array) -> NDArray[np.bool_]:
-    """Return whether triangles are crossed by the segment from the light to the camera, watertight.
+def _crosses(casters: Casters, number, line: tuple[Array, Array], reach: tuple[float, float]) -> NDArray[np.bool_]:
+    """Return whether triangles are crossed by start + u direction with u between two bounds, watertight.
 
     The line crosses a triangle if it passes all three edges on the same side. d . (a x b) of an edge is computed from
     its lower vertex number to its higher one, so that both triangles at an edge see the same rounding.
     """
-    direction = camera - light
+    start, direction = line
     triangle = casters.triangles[number]
     sides = []
     for k in range(3):
         tail, head = triangle[:, k], triangle[:, (k + 1) % 3]
-        low, high = casters.vertices[np.minimum(tail, head)] - light, casters.vertices[np.maximum(tail, head)] - light
+        low, high = casters.vertices[np.minimum(tail, head)] - start, casters.vertices[np.maximum(tail, head)] - start
         left = np.cross(low, high) @ direction >= 0
         sides.append(np.where(tail < head, left, ~left))
     inside = (sides[0] == sides[1]) & (sides[1] == sides[2])
-    # The plane normal . p = offset is met at light + u direction.
+    # The plane normal . p = offset is met at start + u direction.
     normal = casters.normals[number]
     with np.errstate(divide="ignore", invalid="ignore"):
-        u = (casters.offsets[number] - normal @ light) / (normal @ direction)
-    return inside & (u > 0) & (u < 1)
+        u = (casters.offsets[number] - normal @ start) / (normal @ direction)
+    return inside & (u > reach[0]) & (u < reach[1])
 
 
 def index_planes(
@@ -233,8 +280,10 @@ def index_planes(
     ----------
     casters
         Triangles with their adjacency.
-    light, camera
-        Positions [m].
+    light
+        Homogeneous position of the light, (4,), or its place, (3,) [m].
+    camera
+        Position of the camera [m].
     used
         By body, whether its shadow can be seen.
     types
@@ -244,11 +293,12 @@ def index_planes(
     aim
         Axes of the frame -> where the pixels of the camera aim in it.
     """
-    axes, distance = light_frame(light, camera)
-    layers = layers_between(casters, light, axes, distance, used=used)
-    planes = shadow_planes(casters, silhouette(casters, light, used=used), light, axes)
+    basis = light_basis(light, camera)
+    axes = basis.axes
+    layers = layers_between(casters, light, basis, used=used)
+    planes = shadow_planes(casters, silhouette(casters, light, used=used), basis)
     if ring is not None:
-        edges = NEARNESS * distance * ring_edges(ring) @ axes.T
+        edges = NEARNESS * basis.distance * ring_edges(ring) @ axes.T
         planes = _joined(planes, edge_planes(edges, np.full(len(ring), -1, dtype=np.int8)))
         layers += is_outside(ring, axes[2])
     planes = _parted(planes)
@@ -261,7 +311,7 @@ def index_planes(
         x_axis,
         y_axis,
         z_axis,
-        Float(distance),
+        Float(basis.distance),
         mi.UInt32(_padded(start)),
         mi.UInt32(_padded(entries, 7)),
         Float(_padded(planes.lines.astype(real).ravel(), 5)),
@@ -269,9 +319,32 @@ def index_planes(
         Float(_padded(planes.ends.astype(real).ravel(), 6)),
         Float(layers),
         aim(axes) if aim else None,
+        basis.w,
     )
     dr.make_opaque(index)
     return index
+
+
+def plane_crossing(index: PlaneIndex, number, way, active):
+    """Return where rays cross planes, as D/x (w = 0: 1/x), and whether that is beyond the edge.
+
+    Parameters
+    ----------
+    index
+        The planes.
+    number
+        Which of them.
+    way
+        Unit directions of rays in the frame, three arrays.
+    active
+        Lanes to read for.
+    """
+    x, y, z = way
+    a, b, p, q = dr.gather(four_numbers(type(x)), index.lines, number, active)
+    if not index.w:
+        return dr.fma(a, x, b * y), dr.fma(p, x, q * y) < z
+    quotient = dr.fma(a, x, dr.fma(b, y, -z))
+    return quotient, quotient < index.distance * dr.fma(p, x, q * y)
 
 
 def _padded(values, multiple: int = 1):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""Silhouette edges as seen from a point light.
+r"""Silhouette edges as seen from a light.
 
 Give every triangle t the number of layers w_t that it stands for, positive if its front faces the light. Its shadow is
 the set of directions of its projection on the sphere about the light, and the number of layers over a direction changes
@@ -20,6 +20,10 @@ Layers:
   the light: w = +1 or -1. Its folds get c = +-2, its border edges c = +-1.
 * a triangle whose plane holds the light counts nothing, w = 0.
 
+With the light at (l, 1), or (l, 0) where it is at infinity (`realtime.scene.lights`), the front of a triangle with the
+normal n in the plane n . p = c faces it where n . l - c > 0, or n . l > 0. Nothing else here knows where the light is:
+of one at infinity the plane across it takes the place of the sphere of directions.
+
 Biri, Arques, Michelin 2006, section 5.1.1, for closed meshes.
 """
 
@@ -28,6 +32,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from realtime.scene.lights import place_and_weight
 from realtime.scene.mesh_adjacency import Casters
 
 Array = NDArray[np.float64]
@@ -43,7 +48,8 @@ class Silhouette:
 
 def facing(casters: Casters, light: Array) -> NDArray[np.int8]:
     """Return by triangle whether its front faces a light: 1 yes, -1 no, 0 edge-on; and a last 0 for no triangle."""
-    height = casters.normals @ np.asarray(light, dtype=np.float64) - casters.offsets
+    l, w = place_and_weight(np.asarray(light, dtype=np.float64))  # noqa: E741
+    height = casters.normals @ l - w * casters.offsets
     return np.append(np.sign(height).astype(np.int8), np.int8(0))
 
 
@@ -64,7 +70,7 @@ def silhouette(casters: Casters, light: Array, *, used: NDArray[np.bool_] | None
     casters
         Triangles with their adjacency.
     light
-        Position of the light [m].
+        Homogeneous position of the light, (4,), or its place, (3,) [m].
     used
         By body, which ones to look at; all by default.
 

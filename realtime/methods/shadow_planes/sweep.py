@@ -3,8 +3,8 @@
 
 `realtime.methods.shadow_planes.plane_table` has the mathematics. With D the distance from the light to the camera and
 w the direction of the ray in the frame of the light, a plane is crossed at the distance x with D/x = A wx + B wy - wz,
-where 0 < D/x < D (P wx + Q wy). The walk works with that quotient, which falls from the camera on, and divides twice an
-interval.
+where 0 < D/x < D (P wx + Q wy); for a light at infinity D is 1. The walk works with that quotient, which falls from the
+camera on, and divides twice an interval.
 
 A count holds how many layers lie between the light and the point: it starts with those between light and camera, and
 the point is lit where it is zero. Planes come in the order in which the middle ray of the tile crosses them. Two that
@@ -28,9 +28,9 @@ import mitsuba as mi
 
 from realtime.intervals.lit_intervals import LitIntervals, add_waiting, close_interval, no_intervals, sum_at_end
 from realtime.intervals.nearest_crossings import exchange, filled, insert, pop
-from realtime.methods.shadow_planes.plane_table import FULL, GAIN_SHIFT, GAIN_ZERO, NUMBER, PlaneIndex
+from realtime.methods.shadow_planes.plane_table import FULL, GAIN_SHIFT, GAIN_ZERO, NUMBER, PlaneIndex, plane_crossing
 from realtime.methods.shadow_planes.tile_lists import Lists, Source, entry_at
-from realtime.numerics.array_types import four_numbers, two_numbers
+from realtime.numerics.array_types import two_numbers
 from realtime.numerics.diamond_angle import diamond_angle
 
 FEW, MANY = 2, 8  #: crossings that wait for others which may come before them, or are collected at once
@@ -70,9 +70,7 @@ def read_plane(index: PlaneIndex, lists: Lists, ray: RayPlanes, k, active):
     entry, counts = entry_at(lists.entries, ray.source, k, active)
     number = entry & NUMBER
     Float = type(ray.x)
-    a, b, p, q = dr.gather(four_numbers(Float), index.lines, number, counts)
-    quotient = dr.fma(a, ray.x, dr.fma(b, ray.y, -ray.z))
-    beyond = quotient < index.distance * dr.fma(p, ray.x, q * ray.y)
+    quotient, beyond = plane_crossing(index, number, (ray.x, ray.y, ray.z), counts)
 
     def looked_up(number, azimuth, quotient, beyond, unsure):
         first, last = dr.gather(two_numbers(Float), index.spans, 2 * number, unsure)

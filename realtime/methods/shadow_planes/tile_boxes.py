@@ -4,7 +4,8 @@
 Tiles and blocks: `realtime.tiles.candidate_lists`. Each has a box about the
 directions of its rays in the frame of the light, and the least quotient 1/x at which one of them ends. What decides
 whether a ray crosses a plane, D/x = A wx + B wy - wz and its like (`realtime.methods.shadow_planes.plane_table`), is
-linear in the direction, so its largest value over the box is the value at the centre plus |A| ex + |B| ey + ez.
+linear in the direction, so its largest value over the box is the value at the centre plus |A| ex + |B| ey + ez. So are
+1/x = P wx + Q wy and the margin wz - A wx - B wy of a light at infinity.
 """
 
 from collections.abc import Callable
@@ -106,13 +107,21 @@ def touches(index: PlaneIndex, box: Box, entry, active):
     number = entry & NUMBER
     a, b, p, q = dr.gather(four_numbers(Float), index.lines, number, active)
     first, last = dr.gather(two_numbers(Float), index.spans, 2 * number, active)
-    quotient = dr.fma(a, box.x, dr.fma(b, box.y, -box.z))
-    reach = dr.fma(dr.abs(a), box.x_half, dr.fma(dr.abs(b), box.y_half, box.z_half))
-    reach += _SLACK * (dr.abs(a * box.x) + dr.abs(b * box.y) + 1)
-    pd, qd = p * index.distance, q * index.distance
-    margin = dr.fma(pd, box.x, qd * box.y) - quotient
-    margin_reach = dr.fma(dr.abs(pd - a), box.x_half, dr.fma(dr.abs(qd - b), box.y_half, box.z_half))
-    margin_reach += _SLACK * (dr.abs(a * box.x) + dr.abs(b * box.y) + dr.abs(pd * box.x) + dr.abs(qd * box.y) + 1)
+    if index.w:
+        quotient = dr.fma(a, box.x, dr.fma(b, box.y, -box.z))
+        reach = dr.fma(dr.abs(a), box.x_half, dr.fma(dr.abs(b), box.y_half, box.z_half))
+        reach += _SLACK * (dr.abs(a * box.x) + dr.abs(b * box.y) + 1)
+        pd, qd = p * index.distance, q * index.distance
+        margin = dr.fma(pd, box.x, qd * box.y) - quotient
+        margin_reach = dr.fma(dr.abs(pd - a), box.x_half, dr.fma(dr.abs(qd - b), box.y_half, box.z_half))
+        margin_reach += _SLACK * (dr.abs(a * box.x) + dr.abs(b * box.y) + dr.abs(pd * box.x) + dr.abs(qd * box.y) + 1)
+    else:
+        quotient = dr.fma(a, box.x, b * box.y)
+        reach = dr.fma(dr.abs(a), box.x_half, dr.abs(b) * box.y_half)
+        reach += _SLACK * (dr.abs(a * box.x) + dr.abs(b * box.y))
+        margin = box.z - dr.fma(p, box.x, q * box.y)
+        margin_reach = dr.fma(dr.abs(p), box.x_half, dr.fma(dr.abs(q), box.y_half, box.z_half))
+        margin_reach += _SLACK * (dr.abs(p * box.x) + dr.abs(q * box.y) + 1)
     low, high = box.azimuth - box.azimuth_half, box.azimuth + box.azimuth_half
     overlaps = (first <= high) & (last >= low)
     overlaps |= (first <= high - TURN) & (last >= low - TURN)

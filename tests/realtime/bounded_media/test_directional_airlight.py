@@ -223,12 +223,6 @@ def test_a_medium_around_the_bodies_is_refused(variant):
         render({"type": "scene"} | parts)
 
 
-@pytest.mark.parametrize("method", ["shadow-planes", "min-max"])
-def test_methods_that_need_a_place_refuse(variant, method):
-    with pytest.raises(InputError, match=rf"{method}: the scene has a directional light.*light-volumes or ray-march"):
-        render(shaded(), method)
-
-
 def test_a_mesh_is_refused_as_in_all_bounded_media(variant):
     with pytest.raises(InputError, match=r"evaluation=mesh.*use evaluation=walk"):
         render(shaded(), "light-volumes", evaluation="mesh")

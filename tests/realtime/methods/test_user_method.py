@@ -52,6 +52,10 @@ def calls(view, *, kernel=None, steps=7, share=0.5, word="a", on=True, other=Non
 calls.shadows = False
 calls.frozen = True
 
+def even(view, slope=0.5): return mi.Color3f(2 + slope * view.direction.x)
+even.by_rays = True
+def own_tolerance(view, tolerance=0.5): return mi.Float(tolerance)
+
 def ready(view, size=2): return mi.Color3f(view.prepared[0])
 ready.prepare = lambda scene, size: lambda scene: (float(size),)
 def unready(view): return 1
@@ -126,6 +130,14 @@ def test_the_signature_decides(own):
 )
 def test_what_is_returned_becomes_an_image(render, name, wanted):
     np.testing.assert_array_equal(render(name), np.broadcast_to(wanted, (12, 16, 3)))
+
+
+def test_a_function_of_each_ray_by_itself_is_interpolated(render):
+    """One that says so has a tolerance that it need not take; one that does not may have a parameter of that name."""
+    whole, parted = (render("even", tolerance=tolerance) for tolerance in (0.0, 0.05))
+    np.testing.assert_allclose(parted, whole, rtol=0.05)
+    assert np.any(parted != whole)
+    assert render("own_tolerance", tolerance=0.75)[0, 0, 0] == 0.75
 
 
 @pytest.mark.claim("own-method-parameters")

@@ -48,8 +48,8 @@ def test_both_precisions_cast_the_same_rays(variant, kind):
     # Of a ray in 1e7, a coordinate lies so close to the middle of two numbers that 1e-15 decides.
     assert np.mean(single != double) < 1e-4
     assert np.isfinite(single).any()
-    if maps[0].frame and maps[1].frame:
-        for one, other in zip(maps[0].frame, maps[1].frame):
+    if maps[0].projection.basis and maps[1].projection.basis:
+        for one, other in zip(maps[0].projection.basis, maps[1].projection.basis):
             np.testing.assert_array_equal(np.array(one), np.array(other).astype(np.float32))
 
 

@@ -210,6 +210,7 @@ def test_pieces_of_html_escape_what_they_are_given():
 
 def row(label, frame_ms, error, **more):
     made = {"scene": "fog", "width": 8, "height": 6, "label": label, "frame_ms": frame_ms, "airlight_ms": 1.0}
+    made |= {"frame_low_ms": frame_ms, "frame_high_ms": frame_ms}
     made |= {"light_moved_ms": 2.0, "relative_rmse": error, "relative_bias": 0.0, "p99": 0.1, "nonfinite": 0}
     return MappingProxyType(made | {"refused": None, "note": None} | more)
 

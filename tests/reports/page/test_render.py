@@ -6,7 +6,7 @@ import pytest
 
 from analytic.errors import InputError
 from reports.page.chart import speed_error_chart
-from reports.page.filters import DASH, first_sentence, kept_words, number, percent, words
+from reports.page.filters import DASH, kept_words, number, percent, words
 from reports.page.render import SCRIPTS, render_page
 from reports.plotting.pictures import png_bytes
 from tests.helpers.page import (
@@ -295,7 +295,6 @@ def test_percent_and_words():
     assert percent(0.01234) == "1.23 %"
     assert words({"a": [1, 2, 3], "b": True, "c": []}) == f"a 1, 2, 3, b yes, c {DASH}"
     assert words([320, 240]) == "320 \N{MULTIPLICATION SIGN} 240"
-    assert first_sentence("One. Two.") == first_sentence("One.") == "One"
 
 
 def test_page_says_what_came_from_earlier_runs(data, folder):

@@ -43,7 +43,8 @@ def unescaped_latex(cell):
 def latex_rows(drawn):
     """The cells of each row between the rules; a bare & ends a cell."""
     body = drawn.split("\\midrule\n")[1].split("\\bottomrule")[0]
-    return [re.split(r"(?<!\\) & ", line.removesuffix(r" \\")) for line in body.splitlines()]
+    lines = [line.removesuffix(r" \\") for line in body.splitlines() if not line.startswith(r"\multicolumn")]
+    return [re.split(r"(?<!\\) & ", line) for line in lines]
 
 
 def markdown_rows(drawn):
@@ -131,7 +132,11 @@ def test_what_means_something_to_a_format_is_escaped(words):
     parser.feed(html(drawn))
     assert parser.tags == {"div", "table", "caption", "thead", "tbody", "tr", "th", "td"}
     assert parser.rows[1][0].replace("\N{MULTIPLICATION SIGN}", "x") == words
-    assert unescaped_latex(latex_rows(latex([drawn]))[0][0]) == flat
+    (cell, _), _ = latex_rows(latex([drawn]))
+    assert unescaped_latex(cell) == flat
+    assert not re.search(r"(?<!\\)[_%#&~^<>\"]", cell)
+    cell = next(line for line in markdown(drawn).splitlines() if line.endswith("| 1 |")).removesuffix(" | 1 |")[2:]
+    assert not re.search(r"(?<!\\)(\\\\)*[|`*_<&\[\]]", cell)
     assert csv_rows(csv(drawn))[0]["a"] == words
     assert flat.split()[0] in text(drawn)
 
@@ -180,7 +185,7 @@ def test_values_are_written_by_their_column():
 
 def test_quartiles_without_a_column_are_the_title_of_a_cell():
     shown = html(table("", (Column("a", "a"), Column("b", "b", "ms")), [(1, Measured(2.0, 1.5, 3.0, about=True))]))
-    assert '<td title="quartiles 1.5 to 3 ms">~2</td>' in shown
+    assert '<td title="quartiles 1.5 … 3 ms">~2</td>' in shown
 
 
 @pytest.mark.parametrize(("value", "words"), [(None, None), (math.nan, "nan"), (math.inf, "inf"), (-math.inf, "-inf")])

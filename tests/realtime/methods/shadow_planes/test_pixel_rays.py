@@ -45,7 +45,7 @@ def geometries(place, spot=None):
     import mitsuba as mi
 
     from realtime.methods.shadow_planes.pixel_rays import aim_at, read_spot, seen_rays
-    from realtime.methods.shadow_planes.plane_table import light_frame
+    from realtime.methods.shadow_planes.plane_table import light_basis
     from realtime.numerics.array_types import array_types
     from realtime.rays.ray_light import ray_geometry
     from realtime.scene.camera import read_camera
@@ -53,7 +53,8 @@ def geometries(place, spot=None):
     single, double = array_types("single"), array_types("double")
     camera, ways = camera_of(single)
     light = light_at(single, place, spot)
-    axes, distance = light_frame(np.asarray(place, dtype=float), ORIGIN)
+    basis = light_basis(np.asarray(place, dtype=float), ORIGIN)
+    axes, distance = basis.axes, basis.distance
     aim = aim_at(read_camera(camera), axes, read_spot(light), single)
     pixel = mi.UInt32(np.arange(SIZE[0] * SIZE[1], dtype=np.uint32))
     seen = seen_rays(aim, camera, pixel, single.scalar(distance), light)

@@ -12,7 +12,7 @@ from realtime.methods.shadow_planes.plane_table import (
     NUMBER,
     binned,
     layers_between,
-    light_frame,
+    light_basis,
     shadow_planes,
 )
 from realtime.methods.shadow_planes.silhouettes import silhouette
@@ -25,8 +25,7 @@ from tests.helpers.planes import CAMERA, LIGHT, bundles, casters_of, crossings, 
 def planes_of(casters, light=LIGHT, camera=CAMERA):
     from realtime.methods.shadow_planes.plane_table import _parted
 
-    axes, _ = light_frame(light, camera)
-    return _parted(shadow_planes(casters, silhouette(casters, light), light, axes))
+    return _parted(shadow_planes(casters, silhouette(casters, light), light_basis(light, camera)))
 
 
 def count_between(casters, light, camera):
@@ -52,7 +51,8 @@ def count_between(casters, light, camera):
 
 
 def test_frame_is_right_handed_with_the_camera_on_the_last_axis():
-    axes, distance = light_frame(LIGHT, CAMERA)
+    basis = light_basis(LIGHT, CAMERA)
+    axes, distance = basis.axes, basis.distance
     assert axes @ axes.T == pytest.approx(np.eye(3), abs=1e-15)
     assert np.linalg.det(axes) == pytest.approx(1)
     assert axes @ (CAMERA - LIGHT) == pytest.approx([0, 0, distance])
@@ -73,7 +73,7 @@ def test_two_forms_of_a_crossing(variant, name):
     """D/x from A and B, P and Q against the solution for the point."""
     casters = casters_of(name)
     planes = planes_of(casters)
-    _, distance = light_frame(LIGHT, CAMERA)
+    distance = light_basis(LIGHT, CAMERA).distance
     ways = bundles(640, spread=0.1)
     azimuth = host_diamond_angle(*ways[:, :2].astype(np.float32).T)[:, None]
     quotient = ways[:, :2] @ planes.lines[:, :2].T - ways[:, 2:]
@@ -125,9 +125,9 @@ def test_layers_between_light_and_camera(seed, bodies):
     used = np.ones(len(casters.closed), dtype=bool)
     for _ in range(4):
         light, camera = rng.normal(size=(2, 3)) * rng.choice([0.3, 1.0, 3.0], (2, 1))
-        axes, distance = light_frame(light, camera)
-        assert layers_between(casters, light, axes, distance, used=used) == count_between(casters, light, camera)
-        assert layers_between(casters, light, axes, distance, used=~used) == 0
+        basis = light_basis(light, camera)
+        assert layers_between(casters, light, basis, used=used) == count_between(casters, light, camera)
+        assert layers_between(casters, light, basis, used=~used) == 0
 
 
 @pytest.mark.claim("no-ray-slips-through")
@@ -139,7 +139,7 @@ def test_axis_through_edges_and_vertices_counts_each_layer_once():
     used = np.ones(1, dtype=bool)
     for x, y in ((0, 0), (0.5, 0.5), (0.25, 0), (0, 0.25), (0.25, 0.25), (0.1, 0.3)):
         light, camera = np.array([x, y, 1.0]), np.array([x, y, -1.0])
-        assert layers_between(casters, light, *light_frame(light, camera), used=used) == 1
+        assert layers_between(casters, light, light_basis(light, camera), used=used) == 1
 
 
 def test_index_has_what_the_planes_have(variant):

@@ -2,7 +2,7 @@
 import numpy as np
 import pytest
 
-from realtime.errors import InputError
+from analytic.errors import InputError
 from realtime.methods.shadow_planes.spot_pyramid import cone_ring, is_outside, ring_edges
 
 _AXIS = np.array([0.31, -0.57, 0.43]) / np.linalg.norm([0.31, -0.57, 0.43])

@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Epipolar slices of a light at infinity, in bounded media.
+
+Claim: the error falls as the shadow map and the slices grow, to that of the same map without slices.
+"""
+
+import numpy as np
+import pytest
+
+from tests.helpers.sunlit import read, relative_rmse, render
+from tests.realtime.methods.shadow_planes.test_directional import NAMES, scenes
+
+FINE = {"sampling": "pixels", "slices": 6000}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_against_the_truth(variant, name):
+    import mitsuba as mi
+
+    from validation.estimates.quadrature import truth_image
+
+    scene = scenes()[name]
+    truth = truth_image(mi.load_dict(scene)).airlight
+    loaded = read(scene, "single")
+    errors = [relative_rmse(render(loaded, "min-max", map=size, **FINE).airlight, truth) for size in (64, 1024)]
+    # A texel of the slanted walls at every jump, in a shadow that takes a fair part of the light.
+    assert errors[1] < min(0.05, 0.4 * errors[0])
+    # The height field of the map itself, with slanted walls, is about as far from the truth.
+    walked = relative_rmse(render(loaded, "light-volumes", map=1024, walls="slanted").airlight, truth)
+    assert errors[1] < 3 * walked + 2e-3
+
+
+def test_slices_converge_to_pixels(variant):
+    """What is interpolated between many samples of many slices is what the pixels' own slices say."""
+    scene = read(scenes()["aslant"], "single")
+    pixels = render(scene, "min-max", map=256, **FINE).airlight
+    few, many = (
+        render(scene, "min-max", map=256, slices=count, samples=count, step=1).airlight for count in (32, 1024)
+    )
+    assert relative_rmse(many, pixels) < min(0.05, 0.7 * relative_rmse(few, pixels))
+
+
+def test_foot_and_height_are_cosine_and_sine(variant):
+    """Claim: one formula with the homogeneous vector l - w O serves all lights."""
+    import mitsuba as mi
+
+    from realtime.methods.epipolar.slices import image_slices
+    from realtime.rays.ray_light import ray_geometry
+    from tests.helpers.sunlit import rays
+
+    scene = read(scenes()["aslant"])
+    light = scene.lights[0]
+    axis = np.array(light.axis).ravel()
+    _, ways = rays(scene)
+    geometry = ray_geometry(scene.camera.origin, mi.Vector3d(ways.T), light)
+    np.testing.assert_allclose(np.array(geometry.foot), -ways @ axis, atol=1e-14)
+    np.testing.assert_allclose(np.array(geometry.height), np.linalg.norm(np.cross(ways, axis), axis=1), atol=1e-14)
+    x0, x1 = geometry.lit_segment(0.0, 3.0)
+    assert (x0, x1) == (0.0, 3.0)
+    slices = image_slices(scene.camera, light, 9)
+    assert slices.w == 0
+    np.testing.assert_allclose(np.array(slices.towards).ravel(), axis, atol=1e-14)
+    across = np.array(slices.across).T
+    np.testing.assert_allclose(across @ axis, 0, atol=1e-14)

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Every time stands under its own heading, however the table is drawn, and what is not finite never wins."""
+
+import re
+
+import pytest
+
+from reports.tables.drawing import csv, html, latex, markdown, text
+from reports.tables.methods import COLUMNS, TIMES, fastest_within, method_row, methods_table, rate_words
+
+MEDIANS = {name: 2.0 + place for place, name in enumerate(TIMES)}  # no two alike
+
+
+def timing(median):
+    return {"median_ms": median, "low_ms": 0.9 * median, "high_ms": 1.1 * median, "repetitions": 7}
+
+
+def entry(label="a", *, rmse=0.01, frame=2.0, nonfinite=0, **more):
+    error = {"relative_rmse": rmse, "relative_bias": 0.0, "p50": 0.1, "p99": 0.2, "max": 0.3, "nonfinite": nonfinite}
+    times = {name: timing(median) for name, median in MEDIANS.items()} | {"frame": timing(frame)}
+    found = {"label": label, "kind": "built-in", "refused": None, "note": None, "knows_shadows": True, "times": times}
+    return found | {"error": error} | more
+
+
+@pytest.mark.parametrize("name", TIMES)
+def test_each_time_stands_under_its_own_heading(name):
+    """The column "light moved" once held the time after objects moved, in one of the formats."""
+    table = methods_table("t", [entry()], "label", *TIMES)
+    median = f"{MEDIANS[name]:g}"
+    lines = text(table).splitlines()
+    heading = next(line for line in lines if "method" in line)
+    end = re.search(rf"  {re.escape(COLUMNS[name].title)}(?=  |$)", heading).end()  # numbers end where headings end
+    assert next(line for line in lines if line.startswith(" a "))[:end].split()[-1] == median
+    headings, _, cells = ([cell.strip() for cell in row.split("|")] for row in markdown(table).splitlines()[2:5])
+    assert cells[headings.index(COLUMNS[name].title)] == median
+    place = 1 + TIMES.index(name)
+    assert re.findall(r"<t[dh][^>]*>([\d.]+|a)", html(table).split("<tbody>")[1])[place] == median
+    assert rf"$\num{{{MEDIANS[name]:.2f}}}" in latex([table]).splitlines()[-3].split(" & ")[place]
+    keys, values = (line.split(",") for line in csv(table).splitlines())
+    assert dict(zip(keys, values))[name] == median
+
+
+def test_a_method_is_marked_by_what_it_is():
+    assert method_row(entry(knows_shadows=False)).remarks == ()
+    assert method_row(entry(knows_shadows=False, note="slow"), shadows=True).remarks == ("no shadows", "slow")
+    image = method_row(entry(kind="image", layer="total", times=None, knows_shadows=False), shadows=True)
+    assert (image.remarks, image.values["frame"]) == (("image, total",), None)
+    refused = method_row(entry(refused="no map", left_out=True))
+    assert (refused.reason, refused.values) == ("left out: no map", {"label": "a"})
+
+
+def test_the_fastest_is_within_the_error_and_finite():
+    slow, fast = entry("slow", frame=9.0), entry("fast", frame=1.0, rmse=0.2)
+    broken, unknown = entry("broken", frame=0.1, nonfinite=1), entry("unknown", frame=0.1, rmse=None)
+    everything = [slow, fast, broken, unknown, entry("untimed", times=None), entry("refused", error=None)]
+    assert fastest_within(0.01, everything) is slow
+    assert fastest_within(0.5, everything) is fast
+    assert fastest_within(1e-6, everything) is None
+
+
+def test_rates_are_whole_from_ten_on():
+    assert [rate_words(ms) for ms in (3.21, 321, 0.1)] == ["312 frames/s", "3.1 frames/s", "10000 frames/s"]
