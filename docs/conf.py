@@ -17,7 +17,6 @@ extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
-    "sphinx.ext.viewcode",
     "plain_docstrings",
     "mathml",
     "generated",
@@ -36,10 +35,6 @@ napoleon_use_rtype = False
 napoleon_use_ivar = True
 default_role = "code"
 toc_object_entries = False
-
-# What other packages define has no page here, and there is no network to ask for theirs.
-nitpicky = True
-nitpick_ignore_regex = [("py:.*", r"(numpy|collections|typing|types|pathlib|os|fractions|matplotlib|typer)\..*")]
 
 html_theme = "furo"
 html_title = f"airlight {__version__}"

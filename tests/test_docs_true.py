@@ -82,7 +82,7 @@ def test_what_does_not_exist_is_found():
     wanted = ["../reference/lit_balls.py", "nothing.py", "realtime/frame.py", "realtime/nowhere/"]
     assert missing_files(text, ROOT / "docs") == wanted
     text = (
-        "`realtime.kernels.registry.KERNELS`, `realtime.plan`, `realtime.kernels.registry.PLANS`, [x](api-reports.md)\n"
+        "`realtime.kernels.registry.KERNELS`, `realtime.plan`, `realtime.kernels.registry.PLANS`, [x](api-other.md)\n"
         "`KERNELS`\n(`realtime/kernels/registry.py`), `NONE` (`realtime/kernels/registry.py`)"
     )
     wanted = ["realtime.kernels.registry.NONE", "realtime.kernels.registry.PLANS", "realtime.plan"]

@@ -3,7 +3,7 @@
 
 A line `<!-- generated: NAME WORDS -->` of a page is replaced by Markdown that a function of `listed` or `measured`
 returns, before the page is read. So the pages read well in a plain viewer too, and nothing on them is copied by hand.
-Links to Python files of the project lead to the page of the API that holds the module.
+Links to Python files of the project, which have no pages, become the names of the files.
 """
 
 import re
@@ -16,8 +16,8 @@ from sphinx.errors import ExtensionError
 
 ROOT = Path(__file__).resolve().parents[2]
 PARTS = {
-    "modules": listed.modules,
     "names": listed.names,
+    "signatures": listed.signatures,
     "keys": listed.keys,
     "commands": listed.commands,
     "methods": listed.methods,
@@ -54,13 +54,12 @@ def _part(found: re.Match[str]) -> str:
     return PARTS[found[1]](*found[2].split())
 
 
-def _module(found: re.Match[str]) -> str:
-    name = found[2].replace("/", ".").removesuffix(".__init__")
-    return f"{{py:mod}}`{found[1].strip('`')} <{name}>`"
+def _code(link: re.Match[str]) -> str:
+    return f"`{link[1].strip('`')}`"
 
 
 def _replace(app: Sphinx, docname: str, content: list[str]) -> None:
-    text = _SOURCE.sub(_module, content[0])
+    text = _SOURCE.sub(_code, content[0])
     for path, page in _PAGES.items():
         text = text.replace(f"]({path}", f"]({page}")
     content[0] = fill(text)

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Parts of pages that list what the program has: modules, names, commands, methods, kernels."""
 
-import ast
 import inspect
 import re
 from collections.abc import Callable, Sequence
@@ -27,32 +26,50 @@ def table(headers: Sequence[str], rows: Sequence[Sequence[str]], words: int = 1)
     return "\n".join("| " + " | ".join(row) + " |" for row in [headers, rule, *rows]) + "\n"
 
 
-def modules(package: str) -> str:
-    """Return all modules of a package with their docstrings and what they define."""
-    found = []
-    for path in sorted((ROOT / package).rglob("*.py")):
-        name = ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
-        if path.stem.startswith("command_") or not ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))):
-            continue
-        directive = f".. automodule:: {name}\n   :members:\n   :undoc-members:"
-        heading = f"## `{name}`\n\n" if name != package else ""  # the page has that one
-        found.append(f"{heading}```{{eval-rst}}\n{directive}\n```\n")
-    return "\n".join(found)
+#: What the functions of `import airlight` return.
+_RESULTS = (
+    "reports.api.results.Rendering",
+    "reports.api.results.Reference",
+    "reports.api.comparison.ImageComparison",
+    "reports.api.tables.Integrals",
+    "reports.api.tables.BenchTable",
+    "reports.api.tables.Report",
+)
+
+
+def _public() -> dict[str, Any]:
+    """Return what `import airlight` gives, by name."""
+    import airlight
+
+    return {name: getattr(airlight, name) for name in sorted(airlight._API, key=str.lower)}
+
+
+def _documented(value: Any) -> bool:
+    return inspect.isfunction(value) or inspect.isclass(value)
 
 
 def names() -> str:
-    """Return what `import airlight` gives: each name, in a sentence, with a link to its module."""
+    """Return what `import airlight` gives: each name, in a sentence, with a link to its signature."""
     import airlight
 
-    rows = []
-    for name in sorted(airlight._API, key=str.lower):
-        value = getattr(airlight, name)
-        if inspect.isfunction(value) or inspect.isclass(value):
-            role, words = f"{{py:obj}}`{name} <{value.__module__}.{name}>`", _sentence(value)
-        else:
-            role, words = f"`{name}`", f"see {{py:mod}}`{airlight._API[name]}`"
-        rows.append((role, words))
+    rows = [
+        (f"{{py:obj}}`{name} <{value.__module__}.{name}>`", _sentence(value))
+        if _documented(value)
+        else (f"`{name}`", f"see `{airlight._API[name]}`")
+        for name, value in _public().items()
+    ]
     return table(("name", "what it is"), rows, 2)
+
+
+def signatures() -> str:
+    """Return the functions and classes of `import airlight` with their docstrings, and the results that they return."""
+    paths = {f"{value.__module__}.{name}": value for name, value in _public().items() if _documented(value)}
+    classes = {path: inspect.isclass(value) for path, value in paths.items()} | dict.fromkeys(_RESULTS, True)
+    shown = [
+        f".. autoclass:: {path}\n   :members:" if is_class else f".. autofunction:: {path}"
+        for path, is_class in classes.items()
+    ]
+    return "```{eval-rst}\n" + "\n\n".join(shown) + "\n```"
 
 
 def _sentence(value: Any) -> str:

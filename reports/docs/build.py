@@ -12,7 +12,7 @@ from reports.machine.environment import MissingError
 from reports.machine.progress import progress_bar
 
 _NEEDED = {"sphinx": "sphinx", "myst_parser": "myst-parser", "furo": "furo"}
-_PARTS = {"reading sources": (0.0, 0.5), "writing output": (0.5, 0.3), "highlighting module code": (0.8, 0.2)}
+_PARTS = {"reading sources": (0.0, 0.6), "writing output": (0.6, 0.4)}
 _PROGRESS = re.compile(r"(" + "|".join(_PARTS) + r")\.\.\. \[\s*(\d+)%\] (\S+)")
 
 

@@ -1,0 +1,20 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The functions of `import airlight` and their results, for scripts and notebooks.
+
+Read in this order:
+
+- `inputs.py`: what the functions take, and the one exception
+- `html.py`: pieces of HTML for notebooks
+- `results.py`: images as results
+- `comparison.py`: a comparison as a result
+- `tables.py`: tables and reports as results
+- `images.py`: `load_scene`, `render`, `compare`
+- `reference.py`: `reference`
+- `studies.py`: `integrate`, `bench`
+- `report.py`: `report`
+
+May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.scene`, `reference.storage`, `reports.data`,
+`reports.machine`, `reports.plotting`, `reports.report`, `reports.tables`, `validation.comparison`,
+`validation.configurations`, `validation.estimates`, `validation.frames`, `validation.kernels`, `validation.metrics`,
+`validation.scenes`.
+"""

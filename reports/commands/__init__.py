@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The commands, one module each: a function with its options, which imports what it needs when it runs.
+
+Read in this order:
+
+- `main.py`: the command line: which commands there are, how mistakes are told
+- `printing.py`: how commands print the tables of one run
+- `baselines.py`: `airlight baselines`
+- `bench.py`: `airlight bench`
+- `cache.py`: `airlight cache`
+- `certify.py`: `airlight certify`
+- `compare.py`: `airlight compare`
+- `describe.py`: `airlight describe`
+- `diff.py`: `airlight diff`
+- `docs.py`: `airlight docs`
+- `doctor.py`: `airlight doctor`
+- `figures.py`: `airlight figures`
+- `integrate.py`: `airlight integrate`
+- `lists.py`: `airlight scenes`, `methods`, `kernels`
+- `maps.py`: `airlight maps`
+- `merge.py`: `airlight merge`
+- `mutations.py`: `airlight mutations`
+- `published.py`: `airlight published`
+- `reference.py`: `airlight reference`
+- `render.py`: `airlight render`
+- `report.py`: `airlight report`
+- `stability.py`: `airlight stability`
+- `test.py`: `airlight test`
+
+May import: `analytic`, `realtime.frame`, `realtime.kernels`, `realtime.methods`, `realtime.methods.shadow_planes`,
+`realtime.scene`, `realtime.shadow_maps`, `reference.storage`, `reports.data`, `reports.diff`, `reports.docs`,
+`reports.figures`, `reports.interchange`, `reports.machine`, `reports.papers`, `reports.plotting`, `reports.report`,
+`reports.tables`, `validation.certified`, `validation.comparison`, `validation.configurations`, `validation.estimates`,
+`validation.frames`, `validation.kernels`, `validation.metrics`, `validation.mutations`, `validation.papers`,
+`validation.scenes`.
+"""

@@ -1,0 +1,15 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""report.json: what stands in it, and how it is read and checked.
+
+`schema/report-2.json` is its schema in JSON Schema; docs/report-schema.md explains every key.
+
+Read in this order:
+
+- `json_files.py`: JSON files that a user names
+- `serialize.py`: results of studies as plain data
+- `claims.py`: the sentences at the top, from the numbers
+- `reader.py`: reads a report back, checks it, draws its page again
+
+May import: `analytic`, `realtime.scene`, `reference.quadrature`, `reference.storage`, `reports.page`, `reports.tables`,
+`validation.comparison`, `validation.frames`, `validation.metrics`.
+"""

@@ -1,0 +1,24 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Figures and tables for papers: `compute` writes data, `plot` only reads them.
+
+Read in this order:
+
+- `files.py`: the files of a figure
+- `report.py`: what figures read of a report
+- `published_rows.py`: rows of papers, from a report or measured
+- `convergence.py`: orders of kernels and estimators
+- `frame_speed.py`: time of frames against error
+- `kernel_errors.py`: errors of kernels over depth and angle
+- `kernel_speed.py`: time of kernels against error
+- `map_size.py`: error over the size of the shadow map
+- `methods_table.py`: times and errors of methods
+- `polynomials.py`: Biri's polynomials
+- `published.py`: frames a second beside the papers
+- `stages.py`: shares of the stages of a frame
+- `strip.py`: images with insets and errors
+- `z_distribution.py`: standardised errors of the estimators
+
+May import: `analytic`, `realtime.kernels`, `reference.storage`, `reports.data`, `reports.machine`, `reports.papers`,
+`reports.plotting`, `reports.tables`, `validation.configurations`, `validation.estimates`, `validation.frames`,
+`validation.kernels`, `validation.papers`, `validation.scenes`.
+"""

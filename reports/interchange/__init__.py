@@ -1,0 +1,13 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What other renderers need to render the same scene.
+
+Read in this order:
+
+- `scene.py`: a scene in numbers
+- `meshes.py`: its shapes as triangles
+- `gltf.py`: the scene as glTF
+- `frames.py`: frames of an animation as files
+
+May import: `analytic`, `realtime.frame`, `reference.scene`, `reference.storage`, `reports.machine`, `reports.plotting`,
+`validation.configurations`, `validation.estimates`, `validation.scenes`.
+"""

@@ -1,0 +1,14 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What works on this machine, and what commands ask of it: the Mitsuba variant, libLLVM, CUDA, progress.
+
+Read in this order:
+
+- `progress.py`: progress bars with the time left
+- `llvm.py`: finds a libLLVM that works
+- `gpu.py`: whether CUDA and OptiX work, and why not
+- `environment.py`: chooses the variant; versions and processor
+- `probe.py`: one kernel in a process of its own
+- `doctor.py`: examines all of these
+
+May import: `analytic`, `reference.scene`, `reference.storage`, `reports.tables`.
+"""

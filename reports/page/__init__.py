@@ -1,0 +1,17 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The page of a report: one HTML file that needs no network, with its images as data.
+
+`templates/` holds the page, its style and its scripts.
+
+Read in this order:
+
+- `filters.py`: how numbers are written, and sentences made of data
+- `tables.py`: the tables of the page
+- `chart.py`: speed against error, as SVG
+- `image_codec.py`: images as integers that compress well
+- `image_index.py`: what the script of the page reads
+- `image_cache.py`: packed images kept between runs
+- `render.py`: the page of all these
+
+May import: `analytic`, `reference.storage`, `reports.papers`, `reports.plotting`, `reports.tables`.
+"""

@@ -1,0 +1,16 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Measures what a report asks for and writes it.
+
+Read in this order:
+
+- `staging.py`: a folder out of sight until it is whole
+- `expected.py`: how long the parts will take
+- `scene.py`: one scene: truth, its checks, every method
+- `papers.py`: what belongs to no scene: papers, stability, mutations
+- `measure.py`: all of these, report.json and the page
+
+May import: `analytic`, `realtime.errors`, `realtime.frame`, `reference.storage`, `reports.data`, `reports.machine`,
+`reports.page`, `reports.papers`, `reports.plotting`, `validation.comparison`, `validation.configurations`,
+`validation.estimates`, `validation.frames`, `validation.kernels`, `validation.metrics`, `validation.mutations`,
+`validation.papers`, `validation.scenes`.
+"""
