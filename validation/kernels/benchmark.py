@@ -254,7 +254,7 @@ def _frozen(function: Kernel, cases: Cases, rays: int | None = None) -> Callable
         values=mi.Float(np.asarray(TABLE)) if name == "tabulated" else None,
     )
     medium = Medium((dr.opaque(mi.Float, float(cases.sigma_t[0])),), dr.opaque(mi.Color3f, 1), phase)
-    light = Light("point", False, dr.opaque(mi.Vector3f, 0), dr.opaque(mi.Color3f, 1))
+    light = Light(dr.opaque(mi.Vector3f, 0), dr.opaque(mi.Color3f, 1))
     geometry = RayGeometry(mi.Float(cases.foot[part]), mi.Float(cases.height[part]), None, None)
     x0, x1 = mi.Float(cases.x0[part]), mi.Float(cases.x1[part])
     dr.eval(geometry.foot, geometry.height, x0, x1)

@@ -93,10 +93,10 @@ def evaluate_rows(
     )
     medium = Medium((types.scalar(cases.sigma_t[rows]),), types.color(1), phase)
     if cases.light is None or cases.origin is None or cases.direction is None:
-        light = Light("point", False, types.vector(0), types.color(intensity))
+        light = Light(types.vector(0), types.color(intensity))
         geometry = RayGeometry(types.scalar(cases.foot[rows]), types.scalar(cases.height[rows]), None, None)
     else:
-        light = Light("point", False, types.vector(cases.light[rows].T), types.color(intensity))
+        light = Light(types.vector(cases.light[rows].T), types.color(intensity))
         # A file's directions have unit length to the digits they are written with.
         given = types.vector(cases.direction[rows].T)
         scale = dr.rsqrt(dr.squared_norm(given))
