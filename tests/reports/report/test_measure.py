@@ -174,8 +174,8 @@ def test_every_number_of_the_data_is_on_the_page(written):
         for name in ("relative_rmse", "relative_bias", "p50", "p99"):
             assert percent(one["error"][name]) in page
     for agreed in scene["agreement"].values():
-        assert percent(agreed["statistics"]["relative_bias"]) in page
-        assert percent(agreed["uncorrected_bias"]) in page
+        assert f"{100 * agreed['statistics']['relative_bias']:.3f} %" in page
+        assert f"{100 * agreed['uncorrected_bias']:.3f} %" in page
     assert number(scene["truth"]["mean"], 5) in page
     assert str(scene["truth"]["transitions"]) in page
     assert "my &lt;fog&gt;" in page
