@@ -16,8 +16,8 @@ class BodySides:
     """A body as one point sees it, with the planes through which lines from there enter and leave it."""
 
     seen: Seen
-    entering: EntryPlanes | None  #: None for a ball
-    leaving: EntryPlanes | None  #: None for a ball, and where nobody asks
+    entering: EntryPlanes | None  #: None for a sphere
+    leaving: EntryPlanes | None  #: None for a sphere, and where nobody asks
 
 
 @dataclass(frozen=True)

@@ -31,8 +31,8 @@ class Seen:
     """A body as one point sees it."""
 
     body: Body
-    toward: Any  #: from the point to the centre of the body's ball [m]
-    planes: Any  #: four numbers a plane: g [1/m], and whether the point is outside of the half space; None for a ball
+    toward: Any  #: from the point to the centre of the body's sphere [m]
+    planes: Any  #: four numbers a plane: g [1/m], and whether the point is outside of the half space; None for a sphere
 
 
 def seen_from(body: Body, point) -> Seen:
@@ -73,7 +73,7 @@ def inverse_crossings(seen: Seen, start, direction, distances, active, *, leaves
         leaves.
     """
     if seen.body.planes is None:
-        found = [_ball_crossings(seen, start + direction * x) for x in distances]
+        found = [_sphere_crossings(seen, start + direction * x) for x in distances]
         return [one for one, _ in found], [other for _, other in found]
     Float = type(start.x)
     width = dr.width(start, direction, active, *distances)
@@ -99,7 +99,7 @@ def inverse_crossings(seen: Seen, start, direction, distances, active, *, leaves
     return enter, leave
 
 
-def _ball_crossings(seen: Seen, v):
+def _sphere_crossings(seen: Seen, v):
     """Return 1/f_in and 1/f_out: with u = 1/f, |v - u w|^2 = u^2 radius^2, w from the point to the centre.
 
     That is c u^2 - 2 b u + a = 0 with a = |v|^2, b = v . w, c = |w|^2 - radius^2, which is negative inside.

@@ -15,9 +15,10 @@ Between two bends of polyhedra the exponent is linear, from tau_0 to tau_1 over 
 where 1 - exp(-z) = 2 T/(1 + T), T = tanh(z/2), cancels nothing. A bend is met a rounding error late: lines are extended
 back to it, and no leg becomes shorter than nothing.
 
-With balls, q = sqrt(R^2 - |w x a|^2) ends like a square root at both ends of a piece. In u, x = x_0 + D u^2 (3 - 2 u),
-such an end is smooth; Gauss and Legendre's nodes in u do the rest. So they do for bodies of many planes, whose bends
-lie close together and are small: there the rule is of second order. Pieces are cut so that none is optically thick.
+With spheres, q = sqrt(R^2 - |w x a|^2) ends like a square root at both ends of a piece. In u, with x = x_0 + D u^2 (3 -
+2 u), such an end is smooth; Gauss and Legendre's nodes in u do the rest. So they do for bodies of many planes, whose
+bends lie close together and are small: there the rule is of second order. Pieces are cut so that none is optically
+thick.
 
 In a medium without bounds nothing arrives: the light would have crossed an endless way through it.
 """

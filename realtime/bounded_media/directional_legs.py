@@ -16,7 +16,7 @@ depth of the leg. The bends are where another plane becomes the least or the lar
 changes sides. A plane along the light has lines of next to no width: tilted a little it is like the others, infinitely
 far on one side and on the other.
 
-In a ball of radius R about C, with w = P - C, the leg leaves at w . a + q and enters at w . a - q, q^2 = R^2 - |w x
+In a sphere of radius R about C, with w = P - C, the leg leaves at w . a + q and enters at w . a - q, q^2 = R^2 - |w x
 a|^2. That has no bends but where the ray enters and leaves the cylinder |w x a| = R.
 """
 
@@ -45,7 +45,7 @@ class ParallelSeen:
 
     body: Body
     axis: Any  #: unit direction in which the light travels
-    planes: Any  #: four numbers a plane, phi = g . (P - centre) + k; None for a ball
+    planes: Any  #: four numbers a plane, phi = g . (P - centre) + k; None for a sphere
     comes_in: Any  #: by plane 1 where the light comes in, else 0
 
 
@@ -83,7 +83,7 @@ def parallel_legs(seen: ParallelSeen, origin, direction, distances, active=True)
     """
     start = origin - seen.body.centre
     if seen.planes is None:
-        return [dr.select(active, _ball_leg(seen, start + direction * x), 0) for x in distances]
+        return [dr.select(active, _sphere_leg(seen, start + direction * x), 0) for x in distances]
     Float = type(start.x)
     width = dr.width(start, direction, *distances)
     first = [dr.full(Float, -dr.inf, width) for _ in distances]
@@ -163,7 +163,7 @@ def slope_from(seen: ParallelSeen, origin, direction, x) -> Slope:
 
 
 def cylinder_bend(seen: ParallelSeen, origin, direction, x):
-    """Return the next distance beyond `x` at which rays enter or leave the cylinder about a ball, or infinity [m]."""
+    """Return the next distance beyond `x` at which rays enter or leave the cylinder about a sphere, or infinity [m]."""
     w = dr.cross(origin - seen.body.centre, seen.axis)
     v = dr.cross(direction, seen.axis)
     a, b = dr.squared_norm(v), dr.dot(w, v)
@@ -176,7 +176,7 @@ def cylinder_bend(seen: ParallelSeen, origin, direction, x):
     return bend
 
 
-def _ball_leg(seen: ParallelSeen, w):
+def _sphere_leg(seen: ParallelSeen, w):
     along = dr.dot(w, seen.axis)
     inner = dr.square(seen.body.radius) - dr.squared_norm(dr.cross(w, seen.axis))
     root = dr.sqrt(dr.maximum(inner, 0))

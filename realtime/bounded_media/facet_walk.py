@@ -57,12 +57,12 @@ class Entry:
 
 
 def entry_planes(seen: Seen) -> EntryPlanes | None:
-    """Return the planes where legs enter a body, as the light sees it; None for a ball."""
+    """Return the planes where legs enter a body, as the light sees it; None for a sphere."""
     return _facing_planes(seen, 1)
 
 
 def exit_planes(seen: Seen) -> EntryPlanes | None:
-    """Return the planes where legs leave a body: those that the light is inside of, with -g for g; None for a ball."""
+    """Return the planes where legs leave a body: the light is inside of them, with -g for g; None for a sphere."""
     return _facing_planes(seen, -1)
 
 
@@ -85,10 +85,10 @@ def _facing_planes(seen: Seen, side: int) -> EntryPlanes | None:
 
 
 def _image_frame(seen: Seen):
-    """Return axes in which the body's ball is seen between -1 and 1: (v . across, v . up)/(v . middle)."""
+    """Return axes in which the body's sphere is seen between -1 and 1: (v . across, v . up)/(v . middle)."""
     toward, radius = seen.toward, seen.body.radius
     distance = dr.maximum(dr.norm(toward), 1e-6 * radius)
-    # From within the ball there is no such image; any plane will do to begin at.
+    # From within the sphere there is no such image; any plane will do to begin at.
     beside = dr.sqrt(dr.maximum((distance - radius) * (distance + radius), 0.01 * radius * radius))
     middle = toward / distance
     Vector = type(toward)

@@ -44,7 +44,7 @@ _TANGENT = 0.45
 _DEPTH = 1.6
 _SHARE = 0.5
 _NEARER, _FARTHER = 0.5, 0.8
-_STEEP, _LEAST = 0.2, 0.002  # share for a ball, and of its radius in any case
+_STEEP, _LEAST = 0.2, 0.002  # share for a sphere, and of its radius in any case
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class BodySegment:
     begin: Any  #: where the rays enter the body [m]
     before: tuple[Any, ...]  #: optical depth from the camera to there, by channel
     seen: Seen  #: the body as the light sees it
-    planes: EntryPlanes | None  #: None for a ball
+    planes: EntryPlanes | None  #: None for a sphere
 
 
 def body_integral(one: BodySegment, x0, x1):
@@ -102,7 +102,7 @@ def body_integral(one: BodySegment, x0, x1):
 
 
 def _walk_from(one: BodySegment, x):
-    """Return the plane where legs enter; of a ball nothing needs to be known."""
+    """Return the plane where legs enter; of a sphere nothing needs to be known."""
     if one.planes is None:
         return Entry(dr.zeros(mi.UInt32, dr.width(x)), x * 0, x * 0)
     return first_entry(one.planes, one.start, one.direction, x)
@@ -126,7 +126,7 @@ def _panel_length(one: BodySegment, walk: Entry, *, s, square, h, length):
     r = dr.sqrt(square)
     most = dr.minimum(most, dr.select(s < 0, _NEARER, _FARTHER) * r)
     if one.planes is None:
-        most = dr.minimum(most, dr.minimum(_ball_length(one, x), _DEPTH / (2 * largest)))
+        most = dr.minimum(most, dr.minimum(_sphere_length(one, x), _DEPTH / (2 * largest)))
     else:
         rising = dr.select(u > 0, slope / u, 0)
         most = dr.minimum(most, _SHARE / rising)
@@ -134,11 +134,11 @@ def _panel_length(one: BodySegment, walk: Entry, *, s, square, h, length):
     return length / dr.maximum(dr.ceil(length / most), 1)
 
 
-def _ball_length(one: BodySegment, x):
-    """Return the length in which the square of half the chord that legs have in a ball changes by a share of it [m].
+def _sphere_length(one: BodySegment, x):
+    """Return the length in which the square of half the chord that legs have in a sphere changes by a share of it [m].
 
-    The part of the leg in the ball is like the root of it: steep where legs graze the ball. With w from the light to
-    the middle of the ball it is radius^2 - |v x w|^2/|v|^2.
+    The part of the leg in the sphere is like the root of it: steep where legs graze the sphere. With w from the light
+    to the middle of the sphere it is radius^2 - |v x w|^2/|v|^2.
     """
     radius, w = one.seen.body.radius, one.seen.toward
     v = dr.fma(one.direction, x, one.start)

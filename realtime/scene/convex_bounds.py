@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Convex bounds of media: the half spaces of a closed convex mesh, or a ball, read from Mitsuba's shapes.
+"""Convex bounds of media: the half spaces of a closed convex mesh, or a sphere, read from Mitsuba's shapes.
 
 Facets that lie in one plane are one half space: a cube has 6, not 12. Vertices are float32 numbers, so "in one plane"
 and "convex" hold to 1e-5 of the size of the body; triangles thinner than that have no plane worth the name, and their
@@ -24,18 +24,18 @@ _SAMPLES = 1 << 16  # pairs of points for the mean distance: its standard error 
 
 @dataclass(frozen=True)
 class Bounds:
-    """A convex body: what lies in all half spaces normal . x <= offset, or in the ball where there are none."""
+    """A convex body: what lies in all half spaces normal . x <= offset, or in the sphere where there are none."""
 
     name: str
     normals: Array  #: unit vectors that point outwards, (planes, 3)
     offsets: Array  #: (planes,) [m]
     corners: Array  #: of the triangles, (triangles, 3, 3) [m]
-    centre: Array  #: of a ball that holds the body [m]
-    radius: float  #: of that ball [m]
+    centre: Array  #: of a sphere that holds the body [m]
+    radius: float  #: of that sphere [m]
 
     @property
-    def is_ball(self) -> bool:
-        """Whether the body is its ball."""
+    def is_sphere(self) -> bool:
+        """Whether the body is its sphere."""
         return not len(self.offsets)
 
 
@@ -54,14 +54,14 @@ def read_bounds(shape) -> Bounds:
     """
     name = shape.id()
     if shape.class_name() == "Sphere":
-        return _read_ball(shape)
+        return _read_sphere(shape)
     if not shape.is_mesh():
         raise _refusal(name, f"is a {shape.class_name()}", "a sphere, a cube or a closed convex mesh")
     vertices, faces = mesh_triangles(shape)
     return mesh_bounds(name, vertices, faces[:, ::-1] if shape.has_flipped_normals() else faces)
 
 
-def _read_ball(shape) -> Bounds:
+def _read_sphere(shape) -> Bounds:
     box = shape.bbox()
     low, high = np.array(box.min, dtype=np.float64).ravel(), np.array(box.max, dtype=np.float64).ravel()
     size = high - low
@@ -147,7 +147,7 @@ def plane_neighbours(bounds: Bounds) -> NDArray[np.uint32]:
 
 def holds(bounds: Bounds, point: Array) -> bool:
     """Return whether a point lies inside."""
-    if bounds.is_ball:
+    if bounds.is_sphere:
         return bool(np.linalg.norm(point - bounds.centre) < bounds.radius)
     return bool(np.all(bounds.normals @ point < bounds.offsets))
 
@@ -158,12 +158,12 @@ def overlap(one: Bounds, other: Bounds) -> bool:
     margin = _FLAT * min(one.radius, other.radius)
     if gap >= one.radius + other.radius - margin:
         return False
-    if one.is_ball and other.is_ball:
+    if one.is_sphere and other.is_sphere:
         return True
-    if one.is_ball or other.is_ball:
-        ball, mesh = (one, other) if one.is_ball else (other, one)
-        return _distance_to_hull(mesh, ball.centre) < ball.radius - margin
-    # The largest ball in both: maximise t under n . x + t <= offset.
+    if one.is_sphere or other.is_sphere:
+        sphere, mesh = (one, other) if one.is_sphere else (other, one)
+        return _distance_to_hull(mesh, sphere.centre) < sphere.radius - margin
+    # The largest sphere in both: maximise t under n . x + t <= offset.
     planes = np.concatenate([one.normals, other.normals])
     found = linprog(
         [0, 0, 0, -1],
@@ -193,7 +193,7 @@ def mean_distance(bounds: Bounds) -> float:
     """Return R, the average distance between a point of the boundary and a point of the body [m].
 
     Both are uniform, by area and by volume, and independent: one reading of "the average distance between a point
-    located in the boundary and a point in the medium". In a ball the mean over the boundary is a + d^2/(3 a) for a
+    located in the boundary and a point in the medium". In a sphere the mean over the boundary is a + d^2/(3 a) for a
     point at the distance d from the centre, so R = 6 a/5. In a mesh it is the mean over 65 536 pairs drawn once for all
     from a fixed seed, with a standard error of about 0.2 %.
 
@@ -201,7 +201,7 @@ def mean_distance(bounds: Bounds) -> float:
     ----------
     Biri, Arques, Michelin 2006, section 4.2.
     """
-    if bounds.is_ball:
+    if bounds.is_sphere:
         return 1.2 * bounds.radius
     random = np.random.default_rng(20_061)
     corner = bounds.corners

@@ -4,8 +4,8 @@
 Light enters there before all shapes, and leaves through the same rectangle behind the media. Heights above that end are
 small numbers where depths may be large ones, so its middle stands for the place of the light.
 
-The media lie in the hull of some balls: the corners of bodies of few planes, which are balls of radius 0, and the balls
-about the others. Seen along the light their rectangle is wanted at the angle at which it has the least area.
+The media lie in the hull of some spheres: the corners of bodies of few planes, which are spheres of radius 0, and the
+spheres about the others. Seen along the light their rectangle is wanted at the angle at which it has the least area.
 """
 
 from itertools import combinations
@@ -23,44 +23,44 @@ Array = NDArray[np.float64]
 
 _FEW_PLANES = 12  # of which every three are met
 _ANGLES = 90  # that are tried, in a quarter of a turn
-_BITS = 14  # of the numbers of a ball
+_BITS = 14  # of the numbers of a sphere
 _MARGIN = 1.001  # so that rounding leaves nothing outside
 
 
-def media_balls(bodies: tuple[Body, ...]) -> Array:
-    """Return balls whose hull holds bodies: middles and radii [m], (balls, 4).
+def media_spheres(bodies: tuple[Body, ...]) -> Array:
+    """Return spheres whose hull holds bodies: middles and radii [m], (spheres, 4).
 
-    Numbers are rounded, and the balls grown by as much: what the precision of the bodies puts in their last digits must
-    not move the rays of a map.
+    Numbers are rounded, and the spheres grown by as much: what the precision of the bodies puts in their last digits
+    must not move the rays of a map.
     """
-    balls = np.concatenate([_balls(body) for body in bodies])
-    grain = 2.0 ** np.ceil(np.log2(np.ptp(balls[:, :3], axis=0).max() + balls[:, 3].max()) - _BITS)
-    return grain * (np.round(balls / grain) + np.array([0, 0, 0, 2]))
+    spheres = np.concatenate([_spheres(body) for body in bodies])
+    grain = 2.0 ** np.ceil(np.log2(np.ptp(spheres[:, :3], axis=0).max() + spheres[:, 3].max()) - _BITS)
+    return grain * (np.round(spheres / grain) + np.array([0, 0, 0, 2]))
 
 
-def distance_before(balls: Array, shapes) -> float:
+def distance_before(spheres: Array, shapes) -> float:
     """Return how far from the middle of the media nothing is any more [m].
 
-    An object that turns about the middle of its box stays within the ball about the box.
+    An object that turns about the middle of its box stays within the sphere about the box.
     """
-    middle = _middle(balls)
-    reach = np.linalg.norm(balls[:, :3] - middle, axis=1) + balls[:, 3]
+    middle = _middle(spheres)
+    reach = np.linalg.norm(spheres[:, :3] - middle, axis=1) + spheres[:, 3]
     for shape in shapes:
         low, high = (np.array(corner, dtype=np.float64).ravel() for corner in (shape.bbox().min, shape.bbox().max))
-        ball = np.linalg.norm(0.5 * (low + high) - middle) + 0.5 * np.linalg.norm(high - low)
-        reach = np.append(reach, ball)
+        sphere = np.linalg.norm(0.5 * (low + high) - middle) + 0.5 * np.linalg.norm(high - low)
+        reach = np.append(reach, sphere)
     return float(np.float32(_MARGIN * reach.max()))
 
 
-def directional_fields(axis: Array, balls: Array, back: float, types: ArrayTypes) -> dict[str, Any]:
+def directional_fields(axis: Array, spheres: Array, back: float, types: ArrayTypes) -> dict[str, Any]:
     """Return the fields of a directional `Light` that follow from where it comes from and what it lights.
 
     Parameters
     ----------
     axis
         Unit vector in which the light travels.
-    balls, back
-        From `media_balls` and `distance_before`.
+    spheres, back
+        From `media_spheres` and `distance_before`.
     types
         Of the arrays.
 
@@ -69,15 +69,15 @@ def directional_fields(axis: Array, balls: Array, back: float, types: ArrayTypes
     Valid for any axis. All but the axis is rounded to float32 in any precision, so that its map is the same in all.
     """
     high, low = with_low(axis, types)
-    middle = _middle(balls)
-    across, up, corner = _least_rectangle(axis, balls[:, :3] - middle, balls[:, 3])
-    behind = _MARGIN * float(((balls[:, :3] - middle) @ axis + balls[:, 3]).max())
+    middle = _middle(spheres)
+    across, up, corner = _least_rectangle(axis, spheres[:, :3] - middle, spheres[:, 3])
+    behind = _MARGIN * float(((spheres[:, :3] - middle) @ axis + spheres[:, 3]).max())
     vectors = {"position": middle + corner + behind * axis, "across": across, "up": up}
     made = {name: _vector(vector.astype(np.float32), types) for name, vector in vectors.items()}
     position = made.pop("position")
-    media = types.vector(*(types.scalar(column) for column in balls[:, :3].T))
+    media = types.vector(*(types.scalar(column) for column in spheres[:, :3].T))
     numbers = {"depth": types.scalar(float(np.float32(back + behind))), "back": types.scalar(back)}
-    extent = DirectionalExtent(**made, **numbers, media=media, radii=types.scalar(balls[:, 3]))
+    extent = DirectionalExtent(**made, **numbers, media=media, radii=types.scalar(spheres[:, 3]))
     fields = {"position": position, "axis": _vector(high, types), "axis_low": _vector(low, types), "extent": extent}
     dr.make_opaque(*fields.values())
     return fields
@@ -88,8 +88,8 @@ def extent_spheres(extent: DirectionalExtent) -> Array:
     return np.column_stack([np.array(extent.media, dtype=np.float64).T, np.array(extent.radii, dtype=np.float64)])
 
 
-def _middle(balls: Array) -> Array:
-    centres, radii = balls[:, :3], balls[:, 3:]
+def _middle(spheres: Array) -> Array:
+    centres, radii = spheres[:, :3], spheres[:, 3:]
     return 0.5 * ((centres - radii).min(axis=0) + (centres + radii).max(axis=0))
 
 
@@ -111,8 +111,8 @@ def _least_rectangle(axis: Array, points: Array, radii: Array):
     return across, up, sum(side * (0.5 * (low + high)) for side, (low, high) in zip(sides, ends))
 
 
-def _balls(body: Body) -> Array:
-    """Return the corners of a body of few planes, or its ball."""
+def _spheres(body: Body) -> Array:
+    """Return the corners of a body of few planes, or its sphere."""
     centre, radius = np.array(body.centre, dtype=np.float64).ravel(), float(body.radius[0])
     whole = np.array([[*centre, radius]])
     if body.planes is None or body.count > _FEW_PLANES:

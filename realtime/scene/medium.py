@@ -26,12 +26,12 @@ class Body:
     """A homogeneous medium within convex bounds (`realtime.scene.convex_bounds`)."""
 
     medium: Medium
-    planes: tuple[Any, ...] | None  #: components of the outward normals and offsets of the half spaces; None for a ball
+    planes: tuple[Any, ...] | None  #: components of the outward normals and offsets of half spaces; None for a sphere
     count: int  #: half spaces
-    centre: Any  #: of the ball, or of one that holds the body [m]
-    radius: Any  #: of that ball [m]
+    centre: Any  #: of the sphere, or of one that holds the body [m]
+    radius: Any  #: of that sphere [m]
     mean_distance: Any  #: R, see `realtime.scene.convex_bounds.mean_distance` [m]
-    neighbours: Any = None  #: `sides` numbers a half space: planes that share an edge with it, or itself; None: a ball
+    neighbours: Any = None  #: `sides` numbers a half space: planes that share an edge with it, or itself; None: sphere
     sides: int = 0
 
 

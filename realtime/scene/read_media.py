@@ -131,7 +131,7 @@ def convex_body(medium: Medium, bounds: Bounds, types: ArrayTypes) -> Body:
     radius, distance = (dr.opaque(types.scalar, value) for value in (bounds.radius, mean_distance(bounds)))
     dr.make_opaque(centre)
     body = Body(medium, None, len(bounds.offsets), centre, radius, distance)
-    if bounds.is_ball:
+    if bounds.is_sphere:
         return body
     planes = tuple(types.scalar(column) for column in (*bounds.normals.T, bounds.offsets))
     table = plane_neighbours(bounds)

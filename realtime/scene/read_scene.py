@@ -16,7 +16,7 @@ import numpy as np
 from realtime.errors import InputError
 from realtime.numerics.array_types import ArrayTypes, array_types, is_single
 from realtime.scene.camera import Camera
-from realtime.scene.directional_extent import directional_fields, distance_before, media_balls
+from realtime.scene.directional_extent import directional_fields, distance_before, media_spheres
 from realtime.scene.features import SceneFeatures
 from realtime.scene.lights import Light, spot_fields
 from realtime.scene.medium import Medium
@@ -131,8 +131,8 @@ def _read_directional(emitter, medium: Medium, opaque, types: ArrayTypes) -> Lig
     matrix = np.array(emitter.world_transform().matrix, dtype=np.float64).reshape(4, 4)
     axis = matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])
     arrays: dict[str, Any] = {"intensity": types.color(*(float(c) for c in irradiance))}
-    balls = media_balls(medium.bodies)
-    arrays |= directional_fields(axis, balls, distance_before(balls, opaque), types)
+    spheres = media_spheres(medium.bodies)
+    arrays |= directional_fields(axis, spheres, distance_before(spheres, opaque), types)
     dr.make_opaque(*arrays.values())
     return Light(**arrays)
 

@@ -42,23 +42,23 @@ def test_depths_are_measured_along_the_light(variant):
 @pytest.mark.claim("directional-light-volumes")
 def test_the_face_just_covers_the_media(variant):
     """The corners of the box and the ball fill the rectangle from side to side, and nothing is before or behind it."""
-    from realtime.scene.directional_extent import media_balls
+    from realtime.scene.directional_extent import media_spheres
 
     scene = read(clear_scene(lamp=sun(), cube=cube(), ball=ball()))
-    balls = media_balls(scene.medium.bodies)
-    assert len(balls) == 8 + 1
+    spheres = media_spheres(scene.medium.bodies)
+    assert len(spheres) == 8 + 1
     shadow_map = cast(scene, 4)
     position, across, up, axis = face_of(shadow_map, scene.lights[0])
     for side in (across, up):
         half = np.linalg.norm(side)
-        places = (balls[:, :3] - position) @ side / half  # [m]
+        places = (spheres[:, :3] - position) @ side / half  # [m]
         # It has 0.1 % of its size to spare.
-        assert (places + balls[:, 3]).max() == pytest.approx(half, rel=2e-3)
-        assert (places - balls[:, 3]).min() == pytest.approx(-half, rel=2e-3)
-        assert (places + balls[:, 3]).max() < half
-    depths = (balls[:, :3] - position) @ axis
-    assert (depths + balls[:, 3]).max() < 0
-    assert (depths - balls[:, 3]).min() > -float(shadow_map.projection.depth[0])
+        assert (places + spheres[:, 3]).max() == pytest.approx(half, rel=2e-3)
+        assert (places - spheres[:, 3]).min() == pytest.approx(-half, rel=2e-3)
+        assert (places + spheres[:, 3]).max() < half
+    depths = (spheres[:, :3] - position) @ axis
+    assert (depths + spheres[:, 3]).max() < 0
+    assert (depths - spheres[:, 3]).min() > -float(shadow_map.projection.depth[0])
 
 
 def height_field(scene, size):
