@@ -31,15 +31,15 @@ def claims(scenes: Scenes) -> list[Claim]:
     """Return the claims that follow from the scenes of a report, in the order of the page."""
     if not scenes:
         return []
-    found = _trust(scenes)
+    sentences = _trust(scenes)
     for target in TARGETS:
-        found += _fastest(scenes, target)
-    found += [_left_out(scenes), *_images(scenes), *_failed(scenes)]
+        sentences += _fastest(scenes, target)
+    sentences += [_left_out(scenes), *_images(scenes), *_failed(scenes)]
     refused = [m for m in _methods(scenes) if m[1]["refused"]]
-    found += _listed("refused", "Refused, with the reason in the tables", refused, lambda m: not m.get("left_out"))
+    sentences += _listed("refused", "Refused, with the reason in the tables", refused, lambda m: not m.get("left_out"))
     slow = "Not measured for the time that they take, with the reason in the tables"
-    found += _listed("not-measured", slow, refused, lambda m: bool(m.get("left_out")))
-    return found + _without_flip(scenes)
+    sentences += _listed("not-measured", slow, refused, lambda m: bool(m.get("left_out")))
+    return sentences + _without_flip(scenes)
 
 
 def unstudied(names: Sequence[str], known: Sequence[str]) -> list[Claim]:
@@ -57,10 +57,10 @@ def confirmed(scenes: Scenes) -> bool:
     """Return whether no comparison speaks against the truth, and each layer is confirmed by at least one."""
     for scene in scenes:
         compared = list(scene["agreement"].values())
-        if any(verdict(one) is False for one in compared):
+        if any(verdict(entry) is False for entry in compared):
             return False
-        for layer in {one["layer"] for one in compared}:
-            if not any(verdict(one) for one in compared if one["layer"] == layer):
+        for layer in {entry["layer"] for entry in compared}:
+            if not any(verdict(entry) for entry in compared if entry["layer"] == layer):
                 return False
     return True
 
@@ -71,22 +71,22 @@ def _claim(kind: str, text: str, good: bool | None = None) -> Claim:
 
 def _methods(scenes: Scenes, *, images: bool = False) -> list[tuple[str, Mapping[str, Any]]]:
     """Return the scene's name with every entry of a method, or with every image of an engine."""
-    found = [(scene["name"], one) for scene in scenes for one in scene["methods"]]
-    return [(name, one) for name, one in found if (one.get("kind") == "image") == images]
+    entries = [(scene["name"], entry) for scene in scenes for entry in scene["methods"]]
+    return [(name, entry) for name, entry in entries if (entry.get("kind") == "image") == images]
 
 
 def _trust(scenes: Scenes) -> list[Claim]:
     """Return a claim for each estimator that checked the truth."""
-    compared = [(scene["name"], one) for scene in scenes for one in scene["agreement"].values()]
+    compared = [(scene["name"], entry) for scene in scenes for entry in scene["agreement"].values()]
     if not compared:
         text = "There is no light to compare with Mitsuba's volpath: no airlight and no lit surface in any scene."
         return [_claim("truth", text)]
-    estimators = dict.fromkeys(one["estimator"] for _, one in compared)
+    estimators = dict.fromkeys(entry["estimator"] for _, entry in compared)
     return [_verdict(_WORDS[name], [pair for pair in compared if pair[1]["estimator"] == name]) for name in estimators]
 
 
 def _verdict(words: str, compared: list[tuple[str, Mapping[str, Any]]]) -> Claim:
-    against = [f"{name} ({one['layer']})" for name, one in compared if verdict(one) is False]
+    against = [f"{name} ({entry['layer']})" for name, entry in compared if verdict(entry) is False]
     margin = 100 * compared[0][1]["statistics"]["margin"]
     if against:
         text = (
@@ -94,11 +94,11 @@ def _verdict(words: str, compared: list[tuple[str, Mapping[str, Any]]]) -> Claim
             "interval of the relative bias is not inside the margin."
         )
         return _claim("truth", text, False)
-    open_ = [f"{name} ({one['layer']})" for name, one in compared if verdict(one) is None]
-    good = [one for _, one in compared if verdict(one)]
+    open_ = [f"{name} ({entry['layer']})" for name, entry in compared if verdict(entry) is None]
+    good = [entry for _, entry in compared if verdict(entry)]
     text = ""
     if good:
-        detectable = max(one["statistics"]["detectable_bias"] for one in good)
+        detectable = max(entry["statistics"]["detectable_bias"] for entry in good)
         text = (
             f"The truth is confirmed by {words} in {len(good)} of {len(compared)} comparisons: the 95 % interval of "
             f"the pooled relative bias lies within ±{margin:g} %; the least bias that would have been found is at "
@@ -116,16 +116,16 @@ def _fastest(scenes: Scenes, target: float) -> list[Claim]:
     """Return which method is fastest within a relative RMSE: once where it is the same everywhere, else by scene."""
     best = {scene["name"]: fastest_within(target, scene["methods"]) for scene in scenes}
     words = f"within {100 * target:g} % relative RMSE"
-    labels = {one["label"] if one else None for one in best.values()}
+    labels = {entry["label"] if entry else None for entry in best.values()}
     if len(best) > 1 and len(labels) == 1:
         (label,) = labels
         if label is None:
             text = f"In none of the {len(best)} scenes a method reaches a relative RMSE of {100 * target:g} %."
             return [_claim("fastest", text)]
-        each = ", ".join(f"{name} {_rate(one)}" for name, one in best.items() if one)
+        each = ", ".join(f"{name} {_rate(entry)}" for name, entry in best.items() if entry)
         text = f"In all {len(best)} scenes the fastest method {words} is {label}: {each}."
         return [_claim("fastest", text, True)]
-    return [_of_scene(name, one, words, target) for name, one in best.items()]
+    return [_of_scene(name, entry, words, target) for name, entry in best.items()]
 
 
 def _of_scene(name: str, best: Mapping[str, Any] | None, words: str, target: float) -> Claim:
@@ -139,8 +139,8 @@ def _of_scene(name: str, best: Mapping[str, Any] | None, words: str, target: flo
     return _claim("fastest", text, True)
 
 
-def _rate(one: Mapping[str, Any]) -> str:
-    return f"{one['times']['frame']['median_ms']:.3g} ms"
+def _rate(entry: Mapping[str, Any]) -> str:
+    return f"{entry['times']['frame']['median_ms']:.3g} ms"
 
 
 def _left_out(scenes: Scenes) -> Claim:
@@ -150,13 +150,13 @@ def _left_out(scenes: Scenes) -> Claim:
 
 
 def _images(scenes: Scenes) -> Iterator[Claim]:
-    for scene, one in _methods(scenes, images=True):
-        error = one["error"]
+    for scene, entry in _methods(scenes, images=True):
+        error = entry["error"]
         if not error or error["relative_rmse"] is None:
             continue
-        what = "airlight" if one["layer"] == "airlight" else "total of airlight and surface"
+        what = "airlight" if entry["layer"] == "airlight" else "total of airlight and surface"
         text = (
-            f"The image {one['label']} of {scene}, judged by its {what}: relative RMSE "
+            f"The image {entry['label']} of {scene}, judged by its {what}: relative RMSE "
             f"{100 * error['relative_rmse']:.3g} %, relative bias {100 * error['relative_bias']:+.3g} %."
         )
         yield _claim("image", text)

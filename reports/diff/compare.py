@@ -27,13 +27,13 @@ class Difference:
     @property
     def worse(self) -> tuple[Finding, ...]:
         """What makes the comparison fail."""
-        return tuple(one for one in self.findings if one.verdict == "worse")
+        return tuple(finding for finding in self.findings if finding.verdict == "worse")
 
     def to_json(self) -> dict[str, Any]:
         """Return everything, ready for JSON."""
         times = {name: value for name, value in asdict(self.times).items() if name != "findings"}
-        found = {"worse": len(self.worse), "findings": [asdict(one) for one in self.findings]}
-        return found | {"errors_compared": self.errors, "times": times}
+        summary = {"worse": len(self.worse), "findings": [asdict(finding) for finding in self.findings]}
+        return summary | {"errors_compared": self.errors, "times": times}
 
 
 def compare_reports(
@@ -74,8 +74,8 @@ def compare_reports(
             findings.append(Finding(gone, name, "", "the scene is gone"))
             continue
         findings += compare_truth(before[name], after[name], gone)
-        found, count = compare_methods(before[name], after[name], tolerance=error_tolerance, gone=gone)
-        findings += found
+        differences, count = compare_methods(before[name], after[name], tolerance=error_tolerance, gone=gone)
+        findings += differences
         compared += count
     findings += [Finding("note", name, "", "the scene is new") for name in after if name not in before]
     times = compare_times(old, new, tolerance=time_tolerance)
@@ -86,4 +86,4 @@ def compare_reports(
             "give two reports of the same scenes with the same effort"
         )
     rank = {"worse": 0, "better": 1, "note": 2}
-    return Difference(tuple(sorted(findings, key=lambda one: rank[one.verdict])), compared, times)
+    return Difference(tuple(sorted(findings, key=lambda finding: rank[finding.verdict])), compared, times)

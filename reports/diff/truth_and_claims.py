@@ -38,9 +38,9 @@ def compare_claims(old: Report, new: Report) -> Iterator[Finding]:
 def _claims(old: Report, new: Report) -> Iterator[Finding]:
     """Compare the verdicts at the top: of each kind, how many are bad."""
     before, after = old["claims"], new["claims"]
-    for kind in dict.fromkeys(one["kind"] for one in (*before, *after)):
+    for kind in dict.fromkeys(entry["kind"] for entry in (*before, *after)):
         bad = [
-            [one["text"] for one in claims if one["kind"] == kind and one["good"] is False]
+            [entry["text"] for entry in claims if entry["kind"] == kind and entry["good"] is False]
             for claims in (before, after)
         ]
         if len(bad[1]) > len(bad[0]):
@@ -51,7 +51,7 @@ def _claims(old: Report, new: Report) -> Iterator[Finding]:
 
 def _stability(old: Report, new: Report) -> Iterator[Finding]:
     """Compare which kernels break their bars."""
-    before, after = ({one["kernel"]: one["broken"] for one in report["stability"]} for report in (old, new))
+    before, after = ({entry["kernel"]: entry["broken"] for entry in report["stability"]} for report in (old, new))
     for kernel in before:
         if kernel in after and after[kernel] and not before[kernel]:
             yield Finding("worse", "", kernel, f"breaks its bar: {after[kernel][0]}")
@@ -63,7 +63,7 @@ def _mutations(old: Report, new: Report) -> Iterator[Finding]:
     """Compare how many faults of the physics the checks of the truth miss."""
     if not (old.get("mutations") and new.get("mutations")):
         return
-    before, after = ((one["count"] - one["caught"]) for one in (old["mutations"], new["mutations"]))
+    before, after = ((entry["count"] - entry["caught"]) for entry in (old["mutations"], new["mutations"]))
     if before != after:
         yield Finding("worse" if after > before else "better", "", "", "faults that nothing catches", before, after)
 
@@ -72,9 +72,9 @@ def compare_winners(before: Mapping[str, Report], after: Mapping[str, Report]) -
     """Say where another method is the fastest; which one it is may change within the noise."""
     for name in [name for name in before if name in after]:
         for target in TARGETS:
-            one, two = (_fastest(scene, target) for scene in (before[name], after[name]))
-            if one != two:
-                words = f"fastest within {100 * target:g} %: {one or 'none'} before, {two or 'none'} now"
+            was, is_now = (_fastest(scene, target) for scene in (before[name], after[name]))
+            if was != is_now:
+                words = f"fastest within {100 * target:g} %: {was or 'none'} before, {is_now or 'none'} now"
                 yield Finding("note", name, "", words)
 
 

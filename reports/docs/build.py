@@ -71,9 +71,9 @@ def build_docs(source: Path, output: Path) -> str:
         ):
             assert process.stdout is not None
             for line in process.stdout:
-                found = _PROGRESS.search(line)
-                if found:
-                    begin, length = _PARTS[found[1]]
-                    progress(begin + length * int(found[2]) / 100, found[3])
+                told = _PROGRESS.search(line)
+                if told:
+                    begin, length = _PARTS[told[1]]
+                    progress(begin + length * int(told[2]) / 100, told[3])
         status = process.returncode
         return complaints.read_text(encoding="utf-8").strip() or f"Sphinx ended with {status}" if status else ""

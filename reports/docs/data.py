@@ -47,21 +47,21 @@ def refresh(data: Path, *, report: Path | None = None, kernels: Path | None = No
         If a file is not what it should be; nothing is written then.
     """
     path = data / "report.json"
-    found: dict[str, Any] = {"schema": SCHEMA, "kernels": None}
+    kept: dict[str, Any] = {"schema": SCHEMA, "kernels": None}
     if path.exists():
-        found = _read_object(path, "the data of the documentation")
+        kept = _read_object(path, "the data of the documentation")
     pictures: dict[str, bytes] = {}
     if report is not None:
         content = read_report(report)
-        found |= kept_of_report(content)
-        pictures = pictures_of(report, content, found)
+        kept |= kept_of_report(content)
+        pictures = pictures_of(report, content, kept)
     if kernels is not None:
         costs = _read_object(kernels, "what `airlight bench --kernels --json` prints")
-        found["kernels"] = kept_of_kernels(costs, kernels)
+        kept["kernels"] = kept_of_kernels(costs, kernels)
     ensure_folder(data)
     for name, content_of in pictures.items():
         write_bytes(data / name, content_of)
-    write_text(path, json.dumps(found, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+    write_text(path, json.dumps(kept, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
     return [path, *(data / name for name in pictures)]
 
 
@@ -93,7 +93,7 @@ def kept_of_report(report: dict[str, Any]) -> dict[str, Any]:
 
 
 def _kept_scene(scene: dict[str, Any]) -> dict[str, Any]:
-    built_in = [one for one in scene["methods"] if one["kind"] == "built-in"]
+    built_in = [entry for entry in scene["methods"] if entry["kind"] == "built-in"]
     return {
         "name": scene["name"],
         "size": scene["size"],
@@ -102,17 +102,17 @@ def _kept_scene(scene: dict[str, Any]) -> dict[str, Any]:
         "counts": counts(scene["name"]),
         "truth": scene["truth"],
         "multiple": scene["multiple"],
-        "methods": [_kept_method(one) for one in built_in],
+        "methods": [_kept_method(entry) for entry in built_in],
     }
 
 
-def _kept_method(one: dict[str, Any]) -> dict[str, Any]:
-    times = {name: one["times"][name] for name in ("frame", "airlight", "light_moved")} if one["times"] else None
-    error = {name: one["error"][name] for name in _ERRORS} if one["error"] else None
-    return {name: one[name] for name in _METHOD} | {"times": times, "error": error}
+def _kept_method(entry: dict[str, Any]) -> dict[str, Any]:
+    times = {name: entry["times"][name] for name in ("frame", "airlight", "light_moved")} if entry["times"] else None
+    error = {name: entry["error"][name] for name in _ERRORS} if entry["error"] else None
+    return {name: entry[name] for name in _METHOD} | {"times": times, "error": error}
 
 
-def stale_scenes(found: dict[str, Any]) -> list[str]:
+def stale_scenes(kept: dict[str, Any]) -> list[str]:
     """Return what is older than the accuracy baselines, a line for each scene; empty where nothing is.
 
     The images of the documentation are larger than those of the baselines, so errors cannot be compared one by one.
@@ -121,15 +121,15 @@ def stale_scenes(found: dict[str, Any]) -> list[str]:
 
     Parameters
     ----------
-    found
+    kept
         The content of `docs/data/report.json`.
     """
     from validation.configurations.methods import STANDARD
     from validation.frames.baseline_files import read_baseline
 
     stale = []
-    standard = {one.label for one in STANDARD}
-    for scene in found["scenes"]:
+    standard = {configuration.label for configuration in STANDARD}
+    for scene in kept["scenes"]:
         name, baseline = scene["name"], read_baseline(scene["name"])
         if baseline is None:
             stale.append(f"{name}: there is no such scene any more")
@@ -138,7 +138,7 @@ def stale_scenes(found: dict[str, Any]) -> list[str]:
             measured, now = scene.get("baseline"), baseline["revision"]
             stale.append(f"{name}: measured with revision {measured} of its baseline, now it is {now}")
         kept = {label: entry.get("refused") for label, entry in baseline["configurations"].items() if label in standard}
-        shown = {one["label"]: one["refused"] for one in scene["methods"]}
+        shown = {entry["label"]: entry["refused"] for entry in scene["methods"]}
         stale += [f"{name}: {label} is not what it was" for label in kept if kept[label] != shown.get(label, "absent")]
         stale += [f"{name}: {label} is gone" for label in shown if label not in kept]
     return stale
@@ -170,28 +170,32 @@ def kept_of_kernels(costs: dict[str, Any], path: Path) -> dict[str, Any]:
         raise InputError(f"{path}: wanted what `airlight bench --kernels --json` prints, {error} is missing") from error
 
 
-def pictures_of(folder: Path, report: dict[str, Any], found: dict[str, Any]) -> dict[str, bytes]:
-    """Return the pictures by file name, and put into `found` which frame shows which method."""
+def pictures_of(folder: Path, report: dict[str, Any], kept: dict[str, Any]) -> dict[str, bytes]:
+    """Return the pictures by file name, and put into `kept` which frame shows which method."""
     scenes = {scene["name"]: scene for scene in report["scenes"] if scene["path"] is None}
     pictures = {f"scene-{name}.png": small(folder / scene["files"]["picture"]) for name, scene in scenes.items()}
-    found["pictures"] = {}
+    kept["pictures"] = {}
     if not scenes:
         return pictures
     shown = next((scenes[name] for name in SHOWN if name in scenes), next(iter(scenes.values())))
-    for method in dict.fromkeys(one["method"] for one in shown["methods"]):
-        one = _typical([one for one in shown["methods"] if one["method"] == method and one["files"] and one["error"]])
-        if one is None:
+    for method in dict.fromkeys(entry["method"] for entry in shown["methods"]):
+        entry = _typical(
+            [entry for entry in shown["methods"] if entry["method"] == method and entry["files"] and entry["error"]]
+        )
+        if entry is None:
             continue
-        error = one["error"]["relative_rmse"]
-        found["pictures"][method] = {"scene": shown["name"], "label": one["label"], "relative_rmse": error}
+        error = entry["error"]["relative_rmse"]
+        kept["pictures"][method] = {"scene": shown["name"], "label": entry["label"], "relative_rmse": error}
         for kind, suffix in (("picture", ""), ("error", "-error")):
-            pictures[f"method-{method}{suffix}.png"] = small(folder / one["files"][kind])
+            pictures[f"method-{method}{suffix}.png"] = small(folder / entry["files"][kind])
     return pictures
 
 
 def _typical(candidates: list[dict[str, Any]]) -> dict[str, Any] | None:
     """Return the configuration that shows a method: few parameters set, little error."""
-    return min(candidates, key=lambda one: (len(one["parameters"]), one["error"]["relative_rmse"] or 0), default=None)
+    return min(
+        candidates, key=lambda entry: (len(entry["parameters"]), entry["error"]["relative_rmse"] or 0), default=None
+    )
 
 
 def small(path: Path) -> bytes:

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The documentation's numbers and pictures come from a report, whole or not at all."""
 
-import copy
 import io
 import json
 from pathlib import Path
@@ -13,7 +12,6 @@ from PIL import Image
 from analytic.errors import InputError
 from reports.docs.data import LARGEST, WIDTH, refresh, small, stale_scenes
 from tests.helpers.reports import checked, entry, refused, report_of, scene, timing
-from validation.frames.baseline_files import read_baseline
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -129,28 +127,28 @@ def test_the_numbers_of_the_documentation_are_not_older_than_the_baselines(commi
     )
 
 
-def test_stale_numbers_are_told(committed):
+def test_stale_numbers_are_told(monkeypatch):
     """An older revision of a baseline, a refusal that is gone, a configuration too many, too few."""
-    fresh = copy.deepcopy(committed)
-    (scene,) = fresh["scenes"] = [one for one in fresh["scenes"] if one["name"] == "windows"]
-    scene["baseline"] = read_baseline("windows")["revision"]
-    assert stale_scenes(fresh) == []
+    label = "min-max (exact)"
+    accurate, refused = {"airlight": {"relative_rmse": 0.01}}, {"refused": "no such light"}
+    configurations = {"unshadowed (exact)": accurate, label: refused, "unshadowed (uniform)": accurate}
+    baseline = {"revision": 3, "configurations": configurations}
+    monkeypatch.setattr(
+        "validation.frames.baseline_files.read_baseline", lambda name: baseline if name == "windows" else None
+    )
+    # Kernels that only baselines measure are not asked for.
+    methods = [{"label": "unshadowed (exact)", "refused": None}, {"label": label, "refused": "no such light"}]
+    fresh = {"name": "windows", "baseline": 3, "methods": methods}
 
-    def told(change):
-        changed = copy.deepcopy(fresh)
-        change(changed["scenes"][0])
-        return stale_scenes(changed)
+    def told(**changes):
+        return stale_scenes({"scenes": [fresh | changes]})
 
-    assert told(lambda scene: scene.update(baseline=1))[0].startswith("windows: measured with revision 1")
-    refused = next(number for number, one in enumerate(scene["methods"]) if one["refused"])
-    label = scene["methods"][refused]["label"]
-    assert told(lambda scene: scene["methods"][refused].update(refused=None)) == [
-        f"windows: {label} is not what it was"
-    ]
-    assert told(lambda scene: scene["methods"].pop(refused)) == [f"windows: {label} is not what it was"]
-    extra = scene["methods"][0] | {"label": "new"}
-    assert told(lambda scene: scene["methods"].append(extra)) == ["windows: new is gone"]
-    assert told(lambda scene: scene.update(name="nowhere")) == ["nowhere: there is no such scene any more"]
+    assert told() == []
+    assert told(baseline=2) == ["windows: measured with revision 2 of its baseline, now it is 3"]
+    assert told(methods=[methods[0], methods[1] | {"refused": None}]) == [f"windows: {label} is not what it was"]
+    assert told(methods=methods[:1]) == [f"windows: {label} is not what it was"]
+    assert told(methods=[*methods, {"label": "new", "refused": None}]) == ["windows: new is gone"]
+    assert told(name="nowhere") == ["nowhere: there is no such scene any more"]
 
 
 def test_pictures_are_small(tmp_path):
