@@ -243,7 +243,7 @@ def test_a_light_that_moves_between_frames(variant):
             moved = replace(renderer[one], scene=there)
             frames.append(image_frame(moved, run_stages(moved, moved.prepare(there))).airlight)
         assert differ(frames[-1], frames[-2]) < 1e-5
-    assert renderer["walk"].airlight.n_recordings == 1
+    assert renderer["walk"].render.n_recordings == 1
     assert np.max(np.abs(frames[0] - frames[-1])) > 0.01 * np.max(frames[0])
 
 
