@@ -120,12 +120,11 @@ def test_the_command_runs_every_part_and_its_status_is_theirs(checkout, monkeypa
 def test_ctrl_c_leaves_the_record_of_the_last_run(checkout, monkeypatch, capfd):
     run_all([pytest_part()], checkout, machine="the last run")
     kept = (checkout / RECORD).read_text(), (checkout / "docs/verification.md").read_text()
-    interrupt = Part(
-        "slow",
-        ["-c", "import os, signal, time; os.kill(os.getppid(), signal.SIGINT); time.sleep(30)"],
-        "argument",
-        None,
-    )
+
+    def interrupted(content):
+        raise KeyboardInterrupt
+
+    interrupt = Part("slow", ["-c", ""], "output", interrupted)
     monkeypatch.setattr("reports.commands.test.__file__", str(checkout / "reports/commands/test.py"))
     monkeypatch.chdir(checkout)
     monkeypatch.setattr(full_run, "all_parts", lambda sharing: [pytest_part(), interrupt])
