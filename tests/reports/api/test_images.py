@@ -220,7 +220,7 @@ def test_what_cannot_be_rendered_is_refused(arguments, words, variant):
 # The truth
 
 
-def test_the_truth_with_its_bound(variant):
+def test_the_truth_with_its_bound(variant, own_cache):
     told = []
     scene = airlight.load_scene("sphere-spot", TINY)
     truth = airlight.reference(scene, progress=lambda share, what: told.append((share, what)))

@@ -147,7 +147,8 @@ def test_interrupted_run_leaves_the_file_and_says_what_is_kept(variant, tmp_path
     monkeypatch.setattr(validation.estimates.monte_carlo, "volpath_batch", interrupted)
     run(tmp_path / "a.exr", "--spp", "64", status=130)
     captured = capfd.readouterr()
-    assert captured.err == "interrupted: 5 finished batches are kept; run again to go on\n"
+    # Before it, on a busy machine, lines of progress.
+    assert captured.err.splitlines()[-1] == "interrupted: 5 finished batches are kept; run again to go on"
     assert captured.out == ""
     assert (tmp_path / "a.exr").read_text() == "an older file"
     monkeypatch.setattr(validation.estimates.monte_carlo, "volpath_batch", trace)
