@@ -101,7 +101,7 @@ def _integral(ray: ParallelRay, piece: Piece, x0, x1):
                 end = dr.minimum(end, one.until)
             channels = _linear_channels(ray, piece, slopes, at, x, end)
         else:
-            end = dr.minimum(_next_bend(ray, at, x1), x + _THICK / _largest_extinction(piece.medium))
+            end = dr.minimum(_next_facet_change(ray, at, x1), x + _THICK / _largest_extinction(piece.medium))
             channels = _node_channels(ray, piece, x, end)
         return count + 1, dr.maximum(end, at), total + Color(*channels)
 
@@ -137,7 +137,7 @@ def _linear_channels(ray: ParallelRay, piece: Piece, slopes, at, x, end) -> list
     return channels
 
 
-def _next_bend(ray: ParallelRay, at, x1):
+def _next_facet_change(ray: ParallelRay, at, x1):
     """Return where the legs bend next beyond `at`, or the end of the segment."""
     end = x1
     for one in ray.seen:

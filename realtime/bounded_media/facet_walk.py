@@ -232,10 +232,10 @@ def clear_of(planes: tuple[EntryPlanes, EntryPlanes], start, direction, x0, x1):
     return clear & ~planes[0].within
 
 
-def next_bend(planes: EntryPlanes, start, direction, entry: Entry):
+def next_facet_change(planes: EntryPlanes, start, direction, entry: Entry):
     """Return where legs pass to another plane next [m], infinite where they do not, and that plane.
 
-    A bend that lies behind by rounding is returned as it is: whoever walks goes on from where he is.
+    Rounding can place the change behind the point; it is returned as it is, and the walk continues from its own place.
     """
 
     def sooner(best, other, line):

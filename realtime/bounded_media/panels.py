@@ -30,7 +30,7 @@ import drjit as dr
 import mitsuba as mi
 
 from realtime.bounded_media.convex_clip import Seen, inverse_crossings
-from realtime.bounded_media.facet_walk import Entry, EntryPlanes, first_entry, next_bend
+from realtime.bounded_media.facet_walk import Entry, EntryPlanes, first_entry, next_facet_change
 from realtime.numerics.array_types import is_single
 from realtime.numerics.fast_exp import exp_bounded
 from realtime.numerics.gauss_legendre import unit_nodes
@@ -111,7 +111,7 @@ def _walk_from(one: BodySegment, x):
 def _bend(one: BodySegment, walk: Entry):
     if one.planes is None:
         return type(walk.constant)(dr.inf), walk
-    return next_bend(one.planes, one.start, one.direction, walk)
+    return next_facet_change(one.planes, one.start, one.direction, walk)
 
 
 def _panel_length(one: BodySegment, walk: Entry, *, s, square, h, length):

@@ -24,7 +24,7 @@ def published(
     limit: Annotated[
         float, typer.Option(help="billeter: frames that take longer are left out, with the reason [s].")
     ] = 30.0,
-    needless: Annotated[
+    zero_cost: Annotated[
         bool, typer.Option(help="biri: also measure that casters which are not there or not seen cost nothing.")
     ] = True,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
@@ -60,7 +60,7 @@ def published(
     data: dict[str, Any] = {}
     with progress_bar("published") as progress:
         if "biri" in papers:
-            data |= _biri(wanted, names, scale=scale, needless=needless, progress=progress)
+            data |= _biri(wanted, names, scale=scale, zero_cost=zero_cost, progress=progress)
         if "billeter" in papers:
             data |= _billeter(wanted, names[0], scale=scale, maps=sizes, limit=limit, progress=progress)
     if json:
@@ -108,7 +108,7 @@ def _wanted_scenes(scenes: str | None, papers: Sequence[str]) -> list[str]:
 
 
 def _biri(
-    wanted: Sequence[str], kernels: Sequence[str], *, scale: float, needless: bool, progress: Callable
+    wanted: Sequence[str], kernels: Sequence[str], *, scale: float, zero_cost: bool, progress: Callable
 ) -> dict[str, Any]:
     """Measure the tables of Biri 2006, nothing where none of their scenes is wanted."""
     from reports.papers.biri import biri_data
@@ -119,9 +119,9 @@ def _biri(
     if not chosen:
         return {}
     rows = biri_rows(chosen, kernels, scale=scale, progress=progress)
-    if needless:
+    if zero_cost:
         progress(0.99, "what is not needed")
-    costs = zero_costs(size=(round(800 * scale), round(600 * scale))) if needless else []
+    costs = zero_costs(size=(round(800 * scale), round(600 * scale))) if zero_cost else []
     return biri_data(rows, costs)
 
 

@@ -30,13 +30,13 @@ def biri_data(rows: Sequence[Any], costs: Sequence[Any]) -> dict[str, Any]:
     return {
         "stages": list(STAGES),
         "rows": [plain(row) | {"shares": [float(share) for share in row.shares]} for row in rows],
-        "needless": plain(costs),
+        "zero_cost": plain(costs),
     }
 
 
 def biri_tables(data: Data) -> list[Table]:
     """Return the tables: shares of the stages, frames a second, and what is not needed if that was measured."""
-    costs = [_cost_table(data["needless"])] if data["needless"] else []
+    costs = [_cost_table(data["zero_cost"])] if data["zero_cost"] else []
     return [_share_table(data), _rate_table(data["rows"]), *costs]
 
 

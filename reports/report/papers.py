@@ -17,7 +17,7 @@ from validation.frames.scene_study import Effort
 class OtherPart:
     """A part of a report that belongs to no scene."""
 
-    kind: str  #: 'stability', 'mutations', 'biri', 'needless' or 'billeter'
+    kind: str  #: 'stability', 'mutations', 'biri', 'zero_cost' or 'billeter'
     title: str  #: for the progress
     entry: CacheEntry
     compute: Callable[[Progress], Computed]
@@ -46,9 +46,9 @@ def published_data(results: Mapping[str, Sequence[CachedResult]]) -> dict[str, A
         return None
     tables = None
     if biri:
-        needless = [cost for result in results.get("needless", ()) for cost in result.data["costs"]]
+        zero_cost = [cost for result in results.get("zero_cost", ()) for cost in result.data["costs"]]
         rows = [row for result in biri for row in result.data["rows"]]
-        tables = {"stages": biri[-1].data["stages"], "rows": rows, "needless": needless}
+        tables = {"stages": biri[-1].data["stages"], "rows": rows, "zero_cost": zero_cost}
     return {"biri": tables, "billeter": billeter[-1].data if billeter else None}
 
 
@@ -82,9 +82,9 @@ def _biri(effort: Effort, scenes: Sequence[str], cache: ResultCache) -> list[Oth
 
     parts = [part(published) for published in PUBLISHED if published.scene in scenes]
     if parts and "billeter" in effort.papers:  # the effort that leaves nothing out
-        entry = cache_entry(cache, "needless", identity={})
+        entry = cache_entry(cache, "zero_cost", identity={})
         costs = OtherPart(
-            "needless", "what is not needed", entry, lambda progress: ({"costs": plain(zero_costs())}, {})
+            "zero_cost", "what is not needed", entry, lambda progress: ({"costs": plain(zero_costs())}, {})
         )
         parts.append(costs)
     return parts

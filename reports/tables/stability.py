@@ -91,14 +91,14 @@ def set_table(one: Entry) -> Table:
     def rows() -> Iterator[Entry]:
         for group, single in one["single"].items():
             double, both = one["double"][group], one["single_against_double"][group]["max"]
-            written = {"single": boost(single, "single"), "double": boost(double, "double")}
+            written = {"single": in_epsilons(single, "single"), "double": in_epsilons(double, "double")}
             odd = {"odd": _odd(single), "double_odd": _odd(double)}
             yield {**single, **written, **odd, "group": group, "refused": single["refused"] or "", "both": both}
 
     return table(one["name"], columns, rows())
 
 
-def boost(errors: Entry, precision: str) -> str:
+def in_epsilons(errors: Entry, precision: str) -> str:
     """Return 'Max = 3.2ε (Mean = 0.4ε)', a dash where nothing was compared."""
     if errors["max"] is None or errors["mean"] is None:
         return "-"
@@ -130,8 +130,8 @@ def gamma_table(by_precision: Mapping[str, Entry]) -> Table:
         {
             **one["difference"],
             "precision": precision,
-            "direct": boost(one["direct"], precision),
-            "difference": boost(one["difference"], precision),
+            "direct": in_epsilons(one["direct"], precision),
+            "difference": in_epsilons(one["difference"], precision),
             "rounding": f"Max = {number(one['max_rounding'])} (Median = {number(one['median_rounding'])})",
         }
         for precision, one in by_precision.items()

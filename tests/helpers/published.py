@@ -32,7 +32,7 @@ BIRI = {
         }
         for kernel, size, note in (("exact", [800, 600], "a note"), ("taylor", [80, 60], ""))
     ],
-    "needless": [
+    "zero_cost": [
         {"what": "unseen", "ratio": 1.013, "low": 0.99, "high": 1.03, "with_ms": 2.0, "without_ms": 1.97, "turns": 60}
     ],
 }

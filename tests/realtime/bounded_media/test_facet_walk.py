@@ -67,7 +67,7 @@ def least_of_all(name, light, v):
 def test_a_walk_meets_the_least_of_all_planes_everywhere(variant, name, light, precision):
     import drjit as dr
 
-    from realtime.bounded_media.facet_walk import entry_planes, first_entry, next_bend
+    from realtime.bounded_media.facet_walk import entry_planes, first_entry, next_facet_change
 
     light = np.array(light)
     seen, types = seen_body(name, light, precision)
@@ -79,7 +79,7 @@ def test_a_walk_meets_the_least_of_all_planes_everywhere(variant, name, light, p
     for _ in range(60):
         if np.all(x == high):
             break
-        until, beyond = next_bend(planes, v0, d, entry)
+        until, beyond = next_facet_change(planes, v0, d, entry)
         dr.eval(until, entry, beyond)
         end = np.minimum(np.array(until, dtype=np.float64), high)
         for share in (0.01, 0.5, 0.99):

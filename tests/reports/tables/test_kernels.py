@@ -8,7 +8,7 @@ from reports.commands.stability import stability as command
 from reports.data.serialize import plain
 from reports.tables.drawing import text
 from reports.tables.kernels import convergence_data, kernel_tables, order_table
-from reports.tables.stability import boost
+from reports.tables.stability import in_epsilons
 from validation.kernels.benchmark import KernelBench, KernelCost, Spread, speed_against_error
 from validation.kernels.convergence import Convergence
 from validation.kernels.errors import Errors
@@ -18,8 +18,8 @@ ERRORS = Errors(3, 0, 2.0**-23, 1e-6, 2.0**-20, 2.0**-22, 0, 0, 0, None)
 
 
 def test_errors_are_printed_in_the_manner_of_boost():
-    assert boost(plain(ERRORS), "single") == "Max = 8ε (Mean = 2ε)"
-    assert boost(plain(Errors(0, 3, None, None, None, None, 0, 0, 0, None)), "double") == "-"
+    assert in_epsilons(plain(ERRORS), "single") == "Max = 8ε (Mean = 2ε)"
+    assert in_epsilons(plain(Errors(0, 3, None, None, None, None, 0, 0, 0, None)), "double") == "-"
 
 
 def test_costs_and_levels_are_printed():

@@ -52,7 +52,7 @@ def test_command_prints_both_tables_beside_the_published_figures(variant, monkey
         return measured
 
     monkeypatch.setattr("validation.papers.biri.biri_rows", once)
-    arguments = ["published", "--scenes", "two-pens", "--kernels", "exact", "--scale", "0.03", "--no-needless"]
+    arguments = ["published", "--scenes", "two-pens", "--kernels", "exact", "--scale", "0.03", "--no-zero-cost"]
     assert cli.run([*arguments, "--markdown"]) == 0
     out = capfd.readouterr().out
     assert "| two-pens: Table 1, Fig. 7a | 1 % | 8.7 % | 21.7 % | 9.6 % | 59 % | - |" in out
