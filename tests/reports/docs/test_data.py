@@ -119,7 +119,6 @@ def committed():
     return json.loads((ROOT / "docs/data/report.json").read_text(encoding="utf-8"))
 
 
-@pytest.mark.xfail(strict=True, reason="the numbers are from before upright walls: a quiet machine must measure them")
 def test_the_numbers_of_the_documentation_are_not_older_than_the_baselines(committed):
     stale = stale_scenes(committed)
     assert not stale, "\n".join(
