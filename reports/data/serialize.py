@@ -12,7 +12,7 @@ from validation.comparison.engine_images import ImageMeasurement
 from validation.frames.baseline_files import read_baseline
 from validation.frames.benchmark import Measurement, knows_shadows
 from validation.frames.scene_study import SceneStudy
-from validation.metrics.errors import plain as plain
+from validation.metrics.errors import plain
 
 
 def scene_facts(study: SceneStudy) -> dict[str, Any]:

@@ -21,7 +21,6 @@ from analytic.errors import InputError
 from reference.storage.files import ensure_folder
 from reports.data.claims import claims, unstudied
 from reports.data.reader import SCHEMA
-from reports.data.serialize import plain
 from reports.machine.environment import describe_environment
 from reports.machine.progress import Interrupted, Progress, part_of
 from reports.page.render import render_page
@@ -33,6 +32,7 @@ from validation.comparison.engine_images import EngineImage, images_size
 from validation.configurations.methods import STANDARD, Configuration
 from validation.frames.result_cache import CachedResult, ResultCache, cached_result, now, result_cache, sweep_results
 from validation.frames.scene_study import Effort, open_study
+from validation.metrics.errors import plain
 from validation.scenes.registry import SCENES
 
 #: Modules that make what is kept, besides the four sides.

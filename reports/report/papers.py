@@ -5,12 +5,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from reports.data.serialize import mutations_data, plain
+from reports.data.serialize import mutations_data
 from reports.machine.progress import Progress, counted, part_of
 from reports.papers.billeter import billeter_data
 from reports.papers.biri import biri_data
 from validation.frames.result_cache import CachedResult, CacheEntry, Computed, ResultCache, cache_entry
 from validation.frames.scene_study import Effort
+from validation.metrics.errors import plain
 
 
 @dataclass(frozen=True)

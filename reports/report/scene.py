@@ -14,7 +14,7 @@ import numpy as np
 
 from analytic.errors import InputError
 from reference.storage.exr import Image, write_exr
-from reports.data.serialize import image_data, measurement_data, plain, scene_facts, truth_data
+from reports.data.serialize import image_data, measurement_data, scene_facts, truth_data
 from reports.machine.environment import stamped, threads
 from reports.machine.progress import Progress, part_of
 from reports.plotting.pictures import error_map, exposure, png_bytes, tone_mapped
@@ -33,6 +33,7 @@ from validation.frames.result_cache import (
     store_result,
 )
 from validation.frames.scene_study import SceneStudy, check_truth, study_configuration, study_multiple, with_flips
+from validation.metrics.errors import plain
 from validation.metrics.flip import Flip
 
 #: Files of a report by what they are.

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from reports.data.serialize import measurement_data, plain, truth_data
+from reports.data.serialize import measurement_data, truth_data
 from validation.configurations.methods import Configuration
 from validation.frames.benchmark import Measurement
+from validation.metrics.errors import plain
 
 
 @dataclass(frozen=True)

@@ -5,13 +5,13 @@ import pytest
 import typer
 
 from reports.commands.stability import stability as command
-from reports.data.serialize import plain
 from reports.tables.drawing import text
 from reports.tables.kernels import convergence_data, kernel_tables, order_table
 from reports.tables.stability import in_epsilons
 from validation.kernels.benchmark import KernelBench, KernelCost, Spread, speed_against_error
 from validation.kernels.convergence import Convergence
 from validation.kernels.errors import Errors
+from validation.metrics.errors import plain
 
 SPREAD = Spread(7.5, 7.25, 8.0, 9)
 ERRORS = Errors(3, 0, 2.0**-23, 1e-6, 2.0**-20, 2.0**-22, 0, 0, 0, None)
