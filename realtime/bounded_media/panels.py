@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Panels of few nodes along a ray in a body: as many as the bends of the legs and the depth of the medium ask for.
+"""Panels of few nodes along a ray in a bounded medium: as many as the bends of the legs and its depth ask for.
 
-The integral is that of `realtime.bounded_media.airlight` over a segment in a body that the leg from the light enters
+The integral is that of `realtime.bounded_media.airlight` over a segment in a medium that the leg from the light enters
 on its way, and enters no other. With r the distance from the light, u(x) from `realtime.bounded_media.facet_walk` and
-rho = r/u what of the leg lies before the body,
+rho = r/u what of the leg lies before the medium,
 
-    tau = tau_before + sigma_t (x - x_begin + r - rho) + sigma_0 rho,      sigma_0 of what surrounds the bodies.
+    tau = tau_before + sigma_t (x - x_begin + r - rho) + sigma_0 rho,      sigma_0 of what surrounds the bounded media.
 
 Between two bends all of this is smooth. A panel ends at a bend, and sooner where it would
 
@@ -48,23 +48,23 @@ _STEEP, _LEAST = 0.2, 0.002  # share for a sphere, and of its radius in any case
 
 
 @dataclass(frozen=True)
-class BodySegment:
-    """What the integrals over parts of rays in one body need."""
+class MediumSegment:
+    """What the integrals over parts of rays in one bounded medium need."""
 
-    medium: Medium  #: of the body
-    around: tuple[Any, ...] | None  #: extinction of what surrounds the bodies [1/m]; None for clear air
+    medium: Medium  #: what scatters in it
+    around: tuple[Any, ...] | None  #: extinction of what surrounds the bounded media [1/m]; None for clear air
     light: Light
     geometry: RayGeometry
     start: Any  #: from the light to the camera [m]
     direction: Any
-    begin: Any  #: where the rays enter the body [m]
+    begin: Any  #: where the rays enter the medium [m]
     before: tuple[Any, ...]  #: optical depth from the camera to there, by channel
-    seen: Seen  #: the body as the light sees it
+    seen: Seen  #: the bounded medium as the light sees it
     planes: EntryPlanes | None  #: None for a sphere
 
 
-def body_integral(one: BodySegment, x0, x1):
-    """Return albedo sigma_t times the integral from x0 to x1 within the body, RGB [1/m^2]."""
+def medium_integral(one: MediumSegment, x0, x1):
+    """Return albedo sigma_t times the integral from x0 to x1 within the medium, RGB [1/m^2]."""
     Float, Color = type(x0), type(one.medium.albedo)
     foot = one.geometry.foot
     # A ray through the light itself: its integral is infinite, and so nearly is this.
@@ -101,20 +101,20 @@ def body_integral(one: BodySegment, x0, x1):
     return one.medium.albedo * Color(*channels)
 
 
-def _walk_from(one: BodySegment, x):
+def _walk_from(one: MediumSegment, x):
     """Return the plane where legs enter; of a sphere nothing needs to be known."""
     if one.planes is None:
         return Entry(dr.zeros(mi.UInt32, dr.width(x)), x * 0, x * 0)
     return first_entry(one.planes, one.start, one.direction, x)
 
 
-def _bend(one: BodySegment, walk: Entry):
+def _bend(one: MediumSegment, walk: Entry):
     if one.planes is None:
         return type(walk.constant)(dr.inf), walk
     return next_facet_change(one.planes, one.start, one.direction, walk)
 
 
-def _panel_length(one: BodySegment, walk: Entry, *, s, square, h, length):
+def _panel_length(one: MediumSegment, walk: Entry, *, s, square, h, length):
     """Return the length of a panel: the whole `length`, or an equal part of it [m]."""
     x = s + one.geometry.foot
     u = dr.fma(walk.slope, x, walk.constant)
@@ -134,13 +134,13 @@ def _panel_length(one: BodySegment, walk: Entry, *, s, square, h, length):
     return length / dr.maximum(dr.ceil(length / most), 1)
 
 
-def _sphere_length(one: BodySegment, x):
+def _sphere_length(one: MediumSegment, x):
     """Return the length in which the square of half the chord that legs have in a sphere changes by a share of it [m].
 
     The part of the leg in the sphere is like the root of it: steep where legs graze the sphere. With w from the light
     to the middle of the sphere it is radius^2 - |v x w|^2/|v|^2.
     """
-    radius, w = one.seen.body.radius, one.seen.toward
+    radius, w = one.seen.bounded_medium.radius, one.seen.toward
     v = dr.fma(one.direction, x, one.start)
     cross, square = dr.cross(v, w), dr.squared_norm(v)
     distance = dr.squared_norm(cross) / square
@@ -149,14 +149,14 @@ def _sphere_length(one: BodySegment, x):
     return dr.clip(_STEEP * chord / dr.abs(rate), _LEAST * radius, 0.25 * radius)
 
 
-def _largest_tangent(one: BodySegment):
+def _largest_tangent(one: MediumSegment):
     turn = one.medium.phase.largest_turn()
     if one.light.soft:
         turn = dr.minimum(turn, 0.4)
     return _TANGENT * turn
 
 
-def _panel(one: BodySegment, walk: Entry, *, ends, squares, h) -> list[Any]:
+def _panel(one: MediumSegment, walk: Entry, *, ends, squares, h) -> list[Any]:
     """Return the integrals of p exp(-tau) / r^2 over a panel, by channel."""
     s0, s1 = ends
     Float = type(s0)
@@ -171,7 +171,7 @@ def _panel(one: BodySegment, walk: Entry, *, ends, squares, h) -> list[Any]:
         s = dr.fma(length, far / dr.fma(1 - t, product, far), s0)
         x = s + one.geometry.foot
         r = dr.sqrt(dr.fma(s, s, h * h))
-        before = _before_body(one, walk, x, r)
+        before = _before_medium(one, walk, x, r)
         inside = (x - one.begin) + (r - before)
         weight = share * one.medium.phase.evaluate(-s / r) / dr.fma(t * t, tangent, 1)
         if one.light.soft:
@@ -184,8 +184,8 @@ def _panel(one: BodySegment, walk: Entry, *, ends, squares, h) -> list[Any]:
     return [scale * total for total in totals]
 
 
-def _before_body(one: BodySegment, walk: Entry, x, r):
-    """Return what of the leg to a point within the body lies before it [m]."""
+def _before_medium(one: MediumSegment, walk: Entry, x, r):
+    """Return what of the leg to a point within the medium lies before it [m]."""
     if one.planes is None:
         (u,), _ = inverse_crossings(one.seen, one.start, one.direction, [x], True)
         return r / dr.maximum(u, 1)

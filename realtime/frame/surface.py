@@ -139,7 +139,7 @@ def lit_surface(scene, surface: VisibleSurface, *, medium: Medium, light: Light,
     if shadows:
         lit &= ~scene.ray_test(light.shadow_ray_from(surface.interaction), lit)
     reflected = surface.albedo * arriving * (dr.inv_pi * cosine / dr.square(r) if light.w else dr.inv_pi * cosine)
-    if medium.bodies:
+    if medium.bounded_media:
         kept = path_transmittance(medium, light, depths=depths, point=surface.point, active=lit)
     else:
         kept = transmittance(medium, dr.select(lit, surface.distance + r, 0))

@@ -98,7 +98,7 @@ def mesh_bounds(name: str, vertices: Array, faces: NDArray[Any]) -> Bounds:
     offsets = np.mean(np.sum(corners[sound] * normals[:, None], axis=2), axis=1)
     normals, offsets = _merged(normals, offsets, size)
     if np.any(vertices @ normals.T > offsets + 2 * _FLAT * size):
-        raise _refusal(name, "is not convex", "convex bounds: cut the body into convex parts")
+        raise _refusal(name, "is not convex", "convex bounds: cut the shape into convex parts")
     centre = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
     radius = float(np.linalg.norm(vertices - centre, axis=1).max())
     return Bounds(name, normals, offsets, corners, centre, radius)

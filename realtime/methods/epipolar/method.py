@@ -234,7 +234,8 @@ def _sampled_shares(view: View, number: int, kernel, samples: Samples, heights: 
 
     lane = spread(dr.width(marked))
     if view.features.bounded:
-        # The planes of bodies are written to a table first, which no branch may do: empty room repeats the last sample.
+        # The planes of bounded media are written to a table first, which no branch may do: empty room repeats the last
+        # sample.
         computed(dr.minimum(lane, dr.maximum(count, 1) - 1))
     else:
         # Most of the room is empty: a branch steps over it.

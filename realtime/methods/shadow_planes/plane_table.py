@@ -208,8 +208,8 @@ def _joined(one: Planes, other: Planes) -> Planes:
 def layers_between(casters: Casters, light: Array, basis: LightBasis, *, used: NDArray[np.bool_]) -> int:
     """Return how many layers lie between a light and the camera of their basis.
 
-    A closed body counts the larger number of its triangles that face the light and that are averted: the two differ
-    where the light or the camera is inside, and then all beyond is dark.
+    A closed component counts the larger number of its triangles that face the light and that are averted: the two
+    differ where the light or the camera is inside, and then all beyond is dark.
     """
     l, w = place_and_weight(light)  # noqa: E741
     axes = basis.axes
@@ -229,16 +229,19 @@ def layers_between(casters: Casters, light: Array, basis: LightBasis, *, used: N
     # The axis runs through x = y = 0: most triangles lie aside, all three corners beyond it on one of four sides.
     x, y = axes[:2] @ casters.vertices.T - (axes[:2] @ start)[:, None]
     sides = (x > 0) | (x < 0).view(np.uint8) << 1 | (y > 0).view(np.uint8) << 2 | (y < 0).view(np.uint8) << 3
-    number = np.flatnonzero(near[casters.body])
+    number = np.flatnonzero(near[casters.component])
     one, other, third = casters.triangles[number].T
     number = number[sides[one] & sides[other] & sides[third] == 0]
     if not len(number):
         return 0
     crossed = number[_crosses(casters, number, (start, direction), reach)]
     sign = np.sign(casters.normals[crossed] @ l - w * casters.offsets[crossed])
-    body = casters.body[crossed]
-    bodies = len(casters.closed)
-    front, back = np.bincount(body[sign > 0], minlength=bodies), np.bincount(body[sign < 0], minlength=bodies)
+    component = casters.component[crossed]
+    components = len(casters.closed)
+    front, back = (
+        np.bincount(component[sign > 0], minlength=components),
+        np.bincount(component[sign < 0], minlength=components),
+    )
     return int(np.where(casters.closed, np.maximum(front, back), front + back).sum())
 
 
@@ -285,7 +288,7 @@ def index_planes(
     camera
         Position of the camera [m].
     used
-        By body, whether its shadow can be seen.
+        By component, whether its shadow can be seen.
     types
         The array types to use, see `realtime.numerics.array_types`.
     ring

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Convex bounds against bodies whose planes, volume and mean distance are known."""
+"""Convex bounds of shapes whose planes, volume and mean distance are known."""
 
 import numpy as np
 import pytest
@@ -12,13 +12,13 @@ from validation.scenes.solids import box, icosphere, prism, star
 TURN = rotation((0.3, 1.0, 0.2), 27.3)
 
 
-def bounds(mesh, name="body"):
+def bounds(mesh, name="solid"):
     vertices, faces = mesh
     return mesh_bounds(name, vertices.astype(np.float32).astype(np.float64), faces)
 
 
-def ball(centre, radius):
-    return Bounds("ball", np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3, 3)), np.array(centre), radius)
+def sphere_bounds(centre, radius):
+    return Bounds("sphere", np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3, 3)), np.array(centre), radius)
 
 
 def test_a_box_has_six_planes_not_twelve():
@@ -47,37 +47,37 @@ def test_many_facets_stay_many_planes():
 @pytest.mark.parametrize(
     ("mesh", "message"),
     [
-        (lambda: prism(star(0.3, 0.9, 5), 0.4), "'body' bounds a medium and is not convex"),
+        (lambda: prism(star(0.3, 0.9, 5), 0.4), "'solid' bounds a medium and is not convex"),
         (lambda: (box((1.0, 1.1, 1.2))[0], box((1.0, 1.1, 1.2))[1][:, ::-1]), "inside out"),
         (lambda: (box((1.0, 1.1, 1.2))[0], box((1.0, 1.1, 1.2))[1][1:]), "not a closed surface"),
         (lambda: (box((1.0, 1.1, 1.2))[0] * (1, 1, 0), box((1.0, 1.1, 1.2))[1]), "has no volume|not a closed"),
     ],
 )
-def test_refusals_name_the_body_and_the_flaw(mesh, message):
+def test_refusals_name_the_shape_and_the_flaw(mesh, message):
     with pytest.raises(InputError, match=message):
         bounds(mesh())
 
 
 @pytest.mark.parametrize("gap", [-0.01, 0.01])
-def test_bodies_overlap_as_soon_as_they_do(gap):
+def test_bounds_overlap_as_soon_as_they_do(gap):
     """Pairs at a distance known from their sizes."""
-    ball_one = ball((0.0, 0.0, 0.0), 0.7)
+    sphere = sphere_bounds((0.0, 0.0, 0.0), 0.7)
     cube = box((1.0, 1.2, 1.4))
-    assert overlap(ball_one, ball((1.2 + gap, 0.0, 0.0), 0.5)) == (gap < 0)
-    assert overlap(ball_one, bounds(placed(cube, (1.2 + gap, 0.1, 0.0)))) == (gap < 0)
-    # At an edge of the cube: its distance from the centre of the ball counts, not its planes'.
+    assert overlap(sphere, sphere_bounds((1.2 + gap, 0.0, 0.0), 0.5)) == (gap < 0)
+    assert overlap(sphere, bounds(placed(cube, (1.2 + gap, 0.1, 0.0)))) == (gap < 0)
+    # At an edge of the cube: its distance from the centre of the sphere counts, not its planes'.
     corner = (0.7 + gap) / np.sqrt(2)
-    assert overlap(bounds(placed(cube, (0.5 + corner, 0.6 + corner, 0.0))), ball_one) == (gap < 0)
+    assert overlap(bounds(placed(cube, (0.5 + corner, 0.6 + corner, 0.0))), sphere) == (gap < 0)
     assert overlap(bounds(cube), bounds(placed(cube, (1.0 + gap, 0.3, 0.2)))) == (gap < 0)
 
 
-def test_a_body_within_another_overlaps_it():
+def test_bounds_within_another_overlaps_it():
     assert overlap(bounds(box((2.0, 2.1, 2.2))), bounds(box((0.2, 0.3, 0.4))))
-    assert overlap(ball((0.1, 0.0, 0.0), 0.2), bounds(box((2.0, 2.1, 2.2))))
+    assert overlap(sphere_bounds((0.1, 0.0, 0.0), 0.2), bounds(box((2.0, 2.1, 2.2))))
 
 
-def test_mean_distance_of_a_ball_is_six_fifths_of_its_radius():
-    assert mean_distance(ball((1.0, 2.0, 3.0), 0.83)) == pytest.approx(1.2 * 0.83)
+def test_mean_distance_of_a_sphere_is_six_fifths_of_its_radius():
+    assert mean_distance(sphere_bounds((1.0, 2.0, 3.0), 0.83)) == pytest.approx(1.2 * 0.83)
     # 1280 facets lie within 0.5 % of the sphere, the sum over random pairs within 0.2 % (one standard error).
     assert mean_distance(bounds(icosphere(3))) == pytest.approx(1.2, rel=0.01)
 

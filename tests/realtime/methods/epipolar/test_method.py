@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from realtime.errors import InputError
-from tests.helpers.scenes import body, clear_scene, spot, tiny_scene
+from tests.helpers.scenes import bounded_medium, clear_scene, spot, tiny_scene
 
 SIZE = (48, 36)
 MAP = 256
@@ -125,7 +125,7 @@ def test_bounded_media(variant, sampling):
     import mitsuba as mi
 
     occluders = {name: tiny_scene()[name] for name in ("ball", "floor")}
-    smoke = body({"type": "sphere", "center": [-0.2, 0.3, 0.9], "radius": 1.3}, 0.7, (0.9, 0.8, 0.7))
+    smoke = bounded_medium({"type": "sphere", "center": [-0.2, 0.3, 0.9], "radius": 1.3}, 0.7, (0.9, 0.8, 0.7))
     scene = mi.load_dict(clear_scene(size=SIZE, smoke=smoke, **occluders))
     expected = marched(scene)
     settings = {"sampling": sampling, "slices": 200, "samples": 128, "step": 4}
@@ -142,9 +142,9 @@ def test_without_casters_it_is_the_unshadowed_frame(variant, sampling):
 
 @pytest.mark.parametrize("sampling", ["slices", "pixels"])
 def test_where_no_shadow_is_seen_it_is_unshadowed(variant, sampling):
-    """A ball behind the light: there is a map, and nothing in view is dark."""
-    ball = {"type": "sphere", "center": [4.9, 5.7, 2.9], "radius": 0.41}
-    scene = scene_with(ball=ball, floor=None)
+    """A sphere behind the light: there is a map, and nothing in view is dark."""
+    sphere = {"type": "sphere", "center": [4.9, 5.7, 2.9], "radius": 0.41}
+    scene = scene_with(ball=sphere, floor=None)
     found = render(scene, "min-max", sampling=sampling, step=1, samples=128, slices=200)
     expected = render(scene, "unshadowed")
     # Every pixel by itself: rounding. Between samples: what is interpolated is smooth, but not linear.

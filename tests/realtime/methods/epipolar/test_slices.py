@@ -30,9 +30,9 @@ def read(position, *, kind="point", **changes):
     if kind == "spot":
         aim = mi.ScalarTransform4f().look_at(list(position), [0.1, 2.4, -0.9], [1, 0, 0])
         lamp = {"type": "spot", "to_world": aim, "cutoff_angle": 37.0, "beam_width": 37.0, "intensity": 1.0}
-    ball = {"type": "sphere", "center": [0.3, 1.6, 0.6], "radius": 0.41}
+    sphere = {"type": "sphere", "center": [0.3, 1.6, 0.6], "radius": 0.41}
     floor = {"type": "rectangle", "to_world": mi.ScalarTransform4f().translate([0, 0, -1]).scale(6.3)}
-    scene = tiny_scene(size=SIZE, **({"lamp": lamp, "ball": ball, "floor": floor} | changes))
+    scene = tiny_scene(size=SIZE, **({"lamp": lamp, "ball": sphere, "floor": floor} | changes))
     scene["sensor"] = scene["sensor"] | {"to_world": look}
     return read_scene(mi.load_dict(scene))
 

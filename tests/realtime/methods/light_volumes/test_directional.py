@@ -8,7 +8,19 @@ import numpy as np
 import pytest
 
 from tests.helpers.scenes import clear_scene, tiny_scene
-from tests.helpers.sunlit import ALONG, ball, box_part, cube, read, relative_rmse, render, shaded, summed, sun, unit
+from tests.helpers.sunlit import (
+    ALONG,
+    box_part,
+    cube,
+    fog_sphere,
+    read,
+    relative_rmse,
+    render,
+    shaded,
+    summed,
+    sun,
+    unit,
+)
 from validation.scenes.parts import rotation
 
 
@@ -41,11 +53,11 @@ def test_depths_are_measured_along_the_light(variant):
 
 @pytest.mark.claim("directional-light-volumes")
 def test_the_face_just_covers_the_media(variant):
-    """The corners of the box and the ball fill the rectangle from side to side, and nothing is before or behind it."""
+    """The corners of the box and the sphere fill the rectangle from side to side; nothing is before or behind it."""
     from realtime.scene.directional_extent import media_spheres
 
-    scene = read(clear_scene(lamp=sun(), cube=cube(), ball=ball()))
-    spheres = media_spheres(scene.medium.bodies)
+    scene = read(clear_scene(lamp=sun(), cube=cube(), ball=fog_sphere()))
+    spheres = media_spheres(scene.medium.bounded_media)
     assert len(spheres) == 8 + 1
     shadow_map = cast(scene, 4)
     position, across, up, axis = face_of(shadow_map, scene.lights[0])
@@ -110,7 +122,7 @@ def test_the_error_falls_as_the_map_grows(variant):
         return relative_rmse(render(loaded, "light-volumes", map=size, walls=walls).airlight, truth)
 
     errors = [error(size, "slanted") for size in (32, 128, 512, 2048)]
-    # As 1/size where shadow edges are crossed, as its root for the few rays that graze the shadow of the ball.
+    # As 1/size where shadow edges are crossed, as its root for the few rays that graze the shadow of the sphere.
     assert all(other < 0.65 * one for one, other in pairwise(errors))
     assert errors[-1] < 5e-3
     # Walls that stand upright where rays found them are worth a map of eight times the size.
@@ -127,7 +139,7 @@ def test_marching_with_the_map_comes_to_the_same(variant):
     assert relative_rmse(marched, walked) < 5e-3
 
 
-def test_a_map_of_rays_that_miss_all_bodies(variant):
+def test_a_map_of_rays_that_miss_all_media(variant):
     """A camera that looks away from the media: points at infinity have no place in a map."""
     scene = shaded(size=(8, 8), floor=None)
     import mitsuba as mi

@@ -103,8 +103,8 @@ def unit(vector):
     return vector / np.linalg.norm(vector)
 
 
-def test_no_body_is_dropped_whose_parallel_shadow_is_seen(variant):
-    from realtime.methods.shadow_planes.view_culling import bodies_in_view
+def test_no_component_is_dropped_whose_parallel_shadow_is_seen(variant):
+    from realtime.methods.shadow_planes.view_culling import components_in_view
 
     rng = np.random.default_rng(12)
     dropped = 0
@@ -112,12 +112,12 @@ def test_no_body_is_dropped_whose_parallel_shadow_is_seen(variant):
         casters = boxes(rng, 8)
         along, origin, target = rng.normal(size=(3, 3)) * 3
         camera = camera_at(origin, target)
-        used = bodies_in_view(casters, camera, np.append(-unit(along), 0.0))
-        for body, (low, high) in enumerate(casters.boxes):
+        used = components_in_view(casters, camera, np.append(-unit(along), 0.0))
+        for component, (low, high) in enumerate(casters.boxes):
             points = rng.uniform(low, high, (4000, 3))
             beyond = rng.exponential(10, (len(points), 1)) * (rng.random((len(points), 1)) < 0.9)
             if sees(camera, points + beyond * unit(along)).any():
-                assert used[body]
+                assert used[component]
         dropped += int(np.sum(~used))
     assert dropped > 20
 

@@ -26,14 +26,14 @@ def determinant(a, b, c):
 
 
 def layers_over(casters, light, way):
-    """How many layers lie over a direction, triangle by triangle: those of a closed body that face the light."""
+    """How many layers lie over a direction, triangle by triangle: those of a closed component that face the light."""
     a, b, c = (casters.vertices[casters.triangles[:, k]] - light for k in range(3))
     towards = -determinant(a, b, c)  # the normal is turned to the light if the corners run clockwise from outside
     sides = np.stack([determinant(p, q, way) for p, q in ((a, b), (b, c), (c, a))])
     hit = np.all(sides > 0, axis=0) | np.all(sides < 0, axis=0)
     # All corners lie on the far side of the light, or the three sides agree behind it.
     hit &= np.sign(determinant(a, b, c)) * sides[0] > 0
-    counts = hit & ((towards > 0) | (~casters.closed[casters.body] & (towards != 0)))
+    counts = hit & ((towards > 0) | (~casters.closed[casters.component] & (towards != 0)))
     return int(counts.sum())
 
 
@@ -143,7 +143,7 @@ def test_any_triangles_and_any_light(vertices, faces, light, seed):
     flips=st.lists(st.booleans(), min_size=2, max_size=2),
 )
 def test_tetrahedra_either_way_round(corners, light, flips):
-    """Closed bodies, one or both of which may be inside out, flat, or about the light."""
+    """Closed components, one or both of which may be inside out, flat, or about the light."""
     faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
     parts = [faces[:, ::-1] if flip else faces for flip in flips]
     casters = casters_of((np.array(corners, dtype=float), np.concatenate([parts[0], parts[1] + 4])))
@@ -153,7 +153,7 @@ def test_tetrahedra_either_way_round(corners, light, flips):
 
 
 @pytest.mark.parametrize("turned", [False, True])
-def test_closed_body_has_the_silhouette_of_the_paper(turned):
+def test_closed_component_has_the_silhouette_of_the_paper(turned):
     """The edges between a facing and an averted triangle, whichever side is out."""
     vertices, faces = closed_sphere()
     casters = casters_of((vertices, faces[:, ::-1] if turned else faces))
@@ -177,7 +177,7 @@ def test_light_inside_a_convex_caster_has_no_silhouette():
     assert len(silhouette(casters_of(closed_box()), np.array([-0.1, 0.15, 0.1])).edges) == 0
 
 
-def test_only_bodies_in_use_are_looked_at():
+def test_only_components_in_use_are_looked_at():
     both = casters_of(SOUND["nested spheres"]())
     light = np.array(LIGHTS["aside"])
     parts = [silhouette(both, light, used=np.array(used)) for used in ((True, False), (False, True))]
@@ -202,7 +202,7 @@ def test_loops_use_every_edge_once(name):
     assert used == wanted
 
 
-def test_ball_has_one_loop_and_two_balls_two():
+def test_sphere_has_one_loop_and_two_spheres_two():
     light = np.array(LIGHTS["aside"])
     assert len(link_loops(silhouette(casters_of(closed_sphere()), light))) == 1
     assert len(link_loops(silhouette(casters_of(SOUND["nested spheres"]()), light))) == 2

@@ -20,7 +20,7 @@ def map_of(kind: str, size: int, **changes):
 
 
 def assert_closed(mesh):
-    """Every edge has two triangles of opposite direction, and the surface is one ball: no vertex twice."""
+    """Every edge has two triangles of opposite direction, and the surface is one sphere: no vertex twice."""
     ends = np.concatenate([mesh.triangles[:, [k, (k + 1) % 3]] for k in range(3)]).astype(np.int64)
     count = len(mesh.vertices)
     keys = ends[:, 0] * count + ends[:, 1]
