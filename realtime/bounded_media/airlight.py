@@ -139,8 +139,8 @@ def lit_ray(
     geometry = ray_geometry(origin, direction, light, low=low)
     # The published form needs no legs from the light.
     known = () if form != "exact" else views or light_views(medium, light)
-    seen, entries = tuple(one.seen for one in known), tuple(one.entering for one in known)
-    exits = tuple(one.leaving for one in known) if len(known) > 1 else ()
+    seen, entries = tuple(view.seen for view in known), tuple(view.entering for view in known)
+    exits = tuple(view.leaving for view in known) if len(known) > 1 else ()
     return PlacedRay(medium, light, geometry, origin - light.position, direction, pieces, seen, entries, exits, form)
 
 
@@ -168,7 +168,7 @@ def _piece_integral(ray: MediaRay, piece: Piece, x0, x1):
     if piece.number is None or ray.form != "exact":
         return _integral(ray, piece, x0, x1)
     number = piece.number
-    one = MediumSegment(
+    segment = MediumSegment(
         medium=piece.medium,
         around=None if ray.medium.clear else ray.medium.sigma_t,
         light=ray.light,
@@ -181,12 +181,12 @@ def _piece_integral(ray: MediaRay, piece: Piece, x0, x1):
         planes=ray.entries[number],
     )
     if len(ray.seen) == 1:
-        return medium_integral(one, x0, x1)
+        return medium_integral(segment, x0, x1)
     return dr.if_stmt(
         args=(x0, x1),
         cond=other_media_near(ray, number, x0, x1),
         true_fn=lambda x0, x1: _integral(ray, piece, x0, x1),
-        false_fn=lambda x0, x1: medium_integral(one, x0, x1),
+        false_fn=lambda x0, x1: medium_integral(segment, x0, x1),
     )
 
 

@@ -73,8 +73,8 @@ def inverse_crossings(seen: Seen, start, direction, distances, active, *, leaves
         leaves.
     """
     if seen.bounded_medium.planes is None:
-        found = [_sphere_crossings(seen, start + direction * x) for x in distances]
-        return [one for one, _ in found], [other for _, other in found]
+        crossings = [_sphere_crossings(seen, start + direction * x) for x in distances]
+        return [enter for enter, _ in crossings], [leave for _, leave in crossings]
     Float = type(start.x)
     width = dr.width(start, direction, active, *distances)
     enter = [dr.full(Float, dr.inf, width) for _ in distances]
@@ -113,9 +113,9 @@ def _sphere_crossings(seen: Seen, v):
     root = dr.sqrt(dr.maximum(inner, 0))
     q = b + dr.mulsign(root, b)
     # From outside u is the larger root to enter and the smaller one to leave; from inside only the positive one counts.
-    one, other = q / c, a / q
-    enter = dr.select(c > 0, dr.select((inner > 0) & (b > 0), dr.maximum(one, other), -1), dr.inf)
-    leave = dr.select(c > 0, dr.minimum(one, other), dr.maximum(one, other))
+    first_root, second_root = q / c, a / q
+    enter = dr.select(c > 0, dr.select((inner > 0) & (b > 0), dr.maximum(first_root, second_root), -1), dr.inf)
+    leave = dr.select(c > 0, dr.minimum(first_root, second_root), dr.maximum(first_root, second_root))
     return enter, leave
 
 

@@ -86,7 +86,7 @@ class ParallelRay:
 
 def _integral(ray: ParallelRay, piece: Piece, x0, x1):
     """Integrate one segment in one piece, from bend to bend."""
-    linear = all(_has_few_planes(one) for one in ray.seen)
+    linear = all(_has_few_planes(seen) for seen in ray.seen)
     Float, Color = type(x0), type(ray.medium.albedo)
     reach = piece.begin + _DARK / least_extinction(piece.medium)
     x1 = dr.minimum(x1, reach)
@@ -95,10 +95,10 @@ def _integral(ray: ParallelRay, piece: Piece, x0, x1):
     def step(count, x, total):
         at = x + slack * (x + 1)
         if linear:
-            slopes = [slope_from(one, ray.origin, ray.direction, at) for one in ray.seen]
+            slopes = [slope_from(seen, ray.origin, ray.direction, at) for seen in ray.seen]
             end = x1
-            for one in slopes:
-                end = dr.minimum(end, one.until)
+            for slope in slopes:
+                end = dr.minimum(end, slope.until)
             channels = _linear_channels(ray, piece, slopes, at, x, end)
         else:
             end = dr.minimum(_next_facet_change(ray, at, x1), x + _THICK / _largest_extinction(piece.medium))
@@ -121,14 +121,14 @@ def _has_few_planes(seen: ParallelSeen) -> bool:
 
 def _linear_channels(ray: ParallelRay, piece: Piece, slopes, at, x, end) -> list[Any]:
     """Return the integral from x to end, by channel, where the legs are linear."""
-    lengths = [[dr.maximum(dr.fma(one.rate, here - at, one.length), 0) for one in slopes] for here in (x, end)]
+    lengths = [[dr.maximum(dr.fma(slope.rate, here - at, slope.length), 0) for slope in slopes] for here in (x, end)]
     channels = []
     for channel, own in enumerate(piece.medium.sigma_t):
         depths = []
         for here, parts in zip((x, end), lengths):
             depth = dr.fma(own, here - piece.begin, piece.before[channel])
-            for one, length in zip(ray.seen, parts):
-                depth = dr.fma(one.bounded_medium.medium.sigma_t[channel], length, depth)
+            for seen, length in zip(ray.seen, parts):
+                depth = dr.fma(seen.bounded_medium.medium.sigma_t[channel], length, depth)
             depths.append(depth)
         z = dr.maximum(dr.abs(depths[1] - depths[0]), 1e-30)
         tangent = dr.tanh(0.5 * z)
@@ -140,11 +140,11 @@ def _linear_channels(ray: ParallelRay, piece: Piece, slopes, at, x, end) -> list
 def _next_facet_change(ray: ParallelRay, at, x1):
     """Return where the legs bend next beyond `at`, or the end of the segment."""
     end = x1
-    for one in ray.seen:
-        if one.planes is None:
-            end = dr.minimum(end, cylinder_bend(one, ray.origin, ray.direction, at))
-        elif _has_few_planes(one):
-            end = dr.minimum(end, slope_from(one, ray.origin, ray.direction, at).until)
+    for seen in ray.seen:
+        if seen.planes is None:
+            end = dr.minimum(end, cylinder_bend(seen, ray.origin, ray.direction, at))
+        elif _has_few_planes(seen):
+            end = dr.minimum(end, slope_from(seen, ray.origin, ray.direction, at).until)
     return end
 
 
@@ -162,14 +162,14 @@ def _node_channels(ray: ParallelRay, piece: Piece, x, end) -> list[Any]:
 
 def _attenuation(ray: ParallelRay, piece: Piece, xs) -> list[list[Any]]:
     """Return exp(-tau) of both legs, by node and channel."""
-    insides = [parallel_legs(one, ray.origin, ray.direction, xs) for one in ray.seen]
+    insides = [parallel_legs(seen, ray.origin, ray.direction, xs) for seen in ray.seen]
     result = []
     for node, x in enumerate(xs):
         channels = []
         for channel, own in enumerate(piece.medium.sigma_t):
             depth = piece.before[channel] + own * (x - piece.begin)
-            for one, inside in zip(ray.seen, insides):
-                depth += one.bounded_medium.medium.sigma_t[channel] * inside[node]
+            for seen, inside in zip(ray.seen, insides):
+                depth += seen.bounded_medium.medium.sigma_t[channel] * inside[node]
             channels.append(exp_bounded(-depth))
         result.append(channels)
     return result

@@ -117,20 +117,20 @@ def _nearest_planes(seen: Seen, side: int):
     first, second = (Float(part) * (2 / _CELLS) + (1 / _CELLS - 1) for part in (cell % _CELLS, cell // _CELLS))
     v = middle + across * (first * scale) + up * (second * scale)
 
-    def nearer(number, least, found):
+    def nearer(number, least, nearest):
         values = dr.gather(Four, seen.planes, number)
         value = dr.dot(values.xyz * side, v)
         less = ((values.w > 0) == (side > 0)) & (value < least)
-        return number + 1, dr.select(less, value, least), dr.select(less, number, found)
+        return number + 1, dr.select(less, value, least), dr.select(less, number, nearest)
 
     width = dr.width(v)
-    _, _, found = dr.while_loop(
+    _, _, nearest = dr.while_loop(
         state=(mi.UInt32(0), dr.full(Float, dr.inf, width), dr.full(mi.UInt32, seen.bounded_medium.count, width)),
-        cond=lambda number, least, found: number < seen.bounded_medium.count,
+        cond=lambda number, least, nearest: number < seen.bounded_medium.count,
         body=nearer,
-        labels=("number", "least", "found"),
+        labels=("number", "least", "nearest"),
     )
-    return found
+    return nearest
 
 
 def _start(planes: EntryPlanes, v):
@@ -167,8 +167,8 @@ def first_entry(planes: EntryPlanes, start, direction, x, active=True) -> Entry:
             less = least < at
             return tuple(dr.select(less, new, old) for new, old in zip((other, *line), best))
 
-        found = _over_neighbours(planes, number, (number, constant, slope), start, direction, nearer)
-        return turn + 1, *found, searches & (found[0] != number)
+        least_plane = _over_neighbours(planes, number, (number, constant, slope), start, direction, nearer)
+        return turn + 1, *least_plane, searches & (least_plane[0] != number)
 
     width = dr.width(start, direction, x, active)
     number = _start(planes, dr.fma(direction, x, start))
@@ -233,7 +233,7 @@ def clear_of(planes: tuple[EntryPlanes, EntryPlanes], start, direction, x0, x1):
     """
     clear = dr.mask_t(x0)(False)
     for x in (0.5 * (x0 + x1), x0, x1):
-        enter, leave = (first_entry(one, start, direction, x) for one in planes)
+        enter, leave = (first_entry(facing, start, direction, x) for facing in planes)
         short, beside = dr.mask_t(x)(True), dr.mask_t(x)(True)
         for end in (x0, x1):
             u = dr.fma(enter.slope, end, enter.constant)
@@ -256,8 +256,8 @@ def next_facet_change(planes: EntryPlanes, start, direction, entry: Entry):
         return tuple(dr.select(less, new, old) for new, old in zip((at, other, *line), best))
 
     none = (type(entry.constant)(dr.inf), entry.number, entry.constant, entry.slope)
-    until, *found = _over_neighbours(planes, entry.number, none, start, direction, sooner)
-    return until, Entry(*found)
+    until, *next_plane = _over_neighbours(planes, entry.number, none, start, direction, sooner)
+    return until, Entry(*next_plane)
 
 
 def _over_neighbours(planes: EntryPlanes, number, state, start, direction, function):

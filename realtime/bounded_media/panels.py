@@ -63,23 +63,23 @@ class MediumSegment:
     planes: EntryPlanes | None  #: None for a sphere
 
 
-def medium_integral(one: MediumSegment, x0, x1):
+def medium_integral(segment: MediumSegment, x0, x1):
     """Return albedo sigma_t times the integral from x0 to x1 within the medium, RGB [1/m^2]."""
-    Float, Color = type(x0), type(one.medium.albedo)
-    foot = one.geometry.foot
+    Float, Color = type(x0), type(segment.medium.albedo)
+    foot = segment.geometry.foot
     # A ray through the light itself: its integral is infinite, and so nearly is this.
-    h = dr.maximum(one.geometry.height, 1e-15)
+    h = dr.maximum(segment.geometry.height, 1e-15)
     last = x1 - foot
-    walk = _walk_from(one, x0)
+    walk = _walk_from(segment, x0)
 
     def panel(turn, s, square, walk, totals):
-        until, beyond = _bend(one, walk)
+        until, beyond = _bend(segment, walk)
         until = dr.clip(until - foot, s, last)
-        end = s + _panel_length(one, walk, s=s, square=square, h=h, length=until - s)
+        end = s + _panel_length(segment, walk, s=s, square=square, h=h, length=until - s)
         bends = end >= until
         end = dr.minimum(end, until)
         end_square = dr.fma(end, end, h * h)
-        parts = _panel(one, walk, ends=(s, end), squares=(square, end_square), h=h)
+        parts = _panel(segment, walk, ends=(s, end), squares=(square, end_square), h=h)
         walk = dr.select(bends, beyond, walk)
         return turn + 1, end, end_square, walk, [total + part for total, part in zip(totals, parts)]
 
@@ -91,42 +91,42 @@ def medium_integral(one: MediumSegment, x0, x1):
             s,
             dr.fma(s, s, h * h),
             walk,
-            [dr.zeros(Float, width) for _ in one.before],
+            [dr.zeros(Float, width) for _ in segment.before],
         ),
         cond=lambda turn, s, square, walk, totals: (s < last) & (turn < _MOST),
         body=panel,
         labels=("turn", "s", "square", "walk", "totals"),
     )
-    channels = [sigma * total for sigma, total in zip(one.medium.sigma_t, totals)]
-    return one.medium.albedo * Color(*channels)
+    channels = [sigma * total for sigma, total in zip(segment.medium.sigma_t, totals)]
+    return segment.medium.albedo * Color(*channels)
 
 
-def _walk_from(one: MediumSegment, x):
+def _walk_from(segment: MediumSegment, x):
     """Return the plane where legs enter; of a sphere nothing needs to be known."""
-    if one.planes is None:
+    if segment.planes is None:
         return Entry(dr.zeros(mi.UInt32, dr.width(x)), x * 0, x * 0)
-    return first_entry(one.planes, one.start, one.direction, x)
+    return first_entry(segment.planes, segment.start, segment.direction, x)
 
 
-def _bend(one: MediumSegment, walk: Entry):
-    if one.planes is None:
+def _bend(segment: MediumSegment, walk: Entry):
+    if segment.planes is None:
         return type(walk.constant)(dr.inf), walk
-    return next_facet_change(one.planes, one.start, one.direction, walk)
+    return next_facet_change(segment.planes, segment.start, segment.direction, walk)
 
 
-def _panel_length(one: MediumSegment, walk: Entry, *, s, square, h, length):
+def _panel_length(segment: MediumSegment, walk: Entry, *, s, square, h, length):
     """Return the length of a panel: the whole `length`, or an equal part of it [m]."""
-    x = s + one.geometry.foot
+    x = s + segment.geometry.foot
     u = dr.fma(walk.slope, x, walk.constant)
     slope = dr.abs(walk.slope)
-    largest = reduce(dr.maximum, one.medium.sigma_t)
-    tangent = _largest_tangent(one)
+    largest = reduce(dr.maximum, segment.medium.sigma_t)
+    tangent = _largest_tangent(segment)
     turning = h - tangent * s
     most = dr.select(turning > 0, tangent * square / turning, dr.inf)
     r = dr.sqrt(square)
     most = dr.minimum(most, dr.select(s < 0, _NEARER, _FARTHER) * r)
-    if one.planes is None:
-        most = dr.minimum(most, dr.minimum(_sphere_length(one, x), _DEPTH / (2 * largest)))
+    if segment.planes is None:
+        most = dr.minimum(most, dr.minimum(_sphere_length(segment, x), _DEPTH / (2 * largest)))
     else:
         rising = dr.select(u > 0, slope / u, 0)
         most = dr.minimum(most, _SHARE / rising)
@@ -134,29 +134,29 @@ def _panel_length(one: MediumSegment, walk: Entry, *, s, square, h, length):
     return length / dr.maximum(dr.ceil(length / most), 1)
 
 
-def _sphere_length(one: MediumSegment, x):
+def _sphere_length(segment: MediumSegment, x):
     """Return the length in which the square of half the chord that legs have in a sphere changes by a share of it [m].
 
     The part of the leg in the sphere is like the root of it: steep where legs graze the sphere. With w from the light
     to the middle of the sphere it is radius^2 - |v x w|^2/|v|^2.
     """
-    radius, w = one.seen.bounded_medium.radius, one.seen.toward
-    v = dr.fma(one.direction, x, one.start)
+    radius, w = segment.seen.bounded_medium.radius, segment.seen.toward
+    v = dr.fma(segment.direction, x, segment.start)
     cross, square = dr.cross(v, w), dr.squared_norm(v)
     distance = dr.squared_norm(cross) / square
-    rate = 2 * (dr.dot(cross, dr.cross(one.direction, w)) - distance * dr.dot(v, one.direction)) / square
+    rate = 2 * (dr.dot(cross, dr.cross(segment.direction, w)) - distance * dr.dot(v, segment.direction)) / square
     chord = dr.maximum(radius * radius - distance, 0)
     return dr.clip(_STEEP * chord / dr.abs(rate), _LEAST * radius, 0.25 * radius)
 
 
-def _largest_tangent(one: MediumSegment):
-    turn = one.medium.phase.largest_turn()
-    if one.light.soft:
+def _largest_tangent(segment: MediumSegment):
+    turn = segment.medium.phase.largest_turn()
+    if segment.light.soft:
         turn = dr.minimum(turn, 0.4)
     return _TANGENT * turn
 
 
-def _panel(one: MediumSegment, walk: Entry, *, ends, squares, h) -> list[Any]:
+def _panel(segment: MediumSegment, walk: Entry, *, ends, squares, h) -> list[Any]:
     """Return the integrals of p exp(-tau) / r^2 over a panel, by channel."""
     s0, s1 = ends
     Float = type(s0)
@@ -165,28 +165,28 @@ def _panel(one: MediumSegment, walk: Entry, *, ends, squares, h) -> list[Any]:
     product = dr.maximum(dr.fma(s0, s1, h * h), 0.5 * dr.sqrt(squares[0] * squares[1]))
     scale = length / product
     tangent = dr.square(h * scale)
-    totals = [Float(0) for _ in one.before]
+    totals = [Float(0) for _ in segment.before]
     for t, share in unit_nodes(_NODES if is_single(Float) else _NODES_DOUBLE):
         far = t * squares[0]
         s = dr.fma(length, far / dr.fma(1 - t, product, far), s0)
-        x = s + one.geometry.foot
+        x = s + segment.geometry.foot
         r = dr.sqrt(dr.fma(s, s, h * h))
-        before = _before_medium(one, walk, x, r)
-        inside = (x - one.begin) + (r - before)
-        weight = share * one.medium.phase.evaluate(-s / r) / dr.fma(t * t, tangent, 1)
-        if one.light.soft:
-            weight *= falloff(one.geometry, one.light, x)
-        for channel, (depth, own) in enumerate(zip(one.before, one.medium.sigma_t)):
+        before = _before_medium(segment, walk, x, r)
+        inside = (x - segment.begin) + (r - before)
+        weight = share * segment.medium.phase.evaluate(-s / r) / dr.fma(t * t, tangent, 1)
+        if segment.light.soft:
+            weight *= falloff(segment.geometry, segment.light, x)
+        for channel, (depth, own) in enumerate(zip(segment.before, segment.medium.sigma_t)):
             depth = dr.fma(own, inside, depth)
-            if one.around is not None:
-                depth = dr.fma(one.around[channel], before, depth)
+            if segment.around is not None:
+                depth = dr.fma(segment.around[channel], before, depth)
             totals[channel] += weight * exp_bounded(-depth)
     return [scale * total for total in totals]
 
 
-def _before_medium(one: MediumSegment, walk: Entry, x, r):
+def _before_medium(segment: MediumSegment, walk: Entry, x, r):
     """Return what of the leg to a point within the medium lies before it [m]."""
-    if one.planes is None:
-        (u,), _ = inverse_crossings(one.seen, one.start, one.direction, [x], True)
+    if segment.planes is None:
+        (u,), _ = inverse_crossings(segment.seen, segment.start, segment.direction, [x], True)
         return r / dr.maximum(u, 1)
-    return dr.select(one.planes.within, 0, r / dr.maximum(dr.fma(walk.slope, x, walk.constant), 1))
+    return dr.select(segment.planes.within, 0, r / dr.maximum(dr.fma(walk.slope, x, walk.constant), 1))

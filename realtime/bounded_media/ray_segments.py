@@ -209,7 +209,7 @@ def light_leg(ray: MediaRay, piece: Piece, xs, rs) -> list[list[Any]]:
         near = dr.full(dr.mask_t(xs[0]), True, dr.width(xs[0])) if own else _near_legs(ray, seen, xs, rs)
         enter, leave = inverse_crossings(seen, ray.start, ray.direction, xs, near, leaves=not own)
         ends = [None] * len(xs) if own else leave
-        shares = [share_inside(one, other) for one, other in zip(enter, ends)]
+        shares = [share_inside(inverse_in, inverse_out) for inverse_in, inverse_out in zip(enter, ends)]
         insides.append([dr.select(near, share * r, 0) for share, r in zip(shares, rs)])
     return insides
 

@@ -45,18 +45,20 @@ def surface_stages(scene: Scene, *, provides_visibility: bool) -> tuple[Callable
 
     def cast_all(geometry, facets, pixel, camera, medium) -> Cast:
         direction, _ = ray_directions(camera, pixel)
-        found = cast_rays(geometry, facets, camera.origin, direction)
+        cast = cast_rays(geometry, facets, camera.origin, direction)
         if not medium.bounded_media:
-            return found
-        insides = camera_insides(medium, camera.origin, direction, found.distance)
-        return replace(found, insides=insides)
+            return cast
+        insides = camera_insides(medium, camera.origin, direction, cast.distance)
+        return replace(cast, insides=insides)
 
     def shade_all(geometry, facets, pixel, camera, medium, lights, cast):
         direction, _ = ray_directions(camera, pixel)
         seen = visible_surface(cast, facets, camera.origin, direction, color=type(medium.albedo))
         depths = optical_depths(medium, cast.distance, cast.insides) if medium.bounded_media else None
         shown = {"medium": medium, "depths": depths}
-        colors = [lit_surface(geometry, seen, light=light, shadows=one, **shown) for light, one in zip(lights, asked)]
+        colors = [
+            lit_surface(geometry, seen, light=light, shadows=shadows, **shown) for light, shadows in zip(lights, asked)
+        ]
         return tuple(colors) if provides_visibility else (sum(colors),)
 
     @Frozen

@@ -92,7 +92,7 @@ def panels_mean(phase: Phase, start, scale, width, decays, weight: Callable[[Any
             if weight is not None:
                 value *= weight(scale * (f + step))
             kept = [_kept(dr.fma(rate, step, depth)) for rate, depth in zip(rates, depths)]
-            totals = [dr.fma(value, one, total) for one, total in zip(kept, totals)]
+            totals = [dr.fma(value, attenuation, total) for attenuation, total in zip(kept, totals)]
         step = dr.fma(f, less_end, c * sinh_end)
         c = dr.fma(f, sinh_end, dr.fma(c, less_end, c))
         return index + 1, f + step, c, [dr.fma(rate, step, depth) for rate, depth in zip(rates, depths)], totals

@@ -59,13 +59,13 @@ def extent(geometry: RayGeometry, x0, x1, extinctions) -> Extent:
     return Extent(dr.square(length) * dr.rcp(dr.fma(nearest, nearest, height_squared)), rate * length)
 
 
-def serves(rule: Rule, found: Extent, phase: Phase):
+def serves(rule: Rule, segment_extent: Extent, phase: Phase):
     """Return whether a rule is right; not where anything is no number or infinite.
 
     Length and depth each spoil part of it: by themselves they may reach their limits, together an ellipse.
     """
     of_length, of_depth = 1 / rule.length(phase.reach) ** 2, 1 / rule.depth**2
-    return dr.fma(found.square, of_length, dr.square(found.depth) * of_depth) < 1
+    return dr.fma(segment_extent.square, of_length, dr.square(segment_extent.depth) * of_depth) < 1
 
 
 def short_segment(geometry: RayGeometry, x0, x1, phase: Phase, extinctions, *, rule: Rule):

@@ -51,10 +51,10 @@ def difference_of_products(a, b, c, d):
 def two_cross(a, b):
     """Return the cross product of two vectors and its rounding error."""
     Vector = type(a)
-    one, one_error = two_product(Vector(a.y, a.z, a.x), Vector(b.z, b.x, b.y))
-    other, other_error = two_product(Vector(a.z, a.x, a.y), Vector(b.y, b.z, b.x))
-    total, error = two_sum(one, -other)
-    return total, error + (one_error - other_error)
+    forward, forward_error = two_product(Vector(a.y, a.z, a.x), Vector(b.z, b.x, b.y))
+    backward, backward_error = two_product(Vector(a.z, a.x, a.y), Vector(b.y, b.z, b.x))
+    total, error = two_sum(forward, -backward)
+    return total, error + (forward_error - backward_error)
 
 
 def two_dot(a, b):

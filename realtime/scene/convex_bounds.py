@@ -110,8 +110,8 @@ def _check_closed(name: str, corners: Array) -> None:
     face = number.reshape(-1, 3)
     tail, head = face.ravel(), np.roll(face, -1, axis=1).ravel()
     count = face.max() + 1
-    one, other = np.sort(tail * count + head), np.sort(head * count + tail)
-    if np.any(tail == head) or np.any(one[1:] == one[:-1]) or not np.array_equal(one, other):
+    forward, backward = np.sort(tail * count + head), np.sort(head * count + tail)
+    if np.any(tail == head) or np.any(forward[1:] == forward[:-1]) or not np.array_equal(forward, backward):
         raise _refusal(name, "is not a closed surface", "a closed convex mesh without doubled or degenerate faces")
 
 
@@ -125,8 +125,8 @@ def _merged(normals: Array, offsets: Array, size: float) -> tuple[Array, Array]:
     return normals[kept], offsets[kept]
 
 
-def _refusal(name: str, found: str, wanted: str) -> InputError:
-    return InputError(f"shape '{name}' bounds a medium and {found}; wanted {wanted}")
+def _refusal(name: str, flaw: str, wanted: str) -> InputError:
+    return InputError(f"shape '{name}' bounds a medium and {flaw}; wanted {wanted}")
 
 
 def plane_neighbours(bounds: Bounds) -> NDArray[np.uint32]:
@@ -152,26 +152,26 @@ def holds(bounds: Bounds, point: Array) -> bool:
     return bool(np.all(bounds.normals @ point < bounds.offsets))
 
 
-def overlap(one: Bounds, other: Bounds) -> bool:
+def overlap(first: Bounds, second: Bounds) -> bool:
     """Return whether two bodies share more than 1e-5 of their size; bodies that touch do not."""
-    gap = float(np.linalg.norm(one.centre - other.centre))
-    margin = _FLAT * min(one.radius, other.radius)
-    if gap >= one.radius + other.radius - margin:
+    gap = float(np.linalg.norm(first.centre - second.centre))
+    margin = _FLAT * min(first.radius, second.radius)
+    if gap >= first.radius + second.radius - margin:
         return False
-    if one.is_sphere and other.is_sphere:
+    if first.is_sphere and second.is_sphere:
         return True
-    if one.is_sphere or other.is_sphere:
-        sphere, mesh = (one, other) if one.is_sphere else (other, one)
+    if first.is_sphere or second.is_sphere:
+        sphere, mesh = (first, second) if first.is_sphere else (second, first)
         return _distance_to_hull(mesh, sphere.centre) < sphere.radius - margin
     # The largest sphere in both: maximise t under n . x + t <= offset.
-    planes = np.concatenate([one.normals, other.normals])
-    found = linprog(
+    planes = np.concatenate([first.normals, second.normals])
+    largest_sphere = linprog(
         [0, 0, 0, -1],
         A_ub=np.column_stack([planes, np.ones(len(planes))]),
-        b_ub=np.concatenate([one.offsets, other.offsets]),
+        b_ub=np.concatenate([first.offsets, second.offsets]),
         bounds=[(None, None)] * 4,
     )
-    return bool(found.status == 0 and -found.fun > margin)
+    return bool(largest_sphere.status == 0 and -largest_sphere.fun > margin)
 
 
 def _distance_to_hull(bounds: Bounds, point: Array) -> float:

@@ -131,4 +131,4 @@ def _spheres(bounded_medium: BoundedMedium) -> Array:
 
 
 def _vector(values, types: ArrayTypes):
-    return types.vector(*(float(one) for one in values))
+    return types.vector(*(float(value) for value in values))

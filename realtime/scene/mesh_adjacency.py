@@ -261,8 +261,8 @@ def _connected_components(triangles, edges, entries):
     key = np.sort(edges[order], axis=1)
     again = np.flatnonzero(np.all(key[1:] == key[:-1], axis=1))
     links.append((left[order[again]], left[order[again + 1]]))
-    one, other = (np.concatenate([link[side] for link in links]) for side in (0, 1))
-    graph = coo_array((np.ones(len(one), dtype=np.int8), (one, other)), shape=(count, count))
+    first, second = (np.concatenate([link[side] for link in links]) for side in (0, 1))
+    graph = coo_array((np.ones(len(first), dtype=np.int8), (first, second)), shape=(count, count))
     components, component = connected_components(graph, directed=False)
     closed = np.ones(components, dtype=bool)
     closed[component[left[~both | same_way]]] = False

@@ -140,11 +140,11 @@ class _Power(Phase):
 
     def series(self, degree: int) -> list[Any]:
         """Return the coefficients by squaring those of (1 - sin)/2."""
-        one = _one(degree)
-        power = [0.5 * (a - b) for a, b in zip(one, _sine(degree))]
+        constant = _one(degree)
+        power = [0.5 * (a - b) for a, b in zip(constant, _sine(degree))]
         for _ in range(self.doublings):
             power = series_product(power, power, degree)
-        return [(a + self.weight * b) / self.mean for a, b in zip(one, power)]
+        return [(a + self.weight * b) / self.mean for a, b in zip(constant, power)]
 
 
 @dataclass(frozen=True)

@@ -94,7 +94,8 @@ def read_medium(sensor, boundaries, types: ArrayTypes) -> Medium:
     ambient = _clear(types) if around is None else _homogeneous(around, types)
     channels = max(len(medium.sigma_t) for medium in [ambient, *media])
     bounded_media = tuple(
-        make_bounded_medium(_in_channels(medium, channels), one, types) for medium, one in zip(media, bounds)
+        make_bounded_medium(_in_channels(medium, channels), own_bounds, types)
+        for medium, own_bounds in zip(media, bounds)
     )
     return replace(_in_channels(ambient, channels), bounded_media=bounded_media)
 
@@ -103,28 +104,30 @@ def _surrounding(sensor, boundaries, bounds: list[Bounds]):
     """Return the Mitsuba medium around the bounded ones, or None; refuse a camera or boundary that says otherwise."""
     camera = np.array(sensor.world_transform().matrix, dtype=np.float64).reshape(4, 4)[:3, 3]
     around = sensor.get_medium()
-    for shape, one in zip(boundaries, bounds):
-        if holds(one, camera):
+    for shape, own_bounds in zip(boundaries, bounds):
+        if holds(own_bounds, camera):
             if sensor.get_medium() != shape.interior_medium():
                 raise InputError(
-                    f"the camera is inside of shape '{one.name}', but references another medium or none; reference "
-                    "that shape's interior medium in the sensor"
+                    f"the camera is inside of shape '{own_bounds.name}', but references another medium or none; "
+                    "reference that shape's interior medium in the sensor"
                 )
             around = shape.exterior_medium()
-    for shape, one in zip(boundaries, bounds):
+    for shape, own_bounds in zip(boundaries, bounds):
         if shape.exterior_medium() != around:
             raise InputError(
-                f"the exterior medium of shape '{one.name}' is not what surrounds the camera or the others; wanted one "
-                "medium around all bounded media, or none at all"
+                f"the exterior medium of shape '{own_bounds.name}' is not what surrounds the camera or the others; "
+                "wanted one medium around all bounded media, or none at all"
             )
     return around
 
 
 def _check_disjoint(bounds: list[Bounds]) -> None:
-    for number, one in enumerate(bounds):
-        for other in bounds[:number]:
-            if overlap(one, other):
-                raise InputError(f"the media of shapes '{other.name}' and '{one.name}' overlap; wanted disjoint bounds")
+    for number, later in enumerate(bounds):
+        for earlier in bounds[:number]:
+            if overlap(later, earlier):
+                raise InputError(
+                    f"the media of shapes '{earlier.name}' and '{later.name}' overlap; wanted disjoint bounds"
+                )
 
 
 def make_bounded_medium(medium: Medium, bounds: Bounds, types: ArrayTypes) -> BoundedMedium:

@@ -170,7 +170,7 @@ def _scene_features(opaque, medium: Medium, lights: tuple[Light, ...]) -> SceneF
         shadows=bool(opaque),
         surfaces=bool(opaque),
         extinctions=len(medium.sigma_t),
-        isotropic=all(one.phase.constant for one in media),
+        isotropic=all(filling.phase.constant for filling in media),
         bounded=bool(medium.bounded_media),
         clear=medium.clear,
         vacuum=any(float(sigma_t[0]) == 0 for sigma_t in medium.sigma_t),

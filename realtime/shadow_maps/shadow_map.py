@@ -87,7 +87,7 @@ def cast_shadow_map(scene, light: Light, size: int) -> ShadowMap:
     face, row, column = _tiled_corners(faces, side)
     there = (row < side) & (column < side)
     # Whole numbers and powers of two: exact, so that neighbouring faces cast the same rays along their common edge.
-    u, v = (dr.fma(Double(one), 2.0 / size, -1.0) for one in (column, row))
+    u, v = (dr.fma(Double(corner), 2.0 / size, -1.0) for corner in (column, row))
     cast = cast_map_rays(scene, light, (face, u, v), there)
     distance = dr.empty(type(cast), faces * side * side)
     dr.scatter(distance, cast, (face * side + row) * side + column, there)

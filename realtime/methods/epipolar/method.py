@@ -271,6 +271,6 @@ def _yardstick(airlight: RayAirlight):
 
 def _interpolated(airlight: RayAirlight, samples: Samples, shares, heights: SliceHeights, point):
     """Return the integral of every pixel: the share of the samples around it, or its own where they do not fit."""
-    share, found = between_samples(samples, shares, point, airlight.view.distance)
-    own = _lit_integral(airlight, heights, _nearest(samples.slices, point), ~found)
-    return dr.select(found, share * _yardstick(airlight), own)
+    share, fits = between_samples(samples, shares, point, airlight.view.distance)
+    own = _lit_integral(airlight, heights, _nearest(samples.slices, point), ~fits)
+    return dr.select(fits, share * _yardstick(airlight), own)

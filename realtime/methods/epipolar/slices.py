@@ -75,9 +75,9 @@ def image_slices(camera: Camera, light: Light, count: int) -> Slices:
     a = dr.dot(v, camera.left) / dr.squared_norm(camera.left)
     b = dr.dot(v, camera.up) / dr.squared_norm(camera.up)
     c = dr.dot(v, camera.forward)
-    epipole = tuple(dr.select(c < 0, -one, one) for one in (a, b, c))
+    epipole = tuple(dr.select(c < 0, -component, component) for component in (a, b, c))
     sides, length, closed = _border(camera.width, camera.height, epipole)
-    found = Slices(
+    slices = Slices(
         count,
         camera.width,
         camera.height,
@@ -93,15 +93,15 @@ def image_slices(camera: Camera, light: Light, count: int) -> Slices:
         ends=None,
     )
     place = (Float(dr.arange(mi.UInt32, count)) + 0.5) * (length / count)
-    leave = _at_border(found, place)
-    enter = _entry(found, *leave)
+    leave = _at_border(slices, place)
+    enter = _entry(slices, *leave)
     out = camera.forward + camera.left * leave[0] + camera.up * leave[1]
     across = _at_right_angles(out, towards, camera)
     ends = dr.empty(Float, 4 * count)
     dr.scatter(ends, four_numbers(Float)(*enter, *leave), dr.arange(mi.UInt32, count))
-    found = replace(found, across=across, ends=ends)
-    dr.eval(found)
-    return found
+    slices = replace(slices, across=across, ends=ends)
+    dr.eval(slices)
+    return slices
 
 
 def image_point(camera: Camera, direction):
@@ -208,11 +208,11 @@ def _entry(slices: Slices, i, j):
 def _at_right_angles(vector, axis, camera: Camera):
     """Return the unit vector across `axis` on the side of `vector`; any across it where the two are parallel."""
 
-    def across(one):
-        normal = dr.cross(axis, one)
+    def across(side):
+        normal = dr.cross(axis, side)
         return dr.cross(normal, axis)
 
-    found = across(vector)
-    flat = dr.squared_norm(found) <= 1e-12 * dr.squared_norm(vector)
+    across_vector = across(vector)
+    flat = dr.squared_norm(across_vector) <= 1e-12 * dr.squared_norm(vector)
     other = dr.select(dr.squared_norm(across(camera.left)) > 0.1 * dr.squared_norm(camera.left), camera.left, camera.up)
-    return dr.normalize(dr.select(flat, across(other), found))
+    return dr.normalize(dr.select(flat, across(other), across_vector))

@@ -79,8 +79,8 @@ def cell_at(pair, per, t, low, side):
 
 def borders(low, start, per, across=1.0):
     """Return the t at which a line enters and leaves a strip of texels."""
-    one, other = (low - start) * per, (low + across - start) * per
-    return dr.minimum(one, other), dr.maximum(one, other)
+    at_low, at_high = (low - start) * per, (low + across - start) * per
+    return dr.minimum(at_low, at_high), dr.maximum(at_low, at_high)
 
 
 def slope_of(line: Line, size: int):
@@ -104,6 +104,6 @@ def texels_on(line: Line, slope, node):
     bits = mi.UInt32(0)
     for k in range(4):
         # One bit in four for each row.
-        first, end = (mi.UInt32(dr.clip(dr.fma(step, float(k), one), 0, 20)) for one in (low, high))
+        first, end = (mi.UInt32(dr.clip(dr.fma(step, float(k), offset), 0, 20)) for offset in (low, high))
         bits |= ((mi.UInt32(1) << end) - (mi.UInt32(1) << first)) & (0x1111 << k)
     return bits

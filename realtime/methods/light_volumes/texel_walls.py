@@ -68,9 +68,9 @@ def parts_of(four, walls, Float) -> Parts:
     cut = _cuts_corner(sides)
     upright = bottom.stands & top.stands
     level = left.stands & right.stands & ~upright
-    zero, one = Float(0), Float(1)
-    line = _select(upright, (-bottom.place, one, bottom.place - top.place), (zero, one, -one))
-    line = _select(level, (-left.place, left.place - right.place, one), line)
+    zero, unit = Float(0), Float(1)
+    line = _select(upright, (-bottom.place, unit, bottom.place - top.place), (zero, unit, -unit))
+    line = _select(level, (-left.place, left.place - right.place, unit), line)
     line = _select(cut, _cut_line(bottom, top, left, right), line)
     below, above, before, behind = s10 - s00, s11 - s01, s01 - s00, s11 - s10
     corner = dr.select(right.stands, dr.select(top.stands, s11, s10), dr.select(top.stands, s01, s00))
@@ -109,8 +109,8 @@ def _cut_line(bottom: Side, top: Side, left: Side, right: Side) -> Numbers:
     return -1 - corner_x * per_x - corner_y * per_y, per_x, per_y
 
 
-def _select(condition, one: Numbers, other: Numbers) -> Numbers:
-    a, b, c = (dr.select(condition, *pair) for pair in zip(one, other))
+def _select(condition, chosen: Numbers, otherwise: Numbers) -> Numbers:
+    a, b, c = (dr.select(condition, *pair) for pair in zip(chosen, otherwise))
     return a, b, c
 
 

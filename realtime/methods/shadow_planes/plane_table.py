@@ -201,8 +201,10 @@ def _chosen(planes: Planes, which: NDArray[np.bool_]) -> Planes:
     return Planes(*(getattr(planes, field.name)[which] for field in fields(Planes)))
 
 
-def _joined(one: Planes, other: Planes) -> Planes:
-    return Planes(*(np.concatenate([getattr(part, field.name) for part in (one, other)]) for field in fields(Planes)))
+def _joined(first: Planes, second: Planes) -> Planes:
+    return Planes(
+        *(np.concatenate([getattr(part, field.name) for part in (first, second)]) for field in fields(Planes))
+    )
 
 
 def layers_between(casters: Casters, light: Array, basis: LightBasis, *, used: NDArray[np.bool_]) -> int:
@@ -230,8 +232,8 @@ def layers_between(casters: Casters, light: Array, basis: LightBasis, *, used: N
     x, y = axes[:2] @ casters.vertices.T - (axes[:2] @ start)[:, None]
     sides = (x > 0) | (x < 0).view(np.uint8) << 1 | (y > 0).view(np.uint8) << 2 | (y < 0).view(np.uint8) << 3
     number = np.flatnonzero(near[casters.component])
-    one, other, third = casters.triangles[number].T
-    number = number[sides[one] & sides[other] & sides[third] == 0]
+    first, second, third = casters.triangles[number].T
+    number = number[sides[first] & sides[second] & sides[third] == 0]
     if not len(number):
         return 0
     crossed = number[_crosses(casters, number, (start, direction), reach)]

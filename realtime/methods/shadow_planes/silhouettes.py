@@ -86,5 +86,5 @@ def silhouette(casters: Casters, light: Array, *, used: NDArray[np.bool_] | None
     if casters.same_way.any():
         right = np.where(casters.same_way, -right, right)
     coefficient = weight[casters.left] - right
-    found = np.flatnonzero(coefficient)
-    return Silhouette(casters.edges[found], coefficient[found])
+    on_silhouette = np.flatnonzero(coefficient)
+    return Silhouette(casters.edges[on_silhouette], coefficient[on_silhouette])
