@@ -43,8 +43,8 @@ def render(scene, method="unshadowed", *, precision="double", **parameters):
     return render_frame(frame_renderer(read, chosen, kernel=kernel, **parameters))
 
 
-def relative_rmse(one, two):
-    return np.sqrt(np.mean((np.asarray(one, dtype=np.float64) - two) ** 2)) / np.mean(two)
+def relative_rmse(image, expected):
+    return np.sqrt(np.mean((np.asarray(image, dtype=np.float64) - expected) ** 2)) / np.mean(expected)
 
 
 def in_sphere(start, end, centre, radius):
@@ -59,9 +59,9 @@ def in_box(start, end, centre):
     """Return where lines enter and leave the box, as shares between 0 and 1, slab by slab in its own frame."""
     p, d = (start - centre) @ TURN, (end - start) @ TURN
     with np.errstate(divide="ignore"):
-        one, other = (-0.5 * SIDES - p) / d, (0.5 * SIDES - p) / d
-    low = np.clip(np.minimum(one, other).max(axis=-1), 0, 1)
-    return low, np.maximum(np.clip(np.maximum(one, other).min(axis=-1), 0, 1), low)
+        low_planes, high_planes = (-0.5 * SIDES - p) / d, (0.5 * SIDES - p) / d
+    low = np.clip(np.minimum(low_planes, high_planes).max(axis=-1), 0, 1)
+    return low, np.maximum(np.clip(np.maximum(low_planes, high_planes).min(axis=-1), 0, 1), low)
 
 
 def share(part, start, end):
@@ -162,23 +162,23 @@ def test_media_of_no_extinction_scatter_nothing(variant):
 
 def test_media_out_of_each_others_light_and_view_add_up(variant):
     light = tiny_scene()["lamp"] | {"position": [0.0, -0.5, 6.0]}
-    one = render(clear_scene(lamp=light, ball=fog_sphere())).airlight
-    other = render(clear_scene(lamp=light, cube=cube())).airlight
+    of_sphere = render(clear_scene(lamp=light, ball=fog_sphere())).airlight
+    of_cube = render(clear_scene(lamp=light, cube=cube())).airlight
     both = render(clear_scene(lamp=light, ball=fog_sphere(), cube=cube())).airlight
-    assert np.all((one > 0).sum(axis=(0, 1)) > 0)
-    assert np.abs(both - one - other).max() < 1e-12 * both.max()
+    assert np.all((of_sphere > 0).sum(axis=(0, 1)) > 0)
+    assert np.abs(both - of_sphere - of_cube).max() < 1e-12 * both.max()
 
 
 @pytest.mark.claim("mean-distance-of-the-paper", tolerance="relative RMSE 1e-4")
 def test_the_mean_distance_of_the_paper_is_a_constant_in_the_exponent(variant):
     """With R for the light's leg the sum over the chord has one factor more, exp(-sigma_t R)."""
     scene = clear_scene(ball=fog_sphere(sigma_t=0.7))
-    found = render(scene, "shadow-planes", media="paper").airlight
+    airlight = render(scene, "shadow-planes", media="paper").airlight
 
     part = (SPHERE[0], np.array([0.7] * 3), SPHERE[2], 0.0)
     expected = summed(scene, [part], leg=False) * np.exp(-0.7 * 1.2 * 0.6)
     # Six nodes on smooth chords, against 500 steps: 1e-5 each.
-    assert relative_rmse(found, expected) < 1e-4
+    assert relative_rmse(airlight, expected) < 1e-4
 
 
 def test_surfaces_are_seen_and_lit_through_bounded_media(variant):
@@ -316,8 +316,8 @@ def test_a_thicker_medium_has_thicker_bounded_media(variant):
     medium = read_scene(mi.load_dict(clear_scene(ball=fog_sphere(), cube=cube())), "double").medium
     thicker = thicker_medium(medium, 1.7)
     assert all(float(value[0]) == 0 for value in thicker.sigma_t)
-    for one, other in zip(thicker.bounded_media, medium.bounded_media, strict=True):
+    for thick, plain in zip(thicker.bounded_media, medium.bounded_media, strict=True):
         # Mitsuba holds extinctions in float32.
-        expected = [1.7 * float(value[0]) for value in other.medium.sigma_t]
-        assert [float(value[0]) for value in one.medium.sigma_t] == pytest.approx(expected, rel=1e-12)
-        assert len(one.medium.sigma_t) == 3
+        expected = [1.7 * float(value[0]) for value in plain.medium.sigma_t]
+        assert [float(value[0]) for value in thick.medium.sigma_t] == pytest.approx(expected, rel=1e-12)
+        assert len(thick.medium.sigma_t) == 3

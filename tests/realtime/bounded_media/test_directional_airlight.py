@@ -48,12 +48,15 @@ def test_a_box_under_light_from_above_has_a_closed_form(variant, precision):
     sides, centre, sigma, g = np.array([1.5, 2.0, 1.25]), np.array([0.25, 0.5, 0.75]), 0.8125, 0.4
     fog = cube(centre=tuple(centre), sides=sides, turn=np.eye(3), sigma_t=sigma, g=g)
     scene = read(clear_scene(lamp=sun((0, 0, -1)), cube=fog), precision)
-    found = render(scene).airlight.reshape(-1, 3)
+    airlight = render(scene).airlight.reshape(-1, 3)
 
     origin, direction = rays(scene)
     with np.errstate(divide="ignore"):
-        one, other = (centre - 0.5 * sides - origin) / direction, (centre + 0.5 * sides - origin) / direction
-    enter, leave = np.minimum(one, other).max(axis=1), np.maximum(one, other).min(axis=1)
+        low_planes, high_planes = (
+            (centre - 0.5 * sides - origin) / direction,
+            (centre + 0.5 * sides - origin) / direction,
+        )
+    enter, leave = np.minimum(low_planes, high_planes).max(axis=1), np.maximum(low_planes, high_planes).min(axis=1)
     chord, height = np.maximum(leave - enter, 0), (origin + enter[:, None] * direction)[:, 2]
     k = sigma * (1 - direction[:, 2])
     integral = np.exp(-sigma * (centre[2] + 0.5 * sides[2] - height)) * -np.expm1(-k * chord) / k
@@ -62,7 +65,7 @@ def test_a_box_under_light_from_above_has_a_closed_form(variant, precision):
     expected = expected * np.array([0.2, 0.5, 0.9]) * np.array([3.0, 2.0, 1.0]) / (4 * np.pi)
     assert np.count_nonzero(chord) > 10
     # The albedo and g are float32 numbers of Mitsuba's, 6e-8 each; chords of float32 rays near an edge lose more.
-    assert relative_rmse(found, expected) < (1e-6 if precision == "double" else 1e-5)
+    assert relative_rmse(airlight, expected) < (1e-6 if precision == "double" else 1e-5)
 
 
 CASES = {
@@ -122,10 +125,10 @@ def test_a_ray_along_the_light(variant, sense):
     scene = clear_scene(sensor=sensor, lamp=sun(), cube=cube(), ball=fog_sphere())
     expected = summed(read(scene), [box_part(), sphere_part()])
     for method in ("unshadowed", "light-volumes"):
-        found = render(scene, method).airlight
-        assert found[2, 2].min() > 0
-        assert found[2, 2] == pytest.approx(expected[2, 2], rel=1e-5)
-        assert relative_rmse(found, expected) < 1e-5
+        airlight = render(scene, method).airlight
+        assert airlight[2, 2].min() > 0
+        assert airlight[2, 2] == pytest.approx(expected[2, 2], rel=1e-5)
+        assert relative_rmse(airlight, expected) < 1e-5
 
 
 def test_a_camera_within_a_bounded_medium(variant):
@@ -141,20 +144,20 @@ def test_a_camera_within_a_bounded_medium(variant):
 
 def test_irradiance_is_a_factor(variant):
     shapes = {"size": SMALL, "cube": cube(), "ball": fog_sphere(), "floor": tiny_scene()["floor"]}
-    one = render(clear_scene(lamp=sun(), **shapes))
-    four = render(clear_scene(lamp=sun(irradiance=(12.0, 8.0, 4.0)), **shapes))
-    assert np.abs(four.airlight - 4 * one.airlight).max() < 1e-12 * four.airlight.max()
-    assert np.abs(four.surface - 4 * one.surface).max() < 1e-12 * four.surface.max()
+    single = render(clear_scene(lamp=sun(), **shapes))
+    fourfold = render(clear_scene(lamp=sun(irradiance=(12.0, 8.0, 4.0)), **shapes))
+    assert np.abs(fourfold.airlight - 4 * single.airlight).max() < 1e-12 * fourfold.airlight.max()
+    assert np.abs(fourfold.surface - 4 * single.surface).max() < 1e-12 * fourfold.surface.max()
 
 
 @pytest.mark.slow
 def test_lights_of_both_kinds_add_up(variant):
     shapes = {"size": SMALL, "cube": cube(), "ball": fog_sphere(), "floor": tiny_scene()["floor"]}
     lamp = tiny_scene()["lamp"]
-    one, point = render(clear_scene(lamp=sun(), **shapes)), render(clear_scene(lamp=lamp, **shapes))
+    directional, point = render(clear_scene(lamp=sun(), **shapes)), render(clear_scene(lamp=lamp, **shapes))
     both = render(clear_scene(lamp=lamp, other=sun(), **shapes))
-    assert np.abs(both.airlight - one.airlight - point.airlight).max() < 1e-12 * both.airlight.max()
-    assert np.abs(both.surface - one.surface - point.surface).max() < 1e-12 * both.surface.max()
+    assert np.abs(both.airlight - directional.airlight - point.airlight).max() < 1e-12 * both.airlight.max()
+    assert np.abs(both.surface - directional.surface - point.surface).max() < 1e-12 * both.surface.max()
     volumes = render(clear_scene(lamp=lamp, other=sun(), **shapes), "light-volumes", map=256)
     # Nothing stands between the lights and the media: a map has nothing to be wrong by.
     assert relative_rmse(volumes.airlight, both.airlight) < 1e-6

@@ -84,11 +84,11 @@ def test_a_walk_meets_the_least_of_all_planes_everywhere(variant, name, light, p
         end = np.minimum(np.array(until, dtype=np.float64), high)
         for share in (0.01, 0.5, 0.99):
             at = x + share * (end - x)
-            found = np.array(entry.constant, dtype=np.float64) + np.array(entry.slope, dtype=np.float64) * at
+            walked = np.array(entry.constant, dtype=np.float64) + np.array(entry.slope, dtype=np.float64) * at
             expected, _ = least_of_all(name, light, start + at[:, None] * direction)
             # Rounding of v, a few units in the last place of some metres, times g: large where the light is nearly in
             # the plane.
-            assert found == pytest.approx(expected, rel=2e-4 if precision == "single" else 1e-9)
+            assert walked == pytest.approx(expected, rel=2e-4 if precision == "single" else 1e-9)
         bends += np.sum(end < high)
         x, entry = end, dr.select(aligned_array(types.scalar, end) < aligned_array(types.scalar, high), beyond, entry)
     assert np.all(x == high)
@@ -135,8 +135,8 @@ def test_lines_enter_and_leave_by_the_planes_that_all_planes_name(variant, name,
     light = np.array(light)
     seen, types = seen_medium(name, light)
     v = CENTRE - light + np.random.default_rng(3).normal(size=(3000, 3)) * 1.3
-    found = line_crossings((entry_planes(seen), exit_planes(seen)), types.vector(*v.T))
-    enter, leave = (np.array(one) for one in found)
+    inverses = line_crossings((entry_planes(seen), exit_planes(seen)), types.vector(*v.T))
+    enter, leave = (np.array(inverse) for inverse in inverses)
     first, last = least_of_all(name, light, v)
     hits = (first > 0) & (first > last)
     assert hits.sum() > 0

@@ -36,7 +36,7 @@ def segments(name, light, phase, *, sigma_t, precision="double"):
     from realtime.bounded_media.facet_walk import entry_planes
 
     x0 = aligned_array(types.scalar, low)
-    one = MediumSegment(
+    segment = MediumSegment(
         medium=medium,
         around=None,
         light=lamp,
@@ -48,13 +48,13 @@ def segments(name, light, phase, *, sigma_t, precision="double"):
         seen=seen,
         planes=entry_planes(seen),
     )
-    return one, x0, aligned_array(types.scalar, low + part)
+    return segment, x0, aligned_array(types.scalar, low + part)
 
 
-def integral(one, x0, x1):
+def integral(segment, x0, x1):
     from realtime.bounded_media.panels import medium_integral
 
-    return np.array(medium_integral(one, x0, x1).x, dtype=np.float64)
+    return np.array(medium_integral(segment, x0, x1).x, dtype=np.float64)
 
 
 @pytest.mark.parametrize("phase", PHASES)
@@ -66,15 +66,15 @@ def test_panels_of_three_nodes_leave_little(variant, monkeypatch, name, away, ph
 
     light = CENTRE + away * np.array([0.36, 0.48, 0.8])
     for sigma_t in (0.2, 9.0):
-        one, x0, x1 = segments(name, light, phase, sigma_t=sigma_t)
+        segment, x0, x1 = segments(name, light, phase, sigma_t=sigma_t)
         monkeypatch.setattr(media_panels, "_NODES_DOUBLE", 12)
-        truth = integral(one, x0, x1)
+        truth = integral(segment, x0, x1)
         monkeypatch.setattr(media_panels, "_NODES_DOUBLE", 3)
-        found = integral(one, x0, x1)
+        three_nodes = integral(segment, x0, x1)
         assert np.all(truth > 0)
         seen = truth > 1e-6 * truth.max()
         # Rounding left aside: 2e-5 where the light is close to a facet and dense fog about it, else 5e-6.
-        assert np.abs(found / truth - 1)[seen].max() < 3e-5
+        assert np.abs(three_nodes / truth - 1)[seen].max() < 3e-5
 
 
 @pytest.mark.parametrize("name", ["icosphere", "gem", "column"])
@@ -84,8 +84,8 @@ def test_panels_against_a_sum_over_small_steps(variant, name):
 
     light, sigma_t = np.array([1.7, 0.4, 2.9]), 1.3
     for precision, close in (("double", 1e-6), ("single", 2e-5)):
-        one, x0, x1 = segments(name, light, ("hg", 0.6), sigma_t=sigma_t, precision=precision)
-        found = integral(one, x0, x1)
+        segment, x0, x1 = segments(name, light, ("hg", 0.6), sigma_t=sigma_t, precision=precision)
+        panels = integral(segment, x0, x1)
         start, direction, low, _ = lines_in(name, light)
         begin, end = np.array(x0, dtype=np.float64), np.array(x1, dtype=np.float64)
         for ray in range(0, len(low), 41):
@@ -97,7 +97,7 @@ def test_panels_against_a_sum_over_small_steps(variant, name):
             cosine = -(v @ direction[ray]) / r
             phase = (1 - 0.36) / (1.36 - 1.2 * cosine) ** 1.5
             expected = sigma_t * np.mean(phase * np.exp(-depth) / r**2) * (end[ray] - begin[ray])
-            assert found[ray] == pytest.approx(expected, rel=close)
+            assert panels[ray] == pytest.approx(expected, rel=close)
 
 
 def test_a_sphere_is_cut_where_legs_graze_it(variant):

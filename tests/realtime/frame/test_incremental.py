@@ -120,12 +120,12 @@ def test_images_are_those_of_frames_made_afresh(variant, scene, method, paramete
     last = host(renderer, stages)
     for now, moved in frames(renderer.scene, steps):
         stages, kept = next_frame(renderer, now, kept, **moved)
-        found = host(renderer, stages)
+        images = host(renderer, stages)
         wanted = host(afresh, run_stages(replace(afresh, scene=now), afresh.prepare(now)))
-        for name, image in found.items():
+        for name, image in images.items():
             np.testing.assert_array_equal(image, wanted[name], err_msg=f"{name} after {moved}")
-        assert np.any(found["airlight"] != last["airlight"]), moved  # each step does change the image
-        last = found
+        assert np.any(images["airlight"] != last["airlight"]), moved  # each step does change the image
+        last = images
 
 
 def counting(renderer: FrameRenderer, counts: Counter) -> FrameRenderer:

@@ -22,20 +22,20 @@ def sphere_bounds(centre, radius):
 
 
 def test_a_box_has_six_planes_not_twelve():
-    found = bounds(placed(box((1.3, 0.7, 2.1)), (3.1, -2.3, 0.9), TURN))
-    assert len(found.offsets) == 6
+    six_planes = bounds(placed(box((1.3, 0.7, 2.1)), (3.1, -2.3, 0.9), TURN))
+    assert len(six_planes.offsets) == 6
     # Each plane lies half an edge from the middle, along a column of the rotation.
-    distance = found.offsets - found.normals @ np.array([3.1, -2.3, 0.9])
+    distance = six_planes.offsets - six_planes.normals @ np.array([3.1, -2.3, 0.9])
     assert np.sort(distance) == pytest.approx([0.35, 0.35, 0.65, 0.65, 1.05, 1.05], abs=1e-6)
-    assert np.abs(found.normals @ TURN).max(axis=1) == pytest.approx(1.0, abs=1e-6)
+    assert np.abs(six_planes.normals @ TURN).max(axis=1) == pytest.approx(1.0, abs=1e-6)
 
 
 def test_what_the_half_spaces_hold_is_what_the_box_holds():
-    found = bounds(placed(box((1.3, 0.7, 2.1)), (3.1, -2.3, 0.9), TURN))
+    half_spaces = bounds(placed(box((1.3, 0.7, 2.1)), (3.1, -2.3, 0.9), TURN))
     points = np.random.default_rng(5).uniform(-2, 2, (200, 3)) + np.array([3.1, -2.3, 0.9])
     own = (points - (3.1, -2.3, 0.9)) @ TURN
     expected = np.all(np.abs(own) < (0.65, 0.35, 1.05), axis=1)
-    assert [holds(found, point) for point in points] == expected.tolist()
+    assert [holds(half_spaces, point) for point in points] == expected.tolist()
     assert 0 < expected.sum() < len(points)
 
 

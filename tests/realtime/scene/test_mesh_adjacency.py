@@ -43,10 +43,10 @@ def test_opposite_half_edges_are_paired_first(name):
         for k in range(3):
             a, b = t[k], t[(k + 1) % 3]
             lonely[min(a, b), max(a, b)] += 1 if a < b else -1
-    found: Counter = Counter()
+    unpaired: Counter = Counter()
     for (a, b), right, same in zip(casters.edges.tolist(), casters.right, casters.same_way):
-        found[min(a, b), max(a, b)] += 1 if right == casters.none else 2 if same else 0
-    assert found == {edge: abs(rest) for edge, rest in lonely.items()}
+        unpaired[min(a, b), max(a, b)] += 1 if right == casters.none else 2 if same else 0
+    assert unpaired == {edge: abs(rest) for edge, rest in lonely.items()}
 
 
 @pytest.mark.parametrize("name", SOUND)

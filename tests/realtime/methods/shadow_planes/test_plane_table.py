@@ -93,8 +93,8 @@ def test_bins_hold_what_a_ray_of_their_azimuth_crosses(name):
         wanted = np.flatnonzero((planes.first <= azimuth) & (azimuth < planes.last))
         for turn in (0, BINS):
             place = int(azimuth * BINS / 4) + turn
-            found = entries[start[place] : start[place + 1]] & NUMBER
-            assert set(wanted.tolist()) <= set(found.tolist())
+            listed = entries[start[place] : start[place + 1]] & NUMBER
+            assert set(wanted.tolist()) <= set(listed.tolist())
     gains = (entries >> GAIN_SHIFT & 63).astype(int) - GAIN_ZERO
     assert np.array_equal(gains, planes.gain[entries & NUMBER])
     firsts, count = entries[: len(entries) // 2] & FIRST, len(planes.gain)

@@ -103,5 +103,5 @@ def test_interpolation_is_exact_on_vertices_and_linear_between(variant, monkeypa
     view: Any = SimpleNamespace(**empty_view())
     light: Any = SimpleNamespace(position=mi.Vector3d(LIGHT.tolist()))
     at = module.mesh_gamma(view, index, light, kernel=None, rows=16)
-    found = np.array(at(*crossed))[0]
-    assert found == pytest.approx(points @ slope + 1, rel=1e-9)
+    gamma = np.array(at(*crossed))[0]
+    assert gamma == pytest.approx(points @ slope + 1, rel=1e-9)

@@ -79,5 +79,5 @@ def test_culling_by_hand(variant, place):
 
 
 def test_no_casters_are_nothing_to_cull(variant):
-    found = components_in_view(make_casters([]), camera_at((0, 0, 0), (0, 1, 0)), np.zeros(3))
-    assert found.shape == (0,)
+    in_view = components_in_view(make_casters([]), camera_at((0, 0, 0), (0, 1, 0)), np.zeros(3))
+    assert in_view.shape == (0,)
