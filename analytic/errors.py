@@ -17,6 +17,6 @@ class InputError(ValueError):
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
-    """Return '; did you mean X?' for the end of a message, an empty string where nothing known is near."""
+    """Return '; did you mean X?' for the end of a message about `word`, an empty string where nothing known is near."""
     close = difflib.get_close_matches(word, list(known), n=1, cutoff=0.4)
     return f"; did you mean {close[0]!r}?" if close else ""

@@ -62,7 +62,7 @@ class Limits:
 
 
 def parameter(default: Any, help: str, **limits: Any) -> Any:
-    """Return the field of a parameter; `limits` are the other fields of `Limits`."""
+    """Return the field of a parameter with its `default`; `help` and `limits` are the fields of `Limits`."""
     return field(default=default, metadata={"limits": Limits(help, **limits)})
 
 
@@ -111,7 +111,7 @@ def read_parameters(method: str, kind: type[Parameters], given: Mapping[str, Any
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
-    """Return '; did you mean X?' or an empty string."""
+    """Return '; did you mean X?' for the end of a message about `word`, or an empty string."""
     close = difflib.get_close_matches(word, list(known), n=1, cutoff=0.4)
     return f"; did you mean {close[0]!r}?" if close else ""
 

@@ -145,7 +145,10 @@ def lit_ray(
 
 
 def ambient_radiance(ray_pieces: tuple[Piece, ...], distance, ambient: float):
-    """Return the light of a constant field in the media, albedo ambient (1 - exp(-tau)) a piece, before `distance`."""
+    """Return the light of a constant field in the media, RGB [W/(m^2 sr)]: albedo ambient (1 - exp(-tau)) a piece.
+
+    `ambient` is the radiance of the field [W/(m^2 sr)]; what lies beyond `distance` [m] counts nothing.
+    """
     total = type(ray_pieces[0].medium.albedo)(0)
     for piece in ray_pieces:
         length = dr.maximum(dr.minimum(dr.minimum(piece.end, distance), 1e30) - piece.begin, 0)
@@ -156,7 +159,13 @@ def ambient_radiance(ray_pieces: tuple[Piece, ...], distance, ambient: float):
 
 
 def check_form(medium: Medium, form: str) -> None:
-    """Refuse a form that is unknown or does not fit the media."""
+    """Refuse a form that is unknown or does not fit the media.
+
+    Raises
+    ------
+    InputError
+        For a name that is not in `FORMS`, and for the published form in media that another one surrounds.
+    """
     if form not in FORMS:
         raise InputError(f"media: got {form!r}, wanted one of {', '.join(FORMS)}")
     if form == "paper" and medium.bounded_media and not medium.clear:

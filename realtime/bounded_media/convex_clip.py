@@ -36,7 +36,7 @@ class Seen:
 
 
 def seen_from(bounded_medium: BoundedMedium, point) -> Seen:
-    """Return what lines from a point, one for all lanes, need of a bounded medium."""
+    """Return what lines from a point [m], one for all lanes, need of a bounded medium."""
     toward = bounded_medium.centre - point
     if bounded_medium.planes is None:
         return Seen(bounded_medium, toward, None)

@@ -50,8 +50,8 @@ class ParallelRay:
 
     medium: Medium
     light: Light
-    origin: Any
-    direction: Any
+    origin: Any  #: the camera [m]
+    direction: Any  #: unit directions
     pieces: tuple[Piece, ...]
     seen: tuple[ParallelSeen, ...]
 

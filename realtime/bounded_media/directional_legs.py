@@ -50,7 +50,10 @@ class ParallelSeen:
 
 
 def seen_along(bounded_medium: BoundedMedium, axis) -> ParallelSeen:
-    """Return what the legs to a directional light need of a bounded medium; `axis` is one direction for all lanes."""
+    """Return what the legs to a directional light need of a bounded medium.
+
+    `axis` is the unit direction in which the light travels, one for all lanes.
+    """
     if bounded_medium.planes is None:
         return ParallelSeen(bounded_medium, axis, None, None)
     *normal, offset = bounded_medium.planes
@@ -165,7 +168,10 @@ def slope_from(seen: ParallelSeen, origin, direction, x) -> Slope:
 
 
 def cylinder_bend(seen: ParallelSeen, origin, direction, x):
-    """Return the next distance beyond `x` at which rays enter or leave the cylinder about a sphere, or infinity [m]."""
+    """Return the next distance beyond `x` at which rays enter or leave the cylinder about a sphere, or infinity [m].
+
+    Rays begin at `origin` [m] and have unit `direction`s.
+    """
     w = dr.cross(origin - seen.bounded_medium.centre, seen.axis)
     v = dr.cross(direction, seen.axis)
     a, b = dr.squared_norm(v), dr.dot(w, v)

@@ -229,7 +229,7 @@ def clear_of(planes: tuple[EntryPlanes, EntryPlanes], start, direction, x0, x1):
 
     With u the entering plane's and -w the leaving one's, legs that meet the medium have u > 1 and u > -w. Both are
     linear along the ray: where u - max(1, -w) is below 0 at both ends with the planes of one point between, no leg
-    does.
+    does. Rays lead from `start`, the camera less the light [m], along `direction`; `x0` and `x1` are the segment [m].
     """
     clear = dr.mask_t(x0)(False)
     for x in (0.5 * (x0 + x1), x0, x1):
@@ -247,6 +247,7 @@ def next_facet_change(planes: EntryPlanes, start, direction, entry: Entry):
     """Return where legs pass to another plane next [m], infinite where they do not, and that plane.
 
     Rounding can place the change behind the point; it is returned as it is, and the walk continues from its own place.
+    `start` and `direction` as for `first_entry`.
     """
 
     def sooner(best, other, line):

@@ -56,7 +56,7 @@ class MediumSegment:
     light: Light
     geometry: RayGeometry
     start: Any  #: from the light to the camera [m]
-    direction: Any
+    direction: Any  #: unit directions of the rays
     begin: Any  #: where the rays enter the medium [m]
     before: tuple[Any, ...]  #: optical depth from the camera to there, by channel
     seen: Seen  #: the bounded medium as the light sees it

@@ -24,9 +24,9 @@ class Piece:
 
     medium: Medium
     number: int | None  #: of the bounded medium; None between them
-    begin: Any  #: distances from the camera [m], equal or infinite where the ray misses it
-    end: Any
-    before: tuple[Any, ...]  #: optical depth from the camera to `begin`, by channel
+    begin: Any  #: distance from the camera [m], infinite or equal to `end` where the ray misses it
+    end: Any  #: [m]
+    before: tuple[Any, ...]  #: optical depth from the camera to `begin`, by channel [1]
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class MediaRay:
     light: Light
     geometry: RayGeometry
     start: Any  #: from the light to the camera [m]
-    direction: Any
+    direction: Any  #: unit directions
     pieces: tuple[Piece, ...]
     seen: tuple[Seen, ...]  #: the bounded media as the light sees them
     entries: tuple[EntryPlanes | None, ...]  #: by medium, the planes where legs to points within it enter
@@ -135,7 +135,10 @@ def _passage(view: MediumView, direction):
 
 
 def camera_insides(medium: Medium, origin, direction, distance) -> tuple[Any, ...]:
-    """Return what of camera rays up to a distance lies in each bounded medium [m]; arguments as in `camera_pieces`."""
+    """Return what of camera rays up to a distance lies in each bounded medium [m]; arguments as in `camera_pieces`.
+
+    `origin` is the camera [m], `direction` unit vectors; `distance` [m] may be infinite.
+    """
     insides = []
     for bounded_medium in medium.bounded_media:
         ends = _passage(medium_view(bounded_medium, origin), direction)
@@ -202,7 +205,10 @@ def line_ends(seen: Seen, planes, v):
 
 
 def light_leg(ray: MediaRay, piece: Piece, xs, rs) -> list[list[Any]]:
-    """Return by medium and node what of the leg from the light lies in it [m]."""
+    """Return by medium and node what of the leg from the light lies in it [m].
+
+    `xs` are the distances of the nodes along the rays and `rs` those from the light [m].
+    """
     insides = []
     for number, seen in enumerate(ray.seen):
         own = number == piece.number
@@ -215,7 +221,7 @@ def light_leg(ray: MediaRay, piece: Piece, xs, rs) -> list[list[Any]]:
 
 
 def other_media_near(ray: MediaRay, number: int, x0, x1):
-    """Return whether legs from the light to points of a segment in a medium may meet another one."""
+    """Return whether legs from the light to points of [x0, x1] [m] in the medium `number` may meet another one."""
     xs = [x0, x1]
     rs = [distance_to_light(ray.geometry, x) for x in xs]
     meets: Any = False

@@ -28,7 +28,7 @@ def frame_view(
     tile: PerRay | None = None,
     views: MediaViews | None = None,
 ) -> View:
-    """Return what a method is given for some pixels.
+    """Return what a method is given for some pixels; `distance` [m] is that to the visible surface.
 
     `geometry` may be None where the method casts no rays, `layout` where these are the pixels of a whole image or
     of its first tile, and `tile` where sixteen pixels that follow one another are a tile.

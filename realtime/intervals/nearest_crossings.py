@@ -23,7 +23,7 @@ class Crossings:
 
 
 def filled(key: float, places: int, Float, width: int, *, gains: bool = True) -> Crossings:
-    """Return a queue that holds one key in all places, without gain."""
+    """Return a queue of so many places that holds one key in all of them, without gain, for `width` lanes."""
     return Crossings(
         [dr.full(Float, key, width) for _ in range(places)],
         [dr.zeros(Float, width) for _ in range(places if gains else 0)],

@@ -53,7 +53,7 @@ _DEEPEST = 116.0  # e^-80
 
 
 def panels_mean(phase: Phase, start, scale, width, decays, weight: Callable[[Any], Any] | None):
-    """Return I/(d (v1 - v0)), the mean over the range of v, for each extinction.
+    """Return I/(d (v1 - v0)), the mean over the range of v, for each extinction [1].
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def _kept(depth):
 
 
 def panel_count(phase: Phase, width, depth, *, soft: bool = False):
-    """Return the number of panels m of segments of some width in v, and depth T; 0 where the width is 0."""
+    """Return the number of panels m of segments of some width in v [1], and depth T [1]; 0 where the width is 0."""
     Float = type(width)
     widest = phase.panel_width(Float)
     if soft:

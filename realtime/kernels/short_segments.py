@@ -34,8 +34,8 @@ class Rule:
     """How many nodes serve which segments."""
 
     nodes: int
-    depth: float  #: largest sigma_t (1 + s1/r1) L
-    length: Callable[[Reach], float]  #: largest L/r of a phase function
+    depth: float  #: largest sigma_t (1 + s1/r1) L [1]
+    length: Callable[[Reach], float]  #: largest L/r of a phase function [1]
 
 
 FEW = Rule(4, 2.0, lambda reach: reach.few)
@@ -47,11 +47,14 @@ class Extent:
     """How long segments are."""
 
     square: Any  #: (L/r)^2, infinite at the light
-    depth: Any  #: sigma_t (1 + s1/r1) L of the largest extinction
+    depth: Any  #: sigma_t (1 + s1/r1) L of the largest extinction [1]
 
 
 def extent(geometry: RayGeometry, x0, x1, extinctions) -> Extent:
-    """Return how long segments are."""
+    """Return how long the segments [x0, x1] [m] are; `extinctions` are those of the medium [1/m].
+
+    Valid for any segment; see `serves` for what is too long.
+    """
     s0, length, height_squared = x0 - geometry.foot, x1 - x0, dr.square(geometry.height)
     s1 = s0 + length
     nearest = dr.clip(0, s0, s1)

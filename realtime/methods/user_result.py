@@ -77,7 +77,13 @@ def checked_layers(returned: Any, view: View, name: str, *, visibility: bool) ->
 
 
 def check_finite(airlight, *, name: str) -> None:
-    """Refuse an image of radiance, (height, width, 3), with values that are not finite."""
+    """Refuse the image `airlight`, (height, width, 3) [W/(m^2 sr)], with values that are not finite.
+
+    Raises
+    ------
+    InputError
+        With the method's name and the first such pixel.
+    """
     wrong = ~np.isfinite(airlight).all(axis=2)
     if wrong.any():
         row, column = np.argwhere(wrong)[0]

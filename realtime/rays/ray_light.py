@@ -101,9 +101,10 @@ def distance_to_light(geometry: RayGeometry, x):
 
 
 def smooth_subsegments(geometry: RayGeometry, light: Light, x0, x1):
-    """Cut [x0, x1] where a soft spot's `falloff` has kinks, at the cone of the beam; one piece for other lights.
+    """Cut [x0, x1] [m] where a soft spot's `falloff` has kinks, at the cone of the beam; one piece for other lights.
 
     A ray that misses the beam is cut where it is closest to the axis: the closer it passes, the more like a kink.
+    Valid for any segment.
     """
     if not light.soft:
         return [(x0, x1)]

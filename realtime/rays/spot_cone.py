@@ -66,7 +66,11 @@ class AxisGeometry:
 
 
 def axis_geometry(away, direction, direction_low, light: Light) -> AxisGeometry:
-    """Return rays as a spot's axis sees them; `away` is the vector to the light with its low part."""
+    """Return rays as a spot's axis sees them.
+
+    `away` is the vector to the light with its low part [m]; `direction` are unit vectors, `direction_low` what rounding
+    took from them.
+    """
     v, v_low = away
     w, w_low = two_cross(v, direction)
     w_low += dr.cross(v_low, direction)

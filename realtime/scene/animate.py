@@ -66,7 +66,13 @@ def coloured_light(light: Light, share: float) -> Light:
 
 
 def thicker_medium(medium: Medium, factor: float) -> Medium:
-    """Return a medium, and the bounded media in it, with the extinction times a factor; the albedo stays."""
+    """Return a medium, and the bounded media in it, with the extinction times a factor; the albedo stays.
+
+    Raises
+    ------
+    InputError
+        For a factor that is negative or not finite.
+    """
     if not 0 <= factor < np.inf:
         raise InputError(f"factor of the extinction: got {factor!r}, wanted a finite value of 0 or more")
     sigma = tuple(dr.opaque(type(value), factor * float(value[0])) for value in medium.sigma_t)

@@ -75,7 +75,16 @@ def _read_sphere(shape) -> Bounds:
 
 
 def mesh_bounds(name: str, vertices: Array, faces: NDArray[Any]) -> Bounds:
-    """Return the bounds that a mesh describes, counter-clockwise seen from outside.
+    """Return the bounds that the mesh `name` describes.
+
+    Parameters
+    ----------
+    name
+        For messages.
+    vertices
+        Positions [m], (vertices, 3).
+    faces
+        Vertex numbers, counter-clockwise seen from outside, (faces, 3).
 
     Raises
     ------
@@ -146,7 +155,7 @@ def plane_neighbours(bounds: Bounds) -> NDArray[np.uint32]:
 
 
 def holds(bounds: Bounds, point: Array) -> bool:
-    """Return whether a point lies inside."""
+    """Return whether a point lies inside [m], (3,)."""
     if bounds.is_sphere:
         return bool(np.linalg.norm(point - bounds.centre) < bounds.radius)
     return bool(np.all(bounds.normals @ point < bounds.offsets))

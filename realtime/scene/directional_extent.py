@@ -41,7 +41,8 @@ def media_spheres(bounded_media: tuple[BoundedMedium, ...]) -> Array:
 def distance_before(spheres: Array, shapes) -> float:
     """Return how far from the middle of the media nothing is any more [m].
 
-    An object that turns about the middle of its box stays within the sphere about the box.
+    `spheres` are those of `media_spheres`, `shapes` Mitsuba's. An object that turns about the middle of its box stays
+    within the sphere about the box.
     """
     middle = _middle(spheres)
     reach = np.linalg.norm(spheres[:, :3] - middle, axis=1) + spheres[:, 3]
@@ -60,7 +61,7 @@ def directional_fields(axis: Array, spheres: Array, back: float, types: ArrayTyp
     axis
         Unit vector in which the light travels.
     spheres, back
-        From `media_spheres` and `distance_before`.
+        From `media_spheres` and `distance_before` [m].
     types
         Of the arrays.
 

@@ -52,7 +52,7 @@ class Projection:
         return self.basis[2] if self.basis and not self.w else None
 
     def products(self, face, vector) -> tuple[Any, Any, Any]:
-        """Return the scalar products of a vector with the across, up and axis of a face."""
+        """Return the scalar products of a vector [m] with the across, up and axis of a face [m]."""
         if self.basis:
             return tuple(dr.dot(vector, basis_vector) for basis_vector in self.basis)
         x, y, z = vector.x, vector.y, vector.z
@@ -153,7 +153,7 @@ def cube_direction(Vector, face, u, v):
 
 
 def cube_coordinates(d):
-    """Return the face of a cube that a direction goes through, and u and v there."""
+    """Return the face of a cube that a direction `d` of any length goes through, and u and v there, from -1 to 1."""
     size = dr.abs(d)
     x_major = (size.x >= size.y) & (size.x >= size.z)
     y_major = ~x_major & (size.y >= size.z)

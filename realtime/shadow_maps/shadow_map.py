@@ -141,7 +141,7 @@ def cast_map_rays(scene, light: Light, place, active=True):
 
 
 def lit_in_map(shadow_map: ShadowMap, light: Light, point):
-    """Return whether the light reaches a point by the nearest value of its shadow map."""
+    """Return whether the light reaches a point [m] by the nearest value of its shadow map."""
     Float, projection = type(point.x), shadow_map.projection
     d = point - light.position
     if projection.basis is None:

@@ -93,7 +93,7 @@ def slice_heights(shadow_map: ShadowMap, heights, slices: Slices, light: Light) 
 
 
 def line_point(heights: SliceHeights, number, q):
-    """Return (k_x, k_y) at `q`, counted in leaves, of slices."""
+    """Return (k_x, k_y) at `q`, counted in leaves, of the slices of a `number`."""
     q = q * (1.0 / heights.size)
     if heights.chord is None:
         kx = 1 - q
@@ -184,7 +184,7 @@ def _band(slices: Slices, shadow_map: ShadowMap):
 
 
 def node_pair(heights: SliceHeights, number, place, level):
-    """Return the pair of the node of a level that begins at a leaf."""
+    """Return the pair [1/m] of the node of a level that begins at the leaf `place`, of the slices of a `number`."""
     heap = (mi.UInt32(heights.leaves) + place) >> level
     pair = dr.gather(two_numbers(type(heights.tree)), heights.tree, number * (2 * heights.leaves) + heap)
     return pair.x, pair.y

@@ -36,7 +36,7 @@ class Slices:
 
     count: int
     width: int  #: of the image [pixels]
-    height: int
+    height: int  #: of the image [pixels]
     epipole: tuple[Any, Any, Any]  #: a, b, c, and all times -1 where c < 0; one entry each
     sides: tuple[tuple[Any, Any], ...]  #: of the border: where it begins along those that face away, and if it does
     length: Any  #: of those sides [pixels], one entry
@@ -105,7 +105,7 @@ def image_slices(camera: Camera, light: Light, count: int) -> Slices:
 
 
 def image_point(camera: Camera, direction):
-    """Return (i, j) of rays [pixels]."""
+    """Return (i, j) of rays along `direction` [pixels], to the left of and above the middle of the image."""
     depth = dr.rcp(dr.dot(direction, camera.forward))
     i = dr.dot(direction, camera.left) / dr.squared_norm(camera.left)
     j = dr.dot(direction, camera.up) / dr.squared_norm(camera.up)
@@ -113,14 +113,14 @@ def image_point(camera: Camera, direction):
 
 
 def pixel_number(slices: Slices, i, j):
-    """Return the number, row times width plus column, of the pixel that holds an image point, or of the nearest."""
+    """Return the number, row times width plus column, of the pixel that holds a point (i, j), or of the nearest."""
     column = dr.clip(0.5 * slices.width - i, 0, slices.width - 1)
     row = dr.clip(0.5 * slices.height - j, 0, slices.height - 1)
     return mi.UInt32(row) * slices.width + mi.UInt32(column)
 
 
 def slice_coordinate(slices: Slices, i, j):
-    """Return the place of image points among the slices: 0 on the first, 1 on the second, and so on.
+    """Return the place of image points (i, j) [pixels] among the slices: 0 on the first, 1 on the second, and so on.
 
     Beyond the first and the last it goes on to -1/2 and count - 1/2, where all four sides face away round the circle.
     """

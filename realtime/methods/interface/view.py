@@ -67,5 +67,5 @@ def rays_in_media(view: View, form: str = "exact") -> tuple[LitRay, ...]:
 
 
 def bounded_radiance(light: Light, scattered):
-    """Return the radiance of what `airlight` of a ray in bounded media returns [W/(m^2 sr)]."""
+    """Return the radiance of `scattered`, what `airlight` of a ray in bounded media returns [W/(m^2 sr)]."""
     return light.intensity * (scattered * (0.25 * dr.inv_pi))

@@ -41,7 +41,7 @@ class Side:
     """The wall on a side of a texel, which goes from its corner of lower u or v to the other."""
 
     stands: Any  #: whether there is one
-    place: Any  #: where, from 0 to 1
+    place: Any  #: where, from 0 to 1 [1]
 
 
 def side_of(walls, side, Float) -> Side:
@@ -115,17 +115,17 @@ def _select(condition, chosen: Numbers, otherwise: Numbers) -> Numbers:
 
 
 def value_at(numbers: Numbers, x, y):
-    """Return c0 + cx x + cy y."""
+    """Return c0 + cx x + cy y at a point (x, y) of a texel, each from 0 to 1 [1/m]."""
     return dr.fma(numbers[1], x, dr.fma(numbers[2], y, numbers[0]))
 
 
 def height_at(parts: Parts, second, x, y):
-    """Return the height at a point by the plane of the second part, or of the first."""
+    """Return the height at (x, y) by the plane of the second part, or of the first [1/m]."""
     return dr.select(second, value_at(parts.second, x, y), value_at(parts.first, x, y))
 
 
 def height_in(parts: Parts, x, y):
-    """Return the height at a point of a texel."""
+    """Return the height at the point (x, y) of a texel, each from 0 to 1 [1/m]."""
     return height_at(parts, value_at(parts.line, x, y) > 0, x, y)
 
 

@@ -190,7 +190,11 @@ def may_meet(planes: BeamPlanes, values, low, high):
 
 
 def parts_within(planes: BeamPlanes, values, half, low, high):
-    """Return bit 4 row + column of each of the 4 x 4 parts of a square that is not beyond a plane through the light."""
+    """Return bit 4 row + column of each of the 4 x 4 parts of a square that is not beyond a plane through the light.
+
+    `values` are those of the planes at the middle of the square, `half` is half its side, and `low` and `high` bound
+    the heights over it [1/m].
+    """
     low, high = dr.fma(-1e-5, high, low), dr.fma(1e-5, high, high)
     sides = []
     for k in _NARROW:

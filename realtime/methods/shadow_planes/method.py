@@ -201,6 +201,11 @@ def shadow_planes(
     parameters
         Values of the parameters.
 
+    Raises
+    ------
+    InputError
+        For an evaluation that does not know bounded media.
+
     Notes
     -----
     Valid for all lights and casters that are triangle meshes, closed or not. Shadows are those of the

@@ -165,7 +165,7 @@ def seen_rays(aim: Aim, camera: Camera, pixel, distance, light: Light) -> SeenRa
 
 
 def seen_ways(aim: Aim, camera: Camera, pixel):
-    """Return the unit directions of rays in the frame, three arrays."""
+    """Return the unit directions of the rays of pixel numbers `pixel` in the light's basis, three arrays."""
     _, _, w = _aimed(aim, camera, pixel)
     return tuple(w * dr.rsqrt(dr.squared_norm(w)))
 

@@ -211,7 +211,7 @@ def layers_between(casters: Casters, light: Array, basis: LightBasis, *, used: N
     """Return how many layers lie between a light and the camera of their basis.
 
     A closed component counts the larger number of its triangles that face the light and that are averted: the two
-    differ where the light or the camera is inside, and then all beyond is dark.
+    differ where the light or the camera is inside, and then all beyond is dark. `used` says which components count.
     """
     l, w = place_and_weight(light)  # noqa: E741
     axes = basis.axes

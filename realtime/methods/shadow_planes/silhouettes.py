@@ -54,7 +54,10 @@ def facing(casters: Casters, light: Array) -> NDArray[np.int8]:
 
 
 def layers(casters: Casters, light: Array) -> NDArray[np.int8]:
-    """Return the number of layers that each triangle stands for, and a last 0 for no triangle."""
+    """Return the number of layers that each triangle stands for, (triangles + 1,), with a last 0 for no triangle.
+
+    `light` is a homogeneous position, (4,), or a place, (3,) [m].
+    """
     sign = facing(casters, light)
     if casters.closed.all():
         return np.maximum(sign, 0)

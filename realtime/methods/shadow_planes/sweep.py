@@ -41,7 +41,7 @@ _DUE = 3  # in the last bits of a place: there waiting integrals are asked for
 class RayPlanes:
     """A camera ray in the frame of an index of planes."""
 
-    x: Any  #: direction
+    x: Any  #: components of the unit direction
     y: Any
     z: Any
     azimuth: Any  #: diamond angle
@@ -50,7 +50,10 @@ class RayPlanes:
 
 
 def ray_planes(lists: Lists, x, y, z, *, tile) -> RayPlanes:
-    """Return camera rays, directions in the frame of a light, with the planes of their tiles; see `View.tile`."""
+    """Return camera rays, unit directions (x, y, z) in the basis of a light, with the planes of their tiles.
+
+    `tile` is that of `View`.
+    """
     source = dr.gather(Source, lists.source, tile)
     return RayPlanes(x, y, z, diamond_angle(x, y), source, dr.gather(mi.Bool, lists.sorted, tile))
 

@@ -33,7 +33,7 @@ class Source:
 
 
 def entry_at(entries, source: Source, k, active):
-    """Return the k-th entry of a source and whether it counts there."""
+    """Return the k-th of the `entries` of a source and whether it counts there."""
     place = source.first + k
     active = active & (k < source.count)
     entry = dr.gather(mi.UInt32, entries, place, active)
@@ -48,7 +48,7 @@ def tile_lists(index: PlaneIndex, rays, distance, *, order: str, square: bool) -
     index
         The planes.
     rays, distance, square
-        See `tile_boxes`.
+        See `tile_boxes` [m].
     order
         See `listed`.
     """

@@ -84,6 +84,11 @@ def tessellation_stages(
 
     The passes are those of the paper's Table 1, ``laplacian``, ``edge map`` and ``tessellate``, and ``vertices``, which
     a graphics card does while it draws.
+
+    Raises
+    ------
+    InputError
+        If `threshold` is not a positive number.
     """
     passed: list[Any] = [_heights(shadow_map)]
     times = {}

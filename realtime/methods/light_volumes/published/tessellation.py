@@ -64,9 +64,9 @@ def edges(height, threshold: float) -> list[Any]:
     Parameters
     ----------
     height
-        Array (faces, N + 1, N + 1), N a power of two, of inverse depths, none negative.
+        Array (faces, N + 1, N + 1), N a power of two, of inverse depths [1/m], none negative.
     threshold
-        Largest departure that is no edge, relative to the height.
+        Largest departure that is no edge, relative to the height [1].
 
     Raises
     ------
@@ -149,7 +149,8 @@ def quads(divided: list[Any]):
 def triangles(divided: list[Any]):
     """Return the triangles of the quads, (m, 3) numbers of corners face by face and row by row.
 
-    They are counter-clockwise in (column, row). No corner lies inside a side of a triangle.
+    `divided` is that of `divide`. Triangles are counter-clockwise in (column, row), and no corner lies inside a side
+    of one.
     """
     size = 2 ** len(divided)
     parts = []
