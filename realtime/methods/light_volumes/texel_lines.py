@@ -31,7 +31,7 @@ class Line:
 
 
 def line_of(heights: InverseDepthField, face, ray: FaceRay) -> Line:
-    """Return the line of a ray in a face; D at its ends is that of the texel whose borders are on either side of them."""
+    """Return the line of a ray in a face; D at its ends is that of the texel whose borders lie about them."""
     right, up = ray.per_u > 0, ray.per_v > 0
     excess, cells, slack = [], [], type(ray.begin)(0)
     for t in (0, 1):
