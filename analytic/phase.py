@@ -136,7 +136,7 @@ class PhaseFunction:
 
     @property
     def is_constant(self) -> bool:
-        """Whether it is 1 in all directions, so that integrands leave it out."""
+        """Whether it is 1 in all directions, so that integrands can leave it out."""
         return self.name == "isotropic"
 
     def series(self, degree: int) -> list[float] | None:

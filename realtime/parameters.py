@@ -47,7 +47,7 @@ class Parameters:
 
 @dataclass(frozen=True)
 class Limits:
-    """What is said of a parameter beside its default: the metadata of its field."""
+    """What the metadata of a field say about a parameter, beside its default."""
 
     help: str
     choices: tuple[Any, ...] = ()
@@ -67,7 +67,7 @@ def parameter(default: Any, help: str, **limits: Any) -> Any:
 
 
 def limits_of(item: Field) -> Limits:
-    """Return what is said of a parameter; of one that was made without `parameter`, nothing."""
+    """Return the limits of a parameter; a field that was made without `parameter` has none."""
     return item.metadata.get("limits", Limits(""))
 
 
@@ -156,7 +156,7 @@ def _allowed(limits: Limits, default: Any, value: Any) -> bool:
     if value in limits.also:
         return True
     if not math.isfinite(value):
-        return limits == Limits(limits.help)  # nothing is said of it, so anything may be
+        return limits == Limits(limits.help)  # It has no limits: every value is allowed.
     return (
         (limits.least is None or value >= limits.least)
         and (limits.most is None or value <= limits.most)

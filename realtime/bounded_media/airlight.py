@@ -203,7 +203,7 @@ def _integral(ray: MediaRay, piece: Piece, x0, x1):
     """Integrate one segment in one piece."""
     Float = type(ray.geometry.height)
     x1 = dr.minimum(x1, x0 + _OPTICAL_REACH / least_extinction(piece.medium))
-    # A ray through the light itself: its integral is infinite, and so nearly is this.
+    # A ray passes through the light itself: its integral is infinite, and so nearly is this value.
     h = dr.maximum(ray.geometry.height, 1e-15)
     s0, s1 = x0 - ray.geometry.foot, x1 - ray.geometry.foot
     width = dr.select(dr.isfinite(x1), dr.atan2(h * (s1 - s0), dr.fma(h, h, s0 * s1)), dr.atan2(h, s0))

@@ -42,7 +42,7 @@ def seen_from(bounded_medium: BoundedMedium, point) -> Seen:
         return Seen(bounded_medium, toward, None)
     *normal, offset = bounded_medium.planes
     room = offset - (normal[0] * point.x + normal[1] * point.y + normal[2] * point.z)
-    # A point in the plane itself counts as just outside: the line is in from next to nothing on, or never.
+    # A point in the plane itself counts as just outside: the line enters at once, or never.
     room = dr.select(dr.abs(room) < 1e-7 * bounded_medium.radius, -1e-7 * bounded_medium.radius, room)
     columns = (*(component / room for component in normal), dr.select(room < 0, type(room)(1), 0))
     numbers = packed(four_numbers(type(room))(*columns))
@@ -133,7 +133,7 @@ def share_inside(enter, leave=None):
 
 
 def near_line(seen: Seen, direction, length):
-    """Return whether the line of a unit direction and a length comes near the medium: cheap, and never wrongly no."""
+    """Return whether a line of a unit direction and a length may meet the medium; never False where it does."""
     along = dr.dot(seen.toward, direction)
     nearest = dr.clip(along, 0, length)
     reach = seen.bounded_medium.radius * 1.001

@@ -98,7 +98,7 @@ def _image_frame(seen: Seen):
     """Return axes in which the medium's sphere is seen between -1 and 1: (v . across, v . up)/(v . middle)."""
     toward, radius = seen.toward, seen.bounded_medium.radius
     distance = dr.maximum(dr.norm(toward), 1e-6 * radius)
-    # From within the sphere there is no such image; any plane will do to begin at.
+    # A point within the sphere sees no such image; the walk can begin at any plane.
     beside = dr.sqrt(dr.maximum((distance - radius) * (distance + radius), 0.01 * radius * radius))
     middle = toward / distance
     Vector = type(toward)
@@ -225,7 +225,9 @@ def _across(planes: EntryPlanes, number, side: int):
 
 
 def clear_of(planes: tuple[EntryPlanes, EntryPlanes], start, direction, x0, x1):
-    """Return whether no leg to a segment meets the medium whose entry and exit planes are given; never wrongly yes.
+    """Return whether no leg to a segment meets the medium whose entry and exit planes are given.
+
+    The answer is conservative: where it is False, legs may still miss the medium.
 
     With u the entering plane's and -w the leaving one's, legs that meet the medium have u > 1 and u > -w. Both are
     linear along the ray: where u - max(1, -w) is below 0 at both ends with the planes of one point between, no leg

@@ -39,7 +39,7 @@ from realtime.scene.lights import Light
 from realtime.scene.medium import Medium
 
 _NODES, _NODES_DOUBLE = 3, 6
-_MOST = 1000  # panels; more than any segment needs: what is not a number must end too
+_MOST = 1000  # panels; no segment needs as many, but a loop over values that are not numbers must end too
 _TANGENT = 0.45
 _DEPTH = 1.6
 _SHARE = 0.5
@@ -67,7 +67,7 @@ def medium_integral(segment: MediumSegment, x0, x1):
     """Return albedo sigma_t times the integral from x0 to x1 within the medium, RGB [1/m^2]."""
     Float, Color = type(x0), type(segment.medium.albedo)
     foot = segment.geometry.foot
-    # A ray through the light itself: its integral is infinite, and so nearly is this.
+    # A ray passes through the light itself: its integral is infinite, and so nearly is this value.
     h = dr.maximum(segment.geometry.height, 1e-15)
     last = x1 - foot
     walk = _walk_from(segment, x0)
@@ -102,7 +102,7 @@ def medium_integral(segment: MediumSegment, x0, x1):
 
 
 def _walk_from(segment: MediumSegment, x):
-    """Return the plane where legs enter; of a sphere nothing needs to be known."""
+    """Return the plane where legs enter; a sphere has none, and its entry is not used."""
     if segment.planes is None:
         return Entry(dr.zeros(mi.UInt32, dr.width(x)), x * 0, x * 0)
     return first_entry(segment.planes, segment.start, segment.direction, x)
@@ -161,7 +161,7 @@ def _panel(segment: MediumSegment, walk: Entry, *, ends, squares, h) -> list[Any
     s0, s1 = ends
     Float = type(s0)
     length = s1 - s0
-    # A panel turns by less than 31 degrees: a smaller product is what rounding left of it.
+    # A panel turns by less than 31 degrees, so a smaller product is the work of rounding.
     product = dr.maximum(dr.fma(s0, s1, h * h), 0.5 * dr.sqrt(squares[0] * squares[1]))
     scale = length / product
     tangent = dr.square(h * scale)

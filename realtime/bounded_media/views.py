@@ -17,7 +17,7 @@ class MediumView:
 
     seen: Seen
     entering: EntryPlanes | None  #: None for a sphere
-    leaving: EntryPlanes | None  #: None for a sphere, and where nobody asks
+    leaving: EntryPlanes | None  #: None for a sphere, and where the caller does not need them
 
 
 @dataclass(frozen=True)

@@ -120,7 +120,7 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
         layers = layers_of(view) if corners is None else adaptive_layers(layers_of, view, corners, tolerance)
         return layers if method.passes else composed(layers, by_light)
 
-    # Asked of every scene: it checks the parameters also where nothing casts a shadow.
+    # Every scene runs it: it checks the parameters also where nothing casts a shadow.
     prepare = method.prepare(scene, chosen) if method.prepare else _no_state
     if not features.shadows:
         prepare = _no_state

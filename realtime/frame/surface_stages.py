@@ -40,7 +40,7 @@ def surface_stages(scene: Scene, *, provides_visibility: bool) -> tuple[Callable
     """
     if not scene.features.surfaces:
         return _nothing_met, no_surface, False
-    # A map of a light at infinity shows the media alone, but not all that is lit.
+    # The map of a light at infinity covers the media alone; surfaces beside them are lit too.
     asked = [not (light.w and provides_visibility) for light in scene.lights]
 
     def cast_all(geometry, facets, pixel, camera, medium) -> Cast:

@@ -67,7 +67,7 @@ def open_interval(intervals: LitIntervals, begin, opens) -> LitIntervals:
 def close_interval(intervals: LitIntervals, end, closes, *, begin=None) -> LitIntervals:
     """Return intervals behind the place `end` [m] where the light ends if it `closes` one; no other may have waited.
 
-    `begin` is where it began [m], None for where `open_interval` was told.
+    `begin` is where it began [m], None for where `open_interval` put it.
     """
     if begin is not None:
         intervals = open_interval(intervals, begin, closes)

@@ -46,7 +46,7 @@ def insert(queue: Crossings, key, gain=None, *, larger_is_nearer: bool):
         keys.append(nearer(held, key))
         key = farther(held, key)
         if queue.gain:
-            # Asked of the new key, not of the one that it displaced: equal keys must not pass one another.
+            # Compare with the new key, not with the one that it displaced: equal keys must keep their order.
             before = new > held if larger_is_nearer else new < held
             gains.append(dr.select(before, gain, queue.gain[place]))
             gain = dr.select(before, queue.gain[place], gain)

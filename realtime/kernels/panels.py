@@ -45,7 +45,7 @@ from realtime.numerics.gauss_legendre import unit_nodes
 from realtime.scene.phase import Phase
 
 _NODES = 8
-_MOST = 160  # panels; more than any segment needs: what is not a number must end too
+_MOST = 160  # panels; no segment needs as many, but a loop over values that are not numbers must end too
 _DEPTH = 10.5  # T1
 _SOFT = 0.85  #: w for a light whose intensity falls off
 _NO_RATE = 1e-30
@@ -82,7 +82,7 @@ def panels_mean(phase: Phase, start, scale, width, decays, weight: Callable[[Any
     part = width * part_of_all
     nodes = [(share, *_offset(part * fraction)) for fraction, share in unit_nodes(_NODES)]
     sinh_end, less_end = _offset(part)
-    # Not 0 in a vacuum: Dr.Jit must not find the depth to be the same in all turns of the loop.
+    # Not 0 in a vacuum, where Dr.Jit would see a depth that no turn of the loop changes, and drop it from the state.
     rates = [dr.minimum(-decay * scale * LOG2_E, -_NO_RATE) for decay in decays]
 
     def panel(index, f, c, depths, totals):

@@ -31,7 +31,7 @@ from realtime.scene.phase import Phase, Reach
 
 @dataclass(frozen=True)
 class Rule:
-    """How many nodes serve which segments."""
+    """How many nodes a rule has, and which segments it serves."""
 
     nodes: int
     depth: float  #: largest sigma_t (1 + s1/r1) L [1]
@@ -63,7 +63,7 @@ def extent(geometry: RayGeometry, x0, x1, extinctions) -> Extent:
 
 
 def serves(rule: Rule, segment_extent: Extent, phase: Phase):
-    """Return whether a rule is right; not where anything is no number or infinite.
+    """Return whether a rule is accurate enough; False where a value is infinite or not a number.
 
     Length and depth each spoil part of it: by themselves they may reach their limits, together an ellipse.
     """

@@ -112,7 +112,7 @@ def _extinction_series(a, degree: int):
 
 
 def phase_series(phase: Phase, degree: int, kernel: str):
-    """Return the coefficients of p(-sin theta) in powers of theta; refuse for a kernel what has none."""
+    """Return the coefficients of p(-sin theta) in powers of theta; refuse a phase function without them."""
     series = phase.series(degree)
     if series is None:
         known = ", ".join(candidate.name for candidate in PHASES if candidate.series is not Phase.series)

@@ -135,7 +135,7 @@ def _from_file(path: Path, name: str) -> ModuleType:
         return known
     spec = importlib.util.spec_from_file_location(key, place)
     if spec is None or spec.loader is None:
-        raise InputError(f"method {name}: {path} is no Python file; {_WANTED}")
+        raise InputError(f"method {name}: {path} is not a Python file; {_WANTED}")
     module = importlib.util.module_from_spec(spec)
     module.__dict__["__airlight_stamp__"] = stamp
     sys.modules[key] = module

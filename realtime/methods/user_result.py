@@ -60,7 +60,7 @@ def checked_layers(returned: Any, view: View, name: str, *, visibility: bool) ->
     Raises
     ------
     InputError
-        For what is no `Layers`, radiance of another type or shape, and a visibility that is not that of every light.
+        For an object other than `Layers`, radiance of another type or shape, and a visibility that lacks a light.
     """
     if not isinstance(returned, Layers):
         raise InputError(

@@ -131,7 +131,7 @@ def falloff(geometry: RayGeometry, light: Light, x):
     t = dr.fma(geometry.slant, s, -geometry.slide)
     away = dr.sqrt(dr.fma(t, t, dr.square(geometry.gap)))
     along = dr.fma(geometry.axial, s, geometry.offset)
-    # As one angle: at the dim edge the difference of two has lost what is left of it.
+    # Compute one angle: at the dim edge the difference of two angles would cancel.
     cos, sin = light.cone.cos, dr.sqrt(light.cone.square_sin)
     within = dr.atan2(sin * along - cos * away, dr.fma(cos, along, sin * away))
     return dr.clip(within * light.inverse_transition, 0, 1)

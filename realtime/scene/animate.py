@@ -58,7 +58,7 @@ def _turned_directional(light: Light, extent: DirectionalExtent, turn: Array) ->
 
 
 def coloured_light(light: Light, share: float) -> Light:
-    """Return a light whose red, green and blue went round by a share of a turn; their sum stays."""
+    """Return a light whose red, green and blue rotate by a share of a turn; their sum stays."""
     intensity = np.array(light.intensity, dtype=np.float64).ravel()
     whole, part = divmod(3 * share, 1)
     here, there = (np.roll(intensity, int(whole) + step) for step in (0, 1))

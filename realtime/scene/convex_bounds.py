@@ -162,7 +162,7 @@ def holds(bounds: Bounds, point: Array) -> bool:
 
 
 def overlap(first: Bounds, second: Bounds) -> bool:
-    """Return whether two bodies share more than 1e-5 of their size; bodies that touch do not."""
+    """Return whether two bounds share more than 1e-5 of their size; bounds that touch do not."""
     gap = float(np.linalg.norm(first.centre - second.centre))
     margin = _FLAT * min(first.radius, second.radius)
     if gap >= first.radius + second.radius - margin:

@@ -39,7 +39,7 @@ def media_spheres(bounded_media: tuple[BoundedMedium, ...]) -> Array:
 
 
 def distance_before(spheres: Array, shapes) -> float:
-    """Return how far from the middle of the media nothing is any more [m].
+    """Return the distance from the middle of the media beyond which nothing lies [m].
 
     `spheres` are those of `media_spheres`, `shapes` Mitsuba's. An object that turns about the middle of its box stays
     within the sphere about the box.

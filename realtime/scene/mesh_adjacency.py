@@ -123,7 +123,7 @@ def with_positions(casters: Casters, positions: Mapping[str, Array]) -> Casters:
 
 def mesh_triangles(mesh) -> tuple[Array, NDArray[np.int64]]:
     """Return the vertices [m] and the triangles of a Mitsuba mesh, (vertices, 3) and (triangles, 3)."""
-    # Asked for one by one: `mi.traverse` shows the transform of a rectangle or a cube, not its vertices.
+    # Ask for vertices one by one: `mi.traverse` shows the transform of a rectangle or a cube, not its vertices.
     position = mesh.vertex_position(dr.arange(mi.UInt32, mesh.vertex_count()))
     face = mesh.face_indices(dr.arange(mi.UInt32, mesh.face_count()))
     return np.array(position, dtype=np.float64).T.copy(), np.array(face, dtype=np.int64).T.copy()
@@ -144,7 +144,7 @@ def _mesh_part(name: str, vertices: Array, triangles: NDArray[Any]) -> tuple[dic
     vertices = np.asarray(vertices, dtype=np.float64).reshape(-1, 3)
     vertices, own, inverse = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
     triangles = inverse.reshape(-1)[np.asarray(triangles, dtype=np.int64).reshape(-1, 3)]
-    # One that is a line stays: it closes the gap between a long edge and the two halves on its other side.
+    # A triangle that is a line stays: it closes the gap between a long edge and the two halves on its other side.
     triangles = triangles[np.all(triangles != np.roll(triangles, 1, axis=1), axis=1)]
     _, kept = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)
     if len(kept) < len(triangles):

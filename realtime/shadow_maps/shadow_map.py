@@ -41,7 +41,7 @@ class ShadowMap:
 
 
 def check_size(size) -> None:
-    """Refuse what is no resolution of a shadow map.
+    """Refuse a resolution that no shadow map can have.
 
     Raises
     ------
@@ -91,7 +91,7 @@ def cast_shadow_map(scene, light: Light, size: int) -> ShadowMap:
     cast = cast_map_rays(scene, light, (face, u, v), there)
     distance = dr.empty(type(cast), faces * side * side)
     dr.scatter(distance, cast, (face * side + row) * side + column, there)
-    dr.eval(distance, projection)  # once: whoever reads it would cast the rays again
+    dr.eval(distance, projection)  # Evaluate it once: every kernel that reads it would cast the rays again.
     return ShadowMap(size, distance, projection)
 
 

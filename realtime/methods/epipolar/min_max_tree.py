@@ -106,7 +106,7 @@ def _tree(heights: SliceHeights, at_begin, at_end):
     """Return the trees over leaves with the heights `at_begin` and `at_end` at their ends."""
     count, leaves = heights.slices.count, heights.leaves
     Pair = two_numbers(type(at_begin))
-    # Written only: reading from what is being written would copy it at every level.
+    # The tree is only written here: if a kernel read it too, Dr.Jit would copy it at every level.
     tree = dr.empty(type(at_begin), 2 * count * 2 * leaves)
     index = dr.arange(mi.UInt32, count * leaves)
     dr.scatter(tree, Pair(at_begin, at_end), index + (index // leaves + 1) * leaves)
@@ -176,7 +176,7 @@ def _band(slices: Slices, shadow_map: ShadowMap):
         begin = dr.select(slope == 0, begin, dr.maximum(begin, (-side - start) / slope))
         end = dr.select(slope == 0, end, dr.minimum(end, (side - start) / slope))
     margin = (2 / shadow_map.size) * dr.rcp(dr.maximum(dr.abs(a), dr.abs(b)))
-    # A slice that misses the map has a band of no use, beside it.
+    # A slice that misses the map gets a band beside it, which no ray uses.
     begin = dr.maximum(begin - margin, 0)
     end = dr.maximum(end + margin, begin + margin)
     height = height + dr.zeros(Float, slices.count)

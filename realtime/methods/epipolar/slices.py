@@ -126,7 +126,7 @@ def slice_coordinate(slices: Slices, i, j):
     """
     x, y = 0.5 * slices.width, 0.5 * slices.height
     di, dj = _towards_epipole(slices.epipole, i, j)
-    # Away from E, to whichever side comes first.
+    # The half line from E leaves the image through the side that it meets first.
     to_i = dr.select(di < 0, x - i, x + i) / dr.abs(di)
     to_j = dr.select(dj < 0, y - j, y + j) / dr.abs(dj)
     t = dr.minimum(to_i, to_j)
@@ -134,7 +134,7 @@ def slice_coordinate(slices: Slices, i, j):
     first, second, third, fourth = (begin for begin, _ in slices.sides)
     along_i = dr.select(di < 0, first + (at_j + y), third + (y - at_j))
     along_j = dr.select(dj < 0, second + (x - at_i), fourth + (at_i + x))
-    # On E itself any slice will do.
+    # A point on E itself belongs to every slice: take any.
     here = (di == 0) & (dj == 0)
     place = dr.select(here, 0, dr.select(to_i <= to_j, along_i, along_j))
     return dr.clip(place, 0, slices.length) * (slices.count / slices.length) - 0.5

@@ -125,7 +125,7 @@ def _coordinates(size: int, x, origin, direction, nearest):
     a, b, c = (dr.select(finite, dr.fma(at, d, o), d) for o, d in zip(origin, direction))
     inverse = dr.rcp(dr.select(finite, dr.maximum(c, nearest), c))
     half = 0.5 * size
-    # Just within the last column and row: a line along the far border would lie in none.
+    # Stay just within the last column and row: a line along the far border would lie in none.
     last = size * (1 - dr.epsilon(type(x)))
     u, v = (dr.clip(dr.fma(half * p, inverse, half), 0, last) for p in (a, b))
     return u, v, dr.select(finite, inverse, 0), dr.select(finite, at * inverse, inverse)

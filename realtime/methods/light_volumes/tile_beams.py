@@ -77,7 +77,7 @@ def make_beam(directions, end, light, axis=None) -> Beam:
     middle = dr.normalize(sum(directions[1:], directions[0]))
     across = directions[-1] - directions[0]
     across -= middle * dr.dot(across, middle)
-    # A tile of one ray, or of a row of pixels, has no extent in some direction: any other will do.
+    # A tile of one ray, or of a row of pixels, has no extent in some direction: take any.
     other = dr.cross(middle, dr.select(dr.abs(middle.x) < 0.7, type(middle)(1, 0, 0), type(middle)(0, 1, 0)))
     across = dr.normalize(dr.select(dr.squared_norm(across) > 1e-12, across, other))
     up = dr.cross(middle, across)

@@ -101,7 +101,7 @@ class HostSpot:
 
 
 def read_spot(light: Light) -> HostSpot | None:
-    """Bring what only a spot has to the host; None for other lights."""
+    """Read the fields of a spot to the host; None for other lights."""
     if light.cone is None:
         return None
     sines = [
@@ -179,7 +179,7 @@ def _aimed(aim: Aim, camera: Camera, pixel):
 
 
 def _in_cone(aim: Aim, place, way, geometry: RayGeometry, *, light: Light, distance) -> RayGeometry:
-    """Add to a geometry what only a spot has."""
+    """Return a geometry with the fields that only a spot has."""
     x, y, z, scale = way
     a = aim.axis
     square = dr.fma(x, x, dr.square(y))

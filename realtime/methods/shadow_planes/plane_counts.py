@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the casters of a scene ask of shadow planes, and what is left out for this camera."""
+"""How many shadow planes the casters of a scene have, and how many of them this camera needs."""
 
 from dataclasses import dataclass
 

@@ -141,7 +141,7 @@ def edge_planes(vertices: Array, coefficient: NDArray[np.int8], *, w: int = 1) -
     # layers left of an edge that leads to the left lie below it, at larger psi.
     gain = np.where(ahead, coefficient, -coefficient).astype(np.int8)
     cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-    # An edge that meets the axis itself: any tiny number keeps the loop closed.
+    # The edge meets the axis itself: any tiny number keeps the loop closed.
     cross = np.where(cross == 0, 1e-12 * np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1), cross)
     with np.errstate(divide="ignore", invalid="ignore"):
         lines = np.stack(

@@ -34,7 +34,7 @@ from realtime.numerics.array_types import two_numbers
 from realtime.numerics.diamond_angle import diamond_angle
 
 FEW, MANY = 2, 8  #: crossings that wait for others which may come before them, or are collected at once
-_DUE = 3  # in the last bits of a place: there waiting integrals are asked for
+_DUE = 3  # marks in the last bits of a place where waiting integrals are added
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,7 @@ def sum_lit_intervals(index: PlaneIndex, lists: Lists, ray: RayPlanes, segment, 
 
 @dataclass(frozen=True)
 class _Sweep:
-    """What does not change on a walk."""
+    """What stays the same during a walk."""
 
     index: PlaneIndex
     lists: Lists
@@ -224,7 +224,7 @@ def _walk(sweep: _Sweep, active, *, places: int):
         passed = _pass_plane(sweep, passed, nearest, gained, crosses=crosses, due=due)
         return place + 1, waiting, passed, lost
 
-    # What comes out of the queue first has no place and no gain: nothing happens there.
+    # The first entries that leave the queue have no place and no gain, and change nothing.
     nothing_waits = filled(dr.inf, places, Float, width)
     _, _, passed, lost = dr.while_loop(
         state=(dr.zeros(mi.UInt32, width), nothing_waits, _start(sweep), dr.full(mi.Bool, False, width)),

@@ -218,6 +218,6 @@ def _write_sorted(pool, unsorted: _Unsorted, source: Source, behind: int, total)
         return place
 
     place = dr.arange(mi.UInt32, dr.width(unsorted.entry))
-    # Most of the room is empty: a branch steps over it without reading.
+    # Most places are empty: a branch skips them without reading.
     dr.if_stmt(args=(place,), cond=place < total, true_fn=placed, false_fn=lambda place: place)
     dr.eval(pool)

@@ -155,7 +155,7 @@ def _pixel_range(values, depth, size: int):
         at = value / z
         low, high = dr.select(z > 0, dr.minimum(low, at), low), dr.select(z > 0, dr.maximum(high, at), high)
     for k, m in ((0, 1), (1, 2), (2, 0)):
-        # Where an edge passes z = 0 it leaves the image on the side of its value there; in doubt, on both.
+        # Where an edge passes z = 0 it leaves the image on the side of its value there, or on both if that is unclear.
         cut = (depth[k] > 0) ^ (depth[m] > 0)
         from_k, from_m = values[k] * dr.abs(depth[m]), values[m] * dr.abs(depth[k])
         doubt = 1e-12 * (dr.abs(from_k) + dr.abs(from_m))
@@ -173,7 +173,7 @@ def _expand(count, limit: int):
     ends = np.cumsum(np.array(dr.gather(mi.UInt32, count, used)), dtype=np.int64)
     begin = before = 0
     while begin < len(ends):
-        # One that is larger than the limit comes alone; it is the width or the height of an image at most.
+        # A count above the limit comes alone; it is the width or the height of an image at most.
         end = max(begin + 1, int(np.searchsorted(ends, before + limit, side="right")))
         starts = np.concatenate(([before], ends[begin : end - 1])) - before
         start = mi.UInt32(starts.astype(np.uint32))

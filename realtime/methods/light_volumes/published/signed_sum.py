@@ -64,7 +64,7 @@ def crossing_sum(
     beyond = dr.zeros(mi.Float64, dr.width(distance))
 
     def add(index, x0, x1, sign):
-        dr.eval(index, x0, x1, sign)  # so that all calls are one kernel: compiling it is what takes time
+        dr.eval(index, x0, x1, sign)  # All calls then share one kernel; compiling it takes longer than running it.
         columns = (getattr(geometry, field.name) for field in fields(RayGeometry))
         rays = RayGeometry(*(None if column is None else dr.gather(Float, column, index) for column in columns))
         term = airlight_integral(kernel, rays, x0, x1, medium=medium, light=light)
