@@ -23,9 +23,9 @@ def rays_of(truth, light=0):
     return lamp, (direction, normal, height), (np.maximum(np.arctan2(-foot, height), cone[0]), np.minimum(end, cone[1]))
 
 
-def lit_lengths(found, ends):
+def lit_lengths(intervals, ends):
     """Return how much of the angle at the light is lit on each ray."""
-    return np.bincount(found.ray, found.high - found.low, len(ends[0]))
+    return np.bincount(intervals.ray, intervals.high - intervals.low, len(ends[0]))
 
 
 def box(centre, size, **changes):

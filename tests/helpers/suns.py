@@ -58,8 +58,8 @@ def chord(name: str, origin, direction) -> tuple[Any, Any]:
         root = np.sqrt(np.maximum(b * b - c, 0))
         return np.where(b * b > c, -b - root, 0), np.where(b * b > c, -b + root, 0)
     with np.errstate(divide="ignore"):
-        one, two = ((BRICK[0] + sign * BRICK[1] - origin) / direction for sign in (-1, 1))
-    low, high = np.minimum(one, two).max(axis=-1), np.maximum(one, two).min(axis=-1)
+        low_sides, high_sides = ((BRICK[0] + sign * BRICK[1] - origin) / direction for sign in (-1, 1))
+    low, high = np.minimum(low_sides, high_sides).max(axis=-1), np.maximum(low_sides, high_sides).min(axis=-1)
     return np.where(high > low, low, 0), np.where(high > low, high, 0)
 
 

@@ -52,9 +52,9 @@ def chord(name, origin, direction):
         root = np.sqrt(np.maximum(b * b - c, 0))
         return np.where(b * b > c, -b - root, 0), np.where(b * b > c, -b + root, 0)
     with np.errstate(divide="ignore"):
-        one = ([-0.8125, -0.3125, 0.21875] - origin) / direction
-        two = ([-0.1875, 0.5625, 0.96875] - origin) / direction
-    low, high = np.minimum(one, two).max(axis=-1), np.maximum(one, two).min(axis=-1)
+        low_sides = ([-0.8125, -0.3125, 0.21875] - origin) / direction
+        high_sides = ([-0.1875, 0.5625, 0.96875] - origin) / direction
+    low, high = np.minimum(low_sides, high_sides).max(axis=-1), np.maximum(low_sides, high_sides).min(axis=-1)
     return np.where(high > low, low, 0), np.where(high > low, high, 0)
 
 

@@ -65,7 +65,7 @@ def test_ray_through_a_box_in_closed_form(variant, way):
     directions = {"across": [0.0, 0.0, -1.0], "with the ray": [0.0, 1.0, 0.0], "against it": [0.0, -1.0, 0.0]}
     truth, _ = truth_and_image(sunny(brick=brick(**HG), sun=sun(directions[way])))
     around = replace(truth, origin=origin, direction=direction[None], width=1, height=1)
-    found = ray_values(around)
+    values = ray_values(around)
     (medium,) = truth.media
     sigma_t, length = medium.sigma_t, 2 * BRICK[1][1]
     cos_scatter = -float(np.dot(directions[way], direction))
@@ -79,8 +79,8 @@ def test_ray_through_a_box_in_closed_form(variant, way):
     g = float(np.float32(0.6))
     p = (1 - g * g) / (1 + g * g - 2 * g * cos_scatter) ** 1.5
     expected = truth.directional[0].irradiance / (4 * np.pi) * medium.albedo * sigma_t * p * integral
-    assert found.airlight[0] == pytest.approx(expected, rel=1e-12)  # the closed form, but for rounding
-    assert np.all(found.bound < 1e-6 * found.airlight)
+    assert values.airlight[0] == pytest.approx(expected, rel=1e-12)  # the closed form, but for rounding
+    assert np.all(values.bound < 1e-6 * values.airlight)
 
 
 @pytest.mark.claim("directional-truth", tolerance="2e-9 relative")
@@ -101,12 +101,12 @@ def test_panels_give_the_closed_form(variant):
     rays = parallel_rays(truth.origin, truth.direction, light, scattering_range(segments))
     lit = directional_intervals(truth, rays)
     scale = edge_scale(truth, rays)
-    one, other = (
+    by_exponential, by_panels = (
         sum_directional(truth, light, rays, lit, segments, scale=scale, closed=closed)[0] for closed in (True, False)
     )
     assert lit.transitions > 10
-    assert one.max() > 0
-    assert other == pytest.approx(one, rel=2e-9)  # 1e-9 is asked of the panels
+    assert by_exponential.max() > 0
+    assert by_panels == pytest.approx(by_exponential, rel=2e-9)  # 1e-9 is asked of the panels
 
 
 def test_whole_light_scattered_out_of_a_thin_ball(variant):

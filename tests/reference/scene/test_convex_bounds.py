@@ -60,9 +60,9 @@ OVERLAPS = [
 
 @pytest.mark.parametrize(("make", "expected"), OVERLAPS)
 def test_overlap(variant, make, expected):
-    one, other = (bounds_of(shape) for shape in make())
-    assert overlap(one, other) is expected
-    assert overlap(other, one) is expected
+    first, second = (bounds_of(shape) for shape in make())
+    assert overlap(first, second) is expected
+    assert overlap(second, first) is expected
 
 
 L_SHAPE = [(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)]

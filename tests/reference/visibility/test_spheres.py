@@ -89,8 +89,8 @@ def test_a_ball_against_a_mesh_of_it(variant):
     ball = Shapes(np.empty((0, 3, 3)), np.array([[0.1, 0.1, 0.7]]), np.array([0.41]))
     lit = []
     for shapes in (ball, Shapes(mesh)):
-        found = geometric_intervals(truth, light, rays, ends=ends, shapes=shapes)
-        lit.append(lit_lengths(found, ends))
+        intervals = geometric_intervals(truth, light, rays, ends=ends, shapes=shapes)
+        lit.append(lit_lengths(intervals, ends))
     assert np.sum(lit[0] < ends[1] - ends[0]) > 20
     assert np.all(lit[0] <= lit[1] + 1e-12)
     # Both triangles of a quad are at most 2 (1 - cos(pi/128)) R inside; a shadow that just touches loses its root.
@@ -123,12 +123,12 @@ def test_random_shadow_rays_contradict_nothing(variant, place):
     second = {"type": "sphere", "center": [0.5, 0.2, 1.3], "radius": 0.15}
     truth = read_truth(mi.load_dict(tiny_scene(second=second, size=(32, 24), **more)))
     light, rays, ends = rays_of(truth)
-    found = lit_intervals(truth, light, rays, ends=ends, samples=800)
-    assert found.edge == EXACT_EDGE
-    assert found.random_checks.checked == 100 * np.sum(ends[1] > ends[0])
-    assert found.random_checks.left == 0
-    assert found.random_checks.missed < 1e-4  # float32 rays where a plane grazes a ball, settled in float64
-    assert (found.transitions > 100) == (place in ("outside", "both"))
+    intervals = lit_intervals(truth, light, rays, ends=ends, samples=800)
+    assert intervals.edge == EXACT_EDGE
+    assert intervals.random_checks.checked == 100 * np.sum(ends[1] > ends[0])
+    assert intervals.random_checks.left == 0
+    assert intervals.random_checks.missed < 1e-4  # float32 rays where a plane grazes a ball, settled in float64
+    assert (intervals.transitions > 100) == (place in ("outside", "both"))
     # Were the second ball forgotten, the check would tell.
     shapes = read_shapes(truth.occluders)
     keep = shapes.radius != shapes.radius.min()

@@ -114,18 +114,20 @@ def test_corners_are_exact_in_mitsuba(variant):
     for scene in fog_scenes():
         # Mitsuba merges meshes of one material, and then screens are among them.
         parameters = [mi.traverse(shape) for shape in load_fog(mitsuba_dict(scene)).shapes()]
-        vertices = [np.array(one["vertex_positions"]).reshape(-1, 3) for one in parameters if "vertex_positions" in one]
-        found = {tuple(map(float, corner)) for part in vertices for corner in part}
+        vertices = [
+            np.array(mesh["vertex_positions"]).reshape(-1, 3) for mesh in parameters if "vertex_positions" in mesh
+        ]
+        mesh_corners = {tuple(map(float, corner)) for part in vertices for corner in part}
         boxes = set().union(*(corners(shape) for shape in scene.occluders if isinstance(shape, FogBox)))
         screens = set().union(*(corners(shape) for shape in scene.occluders if isinstance(shape, FogScreen)))
-        assert boxes <= found <= boxes | screens, scene.name
+        assert boxes <= mesh_corners <= boxes | screens, scene.name
 
 
 @pytest.mark.claim("certified-fog", tolerance="none: equal digits")
 @pytest.mark.parametrize(("name", "pixel"), SOME.items())
 def test_some_rays_come_out_the_same(certified, name, pixel):
-    found = json.loads(json.dumps(asdict(certify_pixel(SCENES[name], directions(SCENES[name])[pixel]))))
-    assert found == certified[name]["pixels"][pixel]
+    certificate = json.loads(json.dumps(asdict(certify_pixel(SCENES[name], directions(SCENES[name])[pixel]))))
+    assert certificate == certified[name]["pixels"][pixel]
 
 
 @pytest.mark.claim("certified-fog", tolerance="none: equal digits")
@@ -166,10 +168,10 @@ def test_single_scatter_agrees_within_its_noise(variant, certified, name):
 
     truth = truth_of(certified[name])
     batches = [single_scatter_batch(truth, seed, 256) for seed in range(24)]
-    found = batches[0]
+    pooled = batches[0]
     for batch in batches[1:]:
-        found = merged(found, batch)
-    totals = found.totals[:, 0] / radiance(certified[name]).mean(axis=0) - 1
+        pooled = merged(pooled, batch)
+    totals = pooled.totals[:, 0] / radiance(certified[name]).mean(axis=0) - 1
     error = totals.std(axis=0, ddof=1) / np.sqrt(len(totals))
     assert np.all(error < 2e-3)
     # Beside the noise the intensities, which this estimator asks Mitsuba for in float32.

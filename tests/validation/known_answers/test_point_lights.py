@@ -20,9 +20,9 @@ OF_QUADRATURE = (
 )
 
 
-def assert_passed(found: KnownAnswer):
-    assert found.passed, found
-    assert found.reason
+def assert_passed(answer: KnownAnswer):
+    assert answer.passed, answer
+    assert answer.reason
 
 
 @pytest.mark.claim("known-answers")

@@ -188,9 +188,9 @@ _LAMPS = {"in clear air": np.array([1.7, 0.4, 1.5]), "in the box": np.array([0.3
 def _box_crossing(start, step):
     """Return at which shares of a leg the box begins and ends."""
     with np.errstate(divide="ignore"):
-        one, two = (-_HALF - start) / step, (_HALF - start) / step
-    begin = np.clip(np.minimum(one, two).max(axis=-1), 0, 1)
-    return begin, np.maximum(np.clip(np.maximum(one, two).min(axis=-1), 0, 1), begin)
+        low_sides, high_sides = (-_HALF - start) / step, (_HALF - start) / step
+    begin = np.clip(np.minimum(low_sides, high_sides).max(axis=-1), 0, 1)
+    return begin, np.maximum(np.clip(np.maximum(low_sides, high_sides).min(axis=-1), 0, 1), begin)
 
 
 def _ball_crossing(start, step):
@@ -242,7 +242,7 @@ def test_bounded_media_against_a_plain_sum(variant, place):
     origin = np.array([-4.0, -1.0, 0.6])
     direction = rng.uniform([-1, -0.8, -0.7], [3, 0.8, 0.7], (40, 3)) - origin
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    expected = np.array([_brute_force(lamp, origin, one) for one in direction])
+    expected = np.array([_brute_force(lamp, origin, towards) for towards in direction])
     mean, error = _mean_and_error(scene, origin, direction, batches=16, samples=128)
     assert np.count_nonzero(expected[:, 0]) > 30
     _assert_agrees(mean, error, expected, batches=16, largest_error=1e-3)
@@ -347,8 +347,8 @@ def test_seeds_decide(variant):
     from reference.scene.read import read_truth
 
     truth = read_truth(_load())
-    one, again = single_scatter_batch(truth, 7, 8), single_scatter_batch(truth, 7, 8)
-    assert np.array_equal(one.mean, again.mean)
+    first, again = single_scatter_batch(truth, 7, 8), single_scatter_batch(truth, 7, 8)
+    assert np.array_equal(first.mean, again.mean)
     centre = _run(_load(), first_seed=50).mean[0]
     signs = [np.sign(single_scatter_batch(truth, seed, 8).mean[0] - centre)[:, 0] for seed in range(20)]
     correlation = np.corrcoef(signs)[np.triu_indices(20, 1)]

@@ -33,9 +33,9 @@ def test_same_batch_twice_is_refused(truth):
     from reference.monte_carlo.batches import merged
     from reference.monte_carlo.volpath.integrator import volpath_batch
 
-    one = volpath_batch(truth, 3, 4)
+    batch = volpath_batch(truth, 3, 4)
     with pytest.raises(ValueError, match="different seeds"):
-        merged(one, one)
+        merged(batch, batch)
 
 
 def test_materials_come_back(truth):
