@@ -41,7 +41,7 @@ def allocated(
     Returns
     -------
     array
-        Samples of every pixel, (layers, pixels), at least 1; their mean is `samples` up to rounding.
+        Samples of every pixel [1], (layers, pixels), at least 1; their mean is `samples` up to rounding.
     """
     counts = []
     for number, layer in enumerate(LAYERS):

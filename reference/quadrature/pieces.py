@@ -74,11 +74,11 @@ def cut_pieces(
     setup
         The rays.
     lit
-        Rays and distances of both ends of the lit intervals [m].
+        Rays, (intervals,), and distances of both ends of the lit intervals, (intervals,) each [m].
     kinks
-        Rays and distances of the kinks [m], in any order.
+        Rays and distances of the kinks, (kinks,) each [m], in any order.
     foot
-        Distance at which each ray is closest to the light, where rays may be endless [m].
+        Distance at which each ray is closest to the light, (rays,) [m], where rays may be endless.
     """
     return _cut(setup, _parts(setup, *lit, foot), *kinks)
 

@@ -101,10 +101,15 @@ def area_image(
     samples, shadow_scale, edges
         See `reference.quadrature.image.quadrature_image`.
     tolerance
-        Relative error to reach in airlight and surface, where `_LEVELS` cuts of a pixel suffice. What was reached for
-        the airlight is in `airlight_bound`: three standard deviations of an estimate, no strict bound.
+        Relative error [1] to reach in airlight and surface, where `_LEVELS` cuts of a pixel suffice. What was reached
+        for the airlight is in `airlight_bound`: three standard deviations of an estimate, no strict bound.
     progress
         Called with (done, total, what) after each of the levels.
+
+    Returns
+    -------
+    TruthImage
+        The means, (height, width, 3) [W/(m^2 sr)].
 
     Notes
     -----

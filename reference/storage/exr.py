@@ -64,7 +64,16 @@ class Image:
 
 
 def layer(image: Image, name: str, path: str | os.PathLike[str] = "the image") -> NDArray[np.floating]:
-    """Return a layer, (height, width, 3); the empty name is the total.
+    """Return a layer in the unit of the file, radiance [W/(m^2 sr)] in ours, (height, width, 3).
+
+    Parameters
+    ----------
+    image
+        The image.
+    name
+        Of the layer; the empty name is the total.
+    path
+        What messages call the image.
 
     Raises
     ------

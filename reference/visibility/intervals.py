@@ -64,7 +64,7 @@ def intersected(first: LitIntervals, second: LitIntervals, ends: tuple[Array, Ar
     first, second
         The intervals; those of one ray neither overlap nor touch.
     ends
-        Angles at the light between which the rays are looked at [rad].
+        Angles at the light between which the rays are looked at, (rays,) each [rad].
     """
     count = len(first.ray), len(second.ray)
     ray = np.concatenate([first.ray, first.ray, second.ray, second.ray])

@@ -68,7 +68,7 @@ def checked_cast(toggles: Toggles, found_by: Rounding, *, ends: tuple[Array, Arr
     found_by
         The shadow rays that found them.
     ends
-        Angles at the light between which the rays are looked at [rad].
+        Angles at the light between which the rays are looked at, (rays,) each [rad].
     checks
         Random samples of each ray and round.
     """

@@ -37,6 +37,6 @@ def box(centre, size, **changes):
 
 
 def box_scene(**changes):
-    """A scene of polygons: the ball of the tiny scene replaced by boxes."""
+    """A scene of polygons: the sphere of the tiny scene replaced by boxes."""
     boxes = {"tower": box((0.1, 0.1, 0.7), (0.43, 0.37, 1.4)), "beam": box((0.6, 0.3, 1.1), (0.9, 0.11, 0.13))}
     return tiny_scene(ball=None, **boxes, **changes)

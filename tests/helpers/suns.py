@@ -34,7 +34,7 @@ def brick(sigma_t: Any = (0.9, 0.5, 0.2), albedo=(0.9, 0.4, 0.3), **medium: Any)
 
 
 def pearl(sigma_t: Any = 1.3, albedo=(0.2, 0.5, 0.8), **medium: Any) -> dict[str, Any]:
-    """Return a ball of fog."""
+    """Return a sphere of fog."""
     return body({"type": "sphere", "center": PEARL[0].tolist(), "radius": PEARL[1]}, sigma_t, albedo, **medium)
 
 
@@ -46,7 +46,7 @@ def sunny(*, size=(12, 9), **changes: Any) -> dict[str, Any]:
 
 
 def ball_over_floor() -> dict[str, Any]:
-    """Return the entries of the ball and the floor of the tiny scene."""
+    """Return the entries of the sphere and the floor of the tiny scene."""
     return {name: tiny_scene()[name] for name in ("ball", "floor")}
 
 

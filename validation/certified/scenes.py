@@ -32,7 +32,7 @@ def _look(origin: Sequence[float], target: Sequence[float]) -> Matrix:
     return (*(tuple(row) for row in rows), (0.0, 0.0, 0.0, 1.0))
 
 
-def _ball(centre: Sequence[float], radius: float) -> FogSphere:
+def _sphere(centre: Sequence[float], radius: float) -> FogSphere:
     return FogSphere(_grid(centre), _grid([radius])[0])
 
 
@@ -133,37 +133,37 @@ def _open_scenes() -> tuple[FogScene, ...]:
 def _ball_scenes() -> tuple[FogScene, ...]:
     return (
         _scene(
-            "ball-shadow",
-            "A ball between the camera and a point light: the camera looks along the cone of its shadow.",
+            "sphere-shadow",
+            "A sphere between the camera and a point light: the camera looks along the cone of its shadow.",
             _CAMERA,
             fov=25.0,
             sigma_t=[0.31],
             albedo=[0.9, 0.8, 0.7],
             lights=[_point([0.33, 2.41, 1.17], [11.0, 9.0, 8.0])],
-            occluders=[_ball([0.21, 0.43, 0.92], 0.57)],
+            occluders=[_sphere([0.21, 0.43, 0.92], 0.57)],
         ),
         _scene(
-            "thick-ball",
-            "Thick fog: two balls, the larger one 3, 5 and 8 mean free paths from the camera in the three colours.",
+            "thick-spheres",
+            "Thick fog: two spheres, the larger one 3, 5 and 8 mean free paths from the camera in the three colours.",
             ([0.1, -2.9, 1.2], [0.2, 0.0, 0.8]),
             fov=37.0,
             sigma_t=[1.3, 2.1, 3.4],
             albedo=[0.5, 0.75, 0.98],
             lights=[_point([-0.83, -1.12, 1.74], [900.0, 800.0, 700.0])],
-            occluders=[_ball([0.27, 0.12, 0.71], 0.63), _ball([-0.62, -0.71, 1.33], 0.21)],
+            occluders=[_sphere([0.27, 0.12, 0.71], 0.63), _sphere([-0.62, -0.71, 1.33], 0.21)],
         ),
         _scene(
-            "three-balls",
-            "Three balls about a point light, one of them a hand's breadth from it, in backward scattering fog.",
+            "three-spheres",
+            "Three spheres about a point light, one of them a hand's breadth from it, in backward scattering fog.",
             _CAMERA,
             fov=29.0,
             sigma_t=[0.23],
             albedo=[0.7, 0.8, 0.9],
             lights=[_point([0.16, 0.22, 1.08], [4.0, 4.5, 5.0])],
             occluders=[
-                _ball([0.52, -0.31, 0.97], 0.24),
-                _ball([-0.61, 0.93, 0.55], 0.41),
-                _ball([0.1, 0.3, 1.31], 0.13),
+                _sphere([0.52, -0.31, 0.97], 0.24),
+                _sphere([-0.61, 0.93, 0.55], 0.41),
+                _sphere([0.1, 0.3, 1.31], 0.13),
             ],
             phase="hg",
             g=-0.3125,
@@ -212,13 +212,13 @@ def _spot_scenes() -> tuple[FogScene, ...]:
     return (
         _scene(
             "hard-spot",
-            "A spot with a hard edge shines on a ball over a floor.",
+            "A spot with a hard edge shines on a sphere over a floor.",
             _CAMERA,
             fov=41.0,
             sigma_t=[0.33],
             albedo=[0.9, 0.7, 0.6],
             lights=[_spot([1.52, -0.83, 2.74], [0.1, 0.2, 0.5], intensity=[21.0, 19.0, 17.0], cutoff=23.5, beam=23.5)],
-            occluders=[_FLOOR, _ball([0.24, 0.07, 0.81], 0.37)],
+            occluders=[_FLOOR, _sphere([0.24, 0.07, 0.81], 0.37)],
             phase="rayleigh",
         ),
         _scene(
@@ -238,7 +238,7 @@ def _spot_scenes() -> tuple[FogScene, ...]:
         ),
         _scene(
             "many-lights",
-            "Two point lights, one behind the camera, and a spot about a box, a ball, a needle and a floor.",
+            "Two point lights, one behind the camera, and a spot about a box, a sphere, a needle and a floor.",
             _CAMERA,
             fov=41.0,
             sigma_t=[0.16],
@@ -251,7 +251,7 @@ def _spot_scenes() -> tuple[FogScene, ...]:
             occluders=[
                 _FLOOR,
                 _box([0.61, 0.24, 0.47], [0.31, -0.12, 0], [0.1, 0.33, 0.02], [0.02, 0.03, 0.43]),
-                _ball([-0.47, 0.13, 0.68], 0.33),
+                _sphere([-0.47, 0.13, 0.68], 0.33),
                 _post(0.05, -1.1, 1.52),
             ],
         ),

@@ -139,8 +139,14 @@ def compare_files(
 
     Parameters
     ----------
+    reference, test
+        The EXR files.
+    layer
+        The layer to compare, (height, width, 3) [W/(m^2 sr)].
     mask
         An EXR file; pixels whose R, G and B (or Y) are all zero there are left out.
+    margin, all_metrics, flip, exposure
+        See `compare_images`.
 
     Raises
     ------
@@ -199,7 +205,7 @@ def _compare(
 
 
 def read_mask(path: str | os.PathLike[str]) -> NDArray[np.bool_]:
-    """Return where the plain channels of an EXR file are not zero, (height, width).
+    """Return where the plain channels of an EXR file are not zero: truth values [1], (height, width).
 
     Raises
     ------

@@ -59,7 +59,7 @@ def monte_carlo_batches(
     go_on: Callable[[int], bool] | None = None,
     progress: Progress | None = None,
 ) -> Run:
-    """Return batches of a Mitsuba scene at its own size.
+    """Return batches, radiances [W/(m^2 sr)], of a Mitsuba scene at its own size.
 
     Parameters
     ----------

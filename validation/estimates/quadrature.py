@@ -23,7 +23,7 @@ def truth_image(
     pixel: str = "centre",
     progress: Progress | None = None,
 ) -> TruthImage:
-    """Return the quadrature truth of a Mitsuba scene at its own size.
+    """Return the quadrature truth of a Mitsuba scene at its own size, (height, width, 3) [W/(m^2 sr)].
 
     Parameters
     ----------

@@ -99,7 +99,7 @@ def compare_baseline(kept: Baseline | None, measured: Baseline, *, tolerance: fl
     measured
         The new measurement. Entries without a time are compared without it.
     tolerance
-        Relative band of errors.
+        Relative band of errors [1].
     """
     scene = measured["scene"]
     if kept is None:

@@ -131,7 +131,7 @@ def load_result(entry: CacheEntry) -> CachedResult | None:
 
 
 def store_result(entry: CacheEntry, computed: Computed, seconds: float) -> CachedResult:
-    """Keep what was computed in so many seconds, in place of what was there."""
+    """Keep what was computed in `seconds` [s], in place of what was there."""
     data, files = computed
     about = {"data": data, "measured": now(), "seconds": round(seconds, 3)}
     about |= {"fingerprint": entry.fingerprint, "made_by": entry.made_by}
@@ -155,12 +155,12 @@ def cached_result(entry: CacheEntry, compute: Callable[[], Computed]) -> CachedR
 
 
 def expected_seconds(entry: CacheEntry) -> float | None:
-    """Return how long a result will take: none where it is kept, else as long as the last time on this machine.
+    """Return how long a result will take [s]: 0 where it is kept, else as long as the last time on this machine.
 
     Returns
     -------
     float or None
-        None where the machine never computed it [s].
+        None where this machine never computed it.
     """
     about = peek_array(entry.key, "about")
     if about is None:

@@ -127,7 +127,7 @@ def bench_kernels(
     rays
         Number of rays that are timed.
     seconds
-        How long each is timed.
+        How long each is timed [s].
     progress
         Called with (done, total, what) before every kernel.
     """

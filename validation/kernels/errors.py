@@ -64,7 +64,7 @@ def relative_error(results: Array, expected: Array, precision: str) -> Array:
 def errors_by_group(
     cases: Cases, values: Values, precision: str, rows: Mapping[str, Rows], *, expected: Array | None = None
 ) -> dict[str, Errors]:
-    """Return the errors of each group of rows.
+    """Return the relative errors [1] of each group of rows.
 
     Parameters
     ----------
@@ -77,7 +77,12 @@ def errors_by_group(
     rows
         The groups, see `groups`.
     expected
-        What to compare with instead of the truth.
+        What to compare with instead of the truth, (cases,) [1/m].
+
+    Raises
+    ------
+    ValueError
+        If the cases have no `value` and nothing is expected.
     """
     expected = cases.value if expected is None else expected
     if expected is None:

@@ -37,7 +37,7 @@ QUADRATURE: tuple[Mutation, ...] = (
     ),
     _fault(
         "sun-chord-both-ways",
-        "the leg through a ball followed on behind the scattering point",
+        "the leg through a sphere followed on behind the scattering point",
         _SUMS,
         "np.maximum(closest - half, 0.0)",
         "(closest - half)",
@@ -71,8 +71,8 @@ QUADRATURE: tuple[Mutation, ...] = (
         "keep = np.flatnonzero(np.maximum(y0, y1) > np.inf)",
     ),
     _fault(
-        "sun-no-ball-shadows",
-        "the fog lit through all balls",
+        "sun-no-sphere-shadows",
+        "the fog lit through all spheres",
         _GEOMETRY,
         "dark = np.flatnonzero(c_y + disk > 0)",
         "dark = np.flatnonzero(c_y + disk > np.inf)",

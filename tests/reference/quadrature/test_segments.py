@@ -92,7 +92,7 @@ def test_between_its_kinks_the_chord_of_the_leg_is_smooth(variant):
     """Rationale: a kink that is not found costs digits. Second differences jump there, and nowhere else.
 
     The part of the leg inside of a body, for legs to points 2e-4 m apart on rays that pass beyond it: its second
-    differences are 4e-8 m^2 times its curvature, which is below 50/m but beside the tangents of a ball.
+    differences are 4e-8 m^2 times its curvature, which is below 50/m but beside the tangents of a sphere.
     """
     truth = truth_of()
     light, step = np.array([-0.9, 0.7, 1.4]), 2e-4

@@ -7,8 +7,8 @@ from tests.helpers.scenes import spot, tiny_scene
 
 
 @pytest.mark.parametrize("scale", [[2.0, 1.0, 1.0], [1.0, 2.0, 0.5], [-1.5, 1.5, 1.5]])
-def test_a_stretched_sphere_is_the_ball_that_mitsuba_makes_of_it(variant, scale):
-    """Mitsuba warns of it, and intersects a ball whose radius is the first of the scales."""
+def test_a_stretched_sphere_is_the_sphere_that_mitsuba_makes_of_it(variant, scale):
+    """Mitsuba warns of it, and intersects a sphere whose radius is the first of the scales."""
     import mitsuba as mi
 
     from reference.scene.shapes import read_shapes

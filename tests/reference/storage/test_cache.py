@@ -43,7 +43,7 @@ CHANGES = {
     "blue reflectance": lambda: changed("ball", bsdf={"type": "diffuse", "reflectance": rgb(0.6, 0.5, 0.31)}),
     "both sides": lambda: changed("ball", bsdf={"type": "twosided", "bsdf": tiny_scene()["ball"]["bsdf"]}),
     "turned inside out": lambda: changed("ball", flip_normals=True),
-    "without the ball": lambda: load(ball=None),
+    "without the sphere": lambda: load(ball=None),
     "field of view": lambda: changed("sensor", fov=49.5),
     "size": lambda: changed("sensor", film=tiny_scene(size=(6, 4))["sensor"]["film"]),
 }

@@ -26,7 +26,7 @@ def unit(vector):
 
 
 def samples(rays, intervals, count, seed):
-    """Return random points of rays, whether the intervals call them lit, and their distance from the nearest edge [m]."""
+    """Return random points of rays, whether the intervals call them lit, and their distance from the next edge [m]."""
     share = np.random.default_rng(seed).random((len(rays.first), count))
     lit, gap = np.zeros(share.shape, bool), np.full(share.shape, np.inf)
     for ray, low, high in zip(intervals.ray, intervals.low, intervals.high, strict=True):
@@ -50,9 +50,9 @@ def hits_triangles(point, towards, triangles):
     return hit
 
 
-def hits_balls(point, towards, balls):
+def hits_spheres(point, towards, spheres):
     hit = np.zeros(point.shape[:-1], bool)
-    for centre, radius in balls:
+    for centre, radius in spheres:
         off = centre - point
         along = off @ towards
         inside = np.sum(off**2, axis=-1) < radius**2
@@ -63,7 +63,7 @@ def hits_balls(point, towards, balls):
 @pytest.mark.claim("directional-truth")
 @pytest.mark.parametrize("towards", [(0.3, -0.5, 0.7), (0.0, 0.0, 1.0), (-0.9, 0.02, 0.0)])
 def test_random_points_by_the_definition(towards):
-    """Triangles and balls all around the camera, one ball around it: points far from an edge are lit or not."""
+    """Triangles and spheres all around the camera, one sphere around it: points far from an edge are lit or not."""
     from reference.scene.shapes import Shapes
     from reference.visibility.directional_geometry import parallel_intervals
 
@@ -73,10 +73,10 @@ def test_random_points_by_the_definition(towards):
     rays = random_rays(900, 7, towards)
     intervals = parallel_intervals(rays, Shapes(triangles, centres, radii))
     point, lit, gap = samples(rays, intervals, 60, 2)
-    hidden = hits_triangles(point, towards, triangles) | hits_balls(point, towards, list(zip(centres, radii)))
+    hidden = hits_triangles(point, towards, triangles) | hits_spheres(point, towards, list(zip(centres, radii)))
     assert intervals.transitions > 500
     assert 0.1 < hidden.mean() < 0.9
-    # Where a plane all but touches a ball, or a ray is all but along the light, rounding is worth more.
+    # Where a plane all but touches a sphere, or a ray is all but along the light, rounding is worth more.
     assert not np.any((lit == hidden)[gap > 1e-9])
 
 
@@ -121,8 +121,8 @@ def test_rays_along_the_light(sign):
         intervals = parallel_intervals(rays, Shapes(plate[None]))
         # Looking away from the light, what is before the camera lies behind it as seen from the light.
         assert len(intervals.ray) == count, (sign, distance)
-        ball = parallel_intervals(rays, Shapes(np.empty((0, 3, 3)), distance * towards[None], np.array([0.3])))
-        assert len(ball.ray) == count
+        sphere = parallel_intervals(rays, Shapes(np.empty((0, 3, 3)), distance * towards[None], np.array([0.3])))
+        assert len(sphere.ray) == count
 
 
 def scene_of_many(**changes):
@@ -181,10 +181,10 @@ def test_shapes_of_other_kinds_are_cast_at(variant):
     point, lit, gap = samples(rays, intervals, 50, 3)
     height = (1.3 - point[..., 2]) / towards[2]
     on_disk = np.linalg.norm((point + height[..., None] * towards)[..., :2] - [-0.6, 0.2], axis=-1) < 0.2
-    ball = hits_balls(point, towards, [(np.array([0.1, 0.1, 0.7]), 0.41)])
+    sphere = hits_spheres(point, towards, [(np.array([0.1, 0.1, 0.7]), 0.41)])
     used = (rays.last > rays.first)[:, None] & (gap > 1e-5)
     assert intervals.transitions > 10
-    assert not np.any((lit == (on_disk | ball))[used])
+    assert not np.any((lit == (on_disk | sphere))[used])
 
 
 def test_wrong_geometry_is_left_in_doubt(variant, monkeypatch):

@@ -19,7 +19,7 @@ def setup(scene):
 
 
 def cylinder(**changes):
-    """Return a pipe beside the ball."""
+    """Return a pipe beside the sphere."""
     return {"type": "cylinder", "p0": [0.7, -0.2, 0.1], "p1": [0.8, 0.1, 1.3], "radius": 0.1} | changes
 
 
@@ -40,7 +40,7 @@ def test_polygons_and_balls_are_exact_and_other_shapes_are_cast(variant):
 
 
 def test_mixed_scenes_keep_needles_exact_beside_shapes_that_are_cast(variant):
-    """A needle that few samples meet, a ball and a pipe: the intersection is what all three leave, needle and all."""
+    """A needle that few samples meet, a sphere and a pipe: the intersection is what all three leave, needle and all."""
     from reference.visibility.lit_intervals import lit_intervals
     from reference.visibility.triangles import geometric_intervals
 

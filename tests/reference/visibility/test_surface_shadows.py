@@ -64,7 +64,7 @@ def test_what_agrees_stays(variant):
 
 
 def test_segments_are_blocked_as_rays_are(variant):
-    """Against Mitsuba's rays, among triangles and balls of all sizes; float32 errs on edges, one in a million."""
+    """Against Mitsuba's rays, among triangles and spheres of all sizes; float32 errs on edges, one in a million."""
     import mitsuba as mi
 
     scene = mi.load_dict(tiny_scene())
@@ -111,16 +111,16 @@ def test_no_segments_are_no_trouble():
 @pytest.mark.parametrize(
     ("start", "end", "blocked"),
     [
-        ((0, 0, -2), (0, 0, 2), True),  # through the ball
+        ((0, 0, -2), (0, 0, 2), True),  # through the sphere
         ((0, 0, 0), (0, 0, 2), True),  # out of it
         ((0, 0, 0), (0, 0, 0.9), False),  # within
         ((0, 0, -2), (0, 0, -1.1), False),  # before it
         ((1.1, 0, -2), (1.1, 0, 2), False),  # past it
     ],
 )
-def test_balls(start, end, blocked):
-    ball = Shapes(np.empty((0, 3, 3)), np.zeros((1, 3)), np.ones(1))
-    hit = segments_blocked(np.array([start], dtype=float), np.array([end], dtype=float), ball)
+def test_spheres(start, end, blocked):
+    sphere = Shapes(np.empty((0, 3, 3)), np.zeros((1, 3)), np.ones(1))
+    hit = segments_blocked(np.array([start], dtype=float), np.array([end], dtype=float), sphere)
     assert hit.tolist() == [blocked]
 
 

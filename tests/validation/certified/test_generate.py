@@ -16,12 +16,12 @@ from validation.certified.scenes import fog_scenes
 ROOT = Path(__file__).resolve().parents[3]
 NAMES = [scene.name for scene in fog_scenes()]
 SCENES = {scene.name: scene for scene in fog_scenes()}
-# One ray of each kind: endless, near a light, ended by a ball, among needles, in the fading part of a spot, dark.
+# One ray of each kind: endless, near a light, ended by a sphere, among needles, in the fading part of a spot, dark.
 SOME = {
     "thin-open": 27,
     "near-light": 36,
-    "ball-shadow": 9,
-    "three-balls": 29,
+    "sphere-shadow": 9,
+    "three-spheres": 29,
     "box-floor": 34,
     "needles": 20,
     "camera-in-shadow": 0,
@@ -142,7 +142,7 @@ def test_all_rays_come_out_the_same(certified, name):
 @pytest.mark.claim("certified-fog", tolerance="the bound of the pixel, 1e-9 of the largest at most")
 @pytest.mark.parametrize("name", NAMES)
 def test_quadrature_agrees_within_its_own_bound(variant, certified, name):
-    """The route that shares nothing: lit intervals of triangles and balls in a plane, panels of Kronrod in float64."""
+    """The route that shares nothing: lit intervals of triangles and spheres in a plane, Kronrod's panels in float64."""
     from reference.quadrature.image import quadrature_image
 
     image = quadrature_image(truth_of(certified[name]))

@@ -97,7 +97,7 @@ def test_no_light_has_no_error(near):
 
 @pytest.mark.claim("pixels-beside-a-light")
 def test_pixels_beside_a_light_are_those_that_the_truth_names(variant):
-    """The same pixels as from the quadrature's own angles; a light in view, one behind us, one in the ball."""
+    """The same pixels as from the quadrature's own angles; a light in view, one behind us, one in the sphere."""
     import mitsuba as mi
 
     from reference.quadrature.surface import surface_hits

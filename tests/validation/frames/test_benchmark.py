@@ -66,7 +66,7 @@ def test_error_is_that_of_the_frame_against_the_truth(loaded, measured):
 
 
 def test_surface_is_compared_too(measured):
-    # A pixel at the rim of the ball may see it with one method's rays and the floor with the other's.
+    # A pixel at the rim of the sphere may see it with one method's rays and the floor with the other's.
     assert measured[MARCH].surface_error.p50 < 1e-4
     assert measured[MARCH].surface_error.relative_bias == pytest.approx(0, abs=0.02)
 

@@ -218,8 +218,8 @@ def test_what_cannot_be_done_is_refused(variant):
         oracle_airlight(read_truth(scene), [])
     with pytest.raises(InputError, match="got a distance of 0, wanted distances above 0"):
         height_field(ShadowMap(4, np.zeros(150), Projection(None)))
-    ball = body({"type": "sphere", "center": [0, 0, 1], "radius": 0.3}, 0.4, (0.9, 0.9, 0.9))
-    ball["exterior"] = {"type": "ref", "id": "fog"}
-    bounded = mi.load_dict(tiny_scene(ball=ball))
+    sphere = body({"type": "sphere", "center": [0, 0, 1], "radius": 0.3}, 0.4, (0.9, 0.9, 0.9))
+    sphere["exterior"] = {"type": "ref", "id": "fog"}
+    bounded = mi.load_dict(tiny_scene(ball=sphere))
     with pytest.raises(InputError, match="medium 'ball' has bounds"):
         oracle_airlight(read_truth(bounded), maps_of(scene, 4))

@@ -225,12 +225,12 @@ def test_casters_lie_within_across_and_outside_media(variant):
     assert share("ring-within", "red") == 1
     assert share("star", "green") == 1
     assert 0 < share("star-across", "blue") < 1
-    for caster in ("ring-above", "ball", "slats", "tetrahedron", "vase"):
+    for caster in ("ring-above", "sphere", "slats", "tetrahedron", "vase"):
         assert all(share(caster, medium) == 0 for medium in MEDIA), caster
 
 
 def test_things_stand_on_the_table_and_sink_in_a_little(variant):
-    """A gap would let light pass below; a ball or ring that rests on it dips in by its facets less."""
+    """A gap would let light pass below; a sphere or ring that rests on it dips in by its facets less."""
     for shape, (vertices, _) in meshes("clutter").items():
         if shape not in OPEN["clutter"]:
             assert -0.03 < vertices[:, 2].min() < 0, shape
