@@ -135,7 +135,7 @@ def _sorted_shapes(scene) -> tuple[list[Any], list[Any]]:
 
 
 def scene_of(shapes: list[Any], whole):
-    """Return a scene of some of the shapes of another one, `whole`: that itself where they are all of its shapes."""
+    """Return a scene of some of the shapes of `whole`, or `whole` itself if they are all of its shapes."""
     if len(shapes) == len(whole.shapes()):
         return whole
     # The keys become the names of the shapes, in the whole scene too: they keep those they have, if these are keys.

@@ -23,8 +23,8 @@ edges. The ray crosses the plane through L and an edge from A to B where det(u, 
 All edges are taken; those that are no silhouettes only add distances at which nothing changes. The same holds for the
 other half of a cone and for the other side of a plane.
 
-Between two neighbours of all these distances a ray is lit or dark as a whole, and its middle tells which: there the
-definition itself is evaluated, the segment against every occluder. Nothing here is shared with
+Between two neighbours of all these distances a ray is lit or dark as a whole. The definition itself, evaluated in the
+middle for the segment against every occluder, tells which. Nothing here is shared with
 `reference.visibility.triangles`, which projects triangles on the plane of ray and light, nor with the casting of rays.
 """
 
@@ -40,7 +40,7 @@ Number = Any  # mpmath.mpf
 Vector = tuple[Number, Number, Number]
 Occluder = FogSphere | FogBox | FogScreen
 
-_SAME = 1e-25  # distances closer than this are one [m]: they come with 40 digits
+_SAME = 1e-25  # distances closer than this count as equal [m]: they come with 40 digits
 
 
 def vector(values: Sequence[float]) -> Vector:
