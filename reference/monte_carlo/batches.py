@@ -22,7 +22,7 @@ LARGEST_BATCH = 256  #: samples a pixel: float32 sums of more lose digits (DESIG
 class Batches:
     """Running sums of the batch means; `merged` adds batches up in any order."""
 
-    seeds: tuple[int, ...]
+    seeds: tuple[int, ...]  #: of the batches, each once
     samples: int  #: samples a pixel in each batch
     mean: Array  #: mean of the batch means, (layers, pixels, 3)
     squares: Array  #: sum of squared deviations from the mean, (layers, pixels, 3)

@@ -63,8 +63,8 @@ class TruthScene:
 
     scene: Any  #: the `mi.Scene`, whole
     occluders: Any  #: an `mi.Scene` of the opaque shapes alone: cast rays here
-    width: int
-    height: int
+    width: int  #: [pixels]
+    height: int  #: [pixels]
     origin: Array  #: the pinhole [m], (3,)
     direction: Array  #: unit directions through the pixel centres, (pixels, 3), row by row
     medium: TruthMedium  #: the medium without bounds, a vacuum of extinction 0 where there is none

@@ -54,8 +54,8 @@ class Toggles:
 class Rounding:
     """How the edges of cast intervals are found: the shadow rays, and their bisection."""
 
-    visible: Visible
-    bisect: Bisect
+    visible: Visible  #: casts the shadow rays
+    bisect: Bisect  #: narrows a bracket to rounding
 
 
 def checked_cast(toggles: Toggles, found_by: Rounding, *, ends: tuple[Array, Array], checks: int) -> LitIntervals:

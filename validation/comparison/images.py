@@ -25,14 +25,14 @@ BATCHES = "airlight:batches"  #: header attribute: how many batch means gave the
 class Comparison:
     """What `airlight compare` prints."""
 
-    layer: str
-    metrics: Metrics
+    layer: str  #: the layer that was compared
+    metrics: Metrics  #: of all pixels that the mask leaves
     statistics: Statistics | None  #: None where neither image has standard errors
     masked: int = 0  #: pixels that the mask leaves out
     errors: PublishedErrors | None = None  #: as other tools print them
     errors_normalised: PublishedErrors | None = None  #: the same with the mean of the reference as the unit
-    colour: ColourDifference | None = None
-    flip: Flip | None = None
+    colour: ColourDifference | None = None  #: None if it was not asked for
+    flip: Flip | None = None  #: None if it was not asked for
 
     @property
     def failures(self) -> tuple[str, ...]:

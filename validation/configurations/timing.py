@@ -40,10 +40,10 @@ _TURNS = 1.5  # approximate time for the one to five frames that are timed stage
 class Timing:
     """Repeated measurements of one piece of work [ms]."""
 
-    median_ms: float
+    median_ms: float  #: median
     low_ms: float  #: first quartile
     high_ms: float  #: third quartile
-    repetitions: int
+    repetitions: int  #: number of measurements
 
 
 def time_repeated(work: Callable[[], Any], *, seconds: float = 0.6, least: int = 5, most: int = 200) -> Timing:

@@ -44,9 +44,9 @@ class Agreement:
 
     estimator: str  #: 'volpath' or 'single-scatter'
     layer: str  #: 'airlight' or 'surface'
-    width: int
-    height: int
-    batches: int
+    width: int  #: of the image [pixels]
+    height: int  #: of the image [pixels]
+    batches: int  #: traced or taken from the cache
     samples: int  #: a pixel and batch
     epsilon: float  #: the shadow-ray epsilon that was corrected for; 0 for single-scatter, which has none
     masked: int  #: pixels left out because a light is close to their ray

@@ -47,21 +47,21 @@ class ResultCache:
 class CacheEntry:
     """Where a result belongs, and what it must have been made from."""
 
-    key: str
-    fingerprint: str
+    key: str  #: name in the cache: the digest of the identity
+    fingerprint: str  #: digest of all that the numbers depend on
     made_by: str  #: digest of source and versions alone, without the scene
-    fresh: bool = False
+    fresh: bool = False  #: whether to compute it although it is kept
 
 
 @dataclass(frozen=True)
 class CachedResult:
     """A result, and whether it was there already."""
 
-    data: dict[str, Any]
-    files: Mapping[str, bytes] = field(repr=False)
+    data: dict[str, Any]  #: what JSON can hold
+    files: Mapping[str, bytes] = field(repr=False)  #: contents by name
     measured: str  #: date and time of the computation
-    seconds: float  #: that the computation took
-    cached: bool
+    seconds: float  #: that the computation took [s]
+    cached: bool  #: whether it was there already
 
 
 def result_cache(machine: Mapping[str, str], *, more: Sequence[Path] = (), fresh: bool = False) -> ResultCache:

@@ -25,14 +25,14 @@ class Errors:
     """Relative errors of one group of rays [1]; the quantiles are of the finite ones, None where there is none."""
 
     rays: int  #: that the kernel did not refuse
-    refused: int
+    refused: int  #: rays that it refused
     median: float | None
-    p99: float | None
+    p99: float | None  #: 99 % quantile
     max: float | None
     mean: float | None
-    nan: int
-    infinite: int  #: where the truth is finite
-    negative: int
+    nan: int  #: rays with a NaN
+    infinite: int  #: rays with an infinity where the truth is finite
+    negative: int  #: rays with a negative value
     worst: str | None  #: the ray with the largest error, or the first that is not finite, as a line of CSV
 
 
