@@ -48,10 +48,10 @@ def fill(text: str) -> str:
     return _MARK.sub(_part, text)
 
 
-def _part(found: re.Match[str]) -> str:
-    if found[1] not in PARTS:
-        raise ExtensionError(f"{found[0]}: wanted one of {', '.join(PARTS)}")
-    return PARTS[found[1]](*found[2].split())
+def _part(match: re.Match[str]) -> str:
+    if match[1] not in PARTS:
+        raise ExtensionError(f"{match[0]}: wanted one of {', '.join(PARTS)}")
+    return PARTS[match[1]](*match[2].split())
 
 
 def _code(link: re.Match[str]) -> str:

@@ -54,18 +54,18 @@ class ImageComparison(Comparison, Pictured):
 
     def _colours(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         shape = (*self.reference.shape[:2], -1)
-        one, two = (np.asarray(v, dtype=np.float64).reshape(shape) for v in (self.reference, self.test))
-        return colours(one), colours(two)
+        reference, test = (np.asarray(v, dtype=np.float64).reshape(shape) for v in (self.reference, self.test))
+        return colours(reference), colours(test)
 
     def _repr_html_(self) -> str:
         from reports.api.html import block, bullets, picture, table
         from reports.plotting.pictures import ERROR_CEILING, ERROR_FLOOR, exposure, png_bytes, tone_mapped
 
-        one, two = self._colours()
-        factor, width = exposure(one), one.shape[1]
+        reference, test = self._colours()
+        factor, width = exposure(reference), reference.shape[1]
         shown = [
             picture(png_bytes(tone_mapped(values, factor)), width, alt=f"{name}, {self.layer}", caption=name)
-            for name, values in zip(self.names, (one, two))
+            for name, values in zip(self.names, (reference, test))
         ]
         scale = f"relative error: blue too dark, red too bright, logarithmic from {ERROR_FLOOR:g} to {ERROR_CEILING:g}"
         shown.append(picture(self._png, width, alt=f"signed relative error of the {self.layer}", caption=scale))

@@ -177,15 +177,15 @@ class Rendering(LayeredImage):
 
     def facts(self) -> dict[str, str]:
         """Return what there is to say of the frame, in words, by name."""
-        found = super().facts() | {"method": self.label, "precision": self.precision}
+        facts = super().facts() | {"method": self.label, "precision": self.precision}
         if self.times is not None:
             frame = self.times.frame
-            found["a frame"] = (
+            facts["a frame"] = (
                 f"{number(frame.median_ms)} ms, quartiles {number(frame.low_ms)}..{number(frame.high_ms)}"
             )
-            found["of it airlight"] = f"{number(self.times.airlight.median_ms)} ms"
-            found["after the light moved"] = f"{number(self.times.light_moved.median_ms)} ms"
-        return found | ({"notes": " ".join(self.notes)} if self.notes else {})
+            facts["of it airlight"] = f"{number(self.times.airlight.median_ms)} ms"
+            facts["after the light moved"] = f"{number(self.times.light_moved.median_ms)} ms"
+        return facts | ({"notes": " ".join(self.notes)} if self.notes else {})
 
     @property
     def title(self) -> str:
@@ -242,11 +242,11 @@ def as_array(values: Array, dtype: DTypeLike | None, copy: bool | None) -> Array
 
 def _levels(image: LayeredImage) -> dict[str, str]:
     """Say how bright the layers are, and what is odd in them."""
-    found = {}
+    levels = {}
     for name, values in (("airlight", image.airlight), ("surface", image.surface)):
         finite = np.isfinite(values)
         mean = float(values[finite].mean(dtype=np.float64)) if finite.any() else math.nan
         odd = [f"{int((~finite).any(axis=-1).sum())} pixels not finite"] if not finite.all() else []
         odd += [f"{int((values < 0).any(axis=-1).sum())} pixels negative"] if (values < 0).any() else []
-        found[f"mean {name}"] = ", ".join([f"{number(mean, 4)} W/(m^2 sr)", *odd])
-    return found
+        levels[f"mean {name}"] = ", ".join([f"{number(mean, 4)} W/(m^2 sr)", *odd])
+    return levels

@@ -61,18 +61,18 @@ def bench(
     names = scenes or list(SCENES)
     for name in names:  # refuse what cannot be used before an hour of work, not after
         read_scene(load_scene(name, pixels).scene)
-    found = []
+    benched = []
     with progress_bar("bench") as progress:
         for number, name in enumerate(names):
             step = part_of(progress, number / len(names), (number + 1) / len(names))
-            found.append(_bench_scene(name, pixels, chosen, margin=margin if truth else None, progress=step))
+            benched.append(_bench_scene(name, pixels, chosen, margin=margin if truth else None, progress=step))
     if json:
         from reports.machine.environment import describe_environment
 
-        print_json({"environment": describe_environment(), "scenes": found})
+        print_json({"environment": describe_environment(), "scenes": benched})
     else:
-        _print_bench(found, markdown=markdown)
-    if any(not one["statistics"]["equivalent"] for scene in found for one in scene["agreement"].values()):
+        _print_bench(benched, markdown=markdown)
+    if any(not agreement["statistics"]["equivalent"] for scene in benched for agreement in scene["agreement"].values()):
         raise typer.Exit(1)
 
 
@@ -82,8 +82,8 @@ def _print_bench(scenes: list[dict], *, markdown: bool) -> None:
     from reports.tables.agreement import agreement_table
     from reports.tables.methods import methods_table
 
-    tables = [methods_table("{}, {} x {}".format(one["name"], *one["size"]), one["methods"]) for one in scenes]
-    compared = [(f"{one['name']}, {each['layer']}", each) for one in scenes for each in one["agreement"].values()]
+    tables = [methods_table("{}, {} x {}".format(scene["name"], *scene["size"]), scene["methods"]) for scene in scenes]
+    compared = [(f"{scene['name']}, {each['layer']}", each) for scene in scenes for each in scene["agreement"].values()]
     if compared:
         title = "Monte Carlo against the quadrature truth; volpath corrected for its shadow-ray epsilon"
         tables.append(agreement_table(title, compared))
@@ -138,9 +138,9 @@ def _bench_kernels(names: list[str] | None, *, json: bool, markdown: bool) -> No
     wanted = [split_name(name)[0].name for name in names] if names else list(KERNELS)
     activate()
     with progress_bar("bench") as progress:
-        found = bench_kernels(names, progress=counted(progress))
+        costs = bench_kernels(names, progress=counted(progress))
         rates = [convergence(name) for name in declared() if name in wanted]
-    measured, orders = plain(found), [convergence_data(one) for one in rates]
+    measured, orders = plain(costs), [convergence_data(rate) for rate in rates]
     if json:
         print_json({"environment": describe_environment(), "kernels": measured, "convergence": orders})
         return
@@ -166,16 +166,16 @@ def _bench_estimators(scenes: list[str] | None, *, size: str | None, json: bool)
     loaded = {name: load_scene(name, pixels).scene for name in names}  # refuse before any work, not after
     if not scenes:
         loaded = {"open-fog, optical depth 0.2": thin_fog(pixels)} | loaded
-    found = {}
+    efficiencies = {}
     with progress_bar("bench") as progress:
         for number, (name, scene) in enumerate(loaded.items()):
             progress(number / len(loaded), name)
-            found[name] = scene_efficiency(scene)
+            efficiencies[name] = scene_efficiency(scene)
     if json:
         from validation.metrics.errors import plain
 
-        print_json({"environment": describe_environment(), "estimators": plain(found)})
+        print_json({"environment": describe_environment(), "estimators": plain(efficiencies)})
         return
-    for name, one in found.items():
+    for name, efficiency in efficiencies.items():
         print(f"{name}, {pixels[0]} x {pixels[1]}")
-        print("\n".join(f"  {line}" for line in efficiency_lines(one)))
+        print("\n".join(f"  {line}" for line in efficiency_lines(efficiency)))

@@ -36,12 +36,12 @@ def describe(
     pixels = parse_size(size) if size else None
     activate()
     loaded = load_scene(scene, pixels)
-    found = describe_scene(loaded)
+    described = describe_scene(loaded)
     written = None if gltf is None else write_gltf(gltf, loaded)
     if json:
-        print_json(found | ({} if written is None else {"gltf": written}))
+        print_json(described | ({} if written is None else {"gltf": written}))
         return
-    print(description_text(found))
+    print(description_text(described))
     if written is not None:
         cut = ", ".join(written["tessellated"])
         print(f"{written['path']}: {written['triangles']} triangles" + (f"; cut into triangles: {cut}" if cut else ""))

@@ -34,7 +34,7 @@ def diff(
     from reports.diff.table import print_difference
     from reports.tables.terminal import print_json
 
-    found = compare_reports(
+    difference = compare_reports(
         read_report(old),
         read_report(new),
         error_tolerance=error_tolerance,
@@ -42,8 +42,8 @@ def diff(
         common=common,
     )
     if json:
-        print_json(found.to_json())
+        print_json(difference.to_json())
     else:
-        print_difference(found)
-    if found.worse:
+        print_difference(difference)
+    if difference.worse:
         raise typer.Exit(1)

@@ -75,9 +75,9 @@ def figures(
     if source is not None:
         _redraw(names, source, ensure_folder(output or source), drawing)
         return
-    found = _report_folder(report)
-    given = {"quick": quick, "rays": rays, "report": found, "scene": scene, "methods": methods}
-    chosen = _chosen(names, found)
+    report_path = _report_folder(report)
+    given = {"quick": quick, "rays": rays, "report": report_path, "scene": scene, "methods": methods}
+    chosen = _chosen(names, report_path)
     if (scene or methods) and "strip" not in chosen:
         raise InputError(
             "--scene and --methods choose images of the figure strip, which is not asked for: leave them out"

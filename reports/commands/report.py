@@ -118,7 +118,7 @@ def _measured(
         shown = find_images(images, {Path(name).stem: name for name in [*SCENES, *asked]})
         if not asked:
             names = list(shown)
-        wanted = {Path(one).stem for one in names}
+        wanted = {Path(path).stem for path in names}
         if not wanted & set(shown):
             raise InputError(
                 f"--images: {images} has no image of {', '.join(sorted(wanted))}, only of {', '.join(shown)}"

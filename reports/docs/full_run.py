@@ -91,7 +91,8 @@ def count_mutations(content: bytes) -> Counts:
     data = json.loads(content)
     missed = [result["name"] for result in data["results"] if not result["caught"]]
     failed = [name for name in missed if name not in BELOW_THE_MARGIN]
-    failed += [f"{one['scene']}, {one['layer']}, without a mutation" for one in data["control"] if not one["agrees"]]
+    disagreeing = [control for control in data["control"] if not control["agrees"]]
+    failed += [f"{control['scene']}, {control['layer']}, without a mutation" for control in disagreeing]
     remark = f"not caught: {', '.join(missed)}" if missed else ""
     return Counts(data["caught"], len(failed), len(missed) - len(set(missed) & set(failed)), remark)
 
@@ -144,12 +145,13 @@ def run_all(parts: Sequence[Part], root: Path, *, machine: str) -> bool:
         outcomes.append(run_part(part, root))
     seconds = round(time.monotonic() - start, 1)
     print("--- all parts")
-    for one in outcomes:
-        words = f"{one.passed} passed, {one.failed} failed, {one.skipped} skipped, {duration(one.seconds)}"
-        print(f"{one.name}: {words}{f' ({one.remark})' if one.remark else ''}")
+    for outcome in outcomes:
+        counts = f"{outcome.passed} passed, {outcome.failed} failed, {outcome.skipped} skipped"
+        remark = f" ({outcome.remark})" if outcome.remark else ""
+        print(f"{outcome.name}: {counts}, {duration(outcome.seconds)}{remark}")
     record = {"date": date, "machine": machine, "commit": commit, "changed": changed, "seconds": seconds}
-    _write_record(root, record | {"parts": [asdict(one) for one in outcomes]})
-    return not any(one.failed for one in outcomes)
+    _write_record(root, record | {"parts": [asdict(outcome) for outcome in outcomes]})
+    return not any(outcome.failed for outcome in outcomes)
 
 
 def _write_record(root: Path, record: dict[str, Any]) -> None:

@@ -48,9 +48,9 @@ def read_claims(root: Path = ROOT) -> dict[str, Claim]:
     """Return the claims of `docs/claims.toml` by identifier, in its order."""
     topics = tomllib.loads((root / "docs/claims.toml").read_text(encoding="utf-8"))["topic"]
     return {
-        identifier: Claim(identifier, topic["name"], one["says"], tuple(one["stated"]), tuple(one.get("mutations", ())))
+        name: Claim(name, topic["name"], claim["says"], tuple(claim["stated"]), tuple(claim.get("mutations", ())))
         for topic in topics
-        for identifier, one in topic["claim"].items()
+        for name, claim in topic["claim"].items()
     }
 
 
@@ -95,12 +95,12 @@ def _claims_in(expression: ast.expr, module: str, test: str, tier: str) -> Itera
 
 def _tier(expressions: Sequence[ast.expr]) -> str:
     """Return the tiers of a test from its marks; those of single parameters leave it in the first tier too."""
-    found = []
+    tiers = []
     for expression in expressions:
         text = ast.unparse(expression)
         names = [name for name in _TIERS if f"pytest.mark.{name}" in text]
-        found += ["unit", *names] if names and "parametrize" in text else names
-    return " and ".join(dict.fromkeys(found)) or "unit"
+        tiers += ["unit", *names] if names and "parametrize" in text else names
+    return " and ".join(dict.fromkeys(tiers)) or "unit"
 
 
 def page(text: str, claims: Iterable[Claim], marks: Sequence[Mark], record: Mapping[str, Any] | None) -> str:

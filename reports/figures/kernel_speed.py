@@ -42,9 +42,9 @@ def compute(
 
     target = ensure_folder(folder)
     rays, seconds = (RAYS // 16, 0.02) if quick else (RAYS // 2, 0.1)
-    found = bench_kernels(names, phases=PHASES[:1], rays=rays, seconds=seconds, progress=counted(progress))
+    measured = bench_kernels(names, phases=PHASES[:1], rays=rays, seconds=seconds, progress=counted(progress))
     rows = []
-    for cost in found.costs:
+    for cost in measured.costs:
         time = cost.device or cost.wall
         if cost.refused or time is None:
             continue

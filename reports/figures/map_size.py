@@ -61,10 +61,10 @@ def compute(
     rows: list[tuple] = []
     for number, (method, parameters) in enumerate(METHODS):
         step = counted(part_of(progress, number / len(METHODS), (number + 1) / len(METHODS)))
-        found = map_errors(loaded.scene, method, parameters=parameters, sizes=chosen, progress=step)
-        order = (found.slope.order, found.slope.standard_error)
-        name = found.configuration.label
-        for size, error in zip(found.sizes, found.metrics):
+        study = map_errors(loaded.scene, method, parameters=parameters, sizes=chosen, progress=step)
+        order = (study.slope.order, study.slope.standard_error)
+        name = study.configuration.label
+        for size, error in zip(study.sizes, study.metrics):
             errors = (error.relative_rmse, error.relative_bias, error.p99)
             rows.append((name, method, loaded.name, size, *errors, *order))
     write_data(target, NAME, _HEADER, rows, scene=scene, image=image, sizes=chosen)

@@ -46,8 +46,8 @@ def compute(folder: Path | str, *, rays: int = 100_000) -> None:
             curves = _curves(phase, a, theta)
             rows += [(phase, a, *values) for values in zip(theta, *(curves[name] for name in _CURVES))]
     shares = [
-        (one.phase, one.region, one.kernel, one.rays, one.within_1_percent, one.within_10_percent)
-        for one in printed_against_derived(rays)
+        (share.phase, share.region, share.kernel, share.rays, share.within_1_percent, share.within_10_percent)
+        for share in printed_against_derived(rays)
     ]
     header = ("phase", "region", "kernel", "rays", "within_1_percent", "within_10_percent")
     write_csv(target / f"{NAME}-shares.csv", header, shares)

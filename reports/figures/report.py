@@ -28,6 +28,6 @@ def reported_papers(folder: Path | str | None) -> tuple[dict[str, Any], dict[str
 
 def measured(scene: dict[str, Any], layer: str = "airlight") -> Iterator[dict[str, Any]]:
     """Yield the methods of a scene that were not refused and whose error is of a layer."""
-    for one in scene["methods"]:
-        if not one["refused"] and one["error"] and one.get("layer", "airlight") == layer:
-            yield one
+    for entry in scene["methods"]:
+        if not entry["refused"] and entry["error"] and entry.get("layer", "airlight") == layer:
+            yield entry

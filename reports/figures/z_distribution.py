@@ -65,7 +65,7 @@ def compute(
         laws = (len(z) * np.diff(law) for law in (t.cdf(outer, _BATCHES - 1), norm.cdf(outer)))
         shared = (len(z), _BATCHES, float(z.mean()), float(z.std()))
         bins = zip(edges[:-1].tolist(), edges[1:].tolist(), counts.tolist(), *(law.tolist() for law in laws))
-        rows += [(estimator, *one, *shared) for one in bins]
+        rows += [(estimator, *counted_bin, *shared) for counted_bin in bins]
     write_data(target, NAME, _HEADER, rows, scene=scene, image=image, batches=_BATCHES, samples=ESTIMATORS)
 
 
@@ -78,9 +78,9 @@ def _z(scene, estimator: str, samples: int, progress):
     from validation.estimates.monte_carlo import monte_carlo_batches
 
     expected, mask = estimator_truth(scene, estimator)
-    found = monte_carlo_batches(scene, estimator, batches=_BATCHES, samples=samples, progress=progress).batches
-    estimate = batch_estimate(found, "airlight", mask)
-    error, mean = (np.asarray(one)[mask] for one in (estimate.standard_error, estimate.mean))
+    batches = monte_carlo_batches(scene, estimator, batches=_BATCHES, samples=samples, progress=progress).batches
+    estimate = batch_estimate(batches, "airlight", mask)
+    error, mean = (np.asarray(layer)[mask] for layer in (estimate.standard_error, estimate.mean))
     channel = int(np.argmax(expected.sum(axis=0) > 0))
     tested = error[:, channel] > 0
     return ((mean - expected)[:, channel] / np.where(tested, error[:, channel], 1.0))[tested]

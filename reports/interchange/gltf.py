@@ -92,8 +92,8 @@ def _document(
 ) -> tuple[dict[str, Any], bytes]:
     """Return the JSON and the binary part."""
     buffer = _Buffer()
-    materials = [_material(one) for one in described["surfaces"]]
-    materials += [_boundary(one) for one in described["bounded_media"]]
+    materials = [_material(surface) for surface in described["surfaces"]]
+    materials += [_boundary(medium) for medium in described["bounded_media"]]
     meshes = [buffer.mesh(mesh, turn, number) for number, mesh in enumerate([*opaque, *bounds])]
     nodes: list[dict[str, Any]] = [{"name": mesh["name"], "mesh": number} for number, mesh in enumerate(meshes)]
     camera = described["camera"]
@@ -165,7 +165,7 @@ def _light(light: dict[str, Any]) -> dict[str, Any]:
     quantity, unit = ("irradiance", "W/m^2") if light["kind"] == "directional" else ("intensity", "W/sr")
     intensity = np.array(light[quantity])
     largest = float(intensity.max())
-    found: dict[str, Any] = {
+    punctual: dict[str, Any] = {
         "type": light["kind"],
         "intensity": largest,
         "color": (intensity / largest if largest > 0 else np.ones(3)).tolist(),
@@ -179,9 +179,9 @@ def _light(light: dict[str, Any]) -> dict[str, Any]:
         outer = float(np.deg2rad(light["cutoff_angle"]))
         # The format wants the inner angle below the outer one, also for a cone with a hard edge.
         inner = min(float(np.deg2rad(light["beam_angle"])), outer * (1 - 1e-4))
-        found["spot"] = {"innerConeAngle": inner, "outerConeAngle": outer}
-        found["extras"] |= {key: light[key] for key in ("beam_angle", "cutoff_angle")}
-    return found
+        punctual["spot"] = {"innerConeAngle": inner, "outerConeAngle": outer}
+        punctual["extras"] |= {key: light[key] for key in ("beam_angle", "cutoff_angle")}
+    return punctual
 
 
 def _light_matrix(light: dict[str, Any], turn: Array) -> list[float]:

@@ -164,14 +164,14 @@ def _bounds(bounds: Any) -> dict[str, Any]:
 
 
 def _light(light: TruthLight) -> dict[str, Any]:
-    found: dict[str, Any] = {
+    described: dict[str, Any] = {
         "kind": "point",
         "position": _numbers(light.position),
         "intensity": _numbers(light.intensity),
     }
     if light.axis is None:
-        return found | {"falloff": _FALLOFF["point"]}
-    return found | {
+        return described | {"falloff": _FALLOFF["point"]}
+    return described | {
         "kind": "spot",
         "axis": _numbers(light.axis),
         "cutoff_angle": _number(np.rad2deg(light.cutoff)),
@@ -196,8 +196,8 @@ def _reflectance(shape: Any) -> tuple[list[float], bool]:
 
     number = np.arange(_POINTS)
     place = mi.Point2f((number + 0.5) / _POINTS, number * 0.6180339887 % 1)  # evenly spread: Kronecker's points
-    found = shape.sample_position(0, place)
-    interaction = mi.SurfaceInteraction3f(found, dr.zeros(mi.Color0f))
+    sample = shape.sample_position(0, place)
+    interaction = mi.SurfaceInteraction3f(sample, dr.zeros(mi.Color0f))
     interaction.wi = mi.Vector3f(0, 0, 1)
     values = np.array(shape.bsdf().eval_diffuse_reflectance(interaction), dtype=np.float64).reshape(3, -1)
     return _numbers(values.mean(axis=1)), bool(np.ptp(values, axis=1).max() > 1e-6)

@@ -186,13 +186,13 @@ def versions() -> dict[str, str]:
     """Return the versions of airlight, Python and the packages that make the numbers."""
     from importlib.metadata import PackageNotFoundError, version
 
-    found = {"airlight": __version__, "python": ".".join(map(str, sys.version_info[:3]))}
+    installed = {"airlight": __version__, "python": ".".join(map(str, sys.version_info[:3]))}
     for package in _PACKAGES:
         try:
-            found[package] = version(package)
+            installed[package] = version(package)
         except PackageNotFoundError:
-            found[package] = "missing"
-    return found
+            installed[package] = "missing"
+    return installed
 
 
 def stamped(image: "Image") -> "Image":
@@ -207,7 +207,7 @@ def describe_environment() -> dict[str, object]:
 
     mitsuba = sys.modules.get("mitsuba")
     variant = mitsuba.variant() if mitsuba else None
-    found: dict[str, object] = {
+    environment: dict[str, object] = {
         "versions": versions(),
         "platform": platform.platform(),
         "processor": processor(),
@@ -215,11 +215,11 @@ def describe_environment() -> dict[str, object]:
         "variant": variant or "none yet",
     }
     if variant == "cuda_ad_rgb":
-        found["device"] = cuda_status().reason
+        environment["device"] = cuda_status().reason
     llvm = next(iter(find_llvm()), None)
     if llvm is not None:
-        found["llvm"] = f"{llvm.label}, {llvm.path}"
-    return found
+        environment["llvm"] = f"{llvm.label}, {llvm.path}"
+    return environment
 
 
 def machine_in_words(environment: Mapping[str, Any]) -> str:

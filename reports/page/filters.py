@@ -54,10 +54,10 @@ def words(value: Any) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, Mapping):
-        return ", ".join(f"{key} {words(one)}" for key, one in value.items())
+        return ", ".join(f"{key} {words(entry)}" for key, entry in value.items())
     if isinstance(value, list | tuple):
-        size = len(value) == 2 and all(isinstance(one, int) for one in value)  # width and height
-        return (" \N{MULTIPLICATION SIGN} " if size else ", ").join(words(one) for one in value) or DASH
+        size = len(value) == 2 and all(isinstance(entry, int) for entry in value)  # width and height
+        return (" \N{MULTIPLICATION SIGN} " if size else ", ").join(words(entry) for entry in value) or DASH
     return str(value)
 
 

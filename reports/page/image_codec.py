@@ -154,7 +154,7 @@ def decode_planes(packed: Packed, size: tuple[int, int], bits: int) -> Codes:
     """
     width, height = size
     raw = np.frombuffer(zlib.decompress(packed.data), np.uint8).astype(np.int64)
-    found: list[NDArray[np.int64]] = []
+    decoded: list[NDArray[np.int64]] = []
     for part, (relative, predictor) in zip(np.split(raw, len(packed.planes)), packed.planes):
         zigzag = sum(byte << 8 * place for place, byte in enumerate(np.split(part, bits // 8)))
         residual = np.where(zigzag & 1, -(zigzag + 1) // 2, zigzag // 2).reshape(height, width)
@@ -162,9 +162,9 @@ def decode_planes(packed: Packed, size: tuple[int, int], bits: int) -> Codes:
             residual = np.cumsum(residual, axis=1)
         elif predictor == GRADIENT:
             residual = np.cumsum(np.cumsum(residual, axis=1), axis=0)
-        codes = residual + found[0] if relative else residual
-        found.append(np.asarray(codes % (1 << bits), dtype=np.int64))
-    planes = np.stack(found, axis=-1)
+        codes = residual + decoded[0] if relative else residual
+        decoded.append(np.asarray(codes % (1 << bits), dtype=np.int64))
+    planes = np.stack(decoded, axis=-1)
     if bits == DIFFERENCE_BITS:
         planes = np.where(planes >> (bits - 1), planes - (1 << bits), planes)
     return planes.astype(np.int32)

@@ -114,10 +114,10 @@ def report_styles(scenes: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, An
     """
     variants: dict[str, list[str]] = {}
     for scene in scenes:
-        for one in scene["methods"]:
-            labels = variants.setdefault(one["method"], [])
-            if one["label"] not in labels:
-                labels.append(one["label"])
+        for entry in scene["methods"]:
+            labels = variants.setdefault(entry["method"], [])
+            if entry["label"] not in labels:
+                labels.append(entry["label"])
     others = [method for method in variants if method not in _METHODS]
     styles = {}
     for method, labels in variants.items():

@@ -131,7 +131,7 @@ def latex(tables: Sequence[Table], *, comment: Sequence[str] = ()) -> str:
     for place, table in enumerate(tables):
         lines += [r"\addlinespace"] if place else []
         if table.title:
-            about = re.sub(r"\b([\d.]+e-?\d+)\b", lambda found: _num(found[1]), _in_latex(table.explanation))
+            about = re.sub(r"\b([\d.]+e-?\d+)\b", lambda match: _num(match[1]), _in_latex(table.explanation))
             title = rf"\textit{{{_in_latex(table.title)}}}{f', {about}' if about else ''}"
             lines.append(rf"\multicolumn{{{len(columns)}}}{{l}}{{{title}}} \\")
         for row in table.rows:

@@ -46,7 +46,7 @@ def methods_table(title: str, methods: Iterable[Entry | Row], *keys: str, explan
     keys
         Of `COLUMNS`; `BENCH` by default.
     """
-    rows = tuple(one if isinstance(one, Row) else method_row(one) for one in methods)
+    rows = tuple(entry if isinstance(entry, Row) else method_row(entry) for entry in methods)
     return Table(title, tuple(COLUMNS.values()), rows, explanation).only(*(keys or BENCH))
 
 
@@ -94,8 +94,8 @@ def fastest_within(error: float, entries: Iterable[Entry]) -> Entry | None:
     """
 
     def reaches(entry: Entry) -> bool:
-        found = entry.get("error") or {}
-        rmse = found.get("relative_rmse")
-        return bool(entry.get("times")) and rmse is not None and rmse <= error and not found.get("nonfinite")
+        errors = entry.get("error") or {}
+        rmse = errors.get("relative_rmse")
+        return bool(entry.get("times")) and rmse is not None and rmse <= error and not errors.get("nonfinite")
 
     return min(filter(reaches, entries), key=lambda entry: entry["times"]["frame"]["median_ms"], default=None)

@@ -75,7 +75,7 @@ def test_page_needs_nothing_but_itself(page):
 def test_images_are_data_and_every_canvas_has_words(page):
     index = json.loads(page.script("images"))
     (scene,) = index["scenes"]
-    assert [one["label"] for one in scene["methods"]] == ["good (k)", "flat"]
+    assert [entry["label"] for entry in scene["methods"]] == ["good (k)", "flat"]
     assert set(scene["methods"][1]["layers"]) == {"airlight", "surface", "flip"}
     assert len(page.script("pixels-0")) > 1000
     pictures = [attributes for attributes in page.attributes("canvas") if "aria-hidden" not in attributes]
@@ -178,7 +178,7 @@ def test_scene_of_which_everything_was_refused_has_no_viewer(data, folder):
     blank = report_data()["scenes"][0] | {"name": "dark", "methods": [refused("x", "too dark")]}
     page = render(data | {"scenes": [blank, data["scenes"][0]]}, folder)
     assert len([1 for _, attributes in page.tags if attributes.get("class") == "viewer"]) == 1
-    assert [one["name"] for one in json.loads(page.script("images"))["scenes"]] == ["hall"]
+    assert [scene["name"] for scene in json.loads(page.script("images"))["scenes"]] == ["hall"]
     assert "viewer-0" in {attributes.get("id") for _, attributes in page.tags}
 
 

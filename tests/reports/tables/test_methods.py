@@ -18,8 +18,8 @@ def timing(median):
 def entry(label="a", *, rmse=0.01, frame=2.0, nonfinite=0, **more):
     error = {"relative_rmse": rmse, "relative_bias": 0.0, "p50": 0.1, "p99": 0.2, "max": 0.3, "nonfinite": nonfinite}
     times = {name: timing(median) for name, median in MEDIANS.items()} | {"frame": timing(frame)}
-    found = {"label": label, "kind": "built-in", "refused": None, "note": None, "knows_shadows": True, "times": times}
-    return found | {"error": error} | more
+    fields = {"label": label, "kind": "built-in", "refused": None, "note": None, "knows_shadows": True, "times": times}
+    return fields | {"error": error} | more
 
 
 @pytest.mark.parametrize("name", TIMES)
