@@ -5,7 +5,7 @@ import base64
 from collections.abc import Sequence
 from html import escape
 
-from reports.tables.drawing import html
+from reports.tables.drawing import html, sentence_in_html
 from reports.tables.table import Column
 from reports.tables.table import table as make_table
 
@@ -24,8 +24,8 @@ def paragraph(text: str) -> str:
 
 
 def bullets(items: Sequence[str]) -> str:
-    """Return a list of plain texts; nothing for no items."""
-    inside = "".join(f"<li>{escape(item)}</li>" for item in items)
+    """Return a list of sentences, in which what stands in backticks is code; nothing for no items."""
+    inside = "".join(f"<li>{sentence_in_html(item)}</li>" for item in items)
     return f"<ul>{inside}</ul>" if items else ""
 
 

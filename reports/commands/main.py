@@ -76,6 +76,7 @@ app = typer.Typer(
     add_completion=False,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
+    rich_markup_mode="markdown",  # draws `code` as code, without its marks
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 120},
 )
 for _command in _COMMANDS:

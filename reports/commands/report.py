@@ -45,6 +45,7 @@ def report(
     """
     from analytic.errors import InputError
     from reports.data.claims import confirmed
+    from reports.tables.drawing import sentence_in_text
     from reports.tables.terminal import print_json
 
     if redraw is not None:
@@ -72,7 +73,7 @@ def report(
     if json:
         print_json(data)
     else:
-        print("\n".join(f"- {claim['text']}" for claim in data["claims"]))
+        print("\n".join(f"- {sentence_in_text(claim['text'])}" for claim in data["claims"]))
         count = len(data["scenes"])
         print(f"{target / 'report.html'}: {count} scene{'' if count == 1 else 's'}, {done}")
     if not confirmed(data["scenes"]):

@@ -5,7 +5,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from reports.tables.drawing import DASH, typeset
+from reports.tables.drawing import DASH, sentence_in_html, typeset
 from reports.tables.table import number as plain_number
 
 #: Kinds of claims as the page names them.
@@ -71,6 +71,13 @@ def unbroken(text: str) -> str:
     return re.sub(r"(?<=\d) (?=%|ms\b|frames/s)", "\N{NO-BREAK SPACE}", text)
 
 
+def with_code(text: str) -> str:
+    """Return a sentence as HTML, in which what stands in backticks is code."""
+    from markupsafe import Markup
+
+    return Markup(sentence_in_html(text))
+
+
 def kept_words(data: Mapping[str, Any]) -> str:
     """Return how many results of a report were kept from earlier runs; empty where none was."""
     kept, computed = data.get("kept") or 0, data.get("computed")
@@ -107,4 +114,5 @@ FILTERS: Mapping[str, Callable[..., str]] = {
     "words": words,
     "sentence": sentence,
     "unbroken": unbroken,
+    "with_code": with_code,
 }

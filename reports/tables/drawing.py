@@ -236,6 +236,11 @@ def _below(table: Table) -> list[str]:
     ]
 
 
+def sentence_in_text(sentence: str) -> str:
+    """Return a sentence without the backticks around code."""
+    return sentence.replace("`", "")
+
+
 def _in_markdown(words: str) -> str:
     """Return text in which nothing is a mark of Markdown or the end of a cell."""
     return re.sub(r"([\\|`*_<&\[\]])", r"\\\1", re.sub(r"\s*\n\s*", " ", words))
@@ -261,6 +266,11 @@ def _until_reason(row: Row, columns: Sequence[Column]) -> tuple[Sequence[Column]
 def _in_html(words: str) -> str:
     """Return text in which nothing is a mark of HTML, with the sign of multiplication in sizes of images."""
     return escape(re.sub(r"(?<=\d) x(?= \d|$)|^ x$", " \N{MULTIPLICATION SIGN}", words))
+
+
+def sentence_in_html(sentence: str) -> str:
+    """Return a sentence as HTML; what stands in backticks is code."""
+    return re.sub(r"`([^`]+)`", r"<code>\1</code>", escape(sentence))
 
 
 def _name_in_html(name: Name) -> str:

@@ -231,11 +231,12 @@ def test_the_fastest_row_is_finite_and_within_the_error():
 
 def test_a_report_shows_its_claims_and_leads_to_the_page(tmp_path, monkeypatch):
     scenes = [{"name": "fog", "agreement": {"x": {"statistics": {"equivalent": False}}}}]
-    data = {"claims": [{"kind": "truth", "text": "It is <so>.", "good": True}], "scenes": scenes, "created": "today"}
+    claims = [{"kind": "truth", "text": "It is <so>: `--full`.", "good": True}]
+    data = {"claims": claims, "scenes": scenes, "created": "today"}
     report = Report(folder=tmp_path / "out", data=data)
-    assert report.claims == ("It is <so>.",)
+    assert report.claims == ("It is <so>: `--full`.",)
     assert not report.confirmed
-    assert any("It is <so>." in text for text in parsed(report._repr_html_()).text)
+    assert "It is &lt;so&gt;: <code>--full</code>." in report._repr_html_()
     (link,) = tags(report._repr_html_(), "a")
     assert link["href"] == (tmp_path / "out" / "report.html").as_uri()
     monkeypatch.chdir(tmp_path)

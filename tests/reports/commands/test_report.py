@@ -38,10 +38,16 @@ def handed_on(monkeypatch):
 
     def write(folder, **options):
         given.update(options, folder=folder)
-        return {"claims": [], "scenes": [], "seconds": 1.2, "kept": 0, "computed": 3, "measured": None}
+        claims = [{"text": "`--full` has all."}]
+        return {"claims": claims, "scenes": [], "seconds": 1.2, "kept": 0, "computed": 3, "measured": None}
 
     monkeypatch.setattr("reports.report.measure.write_report", write)
     return given
+
+
+def test_claims_are_printed_without_marks(variant, handed_on, capsys):
+    assert run(["report", "--quick"]) == 0
+    assert "- --full has all.\n" in capsys.readouterr().out
 
 
 def refused(capsys, *arguments):

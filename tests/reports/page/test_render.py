@@ -59,6 +59,11 @@ def test_page_shows_the_numbers_of_the_data(page):
     assert "mitsuba 3.9.1" in text
 
 
+def test_code_in_a_claim_is_drawn_as_code(data, folder):
+    data["claims"].append({"kind": "not-measured", "text": "`--scenes` names <them>.", "good": None})
+    assert "<code>--scenes</code> names &lt;them&gt;." in render(data, folder).source
+
+
 @pytest.mark.claim("report-stands-alone")
 def test_page_needs_nothing_but_itself(page):
     """Only the pictures that are named for readers without scripts are other files, and they are not loaded."""
