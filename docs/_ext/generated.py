@@ -33,7 +33,7 @@ PARTS = {
 }
 _MARK = re.compile(r"^<!-- generated: ([a-z-]+)((?: [\w-]+)*) -->$", flags=re.MULTILINE)
 _SOURCE = re.compile(r"\[([^\]]+)\]\(\.\./((?:analytic|realtime|reference|validation|reports)/[\w/]+)\.py\)")
-#: Documents above this folder and the pages that show them.
+#: Documents in the folder above, and the pages that show them.
 _PAGES = {"../CONTRIBUTING.md": "contributing.md", "../CHANGELOG.md": "changelog.md", "../DESIGN.md": "conventions.md"}
 
 

@@ -14,9 +14,9 @@ from reports.tables.lists import kernel_list, method_list
 from reports.tables.table import Name, Row, Table
 
 ROOT = Path(__file__).resolve().parents[2]
-#: Pages of methods that are called otherwise than the method.
+#: Pages of methods whose name is not that of the method.
 PAGES: dict[str, str] = {}
-#: What the help of parameters leads to.
+#: Words in the help of parameters, and the pages that they link to.
 LINKS = {"between the corners of tiles": "methods.md#between-the-corners-of-tiles"}
 
 

@@ -8,7 +8,7 @@ from sphinx.application import Sphinx
 _CODE = re.compile(r"``.+?``|`[^`]+`")
 _EMPHASIS = re.compile(r"(?<![\w*])\*(?=[^\s*])[^*]*[^\s*]\*(?![\w*])")
 _ATTRIBUTES = ("attribute", "data", "property")
-_COLON = "\0"  # stands for a colon that napoleon is not to see
+_COLON = "\0"  # stands for a colon that napoleon must not see
 _ITEM = re.compile(r"\s*[*-] \S")
 _RAISES = re.compile(r"^:raises InputError:")
 
@@ -20,7 +20,7 @@ def _indent(line: str) -> int:
 def formulas_as_blocks(lines: list[str]) -> list[str]:
     """Return lines in which text that is set in by four or more after a blank line is a literal block."""
     marked: list[str] = []
-    inside: int | None = None  # the least indentation of the block that is open
+    inside: int | None = None  # least indentation of the open block
     before = 0  # indentation of the last line that was not blank
     for number, line in enumerate(lines):
         if not line.strip():

@@ -19,7 +19,7 @@ class ImageComparison(Comparison, Pictured):
     """How far an image is from a reference: the numbers of `airlight compare`, and the images."""
 
     reference: Array  #: the layer of the reference, (height, width[, channels]) [W/(m^2 sr)]
-    test: Array  #: the layer of the image that is judged
+    test: Array  #: the same layer of the image under test
     names: tuple[str, str] = ("the reference", "the test image")
 
     @property

@@ -9,7 +9,7 @@ from reports.tables.drawing import html, sentence_in_html
 from reports.tables.table import Column
 from reports.tables.table import table as make_table
 
-#: Narrower pictures are enlarged to this in whole multiples, so that single pixels can be seen [CSS pixels].
+#: Pictures narrower than this are enlarged by a whole factor, so that single pixels can be seen [CSS pixels].
 _NARROW = 240
 
 

@@ -101,7 +101,7 @@ def render(
     from validation.configurations.timing import time_frame
     from validation.estimates.images import layered_frame
 
-    activate()  # a module of the user's may want a variant when it is imported
+    activate()  # a user's module may need a variant when it is imported
     chosen = configuration(method, kernel_name(kernel), parameters)
     loaded = opened(scene, size)
     read = read_scene(loaded.scene, precision)

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from reports.api.results import Reference
     from validation.estimates.budget import Budget
 
-USUAL_SAMPLES = 2048  #: a pixel, of an estimator that samples and is given no budget
+USUAL_SAMPLES = 2048  #: samples a pixel of a sampling estimator without a budget
 
 
 @one_error

@@ -121,7 +121,13 @@ class LayeredImage(Pictured):
         return tone_mapped(radiance, 2.0**stops)
 
     def save(self, path: str | os.PathLike[str], exposure: float | None = None) -> Path:
-        """Write the layers as EXR or the picture of the total as PNG, by the suffix of the path, which is returned."""
+        """Write the layers as EXR or the picture of the total as PNG, by the suffix of the path; return the path.
+
+        Raises
+        ------
+        InputError
+            For another suffix, or if the file cannot be written.
+        """
         from reference.storage.exr import write_exr
         from reports.machine.environment import stamped
         from reports.plotting.pictures import write_png
@@ -168,12 +174,12 @@ class Rendering(LayeredImage):
 
     method: str
     kernel: str | None  #: None for a method that calls none
-    parameters: Mapping[str, Any]  #: those that differ from the method's defaults
+    parameters: Mapping[str, Any]  #: parameters that differ from the method's defaults
     label: str  #: method, kernel and parameters in one
     precision: str  #: 'single' or 'double'
     plan: Mapping[str, str]  #: what the scene needs of a method, in words
-    notes: tuple[str, ...] = ()  #: what there is to know of the scene
-    times: FrameTimes | None = None  #: what a frame costs, where it was asked for
+    notes: tuple[str, ...] = ()  #: notes on the scene
+    times: FrameTimes | None = None  #: what a frame costs, if that was measured
 
     def facts(self) -> dict[str, str]:
         """Return what there is to say of the frame, in words, by name."""
@@ -198,10 +204,10 @@ class Reference(LayeredImage):
     """The truth of a scene, with its error."""
 
     estimator: str  #: 'quadrature', 'single-scatter' or 'volpath'
-    relative_error: float  #: of the airlight: mean bound over mean, or the relative standard error of the image
+    relative_error: float  #: of the airlight: the mean bound over the mean, or the relative standard error of the image
     details: Mapping[str, Any] = field(
         default_factory=dict
-    )  #: how it was made: samples, seeds, shadow rays that checked
+    )  #: how it was made: samples, seeds, shadow rays that checked the intervals
 
     @property
     def bound(self) -> Array | None:
@@ -232,7 +238,7 @@ class Reference(LayeredImage):
 
 
 def as_array(values: Array, dtype: DTypeLike | None, copy: bool | None) -> Array:
-    """Answer NumPy's protocol: a view unless another type or a copy is wanted."""
+    """Answer NumPy's protocol: a view, or a copy for another type; raises ValueError if a needed copy is forbidden."""
     if dtype is not None and np.dtype(dtype) != values.dtype:
         if copy is False:
             raise ValueError(f"a copy is needed to turn {values.dtype} into {np.dtype(dtype)}")

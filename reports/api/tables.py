@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-_SHOWN = 12  #: rows of integrals that a notebook shows
+_SHOWN = 12  #: rows of integrals shown in a notebook
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -30,7 +30,7 @@ class Integrals:
     kernel: str
     precision: str  #: 'single' or 'double'
     cases: Cases  #: the cases, one after the other
-    summary: Mapping[str, Any]  #: rows, and where there are values to compare with the quantiles of the relative error
+    summary: Mapping[str, Any]  #: number of rows and, with values to compare, the quantiles of the relative error
 
     @property
     def error(self) -> Array | None:

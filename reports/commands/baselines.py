@@ -61,7 +61,7 @@ def baselines(
     moves = {name: compare_baseline(kept[name], measured[name]) for name in names}
     stray = [] if scenes else stray_baselines(SCENES)
     if update:
-        # All reasons are asked for before the first file is written.
+        # A missing reason is refused before the first file is written.
         new = [updated(kept[name], measured[name], because) for name in names]
         written = [baseline for baseline in new if baseline is not None]
         for baseline in written:

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-_BATCHES = 4096  # at most: a comparison ends before, when its interval is narrow enough
+_BATCHES = 4096  # at most: a comparison ends earlier if its interval is narrow enough
 
 
 def bench(
@@ -54,12 +54,12 @@ def bench(
 
     names = methods.split(",") if methods else list(METHODS)
     if any(":" in name for name in names):
-        activate()  # one's own module may want arrays when it is imported
+        activate()  # a user's module may create arrays when it is imported
     chosen = chosen_configurations([name.strip() for name in names])
     pixels = parse_size(size) if size else None
     activate()
     names = scenes or list(SCENES)
-    for name in names:  # refuse what cannot be used before an hour of work, not after
+    for name in names:  # refuses unusable input before an hour of work, not after
         read_scene(load_scene(name, pixels).scene)
     benched = []
     with progress_bar("bench") as progress:
@@ -163,7 +163,7 @@ def _bench_estimators(scenes: list[str] | None, *, size: str | None, json: bool)
     pixels = parse_size(size) if size else (160, 120)
     activate()
     names = list(scenes or SCENES)
-    loaded = {name: load_scene(name, pixels).scene for name in names}  # refuse before any work, not after
+    loaded = {name: load_scene(name, pixels).scene for name in names}  # refuses unusable input before any work
     if not scenes:
         loaded = {"open-fog, optical depth 0.2": thin_fog(pixels)} | loaded
     efficiencies = {}

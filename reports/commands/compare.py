@@ -94,7 +94,7 @@ def _with_scene(scene: str, file: Path, **options):
     from reports.machine.progress import progress_bar
     from validation.comparison.engine_compare import compare_scene
 
-    read_exr(file)  # what cannot be read is refused before Mitsuba starts
+    read_exr(file)  # unreadable files are refused before Mitsuba starts
     activate()
     with progress_bar("the truth") as progress:
         return compare_scene(scene, file, progress=progress, **options)

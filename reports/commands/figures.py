@@ -10,8 +10,8 @@ import typer
 if TYPE_CHECKING:
     from types import ModuleType
 
-#: Figure -> module and what its `compute` takes: 'quick', 'report' (without which it cannot be), 'published' (a report
-#: if there is one). A figure's name is its module's `NAME`; its summary is there too.
+#: Figure -> its module, and what its `compute` takes: 'quick', 'report' (required), 'published' (a report, optional).
+#: A figure's name is its module's `NAME`; its summary is there too.
 FIGURES: dict[str, tuple[str, tuple[str, ...]]] = {
     "polynomials": ("polynomials", ("rays",)),
     "kernel-errors": ("kernel_errors", ("quick", "progress")),

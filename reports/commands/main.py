@@ -81,7 +81,7 @@ app = typer.Typer(
 )
 for _command in _COMMANDS:
     app.command()(_command)
-# What it does not know goes on to pytest.
+# Typer hands unknown arguments on to pytest.
 app.command("test", context_settings={"allow_extra_args": True, "ignore_unknown_options": True})(run_tests)
 
 
@@ -139,7 +139,7 @@ def run(arguments: Sequence[str]) -> int:
         return _fail(f"system libraries are missing, install them with `{install_line(packages)}`", MISSING)
     except _input_errors() as error:
         return _fail(str(error), WRONG_INPUT)
-    except Exception as error:  # what Typer raises for wrong usage has its class in one of Typer's private modules
+    except Exception as error:  # Typer's class for wrong usage is in a private module
         if not hasattr(error, "format_message"):
             raise
         return _usage(error)

@@ -52,7 +52,7 @@ def maps(
     largest = configuration(method, kernel, parameters | {"map": texels[-1]})
     activate()
     loaded = [load_scene(name, pixels) for name in scenes or SCENES]
-    for opened in loaded:  # refuse what cannot be used, or does not fit into the memory, before any work, not after
+    for opened in loaded:  # refuse unusable scenes, and maps that exceed the memory, before any work
         prepared(read_scene(opened.scene), largest)
     studied = []
     with progress_bar("maps") as progress:

@@ -45,7 +45,7 @@ def render(
     from validation.scenes.loading import load_scene, parse_size
 
     if ":" in method:
-        activate()  # one's own module may want arrays when it is imported
+        activate()  # a user's module may create arrays when it is imported
     chosen = configuration(method, kernel, parse_settings(set_ or []))
     outputs = {"exr": output, "png": preview}
     _check_outputs(outputs, frames, animate)

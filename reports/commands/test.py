@@ -36,7 +36,7 @@ def run_tests(
         )
     variant = prepare().variant
     shared = (2 if threads() > 1 else 0) if workers is None else workers
-    # Each process begins with its own half of the files: few kernels are compiled and few scenes loaded twice.
+    # Each process begins with its own half of the files, so that few kernels are compiled and few scenes loaded twice.
     sharing = ["-n", str(shared), "--dist", "worksteal"] if shared else []
     os.chdir(root)
     if everything and not context.args:

@@ -87,7 +87,7 @@ def _fault(data: Any, schema: Mapping[str, Any]) -> str | None:
     if error is None:
         return None
     words = " ".join(error.message.split())
-    # The message begins with what was found, which may be a whole scene.
+    # The message begins with the offending value, which may be a whole scene.
     return f"{error.json_path.replace('$', 'report', 1)}: {words if len(words) < 200 else f'.. {words[-160:]}'}"
 
 

@@ -22,7 +22,7 @@ def compare_methods(old: Report, new: Report, *, tolerance: float, gone: str) ->
         if bool(old_entry["refused"]) != bool(new_entry["refused"]):
             lost = new_entry["refused"]
             words = f"refused: {lost}" if lost else "no longer refused"
-            # What was left out for the time it would take is a decision of the one who measured, not a fault.
+            # Leaving a method out for the time it takes is a decision of the user, not a fault.
             decided = old_entry.get("left_out") or new_entry.get("left_out")
             findings.append(Finding("note" if decided else "worse" if lost else "better", name, label, words))
         elif old_entry.get("layer", "airlight") != new_entry.get("layer", "airlight"):
@@ -46,7 +46,7 @@ def _incomparable(old: Report, new: Report) -> Finding | None:
     before, after = (scene["truth"]["mean"] for scene in (old, new))
     if before is None or after is None:
         return None
-    # A bound is of the mean absolute error: the means cannot be further apart than both.
+    # Each bound limits the mean absolute error, so the means differ by at most the sum of both bounds.
     bounds = sum(scene["truth"].get("relative_bound") or 0.0 for scene in (old, new))
     if abs(after - before) > (bounds + FLOORS["mean"]) * abs(before):
         words = "the truth moved (mean radiance): another scene by this name, or another truth; errors not compared"
@@ -66,7 +66,7 @@ def _errors(old: Report | None, new: Report | None, tolerance: float, *, prefix:
         before, after = old.get(name), new.get(name)
         what = f"{prefix}{name}"
         if before is None or after is None:
-            if before is not after:  # not-a-number is null
+            if before is not after:  # JSON writes NaN as null
                 changes.append(("worse" if after is None else "better", what, before, after))
             continue
         band = error_band(name, before, tolerance=tolerance, pixels=old["pixels"], rmse=old.get("relative_rmse") or 0.0)

@@ -13,7 +13,7 @@ _COLUMNS = (
     Column("new", "new", digits=4),
     Column("change", "change", words=True),
 )
-_BUSY = 1.25  # a spread of quartiles from which on the machine was not quiet
+_BUSY = 1.25  # with a larger ratio of the quartiles the machine was not quiet
 
 
 def print_difference(difference: Difference) -> None:

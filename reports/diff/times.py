@@ -17,8 +17,8 @@ class TimeComparison:
     compared: int  #: configurations
     same_machine: bool
     machine: tuple[str, ...]  #: how the machines and versions differ, in words
-    spread: float  #: quartiles of the noisier report, upper over lower
-    least: float  #: least ratio of two times that means something
+    spread: float  #: upper over lower quartile, of the noisier report
+    least: float  #: least ratio of two times that is significant
     drift: float  #: median ratio of all frames
     findings: tuple[Finding, ...] = field(default=())
 

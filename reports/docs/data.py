@@ -155,7 +155,7 @@ def counts(name: str) -> dict[str, int]:
 
 
 def kept_of_kernels(costs: dict[str, Any], path: Path) -> dict[str, Any]:
-    """Return what the documentation keeps of the costs of kernels."""
+    """Return what the documentation keeps of the costs of kernels; raises InputError if a key is missing."""
     try:
         rows = costs["kernels"]["costs"]
         environment = costs["environment"]
@@ -199,7 +199,7 @@ def _typical(candidates: list[dict[str, Any]]) -> dict[str, Any] | None:
 
 
 def small(path: Path) -> bytes:
-    """Return a picture as a PNG file of at most `LARGEST` bytes."""
+    """Return a picture as a PNG file of at most `LARGEST` bytes; raises InputError if it cannot be read."""
     from PIL import Image, UnidentifiedImageError
 
     try:

@@ -18,7 +18,7 @@ from xml.etree import ElementTree
 
 from reports.docs.verification import RECORD, duration, redraw
 
-#: Tests that two other parts repeat.
+#: Tests that other parts of the run repeat.
 REPEATED = (
     "tests/test_regression.py::test_errors_are_those_of_the_baseline",
     "tests/validation/mutations/test_study.py::test_the_standard_run_catches_nine_in_ten",
@@ -34,7 +34,7 @@ class Counts:
     passed: int = 0
     failed: int = 0
     skipped: int = 0
-    remark: str = ""  #: what failed, or was expected not to pass
+    remark: str = ""  #: what failed, or is expected to fail
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,9 @@ class Part:
 
     name: str
     command: Sequence[str]  #: arguments of Python
-    result: str  #: "argument": the command writes the file that its last argument names; "output": what it prints
+    result: (
+        str  #: "argument": counts are in the file that the last argument names; "output": in what the command prints
+    )
     count: Callable[[bytes], Counts]
 
 
@@ -66,7 +68,7 @@ def all_parts(workers: Sequence[str]) -> tuple[Part, ...]:
     return (
         Part("unit", _pytest(tests[:2], workers, "not statistical and not slow"), "argument", count_tests),
         Part("statistical", _pytest(tests, workers, "statistical and not slow"), "argument", count_tests),
-        # Some of the slow tests compare times: they have the machine for themselves.
+        # Some of the slow tests compare times, so nothing else runs beside them.
         Part("slow", _pytest(tests, (), "slow"), "argument", count_tests),
         Part("mutations", [airlight, "mutations", "--json"], "output", count_mutations),
         Part("baselines", [airlight, "baselines", "--no-times", "--json"], "output", count_baselines),

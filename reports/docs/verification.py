@@ -30,7 +30,7 @@ class Claim:
     topic: str
     says: str
     stated: tuple[str, ...]  #: documents with the anchor of a heading, as in README.md#limits
-    mutations: tuple[str, ...]  #: that would break it
+    mutations: tuple[str, ...]  #: mutations that would break it
 
 
 @dataclass(frozen=True)

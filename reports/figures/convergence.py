@@ -22,7 +22,7 @@ SUMMARY = "convergence of each kernel and of each Monte Carlo estimator, with sl
 
 SCENE = "open-fog"
 ESTIMATORS = ("single-scatter", "volpath")
-_SAMPLES = 16  # a pixel in each batch
+_SAMPLES = 16  # samples a pixel in each batch
 _HEADER = ("panel", "name", "size", "error", "kind", "declared", "measured", "power")
 _PANELS = {
     "order": ("size of the kernel [1]", "largest relative error of J [1]"),

@@ -20,7 +20,7 @@ SUMMARY = "relative error of each kernel over the optical depth and the angle of
 _DEPTHS = (1e-3, 30.0)  # optical depth of the distance to the light
 _ANGLES = (0.5, 179.5)  # [degrees]
 _REACH = 2.0  # length of the segment over the distance to the light
-_FLOOR, _CEILING = 1e-7, 1.0  # of the colour scale: float32's rounding, and nothing right any more
+_FLOOR, _CEILING = 1e-7, 1.0  # ends of the colour scale: the rounding of float32, and no correct digit
 
 
 def compute(folder: Path | str, *, quick: bool = False, progress: Callable[[float, str], None] | None = None) -> None:

@@ -15,7 +15,7 @@ SUMMARY = "nanoseconds a ray against the error of each kernel, over its sizes"
 
 _HEADER = ("kernel", "family", "size", "phase", "rays", "ns", "ns_low", "ns_high", "median", "p99", "max", "nonfinite")
 _STATISTICS = {"median": "half of the rays", "p99": "99 % of the rays", "max": "worst ray"}
-_SHOWN = (1e-7, 10.0)  # errors; what lies outside is drawn at the edge
+_SHOWN = (1e-7, 10.0)  # errors; those outside are drawn at the edge
 
 
 def compute(

@@ -17,7 +17,7 @@ from reports.plotting.style import WIDTHS, method_style
 NAME = "map-size"
 SUMMARY = "error of the airlight against the size of the shadow map, with slopes"
 
-#: What is measured: a method with the parameters that leave the map alone to limit its accuracy.
+#: The methods, with parameters for which only the map limits the accuracy.
 METHODS: tuple[tuple[str, dict[str, Any]], ...] = (
     ("light-volumes", {}),
     ("min-max", {"sampling": "pixels", "slices": 4096}),

@@ -64,7 +64,7 @@ def _curves(phase: str, a: float, theta):
     function = PhaseFunction(phase)
     exact = np.exp(-a * (np.tan(0.5 * theta + 0.25 * np.pi) - 1)) * function(-np.sin(theta))
     derived = np.ravel(taylor_coefficients(a, function))
-    # The annex gives c0 to c2 and, for the isotropic case, c3 and c4; what it leaves out is taken from the derivation.
+    # The annex prints c0 to c2 and, for the isotropic case, c3 and c4; the others come from the derivation.
     printed = [float(c) for c in printed_coefficients(a, phase)]
     printed += list(derived[len(printed) :])
     polynomials = {name: np.polyval(c[::-1], theta) for name, c in (("taylor", derived), ("taylor-printed", printed))}

@@ -23,7 +23,7 @@ SUMMARY = "share of each stage of shadow planes in a frame: Table 1 of Biri 2006
 _PAPER = "published"
 _HEADER = ("scene", "where", "row", "width", "height", "stage", "share_percent", "ms", "frame_ms", "low_ms", "high_ms")
 _COLOURS = ("purple", "sky", "blue", "orange", "vermillion")
-_HATCHES = ("", "....", "", "////", "")  # beside the colour: for prints in grey
+_HATCHES = ("", "....", "", "////", "")  # hatches tell the stages apart in grey prints
 
 
 def compute(

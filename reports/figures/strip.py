@@ -19,8 +19,8 @@ from reports.plotting.style import COLOURS, WIDTHS
 NAME = "strip"
 SUMMARY = "reference and methods of a scene in one exposure, with insets and error maps, from a report"
 
-_MOST = 4  # methods beside the reference
-_INSET = 6  # of an image's shorter side over the side of an inset
+_MOST = 4  # most methods beside the reference
+_INSET = 6  # shorter side of an image over the side of an inset
 _HEADER = ("file", "label", "scene", "layer", "exposure", "relative_rmse", "x0", "y0", "x1", "y1", "side")
 _FRAMES = (COLOURS["orange"], COLOURS["sky"])
 

@@ -19,10 +19,10 @@ NAME = "z-distribution"
 SUMMARY = "distribution of z of single-scatter and volpath against the quadrature truth"
 
 SCENE = "open-fog"
-#: With the samples a pixel in each batch: volpath's batch means need more of them to come close to the normal law.
+#: Samples a pixel in each batch; volpath needs more of them until its batch means are nearly normal.
 ESTIMATORS = {"single-scatter": 64, "volpath": 256}
 _BATCHES = 64
-_EDGE, _BINS = 5.0, 50  # of the histogram; what lies beyond is counted in the outermost bins
+_EDGE, _BINS = 5.0, 50  # of the histogram; values beyond are counted in the outermost bins
 _HEADER = ("estimator", "low", "high", "count", "expected", "normal", "tested", "batches", "z_mean", "z_std")
 
 
@@ -106,7 +106,7 @@ def _draw(folder: Path, column: str):
         middle = 0.5 * (low + high)
         panel.bar(low, count, high - low, align="edge", color=COLOURS["sky"], label="pixels")
         panel.plot(middle, expected, label=f"Student's law, {int(chosen[0]['batches']) - 1} degrees", **truth_style())
-        # Counts of independent pixels spread like Poisson's law.
+        # Counts of independent pixels follow Poisson's law.
         panel.fill_between(
             middle,
             expected - 2 * np.sqrt(expected),

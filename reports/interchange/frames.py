@@ -14,7 +14,7 @@ STAGES = (
     "cull",
     "render",
     "passes",
-)  #: the functions of a frame that are frozen, of a `FrameRenderer`
+)  #: the frozen functions of a `FrameRenderer`
 
 
 def check_ending(option: str, path: Path, ending: str, *, instead: str = "") -> None:
@@ -68,7 +68,7 @@ def write_frames(
 
     cost: list[tuple[float, float]] = []
     kept = None
-    factor: float | None = None  # the exposure of the first frame serves for all: a lamp that fades must look so
+    factor: float | None = None  # all frames share the exposure of the first, so that a lamp that fades looks it
     done = 0
     try:
         start = time.perf_counter()

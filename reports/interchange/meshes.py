@@ -44,7 +44,7 @@ def shape_mesh(shape: Any) -> ShapeMesh:
         For a shape that cannot be made one, with its name.
     """
     unit = {"Rectangle": _rectangle, "Sphere": _sphere, "Disk": _disk, "Cylinder": _cylinder}.get(shape.class_name())
-    if unit is None and shape.is_mesh():  # Mitsuba's rectangle says that it is a mesh too, but has no vertices
+    if unit is None and shape.is_mesh():  # Mitsuba's rectangle claims to be a mesh, but has no vertices
         return _of_mesh(shape)
     if unit is None:
         raise InputError(

@@ -14,7 +14,7 @@ from validation.scenes.loading import LoadedScene
 
 Array = NDArray[np.float64]
 
-_POINTS = 64  # at which a reflectance is asked for, to tell a texture from a colour
+_POINTS = 64  # samples of a reflectance, to tell a texture from a colour
 
 _FALLOFF = {
     "point": "the same intensity in every direction; irradiance falls as 1/r^2, times exp(-sigma_t r)",
@@ -210,5 +210,5 @@ def _numbers(values: Any) -> list[float]:
 def _number(value: float) -> float:
     """Return a number that float32 rounded as the one that was meant: 0.91 instead of 0.9100000262260437."""
     short = float(str(np.float32(value)))
-    # A number with more digits than float32 has stays what it is; + 0.0 takes the sign from a zero.
+    # A number with more digits than float32 holds is kept; + 0.0 removes the sign of a zero.
     return (short if abs(short - value) <= 1e-7 * abs(value) else float(value)) + 0.0

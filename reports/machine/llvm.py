@@ -38,7 +38,7 @@ _ASK_VERSION = (
 class Llvm:
     """A libLLVM, and whether it can be used."""
 
-    path: str  #: as Dr.Jit would be told
+    path: str  #: as `DRJIT_LIBLLVM_PATH` would name it
     version: tuple[int, int] | None  #: major and minor, None if the file does not tell
     works: bool
     reason: str  #: why it works or not, in words

@@ -18,7 +18,7 @@ KINDS = {
     "refused": "Refused",
     "not-measured": "Not measured",
 }
-#: By whether a claim is good: a mark, and the words for who cannot see it.
+#: By whether a claim is good: a mark, and its words for screen readers.
 MARKS = {True: ("✓", "holds"), False: ("✗", "does not hold"), None: ("·", "")}
 
 #: The keys of the page, and what they do.

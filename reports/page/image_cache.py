@@ -92,7 +92,7 @@ def _load(name: str) -> SceneImages | None:
 
 
 def _keep(name: str, images: SceneImages) -> None:
-    # A page is worth having where nothing can be kept, on a full or read-only disk.
+    # On a full or read-only disk nothing can be kept, but the page can still be drawn.
     with suppress(OSError):
         data = np.frombuffer(images.data.encode("ascii"), np.uint8)
         store_arrays(name, {"index": np.array(json.dumps(images.index)), "data": data})

@@ -35,7 +35,7 @@ Array = NDArray[np.float64]
 NONE, LEFT, GRADIENT = range(3)  #: predictors
 REFERENCE_BITS, DIFFERENCE_BITS, FLIP_BITS = 24, 16, 8
 LARGEST = 32766  #: code of the largest finite difference
-NAN, INFINITE = -32768, 32767  #: codes of what is no number; minus infinity is -INFINITE
+NAN, INFINITE = -32768, 32767  #: codes of values that are not finite; minus infinity is -INFINITE
 
 _BAND = 48  # rows on which a predictor is chosen
 
@@ -45,7 +45,7 @@ class Precision:
     """How finely differences are stored."""
 
     k: float  #: codes for each factor e of a large difference
-    s: float  #: relative difference where linear turns into logarithmic
+    s: float  #: relative difference at which the scale turns from linear to logarithmic
 
     @property
     def of_difference(self) -> float:
@@ -79,8 +79,8 @@ class Packed:
 
 
 def reference_codes(radiance: NDArray[np.floating]) -> Codes:
-    """Return the upper 24 bits of float32 values, rounded to nearest; infinities stay, every NaN becomes one."""
-    with np.errstate(over="ignore"):  # beyond float32 is infinite, as in the file
+    """Return the upper 24 bits of float32 values of any shape, rounded to nearest; every NaN has the same code."""
+    with np.errstate(over="ignore"):  # values beyond float32 become infinite, as in the file
         single = np.ascontiguousarray(radiance, dtype=np.float32)
     bits = single.view(np.uint32).astype(np.int64)
     # Rounding up the largest finite numbers may reach the pattern of infinity, never beyond.
@@ -90,12 +90,12 @@ def reference_codes(radiance: NDArray[np.floating]) -> Codes:
 
 
 def reference_values(codes: Codes) -> Array:
-    """Return the values of `reference_codes`."""
+    """Return the values that the codes of `reference_codes` stand for, in the same shape."""
     return (codes.astype(np.uint32) << np.uint32(8)).view(np.float32).astype(np.float64)
 
 
 def difference_codes(difference: Array, precision: Precision) -> tuple[Codes, float]:
-    """Return the codes of relative differences and the k that they were made with (see the module)."""
+    """Return the codes of relative differences, in the same shape, and the k of their scale (see the module)."""
     finite = np.isfinite(difference)
     scaled = np.arcsinh(np.where(finite, difference, 0) / precision.s)
     largest = float(np.abs(scaled).max(initial=0))
@@ -106,7 +106,7 @@ def difference_codes(difference: Array, precision: Precision) -> tuple[Codes, fl
 
 
 def difference_values(codes: Codes, k: float, s: float) -> Array:
-    """Return the relative differences of `difference_codes`."""
+    """Return the relative differences that the codes of `difference_codes` stand for, in the same shape."""
     values = s * np.sinh(codes / k)
     values = np.where(codes == INFINITE, np.inf, np.where(codes == -INFINITE, -np.inf, values))
     return np.where(codes == NAN, np.nan, values)

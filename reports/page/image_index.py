@@ -37,8 +37,8 @@ Array = NDArray[np.float64]
 LAYERS = ("airlight", "surface")
 FLIP_LAYER = "flip"
 FLIP_LEVELS = 255  #: code of an HDR-FLIP of 1
-DARK = 1e-3  #: share of the mean of the reference below which a relative error is against that, as in the tables
-#: Precision of the differences, and which pixels are kept: from the finest down.
+DARK = 1e-3  #: share of the reference's mean; darker pixels are compared with this floor, as in the tables
+#: Precision of the differences and stride of the pixels, from the finest down.
 LADDER: tuple[tuple[Precision, int], ...] = (
     *((precision, 1) for precision in PRECISIONS),
     *((PRECISIONS[1], stride) for stride in (2, 3, 4, 6, 8, 12, 16)),
@@ -79,7 +79,7 @@ def read_images(scene: Mapping[str, Any], folder: Path) -> StoredImages:
     """
     reference = _layers(folder / scene["files"]["exr"])
     files = [folder / entry["files"]["exr"] for entry in scene["methods"] if entry["files"]]
-    methods = [_layers(path) for path in files]  # one at a time: reading turns the standard error stream off
+    methods = [_layers(path) for path in files]  # not in parallel: reading turns the standard error stream off
     size = reference["airlight"].shape
     for path, layers in zip(files, methods):
         for layer in layers.values():

@@ -21,7 +21,7 @@ from reports.plotting.colour_maps import signed_colours, unsigned_colours
 from reports.tables.methods import fastest_within
 
 PAGE_LIMIT = 30_000_000  #: bytes of a page
-WORDS_LIMIT = 2_500_000  #: of these for all that is not an image
+WORDS_LIMIT = 2_500_000  #: bytes of these for everything but images
 SCRIPTS = ("codec.js", "scene.js", "draw.js", "viewer.js", "page.js")
 TEMPLATES = Path(__file__).parent / "templates"
 
@@ -55,7 +55,7 @@ def render_page(data: dict[str, Any], folder: Path, *, limit: int = PAGE_LIMIT) 
     )
     environment.filters |= FILTERS
     environment.globals |= TABLES
-    # A scene of which nothing could be shown has no viewer, and no images in the page.
+    # A scene without any image has no viewer.
     with_images = [scene for scene in data["scenes"] if any(entry["files"] for entry in scene["methods"])]
     images = page_images(with_images, Path(folder), limit - WORDS_LIMIT)
     number_of = {id(scene): number for number, scene in enumerate(with_images)}

@@ -18,7 +18,7 @@ from typing import Any
 
 from analytic.errors import InputError
 
-#: Of any two of `COLOURS`, in CIEDE2000, under normal sight and without one kind of cones.
+#: Least difference of any two `COLOURS` in CIEDE2000, under normal sight and without one kind of cones.
 LEAST_DIFFERENCE = 10.0
 
 COLOURS: Mapping[str, str] = {

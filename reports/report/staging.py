@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 _PREFIX = ".airlight-report-"
-_STALE = 86400.0  # seconds after which what a killed run left belongs to nobody
+_STALE = 86400.0  # seconds after which the remains of a killed run are removed
 
 
 @contextmanager

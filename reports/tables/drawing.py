@@ -43,7 +43,7 @@ class _Style:
     between: str = ".."  #: the ends of an interval
     percent: str = " %"
     shares: bool = False  #: in per cent
-    zeros: bool = False  #: at the end of numbers are kept: they say how exact a number is
+    zeros: bool = False  #: whether zeros at the end of numbers are kept: they say how exact a number is
 
 
 def text(table: Table, *, width: int | None = None, styled: bool = False) -> str:
@@ -217,7 +217,7 @@ def _with_spreads(columns: Iterable[Column]) -> list[Column]:
 def _open_rows(table: Table, style: _Style) -> Iterator[list[str]]:
     for row in table.rows:
         if row.reason and all(row.values.get(column.key) is None for column in table.columns[1:]):
-            continue  # nothing but a name: the line below the table says it
+            continue  # the row has nothing but a name: a line below the table gives the reason
         cells = []
         for column in table.columns:
             value = row.values.get(column.key)

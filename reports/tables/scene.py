@@ -8,7 +8,7 @@ from typing import Any
 from reports.tables.drawing import text
 from reports.tables.table import Column, Table, table
 
-_LISTED = 12  # surfaces that are shown one by one; the others are in the JSON
+_LISTED = 12  # surfaces that have a row; the others are in the JSON
 _WIDTH = 120
 
 Cells = tuple[str, str, str]  # what it is, which part of it, and its value
