@@ -24,7 +24,7 @@ class ImageComparison(Comparison, Pictured):
 
     @property
     def passed(self) -> bool:
-        """Whether nothing is wrong with the test image; `failures` says what is."""
+        """Whether the test image has no fault; `failures` names the faults."""
         return not self.failures
 
     @cached_property

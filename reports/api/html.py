@@ -30,7 +30,7 @@ def bullets(items: Sequence[str]) -> str:
 
 
 def table(rows: Sequence[Sequence[str]]) -> str:
-    """Return a table of names and what there is to say of each."""
+    """Return a table of names and their values."""
     columns = (Column("name", "", words=True), Column("value", "", words=True))
     return html(make_table("", columns, rows))
 

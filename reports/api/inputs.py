@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the functions of the Python API take: scenes, images, progress; and the one exception that they raise."""
+"""Arguments of the Python API (scenes, images, progress), and the one exception that its functions raise."""
 
 import functools
 import os
@@ -44,7 +44,7 @@ class OpenScene(LoadedScene):
         return int(width), int(height)
 
     def plan(self) -> dict[str, str]:
-        """Return what the scene needs of a method, in words; raises InputError where no method can render it."""
+        """Return the features that the scene needs, in words; raises InputError if no method can render it."""
         return dict(_described(self)[0])
 
     def _repr_html_(self) -> str:
@@ -63,7 +63,7 @@ class OpenScene(LoadedScene):
 
 
 def one_error(function: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Let a function raise `airlight.InputError` also for what the side under test refuses with its own."""
+    """Let a function raise `airlight.InputError` in place of the InputError of `realtime`."""
 
     @functools.wraps(function)
     def wrapped(*arguments: _P.args, **named: _P.kwargs) -> _R:
@@ -81,7 +81,7 @@ def opened(scene: SceneLike, size: Size | None = None) -> OpenScene:
     Raises
     ------
     InputError
-        For what is no scene, and for another size than that of a scene that is loaded already.
+        If `scene` is not a scene, or is already loaded at another size.
     """
     from reports.machine.environment import activate
 

@@ -92,7 +92,7 @@ def report(
 
 
 def _scenes_and_images(scenes: Any, images: Any, effort: str) -> tuple[list[str], dict[str, Any]]:
-    """Return the scenes to study, those of the images where only these are given; refuse what cannot be used."""
+    """Return the scenes to study, by default those of the images; refuse unusable input."""
     from realtime.scene.read_scene import read_scene
     from validation.comparison.engine_images import find_images
     from validation.frames.scene_study import EFFORTS

@@ -42,7 +42,7 @@ def read_only(values: Any) -> Array:
 
 
 class Pictured(ABC):
-    """What a notebook shows as the PNG file of its picture."""
+    """A result that a notebook shows as a PNG picture."""
 
     @abstractmethod
     def picture(self) -> NDArray[np.uint8]:
@@ -60,7 +60,7 @@ class Pictured(ABC):
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class LayeredImage(Pictured):
-    """What renderings and references share: layers of radiance and the depth, see the module."""
+    """Layers of radiance and the depth, shared by renderings and references; see the module."""
 
     scene: str  #: name of the scene
     image: Image  #: the layers as they are written to a file, with what made them
@@ -144,13 +144,13 @@ class LayeredImage(Pictured):
         return target
 
     def facts(self) -> dict[str, str]:
-        """Return what there is to say of the image, in words, by name."""
+        """Return facts on the image, in words, by name."""
         width, height = self.size
         return {"scene": self.scene, "size": f"{width} x {height}"} | _levels(self)
 
     @property
     def title(self) -> str:
-        """What to call the image."""
+        """Title of the image."""
         return self.scene
 
     def _repr_html_(self) -> str:
@@ -182,7 +182,7 @@ class Rendering(LayeredImage):
     times: FrameTimes | None = None  #: what a frame costs, if that was measured
 
     def facts(self) -> dict[str, str]:
-        """Return what there is to say of the frame, in words, by name."""
+        """Return facts on the frame, in words, by name."""
         facts = super().facts() | {"method": self.label, "precision": self.precision}
         if self.times is not None:
             frame = self.times.frame
@@ -195,7 +195,7 @@ class Rendering(LayeredImage):
 
     @property
     def title(self) -> str:
-        """What to call the frame."""
+        """Title of the frame."""
         return f"{self.scene} by {self.label}"
 
 
@@ -225,7 +225,7 @@ class Reference(LayeredImage):
         return self.image.layers.get("surface_se")
 
     def facts(self) -> dict[str, str]:
-        """Return what there is to say of the truth, in words, by name."""
+        """Return facts on the truth, in words, by name."""
         kind = "mean bound of the airlight's error" if self.bound is not None else "standard error of the image"
         error = {kind: f"{number(100 * self.relative_error)} %"} if math.isfinite(self.relative_error) else {}
         words = {name.replace("_", " "): str(value) for name, value in self.details.items() if value is not None}
@@ -233,7 +233,7 @@ class Reference(LayeredImage):
 
     @property
     def title(self) -> str:
-        """What to call the truth."""
+        """Title of the truth."""
         return f"{self.scene}, the truth by {self.estimator}"
 
 
@@ -247,7 +247,7 @@ def as_array(values: Array, dtype: DTypeLike | None, copy: bool | None) -> Array
 
 
 def _levels(image: LayeredImage) -> dict[str, str]:
-    """Say how bright the layers are, and what is odd in them."""
+    """Return the mean of each layer, and how many of its pixels are not finite or negative."""
     levels = {}
     for name, values in (("airlight", image.airlight), ("surface", image.surface)):
         finite = np.isfinite(values)

@@ -88,8 +88,8 @@ class BenchTable:
     `frame_low_ms` and `frame_high_ms`, `airlight_ms`, `surface_ms`, `light_moved_ms`, `objects_moved_ms`
     (after these moved), `light_moved_camera_kept_ms` (after the light moved, camera rays kept), `colours_changed_ms`
     (after only medium or colours changed) [ms]; of the airlight `relative_rmse`, `relative_bias`, `p50`, `p99`, `max`,
-    `nonfinite` and `negative`; `refused`, why the method cannot render the scene, and `note`. What there is
-    none of is None.
+    `nonfinite` and `negative`; `refused`, why the method cannot render the scene, and `note`. Missing values
+    are None.
     """
 
     rows: tuple[Mapping[str, Any], ...]
@@ -186,7 +186,7 @@ class Report:
 
 
 def _address(page: Path) -> str:
-    """Return the address of a page for a notebook in the current folder, which shows no files outside of it."""
+    """Return the address of a page, relative inside the current folder: a notebook shows only files below it."""
     try:
         return page.resolve().relative_to(Path(os.getcwd()).resolve()).as_posix()
     except ValueError:

@@ -24,9 +24,9 @@ def baselines(
 ) -> None:
     """Compare the errors of every configuration with the baselines in the repository; small images of every scene.
 
-    Errors may move by rounding, both ways; a frame may take three times as many frames of `unshadowed` as before. What
-    has no baseline, and a baseline without its configuration, fails too. Exit status 1 if anything moved. With --update
-    what moved is written, with a new revision, which CHANGELOG.md must name.
+    Errors may move by rounding in either direction; a frame may take up to three times as long, relative to a frame of
+    `unshadowed`. A configuration without a baseline fails too, and so does a baseline without its configuration. Exit
+    status 1 if anything moved. --update writes what moved with a new revision, which CHANGELOG.md must name.
     """
     from analytic.errors import InputError, nearest
     from reports.machine.environment import activate

@@ -30,8 +30,8 @@ def bench(
     """Time every method in every scene, or every kernel on many rays, and compare it with the truth.
 
     `airlight` is the airlight alone (the kernel with its ray set-up), `frame` a frame with static geometry and light,
-    `light moved` a frame after it moved. Exit status 1 if single-scatter does not confirm the truth within +-0.05 %,
-    or volpath within +- the margin.
+    `light moved` a frame after the light moved. Exit status 1 if single-scatter does not confirm the truth within
+    +-0.05 %, or volpath within +- the margin.
     """
     if not 0 < margin < 1:
         from analytic.errors import InputError

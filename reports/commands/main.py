@@ -170,6 +170,6 @@ def _usage(error) -> int:
 
 
 def _drop_output(status: int) -> int:
-    """Let nothing more be written on the output, so that what cannot be written is not tried again at exit."""
+    """Redirect the output to nowhere, so that Python does not try again at exit what cannot be written."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return status

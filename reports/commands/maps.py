@@ -29,8 +29,8 @@ def maps(
 ) -> None:
     """Measure how the error of a method falls with the size of its shadow map, against the ray-traced truth.
 
-    With the slope of the relative RMSE, fitted to the logarithms. --flicker: a light that circles slowly, and the
-    change of the image from frame to frame less that of the truth.
+    Also prints the slope of the relative RMSE, fitted to the logarithms. With --flicker the light circles slowly, and
+    the change of the image from frame to frame is measured, less that of the truth.
     """
     from analytic.errors import InputError
     from realtime.scene.read_scene import read_scene
@@ -97,7 +97,7 @@ def parse_map_sizes(option: str, words: str) -> list[int]:
     Raises
     ------
     InputError
-        If one is none.
+        If one of them is not a size of a map.
     """
     from analytic.errors import InputError
     from realtime.shadow_maps.shadow_map import check_size

@@ -25,7 +25,7 @@ def mutations(
 ) -> None:
     """Put faults of the physics into copies of the estimators and count how many the standard run catches.
 
-    Exit status 1 if fewer than nine in ten are caught, or if the unchanged copy does not agree either.
+    Exit status 1 if fewer than nine in ten are caught, or if the unchanged copy does not agree.
     """
     from reports.machine.environment import activate, describe_environment
     from reports.machine.progress import progress_bar

@@ -32,7 +32,7 @@ class Pixel(StrEnum):
 
 
 class Target(StrEnum):
-    """The standard error that `--target-error` is about."""
+    """The standard error that `--target-error` limits."""
 
     pooled = "pooled"
     worst = "worst"
@@ -63,7 +63,7 @@ def reference(
 ) -> None:
     """Compute the ground truth of a scene and write it as layered EXR, with its error.
 
-    Finished batches are kept: a Monte Carlo run that was interrupted, or that asks for more, goes on from them.
+    Finished batches are kept: a Monte Carlo run continues from them, after an interruption or with more samples.
 
     Exit status 1 if the target error was not reached.
     """
@@ -100,7 +100,7 @@ def reference(
 
 
 def _check_options(estimator: Estimator, budgets: dict[str, Any], pixel: Pixel) -> None:
-    """Refuse what the estimator has no use for."""
+    """Refuse options that the estimator does not use."""
     from analytic.errors import InputError
 
     given = [name for name, value in budgets.items() if value is not None]
@@ -128,7 +128,7 @@ def _sample(
 
 
 def _sampling(sampled: "MonteCarloReference") -> dict[str, Any]:
-    """Return what a run says of itself, by name."""
+    """Return how a run was sampled, by name."""
     attributes = {name.removeprefix("airlight:"): value for name, value in sampled.image.attributes.items()}
     return {
         **{name: attributes[name] for name in ("spp", "batch_spp", "batches", "seeds")},

@@ -36,8 +36,8 @@ def render(
 ) -> None:
     """Render a frame, or an animation, with a real-time method and print what it costs.
 
-    An animation is one turn: lights circle, objects turn, the medium's density swings, colours go round. Only what
-    moves is made anew. Ctrl-C keeps the frames that are finished.
+    An animation is one turn: lights circle, objects turn, the medium's density swings, colours go round. Each frame
+    recomputes only what depends on the motion. Ctrl-C keeps the finished frames.
     """
     from realtime.scene.read_scene import read_scene
     from reports.machine.environment import activate
@@ -62,7 +62,7 @@ def render(
 
 
 def _check_outputs(outputs: dict[str, Path | None], frames: int | None, animate: str | None) -> None:
-    """Refuse what could not be written, before any work."""
+    """Refuse outputs that cannot be written, before any work."""
     from analytic.errors import InputError
     from reference.storage.files import ensure_writable
     from reports.interchange.frames import check_ending, numbered
@@ -99,7 +99,7 @@ def _print_plan(scene, chosen, *, json: bool) -> None:
 
 
 def _warn(warnings) -> None:
-    """Print what is odd about the casters on the error stream, once a command."""
+    """Print warnings about the casters on the error stream, once a command."""
     for warning in warnings:
         print(f"airlight: warning: {warning}", file=sys.stderr)
 

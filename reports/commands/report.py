@@ -40,7 +40,7 @@ def report(
 ) -> None:
     """Measure every method in every scene and write the report: one HTML page, report.json, EXR and PNG files.
 
-    What was measured before on this machine, with the same code and scenes, is taken from the cache. Exit status 1 if
+    Results that this machine measured before, with the same code and scenes, come from the cache. Exit status 1 if
     single-scatter or volpath does not confirm the truth within the margin.
     """
     from analytic.errors import InputError
@@ -100,7 +100,7 @@ def _measured(
     images: Path | None,
     fresh: bool,
 ) -> dict[str, Any]:
-    """Measure and write a report; what cannot be used is refused before the work begins."""
+    """Measure and write a report; unusable input is refused before the work begins."""
     from analytic.errors import InputError
     from realtime.scene.read_scene import read_scene
     from reference.storage.files import ensure_folder

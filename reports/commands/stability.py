@@ -15,9 +15,8 @@ def stability(
 ) -> None:
     """Try every kernel on certified values, on rays of every magnitude and against exact laws, and sums of many planes.
 
-    Errors come with the ray where they are largest, ready for `airlight integrate`. Exit status 1 if a kernel that
-    claims to be exact breaks its bar, or shadow planes theirs; the latter are left out where --kernels leaves out
-    'exact'.
+    Prints the ray of each largest error in the format of `airlight integrate`. Exit status 1 if a kernel that claims to
+    be exact, or shadow planes, exceed the error that they claim; --kernels without 'exact' leaves the planes out.
     """
     from reports.machine.environment import activate, describe_environment
     from reports.machine.progress import progress_bar

@@ -21,8 +21,8 @@ def run_tests(
 ) -> None:
     """Run the fast tests of the source checkout, or all; other arguments go to pytest, paths are relative to it.
 
-    With --all a summary is printed, and the date, the machine and the counts go to docs/verification.md. With --all and
-    arguments for pytest, tests of all tiers run and nothing is written. Exit status 1 if anything failed.
+    --all also prints a summary and writes the date, the machine and the counts into docs/verification.md. With --all
+    and arguments for pytest, tests of all tiers run and nothing is written. Exit status 1 if anything failed.
     """
     import os
     import sys

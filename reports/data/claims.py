@@ -3,13 +3,13 @@
 
 A claim is {"kind", "text", "good"}: `good` is true or false for what is a verdict, null for what is a fact. The kinds:
 
-    truth          whether an estimator confirms the truth, with its margin and the least bias that it would have found
+    truth          whether an estimator confirms the truth, with its margin and the least bias that it would detect
     fastest        which method is fastest within a target error
     left-out       the light that single scattering leaves out
-    image          what the images of an engine are off by
+    image          the errors of an engine's images
     failed         values that are not finite or negative, lit intervals on which shadow rays disagree
-    refused        what a method cannot do, by its own words
-    not-measured   what was left out for the time it takes, HDR-FLIP that could not be had
+    refused        which method refuses which scene
+    not-measured   what was left out for its time, HDR-FLIP that could not be computed
 """
 
 import re
@@ -43,7 +43,7 @@ def claims(scenes: Scenes) -> list[Claim]:
 
 
 def unstudied(names: Sequence[str], known: Sequence[str]) -> list[Claim]:
-    """Return which built-in scenes were left out by the effort; nothing where the user named the scenes."""
+    """Return a claim on the built-in scenes that the effort leaves out, if any."""
     left = [name for name in known if name not in names]
     if not left:
         return []
@@ -184,7 +184,7 @@ def _listed(kind: str, words: str, entries: Sequence[tuple[str, Mapping[str, Any
 
 
 def _without_flip(scenes: Scenes) -> list[Claim]:
-    """Return why there is no HDR-FLIP where it was wanted; once for each reason."""
+    """Return a claim for each reason why HDR-FLIP is missing."""
     everything = _methods(scenes) + _methods(scenes, images=True)
     reasons: dict[str, list[str]] = {}
     for name, m in everything:

@@ -8,7 +8,7 @@ _ERRORS = ("relative_rmse", "relative_bias", "p50", "p99", "max", "nonfinite", "
 
 
 def compare_methods(old: Report, new: Report, *, tolerance: float, gone: str) -> tuple[list[Finding], int]:
-    """Compare the methods of a scene; also return how many numbers were compared."""
+    """Return the findings on the methods of a scene, and how many numbers were compared."""
     name = old["name"]
     before, after = ({entry["label"]: entry for entry in scene["methods"]} for scene in (old, new))
     findings = [Finding(gone, name, label, "gone") for label in before if label not in after]

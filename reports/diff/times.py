@@ -12,7 +12,7 @@ _MACHINE = ("processor", "threads", "variant", "device")
 
 @dataclass(frozen=True)
 class TimeComparison:
-    """What two reports say of the speed."""
+    """The times of two reports compared."""
 
     compared: int  #: configurations
     same_machine: bool
@@ -61,7 +61,7 @@ Key = tuple[str, str]  # scene and label
 
 
 def _pairs(old: Report, new: Report) -> tuple[dict[Key, tuple[Times, Times]], list[Finding]]:
-    """Return the times of what both reports timed alike, and what they timed otherwise."""
+    """Return the pairs of comparable times, and a note on each time without a partner."""
     before, after = _timed(old), _timed(new)
     pairs: dict[Key, tuple[Times, Times]] = {}
     notes: dict[Finding, None] = {}
@@ -95,7 +95,7 @@ def _all_times(report: Report) -> list[Times]:
 
 
 def _drift(common: float, least: float, machine: bool, count: int) -> list[Finding]:
-    """Judge what all frames share."""
+    """Return a finding if all frames got slower or faster together."""
     if not machine or count == 0 or 1 / least < common < least:
         return []
     words = "every frame, in the median: the machine, or what all methods share (time ratio)"

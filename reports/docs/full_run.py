@@ -29,7 +29,7 @@ BELOW_THE_MARGIN = ("one-in-ten-thousand",)
 
 @dataclass(frozen=True)
 class Counts:
-    """What a part found."""
+    """Counts of a part of the run."""
 
     passed: int = 0
     failed: int = 0
@@ -108,7 +108,7 @@ def count_baselines(content: bytes) -> Counts:
 
 
 def run_part(part: Part, root: Path) -> Outcome:
-    """Run one part; a command that ends without the file that it should have written has failed."""
+    """Run one part; it has failed if its command does not write its file."""
     start = time.monotonic()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "result"

@@ -94,7 +94,7 @@ def _claims_in(expression: ast.expr, module: str, test: str, tier: str) -> Itera
 
 
 def _tier(expressions: Sequence[ast.expr]) -> str:
-    """Return the tiers of a test from its marks; those of single parameters leave it in the first tier too."""
+    """Return the tiers of a test from its marks; if only some parameters are marked, the first tier as well."""
     tiers = []
     for expression in expressions:
         text = ast.unparse(expression)
@@ -190,7 +190,7 @@ def duration(seconds: float) -> str:
 
 
 def current_page(root: Path = ROOT) -> str:
-    """Return what `docs/verification.md` should hold."""
+    """Return the up-to-date content of `docs/verification.md`."""
     path = root / RECORD
     record = json.loads(path.read_text(encoding="utf-8")) if path.exists() else None
     return page((root / _PAGE).read_text(encoding="utf-8"), read_claims(root).values(), read_marks(root), record)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The figure of the polynomials: the airlight kernel over the angle at the light, and what Biri's polynomials make of
-it.
+"""The figure of the polynomials: the airlight kernel over the angle at the light, and Biri's
+polynomials for it.
 
 `compute` writes the data, `plot` only reads them. For each phase function of Biri 2006 and some a = sigma_t height:
 

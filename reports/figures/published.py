@@ -78,7 +78,7 @@ def _draw(folder: Path, column: str):
 
 
 def _scale(row: dict[str, str]) -> str:
-    """Say of what size the images are, where it is not the published one."""
+    """Return the size of the images in words, if it is not the published one."""
     scale = int(row["width"]) / int(row["published_width"])
     return "" if scale == 1 else f", here at {100 * scale:.3g} % of its size"
 

@@ -133,7 +133,7 @@ def _exposure(reference) -> float:
 def _worst_squares(images, side: int) -> tuple[tuple[int, int], ...]:
     """Return the corners (column, row) of two squares that do not overlap, with the largest errors of all methods.
 
-    Errors are relative to the largest of their method, so that each has its say.
+    Errors are divided by the largest of their method, so that every method counts.
     """
     import numpy as np
 

@@ -18,7 +18,7 @@ STAGES = (
 
 
 def check_ending(option: str, path: Path, ending: str, *, instead: str = "") -> None:
-    """Refuse a file whose name says that it is something else than what will be written.
+    """Refuse a file name that ends like another kind of file.
 
     Raises
     ------

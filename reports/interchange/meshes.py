@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The shapes of a Mitsuba scene as triangle meshes, for engines that know no other.
+"""The shapes of a Mitsuba scene as triangle meshes, for engines that support nothing else.
 
 Meshes, rectangles and Mitsuba's cubes stay what they are. Round shapes are cut into `SIDES` around: no point of the
 mesh is further inside the shape than 1 - cos(pi / SIDES) = 3e-4 of the radius, twice that for spheres.

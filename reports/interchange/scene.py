@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a scene is, in the numbers that another renderer wants to be told."""
+"""A scene in numbers, as another renderer needs them."""
 
 from typing import Any
 
@@ -34,7 +34,7 @@ CONVENTION = (
 
 
 def describe_scene(loaded: LoadedScene) -> dict[str, Any]:
-    """Return all that a renderer must be told to render a scene, as plain data.
+    """Return everything that a renderer needs to render a scene, as plain data.
 
     Parameters
     ----------

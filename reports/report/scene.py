@@ -134,7 +134,7 @@ class _Parts:
         entries = [self._entries.method(each, self._made_from | _own_source(each)) for each in chosen]
         methods = []
         workers = threads()
-        # HDR-FLIP is computed for as many configurations at once as there are processors; Ctrl-C loses no earlier results.
+        # HDR-FLIP of as many configurations at once as there are processors; Ctrl-C loses no earlier results.
         for first in range(0, len(chosen), workers):
             group = range(first, min(first + workers, len(chosen)))
             results = {number: load_result(entries[number]) for number in group}
