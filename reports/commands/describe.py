@@ -15,7 +15,7 @@ def describe(
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Say all that another renderer must be told to render a scene, so that its image can be judged.
+    """Print everything that another renderer needs to render a scene, so that its image can be judged.
 
     Camera, media, lights, surfaces, what the pixels hold and what file to write. The glTF file has the same camera,
     lights and meshes; media are in its extras.

@@ -53,7 +53,7 @@ def compute(
     scene
         Of the estimators: a built-in scene or the path of a Mitsuba XML file.
     progress
-        Told the share done and what comes next.
+        Called with the share done and what comes next.
     """
     from validation.kernels.convergence import convergence, declared
 

@@ -33,7 +33,7 @@ def compute(folder: Path | str, *, quick: bool = False, progress: Callable[[floa
     quick
         Fewer rays.
     progress
-        Told the share done and what comes next.
+        Called with the share done and what comes next.
     """
     import numpy as np
 

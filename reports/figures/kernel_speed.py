@@ -36,7 +36,7 @@ def compute(
     names
         Kernels; all of them by default.
     progress
-        Told the share done and what comes next.
+        Called with the share done and what comes next.
     """
     from validation.kernels.benchmark import PHASES, RAYS, bench_kernels
 

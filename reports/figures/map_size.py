@@ -49,7 +49,7 @@ def compute(
     sizes
         Of the shadow map [texels].
     progress
-        Told the share done and what comes next.
+        Called with the share done and what comes next.
     """
     from validation.frames.map_size import map_errors
     from validation.scenes.loading import load_scene

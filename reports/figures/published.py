@@ -41,7 +41,7 @@ def compute(
     quick
         Measure at a quarter of the published size, Billeter's Table 1 for its smallest map.
     progress
-        Told the share done and what comes next.
+        Called with the share done and what comes next.
     """
     target = ensure_folder(folder)
     papers, origin = reported_papers(report)

@@ -36,7 +36,7 @@ def measured_papers(quick: bool, progress: Callable[[float, str], None] | None) 
     quick
         A quarter of the published width and height, and one size of the map in Billeter's Table 1.
     progress
-        Told the share done and what comes next.
+        Called with the share done and what comes next.
     """
     from validation.papers.billeter_images import figure_rows
     from validation.papers.billeter_tessellation import MAPS, table_rows

@@ -44,7 +44,7 @@ def compute(
     scene
         A built-in scene or the path of a Mitsuba XML file.
     progress
-        Told the share done and what comes next.
+        Called with the share done and what comes next.
     """
     import numpy as np
     from scipy.stats import norm, t

@@ -53,7 +53,7 @@ def write_frames(
     outputs
         The paths that were asked for, as 'exr' and 'png'; frames get their number before the suffix.
     progress
-        Told the share done and what was written last.
+        Called with the share done and what was written last.
 
     Raises
     ------

@@ -159,7 +159,7 @@ def _bounds(bounds: Any) -> dict[str, Any]:
     from reference.scene.convex_bounds import Sphere
 
     if isinstance(bounds, Sphere):
-        return {"kind": "ball", "centre": _numbers(bounds.centre), "radius": _number(bounds.radius)}
+        return {"kind": "sphere", "centre": _numbers(bounds.centre), "radius": _number(bounds.radius)}
     return {"kind": "convex mesh", "facets": len(bounds.offset)}
 
 

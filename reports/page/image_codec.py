@@ -20,7 +20,7 @@ reference in the denominator and against the exact one in the difference, so tha
 A plane of codes is then predicted (from nothing, from the left, from the gradient left + up - left-up), the second and
 third channel also from the first; what remains, zigzag coded (0, -1, 1, -2, ...), goes byte by byte, low bytes first,
 into zlib. All arithmetic is modulo 2^bits, so decoding is exact. `templates/codec.js` is the decoder of the page,
-`decode_planes` its twin.
+`decode_planes` does the same.
 """
 
 import zlib
@@ -141,7 +141,9 @@ def pack_planes(codes: Codes, bits: int) -> Packed:
 
 
 def decode_planes(packed: Packed, size: tuple[int, int], bits: int) -> Codes:
-    """Return the codes, (height, width, planes); those of 16 bits with their sign. The twin of the page's decoder.
+    """Return the codes, (height, width, planes); those of 16 bits with their sign.
+
+    `templates/codec.js` does the same on the page.
 
     Parameters
     ----------

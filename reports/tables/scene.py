@@ -36,10 +36,10 @@ def description_table(described: dict[str, Any]) -> Table:
 def _rows(described: dict[str, Any]) -> Iterator[Cells]:
     yield "units", "", f"metres, 1/m, W/sr, W/(m^2 sr); right-handed axes, {described['up']} up"
     yield from _camera(described["camera"])
-    around = "around all bodies" if described["bounded_media"] else "everywhere"
+    around = "around the bounded media" if described["bounded_media"] else "everywhere"
     yield from _medium(around, described["medium"])
-    for body in described["bounded_media"]:
-        yield from _medium(f"in {body['name']}", body)
+    for bounded in described["bounded_media"]:
+        yield from _medium(f"in {bounded['name']}", bounded)
     for light in described["lights"]:
         yield from _light(light)
     yield from _surfaces(described["surfaces"])
@@ -65,8 +65,10 @@ def _medium(name: str, medium: dict[str, Any] | None) -> Iterator[Cells]:
     yield "medium", "", name
     if "bounds" in medium:
         bounds = medium["bounds"]
-        ball = f"a ball about {_vector(bounds['centre'])}, radius {bounds['radius']:.7g}" if "radius" in bounds else ""
-        yield "", "bounds", ball or f"a convex mesh of {bounds['facets']} facets; --gltf writes it"
+        if "radius" in bounds:
+            yield "", "bounds", f"a sphere about {_vector(bounds['centre'])}, radius {bounds['radius']:.7g}"
+        else:
+            yield "", "bounds", f"a convex mesh of {bounds['facets']} facets; --gltf writes it"
     yield "", "extinction", f"sigma_t {_colour(medium['sigma_t'])} 1/m"
     yield "", "albedo", _colour(medium["albedo"])
     yield "", "scattering", f"sigma_s = albedo sigma_t = {_colour(medium['sigma_s'])} 1/m"

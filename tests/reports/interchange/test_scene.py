@@ -64,12 +64,12 @@ def test_bodies_of_media_are_listed_with_their_bounds(variant):
     assert description["medium"] is None
     assert [medium["name"] for medium in description["bounded_media"]] == ["haze", "box"]
     haze, box = description["bounded_media"]
-    assert haze["bounds"] == {"kind": "ball", "centre": [2.0, 0.3, 1.1], "radius": 0.3}
+    assert haze["bounds"] == {"kind": "sphere", "centre": [2.0, 0.3, 1.1], "radius": 0.3}
     assert haze["sigma_t"] == [0.5, 0.25, 1.0]
     assert box["bounds"]["kind"] == "convex mesh"
     text = description_text(description)
-    assert "around all bodies: none, clear air" in text
-    assert "a ball about (2, 0.3, 1.1), radius 0.3" in text
+    assert "around the bounded media: none, clear air" in text
+    assert "a sphere about (2, 0.3, 1.1), radius 0.3" in text
 
 
 def test_lights_have_what_their_kind_needs(variant):
