@@ -29,6 +29,7 @@ PARTS = {
     "left-out": measured.left_out,
     "scenes": measured.scenes,
     "claims": measured.claims,
+    "fastest": measured.fastest,
     "provenance": measured.provenance,
 }
 _MARK = re.compile(r"^<!-- generated: ([a-z-]+)((?: [\w-]+)*) -->$", flags=re.MULTILINE)

@@ -10,7 +10,7 @@ from typing import Any
 from reports.tables.checks import left_out_table
 from reports.tables.drawing import markdown
 from reports.tables.kernels import cost_table, order_table
-from reports.tables.methods import COLUMNS, method_row
+from reports.tables.methods import COLUMNS, fastest_table, method_row
 from reports.tables.table import Column, Name, Row, Table, number
 
 DATA = Path(__file__).resolve().parents[1] / "data"
@@ -43,6 +43,11 @@ def provenance() -> str:
 def claims() -> str:
     """Return the sentences at the top of the report."""
     return "\n".join(f"> - {claim}" for claim in data()["claims"])
+
+
+def fastest() -> str:
+    """Return which method is the fastest within an error, scene by scene."""
+    return markdown(replace(fastest_table(data()["scenes"], code=True), title=""))
 
 
 def method(name: str) -> str:

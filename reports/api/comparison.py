@@ -82,7 +82,7 @@ class ImageComparison(Comparison, Pictured):
         if self.statistics is not None:
             low, high = self.statistics.relative_bias_ci
             rows.append(("95 % interval of the bias", f"{_percent(low)} to {_percent(high)}"))
-            rows.append(("bias that would have been found", _percent(self.statistics.detectable_bias)))
+            rows.append(("bias that would have been detected", _percent(self.statistics.detectable_bias)))
         if self.flip is not None:
             rows.append(("HDR-FLIP", f"none: {self.flip.note}" if self.flip.value is None else number(self.flip.value)))
         return rows

@@ -176,10 +176,13 @@ class Report:
 
     def _repr_html_(self) -> str:
         from reports.api.html import block, bullets, link
+        from reports.tables.drawing import html
+        from reports.tables.methods import fastest_table
 
         scenes = ", ".join(scene["name"] for scene in self.data["scenes"])
         title = f"Report on {scenes}, {self.data['created']}"
-        return block(title, bullets(self.claims), f"<p>{link(_address(self.page), str(self.page))}</p>")
+        fastest = html(fastest_table(self.data["scenes"]))
+        return block(title, bullets(self.claims), fastest, f"<p>{link(_address(self.page), str(self.page))}</p>")
 
     def __repr__(self) -> str:
         return f"Report({str(self.folder)!r}, {len(self.data['scenes'])} scenes)"

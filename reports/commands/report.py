@@ -46,7 +46,8 @@ def report(
     from analytic.errors import InputError
     from reports.data.claims import confirmed
     from reports.tables.drawing import sentence_in_text
-    from reports.tables.terminal import print_json
+    from reports.tables.methods import fastest_table
+    from reports.tables.terminal import print_json, print_table
 
     if redraw is not None:
         given = {
@@ -74,6 +75,8 @@ def report(
         print_json(data)
     else:
         print("\n".join(f"- {sentence_in_text(claim['text'])}" for claim in data["claims"]))
+        if data["scenes"]:
+            print_table(fastest_table(data["scenes"]))
         count = len(data["scenes"])
         print(f"{target / 'report.html'}: {count} scene{'' if count == 1 else 's'}, {done}")
     if not confirmed(data["scenes"]):

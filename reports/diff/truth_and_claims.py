@@ -3,10 +3,10 @@
 
 from collections.abc import Iterator, Mapping
 
-from reports.data.claims import TARGETS, confirmed
+from reports.data.claims import confirmed
 from reports.diff.finding import Finding, Report
 from reports.tables.agreement import verdict
-from reports.tables.methods import fastest_within
+from reports.tables.methods import TARGETS, fastest_within
 
 
 def compare_truth(old: Report, new: Report, gone: str) -> Iterator[Finding]:

@@ -11,7 +11,6 @@ from reports.tables.table import number as plain_number
 #: Kinds of claims as the page names them.
 KINDS = {
     "truth": "Truth",
-    "fastest": "Fastest",
     "left-out": "Left out",
     "image": "Engine",
     "failed": "Failed",

@@ -11,7 +11,7 @@ from reports.papers.biri import biri_notes, biri_tables
 from reports.tables.agreement import agreement_table
 from reports.tables.checks import left_out_table, mutation_table
 from reports.tables.drawing import html
-from reports.tables.methods import method_row, methods_table
+from reports.tables.methods import fastest_table, method_row, methods_table
 from reports.tables.stability import summary_table
 from reports.tables.table import Column, Row, Table, table
 
@@ -91,6 +91,7 @@ def _drawn(function: Callable[..., Table | Iterable[Table]]) -> Callable[..., An
 
 #: What the templates call, by name.
 TABLES: dict[str, Callable[..., Any]] = {
+    "fastest_table": _drawn(fastest_table),
     "methods_table": _drawn(methods),
     "agreement_table": _drawn(agreement),
     "stability_table": _drawn(summary_table),

@@ -230,13 +230,14 @@ def test_the_fastest_row_is_finite_and_within_the_error():
 
 
 def test_a_report_shows_its_claims_and_leads_to_the_page(tmp_path, monkeypatch):
-    scenes = [{"name": "fog", "agreement": {"x": {"statistics": {"equivalent": False}}}}]
+    scenes = [{"name": "fog", "agreement": {"x": {"statistics": {"equivalent": False}}}, "methods": []}]
     claims = [{"kind": "truth", "text": "It is <so>: `--full`.", "good": True}]
     data = {"claims": claims, "scenes": scenes, "created": "today"}
     report = Report(folder=tmp_path / "out", data=data)
     assert report.claims == ("It is <so>: `--full`.",)
     assert not report.confirmed
     assert "It is &lt;so&gt;: <code>--full</code>." in report._repr_html_()
+    assert "The fastest method within an error" in report._repr_html_()
     (link,) = tags(report._repr_html_(), "a")
     assert link["href"] == (tmp_path / "out" / "report.html").as_uri()
     monkeypatch.chdir(tmp_path)

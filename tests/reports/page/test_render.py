@@ -9,6 +9,7 @@ from reports.page.chart import speed_error_chart
 from reports.page.filters import DASH, kept_words, number, percent, words
 from reports.page.render import SCRIPTS, render_page
 from reports.plotting.pictures import png_bytes
+from reports.tables.methods import fastest_table
 from tests.helpers.page import (
     DATA,
     Page,
@@ -54,6 +55,8 @@ def test_page_shows_the_numbers_of_the_data(page):
         assert shown in text, shown
     for claim in DATA["claims"]:
         assert claim["text"] in text
+    for row in fastest_table(DATA["scenes"]).rows:
+        assert all(cell in text for cell in row.values.values())
     assert "Answers to: Billeter 2010." in text
     assert "airlight report --quick" in text
     assert "mitsuba 3.9.1" in text
@@ -92,7 +95,7 @@ def test_images_are_data_and_every_canvas_has_words(page):
 
 def test_tables_have_headers_and_captions(page):
     # Probe, methods, agreement, multiple scattering, environment, times of parts, settings, keys.
-    assert len(page.tables) == 8
+    assert len(page.tables) == 9
     for table in page.tables:
         assert any(tag == "caption" for tag, _ in table)
         headers = [attributes for tag, attributes in table if tag == "th"]
@@ -175,7 +178,7 @@ def test_missing_values_are_dashes(data, folder):
 def test_scene_without_agreement_and_published_figure(data, folder):
     data["scenes"][0] |= {"agreement": {}, "published": ""}
     page = render(data, folder)
-    assert len(page.tables) == 7
+    assert len(page.tables) == 8
     assert "Answers to" not in page.text
 
 
