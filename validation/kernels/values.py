@@ -117,7 +117,8 @@ def aligned_array(scalar: Any, numbers: NDArray[Any]) -> Any:
     A Dr.Jit array of NumPy's memory uses it as it stands, and a kernel is compiled for the alignment of each of its
     arrays: where NumPy puts them by chance, the same kernel is compiled again and again.
     """
-    dtype = np.dtype(np.float32 if dr.type_v(scalar) == dr.VarType.Float32 else np.float64)
+    floats: dict[Any, np.dtype[Any]] = {dr.VarType.Float32: np.dtype("f4"), dr.VarType.Float64: np.dtype("f8")}
+    dtype = floats.get(dr.type_v(scalar), numbers.dtype)  # truth values and whole numbers come in their own type
     memory = np.empty(numbers.size * dtype.itemsize + _ALIGNMENT, dtype=np.uint8)
     begin = -memory.ctypes.data % _ALIGNMENT
     aligned = memory[begin : begin + numbers.size * dtype.itemsize].view(dtype)

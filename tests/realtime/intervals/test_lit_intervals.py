@@ -7,6 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from validation.kernels.values import aligned_array
+
 RAYS, STEPS = 24, 7
 GAINS = arrays(np.int64, (RAYS, STEPS), elements=st.integers(-2, 2))
 WAITS = arrays(np.bool_, (RAYS, STEPS))
@@ -41,8 +43,8 @@ def start(layers, places):
 
     from realtime.intervals.lit_intervals import no_intervals
 
-    columns = [mi.Float(column.astype(np.float64)) for column in places.T]
-    return mi.Float(layers.astype(np.float64)), columns, no_intervals(dr.zeros(mi.Vector3f, RAYS), columns[0])
+    columns = [aligned_array(mi.Float, column) for column in places.T]
+    return aligned_array(mi.Float, layers), columns, no_intervals(dr.zeros(mi.Vector3f, RAYS), columns[0])
 
 
 def check(total, layers, places, gains):
@@ -64,9 +66,9 @@ def test_intervals_that_wait_as_long_as_they_may(variant, layers, places, gains,
     over, columns, intervals = start(layers, places)
     opened = columns[0]
     for step in range(STEPS):
-        behind = over + mi.Float(gains[:, step].astype(np.float64))
+        behind = over + aligned_array(mi.Float, gains[:, step])
         opens, closes = (over > 0) & (behind <= 0), (over <= 0) & (behind > 0)
-        intervals = add_waiting(intervals, integral, closes | mi.Bool(due[:, step]))
+        intervals = add_waiting(intervals, integral, closes | aligned_array(mi.Bool, due[:, step]))
         intervals = close_interval(intervals, columns[step + 1], closes, begin=opened)
         over, opened = behind, dr.select(opens, columns[step + 1], opened)
     ends = {"opened": opened, "lit": over <= 0, "active": mi.Bool(True)}
@@ -84,7 +86,7 @@ def test_intervals_that_are_added_at_once(variant, layers, places, gains):
 
     over, columns, intervals = start(layers, places)
     for step in range(STEPS):
-        behind = over + mi.Float(gains[:, step].astype(np.float64))
+        behind = over + aligned_array(mi.Float, gains[:, step])
         intervals = open_interval(intervals, columns[step + 1], (over > 0) & (behind <= 0))
         intervals = close_interval(intervals, columns[step + 1], (over <= 0) & (behind > 0))
         intervals, over = add_waiting(intervals, integral), behind
@@ -106,8 +108,9 @@ def test_nothing_is_integrated_where_nothing_waits(variant, lit, active):
         return (b - a) / dr.select(b > a, 1, 0)
 
     zero, unit = dr.zeros(mi.Float, RAYS), dr.full(mi.Float, 1, RAYS)
-    intervals = close_interval(no_intervals(zero, zero), unit, mi.Bool(lit))
-    np.testing.assert_array_equal(np.array(add_waiting(intervals, integral, mi.Bool(active)).total), lit & active)
-    ends = {"opened": +zero, "lit": mi.Bool(lit), "active": mi.Bool(active)}
+    in_light, traced = aligned_array(mi.Bool, lit), aligned_array(mi.Bool, active)
+    intervals = close_interval(no_intervals(zero, zero), unit, in_light)
+    np.testing.assert_array_equal(np.array(add_waiting(intervals, integral, traced).total), lit & active)
+    ends = {"opened": +zero, "lit": in_light, "active": traced}
     total = sum_at_end(no_intervals(zero, zero), integral, unit, **ends)
     np.testing.assert_array_equal(np.array(total), lit & active)

@@ -7,6 +7,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from validation.kernels.values import aligned_array
+
 RAYS, COUNT, PLACES = 16, 9, 4
 # Few values, so that many are equal; 0 and infinity stand for no crossing.
 KEYS = arrays(np.float32, (RAYS, COUNT), elements=st.sampled_from([0.0, 0.25, 1.5, 1.75, 2.0, 1e30, np.inf]))
@@ -21,7 +23,7 @@ def in_order(keys, *, larger):
 def columns(keys):
     import mitsuba as mi
 
-    return [mi.Float(np.ascontiguousarray(column)) for column in keys.T]
+    return [aligned_array(mi.Float, column) for column in keys.T]
 
 
 def rows(values):
@@ -103,7 +105,7 @@ def test_pop_takes_the_nearest_out_where_it_is_told_to(variant, keys, active):
     for number, key in enumerate(columns(keys)):
         queue, *_ = insert(queue, key, mi.Float(number), larger_is_nearer=True)
     before, gains = rows(queue.key), rows(queue.gain)
-    queue, key, gain = pop(queue, 0.0, mi.Bool(active))
+    queue, key, gain = pop(queue, 0.0, aligned_array(mi.Bool, active))
     np.testing.assert_array_equal(np.array(key), before[:, 0])
     np.testing.assert_array_equal(np.array(gain), gains[:, 0])
     behind = np.concatenate([before[:, 1:], np.zeros((RAYS, 1))], axis=1)

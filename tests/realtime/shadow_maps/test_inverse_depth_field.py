@@ -77,11 +77,9 @@ def test_faces_of_a_cube_meet_with_the_same_values(variant):
     shadow_map, _ = heights_of(16, "point")
     distance = np.array(shadow_map.distance).reshape(6, 17, 17)
     u = np.linspace(-1, 1, 17)
+    face, row, column = (index.ravel() for index in np.indices(distance.shape))
+    direction = cube_direction(mi.Vector3f, mi.UInt32(face), mi.Float(u[column]), mi.Float(u[row]))
     seen: dict[tuple[float, ...], float] = {}
-    for face in range(6):
-        for row in range(17):
-            for column in range(17):
-                direction = cube_direction(mi.Vector3f, mi.UInt32(face), mi.Float(u[column]), mi.Float(u[row]))
-                key = tuple(np.array(direction).ravel())
-                assert seen.setdefault(key, distance[face, row, column]) == distance[face, row, column]
+    for key, value in zip(map(tuple, np.array(direction).T), distance.ravel(), strict=True):
+        assert seen.setdefault(key, value) == value
     assert len(seen) == 6 * 15 * 15 + 12 * 15 + 8
