@@ -28,7 +28,7 @@ from validation.configurations.kernel_names import find_kernel, sized, split_nam
 from validation.configurations.timing import Timing, time_repeated
 from validation.kernels.errors import relative_error
 from validation.kernels.rays import wide_rays
-from validation.kernels.values import TABLE, Kernel
+from validation.kernels.values import TABLE, Kernel, aligned_array
 
 Progress = Callable[[int, int, str], None]
 
@@ -255,8 +255,9 @@ def _frozen(function: Kernel, cases: Cases, rays: int | None = None) -> Callable
     )
     medium = Medium((dr.opaque(mi.Float, float(cases.sigma_t[0])),), dr.opaque(mi.Color3f, 1), phase)
     light = Light(dr.opaque(mi.Vector3f, 0), dr.opaque(mi.Color3f, 1))
-    geometry = RayGeometry(mi.Float(cases.foot[part]), mi.Float(cases.height[part]), None, None)
-    x0, x1 = mi.Float(cases.x0[part]), mi.Float(cases.x1[part])
+    columns = (cases.foot, cases.height, cases.x0, cases.x1)
+    foot, height, x0, x1 = (aligned_array(mi.Float, column[part]) for column in columns)
+    geometry = RayGeometry(foot, height, None, None)
     dr.eval(geometry.foot, geometry.height, x0, x1)
     tables = prepare_kernel(function, mi.Float)
     # Once outside: what a kernel refuses must not be raised while it is recorded.
