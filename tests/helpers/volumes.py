@@ -10,10 +10,6 @@ WIDTH, HEIGHT = 11, 8
 
 def make_camera(origin, target=(0.0, 0.0, 0.0), *, fov=50.0, size=(WIDTH, HEIGHT)):
     """Return a camera, in float64."""
-    import mitsuba as mi
-
-    from realtime.scene.camera import Camera
-
     origin = np.asarray(origin, dtype=float)
     forward = np.asarray(target) - origin
     forward /= np.linalg.norm(forward)
@@ -21,17 +17,24 @@ def make_camera(origin, target=(0.0, 0.0, 0.0), *, fov=50.0, size=(WIDTH, HEIGHT
     pixel = 2 * np.tan(0.5 * np.deg2rad(fov)) / size[0]
     left *= pixel / np.linalg.norm(left)
     vectors = (origin, forward, left, np.cross(forward, left), *np.zeros((3, 3)))
-    return Camera(*size, *(mi.Vector3d(*map(float, vector)) for vector in vectors))
+    return opaque_camera(size, vectors)
 
 
 def simple_camera():
     """Return a camera at the origin that looks along z and has the pixel (i, j) in the direction (5 - i, 4 - j, 1)."""
+    return opaque_camera((11, 9), ((0, 0, 0), (0, 0, 1), (1, 0, 0), (0, 1, 0), *[(0, 0, 0)] * 3))
+
+
+def opaque_camera(size, vectors):
+    """Return a camera of these vectors, in float64; all such cameras share their kernels, as the product's do."""
+    import drjit as dr
     import mitsuba as mi
 
     from realtime.scene.camera import Camera
 
-    vectors = ((0, 0, 0), (0, 0, 1), (1, 0, 0), (0, 1, 0), *[(0, 0, 0)] * 3)
-    return Camera(11, 9, *(mi.Vector3d(*map(float, vector)) for vector in vectors))
+    arrays = [mi.Vector3d(*map(float, vector)) for vector in vectors]
+    dr.make_opaque(arrays)
+    return Camera(*size, *arrays)
 
 
 def tetrahedron(points) -> VolumeMesh:

@@ -12,6 +12,8 @@ SINGLE = float(np.finfo(np.float32).eps)
 
 def camera_of(types, fov=50.0):
     """Return a camera and the unit directions of its pixels, float64, (pixels, 3)."""
+    import drjit as dr
+
     from realtime.scene.camera import Camera
     from realtime.scene.lights import with_low
 
@@ -21,7 +23,9 @@ def camera_of(types, fov=50.0):
     vectors = [FORWARD / np.linalg.norm(FORWARD), side * scale, np.cross(FORWARD, side) * scale]
     parts = [[types.vector(*(float(x) for x in part)) for part in with_low(vector, types)] for vector in vectors]
     high, low = zip(*parts)
-    camera = Camera(*SIZE, types.vector(*(float(x) for x in ORIGIN)), *high, *low)
+    origin = types.vector(*(float(x) for x in ORIGIN))
+    dr.make_opaque(origin, high, low)
+    camera = Camera(*SIZE, origin, *high, *low)
     kept = [sum(np.array(part, dtype=float).ravel() for part in pair) for pair in parts]
     row, column = np.divmod(np.arange(SIZE[0] * SIZE[1]), SIZE[0])
     aim = kept[0] + ((SIZE[0] - 1) / 2 - column)[:, None] * kept[1] + ((SIZE[1] - 1) / 2 - row)[:, None] * kept[2]
@@ -29,19 +33,24 @@ def camera_of(types, fov=50.0):
 
 
 def light_at(types, place, spot=None):
+    import drjit as dr
+
     from realtime.scene.lights import Light, spot_fields
 
     position = types.vector(*(float(x) for x in place))
+    dr.make_opaque(position)
     if spot is None:
         return Light(position, types.color(1))
     axis, cutoff, beam = spot
     axis = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
     fields = spot_fields(axis, np.deg2rad(cutoff), np.deg2rad(beam), types)
+    dr.make_opaque(fields)
     return Light(position, types.color(1), **fields)
 
 
 def geometries(place, spot=None):
     """Return the geometry in float32 by pixel and in float64 by ray, and both lights' cones."""
+    import drjit as dr
     import mitsuba as mi
 
     from realtime.methods.shadow_planes.pixel_rays import aim_at, read_spot, seen_rays
@@ -56,8 +65,9 @@ def geometries(place, spot=None):
     basis = light_basis(np.asarray(place, dtype=float), ORIGIN)
     axes, distance = basis.axes, basis.distance
     aim = aim_at(read_camera(camera), axes, read_spot(light), single)
+    dr.make_opaque(aim)
     pixel = mi.UInt32(np.arange(SIZE[0] * SIZE[1], dtype=np.uint32))
-    seen = seen_rays(aim, camera, pixel, single.scalar(distance), light)
+    seen = seen_rays(aim, camera, pixel, dr.opaque(single.scalar, distance), light)
     way = np.stack([np.array(component, dtype=float) for component in (seen.x, seen.y, seen.z)], axis=1)
     assert np.max(np.abs(way - ways @ axes.T)) < 4 * SINGLE
     truth = ray_geometry(
