@@ -14,6 +14,7 @@ Read in this order:
 - `diff.py`: `airlight diff`
 - `docs.py`: `airlight docs`
 - `doctor.py`: `airlight doctor`
+- `fidelity.py`: `airlight fidelity`
 - `figures.py`: `airlight figures`
 - `integrate.py`: `airlight integrate`
 - `lists.py`: `airlight scenes`, `methods`, `kernels`
@@ -31,6 +32,6 @@ May import: `analytic`, `realtime.frame`, `realtime.kernels`, `realtime.methods`
 `realtime.scene`, `realtime.shadow_maps`, `reference.storage`, `reports.data`, `reports.diff`, `reports.docs`,
 `reports.figures`, `reports.interchange`, `reports.machine`, `reports.papers`, `reports.plotting`, `reports.report`,
 `reports.tables`, `validation.certified`, `validation.comparison`, `validation.configurations`, `validation.estimates`,
-`validation.frames`, `validation.kernels`, `validation.metrics`, `validation.mutations`, `validation.papers`,
-`validation.scenes`.
+`validation.fidelity`, `validation.frames`, `validation.kernels`, `validation.metrics`, `validation.mutations`,
+`validation.papers`, `validation.scenes`.
 """

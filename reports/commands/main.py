@@ -25,6 +25,7 @@ from reports.commands.describe import describe
 from reports.commands.diff import diff
 from reports.commands.docs import docs
 from reports.commands.doctor import doctor
+from reports.commands.fidelity import fidelity
 from reports.commands.figures import figures
 from reports.commands.integrate import integrate
 from reports.commands.lists import kernels, methods, scenes
@@ -60,6 +61,7 @@ _COMMANDS = (
     bench,
     maps,
     published,
+    fidelity,
     stability,
     mutations,
     certify,

@@ -25,26 +25,17 @@ from reports.machine.environment import describe_environment
 from reports.machine.progress import Interrupted, Progress, part_of
 from reports.page.render import render_page
 from reports.report.expected import PAGE_SECONDS, SceneEntries, other_seconds, scene_seconds, shares
+from reports.report.fidelity import fidelity_parts, fidelity_rows
+from reports.report.kept import report_cache
 from reports.report.papers import OtherPart, other_parts, published_data
 from reports.report.scene import raise_own_error, scene_report
 from reports.report.staging import staged
 from validation.comparison.engine_images import EngineImage, images_size
 from validation.configurations.methods import STANDARD, Configuration
-from validation.frames.result_cache import CachedResult, ResultCache, cached_result, now, result_cache, sweep_results
+from validation.frames.result_cache import CachedResult, ResultCache, cached_result, now, sweep_results
 from validation.frames.scene_study import Effort, open_study
 from validation.metrics.errors import plain
 from validation.scenes.registry import SCENES
-
-#: Modules that make what is kept, besides the four sides.
-_MAKERS = (
-    "data/serialize.py",
-    "plotting/pictures.py",
-    "plotting/colour_maps.py",
-    "papers/biri.py",
-    "papers/billeter.py",
-    "report/scene.py",
-    "report/papers.py",
-)
 
 
 def write_report(
@@ -100,13 +91,11 @@ def write_report(
     sweep_results()
     results: list[CachedResult] = []
     start = time.monotonic()
-    here = Path(__file__).parent.parent
-    machine = {name: str(environment.get(name)) for name in ("processor", "threads", "variant", "llvm", "device")}
-    cache = result_cache(machine, more=[here / name for name in _MAKERS], fresh=fresh)
+    cache = report_cache(environment, fresh=fresh)
     efforts = {name: effort.at(sizes.get(Path(name).stem)) for name in scenes}
-    others = other_parts(effort, scenes, cache)
+    others = [*other_parts(effort, scenes, cache), *fidelity_parts(effort, scenes, cache)]
     steps = _steps(progress, cache, efforts, configurations, others)
-    seconds = dict.fromkeys(("scenes", "stability", "mutations", "published"), 0.0)
+    seconds = dict.fromkeys(("scenes", "stability", "mutations", "published", "fidelity"), 0.0)
     try:
         with staged(target) as hidden:
             studied = []
@@ -147,6 +136,7 @@ def write_report(
                 "stability": stability[-1].data["kernels"] if stability else [],
                 "mutations": mutations[-1].data if mutations else None,
                 "published": published_data(by_kind),
+                "fidelity": fidelity_rows(by_kind),
             }
             steps["page"](0.0, "the page")
             write_page(data, images=hidden, folder=hidden)

@@ -9,6 +9,7 @@ from reports.data.serialize import mutations_data
 from reports.machine.progress import Progress, counted, part_of
 from reports.papers.billeter import billeter_data
 from reports.papers.biri import biri_data
+from validation.fidelity.catalogue import ROWS, published_figures
 from validation.frames.result_cache import CachedResult, CacheEntry, Computed, ResultCache, cache_entry
 from validation.frames.scene_study import Effort
 from validation.metrics.errors import plain
@@ -18,7 +19,7 @@ from validation.metrics.errors import plain
 class OtherPart:
     """A part of a report that belongs to no scene."""
 
-    kind: str  #: 'stability', 'mutations', 'biri', 'zero_cost' or 'billeter'
+    kind: str  #: 'stability', 'mutations', 'biri', 'zero_cost', 'billeter' or 'fidelity'
     title: str  #: for the progress
     entry: CacheEntry
     compute: Callable[[Progress], Computed]
@@ -50,7 +51,8 @@ def published_data(results: Mapping[str, Sequence[CachedResult]]) -> dict[str, A
         zero_cost = [cost for result in results.get("zero_cost", ()) for cost in result.data["costs"]]
         rows = [row for result in biri for row in result.data["rows"]]
         tables = {"stages": biri[-1].data["stages"], "rows": rows, "zero_cost": zero_cost}
-    return {"biri": tables, "billeter": billeter[-1].data if billeter else None}
+    figures = published_figures(ROWS)
+    return {"biri": tables, "billeter": billeter[-1].data if billeter else None, "figures": figures}
 
 
 def _stability(rays: int, progress: Progress) -> Computed:

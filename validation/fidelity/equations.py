@@ -41,7 +41,8 @@ def equations() -> dict[str, Any]:
     ends = np.sort(random.uniform(0, 1, (_RAYS, 8)), axis=1) * length[:, None]
     signs = np.tile([-1.0, 1.0], 4)
     gamma = np.stack([airlight_segments(foot, height, 0.0, end, sigma, _HAZY)[0] for end in ends.T], axis=1)
-    lit = sum(airlight_segments(foot, height, *ends[:, (k, k + 1)].T, sigma, _HAZY)[0] for k in range(0, 8, 2))
+    pairs = [(ends[:, k], ends[:, k + 1]) for k in range(0, 8, 2)]
+    lit = np.sum([airlight_segments(foot, height, x0, x1, sigma, _HAZY)[0] for x0, x1 in pairs], axis=0)
     terms = gamma * signs
     shuffled = np.stack([terms[:, random.permutation(8)].sum(axis=1) for _ in range(20)])
     scaled, _ = airlight_segments(foot / height, 1.0, 0.0, length / height, sigma * height, _HAZY)
@@ -100,11 +101,16 @@ def _integrated(rays: list[Any]) -> float:
     worst = 0.0
     for foot, height, length, sigma in rays:
         ends = np.arctan((0 - foot) / height), np.arctan((length - foot) / height)
-        polynomial = np.polynomial.Polynomial(taylor_coefficients(sigma * height, _HAZY, 4))
-        closed = sum(c * (ends[1] ** (n + 1) - ends[0] ** (n + 1)) / (n + 1) for n, c in enumerate(polynomial.coef))
-        scale = quad(lambda theta: abs(polynomial(theta)), *ends, limit=200)[0]
-        worst = max(worst, abs(closed - quad(polynomial, *ends, epsabs=0, epsrel=1e-12, limit=200)[0]) / scale)
+        polynomial = taylor_coefficients(sigma * height, _HAZY, 4)
+        closed = sum(c * (ends[1] ** (n + 1) - ends[0] ** (n + 1)) / (n + 1) for n, c in enumerate(polynomial))
+        # The same polynomial integrated term by term has other rounding, relative to the sum of the terms' sizes.
+        scale = abs(sum(abs(c) * (abs(ends[1]) ** (n + 1) + abs(ends[0]) ** (n + 1)) for n, c in enumerate(polynomial)))
+        worst = max(worst, abs(closed - quad(_polynomial, *ends, (polynomial,), epsabs=0, epsrel=1e-12)[0]) / scale)
     return float(worst)
+
+
+def _polynomial(theta: float, coefficients: Any) -> float:
+    return float(np.polynomial.polynomial.polyval(theta, coefficients))
 
 
 def _overlap(rays: list[Any]) -> float:
@@ -117,7 +123,9 @@ def _overlap(rays: list[Any]) -> float:
             _gamma(foot, height, sigma, x) for x in (b, d)
         )
         true = (
-            _gamma(foot, height, sigma, a) + _gamma(foot, height, sigma, length) - _gamma(foot, height, sigma, max(b, d))
+            _gamma(foot, height, sigma, a)
+            + _gamma(foot, height, sigma, length)
+            - _gamma(foot, height, sigma, max(b, d))
         )
         lost.append((true - signed) / true)
     return float(np.mean(lost))

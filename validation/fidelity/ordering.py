@@ -11,8 +11,6 @@ faces away subtracts Gamma(b) where it is 0. In section 5, stage 5, planes that 
 stencil; in 5.1.5 they decrement it. Any increasing function serves as Gamma; x does.
 """
 
-from typing import Any
-
 import numpy as np
 
 _PAIRS, _RAYS = 20_000, 4000

@@ -52,26 +52,23 @@ def shortcuts() -> dict[str, Any]:
     Returns
     -------
     dict
-        `pixel`, `vertex` (Gamma at the vertices, in `two-pens`), `coarse`, `fine` (with 4 and with 64 rows of a plane's
-        mesh), `bright`, `dim` (the 8-bit buffer whose white is a quarter of, and 4 times, the brightest airlight of 99
-        % of the pixels), `taylor` and `exact` (in `hall`).
+        `pixel`, `vertex` (Gamma at the vertices, in `two-pens`); in `clutter` with an 8-bit buffer `bright` (white is a
+        quarter of the brightest airlight of 99 % of the pixels; `bias` over those whose truth is below white) and `dim`
+        (white is 4 times as much; `relative_rmse` to the truth cut off at white); `taylor` and `exact` (in `hall`).
     """
-    brightest = float(np.percentile(_truth("two-pens").airlight.max(axis=2), 99))
-    planes = {
-        "pixel": {},
-        "vertex": {"evaluation": "vertex"},
-        "coarse": {"evaluation": "vertex", "rows": 4},
-        "fine": {"evaluation": "vertex", "rows": 64},
-        "bright": {"buffer": "8bit", "white": brightest / 4},
-        "dim": {"buffer": "8bit", "white": 4 * brightest},
-    }
+    planes: dict[str, dict[str, Any]] = {"pixel": {}, "vertex": {"evaluation": "vertex"}}
     found = {name: _error("two-pens", "shadow-planes", "exact", values) for name, values in planes.items()}
-    # The clamped image is compared where neither it nor the truth is cut off: there a full buffer shows no error.
-    image = _rendered("two-pens", "shadow-planes", "exact", planes["bright"])
-    true = _truth("two-pens").airlight
-    below = true < brightest / 4
-    found["bright"] |= {"below_white": float((image[below] - true[below]).mean() / true[below].mean())}
-    return found | {kernel: _error("hall", "shadow-planes", kernel, {}) for kernel in ("taylor", "exact")}
+    found |= {kernel: _error("hall", "shadow-planes", kernel, {}) for kernel in ("taylor", "exact")}
+    true = _truth("clutter").airlight
+    brightest = float(np.percentile(true.max(axis=2), 99))
+    for name, white in (("bright", brightest / 4), ("dim", 4 * brightest)):
+        image = _rendered("clutter", "shadow-planes", "exact", {"buffer": "8bit", "white": white})
+        below = true < white
+        found[name] = {
+            "bias": float((image - true)[below].sum() / true[below].sum()),
+            "relative_rmse": error_metrics(np.minimum(true, white), image).relative_rmse,
+        }
+    return found
 
 
 def levels() -> dict[str, Any]:
@@ -143,8 +140,21 @@ def _walk(size: int) -> dict[str, Any]:
     return {"evaluation": "walk", "walls": "slanted", "map": size}
 
 
+def slices() -> dict[str, Any]:
+    """Return the errors of epipolar slices in `colonnade`.
+
+    Returns
+    -------
+    dict
+        `pixel` (a walk for every pixel), `samples` (interpolated), and `volume` (a light volume of the same map).
+    """
+    how = {"pixel": {"sampling": "pixels"}, "samples": {}}
+    found = {name: _error("colonnade", "min-max", "exact", {**values, "map": 512}) for name, values in how.items()}
+    return found | {"volume": _error("colonnade", "light-volumes", "exact", _walk(512))}
+
+
 def two_lights() -> dict[str, Any]:
-    """Return the errors of light volumes in a hall with two lamps, each with a map of 1024 texels, by its evaluation."""
+    """Return the errors of light volumes in a hall with two lamps, each with a map of 1024 texels."""
     scene = two_lamps()
     read, true = read_scene(scene), truth_image(scene).airlight
     found = {}

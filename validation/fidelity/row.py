@@ -17,6 +17,7 @@ from typing import Any
 Evidence = Mapping[str, Any]  # what an experiment gave, as JSON holds it
 
 REPRODUCED, REFUTED, DIFFERS, IMPOSSIBLE = "reproduced", "refuted", "differs", "impossible"
+_ROUNDING = 1e-6  # tolerances up to this are for rounding, and no rule names them [1]
 VERDICTS = (REPRODUCED, REFUTED, DIFFERS, IMPOSSIBLE)
 
 
@@ -53,47 +54,52 @@ class Equal:
 
     @property
     def words(self) -> str:
-        """The rule."""
-        return f"equal within {100 * self.tolerance:g} %" if self.tolerance else "equal"
+        """The rule, with a place for the published figure."""
+        return "{:.4g}" + (f" within {100 * self.tolerance:g} %" if self.tolerance > _ROUNDING else "")
 
 
 @dataclass(frozen=True)
 class AtMost:
-    """The figure must not exceed the bound, which is `factor` times the published one."""
+    """The figure must not exceed the published one."""
 
     reason: str
     otherwise: str = REFUTED
-    factor: float = 1.0
 
     def holds(self, published: float, measured: float) -> bool:
         """Return whether the figure keeps to the bound."""
-        return measured <= self.factor * published
+        return measured <= published
 
     @property
     def words(self) -> str:
-        """The rule."""
-        return "at most" if self.factor == 1 else f"at most {self.factor:g} times as much"
+        """The rule, with a place for the published figure."""
+        return "at most {:.4g}"
 
 
 @dataclass(frozen=True)
 class AtLeast:
-    """The figure must reach the bound, which is `factor` times the published one."""
+    """The figure must reach the published one."""
 
     reason: str
     otherwise: str = REFUTED
-    factor: float = 1.0
 
     def holds(self, published: float, measured: float) -> bool:
         """Return whether the figure reaches the bound."""
-        return measured >= self.factor * published
+        return measured >= published
 
     @property
     def words(self) -> str:
-        """The rule."""
-        return "at least" if self.factor == 1 else f"at least {self.factor:g} times as much"
+        """The rule, with a place for the published figure."""
+        return "at least {:.4g}"
 
 
 Rule = Equal | AtMost | AtLeast
+
+
+@dataclass(frozen=True)
+class Bound:
+    """A number that we read out of words: what the paper prints is no figure."""
+
+    value: float
 
 
 @dataclass(frozen=True)
@@ -103,7 +109,7 @@ class Row:
     paper: str  #: of `validation.fidelity.catalogue.PAPERS`
     item: str  #: where it stands: an equation, a figure, a table, a section
     claim: str  #: the paper's words, short
-    published: float | None  #: the paper's figure, or the number that its words mean; None if it has none
+    published: float | Bound | None  #: the paper's figure, or the number that its words were taken to mean
     unit: str  #: of both figures; empty for a plain number
     experiment: str  #: that measures it
     figure: Callable[[Evidence], Figure]  #: takes the measured figure from what the experiment gave
@@ -128,18 +134,20 @@ def judge(row: Row, evidence: Evidence) -> dict[str, Any]:
     """
     figure = row.figure(evidence)
     measured, verdict, why = None, IMPOSSIBLE, ""
+    goal = row.published.value if isinstance(row.published, Bound) else row.published
     if isinstance(figure, NotMeasured):
         why = figure.reason
     else:
-        assert row.rule is not None and row.published is not None, row.item
+        assert row.rule is not None, row.item
+        assert goal is not None, row.item
         measured = figure.value if isinstance(figure, Spread) else float(figure)
-        verdict, why = _verdict(row.rule, row.published, figure)
+        verdict, why = _verdict(row.rule, goal, figure)
     return {
         "paper": row.paper,
         "item": row.item,
         "claim": row.claim,
         "verdict": verdict,
-        "published": row.published,
+        "published": None if isinstance(row.published, Bound) else row.published,
         "measured": measured,
         "unit": row.unit,
         "command": row.command or f"airlight fidelity --paper {row.paper}",
@@ -154,4 +162,6 @@ def _verdict(rule: Rule, published: float, figure: float | Spread) -> tuple[str,
     if len(verdicts) == 2:
         low, high = ends[0], ends[-1]
         return IMPOSSIBLE, f"cannot be told apart: the measured figure lies between {low:.3g} and {high:.3g}"
-    return (REPRODUCED if verdicts == {True} else rule.otherwise), f"{rule.words}: {rule.reason}"
+    return (
+        REPRODUCED if verdicts == {True} else rule.otherwise
+    ), f"wanted {rule.words.format(published)}: {rule.reason}"

@@ -74,8 +74,8 @@ def left_over(first: Array, second: Array, model: Array) -> float:
     model
         The image to judge.
     """
-    squares = np.mean((first - model) * (second - model)) / np.mean(first * second)
-    return float(np.sqrt(max(0.0, squares)))
+    squares = float(np.mean((first - model) * (second - model)) / np.mean(first * second))
+    return max(0.0, squares) ** 0.5
 
 
 def _multiple(scene: Any, seed: int) -> tuple[Array, Array]:
@@ -101,7 +101,7 @@ def _fog(scene: Any) -> Array:
 
 
 def thin_media() -> dict[str, float]:
-    """Return the share of the airlight that scatters more than once in `open-fog`, as it is and a hundred times thinner."""
+    """Return the share of the airlight that scatters more than once in `open-fog`, usual and 100 times thinner."""
     shares = {}
     for name, extinction in (("usual", None), ("thin", _THIN)):
         described = open_fog()

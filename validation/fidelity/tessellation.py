@@ -46,11 +46,23 @@ def tessellation() -> dict[str, Any]:
     Returns
     -------
     dict
-        `triangles_1024`, `triangles_4096` (static, one face); `configurations` (that occur), `most_triangles` (of a
-        quad), `level_steps` (largest difference of levels between neighbours), `open_edges` (of triangles that have not
-        exactly one neighbour there); `adaptive_triangles`, `static_triangles`; `flat`, `jump` (median side of the quads
-        without and with a jump of the map) [texels]; `filters`: `triangles`, `error` (relative RMSE of the airlight to that of
-        the static mesh), `rms_departure` and `largest_departure` (of the depth [1]) of `ours` and `plain`; `biased`: relative RMSE to the clamped sum, by bias.
+        `triangles_1024`, `triangles_4096`
+            of a static mesh of one face
+        `configurations`, `most_triangles`
+            that occur, and of a quad
+        `level_steps`
+            largest difference of levels between neighbours
+        `open_edges`
+            of triangles that have not exactly one neighbour there
+        `adaptive_triangles`, `static_triangles`
+            of six faces
+        `flat`, `jump`
+            median side of the quads without and with a jump of the map [texels]
+        `filters`
+            `ours`, `plain`: `triangles`, `error` (relative RMSE of the airlight to that of the static mesh),
+            `rms_departure` and `largest_departure` (of the depth [1])
+        `biased`
+            relative RMSE to the clamped sum, by bias
     """
     scene = read_scene(load_scene("colonnade", SIZE).scene)
     light = scene.lights[0]
@@ -88,7 +100,11 @@ def _grid(divided: list[Any], heights: Array) -> dict[str, Any]:
         face, rest = np.divmod(numbers, 4**number)
         row, column = np.divmod(rest, 2**number)
         along = np.arange(step)
-        place = face[:, None, None], (row * step)[:, None, None] + along[:, None], (column * step)[:, None, None] + along
+        place = (
+            face[:, None, None],
+            (row * step)[:, None, None] + along[:, None],
+            (column * step)[:, None, None] + along,
+        )
         level[place] = number
     jump = _jumps(heights)
     side = size / 2.0**level
@@ -148,7 +164,9 @@ def biased() -> list[dict[str, float]]:
     chosen = {"evaluation": "mesh", "map": _BIAS_MAP}
     renderer = methods.prepared(scene, methods.configuration("light-volumes", "exact", chosen))
     cast, by_light = run_cast_and_shade(renderer)
-    distance = image_frame(renderer, evaluated(cast, by_light, run_method(renderer, renderer.prepare(scene), cast, by_light)))
+    distance = image_frame(
+        renderer, evaluated(cast, by_light, run_method(renderer, renderer.prepare(scene), cast, by_light))
+    )
     depth = np.asarray(distance.distance, dtype=np.float64).ravel()
     foot, height = foot_and_height(truth.origin, truth.direction, truth.lights[0].position)
     sigma = float(truth.medium.sigma_t[0])

@@ -50,6 +50,7 @@ class Effort:
     rays: int = 0  #: number of generated rays for the stability of kernels; 0 leaves it out
     papers: tuple[str, ...] = ()  #: papers whose tables are measured again: 'biri', 'billeter'
     paper_kernels: tuple[str, ...] = ("exact",)  #: kernels of these tables
+    fidelity: bool = False  #: whether to measure the claims of papers that need images
 
     def at(self, size: tuple[int, int] | None) -> "Effort":
         """Return the effort with images and timed frames of another size [pixels]; itself for None."""
@@ -94,6 +95,7 @@ EFFORTS: dict[str, Effort] = {
             flip="kinds",
             rays=10_000,
             papers=("biri",),
+            fidelity=True,
         ),
         Effort(
             "full",
@@ -114,6 +116,7 @@ EFFORTS: dict[str, Effort] = {
             rays=100_000,
             papers=("biri", "billeter"),
             paper_kernels=("exact", "taylor"),
+            fidelity=True,
         ),
     )
 }

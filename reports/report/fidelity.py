@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The experiments behind the claims of papers, each kept on disk, and the rows that they decide."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+from reports.machine.progress import Progress, part_of
+from reports.report.expected import other_seconds, shares
+from reports.report.papers import OtherPart, other_parts, published_data
+from validation.fidelity.catalogue import EXPERIMENTS, ROWS, Experiment, experiments_of, judged
+from validation.fidelity.row import Row
+from validation.frames.result_cache import CachedResult, Computed, ResultCache, cache_entry, cached_result
+from validation.frames.scene_study import EFFORTS, Effort
+from validation.scenes.registry import SCENES
+
+#: Experiments that are the tables of a paper, by its name in `published` of report.json.
+_TABLES = {"biri": "biri tables", "billeter": "billeter tables"}
+
+
+def fidelity_parts(
+    effort: Effort, scenes: Sequence[str], cache: ResultCache, *, rows: Sequence[Row] = ROWS
+) -> list[OtherPart]:
+    """Return the experiments of an effort: those with images only where all of its scenes are studied.
+
+    Parameters
+    ----------
+    effort, scenes, cache
+        Of the report.
+    rows
+        Whose experiments to return; the tables of the papers are parts of their own (`reports.report.papers`).
+    """
+    images = effort.fidelity and set(effort.scenes) <= set(scenes)
+    chosen = {name: EXPERIMENTS[name] for name in experiments_of(rows)}
+    return [_part(name, one, cache) for name, one in chosen.items() if one.compute and (images or not one.images)]
+
+
+def _part(name: str, experiment: Experiment, cache: ResultCache) -> OtherPart:
+    def compute(progress: Progress) -> Computed:
+        progress(0.0, name)
+        assert experiment.compute is not None
+        return {"experiment": name, "data": experiment.compute()}, {}
+
+    entry = cache_entry(cache, "fidelity", identity={"experiment": name})
+    return OtherPart("fidelity", "claims of papers", entry, compute)
+
+
+def fidelity_rows(results: Mapping[str, Sequence[CachedResult]], *, rows: Sequence[Row] = ROWS) -> list[dict[str, Any]]:
+    """Return the rows that the results of a run decide; those whose experiment was not made are left out.
+
+    Parameters
+    ----------
+    results
+        By kind of `OtherPart`.
+    rows
+        Which rows.
+    """
+    evidence = {result.data["experiment"]: result.data["data"] for result in results.get("fidelity", ())}
+    published = published_data(results) or {}
+    evidence |= {name: published[paper] for paper, name in _TABLES.items() if published.get(paper)}
+    return judged(rows, evidence)
+
+
+def measure_fidelity(
+    rows: Sequence[Row], cache: ResultCache, *, quick: bool = False, progress: Progress | None = None
+) -> list[dict[str, Any]]:
+    """Measure what rows need and is not kept, and return those that are decided.
+
+    Parameters
+    ----------
+    rows
+        Of `validation.fidelity.catalogue.ROWS`.
+    cache
+        Of the run.
+    quick
+        Leave out what needs images.
+    progress
+        Called with (share done, what) now and then.
+    """
+    names = experiments_of(rows)
+    papers = tuple(paper for paper, name in _TABLES.items() if name in names and not quick)
+    effort = replace(EFFORTS["default"], papers=papers, rays=0, mutations=False, fidelity=not quick)
+    tables = other_parts(effort, tuple(SCENES), cache) if papers else []
+    # What is not needed is no claim of the paper.
+    parts = [part for part in tables if part.kind != "zero_cost"]
+    parts += fidelity_parts(effort, tuple(SCENES), cache, rows=rows)
+    seconds = {str(number): other_seconds(part.entry, part.kind) for number, part in enumerate(parts)}
+    results: dict[str, list[CachedResult]] = {}
+    for part, share in zip(parts, shares(seconds).values()):
+        step = part_of(progress, *share, before=f"{part.title}, ")
+        results.setdefault(part.kind, []).append(
+            cached_result(part.entry, lambda part=part, step=step: part.compute(step))
+        )
+    return fidelity_rows(results, rows=rows)
