@@ -83,7 +83,7 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
     method
         A real-time method.
     kernel
-        An airlight kernel function; needed where `method.uses_kernel`.
+        An airlight kernel function; needed where `method.uses_kernel` says so.
     parameters
         Values of the method's parameters; the others have its defaults.
 
@@ -94,7 +94,7 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
         what the kernel of a method that is not frozen refuses comes with the first frame.
     """
     chosen = read_parameters(method.name, method.parameters, parameters)
-    if method.uses_kernel and kernel is None:
+    if method.uses_kernel(chosen) and kernel is None:
         raise InputError(f"method {method.name}: got no kernel, wanted one of realtime.kernels.registry.KERNELS")
     by_rays = method.by_rays is not None and method.by_rays(chosen)
     tolerance = chosen.tolerance if method.by_rays else 0.0
@@ -103,7 +103,7 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
     pixel = mi.UInt32(tiled_pixels(camera.width, camera.height))
     corners = tile_corners(pixel, camera, tolerance, by_rays=by_rays, lights=len(scene.lights))
     surface, shade, shade_casts_rays = surface_stages(scene, provides_visibility=provides_visibility)
-    tables = prepare_kernel(kernel, type(camera.origin.x)) if method.uses_kernel else None
+    tables = prepare_kernel(kernel, type(camera.origin.x)) if method.uses_kernel(chosen) else None
 
     def sort(pixel, camera, medium, lights, state, distance):
         assert method.cull is not None

@@ -67,7 +67,7 @@ def own_method(name: str) -> Method:
         _guarded(found, name, takes_kernel=takes_kernel, takes=parameters),
         _summary(found),
         _file(found) or "one's own",
-        uses_kernel=takes_kernel,
+        uses_kernel=always if takes_kernel else never,
         prepare=_guarded_prepare(getattr(found, "prepare", None), name),
         casts_rays=always,
         frozen=always if getattr(found, "frozen", False) else never,

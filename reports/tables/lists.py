@@ -18,7 +18,7 @@ def method_list() -> Table:
     from realtime.methods.registry import METHODS
 
     rows = [
-        (one.name, one.summary, one.uses_kernel, one.shadows, _defaults(one.defaults), one.source)
+        (one.name, one.summary, one.uses_kernel(one.parameters()), one.shadows, _defaults(one.defaults), one.source)
         for one in METHODS.values()
     ]
     return table("", words("name", "what", "kernel", "shadows", "parameters", "source", how=_LONG), rows)

@@ -36,7 +36,7 @@ def render(scene, method="unshadowed", *, precision="double", **parameters):
     from realtime.scene.read_scene import read_scene
 
     chosen = METHODS[method]
-    kernel = KERNELS["exact"].function if chosen.uses_kernel else None
+    kernel = KERNELS["exact"].function
     read = read_scene(mi.load_dict(scene), precision)
     return render_frame(frame_renderer(read, chosen, kernel=kernel, **parameters))
 
