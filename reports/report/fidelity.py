@@ -89,7 +89,5 @@ def measure_fidelity(
     results: dict[str, list[CachedResult]] = {}
     for part, share in zip(parts, shares(seconds).values()):
         step = part_of(progress, *share, before=f"{part.title}, ")
-        results.setdefault(part.kind, []).append(
-            cached_result(part.entry, lambda part=part, step=step: part.compute(step))
-        )
+        results.setdefault(part.kind, []).append(cached_result(part.entry, partial(part.compute, step)))
     return fidelity_rows(results, rows=rows)
