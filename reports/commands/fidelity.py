@@ -29,6 +29,7 @@ def fidelity(
     from reports.report.kept import report_cache
     from reports.tables.terminal import print_json
     from validation.fidelity.catalogue import PAPERS, ROWS
+    from validation.frames.result_cache import now
 
     if paper is not None and paper not in PAPERS:
         raise InputError(f"--paper: got {paper!r}, wanted one of {', '.join(PAPERS)}")
@@ -38,11 +39,14 @@ def fidelity(
     with progress_bar("fidelity") as progress:
         found = measure_fidelity(rows, report_cache(environment, fresh=fresh), quick=quick, progress=progress)
     if json:
-        print_json({"environment": environment, "fidelity": found, "left_out": len(rows) - len(found)})
+        print_json(
+            {"measured": now(), "environment": environment, "fidelity": found, "left_out": len(rows) - len(found)}
+        )
         return
     if markdown:
         print_heading()
-    print_tables(fidelity_tables(found), as_markdown=markdown)
+    shown = ("item", "claim", "verdict", "published", "measured", "unit", "why")
+    print_tables((table.only(*shown) for table in fidelity_tables(found)), as_markdown=markdown)
     print(f"\n{count_words(found)}.")
     if len(found) < len(rows):
         print(f"{len(rows) - len(found)} more rows need images: leave out --quick.")

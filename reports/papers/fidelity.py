@@ -21,6 +21,7 @@ def fidelity_tables(rows: Sequence[Data]) -> list[Table]:
         *words("verdict"),
         *numbers("published", "measured"),
         *words("unit"),
+        *words("command"),
         *words("why", how={"long": True}),
     )
     papers = dict.fromkeys(row["paper"] for row in rows)

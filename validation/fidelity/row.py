@@ -10,6 +10,7 @@ differs     it does not, and the claim depends on the machine or on the scene, w
 impossible  the figure cannot be measured here, or the spread hides it
 """
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -140,8 +141,11 @@ def judge(row: Row, evidence: Evidence) -> dict[str, Any]:
     else:
         assert row.rule is not None, row.item
         assert goal is not None, row.item
-        measured = figure.value if isinstance(figure, Spread) else float(figure)
-        verdict, why = _verdict(row.rule, goal, figure)
+        value = figure.value if isinstance(figure, Spread) else float(figure)
+        if math.isfinite(value):
+            measured, (verdict, why) = value, _verdict(row.rule, goal, figure)
+        else:
+            why = "the measured figure is not finite"
     return {
         "paper": row.paper,
         "item": row.item,
