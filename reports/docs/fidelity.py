@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The page of verdicts on the claims of papers, from a run of `airlight fidelity`.
 
-`docs/data/fidelity.json` holds what `airlight fidelity --json` printed; `docs/fidelity.md` is made from it. Tests fail
+`docs/data/fidelity.json` holds what `airlight fidelity --json` printed, or several runs of it for one paper each;
+`docs/fidelity.md` is made from it. Tests fail
 where the page is not what `python -m reports.docs.fidelity` makes it, and where the rows of the run are not those of
 `validation.fidelity.catalogue`.
 """
@@ -83,16 +84,45 @@ def current_page(root: Path = ROOT) -> str:
     return page((root / _PAGE).read_text(encoding="utf-8"), read_record(root / RECORD))
 
 
-def redraw(root: Path = ROOT, measured: Path | None = None) -> Path:
-    """Write `docs/fidelity.md` anew, from a new run if one is given, and return its path."""
+def joined(records: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return several runs as one: of each paper the rows of the last run that has it, in the order of the catalogue.
+
+    Raises
+    ------
+    InputError
+        If the runs were made on different machines.
+    """
+    from validation.fidelity.catalogue import PAPERS
+
+    machines = {
+        json.dumps([record["environment"].get(name) for name in ("processor", "threads", "variant")])
+        for record in records
+    }
+    if len(machines) > 1:
+        raise InputError("the runs were made on different machines; wanted runs of one")
+    of_paper = {
+        paper: [row for row in record["fidelity"] if row["paper"] == paper]
+        for record in records
+        for paper in _papers(record)
+    }
+    rows = [row for paper in PAPERS for row in of_paper.get(paper, ())]
+    return {**records[-1], "measured": min(record["measured"] for record in records), "fidelity": rows}
+
+
+def _papers(record: Mapping[str, Any]) -> list[str]:
+    return list(dict.fromkeys(row["paper"] for row in record["fidelity"]))
+
+
+def redraw(root: Path = ROOT, runs: Sequence[Path] = ()) -> Path:
+    """Write `docs/fidelity.md` anew, with the rows of new runs if some are given, and return its path."""
     from reference.storage.files import write_text
 
-    if measured is not None:
-        record: Sequence[Any] | dict[str, Any] = read_record(measured)
+    if runs:
+        record = joined([read_record(path) for path in runs])
         write_text(root / RECORD, json.dumps(record, indent=1, ensure_ascii=False) + "\n")
     write_text(root / _PAGE, current_page(root))
     return root / _PAGE
 
 
 if __name__ == "__main__":
-    print(redraw(measured=Path(sys.argv[1]) if len(sys.argv) > 1 else None))
+    print(redraw(runs=[Path(name) for name in sys.argv[1:]]))
