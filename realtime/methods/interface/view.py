@@ -8,8 +8,8 @@ from typing import Any
 import drjit as dr
 
 from realtime.bounded_media.airlight import LitRay, PlacedRay, check_form, lit_ray
-from realtime.bounded_media.body_views import MediaSides
 from realtime.bounded_media.ray_segments import camera_pieces
+from realtime.bounded_media.views import MediaViews
 from realtime.errors import InputError
 from realtime.kernels.bounded import ConstantLeg, bounded_form
 from realtime.numerics.array_types import Metres, PerRay
@@ -43,7 +43,7 @@ class View:
     rays: Callable[[Any], tuple[Any, Any]]  #: lanes -> the directions of their rays, and their low parts
     visible_triangle: Callable[[], tuple[Any, Any, Any]]  #: -> corners [m], barycentric weights, whether there is one
     part: Callable[[], Callable[..., "View"]]  #: -> (pixel, distance, tile, layout) -> the view of some of the rays
-    sides: MediaSides | None = None  #: bodies of media, where they are known before the rays
+    media_views: MediaViews | None = None  #: of bounded media, where they are known before the rays
     prepared: Any = ()  #: for a user's plain function: what its `prepare` made
 
 
@@ -72,12 +72,14 @@ def rays_in_media(view: View, form: str = "kernel", *, kernel: Any = None) -> tu
         For what a published form refuses.
     """
     polynomial = media_polynomial(kernel)
-    pieces = camera_pieces(view.medium, view.origin, view.direction, view.sides.camera if view.sides else None)
+    pieces = camera_pieces(
+        view.medium, view.origin, view.direction, view.media_views.camera if view.media_views else None
+    )
     place = {"origin": view.origin, "direction": view.direction, "low": view.direction_low}
-    sides = view.sides.lights if view.sides else [None] * len(view.lights)
+    light_views = view.media_views.lights if view.media_views else [None] * len(view.lights)
     return tuple(
-        _ray_in_media(view.medium, light, place, pieces=pieces, form=form, sides=one, polynomial=polynomial)
-        for light, one in zip(view.lights, sides, strict=True)
+        _ray_in_media(view.medium, light, place, pieces=pieces, form=form, views=views, polynomial=polynomial)
+        for light, views in zip(view.lights, light_views, strict=True)
     )
 
 
@@ -107,12 +109,12 @@ def _ray_in_media(
     if polynomial is not None and isinstance(ray, PlacedRay):
         # What it refuses must be raised here, not in a branch. Nothing is computed that nobody reads.
         zero = type(ray.geometry.height)(0)
-        for body in medium.bodies:
-            leg = body.medium.sigma_t[0], zero, body.mean_distance, form == "printed"
-            polynomial(ray.geometry, zero, zero, light, body.medium.phase, leg)
+        for bounded in medium.bounded_media:
+            leg = bounded.medium.sigma_t[0], zero, bounded.mean_distance, form == "printed"
+            polynomial(ray.geometry, zero, zero, light, bounded.medium.phase, leg)
     return ray
 
 
 def bounded_radiance(light: Light, scattered):
-    """Return the radiance of what `airlight` of a ray in bounded media returns [W/(m^2 sr)]."""
+    """Return the radiance of `scattered`, what `airlight` of a ray in bounded media returns [W/(m^2 sr)]."""
     return light.intensity * (scattered * (0.25 * dr.inv_pi))
