@@ -20,8 +20,8 @@ a cell, it is here at their border:
     J = sum_k V_k J(x_k, x_k+1) = sum over the runs of lit cells of J(x_i, x_j),     x_k = x(u_k),
 
 for neighbouring cells that are lit add up to one integral, by the kernel. Nothing is left of the error of the
-integrand, so on a ray without shadows the sum is that of the kernel with any N. A shadow edge is wrong by half a cell at most: the
-order is 1. The paper starts at the farthest sample; the sum is the same from either end.
+integrand, so on a ray without shadows the sum is that of the kernel with any N. A shadow edge is wrong by half a cell
+at most: the order is 1. The paper starts at the farthest sample; the sum is the same from either end.
 """
 
 from collections.abc import Callable
@@ -99,7 +99,8 @@ def ray_march(view: View, state, lists, *, kernel, parameters: RayMarchParameter
     if spacing == "uniform" and view.features.vacuum and not view.medium.clear:
         raise InputError("spacing=uniform: an endless ray through a vacuum has no step length; use spacing=equiangular")
     total = type(view.medium.albedo)(0)
-    in_media = rays_in_media(view) if view.features.bounded else ()
+    asked = kernel if parameters.sum == "transitions" else None
+    in_media = rays_in_media(view, kernel=asked) if view.features.bounded else ()
     for number, light in enumerate(view.lights):
         x0, x1 = type(view.distance)(0), view.distance
         media = in_media[number] if in_media else None
@@ -152,7 +153,7 @@ def _visibility(view: View, maps, number: int, shadow: str):
 
 
 def _within(media: LitRay, x0, x1):
-    """Return the part of a segment from the first to the last body."""
+    """Return the part of a segment from the first to the last bounded medium."""
     first, last = x1, x0
     for piece in media.pieces:
         first = dr.minimum(first, piece.begin)
@@ -240,7 +241,7 @@ def _march_parallel(view: View, media: LitRay, segment, *, steps: int, lit):
     """Sum equal steps of every ray under a directional light; see `_march`."""
     x0, x1 = segment
     Float = type(view.distance)
-    # Rays that miss all bodies march on the spot: a map has no place for points at infinity.
+    # Rays that miss all bounded media take steps of length 0: a map has no place for points at infinity.
     meets = x1 > x0
     x0, width = dr.select(meets, x0, 0), dr.select(meets, (x1 - x0) / steps, 0)
 

@@ -32,7 +32,8 @@ def published(
 ) -> None:
     """Measure the results of Biri, Arques, Michelin 2006 and of Billeter, Sintorn, Assarsson 2010 again.
 
-    biri: Tables 1 and 2 with `shadow-planes`: share of time by stage, frames a second. billeter: Figures 6 and 7 and
+    biri: Tables 1 and 2 with `shadow-planes`: share of time by stage, frames a second; with `three-media`, the error of
+    the constant R of section 4.2 by size and depth. billeter: Figures 6 and 7 and
     Table 1 with `light-volumes` and its peers: frames a second, static against adaptive tessellation, the passes, and
     which of the paper's conclusions hold here. Each at the published sizes, after the light moved, everything rebuilt
     or camera rays kept, beside the published figures, with the error of the airlight.
@@ -122,7 +123,11 @@ def _biri(
     if zero_cost:
         progress(0.99, "what is not needed")
     costs = zero_costs(size=(round(800 * scale), round(600 * scale))) if zero_cost else []
-    return biri_data(rows, costs)
+    from validation.papers.constant_distance import constant_distance_study
+
+    progress(0.99, "the constant R")
+    study = constant_distance_study() if any(one.scene == "three-media" for one in chosen) else ()
+    return biri_data(rows, costs, study)
 
 
 def _billeter(

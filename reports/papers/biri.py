@@ -14,7 +14,7 @@ from reports.tables.table import Interval, Row, Table, measured, numbers, table,
 Data = Mapping[str, Any]
 
 
-def biri_data(rows: Sequence[Any], costs: Sequence[Any]) -> dict[str, Any]:
+def biri_data(rows: Sequence[Any], costs: Sequence[Any], study: Sequence[Any] = ()) -> dict[str, Any]:
     """Return what was measured as JSON-ready data.
 
     Parameters
@@ -23,6 +23,8 @@ def biri_data(rows: Sequence[Any], costs: Sequence[Any]) -> dict[str, Any]:
         From `validation.papers.biri.biri_rows`.
     costs
         From `validation.frames.zero_cost.zero_costs`, or none.
+    study
+        From `validation.papers.constant_distance.constant_distance_study`, or none.
     """
     from validation.metrics.errors import plain
     from validation.papers.biri import STAGES
@@ -31,13 +33,15 @@ def biri_data(rows: Sequence[Any], costs: Sequence[Any]) -> dict[str, Any]:
         "stages": list(STAGES),
         "rows": [plain(row) | {"shares": [float(share) for share in row.shares]} for row in rows],
         "zero_cost": plain(costs),
+        "constant_distance": plain(study),
     }
 
 
 def biri_tables(data: Data) -> list[Table]:
     """Return the tables: shares of the stages, frames a second, and what is not needed if that was measured."""
     costs = [_cost_table(data["zero_cost"])] if data["zero_cost"] else []
-    return [_share_table(data), _rate_table(data["rows"]), *costs]
+    study = data.get("constant_distance") or []
+    return [_share_table(data), _rate_table(data["rows"]), *([_study_table(study)] if study else []), *costs]
 
 
 def biri_notes(data: Data) -> list[str]:
@@ -96,6 +100,19 @@ def _rate_table(rows: Sequence[Data]) -> Table:
         alone = per_second(measured(row.get("rays")))
         found.append({**row["error"], **beside, "name": _name(row), "triangles": row["triangles"], "rays": alone})
     return table("Table 2 of Biri 2006 again: frames a second, and the error of the airlight", columns, found)
+
+
+def _study_table(rows: Sequence[Data]) -> Table:
+    columns = (
+        *numbers(size="radius over the lamp's distance", optical_depth="optical depth", how={"digits": 2}),
+        *numbers(relative_rmse="rel. RMSE", relative_bias="rel. bias", how={"digits": 2, "share": True}),
+        *numbers(scale="best factor", how={"digits": 3}),
+        *numbers(shape="rel. RMSE left by it", how={"digits": 2, "share": True}),
+        *numbers(polynomial="rel. RMSE of the polynomial", printed="as printed", how={"digits": 2, "share": True}),
+    )
+    explanation = "A sphere of fog in clear air, lit from above; against the true depth of both legs."
+    title = "The constant R of Biri 2006, section 4.2: error by size and optical depth of the medium"
+    return table(title, columns, rows, explanation=explanation)
 
 
 def _cost_table(costs: Sequence[Data]) -> Table:

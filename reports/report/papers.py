@@ -50,7 +50,8 @@ def published_data(results: Mapping[str, Sequence[CachedResult]]) -> dict[str, A
     if biri:
         zero_cost = [cost for result in results.get("zero_cost", ()) for cost in result.data["costs"]]
         rows = [row for result in biri for row in result.data["rows"]]
-        tables = {"stages": biri[-1].data["stages"], "rows": rows, "zero_cost": zero_cost}
+        study = [row for result in biri for row in result.data["constant_distance"]]
+        tables = {"stages": biri[-1].data["stages"], "rows": rows, "zero_cost": zero_cost, "constant_distance": study}
     figures = published_figures(ROWS)
     return {"biri": tables, "billeter": billeter[-1].data if billeter else None, "figures": figures}
 
@@ -71,8 +72,13 @@ def _biri(effort: Effort, scenes: Sequence[str], cache: ResultCache) -> list[Oth
     """Return Tables 1 and 2 of Biri 2006, each entry a part."""
     from validation.frames.zero_cost import zero_costs
     from validation.papers.biri import PUBLISHED, Published, biri_rows
+    from validation.papers.constant_distance import constant_distance_study
 
     kernels, seconds = effort.paper_kernels, effort.seconds
+
+    def measured(published: Published, progress: Progress) -> dict[str, Any]:
+        study = constant_distance_study() if published.scene == "three-media" else ()
+        return biri_data(biri_rows([published], kernels, seconds=seconds, progress=progress), [], study)
 
     def part(published: Published) -> OtherPart:
         identity = {"scene": published.scene, "size": published.size, "kernels": kernels, "seconds": seconds}
@@ -80,7 +86,7 @@ def _biri(effort: Effort, scenes: Sequence[str], cache: ResultCache) -> list[Oth
             "biri",
             "Biri 2006",
             cache_entry(cache, "biri", identity=identity),
-            lambda progress: (biri_data(biri_rows([published], kernels, seconds=seconds, progress=progress), []), {}),
+            lambda progress: (measured(published, progress), {}),
         )
 
     parts = [part(published) for published in PUBLISHED if published.scene in scenes]

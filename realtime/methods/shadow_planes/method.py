@@ -29,7 +29,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from realtime.bounded_media.airlight import FORMS, LitRay, ambient_radiance, check_form
+from realtime.bounded_media.airlight import FORMS, LitRay, ambient_radiance
 from realtime.errors import InputError
 from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.light_airlight import RayAirlight, integral_type, ray_airlight
@@ -41,7 +41,7 @@ from realtime.methods.shadow_planes.published_mesh import mesh_gamma, surface_ga
 from realtime.methods.shadow_planes.spot_pyramid import cone_ring
 from realtime.methods.shadow_planes.sweep import RayPlanes, ray_planes, sum_lit_intervals
 from realtime.methods.shadow_planes.tile_lists import Lists, tile_lists
-from realtime.methods.shadow_planes.view_culling import bodies_in_view
+from realtime.methods.shadow_planes.view_culling import components_in_view
 from realtime.numerics.array_types import ArrayTypes, types_of
 from realtime.parameters import Parameters, parameter
 from realtime.scene.camera import HostCamera, read_camera
@@ -93,7 +93,10 @@ class ShadowPlaneParameters(Parameters):
         unit="W/(m^2 sr)",
     )
     media: str = parameter(
-        "exact", "bounded media: the true depth on both legs, or the constant R of section 4.2", choices=FORMS
+        "kernel",
+        "bounded media: the true depth on both legs, or the constant R of section 4.2 as it is meant or as printed; "
+        "`kernel` is `paper` with a polynomial kernel and otherwise `exact`, which asks no kernel",
+        choices=("kernel", *FORMS),
     )
     cone: int = parameter(
         0,
@@ -171,7 +174,7 @@ def plane_finder(
     seen = None if ring is not None else read_spot(light)
 
     def find() -> PlaneIndex:
-        used = bodies_in_view(casters, camera, position)
+        used = components_in_view(casters, camera, position)
         aim = partial(aim_at, camera, spot=seen, types=types)
         return index_planes(casters, position, camera.origin, used=used, types=types, ring=ring, aim=aim)
 
@@ -201,10 +204,15 @@ def shadow_planes(
     parameters
         Values of the parameters.
 
+    Raises
+    ------
+    InputError
+        For an evaluation that does not know bounded media.
+
     Notes
     -----
     Valid for all lights and casters that are triangle meshes, closed or not. Shadows are those of the
-    triangles, exact to rounding, with order=exact. Bounded media have nodes of their own, the kernel is not asked;
+    triangles, exact to rounding, with order=exact. Bounded media have nodes of their own, but for a polynomial kernel;
     they are for evaluation=pixel.
 
     References
@@ -216,9 +224,8 @@ def shadow_planes(
     lit = []
     in_media: tuple[LitRay, ...] = ()
     if view.features.bounded:
-        check_form(view.medium, parameters.media)
         _check_bounded(parameters.evaluation)
-        in_media = rays_in_media(view, parameters.media)
+        in_media = rays_in_media(view, parameters.media, kernel=kernel)
     for number, light in enumerate(view.lights):
         if parameters.cone and light.cone is not None and not light.soft and view.features.shadows:
             light = light.without_cone()  # planes bound it
