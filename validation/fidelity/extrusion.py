@@ -51,7 +51,7 @@ def extrusion() -> dict[str, Any]:
 def _closed_silhouette(casters: Casters, light: Array) -> NDArray[np.int64]:
     edges = silhouette(casters, light).edges.astype(np.int64)
     of_closed = np.zeros(len(casters.vertices), dtype=bool)
-    of_closed[casters.triangles[casters.closed[casters.body]]] = True
+    of_closed[casters.triangles[casters.closed[casters.component]]] = True
     return edges[of_closed[edges].all(axis=1)]
 
 
