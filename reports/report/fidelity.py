@@ -20,20 +20,27 @@ _TABLES = {"biri": "biri tables", "billeter": "billeter tables"}
 
 
 def fidelity_parts(
-    effort: Effort, scenes: Sequence[str], cache: ResultCache, *, rows: Sequence[Row] = ROWS
+    effort: Effort, scenes: Sequence[str], cache: ResultCache, *, rows: Sequence[Row] = ROWS, reported: bool = True
 ) -> list[OtherPart]:
-    """Return the experiments of an effort: those with images only where all of its scenes are studied.
+    """Return the experiments of an effort, nothing where only some of its scenes are studied.
 
     Parameters
     ----------
     effort, scenes, cache
         Of the report.
     rows
-        Whose experiments to return; the tables of the papers are parts of their own (`reports.report.papers`).
+        Whose experiments to return; the tables of Biri 2006 are parts of their own (`reports.report.papers`).
+    reported
+        Leave out what a report measures only as part of the papers' whole tables.
     """
-    images = effort.fidelity and set(effort.scenes) <= set(scenes)
+    if not effort.scenes or not set(effort.scenes) <= set(scenes):
+        return []
     chosen = {name: EXPERIMENTS[name] for name in experiments_of(rows)}
-    return [_part(name, one, cache) for name, one in chosen.items() if one.compute and (images or not one.images)]
+    return [
+        _part(name, one, cache)
+        for name, one in chosen.items()
+        if one.compute and (one.report or not reported) and (effort.fidelity or not one.images)
+    ]
 
 
 def _part(name: str, experiment: Experiment, cache: ResultCache) -> OtherPart:
@@ -79,12 +86,12 @@ def measure_fidelity(
         Called with (share done, what) now and then.
     """
     names = experiments_of(rows)
-    papers = tuple(paper for paper, name in _TABLES.items() if name in names and not quick)
+    papers = ("biri",) if _TABLES["biri"] in names and not quick else ()
     effort = replace(EFFORTS["default"], papers=papers, rays=0, mutations=False, fidelity=not quick)
     tables = other_parts(effort, tuple(SCENES), cache) if papers else []
     # What is not needed is no claim of the paper.
     parts = [part for part in tables if part.kind != "zero_cost"]
-    parts += fidelity_parts(effort, tuple(SCENES), cache, rows=rows)
+    parts += fidelity_parts(effort, tuple(SCENES), cache, rows=rows, reported=False)
     seconds = {str(number): other_seconds(part.entry, part.kind) for number, part in enumerate(parts)}
     results: dict[str, list[CachedResult]] = {}
     for part, share in zip(parts, shares(seconds).values()):

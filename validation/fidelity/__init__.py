@@ -19,12 +19,14 @@ Read in this order:
 - `pictures.py`: what shortcuts cost in images
 - `scattering.py`: ambient fog against multiple scattering
 - `motion.py`: what moves, and numbers of triangles
+- `billeter_tables.py`: the figures and the table that rows of Billeter need
+- `paper_images.py`: the pictures of the papers again
 - `biri.py`: the rows of Biri, Arques, Michelin 2006
 - `billeter.py`: the rows of Billeter, Sintorn, Assarsson 2010
 - `others.py`: the rows of other papers
 - `catalogue.py`: all rows and experiments, and the judged rows of a run
 
-May import: `analytic`, `realtime.frame`, `realtime.kernels`, `realtime.methods.light_volumes`,
+May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.kernels`, `realtime.methods.light_volumes`,
 `realtime.methods.shadow_planes`, `realtime.scene`, `realtime.shadow_maps`, `reference.monte_carlo`,
 `reference.quadrature`, `reference.scene`, `reference.visibility`, `validation.configurations`, `validation.estimates`,
 `validation.kernels`, `validation.metrics`, `validation.papers`, `validation.scenes`.

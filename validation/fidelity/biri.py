@@ -53,7 +53,7 @@ def table_row(evidence: Evidence, scene: str, size: Sequence[int] = (800, 600), 
     rows = [row for row in evidence["rows"] if row["published"]["scene"] == scene and list(row["size"]) == list(size)]
     rows = [row for row in rows if is_published(row) != ours]
     if ours:
-        rows = [row for row in rows if row["kernel"] == "exact" and not row["cone"] and not row["tolerance"]]
+        rows = [row for row in rows if row["kernel"] == "exact" and not row["cone"] and not row.get("tolerance")]
     return rows[0] if rows else None
 
 

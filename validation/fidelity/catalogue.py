@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from validation.fidelity import billeter, biri, others
+from validation.fidelity.billeter_tables import billeter_tables
 from validation.fidelity.equations import equations
 from validation.fidelity.extrusion import extrusion
 from validation.fidelity.motion import motions, triangles
@@ -34,12 +35,13 @@ ROWS: tuple[Row, ...] = (*biri.ROWS, *billeter.ROWS, *others.ROWS)
 class Experiment:
     """What measures the figures of some rows."""
 
-    compute: Callable[[], dict[str, Any]] | None  #: None for the papers' tables, which `validation.papers` measures
+    compute: Callable[[], dict[str, Any]] | None  #: None for tables that every report with images measures anyway
     seconds: float  #: that it takes on two threads, about
-    images: bool = True  #: whether it renders anything: what does not is part of every report
+    images: bool = True  #: whether it renders anything: what does not is part of a quick report too
+    report: bool = True  #: whether reports measure it by itself; what does not is that of `published`, if it is there
 
 
-#: By name. The tables of the papers, and what needs no measurement, have no function here.
+#: By name.
 EXPERIMENTS: Mapping[str, Experiment] = {
     "nothing": Experiment(dict, 0.0, images=False),
     "equations": Experiment(equations, 0.4, images=False),
@@ -60,7 +62,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {
     "motions": Experiment(motions, 15.0),
     "triangles": Experiment(triangles, 15.0),
     "biri tables": Experiment(None, 60.0),
-    "billeter tables": Experiment(None, 300.0),
+    "billeter tables": Experiment(billeter_tables, 150.0, report=False),
 }
 
 

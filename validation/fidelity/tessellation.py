@@ -91,23 +91,10 @@ def _static_triangles(size: int) -> int:
 
 def _grid(divided: list[Any], heights: Array) -> dict[str, Any]:
     """Return what holds of the quads of an adaptive mesh."""
-    size = 2 ** len(divided)
-    level = np.zeros((len(heights), size, size), dtype=int)
-    used: set[int] = set()
-    for number, numbers, sides in quads(divided):
-        used |= set(np.unique(sides).tolist())
-        step = size >> number
-        face, rest = np.divmod(numbers, 4**number)
-        row, column = np.divmod(rest, 2**number)
-        along = np.arange(step)
-        place = (
-            face[:, None, None],
-            (row * step)[:, None, None] + along[:, None],
-            (column * step)[:, None, None] + along,
-        )
-        level[place] = number
+    used = {int(one) for _, _, sides in quads(divided) for one in np.unique(sides)}
+    level = quad_levels(divided)
     jump = _jumps(heights)
-    side = size / 2.0**level
+    side = 2 ** len(divided) / 2.0**level
     steps = [np.abs(np.diff(level, axis=axis)).max() for axis in (1, 2)]
     return {
         "configurations": len(used),
@@ -116,6 +103,25 @@ def _grid(divided: list[Any], heights: Array) -> dict[str, Any]:
         "flat": float(np.median(side[~jump])),
         "jump": float(np.median(side[jump])),
     }
+
+
+def quad_levels(divided: list[Any]) -> NDArray[np.int64]:
+    """Return the level of the quad in which each texel lies, (faces, size, size); 0 is a whole face.
+
+    Parameters
+    ----------
+    divided
+        From `realtime.methods.light_volumes.published.tessellation.divide`.
+    """
+    size = 2 ** len(divided)
+    level = np.zeros((len(divided[0]), size, size), dtype=np.int64)
+    for number, numbers, _ in quads(divided):
+        step = size >> number
+        face, rest = np.divmod(numbers, 4**number)
+        row, column = np.divmod(rest, 2**number)
+        down = (row * step)[:, None, None] + np.arange(step)[:, None]
+        level[face[:, None, None], down, (column * step)[:, None, None] + np.arange(step)] = number
+    return level
 
 
 def _jumps(heights: Array) -> NDArray[np.bool_]:

@@ -155,7 +155,7 @@ def table_rows(
                 if progress is not None:
                     progress(len(rows) / total, f"Table 1, {table.scene}, map {texels}, {evaluation}")
                 empty = TableRow(table, texels, evaluation, size, light_faces(scene.lights[0]))
-                row = _expected_missing(empty, last.get(evaluation), limit)
+                row = expected_missing(empty, last.get(evaluation), limit)
                 if row is None:
                     row = _measured(empty, scene, frames, kernel=kernel, seconds=seconds, limit=limit)
                 rows.append(row)
@@ -181,7 +181,7 @@ def table_scene(name: str, size: tuple[int, int]) -> Any:
     return scene
 
 
-def _expected_missing(empty: TableRow, last: TableRow | None, limit: float) -> TableRow | None:
+def expected_missing(empty: TableRow, last: TableRow | None, limit: float) -> TableRow | None:
     """Return a row without measurements and the reason, if the row of the last map predicts a time beyond the limit."""
     if last is None:
         return None
@@ -202,7 +202,7 @@ def _measured(
     try:
         renderer = prepared(scene, configuration("light-volumes", kernel, values))
         frame = frames[empty.evaluation] = frame_within(renderer, limit)
-        passes, triangles = _passes(renderer, empty, seconds)
+        passes, triangles = view_passes(renderer, empty, seconds)
         rates = time_rates(renderer, seconds)
     except (InputError, RealtimeError, MemoryError, TimeoutError) as reason:
         return replace(empty, missing=str(reason) or "out of memory")
@@ -216,7 +216,7 @@ def _measured(
     )
 
 
-def _passes(renderer: FrameRenderer, row: TableRow, seconds: float) -> tuple[dict[str, float], int]:
+def view_passes(renderer: FrameRenderer, row: TableRow, seconds: float) -> tuple[dict[str, float], int]:
     """Return the times of the passes [ms], and the number of triangles of all light volumes."""
     scene = renderer.scene
     ready = renderer.prepare(scene)

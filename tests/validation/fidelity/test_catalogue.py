@@ -7,6 +7,7 @@ from collections import Counter
 import pytest
 
 from validation.fidelity import billeter, biri
+from validation.fidelity import billeter_tables as billeter_tables_module
 from validation.fidelity.catalogue import EXPERIMENTS, PAPERS, ROWS, experiments_of, judged, published_figures
 from validation.fidelity.row import Bound, judge
 from validation.papers.billeter_tessellation import TABLE
@@ -203,3 +204,20 @@ def test_the_constant_distance_is_judged_by_its_study():
     assert measured["4.2, constant R"] == 0.3
     assert measured["4.2, bounded media"] == 1.0
     assert measured["4.2, coefficients"] == pytest.approx(2.0)
+
+
+def test_the_tables_of_billeter_are_measured_as_far_as_rows_ask_for_them(variant, monkeypatch):
+    monkeypatch.setattr(billeter_tables_module, "MAPS", (16, 32))
+    evidence = billeter_tables_module.billeter_tables(size=(16, 12))
+    rows = {row.item: judge(row, evidence) for row in ROWS if row.experiment == "billeter tables"}
+    measured = [item for item, row in rows.items() if row["measured"] is not None]
+    assert [
+        item for item in rows if item.startswith(("Fig.", "abstract", "6, map", "6, peers")) and item not in measured
+    ] == []
+    assert [(row["scene"], row["map"], row["evaluation"]) for row in evidence["table"]] == [
+        (scene, texels, evaluation)
+        for scene in ("colonnade", "tangle")
+        for texels in (16, 32)
+        for evaluation in ("static", "adaptive")
+    ]
+    assert all(row["light_moved"]["median_ms"] > 0 for row in evidence["table"])
