@@ -106,12 +106,18 @@ class TableRow:
     rays: Timing  #: the camera rays alone
     error: Metrics  #: of the airlight at pixel centres, at `error_size`
     error_size: tuple[int, int]
+    told_apart: bool = True  #: whether stages 3 and 5 differ by more than the spread of their timings
 
     @property
-    def shares(self) -> tuple[float, ...]:
-        """Share of each stage in the sum of all stages, for a frame after the light moved [%]."""
+    def shares(self) -> tuple[float | None, ...]:
+        """Share of each stage in the sum of all stages, for a frame after the light moved [%].
+
+        One kernel does stages 3 and 5. Stage 3 is timed as an unshadowed frame, stage 5 is what is left: where the
+        spread of both timings hides that, neither has a share.
+        """
         total = sum(self.stages_ms)
-        return tuple(100 * stage / total for stage in self.stages_ms)
+        shares = tuple(100 * stage / total for stage in self.stages_ms)
+        return shares if self.told_apart else (*shares[:2], None, shares[3], None)
 
 
 def biri_row(
@@ -176,6 +182,7 @@ def biri_row(
         rays,
         error,
         error_size,
+        told_apart=told_apart(stages[2], stages[5]),
     )
 
 
@@ -221,6 +228,11 @@ def biri_rows(
 def _whole_tiles(length: float) -> int:
     """Return the side of an image of at least three whole tiles, so that tiles can be interpolated [pixels]."""
     return SIDE * max(3, round(length / SIDE))
+
+
+def told_apart(unshadowed: Timing, airlight: Timing) -> bool:
+    """Return whether the airlight of a frame takes longer than without shadows, by more than the quartiles of both."""
+    return airlight.low_ms > unshadowed.high_ms
 
 
 def _shared(measured: Sequence[float]) -> tuple[float, ...]:
