@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 
 SCENES = ("open-fog", "two-pens", "colonnade")
 SIZE = (32, 24)  #: of the images [pixels]
-_BATCHES, _SAMPLES, _DEPTH = 8, 16, 64
+_BATCHES, _SAMPLES, _DEPTH = 8, 8, 64
 _THIN = 0.00173  # extinction of `open-fog` a hundred times as thin [1/m]: optical depth 0.009 to the lamp
 
 

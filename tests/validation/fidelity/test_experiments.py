@@ -24,7 +24,7 @@ def test_an_error_of_a_thousandth_is_seen(monkeypatch):
     assert equations()["angle"] == pytest.approx(1e-3, rel=1e-6)
 
 
-@pytest.mark.claim("printed-coefficients", tolerance="1e-9 of the largest value: rounding")
+@pytest.mark.claim("errata-of-biri", tolerance="1e-9 of the largest value: rounding")
 def test_the_wrong_coefficients_are_those_of_the_errata():
     found = printed()["coefficients"]
     wrong = {(phase, number) for phase, values in found.items() for number, one in enumerate(values) if one > 1e-9}
