@@ -8,7 +8,7 @@ frame serves the next one too: `realtime.frame.incremental`.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import drjit as dr
@@ -113,6 +113,8 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
     def run(geometry, pixel, camera, medium, lights, state, lists, distance, by_light, tables, corners=None):
         shown = {"features": features, "geometry": geometry, "medium": medium, "lights": lights}
         view = frame_view(camera, pixel, distance, **shown)
+        if provides_visibility:
+            view = replace(view, surfaces=by_light)
 
         def layers_of(view):
             return method.render(view, state, lists, kernel=with_tables(kernel, tables), parameters=chosen)

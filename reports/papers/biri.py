@@ -53,7 +53,9 @@ def biri_notes(data: Data) -> list[str]:
 
 
 def biri_variant(row: Data) -> str:
-    """Return the kernel of a row, and the parameters that differ from their defaults."""
+    """Return the kernel of a row, and the parameters that differ from their defaults, or that it is as published."""
+    if row.get("white"):
+        return f"{row['kernel']}, as published"
     return ", ".join([row["kernel"], *(f"{name}={row[name]}" for name in ("cone", "tolerance") if row.get(name))])
 
 
@@ -96,6 +98,7 @@ def _rate_table(rows: Sequence[Data]) -> Table:
         *COLUMNS,
         *numbers(rays="camera rays alone", how={"whole": True}),
         *numbers(relative_rmse="rel. RMSE", relative_bias="rel. bias", p99="", how={"digits": 2, "share": True}),
+        *numbers(frame_rmse="rel. RMSE of the frame", how={"digits": 2, "share": True}),
     )
     found = []
     for row in rows:
@@ -103,6 +106,7 @@ def _rate_table(rows: Sequence[Data]) -> Table:
         beside = rates(row, published["fps"], comparable=list(row["size"]) == list(published["size"]))
         alone = per_second(measured(row.get("rays")))
         found.append({**row["error"], **beside, "name": _name(row), "triangles": row["triangles"], "rays": alone})
+        found[-1]["frame_rmse"] = (row.get("frame_error") or {}).get("relative_rmse")
     return table("Table 2 of Biri 2006 again: frames a second, and the error of the airlight", columns, found)
 
 

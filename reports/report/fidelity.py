@@ -7,16 +7,20 @@ from functools import partial
 from typing import Any
 
 from reports.machine.progress import Progress, part_of
-from reports.report.expected import other_seconds, shares
-from reports.report.papers import OtherPart, other_parts, published_data
+from reports.report.expected import shares
+from reports.report.papers import OtherPart
 from validation.fidelity.catalogue import EXPERIMENTS, ROWS, Experiment, experiments_of, judged
 from validation.fidelity.row import Row
-from validation.frames.result_cache import CachedResult, Computed, ResultCache, cache_entry, cached_result
+from validation.frames.result_cache import (
+    CachedResult,
+    Computed,
+    ResultCache,
+    cache_entry,
+    cached_result,
+    expected_seconds,
+)
 from validation.frames.scene_study import EFFORTS, Effort
 from validation.scenes.registry import SCENES
-
-#: Experiments that are the tables of a paper, by its name in `published` of report.json.
-_TABLES = {"biri": "biri tables", "billeter": "billeter tables"}
 
 
 def fidelity_parts(
@@ -29,7 +33,7 @@ def fidelity_parts(
     effort, scenes, cache
         Of the report.
     rows
-        Whose experiments to return; the tables of Biri 2006 are parts of their own (`reports.report.papers`).
+        Whose experiments to return.
     reported
         Leave out what a report measures only as part of the papers' whole tables.
     """
@@ -39,18 +43,17 @@ def fidelity_parts(
     return [
         _part(name, one, cache)
         for name, one in chosen.items()
-        if one.compute and (one.report or not reported) and (effort.fidelity or not one.images)
+        if (one.report or not reported) and (effort.fidelity or not one.images)
     ]
 
 
 def _part(name: str, experiment: Experiment, cache: ResultCache) -> OtherPart:
     def compute(progress: Progress) -> Computed:
         progress(0.0, name)
-        assert experiment.compute is not None
         return {"experiment": name, "data": experiment.compute()}, {}
 
     entry = cache_entry(cache, "fidelity", identity={"experiment": name})
-    return OtherPart("fidelity", "claims of papers", entry, compute)
+    return OtherPart("fidelity", name, entry, compute)
 
 
 def fidelity_rows(results: Mapping[str, Sequence[CachedResult]], *, rows: Sequence[Row] = ROWS) -> list[dict[str, Any]]:
@@ -64,8 +67,8 @@ def fidelity_rows(results: Mapping[str, Sequence[CachedResult]], *, rows: Sequen
         Which rows.
     """
     evidence = {result.data["experiment"]: result.data["data"] for result in results.get("fidelity", ())}
-    published = published_data(results) or {}
-    evidence |= {name: published[paper] for paper, name in _TABLES.items() if published.get(paper)}
+    if results.get("billeter"):  # whole tables of the paper, of a full report
+        evidence["billeter tables"] = results["billeter"][-1].data
     return judged(rows, evidence)
 
 
@@ -85,16 +88,15 @@ def measure_fidelity(
     progress
         Called with (share done, what) now and then.
     """
-    names = experiments_of(rows)
-    papers = ("biri",) if _TABLES["biri"] in names and not quick else ()
-    effort = replace(EFFORTS["default"], papers=papers, rays=0, mutations=False, fidelity=not quick)
-    tables = other_parts(effort, tuple(SCENES), cache) if papers else []
-    # What is not needed is no claim of the paper.
-    parts = [part for part in tables if part.kind != "zero_cost"]
-    parts += fidelity_parts(effort, tuple(SCENES), cache, rows=rows, reported=False)
-    seconds = {str(number): other_seconds(part.entry, part.kind) for number, part in enumerate(parts)}
+    effort = replace(EFFORTS["default"], fidelity=not quick)
+    parts = fidelity_parts(effort, tuple(SCENES), cache, rows=rows, reported=False)
+    typical = [EXPERIMENTS[part.title].seconds for part in parts]
+    seconds = {
+        str(number): usual if (last := expected_seconds(part.entry)) is None else last
+        for number, (part, usual) in enumerate(zip(parts, typical))
+    }
     results: dict[str, list[CachedResult]] = {}
     for part, share in zip(parts, shares(seconds).values()):
-        step = part_of(progress, *share, before=f"{part.title}, ")
+        step = part_of(progress, *share)
         results.setdefault(part.kind, []).append(cached_result(part.entry, partial(part.compute, step)))
     return fidelity_rows(results, rows=rows)

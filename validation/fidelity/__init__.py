@@ -19,6 +19,7 @@ Read in this order:
 - `pictures.py`: what shortcuts cost in images
 - `scattering.py`: ambient fog against multiple scattering
 - `motion.py`: what moves, and numbers of triangles
+- `biri_tables.py`: the tables that rows of Biri need
 - `billeter_tables.py`: the figures and the table that rows of Billeter need
 - `paper_images.py`: the pictures of the papers again
 - `biri.py`: the rows of Biri, Arques, Michelin 2006

@@ -44,6 +44,9 @@ class View:
     visible_triangle: Callable[[], tuple[Any, Any, Any]]  #: -> corners [m], barycentric weights, whether there is one
     part: Callable[[], Callable[..., "View"]]  #: -> (pixel, distance, tile, layout) -> the view of some of the rays
     media_views: MediaViews | None = None  #: of bounded media, where they are known before the rays
+    surfaces: tuple[PerRay, ...] | None = (
+        None  #: by light, what the visible surface sends back unshadowed, for a method that provides visibility
+    )
     prepared: Any = ()  #: for a user's plain function: what its `prepare` made
 
 

@@ -263,7 +263,7 @@ def test_refusals_name_what_is_in_the_way(variant, changes, message):
 
 
 @pytest.mark.parametrize(
-    ("parameters", "message"), [({"media": "coarse"}, "media: got"), ({"evaluation": "vertex"}, "evaluation=vertex")]
+    ("parameters", "message"), [({"media": "coarse"}, "media: got"), ({"gamma": "light"}, "gamma: got")]
 )
 def test_parameters_that_do_not_fit_are_refused(variant, parameters, message):
     with pytest.raises(InputError, match=message):

@@ -11,7 +11,7 @@ from scipy.special import factorial
 
 from realtime.errors import InputError
 from realtime.kernels.bounded import tangent_series
-from tests.helpers.scenes import body, clear_scene, spot
+from tests.helpers.scenes import bounded_medium, clear_scene, spot
 
 CENTRE, RADIUS, SIGMA, MEAN = np.array([-0.2, 0.4, 0.7]), 0.6, 0.7, 1.2 * 0.6
 
@@ -29,7 +29,7 @@ def render(scene, kernel, **parameters):
 
 def ball(**phase):
     shape = {"type": "sphere", "center": CENTRE.tolist(), "radius": RADIUS}
-    return body(shape, SIGMA, (0.9, 0.4, 0.3), **phase)
+    return bounded_medium(shape, SIGMA, (0.9, 0.4, 0.3), **phase)
 
 
 def by_hand(scene, exponent, p):

@@ -7,7 +7,7 @@ Protects the claim that `sum=transitions` is that baseline: no error without sha
 import numpy as np
 import pytest
 
-from tests.helpers.scenes import body, clear_scene, spot, tiny_scene
+from tests.helpers.scenes import bounded_medium, clear_scene, spot, tiny_scene
 
 
 def render(method, *, scene, kernel="exact", precision="double", **parameters):
@@ -89,15 +89,14 @@ def test_transitions_are_integrals_over_the_cells_whose_middles_are_lit(variant,
 def test_without_shadows_the_kernel_is_all(variant, name, spacing):
     from tests.helpers.suns import sun
 
+    def fog():
+        return bounded_medium({"type": "sphere", "center": [0.1, 0.2, 0.7], "radius": 0.6}, 0.9, (0.9, 0.4, 0.3))
+
     scenes = {
         "point": lambda: tiny_scene(ball=None),
         "soft spot": lambda: tiny_scene(ball=None, lamp=spot(beam=11.0)),
-        "bounded": lambda: clear_scene(
-            ball=body({"type": "sphere", "center": [0.1, 0.2, 0.7], "radius": 0.6}, 0.9, (0.9, 0.4, 0.3))
-        ),
-        "directional": lambda: clear_scene(
-            lamp=sun(), ball=body({"type": "sphere", "center": [0.1, 0.2, 0.7], "radius": 0.6}, 0.9, (0.9, 0.4, 0.3))
-        ),
+        "bounded": lambda: clear_scene(ball=fog()),
+        "directional": lambda: clear_scene(lamp=sun(), ball=fog()),
     }
     scene = scenes[name]()
     whole = render("unshadowed", scene=scene)

@@ -8,6 +8,7 @@ import pytest
 
 from validation.fidelity import billeter, biri
 from validation.fidelity import billeter_tables as billeter_tables_module
+from validation.fidelity import biri_tables as biri_tables_module
 from validation.fidelity.catalogue import EXPERIMENTS, PAPERS, ROWS, experiments_of, judged, published_figures
 from validation.fidelity.row import Bound, judge
 from validation.papers.billeter_tessellation import TABLE
@@ -60,10 +61,11 @@ def biri_tables(speed, shares=(1.0, 2.0, 3.0, 4.0, 90.0)):
     """Return the tables of Biri, all rates `speed` times the published ones."""
     rows = []
     for published in PUBLISHED:
-        for form in ("published", "exact"):
+        for white in (1.0, 0.0):
             one = {"published": {"scene": published.scene}, "size": list(published.size), "kernel": "exact"}
-            one |= {"form": form, "cone": 0, "tolerance": 0, "triangles": 7, "shares": list(shares)}
+            one |= {"white": white, "cone": 0, "tolerance": 0, "triangles": 7, "shares": list(shares)}
             one |= {"light_moved": timing(speed * published.fps), "error": {"relative_rmse": 0.5 / speed}}
+            one |= {"frame_error": {"relative_rmse": 0.01}}
             rows.append(one)
     study = [
         {"relative_bias": -0.3, "relative_rmse": 0.2, "printed": 2.0, "polynomial": 0.4},
@@ -221,3 +223,15 @@ def test_the_tables_of_billeter_are_measured_as_far_as_rows_ask_for_them(variant
         for evaluation in ("static", "adaptive")
     ]
     assert all(row["light_moved"]["median_ms"] > 0 for row in evidence["table"])
+
+
+def test_the_tables_of_biri_are_measured_as_far_as_rows_ask_for_them(variant, monkeypatch):
+    monkeypatch.setattr(biri_tables_module, "constant_distance_study", lambda: ())
+    monkeypatch.setattr(biri_tables_module, "_SECONDS", 0.0)
+    evidence = biri_tables_module.biri_tables(scale=0.04)
+    assert [(row["published"]["scene"], row["white"] > 0) for row in evidence["rows"]] == [
+        (published.scene, as_published) for published in PUBLISHED for as_published in (False, True)
+    ]
+    assert biri.table_row(evidence, "clutter", (32, 24))["kernel"] == "taylor"
+    assert biri.table_row(evidence, "clutter", (32, 24), ours=True)["kernel"] == "exact"
+    assert biri.table_row(evidence, "clutter") is None

@@ -6,7 +6,7 @@ import pytest
 
 from reports.commands import main as cli
 from validation.configurations.timing import Timing
-from validation.papers.biri import PUBLISHED, STAGES, biri_row, biri_rows, told_apart
+from validation.papers.biri import PUBLISHED, STAGES, as_published, biri_row, biri_rows, told_apart
 
 
 @pytest.mark.claim("published-figures")
@@ -52,9 +52,34 @@ def test_every_entry_is_measured_with_every_kernel(variant):
     assert [(row.size, row.kernel, row.cone, row.tolerance) for row in rows] == [
         (size, *what)
         for size in ((16, 12), (20, 16))
-        for what in (("exact", 0, 0), ("exact", 32, 0), ("exact", 0, 0.005), ("taylor", 0, 0), ("taylor", 32, 0))
+        for what in (
+            ("exact", 0, 0),
+            ("exact", 32, 0),
+            ("exact", 0, 0.005),
+            ("taylor", 0, 0),
+            ("taylor", 32, 0),
+            ("taylor", 32, 0),
+        )
     ]
-    assert [share for share, _ in told] == [number / 10 for number in range(10)]
+    assert [row.published_variant for row in rows] == 2 * [*5 * [False], True]
+    assert [share for share, _ in told] == [number / 12 for number in range(12)]
+
+
+@pytest.mark.claim("biri-as-published")
+@pytest.mark.parametrize("scene", ["sphere-spot", "three-media", "clutter"])
+def test_a_row_as_published_has_all_that_the_paper_has(variant, scene):
+    entry = next(one for one in PUBLISHED if one.scene == scene)
+    chosen = as_published("taylor", white=0.7, cone=entry.cone)
+    expected = {"order": "paper", "evaluation": "vertex", "buffer": "8bit", "white": 0.7, "cone": entry.cone}
+    assert dict(chosen.parameters) == expected
+    row = biri_row(
+        entry, "taylor", cone=entry.cone, published_variant=True, size=(24, 16), error_size=(24, 16), seconds=0.0
+    )
+    assert row.white > 0
+    assert row.error.nonfinite == row.frame_error.nonfinite == 0
+    # The frame has what the airlight has of errors, and surfaces that are right beside it.
+    assert row.error.relative_rmse > 0.02
+    assert row.frame_error.relative_rmse < row.error.relative_rmse
 
 
 def test_command_prints_both_tables_beside_the_published_figures(variant, monkeypatch, capfd):
