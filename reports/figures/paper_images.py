@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The pictures of Biri 2006 and Billeter 2010 again, in our scenes: a triptych, two lamps, two tessellations.
 
-`compute` writes an EXR file for each picture, `plot` only reads them. Tessellations are drawn by the side of the quads.
+`compute` writes an EXR file for each picture, `draw` only reads them. Tessellations are drawn by the side of the quads.
 """
 
 from pathlib import Path
-from typing import Any
 
 from reference.storage.files import ensure_folder
-from reports.figures.files import draw_figure, new_figure, read_data, value, write_data
+from reports.figures.files import new_figure, read_data, value, write_data
 from reports.plotting.style import WIDTHS
 
 NAME = "paper-images"
@@ -49,12 +48,8 @@ def compute(folder: Path | str, *, quick: bool = False) -> None:
     write_data(target, NAME, _HEADER, rows, size=list(size))
 
 
-def plot(folder: Path | str, **options: Any) -> None:
-    """Draw `paper-images.pdf` and `.png` from the data in a folder; options: `reports.figures.files.draw_figure`."""
-    draw_figure(NAME, folder, _draw, **options)
-
-
-def _draw(folder: Path, column: str):
+def draw(folder: Path, column: str):
+    """Return the figure of the data in a folder."""
     import numpy as np
 
     from reference.storage.exr import layer, read_exr

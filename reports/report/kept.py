@@ -7,7 +7,7 @@ from typing import Any
 
 from validation.frames.result_cache import ResultCache, result_cache
 
-#: Modules that make what is kept, besides the four sides.
+#: Modules on which kept results depend, besides the four packages below `reports`.
 _MAKERS = (
     "data/serialize.py",
     "plotting/pictures.py",

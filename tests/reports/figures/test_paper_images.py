@@ -6,7 +6,7 @@ import pytest
 
 from reference.storage.exr import layer, read_exr
 from reports.figures import paper_images
-from reports.figures.files import read_data
+from reports.figures.files import plot, read_data
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +40,6 @@ def test_quads_are_small_at_edges_and_as_many_by_both_filters(folder):
 def test_the_figure_is_drawn_again_to_the_same_bytes(folder):
     drawn = []
     for _ in range(2):
-        paper_images.plot(folder, column="single")
+        plot(paper_images, folder, column="single")
         drawn.append((folder / "paper-images.png").read_bytes())
     assert drawn[0] == drawn[1]
