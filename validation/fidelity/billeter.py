@@ -342,7 +342,7 @@ _PICTURES = (
         AtMost("indistinguishable is read as 1 %"),
     ),
     _row(
-        "7, Wyman and Ramsey",
+        "6, Wyman and Ramsey",
         "the first and last shadow planes span the entire depth: mean share of a ray between them",
         Bound(0.9),
         "shadows",
