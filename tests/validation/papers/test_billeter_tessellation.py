@@ -29,7 +29,7 @@ ENDLESS = 1e9  # seconds that a frame may take: what is measured must not hang o
 
 @pytest.mark.claim("published-figures")
 def test_published_figures_are_those_of_the_paper():
-    rates = {(one.where, one.map): one.fps for one in FIGURES if one.fps}
+    rates = {(figure.where, figure.map): figure.fps for figure in FIGURES if figure.fps}
     assert rates == {
         ("Fig. 6a", 32): 230,
         ("Fig. 6b", 128): 165,
@@ -44,7 +44,7 @@ def test_published_figures_are_those_of_the_paper():
 
 
 def test_adaptive_pays_from_4096_on_in_the_paper():
-    assert [pays_from(one.fps) for one in TABLE] == [4096, 4096]
+    assert [pays_from(row.fps) for row in TABLE] == [4096, 4096]
     assert pays_from({1024: (10, 12), 2048: (10, 9), 4096: (10, 20)}) == 4096
     assert pays_from({1024: (10, 12), 2048: (10, 11)}) == 1024
     assert pays_from({1024: (10, 12), 2048: (10, 10.1)}) is None
@@ -123,7 +123,7 @@ def test_what_takes_too_long_is_left_out_and_said(variant):
     assert all(row.light_moved is None for row in rows)
     assert "more than the limit" in rows[0].missing
     assert rows[4].missing.startswith("not begun after map 16: a frame takes")
-    assert any("could not be compared" in one for one in conclusions([], rows))
+    assert any("could not be compared" in sentence for sentence in conclusions([], rows))
 
 
 def test_a_row_that_must_be_expected_to_take_too_long_is_not_begun(variant, monkeypatch):
@@ -164,9 +164,9 @@ def table_row(size: int, evaluation: str, milliseconds: float) -> TableRow:
 def test_conclusion_about_adaptive_is_that_of_the_measurement():
     times = {1024: (100, 100), 2048: (200, 150), 4096: (800, 300)}
     rows = [
-        table_row(size, name, one)
+        table_row(size, name, milliseconds)
         for size, pair in times.items()
-        for name, one in zip(("static", "adaptive"), pair, strict=True)
+        for name, milliseconds in zip(("static", "adaptive"), pair, strict=True)
     ]
     (sentence,) = conclusions([], rows)
     assert "faster than static from 2048 on" in sentence
@@ -226,8 +226,8 @@ def test_the_ratio_of_map_sizes_mixes_no_forms_of_the_volume():
 
 @pytest.mark.claim("conclusions-follow")
 def test_conclusions_about_walls():
-    found = {dict(one.parameters).get("walls"): one for one in FIGURES if one.where == "Fig. 6b"}
-    rows = [figure_row(found["slanted"], 20.0, 0.05, 1e-5), figure_row(found["upright"], 23.0, 0.002, 1e-5)]
+    figures = {dict(figure.parameters).get("walls"): figure for figure in FIGURES if figure.where == "Fig. 6b"}
+    rows = [figure_row(figures["slanted"], 20.0, 0.05, 1e-5), figure_row(figures["upright"], 23.0, 0.002, 1e-5)]
     (words, *rest) = conclusions(rows, [])
     assert words.startswith("omni-box, map 128: with upright walls a frame takes 1.15 times as long as with slanted")
     assert words.endswith("and has 0.04 of their error against the truth.")
@@ -259,13 +259,13 @@ def test_command_prints_the_table(variant, quick, capfd):
     assert "tangle: adaptive tessellation is faster than static" in out
     assert "the paper has no figures for these maps" in out
     assert cli.run([*arguments, "--json"]) == 0
-    found = json.loads(capfd.readouterr().out)
-    assert set(found) == {"environment", "billeter"}
-    rows = found["billeter"]["table"]
+    printed = json.loads(capfd.readouterr().out)
+    assert set(printed) == {"environment", "billeter"}
+    rows = printed["billeter"]["table"]
     assert [row["evaluation"] for row in rows] == 2 * ["static", "adaptive", "walk", "upright"]
     assert rows[0]["scene"] == "tangle"
-    assert found["billeter"]["figures"] == []
-    assert found["billeter"]["conclusions"]
+    assert printed["billeter"]["figures"] == []
+    assert printed["billeter"]["conclusions"]
 
 
 def test_command_prints_the_figures(variant, quick, monkeypatch, capfd):
@@ -284,7 +284,7 @@ def test_what_is_not_measured_is_printed_with_its_reason():
     peer = next(one for one in FIGURES if one.method == "min-max")
     figures = [FigureRow(peer, (8, 8), missing="no room")]
     table = [TableRow(TABLE[1], 4096, "static", (8, 8), missing="too slow")]
-    out = "".join(text(one) for one in billeter_tables(billeter_data(figures, table)))
+    out = "".join(text(drawn) for drawn in billeter_tables(billeter_data(figures, table)))
     assert "peer, colonnade, 8 x 8: min-max (map=512): not measured: no room" in out
     assert "tangle, 8 x 8, map 4096: static: not measured: too slow" in out
     assert "96.3" in out  # the pass that was published for this row
