@@ -10,7 +10,7 @@ from realtime.scene.features import describe
 from reference.quadrature.ray_values import TruthImage
 from validation.comparison.engine_images import ImageMeasurement
 from validation.frames.baseline_files import read_baseline
-from validation.frames.benchmark import Measurement, knows_shadows
+from validation.frames.benchmark import Measurement
 from validation.frames.scene_study import SceneStudy
 from validation.metrics.errors import plain
 
@@ -61,7 +61,7 @@ def measurement_data(measured: Measurement) -> dict[str, Any]:
         "method": measured.configuration.method,
         "kernel": measured.configuration.kernel,
         "parameters": dict(measured.configuration.parameters),
-        "knows_shadows": knows_shadows(measured.configuration),
+        "knows_shadows": measured.knows_shadows,
         "refused": measured.refused,
         "left_out": measured.left_out,
         "note": measured.note,

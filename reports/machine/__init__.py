@@ -8,7 +8,8 @@ Read in this order:
 - `gpu.py`: whether CUDA and OptiX work, and why not
 - `environment.py`: chooses the variant; versions and processor
 - `probe.py`: one kernel in a process of its own
+- `own_process.py`: the user's own code in a process of its own
 - `doctor.py`: examines all of these
 
-May import: `analytic`, `reference.scene`, `reference.storage`, `reports.tables`.
+May import: `analytic`, `realtime.errors`, `reference.scene`, `reference.storage`, `reports.tables`.
 """

@@ -9,6 +9,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from reference.storage.stopping import cleaned_up
+
 _PREFIX = ".airlight-report-"
 _STALE = 86400.0  # seconds after which what a killed run left belongs to nobody
 
@@ -35,11 +37,12 @@ def staged(target: Path) -> Iterator[Path]:
             shutil.rmtree(left, ignore_errors=True)
     hidden = Path(tempfile.mkdtemp(prefix=_PREFIX, dir=target))
     try:
-        yield hidden
-        files = [path for path in hidden.rglob("*") if path.is_file()]
-        for path in sorted(files, key=lambda one: (one.parent == hidden, one)):
-            place = target / path.relative_to(hidden)
-            place.parent.mkdir(parents=True, exist_ok=True)
-            os.replace(path, place)
+        with cleaned_up(lambda: shutil.rmtree(hidden, ignore_errors=True)):
+            yield hidden
+            files = [path for path in hidden.rglob("*") if path.is_file()]
+            for path in sorted(files, key=lambda one: (one.parent == hidden, one)):
+                place = target / path.relative_to(hidden)
+                place.parent.mkdir(parents=True, exist_ok=True)
+                os.replace(path, place)
     finally:
         shutil.rmtree(hidden, ignore_errors=True)
