@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`airlight bench [SCENE...]`: speed against error."""
 
+import sys
+from functools import partial
 from typing import Annotated
 
 import typer
+
+from reports.commands.own_methods import USUAL_LIMIT, MethodLimit
 
 _BATCHES = 4096  # at most: a comparison ends before, when its interval is narrow enough
 
@@ -19,6 +23,7 @@ def bench(
     methods: Annotated[
         str | None, typer.Option(help="Comma-separated methods, also your own MODULE:FUNCTION; all by default.")
     ] = None,
+    method_limit: MethodLimit = USUAL_LIMIT,
     size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels; the scene's own by default.")] = None,
     truth: Annotated[bool, typer.Option(help="Also compare the truth with single-scatter and volpath.")] = True,
     margin: Annotated[
@@ -31,7 +36,7 @@ def bench(
 
     `airlight` is the airlight alone (the kernel with its ray set-up), `frame` a frame with static geometry and light,
     `light moved` a frame after it moved. Exit status 1 if single-scatter does not confirm the truth within +-0.05 %,
-    or volpath within +- the margin.
+    or volpath within +- the margin, or if a method of your own is at fault.
     """
     if not 0 < margin < 1:
         from analytic.errors import InputError
@@ -45,17 +50,22 @@ def bench(
         return
     from realtime.methods.registry import METHODS
     from realtime.scene.read_scene import read_scene
+    from reports.commands.own_methods import checked_configuration
+    from reports.data.own_faults import own_faults
     from reports.machine.environment import activate
+    from reports.machine.own_process import in_own_process
     from reports.machine.progress import part_of, progress_bar
     from reports.tables.terminal import print_json
-    from validation.configurations.methods import chosen_configurations
+    from validation.configurations.methods import Configuration, chosen_configurations
     from validation.scenes.loading import load_scene, parse_size
     from validation.scenes.registry import SCENES
 
-    names = methods.split(",") if methods else list(METHODS)
-    if any(":" in name for name in names):
-        activate()  # one's own module may want arrays when it is imported
-    chosen = chosen_configurations([name.strip() for name in names])
+    chosen: list[Configuration] = []
+    for name in methods.split(",") if methods else METHODS:
+        name = name.strip()
+        own = ":" in name
+        chosen += [checked_configuration(name, limit=method_limit)] if own else chosen_configurations([name])
+    apart = partial(in_own_process, limit=method_limit)
     pixels = parse_size(size) if size else None
     activate()
     names = scenes or list(SCENES)
@@ -65,14 +75,18 @@ def bench(
     with progress_bar("bench") as progress:
         for number, name in enumerate(names):
             step = part_of(progress, number / len(names), (number + 1) / len(names))
-            found.append(_bench_scene(name, pixels, chosen, margin=margin if truth else None, progress=step))
+            asked = margin if truth else None
+            found.append(_bench_scene(name, pixels, chosen, margin=asked, apart=apart, progress=step))
     if json:
         from reports.machine.environment import describe_environment
 
         print_json({"environment": describe_environment(), "scenes": found})
     else:
         _print_bench(found, markdown=markdown)
-    if any(not one["statistics"]["equivalent"] for scene in found for one in scene["agreement"].values()):
+    faults = own_faults({"scenes": found})
+    for fault in faults:
+        print(f"airlight: error: {fault}", file=sys.stderr)
+    if faults or any(not one["statistics"]["equivalent"] for scene in found for one in scene["agreement"].values()):
         raise typer.Exit(1)
 
 
@@ -92,7 +106,7 @@ def _print_bench(scenes: list[dict], *, markdown: bool) -> None:
     print_tables(tables, as_markdown=markdown)
 
 
-def _bench_scene(name: str, pixels, chosen, *, margin: float | None, progress) -> dict:
+def _bench_scene(name: str, pixels, chosen, *, margin: float | None, apart, progress) -> dict:
     from reports.data.serialize import measurement_data
     from reports.machine.progress import counted, part_of
     from validation.estimates.agreement import agreements
@@ -105,7 +119,7 @@ def _bench_scene(name: str, pixels, chosen, *, margin: float | None, progress) -
     share = 1.0 if margin is None else 0.6
     rows, camera = [], None
     progress(0.0, f"{loaded.name}: the truth")
-    for scene, measured in run(loaded, chosen, progress=counted(part_of(progress, 0.0, share))):
+    for scene, measured in run(loaded, chosen, apart=apart, progress=counted(part_of(progress, 0.0, share))):
         rows.append(measurement_data(measured))
         camera = scene.camera
     agreed = {}

@@ -24,6 +24,7 @@ from realtime.frame.renderer import render_frame
 from reference.storage.files import ensure_folder
 from reference.storage.stopping import hint_when_stopped
 from reports.data.claims import claims, unstudied
+from reports.data.own_faults import own_fault
 from reports.data.reader import SCHEMA
 from reports.machine.environment import describe_environment
 from reports.machine.own_process import EndedError, in_own_process
@@ -31,7 +32,7 @@ from reports.machine.progress import Interrupted, Progress, part_of
 from reports.page.render import render_page
 from reports.report.expected import PAGE_SECONDS, SceneEntries, other_seconds, scene_seconds, shares
 from reports.report.papers import OtherPart, other_parts, published_data
-from reports.report.scene import OwnMethods, own_fault, scene_report
+from reports.report.scene import OwnMethods, scene_report
 from reports.report.staging import staged
 from validation.comparison.engine_images import EngineImage, images_size
 from validation.configurations.methods import STANDARD, Configuration, prepared

@@ -13,6 +13,7 @@ from analytic.errors import InputError
 from realtime.methods.user_method import method_file
 from reference.storage.exr import Image, write_exr
 from reference.storage.files import temporary_folder
+from reports.data.own_faults import own_fault
 from reports.data.serialize import image_data, measurement_data, scene_facts, truth_data
 from reports.machine.environment import stamped, threads
 from reports.machine.progress import Progress, part_of
@@ -63,15 +64,6 @@ class OwnMethods:
         if fault and self.apart is None:
             raise InputError(fault)
         return measurement
-
-
-def own_fault(method: str, refused: str | None) -> str | None:
-    """Return what a method of the user's own did wrong: what it refuses by name is a result, its faults are not.
-
-    They are in the words of `realtime.methods.user_method` and `reports.machine.own_process`, which begin with the name
-    of the method.
-    """
-    return refused if ":" in method and refused and refused.startswith(f"method {method}: ") else None
 
 
 def scene_report(
@@ -222,12 +214,6 @@ def file_stems(labels: Sequence[str]) -> list[str]:
         taken |= files(stem)
         stems.append(stem)
     return stems
-
-
-def own_faults(data: Mapping[str, Any]) -> list[str]:
-    """Return what methods of the user's own did wrong in a whole report, each once."""
-    rows = (row for scene in data["scenes"] for row in scene["methods"] if row["kind"] == "function")
-    return list(dict.fromkeys(filter(None, (own_fault(row["method"], row["refused"]) for row in rows))))
 
 
 def _truth(study: SceneStudy) -> Computed:
