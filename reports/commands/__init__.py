@@ -5,6 +5,7 @@ Read in this order:
 
 - `main.py`: the command line: which commands there are, how mistakes are told
 - `printing.py`: how commands print the tables of one run
+- `options.py`: options that several commands have
 - `own_methods.py`: methods of the user's own
 - `baselines.py`: `airlight baselines`
 - `bench.py`: `airlight bench`

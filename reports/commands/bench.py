@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from reports.commands.own_methods import USUAL_LIMIT, MethodLimit
+from reports.commands.options import USUAL_LIMIT, Force, MethodLimit
 
 _BATCHES = 4096  # at most: a comparison ends before, when its interval is narrow enough
 
@@ -29,6 +29,7 @@ def bench(
     margin: Annotated[
         float, typer.Option(help="Relative bias of volpath that counts as agreement; the time grows like 1/margin^2.")
     ] = 0.01,
+    force: Force = False,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
     markdown: Annotated[bool, typer.Option("--markdown", help="Print tables for a README, dated.")] = False,
 ) -> None:
@@ -46,7 +47,7 @@ def bench(
         _bench_kernels(scenes, json=json, markdown=markdown)
         return
     if estimators:
-        _bench_estimators(scenes, size=size, json=json)
+        _bench_estimators(scenes, size=size, force=force, json=json)
         return
     from realtime.methods.registry import METHODS
     from realtime.scene.read_scene import read_scene
@@ -57,6 +58,7 @@ def bench(
     from reports.machine.progress import part_of, progress_bar
     from reports.tables.terminal import print_json
     from validation.configurations.methods import Configuration, chosen_configurations
+    from validation.frames.expected_work import check_work, frame_work, truth_work
     from validation.scenes.loading import load_scene, parse_size
     from validation.scenes.registry import SCENES
 
@@ -69,8 +71,13 @@ def bench(
     pixels = parse_size(size) if size else None
     activate()
     names = scenes or list(SCENES)
+    works = []
     for name in names:  # refuse what cannot be used before an hour of work, not after
-        read_scene(load_scene(name, pixels).scene)
+        scene = read_scene(load_scene(name, pixels).scene)
+        at, lights = (scene.camera.width, scene.camera.height), len(scene.lights)
+        works.append(truth_work(at, lights=lights))
+        works += [frame_work(at, lights=lights, steps=_steps(each)) for each in chosen]
+    check_work("bench", works, force=force)
     found = []
     with progress_bar("bench") as progress:
         for number, name in enumerate(names):
@@ -88,6 +95,13 @@ def bench(
         print(f"airlight: error: {fault}", file=sys.stderr)
     if faults or any(not one["statistics"]["equivalent"] for scene in found for one in scene["agreement"].values()):
         raise typer.Exit(1)
+
+
+def _steps(chosen) -> float:
+    """Return how many steps a configuration marches."""
+    from validation.frames.expected_work import steps_of
+
+    return steps_of(chosen.parameters) if chosen.method == "ray-march" else 0
 
 
 def _print_bench(scenes: list[dict], *, markdown: bool) -> None:
@@ -166,11 +180,12 @@ def _bench_kernels(names: list[str] | None, *, json: bool, markdown: bool) -> No
         print_tables([order_table(orders)], as_markdown=markdown)
 
 
-def _bench_estimators(scenes: list[str] | None, *, size: str | None, json: bool) -> None:
+def _bench_estimators(scenes: list[str] | None, *, size: str | None, force: bool, json: bool) -> None:
     from reports.machine.environment import activate, describe_environment
     from reports.machine.progress import progress_bar
     from reports.tables.terminal import print_json
     from validation.estimates.efficiency import efficiency_lines, scene_efficiency, thin_fog
+    from validation.frames.expected_work import check_work, sampled_work
     from validation.scenes.loading import load_scene, parse_size
     from validation.scenes.registry import SCENES
 
@@ -180,6 +195,7 @@ def _bench_estimators(scenes: list[str] | None, *, size: str | None, json: bool)
     loaded = {name: load_scene(name, pixels).scene for name in names}  # refuse before any work, not after
     if not scenes:
         loaded = {"open-fog, optical depth 0.2": thin_fog(pixels)} | loaded
+    check_work("bench --estimators", [sampled_work(pixels, 1024) for _ in loaded], force=force)
     found = {}
     with progress_bar("bench") as progress:
         for number, (name, scene) in enumerate(loaded.items()):

@@ -6,7 +6,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from reports.commands.options import Force
+
 if TYPE_CHECKING:
+    from validation.frames.expected_work import check_work, frame_work, truth_work
     from validation.frames.map_size import MapErrors, MapFlicker
 
 
@@ -24,6 +27,7 @@ def maps(
     ] = False,
     frames: Annotated[int, typer.Option(min=2, help="Frames of the moving light.")] = 9,
     step: Annotated[float, typer.Option(help="By how much the light turns from frame to frame [rad].")] = 1e-3,
+    force: Force = False,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
     markdown: Annotated[bool, typer.Option("--markdown", help="Print tables for a README, dated.")] = False,
 ) -> None:
@@ -54,6 +58,10 @@ def maps(
     loaded = [load_scene(name, pixels) for name in scenes or SCENES]
     for one in loaded:  # refuse what cannot be used, or does not fit into the memory, before any work, not after
         prepared(read_scene(one.scene), largest)
+    images = 1 + (frames if flicker else 0)
+    works = [truth_work(pixels, lights=len(one.scene.emitters()), images=images) for one in loaded]
+    works += [frame_work(pixels, frames=images * len(texels)) for _ in loaded]
+    check_work(f"maps, {pixels[0]} x {pixels[1]}", works, force=force)
     found = []
     with progress_bar("maps") as progress:
         for number, one in enumerate(loaded):

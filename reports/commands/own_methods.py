@@ -1,19 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Methods of the user's own on the command line: the command itself never imports them."""
 
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from typing import TYPE_CHECKING, Any
 
 from reports.machine.own_process import LIMIT
 
 if TYPE_CHECKING:
     from validation.configurations.methods import Configuration
-
-MethodLimit = Annotated[
-    float, typer.Option("--method-limit", help="Your own method is stopped after so long in a scene [s].")
-]
-USUAL_LIMIT = LIMIT
 
 
 def check_limit(limit: float) -> None:

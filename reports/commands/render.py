@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from reports.commands.own_methods import USUAL_LIMIT, MethodLimit
+from reports.commands.options import USUAL_LIMIT, Force, MethodLimit
 
 Scene = Annotated[str, typer.Argument(help="A built-in scene or a Mitsuba XML file.", show_default=False)]
 Size = Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels; the scene's own by default.")]
@@ -34,6 +34,7 @@ def render(
             help="What moves: light, objects, medium, colour, or several with commas; the scene's by default."
         ),
     ] = None,
+    force: Force = False,
     method_limit: MethodLimit = USUAL_LIMIT,
     plan: Annotated[bool, typer.Option("--plan", help="Print what the scene needs of a method, and stop.")] = False,
     json: Annotated[bool, typer.Option("--json", help="Print times as JSON.")] = False,
@@ -61,9 +62,9 @@ def render(
         found = call(_plan, scene, pixels, precision, chosen)
         _print_plan(found, json=json)
     elif frames is None:
-        _print_times(call(_render, scene, pixels, precision, chosen, outputs) | {"device": variant}, json=json)
+        _print_times(call(_render, scene, pixels, precision, chosen, outputs, force) | {"device": variant}, json=json)
     else:
-        found = call(_render_frames, scene, pixels, precision, chosen, outputs, frames, animate)
+        found = call(_render_frames, scene, pixels, precision, chosen, outputs, frames, animate, force)
         _print_frames(found | {"device": variant}, json=json)
 
 
@@ -123,6 +124,16 @@ def _warn(warnings) -> None:
         print(f"airlight: warning: {warning}", file=sys.stderr)
 
 
+def _check_work(name: str, scene, chosen, frames: int | None = None, *, force: bool) -> None:
+    from validation.frames.expected_work import TIMED, check_work, frame_work, steps_of
+
+    size = scene.camera.width, scene.camera.height
+    marches = chosen.method == "ray-march" or "steps" in dict(chosen.parameters)
+    steps = steps_of(chosen.parameters) if marches else 0
+    work = frame_work(size, lights=len(scene.lights), steps=steps, frames=TIMED if frames is None else frames)
+    check_work(f"render {name}, {size[0]} x {size[1]}, {chosen.label}", [work], force=force)
+
+
 def _prepared(scene, chosen):
     """Return the frame renderer, the warnings of its casters printed."""
     from realtime.methods.shadow_planes.method import PlanePreparation
@@ -140,6 +151,7 @@ def _render(
     precision: str,
     chosen,
     outputs: dict[str, Path | None],
+    force: bool,
 ) -> dict[str, Any]:
     """Render a frame, write it and return what it costs."""
     import drjit as dr
@@ -152,6 +164,7 @@ def _render(
 
     loaded = load_scene(name_or_path, pixels)
     scene = read_scene(loaded.scene, precision)
+    _check_work(loaded.name, scene, chosen, force=force)
     renderer = _prepared(scene, chosen)
     write_frame(loaded.name, chosen, render_frame(renderer), outputs=outputs)
     times = time_frame(renderer)
@@ -181,6 +194,7 @@ def _render_frames(
     outputs: dict[str, Path | None],
     frames: int,
     animate: str | None,
+    force: bool,
 ) -> dict[str, Any]:
     """Render the frames of an animation, write them and return what they cost."""
     from dataclasses import replace
@@ -196,6 +210,7 @@ def _render_frames(
     animation = loaded.animation
     if animate is not None:
         animation = replace(animation, moves=parse_moves(animate))
+    _check_work(loaded.name, scene, chosen, frames, force=force)
     renderer = _prepared(scene, chosen)
     with progress_bar(f"{loaded.name}: {frames} frames") as progress:
         found = write_frames(

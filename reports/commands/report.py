@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from reports.commands.own_methods import USUAL_LIMIT, MethodLimit
+from reports.commands.options import USUAL_LIMIT, Force, MethodLimit
 
 
 def report(
@@ -32,6 +32,7 @@ def report(
         typer.Option(help="Folder with your engine's images, SCENE.exr or SCENE.NAME.exr, judged against the truth."),
     ] = None,
     method_limit: MethodLimit = USUAL_LIMIT,
+    force: Force = False,
     fresh: Annotated[bool, typer.Option("--fresh", help="Measure again what is kept from earlier runs.")] = False,
     redraw: Annotated[
         Path | None, typer.Option("--from", help="Draw the page of this report.json again, without measuring.")
@@ -81,6 +82,7 @@ def report(
             images=images,
             fresh=fresh,
             method_limit=method_limit,
+            force=force,
         )
         done = _kept_words(data)
     if json:
@@ -116,6 +118,7 @@ def _measured(
     images: Path | None,
     fresh: bool,
     method_limit: float,
+    force: bool,
 ) -> dict[str, Any]:
     """Measure and write a report; what cannot be used is refused before the work begins."""
     from analytic.errors import InputError
@@ -124,7 +127,8 @@ def _measured(
     from reports.machine.environment import activate
     from reports.machine.progress import progress_bar
     from reports.report.measure import write_report
-    from validation.comparison.engine_images import find_images
+    from validation.comparison.engine_images import find_images, images_size
+    from validation.frames.expected_work import check_work, frame_work, truth_work
     from validation.frames.scene_study import EFFORTS
     from validation.scenes.loading import load_scene
     from validation.scenes.registry import SCENES
@@ -147,6 +151,11 @@ def _measured(
     activate()
     for name in names:
         read_scene(load_scene(name, (8, 6)).scene)
+    # The sizes of an effort are known to be right; those of images are the user's.
+    sizes = [images_size(tuple(several)) for several in shown.values()]
+    works = [truth_work(size) for size in sizes]
+    works += [frame_work(size, steps=100, frames=8 * len(chosen)) for size in sizes]
+    check_work("report --images", works, force=force)
     with progress_bar("report") as progress:
         return write_report(
             target,
