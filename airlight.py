@@ -22,7 +22,9 @@ if __name__ == "__main__":  # before all that takes time: what a signal meets du
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
     from reference.storage.stopping import stop_on_signals
+    from reports.machine.streams import usable_streams
 
+    usable_streams()
     stop_on_signals()
     if sys.flags.no_site:  # as the launcher starts it, since Python's own start is not safe from signals either
         import site
@@ -69,7 +71,7 @@ if TYPE_CHECKING:  # for editors, which complete names from here; `_API` says th
     from validation.metrics.errors import error_metrics as error_metrics
     from validation.scenes.registry import SCENES as SCENES
 
-# name -> module; what is not named here is no part of the API.
+# name -> module; names that are missing here are not part of the API
 _API = {
     "load_scene": "reports.api.images",
     "render": "reports.api.images",
@@ -122,7 +124,9 @@ def __dir__() -> list[str]:
 def main() -> None:
     """Run the `airlight` command."""
     from reference.storage.stopping import stop_on_signals
+    from reports.machine.streams import usable_streams
 
+    usable_streams()
     stop_on_signals()
     from reports.commands.main import run
 

@@ -41,8 +41,8 @@ def render(
 ) -> None:
     """Render a frame, or an animation, with a real-time method and print what it costs.
 
-    An animation is one turn: lights circle, objects turn, the medium's density swings, colours go round. Only what
-    moves is made anew. Ctrl-C keeps the frames that are finished.
+    An animation is one turn: lights circle, objects turn, the medium's density swings, colours go round. Each frame
+    recomputes only what depends on the motion. Ctrl-C keeps the finished frames.
     """
     from functools import partial
 
@@ -64,8 +64,8 @@ def render(
     elif frames is None:
         _print_times(call(_render, scene, pixels, precision, chosen, outputs, force) | {"device": variant}, json=json)
     else:
-        found = call(_render_frames, scene, pixels, precision, chosen, outputs, frames, animate, force)
-        _print_frames(found | {"device": variant}, json=json)
+        rendered = call(_render_frames, scene, pixels, precision, chosen, outputs, frames, animate, force)
+        _print_frames(rendered | {"device": variant}, json=json)
 
 
 def _call(function: Callable[..., dict[str, Any]], *arguments: Any) -> dict[str, Any]:
@@ -73,7 +73,7 @@ def _call(function: Callable[..., dict[str, Any]], *arguments: Any) -> dict[str,
 
 
 def _check_outputs(outputs: dict[str, Path | None], frames: int | None, animate: str | None) -> None:
-    """Refuse what could not be written, before any work."""
+    """Refuse outputs that cannot be written, before any work."""
     from analytic.errors import InputError
     from reference.storage.files import ensure_writable
     from reports.interchange.frames import check_ending, numbered
@@ -119,7 +119,7 @@ def _print_plan(plan: dict[str, Any], *, json: bool) -> None:
 
 
 def _warn(warnings) -> None:
-    """Print what is odd about the casters on the error stream, once a command."""
+    """Print warnings about the casters on the error stream, once a command."""
     for warning in warnings:
         print(f"airlight: warning: {warning}", file=sys.stderr)
 
@@ -213,11 +213,11 @@ def _render_frames(
     _check_work(loaded.name, scene, chosen, frames, force=force)
     renderer = _prepared(scene, chosen)
     with progress_bar(f"{loaded.name}: {frames} frames") as progress:
-        found = write_frames(
+        written = write_frames(
             loaded.name, renderer, chosen, animation, frames=frames, outputs=outputs, progress=progress
         )
     size = [scene.camera.width, scene.camera.height]
-    return {"scene": loaded.name, "method": chosen.label, "size": size} | found
+    return {"scene": loaded.name, "method": chosen.label, "size": size} | written
 
 
 def _print_times(times: dict[str, Any], *, json: bool) -> None:
@@ -240,17 +240,17 @@ def _print_times(times: dict[str, Any], *, json: bool) -> None:
     print(f"  {times['device']}, {times['threads']} threads")
 
 
-def _print_frames(found: dict[str, Any], *, json: bool) -> None:
+def _print_frames(written: dict[str, Any], *, json: bool) -> None:
     from reports.tables.methods import rate_words
     from reports.tables.terminal import print_json
 
     if json:
-        print_json(found)
+        print_json(written)
         return
-    move, rendered = found["move_ms"], found["render_ms"]
-    print(f"{found['scene']}, {found['method']}: {found['frames']} frames, {' and '.join(found['moves'])} moving")
-    print(f"  {found['files'][0]} to {found['files'][-1]}")
+    move, rendered, moves = written["move_ms"], written["render_ms"], " and ".join(written["moves"])
+    print(f"{written['scene']}, {written['method']}: {written['frames']} frames, {moves} moving")
+    print(f"  {written['files'][0]} to {written['files'][-1]}")
     print(
-        f"  {found['frame_ms']:.3g} ms a frame ({rate_words(found['frame_ms'])}): {move:.3g} ms to move, "
-        f"{rendered:.3g} ms to render, keeping what stood still; {found['device']}"
+        f"  {written['frame_ms']:.3g} ms a frame ({rate_words(written['frame_ms'])}): {move:.3g} ms to move, "
+        f"{rendered:.3g} ms to render, keeping what stood still; {written['device']}"
     )

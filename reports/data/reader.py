@@ -2,7 +2,6 @@
 """report.json read back, checked, and its page drawn again: without Mitsuba, and without measuring anything."""
 
 import json
-import shutil
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,7 @@ SCHEMA_FILE = Path(__file__).parent / "schema" / "report-2.json"
 
 
 def read_report(path: Path | str) -> dict[str, Any]:
-    """Read a report.json whose schema is the one that is known here; every key at its top is there.
+    """Read a report.json of the current schema; every key at its top is there.
 
     Parameters
     ----------
@@ -33,14 +32,14 @@ def read_report(path: Path | str) -> dict[str, Any]:
     if given != SCHEMA:
         got = f"the schema {given!r}" if given is not None else "no schema"
         raise InputError(f"{file} has {got}, wanted {SCHEMA!r}; make the report again with this version of airlight")
-    missing = [key for key in _schema()["required"] if key not in data]
-    if missing:
-        raise InputError(f"{file} does not keep to {SCHEMA}: {missing[0]!r} is missing; make the report again")
+    fault = _fault(data, json.loads(SCHEMA_FILE.read_text(encoding="utf-8")))
+    if fault:
+        raise InputError(f"{file} does not keep to {SCHEMA}: {fault}; make the report again")
     return data
 
 
 def load_report(path: Path | str) -> tuple[dict[str, Any], Path]:
-    """Read a report of which every key and every file is needed.
+    """Read a report and check that every key and every file is there.
 
     Parameters
     ----------
@@ -58,9 +57,6 @@ def load_report(path: Path | str) -> tuple[dict[str, Any], Path]:
         If there is no such file, it does not keep to the schema, or a file that it names is missing.
     """
     data, file = read_report(path), _report_file(path)
-    fault = _fault(data, _schema())
-    if fault:
-        raise InputError(f"{file} does not keep to {SCHEMA}: {fault}; make the report again")
     for name in named_files(data):
         if Path(name).is_absolute() or ".." in Path(name).parts:
             raise InputError(f"{file} names {name}, which is not in its folder; make the report again")
@@ -74,12 +70,8 @@ def _report_file(path: Path | str) -> Path:
     return file / "report.json" if file.is_dir() or file.suffix != ".json" else file
 
 
-def _schema() -> dict[str, Any]:
-    return json.loads(SCHEMA_FILE.read_text(encoding="utf-8"))
-
-
 def _fault(data: Any, schema: Mapping[str, Any]) -> str | None:
-    """Return what is wrong with a report, the place and the words; None if nothing is."""
+    """Return the first fault of a report with its place; None without a fault."""
     from jsonschema import Draft202012Validator
     from jsonschema.exceptions import best_match
 
@@ -87,8 +79,13 @@ def _fault(data: Any, schema: Mapping[str, Any]) -> str | None:
     if error is None:
         return None
     words = " ".join(error.message.split())
-    # The message begins with what was found, which may be a whole scene.
+    # The message begins with the offending value, which may be a whole scene.
     return f"{error.json_path.replace('$', 'report', 1)}: {words if len(words) < 200 else f'.. {words[-160:]}'}"
+
+
+def report_text(data: Mapping[str, Any]) -> str:
+    """Return the content of report.json."""
+    return json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def redraw_report(data: Mapping[str, Any], folder: Path, target: Path) -> None:
@@ -101,16 +98,15 @@ def redraw_report(data: Mapping[str, Any], folder: Path, target: Path) -> None:
     target
         Where to write.
     """
-    from reference.storage.files import ensure_folder, write_text
+    from reference.storage.files import ensure_folder, write_bytes, write_text
     from reports.page.render import render_page
 
     ensure_folder(target)
     page = render_page(dict(data), folder)
     if not target.samefile(folder):
         for name in named_files(data):
-            (target / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(folder / name, target / name)
-        shutil.copyfile(folder / "report.json", target / "report.json")
+            write_bytes(target / name, (folder / name).read_bytes())
+        write_text(target / "report.json", report_text(data))
     write_text(target / "report.html", page)
 
 

@@ -3,6 +3,7 @@
 
 Read in this order:
 
+- `streams.py`: standard streams that can be written
 - `progress.py`: progress bars with the time left
 - `llvm.py`: finds a libLLVM that works
 - `gpu.py`: whether CUDA and OptiX work, and why not

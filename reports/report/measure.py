@@ -6,7 +6,6 @@ interrupted goes on where it stopped and one in which nothing changed measures n
 when it is whole.
 """
 
-import json
 import sys
 import time
 from collections import Counter
@@ -25,7 +24,7 @@ from reference.storage.files import ensure_folder
 from reference.storage.stopping import hint_when_stopped
 from reports.data.claims import claims, unstudied
 from reports.data.own_faults import own_fault
-from reports.data.reader import SCHEMA
+from reports.data.reader import SCHEMA, report_text
 from reports.machine.environment import describe_environment
 from reports.machine.own_process import EndedError, in_own_process
 from reports.machine.progress import Interrupted, Progress, part_of
@@ -42,7 +41,7 @@ from validation.frames.scene_study import Effort, SceneStudy, open_study
 from validation.metrics.errors import plain
 from validation.scenes.registry import SCENES
 
-#: Modules that make what is kept, besides the four sides.
+#: Modules on which kept results depend, besides the four packages below `reports`.
 _MAKERS = (
     "data/serialize.py",
     "plotting/pictures.py",
@@ -172,8 +171,7 @@ def write_report(
 
 def write_page(data: Mapping[str, Any], *, images: Path, folder: Path) -> None:
     """Write report.json and the page that is made from it and from the files it names, which lie in `images`."""
-    text = json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-    (folder / "report.json").write_text(text, encoding="utf-8", newline="\n")
+    (folder / "report.json").write_text(report_text(data), encoding="utf-8", newline="\n")
     (folder / "report.html").write_text(render_page(dict(data), images), encoding="utf-8", newline="\n")
 
 

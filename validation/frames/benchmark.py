@@ -46,7 +46,7 @@ class Rendering:
 class Measurement:
     """The cost and the error of one configuration in one scene."""
 
-    configuration: Configuration
+    configuration: Configuration  #: what was measured
     frame: Frame | None  #: None if the method refused the scene
     times: FrameTimes | None
     error: Metrics | None  #: of the airlight
