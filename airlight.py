@@ -123,14 +123,16 @@ def __dir__() -> list[str]:
 
 def main() -> None:
     """Run the `airlight` command."""
-    from reference.storage.stopping import stop_on_signals
+    from reference.storage.stopping import stop_on_signals, wait_if_stopped
     from reports.machine.streams import usable_streams
 
     usable_streams()
     stop_on_signals()
     from reports.commands.main import run
 
-    sys.exit(run(sys.argv[1:]))
+    status = run(sys.argv[1:])
+    wait_if_stopped()
+    sys.exit(status)
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ import os
 import select
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
@@ -26,6 +27,7 @@ class Stopper:
     def __init__(self, *, quiet: bool = False) -> None:
         self.cleanups: list[Callable[[], object]] = []
         self.hints: list[Callable[[], str]] = []
+        self.ending = False
         self._quiet = quiet
 
     def __call__(self, number: int, frame: object) -> None:
@@ -34,6 +36,7 @@ class Stopper:
     def watch(self, signals: int) -> None:
         """Wait for a signal, which is a byte that can be read; a second one does not wait for the cleaning up."""
         number = os.read(signals, 1)[0]
+        self.ending = True
         threading.Thread(target=self._end, args=(number,), daemon=True).start()
         select.select([signals], [], [], _PATIENCE)
         os._exit(128 + number)
@@ -91,6 +94,7 @@ def cleaned_up(work: Callable[[], object]) -> Iterator[None]:
     try:
         yield
     finally:
+        wait_if_stopped()  # the work that was cleaned up must not be called a failure meanwhile
         stopper.cleanups.remove(work)
 
 
@@ -109,6 +113,13 @@ def hint_when_stopped(words: Callable[[], str]) -> Iterator[None]:
         yield
     finally:
         stopper.hints.remove(words)
+
+
+def wait_if_stopped() -> None:
+    """Return, but not where a signal is ending the process: then the end comes here."""
+    stopper = _stopper()
+    while stopper is not None and stopper.ending:
+        time.sleep(1)
 
 
 def _stopper() -> Stopper | None:

@@ -9,7 +9,6 @@ import typer
 from reports.commands.options import Force
 
 if TYPE_CHECKING:
-    from validation.frames.expected_work import check_work, frame_work, truth_work
     from validation.frames.map_size import MapErrors, MapFlicker
 
 
@@ -43,6 +42,7 @@ def maps(
     from reports.machine.progress import counted, part_of, progress_bar
     from reports.tables.terminal import print_json
     from validation.configurations.methods import configuration, parse_settings, prepared
+    from validation.frames.expected_work import check_work, frame_work, truth_work
     from validation.frames.map_size import map_errors, map_flicker
     from validation.metrics.errors import plain
     from validation.scenes.loading import load_scene, parse_size

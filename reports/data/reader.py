@@ -32,7 +32,9 @@ def read_report(path: Path | str) -> dict[str, Any]:
     if given != SCHEMA:
         got = f"the schema {given!r}" if given is not None else "no schema"
         raise InputError(f"{file} has {got}, wanted {SCHEMA!r}; make the report again with this version of airlight")
-    fault = _fault(data, json.loads(SCHEMA_FILE.read_text(encoding="utf-8")))
+    schema = json.loads(SCHEMA_FILE.read_text(encoding="utf-8"))
+    missing = [key for key in schema["required"] if key not in data]
+    fault = f"{missing[0]!r} is missing" if missing else _fault(data, schema)
     if fault:
         raise InputError(f"{file} does not keep to {SCHEMA}: {fault}; make the report again")
     return data
@@ -67,7 +69,8 @@ def load_report(path: Path | str) -> tuple[dict[str, Any], Path]:
 
 def _report_file(path: Path | str) -> Path:
     file = Path(path)
-    return file / "report.json" if file.is_dir() or file.suffix != ".json" else file
+    named = file.is_file() or (file.suffix and not file.is_dir())
+    return file if named else file / "report.json"
 
 
 def _fault(data: Any, schema: Mapping[str, Any]) -> str | None:

@@ -58,7 +58,7 @@ class OwnMethods:
             If the user's method is at fault and runs in this process.
         """
         if chosen in self.ended:
-            return Measurement(chosen, None, None, None, None, refused=self.ended[chosen])
+            return Measurement(chosen, None, None, None, None, refused=self.ended[chosen], knows_shadows=True)
         measurement = study_configuration(study, chosen, apart=self.apart)
         fault = own_fault(chosen.method, measurement.refused)
         if fault and self.apart is None:

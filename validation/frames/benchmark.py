@@ -55,7 +55,7 @@ class Measurement:
     refused: str | None = None  #: why there is no frame
     left_out: bool = False  #: whether only the time speaks against this configuration, which could render the scene
     note: str | None = None  #: how its times differ from those of other configurations
-    knows_shadows: bool = True  #: whether it renders volumetric shadows
+    knows_shadows: bool | None = None  #: whether it renders volumetric shadows; None: the method's record says it
 
 
 def configurations_for(
