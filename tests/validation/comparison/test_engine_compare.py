@@ -6,7 +6,8 @@ import pytest
 
 from analytic.errors import InputError
 from reference.storage.exr import Image, write_exr
-from validation.comparison.engine_compare import compare_scene, scene_of_size, truth_layer
+from validation.comparison.engine_compare import compare_scene, scene_of_size
+from validation.comparison.engine_layers import truth_layer
 from validation.estimates.quadrature import truth_image
 from validation.scenes.loading import load_scene
 
@@ -101,11 +102,15 @@ def test_standard_errors_of_the_file_are_used(scene, truth, write):
 
 
 def test_pixels_can_be_means(scene, truth, write):
-    """The mean over a pixel differs from its centre most where the lamp is; both have the same scale."""
+    """The mean over a pixel differs from its centre most where the lamp is; what fits is found."""
     area = truth_image(load_scene(scene, (16, 12)).scene, pixel="area")
     file = write(airlight=area.airlight)
     assert compare_scene(scene, file, pixel="area").comparison.metrics.relative_rmse < 1e-6
-    assert compare_scene(scene, file).comparison.metrics.relative_rmse > 1e-3
+    assert compare_scene(scene, file, pixel="centre").comparison.metrics.relative_rmse > 1e-3
+    found = compare_scene(scene, file)
+    assert (found.pixel, found.fit.area_error < 1e-6, found.fit.centre_error > 0.01) == ("area", True, True)
+    assert found.comparison.metrics.relative_rmse < 1e-6
+    assert "means over the area fit" in found.summary()
 
 
 def test_json_has_every_number_once(scene, truth, write):
