@@ -107,7 +107,7 @@ def tile_corners(pixel, camera: Camera, tolerance: float, *, by_rays: bool, ligh
     number[j, i] = np.arange(len(i), dtype=np.uint32)
     right, below = np.minimum(i + 1, across - 1), np.minimum(j + 1, down - 1)
     middle_i, middle_j = np.clip(i, 1, across - 2), np.clip(j, 1, down - 2)
-    found = Corners(
+    corners = Corners(
         mi.UInt32(number[j, right]),
         mi.UInt32(number[below, i]),
         mi.UInt32(number[below, right]),
@@ -115,8 +115,8 @@ def tile_corners(pixel, camera: Camera, tolerance: float, *, by_rays: bool, ligh
         tuple(mi.UInt32(number[middle_j + step, i]) for step in (-1, 0, 1)),
         mi.Bool((i < across - 1) & (j < down - 1)),
     )
-    dr.eval(found)
-    return found
+    dr.eval(corners)
+    return corners
 
 
 def between_corners(
@@ -165,14 +165,14 @@ def between_corners(
     bends = [_second_difference(corners, part) for part in parts]
     dr.eval(bends)
     four = tile, corners.right, corners.below, corners.diagonal
-    values = [[dr.gather(type(part), part, one) for part in parts] for one in four]
+    values = [[dr.gather(type(part), part, corner) for part in parts] for corner in four]
     smooth = corners.inner & _depths_alike(distance, four)
-    for one, found in zip(four, values):
-        for bend, value in zip(bends, found):
-            here = dr.gather(type(bend), bend, one)
+    for corner, corner_values in zip(four, values):
+        for bend, value in zip(bends, corner_values):
+            here = dr.gather(type(bend), bend, corner)
             for limit, least in zip(_channels(here), _channels(value)):
                 smooth &= limit <= tolerance * least
-        smooth &= dr.gather(mi.UInt32, lit, one) == lit
+        smooth &= dr.gather(mi.UInt32, lit, corner) == lit
     tables = [_bilinear([_channels(value) for value in corner]) for corner in zip(*values)]
     dr.eval(tables, smooth)
 
@@ -189,16 +189,16 @@ def between_corners(
         return kind(*channels)
 
     def between(pixel, distance, own):
-        found = tuple(interpolated(type(part), table, own) for part, table in zip(parts, tables))
-        return found, dr.gather(mi.UInt32, lit, own)
+        blended = tuple(interpolated(type(part), table, own) for part, table in zip(parts, tables))
+        return blended, dr.gather(mi.UInt32, lit, own)
 
     def computed(pixel, distance, own):
-        found, reached = sample(pixel, distance, own, Layout.SOME)
-        return found, _bits(reached)
+        sampled, reached = sample(pixel, distance, own, Layout.SOME)
+        return sampled, _bits(reached)
 
     smooth = dr.gather(mi.Bool, smooth, own)
-    found, bits = dr.if_stmt(args=(pixel, distance, own), cond=smooth, true_fn=between, false_fn=computed)
-    return found, tuple((bits >> number & 1) != 0 for number in range(len(reached)))
+    colors, bits = dr.if_stmt(args=(pixel, distance, own), cond=smooth, true_fn=between, false_fn=computed)
+    return colors, tuple((bits >> number & 1) != 0 for number in range(len(reached)))
 
 
 def _channels(value) -> list[Any]:
@@ -209,8 +209,8 @@ def _channels(value) -> list[Any]:
 def _bits(reached):
     """Return by light, as one bit each, whether it reaches the surface."""
     bits = mi.UInt32(0)
-    for number, one in enumerate(reached):
-        bits |= dr.select(one, mi.UInt32(1 << number), 0)
+    for number, reaches in enumerate(reached):
+        bits |= dr.select(reaches, mi.UInt32(1 << number), 0)
     return bits
 
 
@@ -231,11 +231,11 @@ def _bilinear(values) -> list[Any]:
 
 def _second_difference(corners: Corners, color):
     """Return the larger of the second differences along rows and columns, by channel."""
-    found = type(color)(0)
+    largest = type(color)(0)
     for three in (corners.row, corners.column):
-        before, here, behind = (dr.gather(type(color), color, one) for one in three)
-        found = dr.maximum(found, dr.abs(before + behind - 2 * here))
-    return found
+        before, here, behind = (dr.gather(type(color), color, sample) for sample in three)
+        largest = dr.maximum(largest, dr.abs(before + behind - 2 * here))
+    return largest
 
 
 def _depths_alike(distance, four):

@@ -18,7 +18,7 @@ def casters_of(*names):
 
 
 def index_of(casters, light=LIGHT, camera=CAMERA, precision="single"):
-    """Return the index of the shadow planes of all bodies."""
+    """Return the index of the shadow planes of all components."""
     from realtime.numerics.array_types import array_types
 
     used = np.ones(len(casters.closed), dtype=bool)

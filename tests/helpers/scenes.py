@@ -56,7 +56,9 @@ def spot(*, cutoff=33.0, beam=33.0) -> dict[str, Any]:
     }
 
 
-def body(shape: dict[str, Any], sigma_t: Any, albedo: tuple[float, float, float], **medium: Any) -> dict[str, Any]:
+def bounded_medium(
+    shape: dict[str, Any], sigma_t: Any, albedo: tuple[float, float, float], **medium: Any
+) -> dict[str, Any]:
     """Return a shape that lets light pass and is filled with a homogeneous medium; `sigma_t` is grey or RGB [1/m]."""
     colour = not isinstance(sigma_t, float)
     inside = {

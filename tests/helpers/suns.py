@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from tests.helpers.scenes import body, clear_scene, tiny_scene
+from tests.helpers.scenes import bounded_medium, clear_scene, tiny_scene
 
 TOWARDS = np.array([-0.37, 0.23, 0.81]) / np.linalg.norm([-0.37, 0.23, 0.81])
 
@@ -30,18 +30,20 @@ def brick(sigma_t: Any = (0.9, 0.5, 0.2), albedo=(0.9, 0.4, 0.3), **medium: Any)
     import mitsuba as mi
 
     at = mi.ScalarTransform4f().translate(BRICK[0].tolist()).scale(BRICK[1].tolist())
-    return body({"type": "cube", "to_world": at}, sigma_t, albedo, **medium)
+    return bounded_medium({"type": "cube", "to_world": at}, sigma_t, albedo, **medium)
 
 
 def pearl(sigma_t: Any = 1.3, albedo=(0.2, 0.5, 0.8), **medium: Any) -> dict[str, Any]:
     """Return a ball of fog."""
-    return body({"type": "sphere", "center": PEARL[0].tolist(), "radius": PEARL[1]}, sigma_t, albedo, **medium)
+    return bounded_medium(
+        {"type": "sphere", "center": PEARL[0].tolist(), "radius": PEARL[1]}, sigma_t, albedo, **medium
+    )
 
 
 def sunny(*, size=(12, 9), **changes: Any) -> dict[str, Any]:
     """Return a camera in clear air and a sun; `changes` add or replace entries."""
     scene = clear_scene(size=size, lamp=None, sun=sun()) | changes
-    scene["sensor"] |= {"fov": 25.0}  # both bodies fill most of the view
+    scene["sensor"] |= {"fov": 25.0}  # both media fill most of the view
     return scene
 
 

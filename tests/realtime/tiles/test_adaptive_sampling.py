@@ -35,8 +35,8 @@ def image_of(function, tolerance, *, depth=None, lit=None):
     pixel = mi.UInt32(tiled_pixels(width, height))
     corners = tile_corners(pixel, SimpleNamespace(width=width, height=height), tolerance, by_rays=True, lights=1)
     values, lights, distance = (
-        np.ascontiguousarray(np.broadcast_to(one, (height, width)).ravel(), dtype=kind)
-        for one, kind in (
+        np.ascontiguousarray(np.broadcast_to(entry, (height, width)).ravel(), dtype=kind)
+        for entry, kind in (
             (function(*np.meshgrid(np.arange(width), np.arange(height))), np.float32),
             (True if lit is None else lit, np.uint32),
             (1.0 if depth is None else depth, np.float32),
@@ -50,11 +50,11 @@ def image_of(function, tolerance, *, depth=None, lit=None):
         dr.scatter(computed, mi.UInt32(1), pixel)
         return (mi.Color3f(value, 2 * value, 0.5 * value),), (dr.gather(mi.UInt32, light, pixel) != 0,)
 
-    (found,), (reached,) = between_corners(
+    (color,), (reached,) = between_corners(
         corners, pixel, dr.gather(mi.Float, mi.Float(distance), pixel), sample, width=width, tolerance=tolerance
     )
     order, image = np.array(pixel), np.empty((width * height, 3))
-    image[order] = np.array(found).T
+    image[order] = np.array(color).T
     shown = np.empty(width * height, dtype=bool)
     shown[order] = np.array(reached)
     assert np.allclose(image[:, 1], 2 * image[:, 0], rtol=1e-6)
@@ -62,8 +62,8 @@ def image_of(function, tolerance, *, depth=None, lit=None):
 
 
 def test_a_linear_function_is_computed_at_corners_and_along_two_sides(variant):
-    found, _, computed = image_of(lambda x, y: 3 + 0.2 * x + 0.1 * y, 1e-4)
-    assert found == pytest.approx(3 + 0.2 * np.arange(48) + 0.1 * np.arange(32)[:, None], rel=1e-6)
+    values, _, computed = image_of(lambda x, y: 3 + 0.2 * x + 0.1 * y, 1e-4)
+    assert values == pytest.approx(3 + 0.2 * np.arange(48) + 0.1 * np.arange(32)[:, None], rel=1e-6)
     inner = np.zeros((32, 48), dtype=bool)
     inner[:28, :44] = True
     inner[::4, ::4] = False
@@ -86,9 +86,9 @@ def test_smooth_functions_and_kinks_err_by_the_tolerance_at_most(variant, seed, 
 
     wanted = function(*np.meshgrid(np.arange(48), np.arange(32)))
     assume(wanted.min() >= 0.5)
-    found, _, computed = image_of(function, tolerance)
-    assert np.max(np.abs(found - wanted) / wanted) <= 1.05 * tolerance + 1e-6
-    assert np.all(found[computed > 0] == wanted.astype(np.float32)[computed > 0])
+    values, _, computed = image_of(function, tolerance)
+    assert np.max(np.abs(values - wanted) / wanted) <= 1.05 * tolerance + 1e-6
+    assert np.all(values[computed > 0] == wanted.astype(np.float32)[computed > 0])
 
 
 @pytest.mark.claim("between-corners")
@@ -177,7 +177,9 @@ def test_a_method_knows_on_which_rays_it_is_called(variant):
 
     def spying(view, state, lists, *, kernel, parameters):
         branch = view.layout is Layout.SOME  # in which there are no numbers to look at
-        seen.append((view.layout, *(np.zeros(0, int) if branch else np.array(one) for one in (view.pixel, view.tile))))
+        seen.append(
+            (view.layout, *(np.zeros(0, int) if branch else np.array(numbers) for numbers in (view.pixel, view.tile)))
+        )
         return Layers(mi.Color3f(view.direction.x + 2))
 
     scene = read_scene(mi.load_dict(tiny_scene(size=(16, 12))))
@@ -236,6 +238,6 @@ def test_every_layer_is_interpolated(variant):
     )
     whole, parted = (render_frame(frame_renderer(scene, method, tolerance=tolerance)) for tolerance in (0.0, 0.02))
     for layer in ("airlight", "surface"):
-        found, wanted = getattr(parted, layer), getattr(whole, layer)
-        np.testing.assert_allclose(found, wanted, rtol=0.02)
-        assert np.max(np.abs(found - wanted)) > 0
+        interpolated, wanted = getattr(parted, layer), getattr(whole, layer)
+        np.testing.assert_allclose(interpolated, wanted, rtol=0.02)
+        assert np.max(np.abs(interpolated - wanted)) > 0

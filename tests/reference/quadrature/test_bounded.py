@@ -2,7 +2,7 @@
 import numpy as np
 import pytest
 
-from tests.helpers.scenes import body, clear_scene, spot, tiny_scene
+from tests.helpers.scenes import bounded_medium, clear_scene, spot, tiny_scene
 from tests.helpers.volpath import assert_volpath_agrees
 
 STEPS = 200_000
@@ -27,11 +27,11 @@ def brick(sigma_t=(0.9, 0.5, 0.2), albedo=(0.9, 0.4, 0.3), **medium):
     import mitsuba as mi
 
     half = mi.ScalarTransform4f().translate([-0.5, 0.125, 0.59375]).scale([0.3125, 0.4375, 0.375])
-    return body({"type": "cube", "to_world": half}, sigma_t, albedo, **medium)
+    return bounded_medium({"type": "cube", "to_world": half}, sigma_t, albedo, **medium)
 
 
 def pearl(sigma_t=1.3, albedo=(0.2, 0.5, 0.8), centre=(0.5, 0.1875, 0.59375), **medium):
-    return body({"type": "sphere", "center": list(centre), "radius": 0.4375}, sigma_t, albedo, **medium)
+    return bounded_medium({"type": "sphere", "center": list(centre), "radius": 0.4375}, sigma_t, albedo, **medium)
 
 
 def in_fog(shape):
@@ -276,7 +276,7 @@ def test_agrees_with_volpath(variant, inside):
     if inside:
         huge = {"type": "cube", "to_world": mi.ScalarTransform4f().translate([0.1, -3.5, 1.1]).scale(1.5)}
         scene["sensor"] = tiny_scene()["sensor"]
-        scene["near"] = body(huge, 0.0, (0.0, 0.0, 0.0)) | {"interior": {"type": "ref", "id": "fog"}}
+        scene["near"] = bounded_medium(huge, 0.0, (0.0, 0.0, 0.0)) | {"interior": {"type": "ref", "id": "fog"}}
         scene = {"type": "scene", "fog": tiny_scene()["fog"]} | scene
     truth = read_truth(mi.load_dict(scene))
     assert_volpath_agrees(truth, batches=16, least_precision=0.03)

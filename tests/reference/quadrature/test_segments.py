@@ -4,7 +4,7 @@ import pytest
 
 from reference.quadrature.segments import AMBIENT, camera_segments, leg_kinks, optical_depth, scattering_range
 from reference.visibility.line_crossings import crossings
-from tests.helpers.scenes import body, clear_scene, tiny_scene
+from tests.helpers.scenes import bounded_medium, clear_scene, tiny_scene
 
 FOG = {"type": "homogeneous", "id": "fog", "sigma_t": 0.11, "albedo": 0.6, "has_spectral_extinction": False}
 
@@ -14,8 +14,10 @@ def shapes(**extra):
 
     turn = mi.ScalarTransform4f().translate([-0.5, 0.1, 0.5]).rotate([0, 0, 1], 27.0).scale([0.31, 0.43, 0.37])
     return {
-        "brick": body({"type": "cube", "to_world": turn} | extra, (0.9, 0.5, 0.2), (0.9, 0.4, 0.3)),
-        "pearl": body({"type": "sphere", "center": [0.6, 0.2, 0.6], "radius": 0.43} | extra, 1.3, (0.2, 0.5, 0.8)),
+        "brick": bounded_medium({"type": "cube", "to_world": turn} | extra, (0.9, 0.5, 0.2), (0.9, 0.4, 0.3)),
+        "pearl": bounded_medium(
+            {"type": "sphere", "center": [0.6, 0.2, 0.6], "radius": 0.43} | extra, 1.3, (0.2, 0.5, 0.8)
+        ),
     }
 
 
@@ -131,7 +133,7 @@ def test_the_digest_of_a_scene_tells_its_media_apart(variant):
 
     def pearl(sigma_t, **medium):
         return {
-            "pearl": body(
+            "pearl": bounded_medium(
                 {"type": "sphere", "center": [0.6, 0.2, 0.6], "radius": 0.43}, sigma_t, (0.2, 0.5, 0.8), **medium
             )
         }

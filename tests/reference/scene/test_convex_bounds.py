@@ -4,7 +4,7 @@ import pytest
 
 from analytic.errors import InputError
 from reference.scene.convex_bounds import Polyhedron, Sphere, overlap, read_bounds
-from tests.helpers.scenes import body, clear_scene, tiny_scene
+from tests.helpers.scenes import bounded_medium, clear_scene, tiny_scene
 from tests.helpers.shapes import ball, bounds_of, box
 
 GREY = (0.7, 0.7, 0.7)
@@ -105,7 +105,7 @@ def test_rounding_of_the_corners_is_not_a_dent(variant):
 
 
 def glass(shape):
-    return body(shape, 0.3, GREY) | {"bsdf": {"type": "dielectric"}}
+    return bounded_medium(shape, 0.3, GREY) | {"bsdf": {"type": "dielectric"}}
 
 
 AMBIENT = {"type": "homogeneous", "sigma_t": 0.2, "albedo": 0.5}
@@ -116,12 +116,15 @@ AMBIENT = {"type": "homogeneous", "sigma_t": 0.2, "albedo": 0.5}
     ("changes", "message"),
     [
         (lambda: {"a": glass(box())}, "'a' bounds a medium and has a SmoothDielectric material"),
-        (lambda: {"a": body(box(), 0.3, GREY), "b": body(ball(radius=0.3), 0.3, GREY)}, "'b' and 'a' overlap"),
-        (lambda: {"a": body(box((0, -4.0, 1.0)), 0.3, GREY)}, "the camera is inside of shape 'a'"),
-        (lambda: {"a": body(box(), 0.3, GREY) | {"exterior": AMBIENT}}, "exterior medium of shape 'a'"),
+        (
+            lambda: {"a": bounded_medium(box(), 0.3, GREY), "b": bounded_medium(ball(radius=0.3), 0.3, GREY)},
+            "'b' and 'a' overlap",
+        ),
+        (lambda: {"a": bounded_medium(box((0, -4.0, 1.0)), 0.3, GREY)}, "the camera is inside of shape 'a'"),
+        (lambda: {"a": bounded_medium(box(), 0.3, GREY) | {"exterior": AMBIENT}}, "exterior medium of shape 'a'"),
         (lambda: {"a": box() | {"bsdf": {"type": "null"}, "exterior": AMBIENT}}, "'a' is a hole in a medium"),
         (lambda: {"a": box() | {"bsdf": {"type": "mask", "opacity": 0.5, "nested": {"type": "diffuse"}}}}, "partly"),
-        (lambda: {"a": body({"type": "cylinder"}, 0.3, GREY)}, "is a Cylinder"),
+        (lambda: {"a": bounded_medium({"type": "cylinder"}, 0.3, GREY)}, "is a Cylinder"),
         (lambda: {}, "references no medium"),
     ],
 )

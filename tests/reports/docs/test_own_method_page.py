@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from reports.commands.main import run
-from tests.helpers.scenes import body, tiny_scene
+from tests.helpers.scenes import bounded_medium, tiny_scene
 from validation.configurations.methods import configuration
 
 PAGE = Path(__file__).parents[3] / "docs" / "own-method.md"
@@ -57,7 +57,7 @@ def test_the_worked_example_refuses_by_name_what_it_cannot_do(fog, variant):
     from realtime.scene.read_scene import read_scene
     from validation.frames.benchmark import measure
 
-    ball = body({"type": "sphere", "center": [0.1, 0.1, 0.7], "radius": 0.41}, 0.8, (0.5, 0.5, 0.5))
+    ball = bounded_medium({"type": "sphere", "center": [0.1, 0.1, 0.7], "radius": 0.41}, 0.8, (0.5, 0.5, 0.5))
     scene = tiny_scene(fog=None, ball=ball)
     scene["sensor"] = {key: entry for key, entry in scene["sensor"].items() if key != "medium"}
     found = measure(read_scene(mi.load_dict(scene)), configuration(f"{fog}:interleaved"), truth=None)

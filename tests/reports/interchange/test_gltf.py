@@ -8,7 +8,7 @@ import pytest
 from analytic.errors import InputError
 from reports.interchange.gltf import write_gltf
 from reports.interchange.meshes import SIDES, shape_mesh
-from tests.helpers.scenes import body, spot, tiny_scene
+from tests.helpers.scenes import bounded_medium, spot, tiny_scene
 from validation.scenes.loading import LoadedScene, load_scene
 
 
@@ -139,7 +139,7 @@ def test_lights_are_those_of_the_scene(variant, tmp_path):
 
 
 def test_every_number_in_the_file_is_in_its_bounds(variant, tmp_path):
-    bubble = body({"type": "sphere", "center": [2.0, 0.3, 1.1], "radius": 0.3}, 0.5, (0.5, 0.5, 0.5))
+    bubble = bounded_medium({"type": "sphere", "center": [2.0, 0.3, 1.1], "radius": 0.3}, 0.5, (0.5, 0.5, 0.5))
     one = loaded(bubble=bubble | {"exterior": {"type": "ref", "id": "fog"}})
     write_gltf(tmp_path / "tiny.glb", one)
     document, binary = parts(tmp_path / "tiny.glb")

@@ -8,7 +8,7 @@ import pytest
 from reports.commands.main import run
 from reports.interchange.scene import describe_scene, up_axis
 from reports.tables.scene import description_text
-from tests.helpers.scenes import body, spot, tiny_scene
+from tests.helpers.scenes import bounded_medium, spot, tiny_scene
 from validation.scenes.loading import LoadedScene, load_scene
 from validation.scenes.registry import SCENES
 
@@ -57,8 +57,10 @@ def test_phase_functions_have_their_numbers(variant):
 
 
 def test_bodies_of_media_are_listed_with_their_bounds(variant):
-    ball = body({"type": "sphere", "center": [2.0, 0.3, 1.1], "radius": 0.3}, (0.5, 0.25, 1.0), (0.5, 0.4, 0.3))
-    cube = body({"type": "cube"}, 0.7, (0.5, 0.4, 0.3))
+    ball = bounded_medium(
+        {"type": "sphere", "center": [2.0, 0.3, 1.1], "radius": 0.3}, (0.5, 0.25, 1.0), (0.5, 0.4, 0.3)
+    )
+    cube = bounded_medium({"type": "cube"}, 0.7, (0.5, 0.4, 0.3))
     sensor = {key: entry for key, entry in tiny_scene()["sensor"].items() if key != "medium"}
     found = described(fog=None, sensor=sensor, haze=ball, box=cube, ball=None)
     assert found["medium"] is None

@@ -13,7 +13,7 @@ from reference.quadrature.unbounded import Rays
 from reference.scene.read import TruthLight, read_truth
 from reference.visibility.spot_cone import perpendicular
 from tests.helpers.changes_of_variables import theta_of_x, x_of_theta
-from tests.helpers.scenes import body, spot, tiny_scene
+from tests.helpers.scenes import bounded_medium, spot, tiny_scene
 from validation.estimates.quadrature import truth_image
 from validation.metrics.errors import error_metrics
 from validation.oracles.light_volume import height_field, oracle_airlight, volume_intervals
@@ -217,7 +217,7 @@ def test_what_cannot_be_done_is_refused(variant):
         oracle_airlight(read_truth(scene), [])
     with pytest.raises(InputError, match="got a distance of 0, wanted distances above 0"):
         height_field(ShadowMap(4, np.zeros(150), Projection(None)))
-    ball = body({"type": "sphere", "center": [0, 0, 1], "radius": 0.3}, 0.4, (0.9, 0.9, 0.9))
+    ball = bounded_medium({"type": "sphere", "center": [0, 0, 1], "radius": 0.3}, 0.4, (0.9, 0.9, 0.9))
     ball["exterior"] = {"type": "ref", "id": "fog"}
     bounded = mi.load_dict(tiny_scene(ball=ball))
     with pytest.raises(InputError, match="medium 'ball' has bounds"):
