@@ -5,7 +5,8 @@ A file is one part of scan lines in float32 with ZIP compression, which every vi
 `name.R`, `name.G`, `name.B`; the total, `airlight + surface`, is in plain `R`, `G`, `B`, so that viewers show it.
 
 The binding of OpenEXR 3.5 writes an array with strides as if it were contiguous, drops the upper half of an integer
-attribute, changes the header dictionary that it is given and refuses NumPy's scalars: hence the conversions below.
+attribute, changes the header dictionary that it is given, refuses NumPy's scalars, and leaves out parts that it cannot
+read: hence the conversions and checks below.
 """
 
 import contextlib
@@ -128,12 +129,16 @@ def read_exr(path: str | os.PathLike[str]) -> Image:
     """
     _check_kind(path)
     try:
+        with _quiet(), OpenEXR.File(str(path), header_only=True) as file:
+            declared = len(file.parts)
         with _quiet(), OpenEXR.File(str(path), separate_channels=True) as file:
             # The binding empties its own headers when the file is closed.
             parts = [_Part(part.name(), dict(part.header), _planes(part.channels)) for part in file.parts]
     except (RuntimeError, ValueError, MemoryError, TypeError) as error:
         raise InputError(f"{path} is a broken EXR file: its pixels cannot be read; write or copy it again") from error
-    if not parts or not any(part.planes for part in parts):
+    if len(parts) != declared:  # the binding leaves out a part that it cannot read
+        raise InputError(f"{path} is a broken EXR file: of its {declared} parts {len(parts)} can be read; copy it again")
+    if not any(part.planes for part in parts):
         raise InputError(f"{path} is a broken EXR file: it has no channels; write or copy it again")
     return _image(_channels_of(parts, path), parts[0].header)
 

@@ -42,7 +42,7 @@ def compare(
         str | None,
         typer.Option(
             help="With --scene: the truth at the 'centre' of each pixel, or its mean over the 'area'. By default both "
-            "are computed and kept, which takes about ten times as long as the centres alone, and what fits is used.",
+            "are computed and kept and what fits is used; the means take several times as long as the centres.",
             show_default=False,
         ),
     ] = None,

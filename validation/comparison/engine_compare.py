@@ -146,7 +146,7 @@ def compare_scene(
         For a scene or a file that cannot be read, a layer that is not there, and a size of another aspect than the
         scene's.
     """
-    if margin is not None and not margin > 0:
+    if margin is not None and not 0 < margin < math.inf:
         raise InputError(f"margin: got {margin}, wanted a relative bias above 0, such as 0.005")
     if pixel is not None and pixel not in PIXELS:
         raise InputError(f"--pixel {pixel}; wanted 'centre' or 'area'")
@@ -204,7 +204,8 @@ def relative_bound(truth: TruthImage) -> float:
 
 def lamp_distance(loaded: LoadedScene, truth: TruthImage) -> NDArray[np.float64]:
     """Return how far the nearest lamp is from each pixel, (height, width) [pixels in the middle of the image]."""
-    return truth.light_angle / pixel_angle(read_truth(loaded.scene))
+    angle = pixel_angle(read_truth(loaded.scene))  # zero in an image of one column
+    return truth.light_angle / angle if angle > 0 else np.full(truth.light_angle.shape, math.inf)
 
 
 def scene_of_size(scene: str, size: tuple[int, int], path: str | os.PathLike[str]) -> LoadedScene:

@@ -252,6 +252,19 @@ def test_reads_the_parts_of_a_file(tmp_path):
     assert image.attributes == {"owner": "me"}
 
 
+def test_a_part_that_is_cut_off_is_not_left_out_in_silence(tmp_path, capfd):
+    """The binding returns the other parts, with a word on the terminal."""
+    noise = np.random.default_rng(1).random((3, 64, 64)).astype(np.float32)
+    parts = [(name, {}, dict(zip("RGB", noise))) for name in ("rgba", "fog")]
+    write_parts(tmp_path / "good.exr", parts)
+    good = (tmp_path / "good.exr").read_bytes()
+    for cut in (1, len(good) // 4, len(good) * 3 // 4):
+        (tmp_path / "bad.exr").write_bytes(good[:-cut])
+        with pytest.raises(InputError, match=r"bad\.exr is a broken EXR file"):
+            read_exr(tmp_path / "bad.exr")
+    assert capfd.readouterr() == ("", "")
+
+
 def test_refuses_parts_that_do_not_fit(tmp_path):
     import OpenEXR
 
