@@ -6,8 +6,8 @@
     airlight compare --scene sphere-spot sphere-spot.exr
 
 The interpreter needs the module `bpy` (`pip install bpy==5.0.1` for Python 3.11), or run
-`blender --background --python render_cycles.py -- sphere-spot.json ...`. With `--layers` the file is Blender's multi-layer EXR,
-whose layer ViewLayer.VolumeDir is the airlight. Rendered with Blender 5.0.1; Volume Coefficients came with 4.5.
+`blender --background --python render_cycles.py -- sphere-spot.json ...`. With `--layers` the file is Blender's
+multi-layer EXR, whose layer `ViewLayer.Volume Direct` is the airlight. Rendered with Blender 5.0.1.
 """
 
 import argparse

@@ -51,8 +51,8 @@ def errors_lines(e: PublishedErrors) -> list[str]:
 def colour_lines(c: ColourDifference) -> list[str]:
     """Return the colour differences as text."""
     return [
-        f"CIEDE2000        mean {shown(c.ciede2000_mean)}, p99 {shown(c.ciede2000_p99)}, max {shown(c.ciede2000_max)} at "
-        f"{c.exposure:+.2f} stops; {c.clipped} pixels clipped",
+        f"CIEDE2000        mean {shown(c.ciede2000_mean)}, p99 {shown(c.ciede2000_p99)}, max "
+        f"{shown(c.ciede2000_max)} at {c.exposure:+.2f} stops; {c.clipped} pixels clipped",
         f"Delta E ITP      mean {shown(c.itp_mean)}, p99 {shown(c.itp_p99)}, max {shown(c.itp_max)}, white "
         f"{c.white_luminance:g}, peak {c.peak_luminance:g} cd/m^2; {c.clipped_itp} pixels clipped",
     ]

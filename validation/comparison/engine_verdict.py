@@ -138,6 +138,8 @@ def judge(truth: Array, image: Array, hints: Hints, failures: Sequence[str]) -> 
     reasons = [*failures, *hints.words, *([hints.reason] if hints.reason else [])]
     if not reasons and abs(hints.factor - 1) > RIGHT:
         reasons.append(f"the best factor is {hints.factor:.4g}")
+    if not reasons and math.isnan(error):
+        reasons.append("nothing is lit in the pixels that are compared")
     if error > RIGHT:
         size = "single pixels" if side == 1 else f"means over {side} x {side} pixels"
         most = ", most of it noise: render more samples" if noise > error / math.sqrt(2) else ""

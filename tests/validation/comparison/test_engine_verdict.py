@@ -141,3 +141,5 @@ def test_noise_of_pixels_is_told_from_an_error_of_blocks():
     assert "noise" not in verdict.words
     assert not judge(truth, truth, find_hints(truth, truth), ("2 pixels are negative",)).right
     assert replace(verdict, reasons=()).right
+    dark = judge(0 * truth, 0 * truth, find_hints(truth, truth), ())
+    assert dark.words == "not right: nothing is lit in the pixels that are compared"
