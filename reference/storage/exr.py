@@ -68,7 +68,16 @@ class Image:
 
 
 def layer(image: Image, name: str, path: str | os.PathLike[str] = "the image") -> NDArray[np.floating]:
-    """Return a layer, (height, width, 3); the empty name is the total.
+    """Return a layer in the unit of the file, radiance [W/(m^2 sr)] in ours, (height, width, 3).
+
+    Parameters
+    ----------
+    image
+        The image.
+    name
+        Of the layer; the empty name is the total.
+    path
+        What messages call the image.
 
     Raises
     ------
@@ -94,14 +103,14 @@ def layer_names(image: Image) -> str:
 def write_exr(path: str | os.PathLike[str], image: Image) -> None:
     """Write an image as a single-part float32 EXR, whole or not at all.
 
-    Where there is an airlight, the total in `R`, `G`, `B` is it plus the surface, or it alone. An attribute is kept in
-    32 bits: of a float about 7 digits remain, and a number beyond their range is written as text.
+    If there is an airlight, `R`, `G`, `B` hold the total: the airlight plus the surface, or the airlight alone. The
+    format keeps attributes in 32 bits: a float keeps about 7 digits, and a number beyond their range becomes text.
 
     Raises
     ------
     InputError
-        If the layers are none, of two sizes, of another shape than (height, width, 3), or too large for float32; if a
-        `total` is given that is not the sum; if the name of an attribute is one of the format's own.
+        If there are no layers, or they have two sizes, another shape than (height, width, 3), or values too large for
+        float32; if a `total` is given that is not the sum; if an attribute has a name of the format's own.
     OSError
         If the disk is full; the file is as it was.
     """
@@ -124,8 +133,8 @@ def read_exr(path: str | os.PathLike[str]) -> Image:
     Raises
     ------
     InputError
-        If the file is missing, broken, no EXR, tiled, deep or subsampled, shows a part of its frame, or has a channel
-        twice.
+        If the file is missing, broken, not an EXR file, tiled, deep or subsampled, shows a part of its frame, or has a
+        channel twice.
     """
     _check_kind(path)
     try:
@@ -137,7 +146,9 @@ def read_exr(path: str | os.PathLike[str]) -> Image:
     except (RuntimeError, ValueError, MemoryError, TypeError) as error:
         raise InputError(f"{path} is a broken EXR file: its pixels cannot be read; write or copy it again") from error
     if len(parts) != declared:  # the binding leaves out a part that it cannot read
-        raise InputError(f"{path} is a broken EXR file: of its {declared} parts {len(parts)} can be read; copy it again")
+        raise InputError(
+            f"{path} is a broken EXR file: of its {declared} parts {len(parts)} can be read; copy it again"
+        )
     if not any(part.planes for part in parts):
         raise InputError(f"{path} is a broken EXR file: it has no channels; write or copy it again")
     return _image(_channels_of(parts, path), parts[0].header)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 Row = Mapping[str, str]
 Draw = Callable[[Path, str], "Figure"]  # from the folder of the data and the column
 
-#: Nothing that differs from one run to the next.
+#: Metadata without anything that differs from one run to the next.
 _METADATA: Mapping[str, dict[str, Any]] = {".pdf": {"CreationDate": None}, ".png": {"Software": None}}
 
 
@@ -65,7 +65,7 @@ def draw_figure(
 
 
 def new_figure(width: float, height: float) -> "Figure":
-    """Return an empty figure [inches], laid out so that nothing overlaps; without a window or a global state."""
+    """Return an empty figure of this size [inches], without overlaps, window or global state."""
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout="constrained")
@@ -103,7 +103,7 @@ def write_data(folder: Path, name: str, header: Sequence[str], rows: Iterable[Se
 
 
 def read_data(folder: Path | str, name: str) -> list[dict[str, str]]:
-    """Return the rows of the data of a figure by column; raises InputError where they are missing."""
+    """Return the rows of a figure's data by column; raises InputError if they are missing."""
     return read_csv(Path(folder) / f"{name}.csv", name)
 
 

@@ -15,7 +15,7 @@ SUMMARY = "nanoseconds a ray against the error of each kernel, over its sizes"
 
 _HEADER = ("kernel", "family", "size", "phase", "rays", "ns", "ns_low", "ns_high", "median", "p99", "max", "nonfinite")
 _STATISTICS = {"median": "half of the rays", "p99": "99 % of the rays", "max": "worst ray"}
-_SHOWN = (1e-7, 10.0)  # errors; what lies outside is drawn at the edge
+_SHOWN = (1e-7, 10.0)  # errors; those outside are drawn at the edge
 
 
 def compute(
@@ -36,15 +36,15 @@ def compute(
     names
         Kernels; all of them by default.
     progress
-        Told the share done and what comes next.
+        Called with the share done and what comes next.
     """
     from validation.kernels.benchmark import PHASES, RAYS, bench_kernels
 
     target = ensure_folder(folder)
     rays, seconds = (RAYS // 16, 0.02) if quick else (RAYS // 2, 0.1)
-    found = bench_kernels(names, phases=PHASES[:1], rays=rays, seconds=seconds, progress=counted(progress))
+    measured = bench_kernels(names, phases=PHASES[:1], rays=rays, seconds=seconds, progress=counted(progress))
     rows = []
-    for cost in found.costs:
+    for cost in measured.costs:
         time = cost.device or cost.wall
         if cost.refused or time is None:
             continue

@@ -17,7 +17,7 @@ from reports.plotting.style import WIDTHS, method_style
 NAME = "map-size"
 SUMMARY = "error of the airlight against the size of the shadow map, with slopes"
 
-#: What is measured: a method with the parameters that leave the map alone to limit its accuracy.
+#: The methods, with parameters for which only the map limits the accuracy.
 METHODS: tuple[tuple[str, dict[str, Any]], ...] = (
     ("light-volumes", {}),
     ("min-max", {"sampling": "pixels", "slices": 4096}),
@@ -49,7 +49,7 @@ def compute(
     sizes
         Of the shadow map [texels].
     progress
-        Told the share done and what comes next.
+        Called with the share done and what comes next.
     """
     from validation.frames.map_size import map_errors
     from validation.scenes.loading import load_scene
@@ -61,10 +61,10 @@ def compute(
     rows: list[tuple] = []
     for number, (method, parameters) in enumerate(METHODS):
         step = counted(part_of(progress, number / len(METHODS), (number + 1) / len(METHODS)))
-        found = map_errors(loaded.scene, method, parameters=parameters, sizes=chosen, progress=step)
-        order = (found.slope.order, found.slope.standard_error)
-        name = found.configuration.label
-        for size, error in zip(found.sizes, found.metrics):
+        study = map_errors(loaded.scene, method, parameters=parameters, sizes=chosen, progress=step)
+        order = (study.slope.order, study.slope.standard_error)
+        name = study.configuration.label
+        for size, error in zip(study.sizes, study.metrics):
             errors = (error.relative_rmse, error.relative_bias, error.p99)
             rows.append((name, method, loaded.name, size, *errors, *order))
     write_data(target, NAME, _HEADER, rows, scene=scene, image=image, sizes=chosen)

@@ -39,13 +39,13 @@ def compute(folder: Path | str, *, report: Path | str) -> None:
     rows = []
     for scene in data["scenes"]:
         bound = (scene["truth"] or {}).get("relative_bound")
-        for one in scene["methods"]:
-            error, times = one["error"] or {}, one["times"] or {}
+        for entry in scene["methods"]:
+            error, times = entry["error"] or {}, entry["times"] or {}
             timings = [times.get(name) or {} for name in _TIMES]
             shown = (timing.get(key) for timing in timings for key in _ENDS.values())
             errors = [error.get(name) for name in (*_ERRORS, "nonfinite")]
-            what = (scene["name"], *scene["size"], one["label"], one.get("layer", "airlight"))
-            rows.append((*what, *shown, timings[0].get("repetitions"), *errors, bound, one["refused"]))
+            what = (scene["name"], *scene["size"], entry["label"], entry.get("layer", "airlight"))
+            rows.append((*what, *shown, timings[0].get("repetitions"), *errors, bound, entry["refused"]))
     settings = {name: data["settings"].get(name) for name in ("image", "timed")}
     write_data(target, NAME, _HEADER, rows, **report_origin(report, data), settings=settings)
 

@@ -41,7 +41,7 @@ def compute(
     quick
         Measure at a quarter of the published size, Billeter's Table 1 for its smallest map.
     progress
-        Told the share done and what comes next.
+        Called with the share done and what comes next.
     """
     target = ensure_folder(folder)
     papers, origin = reported_papers(report)
@@ -78,7 +78,7 @@ def _draw(folder: Path, column: str):
 
 
 def _scale(row: dict[str, str]) -> str:
-    """Say of what size the images are, where it is not the published one."""
+    """Return the size of the images in words, if it is not the published one."""
     scale = int(row["width"]) / int(row["published_width"])
     return "" if scale == 1 else f", here at {100 * scale:.3g} % of its size"
 
@@ -109,7 +109,7 @@ def _panel(panel, rows: list[dict[str, str]]) -> None:
 
 def _measured(panel, row: dict[str, str], height: float, style: dict[str, Any]) -> None:
     middle, low, high = (value(row, name) for name in ("fps", "fps_low", "fps_high"))
-    if middle is not None and low is not None and high is not None:  # what was not measured has its name alone
+    if middle is not None and low is not None and high is not None:  # a row without a measurement has its name alone
         panel.errorbar([middle], [height], xerr=[[middle - low], [high - middle]], **style)
 
 
@@ -141,6 +141,6 @@ def _cells(row: dict[str, str]) -> tuple[Value, ...]:
     size = "" if as_published else f"{', ' if variant else ''}{pixels(row)}"
     shown = None if fps is None or low is None or high is None else Measured(fps, low, high)
     ratio = fps / published if fps and published and as_published else None
-    # A published figure has the digits that were printed.
+    # Published numbers keep the digits that were printed.
     printed = None if published is None else int(published) if published == int(published) else published
     return (row["row"], variant + size, printed, shown, ratio, value(row, "relative_rmse"))

@@ -19,10 +19,10 @@ NAME = "z-distribution"
 SUMMARY = "distribution of z of single-scatter and volpath against the quadrature truth"
 
 SCENE = "open-fog"
-#: With the samples a pixel in each batch: volpath's batch means need more of them to come close to the normal law.
+#: Samples a pixel in each batch; volpath needs more of them until its batch means are nearly normal.
 ESTIMATORS = {"single-scatter": 64, "volpath": 256}
 _BATCHES = 64
-_EDGE, _BINS = 5.0, 50  # of the histogram; what lies beyond is counted in the outermost bins
+_EDGE, _BINS = 5.0, 50  # of the histogram; values beyond are counted in the outermost bins
 _HEADER = ("estimator", "low", "high", "count", "expected", "normal", "tested", "batches", "z_mean", "z_std")
 
 
@@ -44,7 +44,7 @@ def compute(
     scene
         A built-in scene or the path of a Mitsuba XML file.
     progress
-        Told the share done and what comes next.
+        Called with the share done and what comes next.
     """
     import numpy as np
     from scipy.stats import norm, t
@@ -65,7 +65,7 @@ def compute(
         laws = (len(z) * np.diff(law) for law in (t.cdf(outer, _BATCHES - 1), norm.cdf(outer)))
         shared = (len(z), _BATCHES, float(z.mean()), float(z.std()))
         bins = zip(edges[:-1].tolist(), edges[1:].tolist(), counts.tolist(), *(law.tolist() for law in laws))
-        rows += [(estimator, *one, *shared) for one in bins]
+        rows += [(estimator, *counted_bin, *shared) for counted_bin in bins]
     write_data(target, NAME, _HEADER, rows, scene=scene, image=image, batches=_BATCHES, samples=ESTIMATORS)
 
 
@@ -78,9 +78,9 @@ def _z(scene, estimator: str, samples: int, progress):
     from validation.estimates.monte_carlo import monte_carlo_batches
 
     expected, mask = estimator_truth(scene, estimator)
-    found = monte_carlo_batches(scene, estimator, batches=_BATCHES, samples=samples, progress=progress).batches
-    estimate = batch_estimate(found, "airlight", mask)
-    error, mean = (np.asarray(one)[mask] for one in (estimate.standard_error, estimate.mean))
+    batches = monte_carlo_batches(scene, estimator, batches=_BATCHES, samples=samples, progress=progress).batches
+    estimate = batch_estimate(batches, "airlight", mask)
+    error, mean = (np.asarray(layer)[mask] for layer in (estimate.standard_error, estimate.mean))
     channel = int(np.argmax(expected.sum(axis=0) > 0))
     tested = error[:, channel] > 0
     return ((mean - expected)[:, channel] / np.where(tested, error[:, channel], 1.0))[tested]
@@ -106,7 +106,7 @@ def _draw(folder: Path, column: str):
         middle = 0.5 * (low + high)
         panel.bar(low, count, high - low, align="edge", color=COLOURS["sky"], label="pixels")
         panel.plot(middle, expected, label=f"Student's law, {int(chosen[0]['batches']) - 1} degrees", **truth_style())
-        # Counts of independent pixels spread like Poisson's law.
+        # Counts of independent pixels follow Poisson's law.
         panel.fill_between(
             middle,
             expected - 2 * np.sqrt(expected),

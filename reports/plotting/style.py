@@ -18,7 +18,7 @@ from typing import Any
 
 from analytic.errors import InputError
 
-#: Of any two of `COLOURS`, in CIEDE2000, under normal sight and without one kind of cones.
+#: Least difference of any two `COLOURS` in CIEDE2000, under normal sight and without one kind of cones.
 LEAST_DIFFERENCE = 10.0
 
 COLOURS: Mapping[str, str] = {
@@ -114,10 +114,10 @@ def report_styles(scenes: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, An
     """
     variants: dict[str, list[str]] = {}
     for scene in scenes:
-        for one in scene["methods"]:
-            labels = variants.setdefault(one["method"], [])
-            if one["label"] not in labels:
-                labels.append(one["label"])
+        for entry in scene["methods"]:
+            labels = variants.setdefault(entry["method"], [])
+            if entry["label"] not in labels:
+                labels.append(entry["label"])
     others = [method for method in variants if method not in _METHODS]
     styles = {}
     for method, labels in variants.items():

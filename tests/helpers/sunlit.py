@@ -79,8 +79,8 @@ def render(scene, method="unshadowed", *, precision="double", **parameters):
     return render_frame(frame_renderer(scene, chosen, kernel=kernel, **parameters))
 
 
-def relative_rmse(one, two) -> float:
-    return float(np.sqrt(np.mean((np.asarray(one, dtype=np.float64) - two) ** 2)) / np.mean(two))
+def relative_rmse(image, reference) -> float:
+    return float(np.sqrt(np.mean((np.asarray(image, dtype=np.float64) - reference) ** 2)) / np.mean(reference))
 
 
 def rays(scene) -> tuple[Array, Array]:
@@ -111,9 +111,9 @@ def box_part(centre=CUBE_AT, sides=SIDES, sigma_t=1.1, g=0.4, turn=TURN) -> Part
     def chord(start, direction):
         p, d = (start - np.asarray(centre)) @ turn, np.broadcast_to(direction, start.shape) @ turn
         with np.errstate(divide="ignore", invalid="ignore"):
-            one, other = (-0.5 * np.asarray(sides) - p) / d, (0.5 * np.asarray(sides) - p) / d
-        low = np.maximum(np.fmin(one, other).max(axis=-1), 0)
-        return low, np.maximum(np.fmax(one, other).min(axis=-1), low)
+            low_sides, high_sides = (-0.5 * np.asarray(sides) - p) / d, (0.5 * np.asarray(sides) - p) / d
+        low = np.maximum(np.fmin(low_sides, high_sides).max(axis=-1), 0)
+        return low, np.maximum(np.fmax(low_sides, high_sides).min(axis=-1), low)
 
     return Part(chord, np.full(3, sigma_t), np.array([0.2, 0.5, 0.9]), g)
 

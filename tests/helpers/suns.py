@@ -34,7 +34,7 @@ def brick(sigma_t: Any = (0.9, 0.5, 0.2), albedo=(0.9, 0.4, 0.3), **medium: Any)
 
 
 def pearl(sigma_t: Any = 1.3, albedo=(0.2, 0.5, 0.8), **medium: Any) -> dict[str, Any]:
-    """Return a ball of fog."""
+    """Return a sphere of fog."""
     return bounded_medium(
         {"type": "sphere", "center": PEARL[0].tolist(), "radius": PEARL[1]}, sigma_t, albedo, **medium
     )
@@ -48,7 +48,7 @@ def sunny(*, size=(12, 9), **changes: Any) -> dict[str, Any]:
 
 
 def ball_over_floor() -> dict[str, Any]:
-    """Return the entries of the ball and the floor of the tiny scene."""
+    """Return the entries of the sphere and the floor of the tiny scene."""
     return {name: tiny_scene()[name] for name in ("ball", "floor")}
 
 
@@ -60,8 +60,8 @@ def chord(name: str, origin, direction) -> tuple[Any, Any]:
         root = np.sqrt(np.maximum(b * b - c, 0))
         return np.where(b * b > c, -b - root, 0), np.where(b * b > c, -b + root, 0)
     with np.errstate(divide="ignore"):
-        one, two = ((BRICK[0] + sign * BRICK[1] - origin) / direction for sign in (-1, 1))
-    low, high = np.minimum(one, two).max(axis=-1), np.maximum(one, two).min(axis=-1)
+        low_sides, high_sides = ((BRICK[0] + sign * BRICK[1] - origin) / direction for sign in (-1, 1))
+    low, high = np.minimum(low_sides, high_sides).max(axis=-1), np.maximum(low_sides, high_sides).min(axis=-1)
     return np.where(high > low, low, 0), np.where(high > low, high, 0)
 
 

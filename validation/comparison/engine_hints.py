@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What may be wrong with an image as a whole: a constant factor, another way up, a gamma, values that stop at one.
 
-Such a fault of set-up hides everything else. For each combination of suspects the root mean square error is computed
-again with the fault taken back; those are named that make it ten times smaller, the fewest first.
+Such a fault of set-up hides everything else. For each combination of suspects this module takes the faults back,
+computes the root mean square error again, and names those that make it ten times smaller, the fewest first.
 
 The radiance grows without bound towards a lamp, so that one pixel beside it can have most of the error, whatever the
 others are like. Therefore the error that decides leaves out a hundredth of the values that are lit, the worst; and the

@@ -73,11 +73,11 @@ class Bar:
     The quantiles describe the certified cases; how many generated rays are hard is a matter of taste.
     """
 
-    single_max: float = 3e-5  #: for |g| <= 0.9
-    single_max_sharp: float = 1e-4  #: for |g| up to 0.95
-    single_p99: float = 3e-6
-    single_median: float = 3e-7
-    double_max: float = 1e-10
+    single_max: float = 3e-5  #: in float32, for |g| <= 0.9
+    single_max_sharp: float = 1e-4  #: in float32, for |g| up to 0.95
+    single_p99: float = 3e-6  #: 99 % quantile in float32
+    single_median: float = 3e-7  #: median in float32
+    double_max: float = 1e-10  #: in float64
 
 
 def certified_files() -> tuple[Path, ...]:

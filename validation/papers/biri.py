@@ -62,10 +62,10 @@ KERNELS = ("exact", "taylor")
 class Published:
     """The published results for a scene."""
 
-    scene: str
-    where: str
-    size: tuple[int, int]
-    fps: float
+    scene: str  #: name of the built-in scene that stands for it
+    where: str  #: table, figure or section of the paper
+    size: tuple[int, int]  #: of the frame [pixels]
+    fps: float  #: frames a second [1/s]
     shares: tuple[float, ...] | None = None  #: of the stages in Table 1 [%]
     note: str = ""
     cone: int = 0  #: edges of the paper's cone over the spot; 0: no spot

@@ -82,6 +82,6 @@ def test_z_follows_its_law(variant, tmp_path):
     assert count.sum() == pytest.approx(float(rows[0]["tested"]))
     assert expected.sum() == pytest.approx(float(rows[0]["tested"]), rel=1e-6)
     large = expected >= 5
-    count, expected = (np.append(one[large], one[~large].sum()) for one in (count, expected))
+    count, expected = (np.append(counts[large], counts[~large].sum()) for counts in (count, expected))
     assert np.sum((count - expected) ** 2 / expected) < chi2.isf(1e-4, len(count) - 1)
     assert drawn(figure_z_distribution, tmp_path) == drawn(figure_z_distribution, tmp_path)

@@ -93,7 +93,7 @@ def test_frames_record_nothing_and_compile_nothing(variant, name, moves):
         with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
             dr.kernel_history_clear()
             _, kept = next_frame(renderer, moved, kept, **moved_parts(animation))
-            compiled = [one for one in dr.kernel_history() if one.get("cache_hit") is False]
+            compiled = [kernel for kernel in dr.kernel_history() if kernel.get("cache_hit") is False]
         if number:
             assert not compiled
     assert renderer.render.n_recordings == 1
