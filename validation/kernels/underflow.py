@@ -20,8 +20,8 @@ So a value is right, on every processor, where
 
 with n = 8 nodes, those of the longest rule in x and of one panel, and upper bounds in the place of L and V:
 
-* L ends 87/sigma_t behind the foot or the beginning, whichever is later: from there on f falls by e^-87 = t, and what is
-  left is below t V. It ends at 2^63 m in any case: there p/r^2 itself is t.
+* L ends 87/sigma_t behind the foot or the beginning, whichever is later: from there on f falls by e^-87 = t, and what
+  is left is below t V. It ends at 2^63 m in any case: there p/r^2 itself is t.
 * V = int p/r^2 dx is at most the largest p times L/r^2, r the least distance to the light, and times pi/h, all angles.
 
 The allowance a is in the units of J, and it is small: relative to V it is 1e-38 for the exponential, and n r^2 1e-38

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Protects the claim that a value which underflows breaks no bar, on any processor, and that nothing else is let off."""
+"""Protects the claim that a value which underflows breaks no bar, on any processor, and nothing else is let off."""
 
 from dataclasses import replace
 
