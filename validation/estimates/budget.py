@@ -80,7 +80,7 @@ def _power_of_two(number: int) -> int:
 
 @dataclass(frozen=True)
 class RelativeErrors:
-    """Relative standard errors of an image, see the module; 0 where nothing is lit."""
+    """Relative standard errors of an image, see the module; 0 where nothing is lit, infinite where one is no number."""
 
     pooled: float
     worst: float
@@ -93,6 +93,8 @@ def relative_errors(batches: Batches, near: NDArray[np.bool_]) -> RelativeErrors
         keep = ~near if layer == "airlight" else np.ones_like(near)
         mean, error = batches.mean[number][keep], batches.standard_error[number][keep]
         total = mean.sum(axis=0)
+        if not (np.isfinite(total).all() and np.isfinite(error).all()):
+            return RelativeErrors(np.inf, np.inf)  # no target is met by what is no number
         lit = total > 0
         if not lit.any():
             continue
