@@ -45,6 +45,7 @@ def bench(
         return
     from realtime.methods.registry import METHODS
     from realtime.scene.read_scene import read_scene
+    from reports.commands.printing import print_notes
     from reports.machine.environment import activate
     from reports.machine.progress import part_of, progress_bar
     from reports.tables.terminal import print_json
@@ -60,7 +61,7 @@ def bench(
     activate()
     names = scenes or list(SCENES)
     for name in names:  # refuse what cannot be used before an hour of work, not after
-        read_scene(load_scene(name, pixels).scene)
+        print_notes(read_scene(load_scene(name, pixels).scene).features.notes)
     found = []
     with progress_bar("bench") as progress:
         for number, name in enumerate(names):

@@ -40,6 +40,7 @@ def render(
     moves is made anew. Ctrl-C keeps the frames that are finished.
     """
     from realtime.scene.read_scene import read_scene
+    from reports.commands.printing import print_notes
     from reports.machine.environment import activate
     from validation.configurations.methods import configuration, parse_settings
     from validation.scenes.loading import load_scene, parse_size
@@ -52,6 +53,8 @@ def render(
     variant = activate()
     loaded = load_scene(scene, parse_size(size) if size else None)
     read = read_scene(loaded.scene, precision)
+    if not plan:
+        print_notes(read.features.notes)
     if plan:
         _print_plan(read, chosen, json=json)
     elif frames is None:

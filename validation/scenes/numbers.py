@@ -19,6 +19,7 @@ LARGEST_LENGTH = 1e9  #: of a coordinate or a radius [m], also of an extinction 
 LARGEST_LIGHT = 1e18  #: of an intensity [W/sr] or an irradiance [W/m^2]
 
 _LIGHT = ("intensity", "irradiance", "radiance")
+_NOT_NEGATIVE = (*_LIGHT, "sigma_t", "albedo", "scale")
 _CLIP = ("near_clip", "far_clip")  # no method takes them
 _NO_MATTER = ("vertex_texcoords",)
 _LEAST_SCALE = 1e-15  # of an axis of a transform [m]
@@ -86,11 +87,13 @@ def _check(name: str, key: str, values: NDArray[np.float64]) -> None:
         return
     light = any(word in _LIGHT for word in words)
     largest = np.inf if words[-1] in _CLIP else LARGEST_LIGHT if light else LARGEST_LENGTH
-    wrong = ~(np.abs(values) <= largest)
+    least = 0.0 if any(word in _NOT_NEGATIVE for word in words) else -largest
+    wrong = ~((values >= least) & (values <= largest))
     if wrong.any():
         given = f"{values[wrong].ravel()[0]:g}"
         given += f" in {int(wrong.sum())} of {values.size} places" if values.size > 1 else ""
-        raise InputError(f"{name}: {key} has {given}; wanted finite numbers of at most {largest:g}: use other units")
+        wanted = f"finite numbers {'from 0 to' if least == 0 else 'of at most'} {largest:g}"
+        raise InputError(f"{name}: {key} has {given}; wanted {wanted}: use other units, or the right sign")
     if words[-1] == "to_world":
         _check_transform(name, key, values.reshape(4, 4))
 
