@@ -13,6 +13,7 @@ import io
 import json
 import math
 import os
+import struct
 import sys
 import tempfile
 import traceback
@@ -65,15 +66,15 @@ def cloud(sigma_t: str = "1, 1, 1", shape: str = "", name: str = ' id="cloud"') 
 
 
 def mesh(vertices: str, faces: str, folder: Path, *, boundary: bool = False) -> str:
-    """Write a mesh as PLY and return the shape."""
-    corners, sides = vertices.strip().split("\n"), faces.strip().split("\n")
+    """Write a mesh as binary PLY, which holds any float32 number, and return the shape."""
+    corners, sides = ([line.split() for line in text.split("\n")] for text in (vertices, faces))
+    header = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(corners)}\n"
+    header += "".join(f"property float {axis}\n" for axis in "xyz")
+    header += f"element face {len(sides)}\nproperty list uchar int vertex_indices\nend_header\n"
+    places = b"".join(struct.pack("<f", float(one)) for corner in corners for one in corner)
+    indices = b"".join(struct.pack("<Biii", *(int(one) for one in side)) for side in sides)
     path = folder / "mesh.ply"
-    path.write_text(
-        f"ply\nformat ascii 1.0\nelement vertex {len(corners)}\nproperty float x\nproperty float y\nproperty float z\n"
-        f"element face {len(sides)}\nproperty list uchar int vertex_indices\nend_header\n"
-        + "\n".join([*corners, *sides])
-        + "\n"
-    )
+    path.write_bytes(header.encode() + places + indices)
     inside = '<bsdf type="null"/><ref name="interior" id="fog"/>' if boundary else ""
     return f'<shape type="ply" id="mesh"><string name="filename" value="{path}"/>{inside}</shape>'
 
@@ -99,7 +100,7 @@ def numbers(folder: Path) -> Iterator[tuple[str, str]]:
 def geometry(folder: Path) -> Iterator[tuple[str, str]]:
     """Yield scenes whose camera or shapes are degenerate."""
     square, two = "0 0 0\n1 0 0\n1 1 0\n0 1 0", "3 0 1 2\n3 0 2 3"
-    for number, odd in enumerate(("nan", "inf", "1e30", "1e39")):
+    for number, odd in enumerate(("nan", "inf", "1e30", "-1e30")):
         own = folder / str(number)
         own.mkdir()
         yield f"vertex {odd}", scene(extra=mesh(square.replace("1 1 0", f"{odd} 1 0"), two, own))
@@ -167,8 +168,9 @@ def lights(folder: Path) -> Iterator[tuple[str, str]]:
     yield "faint", scene(intensity="1e-38, 1e-38, 1e-38")
     yield "faintest", scene(intensity="1e-44, 0, 0")
     yield "bright", scene(intensity="1e18, 1e18, 1e18")
-    yield "two lights, one at the camera", scene(
-        extra='<emitter type="point"><point name="position" x="0" y="-5" z="1"/></emitter>'
+    yield (
+        "two lights, one at the camera",
+        scene(extra='<emitter type="point"><point name="position" x="0" y="-5" z="1"/></emitter>'),
     )
     spot = '<emitter type="spot" id="lamp"><transform name="to_world"><lookat origin="{}" target="{}" up="{}"/>'
     spot += '</transform><rgb name="intensity" value="{}"/><float name="cutoff_angle" value="{}"/></emitter>'
@@ -211,7 +213,9 @@ def _orders(kind: str, path: Path) -> list[list[str]]:
         ["reference", str(path), "--json", "-o", str(out / "sampled.exr"), *sampled, "single-scatter"],
         ["reference", str(path), "--json", "-o", str(out / "traced.exr"), "--spp", "64", "--estimator", "volpath"],
     ]
-    for number, method in enumerate(("ray-march", "ray-march", "unshadowed", "shadow-planes", "light-volumes", "min-max")):
+    for number, method in enumerate(
+        ("ray-march", "ray-march", "unshadowed", "shadow-planes", "light-volumes", "min-max")
+    ):
         settings = [] if method in ("unshadowed", "shadow-planes") else ["--set", "map=64"]
         settings += ["--set", "shadow=map"] if number == 1 else []
         file = out / f"frame-{number}.exr"
@@ -238,7 +242,11 @@ def _fault(order: list[str]) -> tuple[str, str]:
 
     output, errors = io.StringIO(), io.StringIO()
     written = Path(order[order.index("-o") + 1]) if "-o" in order else None
-    with contextlib.redirect_stdout(output), contextlib.redirect_stderr(errors), warnings.catch_warnings(record=True) as told:
+    with (
+        contextlib.redirect_stdout(output),
+        contextlib.redirect_stderr(errors),
+        warnings.catch_warnings(record=True) as told,
+    ):
         warnings.simplefilter("always")
         try:
             status = run(order)
@@ -255,7 +263,9 @@ def _fault(order: list[str]) -> tuple[str, str]:
                 return "0", "JSON is not finite"
         if written is not None and not _finite_file(written):
             return "0", f"{written.name} is not finite"
-    elif status == 2 and not any(word in said for word in ("wanted", "move", "give", "use ", "cannot", "finite", "mend")):
+    elif status == 2 and not any(
+        word in said for word in ("wanted", "move", "give", "use ", "cannot", "finite", "mend")
+    ):
         return "2", f"says nothing of what is wanted: {said}"
     elif status not in (1, 2):
         return str(status), said

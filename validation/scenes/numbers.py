@@ -50,21 +50,15 @@ def check_numbers(scene: Any) -> None:
 
 
 def _plugins(scene: Any) -> Iterator[tuple[str, Any]]:
-    """Yield the parts of a scene under names that a user knows."""
-    media: dict[str, Any] = {}
-    for number, sensor in enumerate(scene.sensors(), 1):
-        yield _name("camera", sensor, number), sensor
-        media |= _named_media(sensor.get_medium())
-    for number, emitter in enumerate(scene.emitters(), 1):
-        yield _name("light", emitter, number), emitter
-    for number, shape in enumerate(scene.shapes(), 1):
-        yield _name("shape", shape, number), shape
-        media |= _named_media(shape.interior_medium(), shape.exterior_medium())
-    yield from media.items()
-
-
-def _named_media(*media: Any) -> dict[str, Any]:
-    return {f"medium '{medium.id()}'": medium for medium in media if medium is not None}
+    """Yield the parts of a scene under names that a user knows; media first, which are parts of others too."""
+    media = [sensor.get_medium() for sensor in scene.sensors()]
+    for shape in scene.shapes():
+        media += [shape.interior_medium(), shape.exterior_medium()]
+    parts = (("medium", media), ("camera", scene.sensors()), ("light", scene.emitters()), ("shape", scene.shapes()))
+    for kind, plugins in parts:
+        for number, plugin in enumerate(plugins, 1):
+            if plugin is not None:
+                yield _name(kind, plugin, number), plugin
 
 
 def _name(kind: str, plugin: Any, number: int) -> str:
