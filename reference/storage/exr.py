@@ -185,8 +185,8 @@ def _check_finite(image: Image) -> None:
         if wrong.any():
             row, column = np.argwhere(wrong)[0]
             raise InputError(
-                f"layer '{name}': {int(wrong.sum())} of {wrong.size} pixels are not finite, first in column {column} of "
-                f"row {row}; an image is written whole, or with finite=False as it is"
+                f"layer '{name}': {int(wrong.sum())} of {wrong.size} pixels are not finite, first in column "
+                f"{column} of row {row}; an image is written whole, or with finite=False as it is"
             )
 
 

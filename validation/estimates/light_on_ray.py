@@ -1,14 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 r"""Which truths are refused: infinite ones, of rays that meet a light, and what is not finite for any other reason.
 
-With q = (x - t) + r, t the foot of the light and h its distance from the ray (DESIGN section 2),
+With q = (x - t) + r = h E, t the foot of the light and h its distance from the ray (DESIGN section 2),
 
-    J = int_{q0}^{q1} exp(-sigma_t (t + q)) p((h^2 - q^2)/(h^2 + q^2)) 2/(h^2 + q^2) dq.
+    h J = int_{q0/h}^{q1/h} exp(-sigma_t (t + h E)) p((1 - E^2)/(1 + E^2)) 2/(1 + E^2) dE.
 
-Let h go to 0 for a ray that passes the light, q0 < h < q1. The Lorentzian 2/(h^2 + q^2) has the weight 2/h atan(q1/h)
-and becomes pi/h times a delta at q = 0, of which p takes what lies in front of the light and behind it, cos from +1 to
--1. So h J tends to a number above 0: J and the radiance grow like 1/h, without a bound. A light at the camera, t = 0, h =
-0, is on every ray. It makes no difference to a sampler that its samples are finite: their mean is infinite.
+Let h go to 0. On a ray that passes the light q0 = O(h^2) and q1 > 0, so that the range becomes all E > 0 and the
+exponential that of t alone:
+
+    h J -> exp(-sigma_t t) int_0^inf p((1 - E^2)/(1 + E^2)) 2/(1 + E^2) dE > 0,        pi exp(-sigma_t t) for p = 1.
+
+J and the radiance grow like 1/h, without a bound. A ray that ends at the light has E up to 1, one that begins there, at
+the camera, E from 1 on: parts of the same integral. A light at the camera is on every ray. That the samples of an
+estimator are finite makes no difference: their mean is infinite.
 
 The mean over the area of a pixel is finite, since int 2 pi h dh / h is: `pixel="area"` is refused only where the camera
 is at the light.
@@ -45,8 +49,8 @@ def check_camera(truth: TruthScene) -> None:
         distance = float(np.linalg.norm(light.position - truth.origin))
         if distance <= _uncertainty(truth, light) and _scatters(truth, light):
             raise InputError(
-                f"{_name(number, light)} is {distance:.3g} m from the camera: the airlight, which grows like 1/distance, "
-                "is infinite in every pixel; move the light or the camera"
+                f"{_name(number, light)} is {distance:.3g} m from the camera: the airlight, which grows like "
+                "1/distance, is infinite in every pixel; move the light or the camera"
             )
 
 
@@ -75,9 +79,9 @@ def check_rays(truth: TruthScene, distance: Array) -> None:
             pixel = int(np.argmax(meets))
             row, column = divmod(pixel, truth.width)
             raise InputError(
-                f"{_name(number, light)} is {height[pixel]:.3g} m from the ray through the centre of the pixel in column "
-                f"{column} of row {row}: the airlight there, which grows like 1/distance, is infinite; move the light "
-                "or the camera, take another size, or the mean over pixels (--pixel area)"
+                f"{_name(number, light)} is {height[pixel]:.3g} m from the ray through the centre of the pixel in "
+                f"column {column} of row {row}: the airlight there, which grows like 1/distance, is infinite; move the "
+                "light or the camera, take another size, or the mean over pixels (--pixel area)"
             )
 
 

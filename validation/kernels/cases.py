@@ -46,8 +46,8 @@ def integrate_cases(cases: Cases, kernel: str, precision: str) -> Array:
         if large.any():
             row = int(np.argmax(large))
             raise InputError(
-                f"{_place(cases, row)}: {name} is {values[row]:g}; wanted at most {LARGEST[precision]:g} in {precision} "
-                "precision: use other units"
+                f"{_place(cases, row)}: {name} is {values[row]:g}; wanted at most {LARGEST[precision]:g} in "
+                f"{precision} precision: use other units"
             )
     results = np.empty(len(cases.x0))
     for name in dict.fromkeys(cases.phase):
@@ -80,8 +80,8 @@ def check_results(cases: Cases, results: Array, kernel: str) -> None:
         if cases.height[row] < 1e-30 and cases.x0[row] <= cases.foot[row] <= cases.x1[row]:
             hint = "the light lies on the segment, and J, which grows like 1/height, is infinite: give a larger height"
         raise InputError(
-            f"{_place(cases, row)}: the result is {results[row]:g}, and {int(wrong.sum())} of {len(results)} rows are not "
-            f"finite; {hint}"
+            f"{_place(cases, row)}: the result is {results[row]:g}, and {int(wrong.sum())} of {len(results)} rows are "
+            f"not finite; {hint}"
         )
 
 

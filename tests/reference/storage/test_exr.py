@@ -82,8 +82,8 @@ def test_what_is_not_finite_is_not_written(tmp_path, odd, layer):
     layers[layer][1, 2, 0] = odd
     with pytest.raises(InputError, match=f"layer '{layer}': 1 of 6 pixels are not finite, first in column 2 of row 1"):
         write_exr(tmp_path / "a.exr", Image(layers))
+    depth = np.array([[np.nan, np.inf], [1.0, 2.0]])
     with pytest.raises(InputError, match="layer 'depth': 1 of 4 pixels"):
-        depth = np.array([[np.nan, np.inf], [1.0, 2.0]])
         write_exr(tmp_path / "a.exr", Image({"airlight": np.ones((2, 2, 3))}, depth))
     assert list(tmp_path.iterdir()) == []
     write_exr(tmp_path / "a.exr", Image({"airlight": np.ones((1, 1, 3))}, np.array([[np.inf]])))  # nothing was hit
