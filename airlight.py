@@ -55,7 +55,7 @@ if TYPE_CHECKING:  # for editors, which complete names from here; `_API` says th
     from validation.metrics.errors import error_metrics as error_metrics
     from validation.scenes.registry import SCENES as SCENES
 
-# name -> module; what is not named here is no part of the API.
+# name -> module; names that are missing here are not part of the API
 _API = {
     "load_scene": "reports.api.images",
     "render": "reports.api.images",

@@ -42,7 +42,7 @@ class Cases:
     value: Array | None  #: J [1/m] as given by the file
     tag: tuple[str, ...] | None  #: kind of each case as given by the file
     origin: Array | None  #: (n, 3) [m], where the file gives rays
-    direction: Array | None  #: (n, 3), where the file gives rays
+    direction: Array | None  #: unit vectors, (n, 3), where the file gives rays
     light: Array | None  #: (n, 3) [m], where the file gives rays
     header: tuple[str, ...]  #: names of all columns of the file
     rows: tuple[tuple[str, ...], ...]  #: the text of all columns, to write the table out again; none from memory
@@ -67,7 +67,13 @@ def read_cases(path: str | Path) -> Cases:
 
 
 def checked_cases(table: "Table") -> Cases:
-    """Return the cases of a table; raises `InputError` as `read_cases` does."""
+    """Return the cases of a table.
+
+    Raises
+    ------
+    InputError
+        As `read_cases` does.
+    """
     header = table.header
     rays = "t" not in header and any(name in header for name in _RAY)
     table.require("phase", *(_RAY if rays else _FOOT), "x0", "x1", "sigma_t")
@@ -109,7 +115,10 @@ def checked_cases(table: "Table") -> Cases:
 
 
 def integrate_cases(cases: Cases, *, rtol: float = 1e-10) -> tuple[Array, Array]:
-    """Return J and its error estimate [1/m] for every case, by `analytic.panels.airlight_segments`."""
+    """Return J and its error estimate [1/m] for every case, (cases,), by `analytic.panels.airlight_segments`.
+
+    `rtol` is the relative error asked for [1].
+    """
     value, error = np.empty(len(cases.phase)), np.empty(len(cases.phase))
     for name, g in sorted(set(zip(cases.phase, cases.g.tolist()))):
         rows = np.flatnonzero((np.array(cases.phase) == name) & (cases.g == g))
@@ -141,16 +150,22 @@ class Table:
             )
 
     def cells(self, name: str) -> list[str]:
-        """Return the text of a column."""
+        """Return the text of the column `name`, one entry for each row."""
         column = self.header.index(name)
         return [cells[column] for _, cells in self.lines]
 
     def where(self, row: int, name: str) -> str:
-        """Name a cell."""
+        """Return the words for a message that name the cell of a row in the column `name`."""
         return f"{self.name}, line {self.lines[row][0]}, column '{name}'"
 
     def numbers(self, name: str, *, infinite: bool = False) -> Array:
-        """Return a column of numbers, finite but for `x1` and where that is said."""
+        """Return the column `name` as numbers, (rows,), finite but for `x1` and where `infinite` allows it.
+
+        Raises
+        ------
+        InputError
+            For a cell that is no number, or not finite, with its line and column.
+        """
         values = np.empty(len(self.lines))
         for row, cell in enumerate(self.cells(name)):
             try:
@@ -163,7 +178,13 @@ class Table:
         return values
 
     def check(self, name: str, fine: NDArray[np.bool_], wanted: str) -> None:
-        """Refuse a column of which a row is not fine."""
+        """Refuse the column `name` where a row is not `fine`, (rows,); `wanted` says what it should be.
+
+        Raises
+        ------
+        InputError
+            With the first such cell.
+        """
         if not fine.all():
             row = int(np.argmin(fine))
             given = self.cells(name)[row]

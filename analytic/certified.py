@@ -75,7 +75,12 @@ def integrate_certified(
 def isotropic_closed_form(foot: float, height: float, x0: float, x1: float, sigma_t: float, *, digits: int = 20) -> Any:
     """Return J [1/m] of an isotropic medium by the complex exponential integral (module docstring, last equation).
 
-    Parameters, errors and special values are those of `integrate_certified`.
+    Parameters and special values are those of `integrate_certified`.
+
+    Raises
+    ------
+    InputError
+        As `integrate_certified` does.
 
     Notes
     -----

@@ -105,7 +105,10 @@ def integrate_distance(
 def integrate_angle(
     foot: float, height: float, x0: float, x1: float, sigma_t: float, phase: PhaseFunction, *, rtol: float = 1e-11
 ) -> Estimate:
-    """Integrate J over the angle at the light (module docstring, form "angle"); as `integrate_distance`."""
+    """Integrate J over the angle at the light [1/m] (module docstring, form "angle").
+
+    Parameters, `Returns` and `Raises` are those of `integrate_distance`.
+    """
     segment = _prepared(foot, height, x0, x1, sigma_t, phase)
     if isinstance(segment, Estimate):
         return segment
@@ -116,7 +119,10 @@ def integrate_angle(
 def integrate_path(
     foot: float, height: float, x0: float, x1: float, sigma_t: float, phase: PhaseFunction, *, rtol: float = 1e-11
 ) -> Estimate:
-    """Integrate J over w, the logarithm of the path (module docstring, form "path"); as `integrate_distance`."""
+    """Integrate J over w, the logarithm of the path [1/m] (module docstring, form "path").
+
+    Parameters, `Returns` and `Raises` are those of `integrate_distance`.
+    """
     segment = _prepared(foot, height, x0, x1, sigma_t, phase)
     if isinstance(segment, Estimate):
         return segment

@@ -92,7 +92,10 @@ class PhaseFunction:
         return self.from_half(0.5 - 0.5 * c, 0.5 + 0.5 * c)
 
     def from_half(self, down: Array, up: Array) -> Array:
-        """Evaluate from sin^2 and cos^2 of half the scattering angle, known without cancellation, of one shape."""
+        """Evaluate from `down`, sin^2, and `up`, cos^2 of half the scattering angle [1], arrays of one shape.
+
+        Where both are known without cancellation, the value has none either.
+        """
         if self.name == "isotropic":
             return np.ones_like(up)
         if self.name == "rayleigh":
@@ -110,7 +113,7 @@ class PhaseFunction:
         return np.interp(up, np.linspace(0.0, 1.0, len(values)), scaled)
 
     def mp(self, cos_scatter: Any) -> Any:
-        """Evaluate one cosine in mpmath at its current precision; g and the table count as exact."""
+        """Evaluate one cosine, `cos_scatter`, in mpmath at its current precision [1]; g and table are exact."""
         c = mpf(cos_scatter)
         if self.name == "isotropic":
             return mpf(1)
@@ -133,7 +136,7 @@ class PhaseFunction:
 
     @property
     def is_constant(self) -> bool:
-        """Whether it is 1 in all directions, so that integrands leave it out."""
+        """Whether it is 1 in all directions, so that integrands can leave it out."""
         return self.name == "isotropic"
 
     def series(self, degree: int) -> list[float] | None:

@@ -47,7 +47,7 @@ class Parameters:
 
 @dataclass(frozen=True)
 class Limits:
-    """What is said of a parameter beside its default: the metadata of its field."""
+    """What the metadata of a field say about a parameter, beside its default."""
 
     help: str
     choices: tuple[Any, ...] = ()
@@ -62,12 +62,12 @@ class Limits:
 
 
 def parameter(default: Any, help: str, **limits: Any) -> Any:
-    """Return the field of a parameter; `limits` are the other fields of `Limits`."""
+    """Return the field of a parameter with its `default`; `help` and `limits` are the fields of `Limits`."""
     return field(default=default, metadata={"limits": Limits(help, **limits)})
 
 
 def limits_of(item: Field) -> Limits:
-    """Return what is said of a parameter; of one that was made without `parameter`, nothing."""
+    """Return the limits of a parameter; a field that was made without `parameter` has none."""
     return item.metadata.get("limits", Limits(""))
 
 
@@ -111,7 +111,7 @@ def read_parameters(method: str, kind: type[Parameters], given: Mapping[str, Any
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
-    """Return '; did you mean X?' or an empty string."""
+    """Return '; did you mean X?' for the end of a message about `word`, or an empty string."""
     close = difflib.get_close_matches(word, list(known), n=1, cutoff=0.4)
     return f"; did you mean {close[0]!r}?" if close else ""
 
@@ -156,7 +156,7 @@ def _allowed(limits: Limits, default: Any, value: Any) -> bool:
     if value in limits.also:
         return True
     if not math.isfinite(value):
-        return limits == Limits(limits.help)  # nothing is said of it, so anything may be
+        return limits == Limits(limits.help)  # It has no limits: every value is allowed.
     return (
         (limits.least is None or value >= limits.least)
         and (limits.most is None or value <= limits.most)

@@ -31,11 +31,10 @@ ALLOWED = {
     "reports": {"analytic", "realtime", "reference", "validation"},
     "airlight": set(FOLDERS),
 }
-# Methods are compared with one another, and the three estimators of the truth confirm one another.
+# Methods are compared with one another. (The estimators of the truth: tests/test_independence.py.)
 METHODS = tuple(
     f"realtime.methods.{name}" for name in ("unshadowed", "ray_march", "shadow_planes", "light_volumes", "epipolar")
 )
-ESTIMATORS = ("reference.quadrature", "reference.monte_carlo.volpath", "reference.monte_carlo.single_scatter")
 
 
 def _python(*arguments: str, **options) -> subprocess.CompletedProcess:
@@ -65,13 +64,11 @@ def test_who_may_import_whom(graph, owner):
         assert {name for name in reached(graph, [module]) if name.split(".")[0] not in allowed} == set(), module
 
 
-@pytest.mark.claim("no-shared-derivation")
-@pytest.mark.parametrize("apart", [METHODS, ESTIMATORS], ids=["methods", "estimators"])
-def test_imports_of_one_lead_to_none_of_the_others(graph, apart):
-    for one, other in permutations(apart, 2):
-        start = [module for module in graph if inside(module, one)]
-        assert start, one
-        assert {module for module in reached(graph, start) if inside(module, other)} == set(), (one, other)
+def test_imports_of_a_method_lead_to_no_other(graph):
+    for method, other in permutations(METHODS, 2):
+        start = [module for module in graph if inside(module, method)]
+        assert start, method
+        assert {module for module in reached(graph, start) if inside(module, other)} == set(), (method, other)
 
 
 def test_every_method_is_kept_apart():

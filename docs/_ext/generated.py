@@ -29,11 +29,12 @@ PARTS = {
     "left-out": measured.left_out,
     "scenes": measured.scenes,
     "claims": measured.claims,
+    "fastest": measured.fastest,
     "provenance": measured.provenance,
 }
 _MARK = re.compile(r"^<!-- generated: ([a-z-]+)((?: [\w-]+)*) -->$", flags=re.MULTILINE)
 _SOURCE = re.compile(r"\[([^\]]+)\]\(\.\./((?:analytic|realtime|reference|validation|reports)/[\w/]+)\.py\)")
-#: Documents above this folder and the pages that show them.
+#: Documents in the folder above, and the pages that show them.
 _PAGES = {"../CONTRIBUTING.md": "contributing.md", "../CHANGELOG.md": "changelog.md", "../DESIGN.md": "conventions.md"}
 
 
@@ -48,10 +49,10 @@ def fill(text: str) -> str:
     return _MARK.sub(_part, text)
 
 
-def _part(found: re.Match[str]) -> str:
-    if found[1] not in PARTS:
-        raise ExtensionError(f"{found[0]}: wanted one of {', '.join(PARTS)}")
-    return PARTS[found[1]](*found[2].split())
+def _part(match: re.Match[str]) -> str:
+    if match[1] not in PARTS:
+        raise ExtensionError(f"{match[0]}: wanted one of {', '.join(PARTS)}")
+    return PARTS[match[1]](*match[2].split())
 
 
 def _code(link: re.Match[str]) -> str:

@@ -14,9 +14,9 @@ from reports.tables.lists import kernel_list, method_list
 from reports.tables.table import Name, Row, Table
 
 ROOT = Path(__file__).resolve().parents[2]
-#: Pages of methods that are called otherwise than the method.
+#: Pages of methods whose name is not that of the method.
 PAGES: dict[str, str] = {}
-#: What the help of parameters leads to.
+#: Words in the help of parameters, and the pages that they link to.
 LINKS = {"between the corners of tiles": "methods.md#between-the-corners-of-tiles"}
 
 
@@ -129,7 +129,7 @@ def keys() -> str:
     """Return the keys of a report's page."""
     from reports.page.filters import KEYS
 
-    rows = [(" ".join(f"`{one}`" for one in names), words) for names, words in KEYS]
+    rows = [(" ".join(f"`{key}`" for key in names), words) for names, words in KEYS]
     return table(("key", "what it does"), rows, 2)
 
 
@@ -143,18 +143,18 @@ def commands() -> str:
 
     from reports.commands.main import app
 
-    found = typer.main.get_group(app).commands
-    return "\n".join(_command(name, command) for name, command in found.items())
+    listed = typer.main.get_group(app).commands
+    return "\n".join(_command(name, command) for name, command in listed.items())
 
 
 def _command(name: str, command: Any) -> str:
     words = [f"## airlight {name}", ""]
-    shown = [one for one in command.params if one.name not in ("help", "context")]
-    arguments = [one for one in shown if one.param_type_name == "argument"]
-    usage = " ".join(["airlight", name, *(_argument(one) for one in arguments), "[OPTIONS]"])
+    shown = [parameter for parameter in command.params if parameter.name not in ("help", "context")]
+    arguments = [parameter for parameter in shown if parameter.param_type_name == "argument"]
+    usage = " ".join(["airlight", name, *(_argument(argument) for argument in arguments), "[OPTIONS]"])
     words += ["```text", usage, "```", "", _prose(inspect.cleandoc(command.help or "")), ""]
-    shown = [one for one in shown if not getattr(one, "hidden", False)]
-    rows = [(_option(one), _cell(one.help or "") + _default(one)) for one in shown]
+    shown = [parameter for parameter in shown if not getattr(parameter, "hidden", False)]
+    rows = [(_option(parameter), _cell(parameter.help or "") + _default(parameter)) for parameter in shown]
     if rows:
         words.append(table(("", "what it does"), rows, 2))
     return "\n".join(words)
@@ -164,20 +164,20 @@ def _prose(words: str) -> str:
     return "\n\n".join(_cell(paragraph) for paragraph in words.split("\n\n"))
 
 
-def _argument(one: Any) -> str:
-    name = one.name.upper() + ("..." if one.nargs == -1 else "")
-    return name if one.required else f"[{name}]"
+def _argument(argument: Any) -> str:
+    name = argument.name.upper() + ("..." if argument.nargs == -1 else "")
+    return name if argument.required else f"[{name}]"
 
 
-def _option(one: Any) -> str:
-    if one.param_type_name == "argument":
-        return f"`{one.name.upper()}`"
-    return ", ".join(f"`{name}`" for name in [*one.opts, *one.secondary_opts])
+def _option(parameter: Any) -> str:
+    if parameter.param_type_name == "argument":
+        return f"`{parameter.name.upper()}`"
+    return ", ".join(f"`{name}`" for name in [*parameter.opts, *parameter.secondary_opts])
 
 
-def _default(one: Any) -> str:
+def _default(parameter: Any) -> str:
     """Return what is added to an option's words: its default, where it has one that says something."""
-    value = one.default
-    if value is None or callable(value) or value in (False, (), []) or one.required:
+    value = parameter.default
+    if value is None or callable(value) or value in (False, (), []) or parameter.required:
         return ""
     return " On by default." if value is True else f" Default: `{value}`."

@@ -11,7 +11,7 @@ from sphinx.errors import ExtensionError
 _CHILDREN = {"mfrac": 2, "msub": 2, "msup": 2, "mover": 2, "munder": 2, "mroot": 2, "msubsup": 3, "munderover": 3}
 _ROWS = ("math", "mrow", "mtd", "msqrt")
 _APPLIED = "\u2061"  # docutils' mark between a function's name and what it is applied to
-_WIDTH = "0.1667em"  # of the space about the name, which browsers do not put there
+_WIDTH = "0.1667em"  # of the space around the name, which browsers leave out
 
 
 def markup(latex: str, *, block: bool) -> str:
@@ -31,7 +31,7 @@ def markup(latex: str, *, block: bool) -> str:
     """
     try:
         formula = tex2mathml(latex, as_block=block).replace("&ApplyFunction;", _APPLIED)
-    except Exception as error:  # a MathError, or what docutils itself stumbles over
+    except Exception as error:  # a MathError, or an exception inside docutils
         raise ExtensionError(f"formula {latex!r}: {error}") from error
     root = ElementTree.fromstring(formula.replace(' xmlns="http://www.w3.org/1998/Math/MathML"', ""))
     for element in root.iter():

@@ -10,7 +10,7 @@ from typing import Any
 from reports.tables.checks import left_out_table
 from reports.tables.drawing import markdown
 from reports.tables.kernels import cost_table, order_table
-from reports.tables.methods import COLUMNS, method_row
+from reports.tables.methods import COLUMNS, fastest_table, method_row
 from reports.tables.table import Column, Name, Row, Table, number
 
 DATA = Path(__file__).resolve().parents[1] / "data"
@@ -45,18 +45,23 @@ def claims() -> str:
     return "\n".join(f"> - {claim}" for claim in data()["claims"])
 
 
+def fastest() -> str:
+    """Return which method is the fastest within an error, scene by scene."""
+    return markdown(replace(fastest_table(data()["scenes"], code=True), title=""))
+
+
 def method(name: str) -> str:
     """Return a method's picture with its error, and its costs and errors in every scene."""
     rows, notes = [], []
     for scene in data()["scenes"]:
-        for one in scene["methods"]:
-            if one["method"] != name:
+        for entry in scene["methods"]:
+            if entry["method"] != name:
                 continue
-            label = _inside(one["label"])
-            if one["refused"] or one["error"] is None:
-                notes.append(f"- {scene['name']}, {label}: {one['refused'] or one['note'] or 'not measured'}")
+            label = _inside(entry["label"])
+            if entry["refused"] or entry["error"] is None:
+                notes.append(f"- {scene['name']}, {label}: {entry['refused'] or entry['note'] or 'not measured'}")
             else:
-                row = method_row(one)
+                row = method_row(entry)
                 rows.append(Row(row.values | {"scene": Name(scene["name"]), "label": label}))
     if not rows:
         return f"The report at hand did not measure `{name}`."
@@ -95,21 +100,21 @@ def kernel_costs(phase: str) -> str:
     """Return what kernels cost and how wrong they are for one phase function, the default sizes."""
     from realtime.kernels.registry import KERNELS
 
-    found = data()["kernels"]
-    if found is None:
+    kernels = data()["kernels"]
+    if kernels is None:
         return "No costs of kernels are at hand: `airlight bench --kernels` measures them."
     costs = []
-    for one in found["costs"]:
-        default = next(iter(KERNELS[one["family"]].parameters.values()), None) if one["family"] in KERNELS else None
-        if one["phase"] == phase and one["size"] in (default, None):
-            costs.append(one | {"device": one["device"] or one["wall"]})
+    for cost in kernels["costs"]:
+        default = next(iter(KERNELS[cost["family"]].parameters.values()), None) if cost["family"] in KERNELS else None
+        if cost["phase"] == phase and cost["size"] in (default, None):
+            costs.append(cost | {"device": cost["device"] or cost["wall"]})
     return markdown(cost_table("", costs, code=True).only("kernel", "device", "median", "p99", "max"))
 
 
 def kernel_orders() -> str:
     """Return the declared and the measured order of convergence of the kernels that have a size."""
-    found = data()["kernels"]
-    return "" if found is None else markdown(replace(order_table(found["convergence"], code=True), title=""))
+    kernels = data()["kernels"]
+    return "" if kernels is None else markdown(replace(order_table(kernels["convergence"], code=True), title=""))
 
 
 def left_out() -> str:

@@ -8,7 +8,7 @@ from sphinx.application import Sphinx
 _CODE = re.compile(r"``.+?``|`[^`]+`")
 _EMPHASIS = re.compile(r"(?<![\w*])\*(?=[^\s*])[^*]*[^\s*]\*(?![\w*])")
 _ATTRIBUTES = ("attribute", "data", "property")
-_COLON = "\0"  # stands for a colon that napoleon is not to see
+_COLON = "\0"  # stands for a colon that napoleon must not see
 _ITEM = re.compile(r"\s*[*-] \S")
 _RAISES = re.compile(r"^:raises InputError:")
 
@@ -19,27 +19,27 @@ def _indent(line: str) -> int:
 
 def formulas_as_blocks(lines: list[str]) -> list[str]:
     """Return lines in which text that is set in by four or more after a blank line is a literal block."""
-    found: list[str] = []
-    inside: int | None = None  # the least indentation of the block that is open
+    marked: list[str] = []
+    inside: int | None = None  # least indentation of the open block
     before = 0  # indentation of the last line that was not blank
     for number, line in enumerate(lines):
         if not line.strip():
-            found.append(line)
+            marked.append(line)
             continue
         if inside is not None and _indent(line) < inside:
             inside = None
         elif inside is None and number and not lines[number - 1].strip() and _indent(line) >= before + 4:
-            if not found or not any(one.rstrip().endswith("::") for one in found[-2:]):
-                found += [" " * before + "::", ""]
+            if not marked or not any(earlier.rstrip().endswith("::") for earlier in marked[-2:]):
+                marked += [" " * before + "::", ""]
             inside = _indent(line)
-        found.append(line)
+        marked.append(line)
         before = _indent(line) if inside is None else before
-    return found
+    return marked
 
 
 def hanging_lists(lines: list[str]) -> list[str]:
     """Return lines in which an item's further lines are set in under its text."""
-    found: list[str] = []
+    indented: list[str] = []
     marker: int | None = None
     for line in lines:
         item = _ITEM.match(line)
@@ -49,20 +49,20 @@ def hanging_lists(lines: list[str]) -> list[str]:
             marker = None if not line.strip() else marker
         elif marker is not None:
             line = "  " + line
-        found.append(line)
-    return found
+        indented.append(line)
+    return indented
 
 
 def escaped(paragraph: str) -> str:
     """Return a paragraph of prose whose bars and lone asterisks mean themselves."""
-    spans = sorted([one.span() for pattern in (_CODE, _EMPHASIS) for one in pattern.finditer(paragraph)])
-    found, at = [], 0
+    spans = sorted([match.span() for pattern in (_CODE, _EMPHASIS) for match in pattern.finditer(paragraph)])
+    pieces, at = [], 0
     for begin, end in spans:
         if begin < at:
             continue
-        found += [_escape(paragraph[at:begin]), paragraph[begin:end]]
+        pieces += [_escape(paragraph[at:begin]), paragraph[begin:end]]
         at = end
-    return "".join([*found, _escape(paragraph[at:])])
+    return "".join([*pieces, _escape(paragraph[at:])])
 
 
 def _escape(text: str) -> str:
@@ -72,7 +72,7 @@ def _escape(text: str) -> str:
 
 def _prose(lines: list[str]) -> list[str]:
     """Escape every paragraph that is not in a literal block."""
-    found: list[str] = []
+    escaped_lines: list[str] = []
     paragraph: list[str] = []
     inside: int | None = None
     marked = False
@@ -86,10 +86,10 @@ def _prose(lines: list[str]) -> list[str]:
             continue
         if paragraph:
             marked = paragraph[-1].rstrip().endswith("::")
-            found += escaped("\n".join(paragraph)).split("\n")
+            escaped_lines += escaped("\n".join(paragraph)).split("\n")
             paragraph = []
-        found.append(line)
-    return found
+        escaped_lines.append(line)
+    return escaped_lines
 
 
 def before_napoleon(app: Sphinx, what: str, name: str, obj, options, lines: list[str]) -> None:

@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Airlight in bounded media: bodies of homogeneous media, each convex, disjoint, in clear air or in another medium.
+"""Airlight in bounded media: homogeneous, convex and disjoint, in clear air or in another medium.
 
-A ray runs through *pieces*, the bodies that it meets and, where the air is not clear, the gaps between them. In a piece
-of the medium j, over a lit segment of it,
+A ray runs through *pieces*, the bounded media that it meets and, where the air is not clear, the gaps between them. In
+a piece of the medium j, over a lit segment of it,
 
     J = int exp(-tau_camera(x) - tau_light(x)) p / r^2 dx,
 
 with the true optical depths on both legs. Camera: what is behind it when the ray enters the piece is one number a ray,
-then sigma_j (x - x_j). Light: the leg from the light to x has the part l_k in the body k
+then sigma_j (x - x_j). Light: the leg from the light to x has the part l_k in the medium k
 (`realtime.bounded_media.convex_clip`), and
 
     tau_light = sigma_0 r + sum_k (sigma_k - sigma_0) l_k,        sigma_0 = 0 in clear air.
 
-In a body, where the legs meet no other one, the segment is cut where the leg passes from facet to facet of the body,
+In a medium, where the legs meet no other one, the segment is cut where the leg passes from facet to facet of it,
 and further as depth and angle need it (`realtime.bounded_media.panels`). Elsewhere, and for the published
 approximation, the nodes are those of Gauss and Legendre in the angle theta at the light, dx / r^2 = dtheta / h,
 between the ends of the segment: with s = x - foot and the angle u from the near end, s_0, on
@@ -20,7 +20,7 @@ between the ends of the segment: with s = x - foot and the angle u from the near
     s = h (s_0 cos u + h sin u)/(h cos u - s_0 sin u),     u_1 = atan2(h (s_1 - s_0), h^2 + s_0 s_1),
 
 so that a segment far from the light or a ray close to it loses nothing. The parts l_k have kinks where the leg passes
-an edge of the body, and there the rule is of second order.
+an edge of the medium, and there the rule is of second order.
 
 The published approximation (section 4.2) puts a constant R for r in the exponent, and takes the distance x_n at which
 the ray enters from x. As printed it is
@@ -33,8 +33,8 @@ x - x_n + R with x = t + h tan theta gives
 
     L = k_t exp(-k_t (t + R - x_n)) Omega/(4 pi h) int I exp(-k_t h tan theta) p dtheta.
 
-That is ``media=paper``. The paper has each medium alone: the light reaches a body through clear air, however many
-bodies are before it. What is before the body on the camera's side is one factor for a ray, and is kept.
+That is ``media=paper``. The paper has each medium alone: the light reaches a medium through clear air, however many
+media are before it. What is before the medium on the camera's side is one factor for a ray, and is kept.
 
 References
 ----------
@@ -46,10 +46,10 @@ from typing import Any
 
 import drjit as dr
 
-from realtime.bounded_media.body_views import light_sides
 from realtime.bounded_media.directional_airlight import ParallelRay
-from realtime.bounded_media.panels import BodySegment, body_integral
-from realtime.bounded_media.ray_segments import MediaRay, Piece, light_leg, other_bodies_near, sum_over_pieces
+from realtime.bounded_media.panels import MediumSegment, medium_integral
+from realtime.bounded_media.ray_segments import MediaRay, Piece, light_leg, other_media_near, sum_over_pieces
+from realtime.bounded_media.views import light_views
 from realtime.errors import InputError
 from realtime.numerics.array_types import is_single
 from realtime.numerics.fast_exp import exp_bounded
@@ -110,7 +110,7 @@ def lit_ray(
     low=None,
     pieces: tuple[Piece, ...],
     form: str = "exact",
-    sides: tuple[Any, ...] | None = None,
+    views: tuple[Any, ...] | None = None,
 ) -> LitRay:
     """Return camera rays in bounded media with one light.
 
@@ -124,8 +124,8 @@ def lit_ray(
         Of the rays, from `realtime.bounded_media.ray_segments.camera_pieces`.
     form
         One of `FORMS`.
-    sides
-        The media as the light sees them, from `realtime.bounded_media.body_views.light_sides`, if they are known.
+    views
+        The media as the light sees them, from `realtime.bounded_media.views.light_views`, if they are known.
 
     Raises
     ------
@@ -135,17 +135,20 @@ def lit_ray(
     if not light.w:
         if form != "exact":
             raise InputError(f"media={form}: the published approximation is of lights with a place; use media=exact")
-        return ParallelRay(medium, light, origin, direction, pieces, sides or light_sides(medium, light))
+        return ParallelRay(medium, light, origin, direction, pieces, views or light_views(medium, light))
     geometry = ray_geometry(origin, direction, light, low=low)
     # The published form needs no legs from the light.
-    known = () if form != "exact" else sides or light_sides(medium, light)
-    seen, entries = tuple(one.seen for one in known), tuple(one.entering for one in known)
-    exits = tuple(one.leaving for one in known) if len(known) > 1 else ()
+    known = () if form != "exact" else views or light_views(medium, light)
+    seen, entries = tuple(view.seen for view in known), tuple(view.entering for view in known)
+    exits = tuple(view.leaving for view in known) if len(known) > 1 else ()
     return PlacedRay(medium, light, geometry, origin - light.position, direction, pieces, seen, entries, exits, form)
 
 
 def ambient_radiance(ray_pieces: tuple[Piece, ...], distance, ambient: float):
-    """Return the light of a constant field in the media, albedo ambient (1 - exp(-tau)) a piece, before `distance`."""
+    """Return the light of a constant field in the media, RGB [W/(m^2 sr)]: albedo ambient (1 - exp(-tau)) a piece.
+
+    `ambient` is the radiance of the field [W/(m^2 sr)]; what lies beyond `distance` [m] counts nothing.
+    """
     total = type(ray_pieces[0].medium.albedo)(0)
     for piece in ray_pieces:
         length = dr.maximum(dr.minimum(dr.minimum(piece.end, distance), 1e30) - piece.begin, 0)
@@ -156,10 +159,16 @@ def ambient_radiance(ray_pieces: tuple[Piece, ...], distance, ambient: float):
 
 
 def check_form(medium: Medium, form: str) -> None:
-    """Refuse a form that is unknown or does not fit the media."""
+    """Refuse a form that is unknown or does not fit the media.
+
+    Raises
+    ------
+    InputError
+        For a name that is not in `FORMS`, and for the published form in media that another one surrounds.
+    """
     if form not in FORMS:
         raise InputError(f"media: got {form!r}, wanted one of {', '.join(FORMS)}")
-    if form == "paper" and medium.bodies and not medium.clear:
+    if form == "paper" and medium.bounded_media and not medium.clear:
         raise InputError("media=paper: wanted clear air around the bounded media; use media=exact")
 
 
@@ -168,7 +177,7 @@ def _piece_integral(ray: MediaRay, piece: Piece, x0, x1):
     if piece.number is None or ray.form != "exact":
         return _integral(ray, piece, x0, x1)
     number = piece.number
-    one = BodySegment(
+    segment = MediumSegment(
         medium=piece.medium,
         around=None if ray.medium.clear else ray.medium.sigma_t,
         light=ray.light,
@@ -181,12 +190,12 @@ def _piece_integral(ray: MediaRay, piece: Piece, x0, x1):
         planes=ray.entries[number],
     )
     if len(ray.seen) == 1:
-        return body_integral(one, x0, x1)
+        return medium_integral(segment, x0, x1)
     return dr.if_stmt(
         args=(x0, x1),
-        cond=other_bodies_near(ray, number, x0, x1),
+        cond=other_media_near(ray, number, x0, x1),
         true_fn=lambda x0, x1: _integral(ray, piece, x0, x1),
-        false_fn=lambda x0, x1: body_integral(one, x0, x1),
+        false_fn=lambda x0, x1: medium_integral(segment, x0, x1),
     )
 
 
@@ -194,7 +203,7 @@ def _integral(ray: MediaRay, piece: Piece, x0, x1):
     """Integrate one segment in one piece."""
     Float = type(ray.geometry.height)
     x1 = dr.minimum(x1, x0 + _OPTICAL_REACH / least_extinction(piece.medium))
-    # A ray through the light itself: its integral is infinite, and so nearly is this.
+    # A ray passes through the light itself: its integral is infinite, and so nearly is this value.
     h = dr.maximum(ray.geometry.height, 1e-15)
     s0, s1 = x0 - ray.geometry.foot, x1 - ray.geometry.foot
     width = dr.select(dr.isfinite(x1), dr.atan2(h * (s1 - s0), dr.fma(h, h, s0 * s1)), dr.atan2(h, s0))
@@ -239,8 +248,8 @@ def _attenuation(ray: MediaRay, piece: Piece, xs, rs) -> list[list[Any]]:
             depth = piece.before[channel] + piece.medium.sigma_t[channel] * (x - piece.begin)
             if not ray.medium.clear:
                 depth += around * r
-            for body, inside in zip(ray.medium.bodies, insides):
-                depth += (body.medium.sigma_t[channel] - around) * inside[node]
+            for bounded_medium, inside in zip(ray.medium.bounded_media, insides):
+                depth += (bounded_medium.medium.sigma_t[channel] - around) * inside[node]
             channels.append(exp_bounded(-depth))
         result.append(channels)
     return result
@@ -249,6 +258,6 @@ def _attenuation(ray: MediaRay, piece: Piece, xs, rs) -> list[list[Any]]:
 def _paper_attenuation(ray: MediaRay, piece: Piece, xs) -> list[list[Any]]:
     """Return exp(-tau) with the constant R for the light's leg, by node and channel."""
     assert piece.number is not None
-    distance = ray.medium.bodies[piece.number].mean_distance
+    distance = ray.medium.bounded_media[piece.number].mean_distance
     constants = [before + s * (distance - piece.begin) for before, s in zip(piece.before, piece.medium.sigma_t)]
     return [[exp_bounded(-(constant + s * x)) for constant, s in zip(constants, piece.medium.sigma_t)] for x in xs]

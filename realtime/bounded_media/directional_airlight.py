@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Airlight of a directional light, in bodies of media in clear air.
+"""Airlight of a directional light, in bounded media in clear air.
 
-Light of the irradiance E arrives everywhere from one direction, along the unit vector a. In the body j a ray has
+Light of the irradiance E arrives everywhere from one direction, along the unit vector a. In the medium j a ray has
 
     L = E/(4 pi) p(cos) albedo_j sigma_j int exp(-tau_camera(x) - sum_k sigma_k l_k(x)) dx,        cos = -a . d,
 
-with l_k the part in the body k of the leg to the light (`realtime.bounded_media.directional_legs`). The cosine is one
+with l_k the part in the medium k of the leg to the light (`realtime.bounded_media.directional_legs`). The cosine is one
 for a ray: for narrow lobes (1 - cos)/2 = |a + d|^2 / 4 and (1 + cos)/2 = |a - d|^2 / 4 keep all digits.
 
 Between two bends of polyhedra the exponent is linear, from tau_0 to tau_1 over the length D, and the integral is
@@ -16,7 +16,7 @@ where 1 - exp(-z) = 2 T/(1 + T), T = tanh(z/2), cancels nothing. A bend is met a
 back to it, and no leg becomes shorter than nothing.
 
 With spheres, q = sqrt(R^2 - |w x a|^2) ends like a square root at both ends of a piece. In u, with x = x_0 + D u^2 (3 -
-2 u), such an end is smooth; Gauss and Legendre's nodes in u do the rest. So they do for bodies of many planes, whose
+2 u), such an end is smooth; Gauss and Legendre's nodes in u do the rest. So they do for media of many planes, whose
 bends lie close together and are small: there the rule is of second order. Pieces are cut so that none is optically
 thick.
 
@@ -41,7 +41,7 @@ _FEW_PLANES = 12  # whose bends are worth the search for them
 _NODES, _NODES_DOUBLE = 10, 24
 _THICK = 8.0  # optical depth of the pieces that nodes are placed in
 _DARK = 60.0  # optical depth before the camera beyond which nothing is left, e^-60 = 9e-27
-_PIECES = 512  # of a ray in a body, at most: no rounding can make a loop endless
+_PIECES = 512  # of a ray in a medium, at most: no rounding can make a loop endless
 
 
 @dataclass(frozen=True)
@@ -50,8 +50,8 @@ class ParallelRay:
 
     medium: Medium
     light: Light
-    origin: Any
-    direction: Any
+    origin: Any  #: the camera [m]
+    direction: Any  #: unit directions
     pieces: tuple[Piece, ...]
     seen: tuple[ParallelSeen, ...]
 
@@ -86,7 +86,7 @@ class ParallelRay:
 
 def _integral(ray: ParallelRay, piece: Piece, x0, x1):
     """Integrate one segment in one piece, from bend to bend."""
-    linear = all(_has_few_planes(one) for one in ray.seen)
+    linear = all(_has_few_planes(seen) for seen in ray.seen)
     Float, Color = type(x0), type(ray.medium.albedo)
     reach = piece.begin + _DARK / least_extinction(piece.medium)
     x1 = dr.minimum(x1, reach)
@@ -95,10 +95,10 @@ def _integral(ray: ParallelRay, piece: Piece, x0, x1):
     def step(count, x, total):
         at = x + slack * (x + 1)
         if linear:
-            slopes = [slope_from(one, ray.origin, ray.direction, at) for one in ray.seen]
+            slopes = [slope_from(seen, ray.origin, ray.direction, at) for seen in ray.seen]
             end = x1
-            for one in slopes:
-                end = dr.minimum(end, one.until)
+            for slope in slopes:
+                end = dr.minimum(end, slope.until)
             channels = _linear_channels(ray, piece, slopes, at, x, end)
         else:
             end = dr.minimum(_next_facet_change(ray, at, x1), x + _THICK / _largest_extinction(piece.medium))
@@ -116,19 +116,19 @@ def _integral(ray: ParallelRay, piece: Piece, x0, x1):
 
 
 def _has_few_planes(seen: ParallelSeen) -> bool:
-    return seen.planes is not None and seen.body.count <= _FEW_PLANES
+    return seen.planes is not None and seen.bounded_medium.count <= _FEW_PLANES
 
 
 def _linear_channels(ray: ParallelRay, piece: Piece, slopes, at, x, end) -> list[Any]:
     """Return the integral from x to end, by channel, where the legs are linear."""
-    lengths = [[dr.maximum(dr.fma(one.rate, here - at, one.length), 0) for one in slopes] for here in (x, end)]
+    lengths = [[dr.maximum(dr.fma(slope.rate, here - at, slope.length), 0) for slope in slopes] for here in (x, end)]
     channels = []
     for channel, own in enumerate(piece.medium.sigma_t):
         depths = []
         for here, parts in zip((x, end), lengths):
             depth = dr.fma(own, here - piece.begin, piece.before[channel])
-            for one, length in zip(ray.seen, parts):
-                depth = dr.fma(one.body.medium.sigma_t[channel], length, depth)
+            for seen, length in zip(ray.seen, parts):
+                depth = dr.fma(seen.bounded_medium.medium.sigma_t[channel], length, depth)
             depths.append(depth)
         z = dr.maximum(dr.abs(depths[1] - depths[0]), 1e-30)
         tangent = dr.tanh(0.5 * z)
@@ -140,11 +140,11 @@ def _linear_channels(ray: ParallelRay, piece: Piece, slopes, at, x, end) -> list
 def _next_facet_change(ray: ParallelRay, at, x1):
     """Return where the legs bend next beyond `at`, or the end of the segment."""
     end = x1
-    for one in ray.seen:
-        if one.planes is None:
-            end = dr.minimum(end, cylinder_bend(one, ray.origin, ray.direction, at))
-        elif _has_few_planes(one):
-            end = dr.minimum(end, slope_from(one, ray.origin, ray.direction, at).until)
+    for seen in ray.seen:
+        if seen.planes is None:
+            end = dr.minimum(end, cylinder_bend(seen, ray.origin, ray.direction, at))
+        elif _has_few_planes(seen):
+            end = dr.minimum(end, slope_from(seen, ray.origin, ray.direction, at).until)
     return end
 
 
@@ -162,14 +162,14 @@ def _node_channels(ray: ParallelRay, piece: Piece, x, end) -> list[Any]:
 
 def _attenuation(ray: ParallelRay, piece: Piece, xs) -> list[list[Any]]:
     """Return exp(-tau) of both legs, by node and channel."""
-    insides = [parallel_legs(one, ray.origin, ray.direction, xs) for one in ray.seen]
+    insides = [parallel_legs(seen, ray.origin, ray.direction, xs) for seen in ray.seen]
     result = []
     for node, x in enumerate(xs):
         channels = []
         for channel, own in enumerate(piece.medium.sigma_t):
             depth = piece.before[channel] + own * (x - piece.begin)
-            for one, inside in zip(ray.seen, insides):
-                depth += one.body.medium.sigma_t[channel] * inside[node]
+            for seen, inside in zip(ray.seen, insides):
+                depth += seen.bounded_medium.medium.sigma_t[channel] * inside[node]
             channels.append(exp_bounded(-depth))
         result.append(channels)
     return result

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How far the light of a directional source runs through convex bodies on its way to a point.
+"""How far the light of a directional source runs through convex media on its way to a point.
 
 With a the unit direction in which the light travels, the leg from a point P back to the light is P - f a, f >= 0. It
 crosses the plane n . x = c of a half space at
@@ -7,7 +7,7 @@ crosses the plane n . x = c of a half space at
     f = phi(P) = (n . P - c) / (n . a).
 
 Where n . a < 0 the light comes in through the plane, and the leg is in the half space up to phi; where n . a > 0 it is
-so from phi on. The leg therefore has in the body the part
+so from phi on. The leg therefore has in the medium the part
 
     l = max(0, min phi over the planes with n . a < 0  -  max(0, max phi over the others)).
 
@@ -27,12 +27,12 @@ import drjit as dr
 import mitsuba as mi
 
 from realtime.numerics.array_types import four_numbers
-from realtime.scene.medium import Body
+from realtime.scene.medium import BoundedMedium
 
 
 @dataclass(frozen=True)
 class Slope:
-    """What of the legs lies in a body along a ray, linear from a distance on."""
+    """What of the legs lies in a medium along a ray, linear from a distance on."""
 
     length: Any  #: l there [m]
     rate: Any  #: dl/dx [1]
@@ -41,39 +41,44 @@ class Slope:
 
 @dataclass(frozen=True)
 class ParallelSeen:
-    """A body as a directional light sees it."""
+    """A bounded medium as a directional light sees it."""
 
-    body: Body
+    bounded_medium: BoundedMedium
     axis: Any  #: unit direction in which the light travels
     planes: Any  #: four numbers a plane, phi = g . (P - centre) + k; None for a sphere
     comes_in: Any  #: by plane 1 where the light comes in, else 0
 
 
-def seen_along(body: Body, axis) -> ParallelSeen:
-    """Return what the legs to a directional light need of a body; `axis` is one direction for all lanes."""
-    if body.planes is None:
-        return ParallelSeen(body, axis, None, None)
-    *normal, offset = body.planes
+def seen_along(bounded_medium: BoundedMedium, axis) -> ParallelSeen:
+    """Return what the legs to a directional light need of a bounded medium.
+
+    `axis` is the unit direction in which the light travels, one for all lanes.
+    """
+    if bounded_medium.planes is None:
+        return ParallelSeen(bounded_medium, axis, None, None)
+    *normal, offset = bounded_medium.planes
     along = normal[0] * axis.x + normal[1] * axis.y + normal[2] * axis.z
     tilt = 16 * dr.epsilon(type(along))
     along = dr.select(dr.abs(along) < tilt, dr.select(along < 0, -tilt, tilt), along)
-    room = offset - (normal[0] * body.centre.x + normal[1] * body.centre.y + normal[2] * body.centre.z)
-    planes = dr.zeros(type(along), 4 * body.count)
+    room = offset - (
+        normal[0] * bounded_medium.centre.x + normal[1] * bounded_medium.centre.y + normal[2] * bounded_medium.centre.z
+    )
+    planes = dr.zeros(type(along), 4 * bounded_medium.count)
     columns = (*(component / along for component in normal), -room / along)
     for place, column in enumerate(columns):
-        dr.scatter(planes, column, 4 * dr.arange(mi.UInt32, body.count) + place)
+        dr.scatter(planes, column, 4 * dr.arange(mi.UInt32, bounded_medium.count) + place)
     comes_in = dr.select(along < 0, type(along)(1), 0)
     dr.eval(planes, comes_in)
-    return ParallelSeen(body, axis, planes, comes_in)
+    return ParallelSeen(bounded_medium, axis, planes, comes_in)
 
 
 def parallel_legs(seen: ParallelSeen, origin, direction, distances, active=True) -> list[Any]:
-    """Return how much of the legs to the points origin + distance direction lies in the body [m].
+    """Return how much of the legs to the points origin + distance direction lies in the medium [m].
 
     Parameters
     ----------
     seen
-        The body and the light.
+        The medium and the light.
     origin, direction
         Of the rays.
     distances
@@ -81,7 +86,7 @@ def parallel_legs(seen: ParallelSeen, origin, direction, distances, active=True)
     active
         Lanes to compute; others have 0.
     """
-    start = origin - seen.body.centre
+    start = origin - seen.bounded_medium.centre
     if seen.planes is None:
         return [dr.select(active, _sphere_leg(seen, start + direction * x), 0) for x in distances]
     Float = type(start.x)
@@ -98,7 +103,7 @@ def parallel_legs(seen: ParallelSeen, origin, direction, distances, active=True)
 
     _, first, last = dr.while_loop(
         state=(mi.UInt32(0), first, last),
-        cond=lambda number, first, last: active & (number < seen.body.count),
+        cond=lambda number, first, last: active & (number < seen.bounded_medium.count),
         body=plane,
         labels=("number", "first", "last"),
     )
@@ -107,18 +112,18 @@ def parallel_legs(seen: ParallelSeen, origin, direction, distances, active=True)
 
 
 def slope_from(seen: ParallelSeen, origin, direction, x) -> Slope:
-    """Return what of the legs lies in a body that has planes, from a distance on.
+    """Return what of the legs lies in a medium that has planes, from a distance on.
 
     Parameters
     ----------
     seen
-        The body and the light.
+        The medium and the light.
     origin, direction
         Of the rays.
     x
         From where; at least a rounding error beyond the last bend, so that each is met once [m].
     """
-    start = origin - seen.body.centre
+    start = origin - seen.bounded_medium.centre
     Float = type(x)
     width = dr.width(start, direction, x)
 
@@ -133,7 +138,7 @@ def slope_from(seen: ParallelSeen, origin, direction, x) -> Slope:
     zero = dr.zeros(Float, width)
     _, first, last, first_rate, last_rate = dr.while_loop(
         state=(mi.UInt32(0), dr.full(Float, -dr.inf, width), dr.full(Float, dr.inf, width), zero, zero + 0),
-        cond=lambda number, *_: number < seen.body.count,
+        cond=lambda number, *_: number < seen.bounded_medium.count,
         body=extremes,
         labels=("number", "first", "last", "first_rate", "last_rate"),
     )
@@ -151,7 +156,7 @@ def slope_from(seen: ParallelSeen, origin, direction, x) -> Slope:
         until = dr.minimum(until, dr.select(at > 0, at, dr.inf))
     _, until = dr.while_loop(
         state=(mi.UInt32(0), until),
-        cond=lambda number, until: number < seen.body.count,
+        cond=lambda number, until: number < seen.bounded_medium.count,
         body=bends,
         labels=("number", "until"),
     )
@@ -163,12 +168,15 @@ def slope_from(seen: ParallelSeen, origin, direction, x) -> Slope:
 
 
 def cylinder_bend(seen: ParallelSeen, origin, direction, x):
-    """Return the next distance beyond `x` at which rays enter or leave the cylinder about a sphere, or infinity [m]."""
-    w = dr.cross(origin - seen.body.centre, seen.axis)
+    """Return the next distance beyond `x` at which rays enter or leave the cylinder about a sphere, or infinity [m].
+
+    Rays begin at `origin` [m] and have unit `direction`s.
+    """
+    w = dr.cross(origin - seen.bounded_medium.centre, seen.axis)
     v = dr.cross(direction, seen.axis)
     a, b = dr.squared_norm(v), dr.dot(w, v)
     # b^2 - a c without its cancellation: a R^2 - |w x v|^2.
-    inner = a * dr.square(seen.body.radius) - dr.squared_norm(dr.cross(w, v))
+    inner = a * dr.square(seen.bounded_medium.radius) - dr.squared_norm(dr.cross(w, v))
     root = dr.sqrt(dr.maximum(inner, 0))
     bend = type(x)(dr.inf)
     for at in ((root - b) / a, (-root - b) / a):
@@ -178,7 +186,7 @@ def cylinder_bend(seen: ParallelSeen, origin, direction, x):
 
 def _sphere_leg(seen: ParallelSeen, w):
     along = dr.dot(w, seen.axis)
-    inner = dr.square(seen.body.radius) - dr.squared_norm(dr.cross(w, seen.axis))
+    inner = dr.square(seen.bounded_medium.radius) - dr.squared_norm(dr.cross(w, seen.axis))
     root = dr.sqrt(dr.maximum(inner, 0))
     return dr.select(inner > 0, dr.maximum(along + root - dr.maximum(along - root, 0), 0), 0)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where legs from a light enter a body of planes on their way to the points of a ray within it.
+"""Where legs from a light enter a polyhedral medium on their way to the points of a ray within it.
 
 Of the planes that the light is outside of, the leg to the point v(x) = v_0 + x d from the light enters through the one
 with the least
@@ -14,9 +14,9 @@ passes from one facet to the next, which shares an edge with it. So from the pla
 over the few neighbours j with s_j < s_k. Every bend makes s less: a walk along the ray never goes round in circles.
 
 The first plane is found in the same way: while a neighbour has a less u at the start, go to the least. Seen from the
-light the facets tile the convex image of the body, and v(x) lies in it. On the straight way from a point of the facet k
-to v(x) the neighbour beyond the edge where k is left has a less u from there on, since the difference is linear: where
-no neighbour has less, none of all planes has.
+light the facets tile the convex image of the medium, and v(x) lies in it. On the straight way from a point of the facet
+k to v(x) the neighbour beyond the edge where k is left has a less u from there on, since the difference is linear:
+where no neighbour has less, none of all planes has.
 """
 
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ import mitsuba as mi
 from realtime.bounded_media.convex_clip import Seen
 from realtime.numerics.array_types import four_numbers, packed
 
-_CELLS = 8  # of the image of a body along a side, for planes to begin at
+_CELLS = 8  # of the image of a medium along a side, for planes to begin at
 _UNROLLED = 4  # neighbours, as many as facets of boxes have
 
 
@@ -39,12 +39,12 @@ class EntryPlanes:
     sides: int  #: neighbours of a plane
     count: int  #: planes
     side: int  #: 1 for planes where legs enter, -1 for those where they leave
-    frame: tuple[Any, Any, Any]  #: axes of the image of the body: across, up, and towards its middle
+    frame: tuple[Any, Any, Any]  #: axes of the image of the medium: across, up, and towards its middle
     starts: Any  #: by cell of that image the number of a plane to begin at, `count` where there is none
-    within: Any  #: whether the light is in the body: it is outside of no plane
+    within: Any  #: whether the light is in the medium: it is outside of no plane
     planes: Any  #: of `Seen`
     entries: Any  #: four numbers a neighbour: its g [1/m] and its number; where there is none those of the plane itself
-    across: Any  #: four numbers a neighbour on the other side of the body: its g [1/m]; 0 where there is none
+    across: Any  #: four numbers a neighbour on the other side of the medium: its g [1/m]; 0 where there is none
 
 
 @dataclass
@@ -57,38 +57,48 @@ class Entry:
 
 
 def entry_planes(seen: Seen) -> EntryPlanes | None:
-    """Return the planes where legs enter a body, as the light sees it; None for a sphere."""
+    """Return the planes where legs enter a medium, as the light sees it; None for a sphere."""
     return _facing_planes(seen, 1)
 
 
 def exit_planes(seen: Seen) -> EntryPlanes | None:
-    """Return the planes where legs leave a body: the light is inside of them, with -g for g; None for a sphere."""
+    """Return the planes where legs leave a medium: the light is inside of them, with -g for g; None for a sphere."""
     return _facing_planes(seen, -1)
 
 
 def _facing_planes(seen: Seen, side: int) -> EntryPlanes | None:
-    body = seen.body
-    if body.planes is None:
+    bounded_medium = seen.bounded_medium
+    if bounded_medium.planes is None:
         return None
     Four = four_numbers(type(seen.planes))
-    own = dr.arange(mi.UInt32, body.count * body.sides) // body.sides
-    there = dr.gather(Four, seen.planes, body.neighbours)
+    own = dr.arange(mi.UInt32, bounded_medium.count * bounded_medium.sides) // bounded_medium.sides
+    there = dr.gather(Four, seen.planes, bounded_medium.neighbours)
     facing = (there.w > 0) == (side > 0)
-    number = dr.select(facing, body.neighbours, own)
+    number = dr.select(facing, bounded_medium.neighbours, own)
     entries = dr.gather(Four, seen.planes, number)
     entries = packed(Four(*dr.select((entries.w > 0) == (side > 0), entries.xyz * side, 0), number))
     across = packed(Four(*dr.select(facing, 0, there.xyz * side), 0))
     starts = _nearest_planes(seen, side)
-    within = dr.gather(mi.UInt32, starts, mi.UInt32(0)) >= body.count
+    within = dr.gather(mi.UInt32, starts, mi.UInt32(0)) >= bounded_medium.count
     dr.eval(entries, across, starts)
-    return EntryPlanes(body.sides, body.count, side, _image_frame(seen), starts, within, seen.planes, entries, across)
+    return EntryPlanes(
+        bounded_medium.sides,
+        bounded_medium.count,
+        side,
+        _image_frame(seen),
+        starts,
+        within,
+        seen.planes,
+        entries,
+        across,
+    )
 
 
 def _image_frame(seen: Seen):
-    """Return axes in which the body's sphere is seen between -1 and 1: (v . across, v . up)/(v . middle)."""
-    toward, radius = seen.toward, seen.body.radius
+    """Return axes in which the medium's sphere is seen between -1 and 1: (v . across, v . up)/(v . middle)."""
+    toward, radius = seen.toward, seen.bounded_medium.radius
     distance = dr.maximum(dr.norm(toward), 1e-6 * radius)
-    # From within the sphere there is no such image; any plane will do to begin at.
+    # A point within the sphere sees no such image; the walk can begin at any plane.
     beside = dr.sqrt(dr.maximum((distance - radius) * (distance + radius), 0.01 * radius * radius))
     middle = toward / distance
     Vector = type(toward)
@@ -107,20 +117,20 @@ def _nearest_planes(seen: Seen, side: int):
     first, second = (Float(part) * (2 / _CELLS) + (1 / _CELLS - 1) for part in (cell % _CELLS, cell // _CELLS))
     v = middle + across * (first * scale) + up * (second * scale)
 
-    def nearer(number, least, found):
+    def nearer(number, least, nearest):
         values = dr.gather(Four, seen.planes, number)
         value = dr.dot(values.xyz * side, v)
         less = ((values.w > 0) == (side > 0)) & (value < least)
-        return number + 1, dr.select(less, value, least), dr.select(less, number, found)
+        return number + 1, dr.select(less, value, least), dr.select(less, number, nearest)
 
     width = dr.width(v)
-    _, _, found = dr.while_loop(
-        state=(mi.UInt32(0), dr.full(Float, dr.inf, width), dr.full(mi.UInt32, seen.body.count, width)),
-        cond=lambda number, least, found: number < seen.body.count,
+    _, _, nearest = dr.while_loop(
+        state=(mi.UInt32(0), dr.full(Float, dr.inf, width), dr.full(mi.UInt32, seen.bounded_medium.count, width)),
+        cond=lambda number, least, nearest: number < seen.bounded_medium.count,
         body=nearer,
-        labels=("number", "least", "found"),
+        labels=("number", "least", "nearest"),
     )
-    return found
+    return nearest
 
 
 def _start(planes: EntryPlanes, v):
@@ -142,13 +152,13 @@ def first_entry(planes: EntryPlanes, start, direction, x, active=True) -> Entry:
     start, direction
         From the light to the camera, and of the rays [m].
     x
-        Distances of points within the body [m].
+        Distances of points within the medium [m].
     active
         Lanes to search in.
 
     Notes
     -----
-    Valid for points within the body. Where the light itself is, there is no such plane, and 0 for u.
+    Valid for points within the medium. Where the light itself is, there is no such plane, and 0 for u.
     """
 
     def step(turn, number, constant, slope, searches):
@@ -157,8 +167,8 @@ def first_entry(planes: EntryPlanes, start, direction, x, active=True) -> Entry:
             less = least < at
             return tuple(dr.select(less, new, old) for new, old in zip((other, *line), best))
 
-        found = _over_neighbours(planes, number, (number, constant, slope), start, direction, nearer)
-        return turn + 1, *found, searches & (found[0] != number)
+        least_plane = _over_neighbours(planes, number, (number, constant, slope), start, direction, nearer)
+        return turn + 1, *least_plane, searches & (least_plane[0] != number)
 
     width = dr.width(start, direction, x, active)
     number = _start(planes, dr.fma(direction, x, start))
@@ -185,20 +195,20 @@ def line_crossings(planes: tuple[EntryPlanes, EntryPlanes], v):
     Parameters
     ----------
     planes
-        Those where legs enter the body, and those where they leave it.
+        Those where legs enter the medium, and those where they leave it.
     v
         Vectors from the light [m].
 
     Returns
     -------
     enter, leave
-        As from `realtime.bounded_media.convex_clip.inverse_crossings`: the line misses the body where enter is 0 or
+        As from `realtime.bounded_media.convex_clip.inverse_crossings`: the line misses the medium where enter is 0 or
         less.
 
     Notes
     -----
     Where no plane next to the one that is found has less, the line enters by it if it meets its facet: if it is within
-    the planes next to it on the other side of the body, too.
+    the planes next to it on the other side of the medium, too.
     """
     entering, leaving = planes
     still, zero = dr.zeros(type(v)), type(v.x)(0)
@@ -215,14 +225,17 @@ def _across(planes: EntryPlanes, number, side: int):
 
 
 def clear_of(planes: tuple[EntryPlanes, EntryPlanes], start, direction, x0, x1):
-    """Return whether no leg to a segment meets the body whose entry and exit planes are given; never wrongly yes.
+    """Return whether no leg to a segment meets the medium whose entry and exit planes are given.
 
-    With u the entering plane's and -w the leaving one's, legs that meet the body have u > 1 and u > -w. Both are linear
-    along the ray: where u - max(1, -w) is below 0 at both ends with the planes of one point between, no leg does.
+    The answer is conservative: where it is False, legs may still miss the medium.
+
+    With u the entering plane's and -w the leaving one's, legs that meet the medium have u > 1 and u > -w. Both are
+    linear along the ray: where u - max(1, -w) is below 0 at both ends with the planes of one point between, no leg
+    does. Rays lead from `start`, the camera less the light [m], along `direction`; `x0` and `x1` are the segment [m].
     """
     clear = dr.mask_t(x0)(False)
     for x in (0.5 * (x0 + x1), x0, x1):
-        enter, leave = (first_entry(one, start, direction, x) for one in planes)
+        enter, leave = (first_entry(facing, start, direction, x) for facing in planes)
         short, beside = dr.mask_t(x)(True), dr.mask_t(x)(True)
         for end in (x0, x1):
             u = dr.fma(enter.slope, end, enter.constant)
@@ -236,6 +249,7 @@ def next_facet_change(planes: EntryPlanes, start, direction, entry: Entry):
     """Return where legs pass to another plane next [m], infinite where they do not, and that plane.
 
     Rounding can place the change behind the point; it is returned as it is, and the walk continues from its own place.
+    `start` and `direction` as for `first_entry`.
     """
 
     def sooner(best, other, line):
@@ -245,8 +259,8 @@ def next_facet_change(planes: EntryPlanes, start, direction, entry: Entry):
         return tuple(dr.select(less, new, old) for new, old in zip((at, other, *line), best))
 
     none = (type(entry.constant)(dr.inf), entry.number, entry.constant, entry.slope)
-    until, *found = _over_neighbours(planes, entry.number, none, start, direction, sooner)
-    return until, Entry(*found)
+    until, *next_plane = _over_neighbours(planes, entry.number, none, start, direction, sooner)
+    return until, Entry(*next_plane)
 
 
 def _over_neighbours(planes: EntryPlanes, number, state, start, direction, function):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Rays through bounded media: the pieces of the camera rays, what of the legs from the light lies in each body.
+"""Rays through bounded media: the pieces of the camera rays, what of the legs from the light lies in each medium.
 
-Lines are followed over the facets of bodies (`realtime.bounded_media.facet_walk`), in packets in which any comes near.
+Lines are followed over the facets of media (`realtime.bounded_media.facet_walk`), in packets in which any comes near.
 """
 
 from dataclasses import dataclass
@@ -9,10 +9,10 @@ from typing import Any
 
 import drjit as dr
 
-from realtime.bounded_media.body_views import BodySides, body_sides
 from realtime.bounded_media.convex_clip import Seen, inverse_crossings, near_line, share_inside
 from realtime.bounded_media.directional_legs import parallel_legs, seen_along
 from realtime.bounded_media.facet_walk import EntryPlanes, clear_of, line_crossings
+from realtime.bounded_media.views import MediumView, medium_view
 from realtime.rays.ray_light import RayGeometry, distance_to_light
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium
@@ -23,10 +23,10 @@ class Piece:
     """A part of every ray that lies in one medium."""
 
     medium: Medium
-    number: int | None  #: of the body; None between bodies
-    begin: Any  #: distances from the camera [m], equal or infinite where the ray misses it
-    end: Any
-    before: tuple[Any, ...]  #: optical depth from the camera to `begin`, by channel
+    number: int | None  #: of the bounded medium; None between them
+    begin: Any  #: distance from the camera [m], infinite or equal to `end` where the ray misses it
+    end: Any  #: [m]
+    before: tuple[Any, ...]  #: optical depth from the camera to `begin`, by channel [1]
 
 
 @dataclass(frozen=True)
@@ -37,11 +37,11 @@ class MediaRay:
     light: Light
     geometry: RayGeometry
     start: Any  #: from the light to the camera [m]
-    direction: Any
+    direction: Any  #: unit directions
     pieces: tuple[Piece, ...]
-    seen: tuple[Seen, ...]  #: the bodies as the light sees them
-    entries: tuple[EntryPlanes | None, ...]  #: by body, the planes where legs to points within it enter
-    exits: tuple[EntryPlanes | None, ...]  #: by body, the planes where legs leave it; only where there are several
+    seen: tuple[Seen, ...]  #: the bounded media as the light sees them
+    entries: tuple[EntryPlanes | None, ...]  #: by medium, the planes where legs to points within it enter
+    exits: tuple[EntryPlanes | None, ...]  #: by medium, the planes where legs leave it; only where there are several
     form: str  #: of `realtime.bounded_media.airlight.FORMS`
 
 
@@ -73,35 +73,35 @@ def sum_over_pieces(pieces: tuple[Piece, ...], segments, integral, zero):
     return total
 
 
-def camera_pieces(medium: Medium, origin, direction, sides: tuple[BodySides, ...] | None = None) -> tuple[Piece, ...]:
+def camera_pieces(medium: Medium, origin, direction, views: tuple[MediumView, ...] | None = None) -> tuple[Piece, ...]:
     """Return the pieces of the camera rays in which something scatters.
 
     Parameters
     ----------
     medium
-        The medium with its bodies.
+        The medium, with bounded media in it.
     origin, direction
         The camera, one for all lanes [m], and unit directions.
-    sides
-        The bodies as the camera sees them, if they are known.
+    views
+        The bounded media as the camera sees them, if they are known.
     """
     Float = type(direction.x)
-    sides = sides or tuple(body_sides(body, origin) for body in medium.bodies)
-    passages = [_passage(one, direction) for one in sides]
+    views = views or tuple(medium_view(bounded_medium, origin) for bounded_medium in medium.bounded_media)
+    passages = [_passage(view, direction) for view in views]
 
     def piece(own: Medium, number, begin, end):
         before = []
         for channel, around in enumerate(medium.sigma_t):
             depth = Float(0) if medium.clear else around * begin
-            for body, (enter, leave) in zip(medium.bodies, passages):
-                excess = body.medium.sigma_t[channel] - around
+            for bounded_medium, (enter, leave) in zip(medium.bounded_media, passages):
+                excess = bounded_medium.medium.sigma_t[channel] - around
                 depth += dr.select(leave <= begin, excess * (leave - enter), 0)
             before.append(depth)
         return Piece(own, number, begin, end, tuple(before))
 
     pieces = [
-        piece(body.medium, number, *ends)
-        for number, (body, ends) in enumerate(zip(medium.bodies, passages, strict=True))
+        piece(bounded_medium.medium, number, *ends)
+        for number, (bounded_medium, ends) in enumerate(zip(medium.bounded_media, passages, strict=True))
     ]
     if not medium.clear:
         starts = [dr.zeros(Float, dr.width(direction)), *(leave for _, leave in passages)]
@@ -109,15 +109,15 @@ def camera_pieces(medium: Medium, origin, direction, sides: tuple[BodySides, ...
             end = Float(dr.inf)
             for enter, _ in passages:
                 end = dr.minimum(end, dr.select(enter >= begin, enter, dr.inf))
-            # A camera within a body has no gap before it.
+            # A camera within a bounded medium has no gap before it.
             inside = [(enter <= begin) & (begin < leave) for enter, leave in passages]
             pieces.append(piece(medium, None, begin, dr.select(_any(inside), begin, end)))
     return tuple(pieces)
 
 
-def _passage(sides: BodySides, direction):
-    """Return where camera rays enter and leave a body [m], both infinite where they miss it."""
-    seen, planes = sides.seen, (sides.entering, sides.leaving)
+def _passage(view: MediumView, direction):
+    """Return where camera rays enter and leave a medium [m], both infinite where they miss it."""
+    seen, planes = view.seen, (view.entering, view.leaving)
     nothing = type(direction.x)(dr.inf)
 
     def ends(direction):
@@ -135,20 +135,23 @@ def _passage(sides: BodySides, direction):
 
 
 def camera_insides(medium: Medium, origin, direction, distance) -> tuple[Any, ...]:
-    """Return what of camera rays up to a distance lies in each body [m]; arguments as in `camera_pieces`."""
+    """Return what of camera rays up to a distance lies in each bounded medium [m]; arguments as in `camera_pieces`.
+
+    `origin` is the camera [m], `direction` unit vectors; `distance` [m] may be infinite.
+    """
     insides = []
-    for body in medium.bodies:
-        ends = _passage(body_sides(body, origin), direction)
+    for bounded_medium in medium.bounded_media:
+        ends = _passage(medium_view(bounded_medium, origin), direction)
         enter, leave = (dr.minimum(end, distance) for end in ends)
         insides.append(dr.select(leave > enter, leave - enter, 0))
     return tuple(insides)
 
 
 def optical_depths(medium: Medium, distance, insides) -> tuple[Any, ...]:
-    """Return the optical depth up to a distance, by channel; `insides` is what of it lies in each body [m]."""
+    """Return the optical depth up to a distance, by channel; `insides` is what lies in each bounded medium [m]."""
     depths = [type(distance)(0) if medium.clear else sigma * distance for sigma in medium.sigma_t]
-    for body, inside in zip(medium.bodies, insides, strict=True):
-        excess = [own - sigma for own, sigma in zip(body.medium.sigma_t, medium.sigma_t)]
+    for bounded_medium, inside in zip(medium.bounded_media, insides, strict=True):
+        excess = [own - sigma for own, sigma in zip(bounded_medium.medium.sigma_t, medium.sigma_t)]
         depths = [dr.fma(more, inside, depth) for more, depth in zip(excess, depths)]
     return tuple(depths)
 
@@ -169,16 +172,16 @@ def path_transmittance(medium: Medium, light: Light, *, depths, point, active):
     """
     if not light.w:
         still = dr.zeros(type(point))
-        for body in medium.bodies:
-            (inside,) = parallel_legs(seen_along(body, light.axis), point, still, [type(point.x)(0)], active)
-            depths = [dr.fma(own, inside, depth) for own, depth in zip(body.medium.sigma_t, depths)]
+        for bounded_medium in medium.bounded_media:
+            (inside,) = parallel_legs(seen_along(bounded_medium, light.axis), point, still, [type(point.x)(0)], active)
+            depths = [dr.fma(own, inside, depth) for own, depth in zip(bounded_medium.medium.sigma_t, depths)]
         return type(medium.albedo)(*(dr.exp(-depth) for depth in depths))
     vector = point - light.position
     length = dr.norm(vector)
     depths = [dr.fma(sigma, length, depth) for depth, sigma in zip(depths, medium.sigma_t)]
-    for body in medium.bodies:
-        sides = body_sides(body, light.position)
-        seen, planes = sides.seen, (sides.entering, sides.leaving)
+    for bounded_medium in medium.bounded_media:
+        view = medium_view(bounded_medium, light.position)
+        seen, planes = view.seen, (view.entering, view.leaving)
         near = active & near_line(seen, vector / length, length)
         inside = dr.if_stmt(
             args=(vector,),
@@ -188,34 +191,37 @@ def path_transmittance(medium: Medium, light: Light, *, depths, point, active):
             ),
             false_fn=lambda vector: type(vector.x)(0),
         )
-        excess = [own - sigma for own, sigma in zip(body.medium.sigma_t, medium.sigma_t)]
+        excess = [own - sigma for own, sigma in zip(bounded_medium.medium.sigma_t, medium.sigma_t)]
         depths = [dr.fma(more, inside, depth) for more, depth in zip(excess, depths)]
     return type(medium.albedo)(*(dr.exp(-depth) for depth in depths))
 
 
 def line_ends(seen: Seen, planes, v):
     """Return 1/f_in and 1/f_out of lines along v, as of `realtime.bounded_media.convex_clip.inverse_crossings`."""
-    if seen.body.planes is None:
+    if seen.bounded_medium.planes is None:
         (enter,), (leave,) = inverse_crossings(seen, v, dr.zeros(type(v)), [type(v.x)(0)], True)
         return enter, leave
     return line_crossings(planes, v)
 
 
 def light_leg(ray: MediaRay, piece: Piece, xs, rs) -> list[list[Any]]:
-    """Return by body and node what of the leg from the light lies in it [m]."""
+    """Return by medium and node what of the leg from the light lies in it [m].
+
+    `xs` are the distances of the nodes along the rays and `rs` those from the light [m].
+    """
     insides = []
     for number, seen in enumerate(ray.seen):
         own = number == piece.number
         near = dr.full(dr.mask_t(xs[0]), True, dr.width(xs[0])) if own else _near_legs(ray, seen, xs, rs)
         enter, leave = inverse_crossings(seen, ray.start, ray.direction, xs, near, leaves=not own)
         ends = [None] * len(xs) if own else leave
-        shares = [share_inside(one, other) for one, other in zip(enter, ends)]
+        shares = [share_inside(inverse_in, inverse_out) for inverse_in, inverse_out in zip(enter, ends)]
         insides.append([dr.select(near, share * r, 0) for share, r in zip(shares, rs)])
     return insides
 
 
-def other_bodies_near(ray: MediaRay, number: int, x0, x1):
-    """Return whether legs from the light to points of a segment in a body may meet another body."""
+def other_media_near(ray: MediaRay, number: int, x0, x1):
+    """Return whether legs from the light to points of [x0, x1] [m] in the medium `number` may meet another one."""
     xs = [x0, x1]
     rs = [distance_to_light(ray.geometry, x) for x in xs]
     meets: Any = False
@@ -242,13 +248,13 @@ def _clear_of(ray: MediaRay, other: int, x0, x1):
 
 
 def _near_legs(ray: MediaRay, seen: Seen, xs, rs):
-    """Return whether legs from the light to points of a segment may come near a body.
+    """Return whether legs from the light to points of a segment may come near a medium.
 
     In the plane of ray and light, with u along the ray and v to it, the legs fill a triangle with the corner at the
-    light and the others at (s_0, h) and (s_1, h); q is the distance of the body's centre from the plane. First and last
-    node stand for the ends.
+    light and the others at (s_0, h) and (s_1, h); q is the distance of the medium's centre from the plane. First and
+    last node stand for the ends.
     """
-    geometry, radius = ray.geometry, seen.body.radius * 1.001
+    geometry, radius = ray.geometry, seen.bounded_medium.radius * 1.001
     foot = dr.fma(ray.direction, geometry.foot, ray.start)
     size = dr.norm(foot)
     # A ray through the light has no such plane: all legs lie in the ray.

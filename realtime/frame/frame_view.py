@@ -4,7 +4,7 @@
 import drjit as dr
 import mitsuba as mi
 
-from realtime.bounded_media.body_views import MediaSides, media_sides
+from realtime.bounded_media.views import MediaViews, media_views
 from realtime.frame.surface import visible_triangle
 from realtime.methods.interface.view import View
 from realtime.numerics.array_types import Metres, PerRay
@@ -26,9 +26,9 @@ def frame_view(
     lights: tuple[Light, ...],
     layout: Layout | None = None,
     tile: PerRay | None = None,
-    sides: MediaSides | None = None,
+    views: MediaViews | None = None,
 ) -> View:
-    """Return what a method is given for some pixels.
+    """Return what a method is given for some pixels; `distance` [m] is that to the visible surface.
 
     `geometry` may be None where the method casts no rays, `layout` where these are the pixels of a whole image or
     of its first tile, and `tile` where sixteen pixels that follow one another are a tile.
@@ -37,10 +37,10 @@ def frame_view(
     shown = {"features": features, "geometry": geometry, "medium": medium, "lights": lights}
 
     def part():
-        # The planes of bodies are written to a table, which no branch may do: so before there are parts.
-        sides = media_sides(medium, lights, camera.origin) if features.bounded else None
+        # The planes of bounded media are written to a table, which no branch may do: so before there are parts.
+        views = media_views(medium, lights, camera.origin) if features.bounded else None
         return lambda pixel, distance, tile, layout: frame_view(
-            camera, pixel, distance, layout=layout, tile=tile, sides=sides, **shown
+            camera, pixel, distance, layout=layout, tile=tile, views=views, **shown
         )
 
     return View(
@@ -59,7 +59,7 @@ def frame_view(
         rays=_rays(camera, pixel),
         visible_triangle=lambda: visible_triangle(geometry, camera.origin, direction),
         part=part,
-        sides=sides,
+        media_views=views,
     )
 
 

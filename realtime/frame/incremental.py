@@ -43,7 +43,7 @@ def next_frame(
     geometry_moved: bool,
     light_moved: bool,
 ) -> tuple[tuple[Any, Any, Any], FrameCache]:
-    """Render a scene after the one that left something.
+    """Render a scene, and reuse what the last frame left.
 
     Parameters
     ----------

@@ -121,7 +121,7 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
         layers = layers_of(view) if corners is None else adaptive_layers(layers_of, view, corners, tolerance)
         return layers if method.passes else composed(layers, by_light)
 
-    # Asked of every scene: it checks the parameters also where nothing casts a shadow.
+    # Every scene runs it: it checks the parameters also where nothing casts a shadow.
     prepare = method.prepare(scene, chosen) if method.prepare else _no_state
     if not features.shadows:
         prepare = _no_state
@@ -172,7 +172,7 @@ def render_frame(renderer: FrameRenderer) -> Frame:
 
 
 def image_frame(renderer: FrameRenderer, stages) -> Frame:
-    """Bring what `run_stages` returned to the host in the order of the image."""
+    """Bring `stages`, what `run_stages` returned, to the host in the order of the image."""
     distance, surface, airlight = stages
     height, width = renderer.scene.camera.height, renderer.scene.camera.width
     light = _image(renderer, airlight, (height, width, 3))
@@ -194,7 +194,10 @@ def run_stages(renderer: FrameRenderer, state):
 
 
 def evaluated(cast: Cast, by_light, layers):
-    """Return distance, surface and airlight, evaluated, from what the stages returned."""
+    """Return distance [m], surface and airlight [W/(m^2 sr)], evaluated, from `cast`, `by_light` and `layers`.
+
+    These are what the stages returned; a colour by light is the surface where the layers have none of their own.
+    """
     airlight, behind = layers[:2]
     surface = by_light[0] if behind is None else behind
     dr.eval(cast.distance, surface, airlight)
@@ -215,7 +218,7 @@ def run_shade(renderer: FrameRenderer, cast: Cast):
 
 
 def run_cull(renderer: FrameRenderer, state, distance: Metres):
-    """Run the stage that sorts by tiles."""
+    """Run the stage that sorts by tiles, for rays up to a `distance` [m], and return its lists."""
     scene = renderer.scene
     return renderer.cull(renderer.pixel, scene.camera, scene.medium, scene.lights, state, distance)
 

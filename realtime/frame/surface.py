@@ -57,7 +57,7 @@ def cast_rays(scene, facets: Facets | None, origin, direction) -> Cast:
     facets
         Its triangles, or None: then Mitsuba will be asked for the surfaces.
     origin, direction
-        Rays in any precision; they are cast in float32.
+        Rays in any precision [m] and their unit directions; they are cast in float32.
     """
     Float = type(origin.x)
     hit = scene.ray_intersect_preliminary(_ray(origin, direction), coherent=True)
@@ -69,7 +69,10 @@ def cast_rays(scene, facets: Facets | None, origin, direction) -> Cast:
 
 
 def visible_surface(cast: Cast, facets: Facets | None, origin, direction, *, color) -> VisibleSurface:
-    """Return the surfaces that camera rays meet, arguments as for `cast_rays`; `color` is the type of an albedo."""
+    """Return the surfaces that camera rays meet; `color` is the type of an albedo.
+
+    `origin` [m] and unit `direction`s as for `cast_rays`.
+    """
     Vector = type(direction)
     distance = cast.distance
     valid = dr.isfinite(distance)
@@ -91,7 +94,7 @@ def visible_surface(cast: Cast, facets: Facets | None, origin, direction, *, col
 
 
 def visible_triangle(scene, origin, direction):
-    """Return the triangles that camera rays hit first.
+    """Return the triangles of the Mitsuba `scene` that rays from `origin` [m] along unit `direction`s hit first.
 
     Returns
     -------
@@ -139,7 +142,7 @@ def lit_surface(scene, surface: VisibleSurface, *, medium: Medium, light: Light,
     if shadows:
         lit &= ~scene.ray_test(light.shadow_ray_from(surface.interaction), lit)
     reflected = surface.albedo * arriving * (dr.inv_pi * cosine / dr.square(r) if light.w else dr.inv_pi * cosine)
-    if medium.bodies:
+    if medium.bounded_media:
         kept = path_transmittance(medium, light, depths=depths, point=surface.point, active=lit)
     else:
         kept = transmittance(medium, dr.select(lit, surface.distance + r, 0))

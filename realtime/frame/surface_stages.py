@@ -40,23 +40,25 @@ def surface_stages(scene: Scene, *, provides_visibility: bool) -> tuple[Callable
     """
     if not scene.features.surfaces:
         return _nothing_met, no_surface, False
-    # A map of a light at infinity shows the media alone, but not all that is lit.
+    # The map of a light at infinity covers the media alone; surfaces beside them are lit too.
     asked = [not (light.w and provides_visibility) for light in scene.lights]
 
     def cast_all(geometry, facets, pixel, camera, medium) -> Cast:
         direction, _ = ray_directions(camera, pixel)
-        found = cast_rays(geometry, facets, camera.origin, direction)
-        if not medium.bodies:
-            return found
-        insides = camera_insides(medium, camera.origin, direction, found.distance)
-        return replace(found, insides=insides)
+        cast = cast_rays(geometry, facets, camera.origin, direction)
+        if not medium.bounded_media:
+            return cast
+        insides = camera_insides(medium, camera.origin, direction, cast.distance)
+        return replace(cast, insides=insides)
 
     def shade_all(geometry, facets, pixel, camera, medium, lights, cast):
         direction, _ = ray_directions(camera, pixel)
         seen = visible_surface(cast, facets, camera.origin, direction, color=type(medium.albedo))
-        depths = optical_depths(medium, cast.distance, cast.insides) if medium.bodies else None
+        depths = optical_depths(medium, cast.distance, cast.insides) if medium.bounded_media else None
         shown = {"medium": medium, "depths": depths}
-        colors = [lit_surface(geometry, seen, light=light, shadows=one, **shown) for light, one in zip(lights, asked)]
+        colors = [
+            lit_surface(geometry, seen, light=light, shadows=shadows, **shown) for light, shadows in zip(lights, asked)
+        ]
         return tuple(colors) if provides_visibility else (sum(colors),)
 
     @Frozen
@@ -73,5 +75,8 @@ def _nothing_met(geometry, facets, pixel, camera, medium, lights):
 
 
 def no_surface(geometry, facets, pixel, camera, medium, lights, cast):
-    """Return what `shade` returns where there are no surfaces."""
+    """Return what `shade` returns where there are no surfaces: black, RGB [W/(m^2 sr)], for each light.
+
+    The parameters are those of `shade`: `geometry`, `facets`, `pixel`, `camera`, `medium`, `lights`, `cast`.
+    """
     return tuple(dr.zeros(type(medium.albedo), dr.width(pixel)) for _ in lights)

@@ -38,8 +38,8 @@ class LitIntervals:
     """The sum over the lit intervals of rays, and the last one of each."""
 
     total: Any  #: the sum
-    begin: Any  #: of the last interval
-    end: Any
+    begin: Any  #: of the last interval [m]
+    end: Any  #: of the last interval [m]
     waits: Any  #: whether it has ended and is not in the sum yet
 
 
@@ -51,20 +51,23 @@ def no_intervals(zero, start) -> LitIntervals:
     zero
         The sum of nothing, one for each ray.
     start
-        Where rays start, one for each: there an interval opens if they are lit.
+        Where rays start, one for each [m]: there an interval opens if they are lit.
     """
     return LitIntervals(zero, start, +start, dr.full(mi.Bool, False, dr.width(zero)))
 
 
 def open_interval(intervals: LitIntervals, begin, opens) -> LitIntervals:
-    """Return intervals behind a place where the light comes back if it `opens` one; nothing may wait there."""
+    """Return intervals behind the place `begin` [m] where the light comes back if it `opens` one.
+
+    Valid where nothing waits.
+    """
     return replace(intervals, begin=dr.select(opens, begin, intervals.begin))
 
 
 def close_interval(intervals: LitIntervals, end, closes, *, begin=None) -> LitIntervals:
-    """Return intervals behind a place where the light ends if it `closes` one; no other may have waited.
+    """Return intervals behind the place `end` [m] where the light ends if it `closes` one; no other may have waited.
 
-    `begin` is where it began, None for where `open_interval` was told.
+    `begin` is where it began [m], None for where `open_interval` put it.
     """
     if begin is not None:
         intervals = open_interval(intervals, begin, closes)
@@ -88,7 +91,8 @@ def add_waiting(intervals: LitIntervals, integral: Callable[[Any, Any], Any], du
 def sum_at_end(intervals: LitIntervals, integral: Callable[[Any, Any], Any], end, *, opened, lit, active):
     """Return the sum at the end of rays that are `active`: with what waits, and where `lit` what is open up to there.
 
-    `opened` is where that began. A loop, not two branches: most rays have one of the two and are served at once.
+    `integral` is the function of both ends [m] of an interval, `end` that of the rays, and `opened` where the last
+    interval began [m]. A loop, not two branches: most rays have one of the two and are served at once.
     """
 
     def body(total, waits, lit):

@@ -23,7 +23,7 @@ class Crossings:
 
 
 def filled(key: float, places: int, Float, width: int, *, gains: bool = True) -> Crossings:
-    """Return a queue that holds one key in all places, without gain."""
+    """Return a queue of so many places that holds one key in all of them, without gain, for `width` lanes."""
     return Crossings(
         [dr.full(Float, key, width) for _ in range(places)],
         [dr.zeros(Float, width) for _ in range(places if gains else 0)],
@@ -46,7 +46,7 @@ def insert(queue: Crossings, key, gain=None, *, larger_is_nearer: bool):
         keys.append(nearer(held, key))
         key = farther(held, key)
         if queue.gain:
-            # Asked of the new key, not of the one that it displaced: equal keys must not pass one another.
+            # Compare with the new key, not with the one that it displaced: equal keys must keep their order.
             before = new > held if larger_is_nearer else new < held
             gains.append(dr.select(before, gain, queue.gain[place]))
             gain = dr.select(before, queue.gain[place], gain)

@@ -130,7 +130,7 @@ def scaled_e1(e, a):
     Parameters
     ----------
     e, a
-        Dr.Jit arrays, e >= 0 and a >= 0. At a = 0 the imaginary part is atan(1/e), the real part large.
+        Dr.Jit arrays [1], e >= 0 and a >= 0. At a = 0 the imaginary part is atan(1/e), the real part large.
 
     Notes
     -----

@@ -77,19 +77,19 @@ def _in_single(geometry: RayGeometry, segment, extinctions, phase: Phase, light:
     if light.soft:
         return _over_subsegments(geometry, segment, extinctions, phase, light)
     x0, x1 = segment
-    found = extent(geometry, x0, x1, extinctions)
+    segment_extent = extent(geometry, x0, x1, extinctions)
 
     def longer(x0, x1):
         return dr.if_stmt(
             args=(x0, x1),
-            cond=serves(MORE, found, phase),
+            cond=serves(MORE, segment_extent, phase),
             true_fn=lambda x0, x1: short_segment(geometry, x0, x1, phase, extinctions, rule=MORE),
             false_fn=lambda x0, x1: _subsegment(geometry, x0, x1, extinctions, phase, light),
         )
 
     return dr.if_stmt(
         args=(x0, x1),
-        cond=serves(FEW, found, phase),
+        cond=serves(FEW, segment_extent, phase),
         true_fn=lambda x0, x1: short_segment(geometry, x0, x1, phase, extinctions, rule=FEW),
         false_fn=longer,
     )

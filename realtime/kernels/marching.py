@@ -30,6 +30,11 @@ def uniform(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, step
     steps
         Number of steps, at least 1.
 
+    Raises
+    ------
+    InputError
+        For `steps` that are no whole number of at least 1.
+
     Notes
     -----
     Valid where a step is shorter than the distance to the light, everywhere on the ray. An endless ray is cut after 20
@@ -56,6 +61,11 @@ def equiangular(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, 
         See `realtime.kernels`.
     steps
         Number of steps, at least 1.
+
+    Raises
+    ------
+    InputError
+        For `steps` that are no whole number of at least 1.
 
     Notes
     -----

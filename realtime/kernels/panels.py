@@ -45,7 +45,7 @@ from realtime.numerics.gauss_legendre import unit_nodes
 from realtime.scene.phase import Phase
 
 _NODES = 8
-_MOST = 160  # panels; more than any segment needs: what is not a number must end too
+_MOST = 160  # panels; no segment needs as many, but a loop over values that are not numbers must end too
 _DEPTH = 10.5  # T1
 _SOFT = 0.85  #: w for a light whose intensity falls off
 _NO_RATE = 1e-30
@@ -53,7 +53,7 @@ _DEEPEST = 116.0  # e^-80
 
 
 def panels_mean(phase: Phase, start, scale, width, decays, weight: Callable[[Any], Any] | None):
-    """Return I/(d (v1 - v0)), the mean over the range of v, for each extinction.
+    """Return I/(d (v1 - v0)), the mean over the range of v, for each extinction [1].
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def panels_mean(phase: Phase, start, scale, width, decays, weight: Callable[[Any
     part = width * part_of_all
     nodes = [(share, *_offset(part * fraction)) for fraction, share in unit_nodes(_NODES)]
     sinh_end, less_end = _offset(part)
-    # Not 0 in a vacuum: Dr.Jit must not find the depth to be the same in all turns of the loop.
+    # Not 0 in a vacuum, where Dr.Jit would see a depth that no turn of the loop changes, and drop it from the state.
     rates = [dr.minimum(-decay * scale * LOG2_E, -_NO_RATE) for decay in decays]
 
     def panel(index, f, c, depths, totals):
@@ -92,7 +92,7 @@ def panels_mean(phase: Phase, start, scale, width, decays, weight: Callable[[Any
             if weight is not None:
                 value *= weight(scale * (f + step))
             kept = [_kept(dr.fma(rate, step, depth)) for rate, depth in zip(rates, depths)]
-            totals = [dr.fma(value, one, total) for one, total in zip(kept, totals)]
+            totals = [dr.fma(value, attenuation, total) for attenuation, total in zip(kept, totals)]
         step = dr.fma(f, less_end, c * sinh_end)
         c = dr.fma(f, sinh_end, dr.fma(c, less_end, c))
         return index + 1, f + step, c, [dr.fma(rate, step, depth) for rate, depth in zip(rates, depths)], totals
@@ -113,7 +113,7 @@ def _kept(depth):
 
 
 def panel_count(phase: Phase, width, depth, *, soft: bool = False):
-    """Return the number of panels m of segments of some width in v, and depth T; 0 where the width is 0."""
+    """Return the number of panels m of segments of some width in v [1], and depth T [1]; 0 where the width is 0."""
     Float = type(width)
     widest = phase.panel_width(Float)
     if soft:

@@ -80,9 +80,9 @@ def _nodes(degree: int) -> tuple[tuple[float, float], ...]:
     if degree < 0:
         raise InputError(f"degree: got {degree}, wanted 0 or more")
     n = degree + 1
-    found = []
+    nodes = []
     for j in range(n):
         angle = math.pi * (2 * j + 1) / (2 * n)
         total = sum(math.cos(2 * k * angle) / (4 * k * k - 1) for k in range(1, n // 2 + 1))
-        found.append((math.cos(angle), (2 - 4 * total) / n))
-    return tuple(found)
+        nodes.append((math.cos(angle), (2 - 4 * total) / n))
+    return tuple(nodes)

@@ -51,7 +51,10 @@ class Piece:
 
 
 def piece_of(geometry: RayGeometry, x0, x1, sigma_t, phase: Phase) -> Piece:
-    """Return the range of [x0, x1] in u, without a polynomial."""
+    """Return the range of [x0, x1] [m] in u, without a polynomial, for an extinction `sigma_t` [1/m].
+
+    Valid for any segment.
+    """
     foot = geometry.foot
     Float = type(geometry.height)
     single = is_single(Float)
@@ -86,7 +89,7 @@ def _path_over_height(s, r, h):
 
 
 def place(piece: Piece, x) -> Place:
-    """Return where a point lies, one beyond the reach of the piece at its reach."""
+    """Return where a point lies that is `x` from the camera [m], one beyond the reach of the piece at its reach."""
     s, h = dr.select(dr.isinf(x), 0, x - piece.foot), piece.height
     r = dr.sqrt(dr.fma(s, s, h * h))
     limit = piece.near.sinh + piece.reach
@@ -95,7 +98,7 @@ def place(piece: Piece, x) -> Place:
 
 
 def offset(piece: Piece, begin: Place, x):
-    """Return w(x) - w(begin), without cancellation of the two.
+    """Return w(x) - w(begin) [1], without cancellation of the two; `x` is a distance along the ray [m].
 
     Since dq = (1 + ds/dr) dx, E - E0 = (x - x0)(E0 + E)/(r0 + r), and by the addition theorem of sinh w - w0 =
     asinh(F C0 - F0 C) = asinh((F - F0)(F0 + F)/(F C0 + F0 C)).
@@ -131,6 +134,9 @@ def integrand(piece: Piece, u, geometry: RayGeometry, medium: Medium, light: Lig
 
 
 def with_limits(piece: Piece, x0, x1, value):
-    """Put in what holds where the formulas are 0/0: segments of no length, and the light on the segment."""
+    """Return a `value` of J [1/m], corrected where the formulas are 0/0.
+
+    J is 0 on a segment [x0, x1] [m] of no length, and infinite with the light on the segment.
+    """
     on_light = piece.through_light & (x0 <= piece.foot) & (piece.foot <= x1)
     return dr.select(x1 == x0, 0, dr.select(on_light, dr.inf, value))

@@ -103,10 +103,11 @@ def _panel(geometry: RayGeometry, x0, x1, sigma_t, medium: Medium, light: Light,
 
 
 def path_interval(geometry: RayGeometry, x0, x1, sigma_t, *, tail=1.0):
-    """Return the height, E = q/h at both ends of a segment, and their difference without cancellation.
+    """Return the height [m], E = q/h at both ends of [x0, x1] [m], and their difference without cancellation [1].
 
     The far end is brought to where extinction or p/(1 + E^2) have left nothing behind it. `tail` is the E from which on
-    p/(1 + E^2) falls like 1/E^2: 1, or where a backward lobe ends.
+    p/(1 + E^2) falls like 1/E^2: 1, or where a backward lobe ends. `sigma_t` is the extinction [1/m]. Valid for any
+    segment.
     """
     foot, h = geometry.foot, geometry.height
     Float = type(h)

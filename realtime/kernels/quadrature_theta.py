@@ -27,6 +27,11 @@ def quadrature_theta(geometry: RayGeometry, x0, x1, medium: Medium, light: Light
     nodes
         Nodes of each panel, at least 1; the range is split at the foot point unless the phase function is isotropic.
 
+    Raises
+    ------
+    InputError
+        For `nodes` that are no whole number of at least 1.
+
     Notes
     -----
     Valid for rays that do not meet the light (height above 0). The difference of the angles is taken as one arc

@@ -144,5 +144,9 @@ def airlight_integral(kernel, geometry: RayGeometry, x0, x1, *, medium: Medium, 
         The rays and their lit segments [m].
     medium, light
         What fills the scene and what lights it.
+
+    Notes
+    -----
+    Valid where the kernel is.
     """
     return kernel(geometry, *geometry.lit_segment(x0, x1), medium, light)

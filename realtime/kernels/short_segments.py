@@ -31,11 +31,11 @@ from realtime.scene.phase import Phase, Reach
 
 @dataclass(frozen=True)
 class Rule:
-    """How many nodes serve which segments."""
+    """How many nodes a rule has, and which segments it serves."""
 
     nodes: int
-    depth: float  #: largest sigma_t (1 + s1/r1) L
-    length: Callable[[Reach], float]  #: largest L/r of a phase function
+    depth: float  #: largest sigma_t (1 + s1/r1) L [1]
+    length: Callable[[Reach], float]  #: largest L/r of a phase function [1]
 
 
 FEW = Rule(4, 2.0, lambda reach: reach.few)
@@ -47,11 +47,14 @@ class Extent:
     """How long segments are."""
 
     square: Any  #: (L/r)^2, infinite at the light
-    depth: Any  #: sigma_t (1 + s1/r1) L of the largest extinction
+    depth: Any  #: sigma_t (1 + s1/r1) L of the largest extinction [1]
 
 
 def extent(geometry: RayGeometry, x0, x1, extinctions) -> Extent:
-    """Return how long segments are."""
+    """Return how long the segments [x0, x1] [m] are; `extinctions` are those of the medium [1/m].
+
+    Valid for any segment; see `serves` for what is too long.
+    """
     s0, length, height_squared = x0 - geometry.foot, x1 - x0, dr.square(geometry.height)
     s1 = s0 + length
     nearest = dr.clip(0, s0, s1)
@@ -59,13 +62,13 @@ def extent(geometry: RayGeometry, x0, x1, extinctions) -> Extent:
     return Extent(dr.square(length) * dr.rcp(dr.fma(nearest, nearest, height_squared)), rate * length)
 
 
-def serves(rule: Rule, found: Extent, phase: Phase):
-    """Return whether a rule is right; not where anything is no number or infinite.
+def serves(rule: Rule, segment_extent: Extent, phase: Phase):
+    """Return whether a rule is accurate enough; False where a value is infinite or not a number.
 
     Length and depth each spoil part of it: by themselves they may reach their limits, together an ellipse.
     """
     of_length, of_depth = 1 / rule.length(phase.reach) ** 2, 1 / rule.depth**2
-    return dr.fma(found.square, of_length, dr.square(found.depth) * of_depth) < 1
+    return dr.fma(segment_extent.square, of_length, dr.square(segment_extent.depth) * of_depth) < 1
 
 
 def short_segment(geometry: RayGeometry, x0, x1, phase: Phase, extinctions, *, rule: Rule):

@@ -112,10 +112,10 @@ def _extinction_series(a, degree: int):
 
 
 def phase_series(phase: Phase, degree: int, kernel: str):
-    """Return the coefficients of p(-sin theta) in powers of theta; refuse for a kernel what has none."""
+    """Return the coefficients of p(-sin theta) in powers of theta; refuse a phase function without them."""
     series = phase.series(degree)
     if series is None:
-        known = ", ".join(one.name for one in PHASES if one.series is not Phase.series)
+        known = ", ".join(candidate.name for candidate in PHASES if candidate.series is not Phase.series)
         raise InputError(
             f"kernel {kernel}: phase function {phase.name!r} has no Taylor series; use the kernel 'quadrature' or one "
             f"of {known}"

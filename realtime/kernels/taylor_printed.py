@@ -99,26 +99,26 @@ def printed_coefficients(a, name: str) -> list:
     name
         'isotropic' (five coefficients), 'rayleigh', 'hazy' or 'murky' (three).
     """
-    one = 0 * a + 1
+    unit = 0 * a + 1
     if name == "isotropic":
         return [
-            one,
+            unit,
             -a,
             a * a - a,
             -(a * a * a) / 6 + a * a / 2 - a,
             a * a * a * a / 24 - a * a * a / 4 + 11 * a * a / 24 - 5 * a / 24,
         ]
     if name == "rayleigh":
-        return [0.75 * one, -0.75 * a, 0.375 * a * a + 0.75]
+        return [0.75 * unit, -0.75 * a, 0.375 * a * a + 0.75]
     if name == "hazy":
         return [
-            265 / 256 / 2 * one,
+            265 / 256 / 2 * unit,
             (-265 / 256 * a + 9 / 36) / 2,
             (265 / 256 * a * a - 121 / 512 * a + 63 / 64) / 2,
         ]
     head, mean = 2147483673 / 2147483648, 83 / 33
     return [
-        head / mean * one,
+        head / mean * unit,
         (head * a - 25 / 367108864) / mean,
         (head / 2 * a * a - 2147482073 / 4294967296 * a + 775 / 134217728) / mean,
     ]

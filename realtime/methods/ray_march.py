@@ -125,7 +125,7 @@ def _visibility(view: View, maps, number: int, shadow: str):
 
 
 def _within(media: LitRay, x0, x1):
-    """Return the part of a segment from the first to the last body."""
+    """Return the part of a segment from the first to the last bounded medium."""
     first, last = x1, x0
     for piece in media.pieces:
         first = dr.minimum(first, piece.begin)
@@ -174,7 +174,7 @@ def _march_parallel(view: View, media: LitRay, segment, *, steps: int, lit):
     """Sum equal steps of every ray under a directional light; see `_march`."""
     x0, x1 = segment
     Float = type(view.distance)
-    # Rays that miss all bodies march on the spot: a map has no place for points at infinity.
+    # Rays that miss all bounded media take steps of length 0: a map has no place for points at infinity.
     meets = x1 > x0
     x0, width = dr.select(meets, x0, 0), dr.select(meets, (x1 - x0) / steps, 0)
 

@@ -47,32 +47,32 @@ def own_method(name: str) -> Method:
     InputError
         For what cannot be imported, is not there or is no function, and a function that no frame can call.
     """
-    found = _find(name)
-    if isinstance(found, Method):
+    named_object = _find(name)
+    if isinstance(named_object, Method):
         return replace(
-            found,
-            render=_guarded_render(found.render, name, provides_visibility=found.provides_visibility),
-            check=found.check or partial(check_finite, name=name),
+            named_object,
+            render=_guarded_render(named_object.render, name, provides_visibility=named_object.provides_visibility),
+            check=named_object.check or partial(check_finite, name=name),
         )
-    if isinstance(found, type) or not callable(found):
-        kind = "class" if isinstance(found, type) else type(found).__name__
+    if isinstance(named_object, type) or not callable(named_object):
+        kind = "class" if isinstance(named_object, type) else type(named_object).__name__
         raise InputError(f"method {name}: this is a {kind}; wanted a function of the view")
-    takes_kernel, parameters = _signature(found, name)
+    takes_kernel, parameters = _signature(named_object, name)
     fields = [(key, type(default), field(default=default)) for key, default in parameters.items()]
-    by_rays = bool(getattr(found, "by_rays", False))
+    by_rays = bool(getattr(named_object, "by_rays", False))
     if by_rays:
-        fields = [*(one for one in fields if one[0] != "tolerance"), ("tolerance", float, tolerance())]
+        fields = [*(entry for entry in fields if entry[0] != "tolerance"), ("tolerance", float, tolerance())]
     return Method(
         name,
-        _guarded(found, name, takes_kernel=takes_kernel, takes=parameters),
-        _summary(found),
-        _file(found) or "one's own",
+        _guarded(named_object, name, takes_kernel=takes_kernel, takes=parameters),
+        _summary(named_object),
+        _file(named_object) or "one's own",
         uses_kernel=takes_kernel,
-        prepare=_guarded_prepare(getattr(found, "prepare", None), name),
+        prepare=_guarded_prepare(getattr(named_object, "prepare", None), name),
         casts_rays=always,
-        frozen=always if getattr(found, "frozen", False) else never,
+        frozen=always if getattr(named_object, "frozen", False) else never,
         by_rays=always if by_rays else None,
-        shadows=bool(getattr(found, "shadows", True)),
+        shadows=bool(getattr(named_object, "shadows", True)),
         parameters=make_dataclass("OwnParameters", fields, bases=(Parameters,), frozen=True),
         check=partial(check_finite, name=name),
     )
@@ -86,14 +86,14 @@ def _find(name: str) -> Any:
     is_file = module_name.endswith(".py") or os.sep in module_name
     with _own_errors(f"method {name}"):
         module = _from_file(Path(module_name), name) if is_file else _from_path(module_name, name)
-    found: Any = module
+    named_object: Any = module
     for part in path.split("."):
-        if not hasattr(found, part):
+        if not hasattr(named_object, part):
             there = [key for key, value in vars(module).items() if _is_candidate(value, module)]
             known = f"it has {', '.join(there)}" if there else "it has no functions of its own"
             raise InputError(f"method {name}: {module_name} has no {path!r}; {known}")
-        found = getattr(found, part)
-    return found
+        named_object = getattr(named_object, part)
+    return named_object
 
 
 def _is_candidate(value: Any, module: ModuleType) -> bool:
@@ -135,7 +135,7 @@ def _from_file(path: Path, name: str) -> ModuleType:
         return known
     spec = importlib.util.spec_from_file_location(key, place)
     if spec is None or spec.loader is None:
-        raise InputError(f"method {name}: {path} is no Python file; {_WANTED}")
+        raise InputError(f"method {name}: {path} is not a Python file; {_WANTED}")
     module = importlib.util.module_from_spec(spec)
     module.__dict__["__airlight_stamp__"] = stamp
     sys.modules[key] = module
@@ -163,15 +163,15 @@ def _signature(function: Callable[..., Any], name: str) -> tuple[bool, dict[str,
         raise InputError(f"method {name}: it takes no view; wanted function(view, *, kernel=None, **parameters)")
     parameters = {}
     takes_kernel = False
-    for one in arguments[1:]:
-        if one.kind in (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD):
+    for argument in arguments[1:]:
+        if argument.kind in (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD):
             continue
-        if one.name == "kernel":
+        if argument.name == "kernel":
             takes_kernel = True
-        elif one.default is inspect.Parameter.empty or one.kind == inspect.Parameter.POSITIONAL_ONLY:
-            raise InputError(f"method {name}: nothing gives {one.name!r} a value; wanted a keyword with a default")
-        elif type(one.default) in _TYPES:  # what has another type cannot be set, and keeps its default
-            parameters[one.name] = one.default
+        elif argument.default is inspect.Parameter.empty or argument.kind == inspect.Parameter.POSITIONAL_ONLY:
+            raise InputError(f"method {name}: nothing gives {argument.name!r} a value; wanted a keyword with a default")
+        elif type(argument.default) in _TYPES:  # what has another type cannot be set, and keeps its default
+            parameters[argument.name] = argument.default
     return takes_kernel, parameters
 
 
@@ -184,8 +184,8 @@ def _guarded(
         given = {key: value for key, value in values(parameters).items() if key in takes}
         given |= {"kernel": kernel} if takes_kernel else {}
         with _own_errors(f"method {name}", _file(function)):
-            found = function(replace(view, prepared=state), **given)
-        return Layers(checked_radiance(found, view, name))
+            returned = function(replace(view, prepared=state), **given)
+        return Layers(checked_radiance(returned, view, name))
 
     return render
 
@@ -197,8 +197,8 @@ def _guarded_render(
 
     def render(view, state, lists, *, kernel, parameters):
         with _own_errors(f"method {name}", _file(function)):
-            found = function(view, state, lists, kernel=kernel, parameters=parameters)
-        return checked_layers(found, view, name, visibility=provides_visibility(parameters))
+            returned = function(view, state, lists, kernel=kernel, parameters=parameters)
+        return checked_layers(returned, view, name, visibility=provides_visibility(parameters))
 
     return render
 
@@ -246,7 +246,7 @@ def _place(root: BaseException, error: BaseException, file: str | None) -> str:
     """Return 'file, line N: ' of the innermost step in the user's file, or of the innermost of all."""
     if isinstance(root, SyntaxError):
         return f"{root.filename}, line {root.lineno}: "
-    steps = [step for one in (error, root) for step in traceback.extract_tb(one.__traceback__)]
+    steps = [step for raised in (error, root) for step in traceback.extract_tb(raised.__traceback__)]
     outside = [step for step in steps if step.filename != __file__ and "importlib" not in step.filename]
     inside = [step for step in outside if step.filename == file]
     chosen = inside or outside

@@ -15,12 +15,12 @@ from realtime.methods.interface.view import View
 _WANTED = "wanted the radiance of every pixel, an RGB colour or one number: a Dr.Jit array, or NumPy's (pixels, 3)"
 
 
-def checked_radiance(found: Any, view: View, name: str):
+def checked_radiance(returned: Any, view: View, name: str):
     """Return the radiance of every pixel as a colour in the precision of the view.
 
     Parameters
     ----------
-    found
+    returned
         What the method `name` returned: a Dr.Jit colour, three-vector or number, or an array (pixels, 3) or (pixels,)
         of another kind, which goes through NumPy; one entry per pixel of `view`, or one for all.
     view
@@ -35,20 +35,20 @@ def checked_radiance(found: Any, view: View, name: str):
     """
     Color, Float = type(view.medium.albedo), type(view.distance)
     width = dr.width(view.pixel)
-    channels = _dr_channels(found, name) if dr.is_array_v(found) else _channels(found, width, name)
-    for one in channels:
-        if dr.width(one) not in (1, width):
-            raise InputError(f"method {name}: returned {dr.width(one)} values for {width} pixels; {_WANTED}")
+    channels = _dr_channels(returned, name) if dr.is_array_v(returned) else _channels(returned, width, name)
+    for channel in channels:
+        if dr.width(channel) not in (1, width):
+            raise InputError(f"method {name}: returned {dr.width(channel)} values for {width} pixels; {_WANTED}")
     # A constant has one entry: every pixel gets it.
-    return Color(*(Float(one) + dr.zeros(Float, width) for one in channels))
+    return Color(*(Float(channel) + dr.zeros(Float, width) for channel in channels))
 
 
-def checked_layers(found: Any, view: View, name: str, *, visibility: bool) -> Layers:
+def checked_layers(returned: Any, view: View, name: str, *, visibility: bool) -> Layers:
     """Return the layers of a method, their in-scattered radiance as `checked_radiance` does.
 
     Parameters
     ----------
-    found
+    returned
         What the method `name` returned.
     view
         What it was given.
@@ -60,24 +60,30 @@ def checked_layers(found: Any, view: View, name: str, *, visibility: bool) -> La
     Raises
     ------
     InputError
-        For what is no `Layers`, radiance of another type or shape, and a visibility that is not that of every light.
+        For an object other than `Layers`, radiance of another type or shape, and a visibility that lacks a light.
     """
-    if not isinstance(found, Layers):
+    if not isinstance(returned, Layers):
         raise InputError(
-            f"method {name}: returned a {type(found).__name__}; wanted realtime.methods.interface.layers.Layers"
+            f"method {name}: returned a {type(returned).__name__}; wanted realtime.methods.interface.layers.Layers"
         )
-    shares = 0 if found.visibility is None else len(found.visibility)
+    shares = 0 if returned.visibility is None else len(returned.visibility)
     wanted = len(view.lights) if visibility else 0
-    if shares != wanted or (found.visibility is None) == visibility:
+    if shares != wanted or (returned.visibility is None) == visibility:
         raise InputError(
             f"method {name}: returned the visibility of {shares} lights, wanted that of {wanted}: one for each light "
             "where `provides_visibility`, otherwise None"
         )
-    return replace(found, in_scattered=checked_radiance(found.in_scattered, view, name))
+    return replace(returned, in_scattered=checked_radiance(returned.in_scattered, view, name))
 
 
 def check_finite(airlight, *, name: str) -> None:
-    """Refuse an image of radiance, (height, width, 3), with values that are not finite."""
+    """Refuse the image `airlight`, (height, width, 3) [W/(m^2 sr)], with values that are not finite.
+
+    Raises
+    ------
+    InputError
+        With the method's name and the first such pixel.
+    """
     wrong = ~np.isfinite(airlight).all(axis=2)
     if wrong.any():
         row, column = np.argwhere(wrong)[0]
@@ -87,26 +93,26 @@ def check_finite(airlight, *, name: str) -> None:
         )
 
 
-def _dr_channels(found: Any, name: str) -> tuple[Any, ...]:
+def _dr_channels(returned: Any, name: str) -> tuple[Any, ...]:
     """Return the three channels of a Dr.Jit array."""
-    kind = type(found)
+    kind = type(returned)
     if dr.is_float_v(kind) and not dr.is_special_v(kind) and not dr.is_tensor_v(kind):
         if dr.depth_v(kind) == 1:
-            return (found,) * 3
-        if dr.depth_v(kind) == 2 and len(found) == 3:
-            return tuple(found)
+            return (returned,) * 3
+        if dr.depth_v(kind) == 2 and len(returned) == 3:
+            return tuple(returned)
     raise InputError(f"method {name}: returned a {kind.__module__}.{kind.__name__}; {_WANTED}")
 
 
-def _channels(found: Any, width: int, name: str) -> tuple[Any, ...]:
+def _channels(returned: Any, width: int, name: str) -> tuple[Any, ...]:
     """Return the three channels of an array of another kind, or of a number."""
     try:
-        values = np.asarray(found)
+        values = np.asarray(returned)
         right = values.dtype.kind in "fiu"
     except (TypeError, ValueError):
         right = False
     if not right:
-        raise InputError(f"method {name}: returned a {type(found).__name__}; {_WANTED}")
+        raise InputError(f"method {name}: returned a {type(returned).__name__}; {_WANTED}")
     if values.ndim == 0:
         return (float(values),) * 3
     if values.shape not in ((width,), (width, 3)):

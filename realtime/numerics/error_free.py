@@ -14,20 +14,20 @@ import drjit as dr
 
 
 def two_product(a, b):
-    """Return the rounded product and its rounding error (Dekker)."""
+    """Return the rounded product a b and its rounding error (Dekker)."""
     product = a * b
     return product, dr.fma(a, type(a)(b), -product)
 
 
 def two_sum(a, b):
-    """Return the rounded sum and its rounding error (Knuth)."""
+    """Return the rounded sum a + b and its rounding error (Knuth)."""
     total = a + b
     of_b = total - a
     return total, (a - (total - of_b)) + (b - of_b)
 
 
 def settled(high, low):
-    """Return the same sum of two numbers, its low part below half a unit in the last place of the other (Dekker).
+    """Return the same sum of `high` and `low`, its low part below half a unit in the last place of the other (Dekker).
 
     Valid where `low` is the smaller one; else the low part has the error that rounding makes in it anyway.
     """
@@ -49,16 +49,16 @@ def difference_of_products(a, b, c, d):
 
 
 def two_cross(a, b):
-    """Return the cross product of two vectors and its rounding error."""
+    """Return the cross product a x b of two vectors and its rounding error."""
     Vector = type(a)
-    one, one_error = two_product(Vector(a.y, a.z, a.x), Vector(b.z, b.x, b.y))
-    other, other_error = two_product(Vector(a.z, a.x, a.y), Vector(b.y, b.z, b.x))
-    total, error = two_sum(one, -other)
-    return total, error + (one_error - other_error)
+    forward, forward_error = two_product(Vector(a.y, a.z, a.x), Vector(b.z, b.x, b.y))
+    backward, backward_error = two_product(Vector(a.z, a.x, a.y), Vector(b.y, b.z, b.x))
+    total, error = two_sum(forward, -backward)
+    return total, error + (forward_error - backward_error)
 
 
 def two_dot(a, b):
-    """Return the scalar product of two vectors and its rounding error."""
+    """Return the scalar product a . b of two vectors and its rounding error."""
     products, errors = two_product(a, b)
     partial, partial_error = two_sum(products.x, products.y)
     total, total_error = two_sum(partial, products.z)

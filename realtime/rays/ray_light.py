@@ -101,9 +101,10 @@ def distance_to_light(geometry: RayGeometry, x):
 
 
 def smooth_subsegments(geometry: RayGeometry, light: Light, x0, x1):
-    """Cut [x0, x1] where a soft spot's `falloff` has kinks, at the cone of the beam; one piece for other lights.
+    """Cut [x0, x1] [m] where a soft spot's `falloff` has kinks, at the cone of the beam; one piece for other lights.
 
     A ray that misses the beam is cut where it is closest to the axis: the closer it passes, the more like a kink.
+    Valid for any segment.
     """
     if not light.soft:
         return [(x0, x1)]
@@ -130,7 +131,7 @@ def falloff(geometry: RayGeometry, light: Light, x):
     t = dr.fma(geometry.slant, s, -geometry.slide)
     away = dr.sqrt(dr.fma(t, t, dr.square(geometry.gap)))
     along = dr.fma(geometry.axial, s, geometry.offset)
-    # As one angle: at the dim edge the difference of two has lost what is left of it.
+    # Compute one angle: at the dim edge the difference of two angles would cancel.
     cos, sin = light.cone.cos, dr.sqrt(light.cone.square_sin)
     within = dr.atan2(sin * along - cos * away, dr.fma(cos, along, sin * away))
     return dr.clip(within * light.inverse_transition, 0, 1)

@@ -66,7 +66,11 @@ class AxisGeometry:
 
 
 def axis_geometry(away, direction, direction_low, light: Light) -> AxisGeometry:
-    """Return rays as a spot's axis sees them; `away` is the vector to the light with its low part."""
+    """Return rays as a spot's axis sees them.
+
+    `away` is the vector to the light with its low part [m]; `direction` are unit vectors, `direction_low` what rounding
+    took from them.
+    """
     v, v_low = away
     w, w_low = two_cross(v, direction)
     w_low += dr.cross(v_low, direction)
@@ -108,7 +112,7 @@ def cone_roots(ray: AxisGeometry, discriminant, cone: Cone):
     Valid for half angles below 90 degrees. Half lines end at infinity. A ray through the light is in the cone on one
     side of it, or nowhere.
     """
-    # Of a ray through the light all that is left are signs, and `_TINY` times them.
+    # For a ray through the light only the signs remain, times `_TINY`.
     b = ray.axial * ray.offset
     c = (ray.offset - cone.cos * ray.height) * (ray.offset + cone.cos * ray.height)
     root = cone.cos * dr.sqrt(dr.maximum(discriminant, _TINY))
@@ -140,7 +144,7 @@ def axis_distance(ray: AxisGeometry) -> dict[str, Any]:
     axial offset / n, gap = |across| / n.
     """
     size = dr.sqrt(dr.fma(ray.offset, ray.offset, dr.square(ray.across)))
-    # Of a ray through the light only the sine is left, which loses digits only near the axis.
+    # For a ray through the light only the sine remains, which loses digits only near the axis.
     sine = dr.sqrt(dr.maximum(dr.fma(-ray.axial, ray.axial, 1), 0))
     slant = dr.select(ray.height > 0, size / ray.height, sine)
     parallel = size == 0

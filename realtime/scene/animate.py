@@ -58,7 +58,7 @@ def _turned_directional(light: Light, extent: DirectionalExtent, turn: Array) ->
 
 
 def coloured_light(light: Light, share: float) -> Light:
-    """Return a light whose red, green and blue went round by a share of a turn; their sum stays."""
+    """Return a light whose red, green and blue rotate by a share of a turn; their sum stays."""
     intensity = np.array(light.intensity, dtype=np.float64).ravel()
     whole, part = divmod(3 * share, 1)
     here, there = (np.roll(intensity, int(whole) + step) for step in (0, 1))
@@ -66,12 +66,21 @@ def coloured_light(light: Light, share: float) -> Light:
 
 
 def thicker_medium(medium: Medium, factor: float) -> Medium:
-    """Return a medium, with the bodies of others in it, with its extinction times a factor; the albedo stays."""
+    """Return a medium, and the bounded media in it, with the extinction times a factor; the albedo stays.
+
+    Raises
+    ------
+    InputError
+        For a factor that is negative or not finite.
+    """
     if not 0 <= factor < np.inf:
         raise InputError(f"factor of the extinction: got {factor!r}, wanted a finite value of 0 or more")
     sigma = tuple(dr.opaque(type(value), factor * float(value[0])) for value in medium.sigma_t)
-    bodies = tuple(replace(body, medium=thicker_medium(body.medium, factor)) for body in medium.bodies)
-    return replace(medium, sigma_t=sigma, bodies=bodies)
+    bounded_media = tuple(
+        replace(bounded_medium, medium=thicker_medium(bounded_medium.medium, factor))
+        for bounded_medium in medium.bounded_media
+    )
+    return replace(medium, sigma_t=sigma, bounded_media=bounded_media)
 
 
 @dataclass(frozen=True)
@@ -142,13 +151,13 @@ def turned_objects(scene: Scene, objects: Objects, turn: Array) -> Scene:
 
 
 def closed_shapes(casters: Casters) -> tuple[str, ...]:
-    """Return the names of the shapes all of whose parts are closed: things, not floors and walls."""
+    """Return the names of the shapes all of whose components are closed: things, not floors and walls."""
     names = []
     firsts = [first for _, first, _ in casters.shapes]
     owner = np.searchsorted(firsts, casters.triangles[:, 0], side="right") - 1
     for number, (name, _, _) in enumerate(casters.shapes):
-        bodies = np.unique(casters.body[owner == number])
-        if len(bodies) and casters.closed[bodies].all():
+        components = np.unique(casters.component[owner == number])
+        if len(components) and casters.closed[components].all():
             names.append(name)
     return tuple(names)
 

@@ -75,7 +75,16 @@ def _read_sphere(shape) -> Bounds:
 
 
 def mesh_bounds(name: str, vertices: Array, faces: NDArray[Any]) -> Bounds:
-    """Return the bounds that a mesh describes, counter-clockwise seen from outside.
+    """Return the bounds that the mesh `name` describes.
+
+    Parameters
+    ----------
+    name
+        For messages.
+    vertices
+        Positions [m], (vertices, 3).
+    faces
+        Vertex numbers, counter-clockwise seen from outside, (faces, 3).
 
     Raises
     ------
@@ -98,7 +107,7 @@ def mesh_bounds(name: str, vertices: Array, faces: NDArray[Any]) -> Bounds:
     offsets = np.mean(np.sum(corners[sound] * normals[:, None], axis=2), axis=1)
     normals, offsets = _merged(normals, offsets, size)
     if np.any(vertices @ normals.T > offsets + 2 * _FLAT * size):
-        raise _refusal(name, "is not convex", "convex bounds: cut the body into convex parts")
+        raise _refusal(name, "is not convex", "convex bounds: cut the shape into convex parts")
     centre = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
     radius = float(np.linalg.norm(vertices - centre, axis=1).max())
     return Bounds(name, normals, offsets, corners, centre, radius)
@@ -110,8 +119,8 @@ def _check_closed(name: str, corners: Array) -> None:
     face = number.reshape(-1, 3)
     tail, head = face.ravel(), np.roll(face, -1, axis=1).ravel()
     count = face.max() + 1
-    one, other = np.sort(tail * count + head), np.sort(head * count + tail)
-    if np.any(tail == head) or np.any(one[1:] == one[:-1]) or not np.array_equal(one, other):
+    forward, backward = np.sort(tail * count + head), np.sort(head * count + tail)
+    if np.any(tail == head) or np.any(forward[1:] == forward[:-1]) or not np.array_equal(forward, backward):
         raise _refusal(name, "is not a closed surface", "a closed convex mesh without doubled or degenerate faces")
 
 
@@ -125,8 +134,8 @@ def _merged(normals: Array, offsets: Array, size: float) -> tuple[Array, Array]:
     return normals[kept], offsets[kept]
 
 
-def _refusal(name: str, found: str, wanted: str) -> InputError:
-    return InputError(f"shape '{name}' bounds a medium and {found}; wanted {wanted}")
+def _refusal(name: str, flaw: str, wanted: str) -> InputError:
+    return InputError(f"shape '{name}' bounds a medium and {flaw}; wanted {wanted}")
 
 
 def plane_neighbours(bounds: Bounds) -> NDArray[np.uint32]:
@@ -146,32 +155,32 @@ def plane_neighbours(bounds: Bounds) -> NDArray[np.uint32]:
 
 
 def holds(bounds: Bounds, point: Array) -> bool:
-    """Return whether a point lies inside."""
+    """Return whether a point lies inside [m], (3,)."""
     if bounds.is_sphere:
         return bool(np.linalg.norm(point - bounds.centre) < bounds.radius)
     return bool(np.all(bounds.normals @ point < bounds.offsets))
 
 
-def overlap(one: Bounds, other: Bounds) -> bool:
-    """Return whether two bodies share more than 1e-5 of their size; bodies that touch do not."""
-    gap = float(np.linalg.norm(one.centre - other.centre))
-    margin = _FLAT * min(one.radius, other.radius)
-    if gap >= one.radius + other.radius - margin:
+def overlap(first: Bounds, second: Bounds) -> bool:
+    """Return whether two bounds share more than 1e-5 of their size; bounds that touch do not."""
+    gap = float(np.linalg.norm(first.centre - second.centre))
+    margin = _FLAT * min(first.radius, second.radius)
+    if gap >= first.radius + second.radius - margin:
         return False
-    if one.is_sphere and other.is_sphere:
+    if first.is_sphere and second.is_sphere:
         return True
-    if one.is_sphere or other.is_sphere:
-        sphere, mesh = (one, other) if one.is_sphere else (other, one)
+    if first.is_sphere or second.is_sphere:
+        sphere, mesh = (first, second) if first.is_sphere else (second, first)
         return _distance_to_hull(mesh, sphere.centre) < sphere.radius - margin
     # The largest sphere in both: maximise t under n . x + t <= offset.
-    planes = np.concatenate([one.normals, other.normals])
-    found = linprog(
+    planes = np.concatenate([first.normals, second.normals])
+    largest_sphere = linprog(
         [0, 0, 0, -1],
         A_ub=np.column_stack([planes, np.ones(len(planes))]),
-        b_ub=np.concatenate([one.offsets, other.offsets]),
+        b_ub=np.concatenate([first.offsets, second.offsets]),
         bounds=[(None, None)] * 4,
     )
-    return bool(found.status == 0 and -found.fun > margin)
+    return bool(largest_sphere.status == 0 and -largest_sphere.fun > margin)
 
 
 def _distance_to_hull(bounds: Bounds, point: Array) -> float:

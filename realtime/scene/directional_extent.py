@@ -4,7 +4,7 @@
 Light enters there before all shapes, and leaves through the same rectangle behind the media. Heights above that end are
 small numbers where depths may be large ones, so its middle stands for the place of the light.
 
-The media lie in the hull of some spheres: the corners of bodies of few planes, which are spheres of radius 0, and the
+The media lie in the hull of some spheres: the corners of media of few planes, which are spheres of radius 0, and the
 spheres about the others. Seen along the light their rectangle is wanted at the angle at which it has the least area.
 """
 
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from realtime.numerics.array_types import ArrayTypes
 from realtime.scene.lights import DirectionalExtent, with_low
-from realtime.scene.medium import Body
+from realtime.scene.medium import BoundedMedium
 
 Array = NDArray[np.float64]
 
@@ -27,21 +27,22 @@ _BITS = 14  # of the numbers of a sphere
 _MARGIN = 1.001  # so that rounding leaves nothing outside
 
 
-def media_spheres(bodies: tuple[Body, ...]) -> Array:
-    """Return spheres whose hull holds bodies: middles and radii [m], (spheres, 4).
+def media_spheres(bounded_media: tuple[BoundedMedium, ...]) -> Array:
+    """Return spheres whose hull holds bounded media: middles and radii [m], (spheres, 4).
 
-    Numbers are rounded, and the spheres grown by as much: what the precision of the bodies puts in their last digits
+    Numbers are rounded, and the spheres grown by as much: what the precision of the media puts in their last digits
     must not move the rays of a map.
     """
-    spheres = np.concatenate([_spheres(body) for body in bodies])
+    spheres = np.concatenate([_spheres(bounded_medium) for bounded_medium in bounded_media])
     grain = 2.0 ** np.ceil(np.log2(np.ptp(spheres[:, :3], axis=0).max() + spheres[:, 3].max()) - _BITS)
     return grain * (np.round(spheres / grain) + np.array([0, 0, 0, 2]))
 
 
 def distance_before(spheres: Array, shapes) -> float:
-    """Return how far from the middle of the media nothing is any more [m].
+    """Return the distance from the middle of the media beyond which nothing lies [m].
 
-    An object that turns about the middle of its box stays within the sphere about the box.
+    `spheres` are those of `media_spheres`, `shapes` Mitsuba's. An object that turns about the middle of its box stays
+    within the sphere about the box.
     """
     middle = _middle(spheres)
     reach = np.linalg.norm(spheres[:, :3] - middle, axis=1) + spheres[:, 3]
@@ -60,7 +61,7 @@ def directional_fields(axis: Array, spheres: Array, back: float, types: ArrayTyp
     axis
         Unit vector in which the light travels.
     spheres, back
-        From `media_spheres` and `distance_before`.
+        From `media_spheres` and `distance_before` [m].
     types
         Of the arrays.
 
@@ -111,16 +112,16 @@ def _least_rectangle(axis: Array, points: Array, radii: Array):
     return across, up, sum(side * (0.5 * (low + high)) for side, (low, high) in zip(sides, ends))
 
 
-def _spheres(body: Body) -> Array:
-    """Return the corners of a body of few planes, or its sphere."""
-    centre, radius = np.array(body.centre, dtype=np.float64).ravel(), float(body.radius[0])
+def _spheres(bounded_medium: BoundedMedium) -> Array:
+    """Return the corners of a bounded medium of few planes, or its sphere."""
+    centre, radius = np.array(bounded_medium.centre, dtype=np.float64).ravel(), float(bounded_medium.radius[0])
     whole = np.array([[*centre, radius]])
-    if body.planes is None or body.count > _FEW_PLANES:
+    if bounded_medium.planes is None or bounded_medium.count > _FEW_PLANES:
         return whole
-    *normal, offsets = (np.array(column, dtype=np.float64).ravel() for column in body.planes)
+    *normal, offsets = (np.array(column, dtype=np.float64).ravel() for column in bounded_medium.planes)
     normals = np.column_stack(normal)
     corners = []
-    for three in combinations(range(body.count), 3):
+    for three in combinations(range(bounded_medium.count), 3):
         matrix = normals[list(three)]
         # Planes that are nearly parallel meet far away, if anywhere.
         if abs(np.linalg.det(matrix)) > 1e-6:
@@ -131,4 +132,4 @@ def _spheres(body: Body) -> Array:
 
 
 def _vector(values, types: ArrayTypes):
-    return types.vector(*(float(one) for one in values))
+    return types.vector(*(float(value) for value in values))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class SceneFeatures:
-    """What a scene needs; every field chooses code, none is data."""
+    """What a scene needs; every field chooses which code runs, and none is data."""
 
     shadows: bool  #: there is something that can cast a shadow
     surfaces: bool  #: there is something that the camera can see

@@ -147,8 +147,8 @@ def spot_fields(axis, cutoff: float, beam: float, types: ArrayTypes) -> dict[str
     axis = np.asarray(axis, dtype=np.float64)
     high, low = with_low(axis, types)
     fields = {
-        "axis": types.vector(*(float(one) for one in high)),
-        "axis_low": types.vector(*(float(one) for one in low)),
+        "axis": types.vector(*(float(component) for component in high)),
+        "axis_low": types.vector(*(float(component) for component in low)),
         "cutoff": types.scalar(cutoff),
         "cone": _cone(cutoff, types),
     }

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Homogeneous media as Dr.Jit values: what fills space, and bodies of other media in it."""
+"""Homogeneous media as Dr.Jit values: what fills space, and bounded media in it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,18 +17,18 @@ class Medium:
     sigma_t: tuple[Any, ...]  #: extinction [1/m], one or three values
     albedo: Any  #: single-scattering albedo, RGB [1]
     phase: Phase
-    bodies: tuple["Body", ...] = ()  #: convex, disjoint bodies of other media, with as many extinctions
-    clear: bool = False  #: around the bodies nothing scatters or absorbs
+    bounded_media: tuple["BoundedMedium", ...] = ()  #: convex, disjoint, with as many extinctions
+    clear: bool = False  #: around the bounded media nothing scatters or absorbs
 
 
 @dataclass(frozen=True)
-class Body:
+class BoundedMedium:
     """A homogeneous medium within convex bounds (`realtime.scene.convex_bounds`)."""
 
     medium: Medium
     planes: tuple[Any, ...] | None  #: components of the outward normals and offsets of half spaces; None for a sphere
     count: int  #: half spaces
-    centre: Any  #: of the sphere, or of one that holds the body [m]
+    centre: Any  #: of the sphere, or of one that holds the medium [m]
     radius: Any  #: of that sphere [m]
     mean_distance: Any  #: R, see `realtime.scene.convex_bounds.mean_distance` [m]
     neighbours: Any = None  #: `sides` numbers a half space: planes that share an edge with it, or itself; None: sphere

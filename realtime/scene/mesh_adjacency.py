@@ -40,9 +40,9 @@ class Casters:
     left: Index  #: triangle that runs along the entry from its first vertex to its second
     right: Index  #: the other triangle, or `none`
     same_way: NDArray[np.bool_]  #: whether `right` runs along the entry in the same direction as `left`
-    body: Index  #: connected part that each triangle belongs to
-    closed: NDArray[np.bool_]  #: by body: whether every edge is met as often one way as the other
-    boxes: Array  #: by body: lower and upper corner of its bounding box [m], (bodies, 2, 3)
+    component: Index  #: connected component that each triangle belongs to
+    closed: NDArray[np.bool_]  #: by component: whether every edge is met as often one way as the other
+    boxes: Array  #: by component: lower and upper corner of its bounding box [m], (components, 2, 3)
     shapes: tuple[tuple[str, int, Index], ...]  #: name, its first vertex, and which of the shape's own each one is
     warnings: tuple[str, ...] = ()  #: what is odd about the meshes, by name
 
@@ -82,13 +82,13 @@ def make_casters(meshes) -> Casters:
         (name, vertices (n, 3) [m], triangles (m, 3)) each. Triangles with a vertex twice and repeated ones are left
         out, the latter with a warning.
     """
-    parts, warnings, shapes, first_vertex, first_body = [], [], [], 0, 0
+    parts, warnings, shapes, first_vertex, first_component = [], [], [], 0, 0
     for name, vertices, triangles in meshes:
         part, remarks, own = _mesh_part(name, vertices, triangles)
         shapes.append((name, first_vertex, own))
-        parts.append(_shifted(part, first_vertex, first_body))
+        parts.append(_shifted(part, first_vertex, first_component))
         first_vertex += len(part["vertices"])
-        first_body += len(part["closed"])
+        first_component += len(part["closed"])
         warnings += remarks
     if not parts:
         parts = [_mesh_part("none", np.zeros((0, 3)), np.zeros((0, 3), dtype=int))[0]]
@@ -98,7 +98,7 @@ def make_casters(meshes) -> Casters:
         for side in ("left", "right"):
             part[side] = np.where(part[side] == count, first_triangle[-1], part[side] + first)
     joined = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
-    for key in ("triangles", "edges", "left", "right", "body"):
+    for key in ("triangles", "edges", "left", "right", "component"):
         joined[key] = np.ascontiguousarray(joined[key], dtype=np.int32)
     return Casters(**joined, shapes=tuple(shapes), warnings=tuple(warnings))
 
@@ -106,7 +106,7 @@ def make_casters(meshes) -> Casters:
 def moved(casters: Casters, vertices: Array) -> Casters:
     """Return the casters with their vertices elsewhere; adjacency stays."""
     normals, offsets = _planes(vertices, casters.triangles)
-    boxes = _boxes(vertices, casters.triangles, casters.body, len(casters.closed))
+    boxes = _boxes(vertices, casters.triangles, casters.component, len(casters.closed))
     return replace(casters, vertices=vertices, normals=normals, offsets=offsets, boxes=boxes)
 
 
@@ -123,7 +123,7 @@ def with_positions(casters: Casters, positions: Mapping[str, Array]) -> Casters:
 
 def mesh_triangles(mesh) -> tuple[Array, NDArray[np.int64]]:
     """Return the vertices [m] and the triangles of a Mitsuba mesh, (vertices, 3) and (triangles, 3)."""
-    # Asked for one by one: `mi.traverse` shows the transform of a rectangle or a cube, not its vertices.
+    # Ask for vertices one by one: `mi.traverse` shows the transform of a rectangle or a cube, not its vertices.
     position = mesh.vertex_position(dr.arange(mi.UInt32, mesh.vertex_count()))
     face = mesh.face_indices(dr.arange(mi.UInt32, mesh.face_count()))
     return np.array(position, dtype=np.float64).T.copy(), np.array(face, dtype=np.int64).T.copy()
@@ -144,7 +144,7 @@ def _mesh_part(name: str, vertices: Array, triangles: NDArray[Any]) -> tuple[dic
     vertices = np.asarray(vertices, dtype=np.float64).reshape(-1, 3)
     vertices, own, inverse = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
     triangles = inverse.reshape(-1)[np.asarray(triangles, dtype=np.int64).reshape(-1, 3)]
-    # One that is a line stays: it closes the gap between a long edge and the two halves on its other side.
+    # A triangle that is a line stays: it closes the gap between a long edge and the two halves on its other side.
     triangles = triangles[np.all(triangles != np.roll(triangles, 1, axis=1), axis=1)]
     _, kept = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)
     if len(kept) < len(triangles):
@@ -152,7 +152,7 @@ def _mesh_part(name: str, vertices: Array, triangles: NDArray[Any]) -> tuple[dic
         triangles = triangles[np.sort(kept)]
     normals, offsets = _planes(vertices, triangles)
     edges, left, right, same_way, met = _paired_edges(triangles)
-    body, closed = _bodies(triangles, edges, (left, right, same_way))
+    component, closed = _connected_components(triangles, edges, (left, right, same_way))
     if np.any(met > 2):
         warnings.append(
             f"shape '{name}' has {int(np.sum(met > 2))} edges at which more than two triangles meet: right with "
@@ -177,18 +177,18 @@ def _mesh_part(name: str, vertices: Array, triangles: NDArray[Any]) -> tuple[dic
         "left": left,
         "right": right,
         "same_way": same_way,
-        "body": body,
+        "component": component,
         "closed": closed,
-        "boxes": _boxes(vertices, triangles, body, len(closed)),
+        "boxes": _boxes(vertices, triangles, component, len(closed)),
     }
     return part, warnings, own.astype(np.int32)
 
 
-def _shifted(part: dict[str, Any], vertex: int, body: int) -> dict[str, Any]:
+def _shifted(part: dict[str, Any], vertex: int, component: int) -> dict[str, Any]:
     return part | {
         "triangles": part["triangles"] + vertex,
         "edges": part["edges"] + vertex,
-        "body": part["body"] + body,
+        "component": part["component"] + component,
     }
 
 
@@ -198,11 +198,11 @@ def _planes(vertices: Array, triangles) -> tuple[Array, Array]:
     return normals, np.einsum("ij,ij->i", normals, corner[:, 0])
 
 
-def _boxes(vertices: Array, triangles, body, bodies: int) -> Array:
-    order = np.argsort(body, kind="stable")
-    starts = np.searchsorted(body[order], np.arange(bodies))
+def _boxes(vertices: Array, triangles, component, components: int) -> Array:
+    order = np.argsort(component, kind="stable")
+    starts = np.searchsorted(component[order], np.arange(components))
     corners = vertices[triangles[order]]
-    if not bodies:
+    if not components:
         return np.zeros((0, 2, 3))
     low, high = np.minimum.reduceat(corners.min(axis=1), starts), np.maximum.reduceat(corners.max(axis=1), starts)
     return np.stack([low, high], axis=1)
@@ -248,8 +248,8 @@ def _paired_edges(triangles: NDArray[Any]):
     return edges, triangle[first], right, (rest[first] >= 0) & ~alone, met
 
 
-def _bodies(triangles, edges, entries):
-    """Return the connected part of every triangle, and by part whether it is closed."""
+def _connected_components(triangles, edges, entries):
+    """Return the connected component of every triangle, and by component whether it is closed."""
     left, right, same_way = entries
     count = len(triangles)
     if not count:
@@ -261,9 +261,9 @@ def _bodies(triangles, edges, entries):
     key = np.sort(edges[order], axis=1)
     again = np.flatnonzero(np.all(key[1:] == key[:-1], axis=1))
     links.append((left[order[again]], left[order[again + 1]]))
-    one, other = (np.concatenate([link[side] for link in links]) for side in (0, 1))
-    graph = coo_array((np.ones(len(one), dtype=np.int8), (one, other)), shape=(count, count))
-    bodies, body = connected_components(graph, directed=False)
-    closed = np.ones(bodies, dtype=bool)
-    closed[body[left[~both | same_way]]] = False
-    return body, closed
+    first, second = (np.concatenate([link[side] for link in links]) for side in (0, 1))
+    graph = coo_array((np.ones(len(first), dtype=np.int8), (first, second)), shape=(count, count))
+    components, component = connected_components(graph, directed=False)
+    closed = np.ones(components, dtype=bool)
+    closed[component[left[~both | same_way]]] = False
+    return component, closed

@@ -39,7 +39,7 @@ class Phase:
     fit_scale: ClassVar[float] = 1.0  #: m of `realtime.kernels.polynomial_piece`
 
     def evaluate_half(self, down, up) -> Any:
-        """Return the value [1] from sin^2 and cos^2 of half the scattering angle, (1 -+ cos)/2.
+        """Return the value [1] from `down`, sin^2, and `up`, cos^2 of half the scattering angle, (1 -+ cos)/2.
 
         A lobe narrower than the rounding of the cosine, 1e-7, is a matter of `down` alone: with it nothing cancels.
         """
@@ -140,11 +140,11 @@ class _Power(Phase):
 
     def series(self, degree: int) -> list[Any]:
         """Return the coefficients by squaring those of (1 - sin)/2."""
-        one = _one(degree)
-        power = [0.5 * (a - b) for a, b in zip(one, _sine(degree))]
+        constant = _one(degree)
+        power = [0.5 * (a - b) for a, b in zip(constant, _sine(degree))]
         for _ in range(self.doublings):
             power = series_product(power, power, degree)
-        return [(a + self.weight * b) / self.mean for a, b in zip(one, power)]
+        return [(a + self.weight * b) / self.mean for a, b in zip(constant, power)]
 
 
 @dataclass(frozen=True)
@@ -297,12 +297,12 @@ def named_phase(name: str, *, g=None, values=None) -> Phase:
 
 
 def evaluate(phase: Phase, cos_scatter):
-    """Return the value of a phase function [1]; see `Phase.evaluate`."""
+    """Return the value of a phase function at `cos_scatter` [1]; see `Phase.evaluate`."""
     return phase.evaluate(cos_scatter)
 
 
 def series_product(left, right, degree: int) -> list[Any]:
-    """Return the coefficients of the product of two power series, up to a degree."""
+    """Return the coefficients of the product of two power series, `left` and `right`, up to a degree."""
     return [sum(left[n - k] * right[k] for k in range(n + 1)) for n in range(degree + 1)]
 
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reading the media of a Mitsuba scene: what surrounds the camera, and what shapes bound.
 
-A shape with the material `null` and an interior medium is the boundary of a body: light passes, nothing is seen of it.
-All bodies lie in one medium, the camera's own or, for a camera inside a body, that body's exterior; none is a vacuum.
+A shape with the material `null` and an interior medium is the boundary of a medium: light passes, nothing is seen of
+it. All of them lie in one medium, the camera's own or, for a camera inside one of them, its exterior; none is a vacuum.
 """
 
 from dataclasses import replace
@@ -14,7 +14,7 @@ import numpy as np
 from realtime.errors import InputError
 from realtime.numerics.array_types import ArrayTypes
 from realtime.scene.convex_bounds import Bounds, holds, mean_distance, overlap, plane_neighbours, read_bounds
-from realtime.scene.medium import Body, Medium
+from realtime.scene.medium import BoundedMedium, Medium
 from realtime.scene.phase import HenyeyGreenstein, Isotropic, Phase, Tabulated, named_phase
 
 _PHASES = {
@@ -66,7 +66,7 @@ def opaque_scene(scene, opaque):
 
 
 def read_medium(sensor, boundaries, types: ArrayTypes) -> Medium:
-    """Return the medium of a scene with the bodies in it.
+    """Return the medium of a scene with the bounded media in it.
 
     Parameters
     ----------
@@ -95,51 +95,56 @@ def read_medium(sensor, boundaries, types: ArrayTypes) -> Medium:
     media = [_homogeneous(shape.interior_medium(), types) for shape in boundaries]
     ambient = _clear(types) if around is None else _homogeneous(around, types)
     channels = max(len(medium.sigma_t) for medium in [ambient, *media])
-    bodies = tuple(convex_body(_in_channels(medium, channels), one, types) for medium, one in zip(media, bounds))
-    return replace(_in_channels(ambient, channels), bodies=bodies)
+    bounded_media = tuple(
+        make_bounded_medium(_in_channels(medium, channels), own_bounds, types)
+        for medium, own_bounds in zip(media, bounds)
+    )
+    return replace(_in_channels(ambient, channels), bounded_media=bounded_media)
 
 
 def _surrounding(sensor, boundaries, bounds: list[Bounds]):
-    """Return the Mitsuba medium around all bodies, or None; refuse a camera or a boundary that says otherwise."""
+    """Return the Mitsuba medium around the bounded ones, or None; refuse a camera or boundary that says otherwise."""
     camera = np.array(sensor.world_transform().matrix, dtype=np.float64).reshape(4, 4)[:3, 3]
     around = sensor.get_medium()
-    for shape, one in zip(boundaries, bounds):
-        if holds(one, camera):
+    for shape, own_bounds in zip(boundaries, bounds):
+        if holds(own_bounds, camera):
             if sensor.get_medium() != shape.interior_medium():
                 raise InputError(
-                    f"the camera is inside of shape '{one.name}', but references another medium or none; reference "
-                    "that shape's interior medium in the sensor"
+                    f"the camera is inside of shape '{own_bounds.name}', but references another medium or none; "
+                    "reference that shape's interior medium in the sensor"
                 )
             around = shape.exterior_medium()
-    for shape, one in zip(boundaries, bounds):
+    for shape, own_bounds in zip(boundaries, bounds):
         if shape.exterior_medium() != around:
             raise InputError(
-                f"the exterior medium of shape '{one.name}' is not what surrounds the camera or the others; wanted one "
-                "medium around all bounded media, or none at all"
+                f"the exterior medium of shape '{own_bounds.name}' is not what surrounds the camera or the others; "
+                "wanted one medium around all bounded media, or none at all"
             )
     return around
 
 
 def _check_disjoint(bounds: list[Bounds]) -> None:
-    for number, one in enumerate(bounds):
-        for other in bounds[:number]:
-            if overlap(one, other):
-                raise InputError(f"the media of shapes '{other.name}' and '{one.name}' overlap; wanted disjoint bounds")
+    for number, later in enumerate(bounds):
+        for earlier in bounds[:number]:
+            if overlap(later, earlier):
+                raise InputError(
+                    f"the media of shapes '{earlier.name}' and '{later.name}' overlap; wanted disjoint bounds"
+                )
 
 
-def convex_body(medium: Medium, bounds: Bounds, types: ArrayTypes) -> Body:
+def make_bounded_medium(medium: Medium, bounds: Bounds, types: ArrayTypes) -> BoundedMedium:
     """Return a medium within bounds."""
     centre = types.vector(*(float(c) for c in bounds.centre))
     radius, distance = (dr.opaque(types.scalar, value) for value in (bounds.radius, mean_distance(bounds)))
     dr.make_opaque(centre)
-    body = Body(medium, None, len(bounds.offsets), centre, radius, distance)
+    bounded_medium = BoundedMedium(medium, None, len(bounds.offsets), centre, radius, distance)
     if bounds.is_sphere:
-        return body
+        return bounded_medium
     planes = tuple(types.scalar(column) for column in (*bounds.normals.T, bounds.offsets))
     table = plane_neighbours(bounds)
     neighbours = mi.UInt32(table.ravel())
     dr.eval(neighbours, *planes)
-    return replace(body, planes=planes, neighbours=neighbours, sides=table.shape[1])
+    return replace(bounded_medium, planes=planes, neighbours=neighbours, sides=table.shape[1])
 
 
 def _clear(types: ArrayTypes) -> Medium:

@@ -124,7 +124,7 @@ def _read_light(emitter, types: ArrayTypes) -> Light:
 
 
 def _read_directional(emitter, medium: Medium, opaque, types: ArrayTypes) -> Light:
-    if not (medium.bodies and medium.clear):
+    if not (medium.bounded_media and medium.clear):
         raise InputError(
             "the scene has a directional light and a medium without bounds, which lets nothing of it through from "
             "infinity: wanted media with bounds in clear air; give the medium bounds, or use a 'point' or 'spot' light"
@@ -136,7 +136,7 @@ def _read_directional(emitter, medium: Medium, opaque, types: ArrayTypes) -> Lig
     matrix = np.array(emitter.world_transform().matrix, dtype=np.float64).reshape(4, 4)
     axis = matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])
     arrays: dict[str, Any] = {"intensity": types.color(*(float(c) for c in irradiance))}
-    spheres = media_spheres(medium.bodies)
+    spheres = media_spheres(medium.bounded_media)
     arrays |= directional_fields(axis, spheres, distance_before(spheres, opaque), types)
     dr.make_opaque(*arrays.values())
     return Light(**arrays)
@@ -170,13 +170,13 @@ def _scene_features(scene, opaque, medium: Medium, lights: tuple[Light, ...]) ->
             notes.append(
                 f"shape '{shape.id()}' is not purely diffuse: shaded by its diffuse reflectance, airlight unaffected"
             )
-    media = [body.medium for body in medium.bodies] + [medium] * (not medium.clear)
+    media = [bounded_medium.medium for bounded_medium in medium.bounded_media] + [medium] * (not medium.clear)
     return SceneFeatures(
         shadows=bool(opaque),
         surfaces=bool(opaque),
         extinctions=len(medium.sigma_t),
-        isotropic=all(one.phase.constant for one in media),
-        bounded=bool(medium.bodies),
+        isotropic=all(filling.phase.constant for filling in media),
+        bounded=bool(medium.bounded_media),
         clear=medium.clear,
         vacuum=any(float(sigma_t[0]) == 0 for sigma_t in medium.sigma_t),
         point_lights=sum(light.kind == "point" for light in lights),

@@ -49,7 +49,7 @@ def read_facets(scene, types: ArrayTypes) -> Facets | None:
 
 
 def facet_number(facets: Facets, hit, active):
-    """Return the number of the triangle of a preliminary intersection."""
+    """Return the number of the triangle of `hit`, a preliminary intersection."""
     shape = dr.reinterpret_array(mi.UInt32, hit.shape)
     return dr.gather(mi.UInt32, facets.first, shape, active) + hit.prim_index
 

@@ -94,7 +94,7 @@ def inverse_depth_field(shadow_map: ShadowMap) -> InverseDepthField:
 
 
 def node_bounds(heights: InverseDepthField, face, level, i, j, active=True):
-    """Return the least and largest height over the node in column `i` and row `j` of a level of the pyramid [1/m]."""
+    """Return the least and largest height over the node in column `i` and row `j` of a level of a face [1/m]."""
     before = 0x55555555 & ((mi.UInt32(1) << (2 * level)) - 1)
     node = face * heights.nodes + before + (j << level) + i
     pair = dr.gather(two_numbers(type(heights.bounds)), heights.bounds, node, active)
@@ -123,7 +123,7 @@ class Leaf:
 
 
 def leaf_sides(heights: InverseDepthField, face, i, j, active=True) -> Leaf:
-    """Return how the texels of the leaf in column `i` and row `j` are sorted."""
+    """Return how the texels of the leaf in column `i` and row `j` of a face are sorted."""
     leaf = (((face << heights.finest) + j) << heights.finest) + i
     gap = dr.gather(two_numbers(type(heights.gaps)), heights.gaps, leaf, active)
     sides = dr.gather(mi.UInt32, heights.sides, leaf, active)

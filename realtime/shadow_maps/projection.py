@@ -52,9 +52,9 @@ class Projection:
         return self.basis[2] if self.basis and not self.w else None
 
     def products(self, face, vector) -> tuple[Any, Any, Any]:
-        """Return the scalar products of a vector with the across, up and axis of a face."""
+        """Return the scalar products of a vector [m] with the across, up and axis of a face [m]."""
         if self.basis:
-            return tuple(dr.dot(vector, one) for one in self.basis)
+            return tuple(dr.dot(vector, basis_vector) for basis_vector in self.basis)
         x, y, z = vector.x, vector.y, vector.z
         axis = face >> 1
         a, b, c = (dr.select(axis == 0, p, dr.select(axis == 1, q, r)) for p, q, r in ((y, z, x), (z, x, y), (x, y, z)))
@@ -81,8 +81,8 @@ class Projection:
         if self.basis:
             inverse = dr.rcp(dr.squared_norm(self.basis[0]))
             a, b = a * inverse, b * (inverse if self.w else dr.rcp(dr.squared_norm(self.basis[1])))
-        one = type(c)(weight)
-        return (a, b, one, c) if self.w else (a, b, -c, one)
+        last = type(c)(weight)
+        return (a, b, last, c) if self.w else (a, b, -c, last)
 
     def inverse_depth(self, place, distance):
         """Return the s of points that rays of the map meet: inverse planar depth [1/m], or height for w = 0 [m].
@@ -104,7 +104,7 @@ class Projection:
 def light_projection(light: Light) -> Projection:
     """Return the projection of the shadow map of a light, in the light's precision."""
     basis = light_basis(light)
-    rounded = basis and tuple(type(light.position)(one) for one in basis)
+    rounded = basis and tuple(type(light.position)(basis_vector) for basis_vector in basis)
     return Projection(rounded, None if light.w else light.extent.depth)
 
 
@@ -153,7 +153,7 @@ def cube_direction(Vector, face, u, v):
 
 
 def cube_coordinates(d):
-    """Return the face of a cube that a direction goes through, and u and v there."""
+    """Return the face of a cube that a direction `d` of any length goes through, and u and v there, from -1 to 1."""
     size = dr.abs(d)
     x_major = (size.x >= size.y) & (size.x >= size.z)
     y_major = ~x_major & (size.y >= size.z)

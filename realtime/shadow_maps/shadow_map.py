@@ -41,7 +41,7 @@ class ShadowMap:
 
 
 def check_size(size) -> None:
-    """Refuse what is no resolution of a shadow map.
+    """Refuse a resolution that no shadow map can have.
 
     Raises
     ------
@@ -87,11 +87,11 @@ def cast_shadow_map(scene, light: Light, size: int) -> ShadowMap:
     face, row, column = _tiled_corners(faces, side)
     there = (row < side) & (column < side)
     # Whole numbers and powers of two: exact, so that neighbouring faces cast the same rays along their common edge.
-    u, v = (dr.fma(Double(one), 2.0 / size, -1.0) for one in (column, row))
+    u, v = (dr.fma(Double(corner), 2.0 / size, -1.0) for corner in (column, row))
     cast = cast_map_rays(scene, light, (face, u, v), there)
     distance = dr.empty(type(cast), faces * side * side)
     dr.scatter(distance, cast, (face * side + row) * side + column, there)
-    dr.eval(distance, projection)  # once: whoever reads it would cast the rays again
+    dr.eval(distance, projection)  # Evaluate it once: every kernel that reads it would cast the rays again.
     return ShadowMap(size, distance, projection)
 
 
@@ -141,7 +141,7 @@ def cast_map_rays(scene, light: Light, place, active=True):
 
 
 def lit_in_map(shadow_map: ShadowMap, light: Light, point):
-    """Return whether the light reaches a point by the nearest value of its shadow map."""
+    """Return whether the light reaches a point [m] by the nearest value of its shadow map."""
     Float, projection = type(point.x), shadow_map.projection
     d = point - light.position
     if projection.basis is None:

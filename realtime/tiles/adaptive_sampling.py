@@ -13,7 +13,15 @@ where
     |Delta| <= tolerance f
 
 at all four corners, in both directions and all channels, and errs by about the tolerance at most. A jump of f, at an
-edge of surfaces, has a Delta of its own size.
+edge of surfaces, has a Delta of its own size. The corners at the ends of a row have one neighbour and take the Delta of
+the corner beside them: there the error of a kink is up to one Delta instead of a half.
+
+A smooth curvature of the opposite sign, whose own Delta is c, hides a kink that is not larger. With both within the
+tolerance, s h w <= tolerance f + c, at the ends of a row
+
+    s h w (1 - w) - c/8 <= tolerance f + 7 c/8,
+
+which is the most by which a kink and a curvature together can err.
 
 What no corner sees is missed: beams and shadows thinner than a tile. Surfaces are not, since the pixels of an
 interpolated tile and its corners have to be about equally far away, and the light reaches the surface at all four
@@ -107,7 +115,7 @@ def tile_corners(pixel, camera: Camera, tolerance: float, *, by_rays: bool, ligh
     number[j, i] = np.arange(len(i), dtype=np.uint32)
     right, below = np.minimum(i + 1, across - 1), np.minimum(j + 1, down - 1)
     middle_i, middle_j = np.clip(i, 1, across - 2), np.clip(j, 1, down - 2)
-    found = Corners(
+    corners = Corners(
         mi.UInt32(number[j, right]),
         mi.UInt32(number[below, i]),
         mi.UInt32(number[below, right]),
@@ -115,8 +123,8 @@ def tile_corners(pixel, camera: Camera, tolerance: float, *, by_rays: bool, ligh
         tuple(mi.UInt32(number[middle_j + step, i]) for step in (-1, 0, 1)),
         mi.Bool((i < across - 1) & (j < down - 1)),
     )
-    dr.eval(found)
-    return found
+    dr.eval(corners)
+    return corners
 
 
 def between_corners(
@@ -165,14 +173,14 @@ def between_corners(
     bends = [_second_difference(corners, part) for part in parts]
     dr.eval(bends)
     four = tile, corners.right, corners.below, corners.diagonal
-    values = [[dr.gather(type(part), part, one) for part in parts] for one in four]
+    values = [[dr.gather(type(part), part, corner) for part in parts] for corner in four]
     smooth = corners.inner & _depths_alike(distance, four)
-    for one, found in zip(four, values):
-        for bend, value in zip(bends, found):
-            here = dr.gather(type(bend), bend, one)
+    for corner, corner_values in zip(four, values):
+        for bend, value in zip(bends, corner_values):
+            here = dr.gather(type(bend), bend, corner)
             for limit, least in zip(_channels(here), _channels(value)):
                 smooth &= limit <= tolerance * least
-        smooth &= dr.gather(mi.UInt32, lit, one) == lit
+        smooth &= dr.gather(mi.UInt32, lit, corner) == lit
     tables = [_bilinear([_channels(value) for value in corner]) for corner in zip(*values)]
     dr.eval(tables, smooth)
 
@@ -189,16 +197,16 @@ def between_corners(
         return kind(*channels)
 
     def between(pixel, distance, own):
-        found = tuple(interpolated(type(part), table, own) for part, table in zip(parts, tables))
-        return found, dr.gather(mi.UInt32, lit, own)
+        blended = tuple(interpolated(type(part), table, own) for part, table in zip(parts, tables))
+        return blended, dr.gather(mi.UInt32, lit, own)
 
     def computed(pixel, distance, own):
-        found, reached = sample(pixel, distance, own, Layout.SOME)
-        return found, _bits(reached)
+        sampled, reached = sample(pixel, distance, own, Layout.SOME)
+        return sampled, _bits(reached)
 
     smooth = dr.gather(mi.Bool, smooth, own)
-    found, bits = dr.if_stmt(args=(pixel, distance, own), cond=smooth, true_fn=between, false_fn=computed)
-    return found, tuple((bits >> number & 1) != 0 for number in range(len(reached)))
+    colors, bits = dr.if_stmt(args=(pixel, distance, own), cond=smooth, true_fn=between, false_fn=computed)
+    return colors, tuple((bits >> number & 1) != 0 for number in range(len(reached)))
 
 
 def _channels(value) -> list[Any]:
@@ -209,8 +217,8 @@ def _channels(value) -> list[Any]:
 def _bits(reached):
     """Return by light, as one bit each, whether it reaches the surface."""
     bits = mi.UInt32(0)
-    for number, one in enumerate(reached):
-        bits |= dr.select(one, mi.UInt32(1 << number), 0)
+    for number, reaches in enumerate(reached):
+        bits |= dr.select(reaches, mi.UInt32(1 << number), 0)
     return bits
 
 
@@ -231,11 +239,11 @@ def _bilinear(values) -> list[Any]:
 
 def _second_difference(corners: Corners, color):
     """Return the larger of the second differences along rows and columns, by channel."""
-    found = type(color)(0)
+    largest = type(color)(0)
     for three in (corners.row, corners.column):
-        before, here, behind = (dr.gather(type(color), color, one) for one in three)
-        found = dr.maximum(found, dr.abs(before + behind - 2 * here))
-    return found
+        before, here, behind = (dr.gather(type(color), color, sample) for sample in three)
+        largest = dr.maximum(largest, dr.abs(before + behind - 2 * here))
+    return largest
 
 
 def _depths_alike(distance, four):

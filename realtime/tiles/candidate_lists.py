@@ -44,12 +44,12 @@ def members(count: int) -> list[Any]:
 
 
 def bounding(lanes: list[Any], *, square: bool) -> list[Any]:
-    """Return those of a tile's rays that bound it: all, or the corners of a square of pixels."""
+    """Return those of a tile's rays, `lanes`, that bound it: all, or the corners of a square of pixels."""
     return [lanes[k] for k in _CORNERS] if square else lanes
 
 
 def farthest(distance, lanes: list[Any]):
-    """Return by tile the largest distance of its rays [m]."""
+    """Return by tile the largest distance of its rays [m]; `lanes` are those of `members`."""
     return reduce(dr.maximum, (dr.gather(type(distance), distance, lane) for lane in lanes))
 
 

@@ -6,7 +6,7 @@ A pooled bias compares sums over all pixels. With n_p samples of standard deviat
     sum_p s_p^2 / n_p,    for a given sum of n_p least where n_p is proportional to s_p:    (sum_p s_p)^2 / sum_p n_p
 
 (Neyman 1934; Cochran 1977, *Sampling Techniques*, eq. 5.26). In fog a few pixels hold nearly all of the variance, those
-that look at or past what is next to a light: the same number for each pixel would be spent on the others.
+that look at or past what is next to a light: equal numbers would spend most samples on the others.
 
 The s_p come from a pilot run of which nothing else is used. Samples that decide where more of them go must not be
 counted themselves: pixels that came out dark by chance would get few more, and the mean would be too small. A quarter
@@ -41,7 +41,7 @@ def allocated(
     Returns
     -------
     array
-        Samples of every pixel, (layers, pixels), at least 1; their mean is `samples` up to rounding.
+        Samples of every pixel [1], (layers, pixels), at least 1; their mean is `samples` up to rounding.
     """
     counts = []
     for number, layer in enumerate(LAYERS):

@@ -24,7 +24,7 @@ LARGEST_BATCH = 256  #: samples a pixel: float32 sums of more lose digits (DESIG
 class Batches:
     """Running sums of the batch means; `merged` adds batches up in any order."""
 
-    seeds: tuple[int, ...]
+    seeds: tuple[int, ...]  #: of the batches, each once
     samples: int  #: samples a pixel in each batch
     mean: Array  #: mean of the batch means, (layers, pixels, 3)
     squares: Array  #: sum of squared deviations from the mean, (layers, pixels, 3)
@@ -77,7 +77,7 @@ def single_batch(seed: int, samples: int, mean: Array) -> Batches:
 
 
 def merged(first: Batches, second: Batches) -> Batches:
-    """Add up two sets of batches.
+    """Add up two sets of batches of the same pixels.
 
     Raises
     ------
@@ -95,9 +95,20 @@ def merged(first: Batches, second: Batches) -> Batches:
 
 
 def combined_moments(first: tuple[int, Array, Array], second: tuple[int, Array, Array]) -> tuple[Array, Array]:
-    """Return mean and sum of squared deviations of two sets together, each given as (count, mean, squares).
+    """Return mean and sum of squared deviations of two sets of numbers together.
 
     The squares are those within each set and those between their means (Chan, Golub and LeVeque 1983, eq. 2.1).
+
+    Parameters
+    ----------
+    first, second
+        Of each set: how many numbers there are, their mean, and the sum of their squared deviations from it. The
+        arrays have one shape; the mean is in any unit, here [W/(m^2 sr)], the squares in its square.
+
+    Returns
+    -------
+    mean, squares
+        Of all numbers, in the same shape and units.
     """
     (n, mean, squares), (m, other_mean, other_squares) = first, second
     difference = other_mean - mean

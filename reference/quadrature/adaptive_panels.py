@@ -18,14 +18,18 @@ _HALVINGS = 40
 
 @dataclass(frozen=True)
 class Panels:
-    """Panels and what the two rules gave for them, arrays of shape (m,) and (m, 3)."""
+    """Panels and what the two rules gave for them.
 
-    piece: Index
-    start: Array  #: in the variable of the integral
-    width: Array
-    value: Array
-    error: Array
-    noise: Array  #: rounding error of the value
+    The integrals are albedo sigma_t J [1/m^2] of a point light, in the logarithmic variable w [1], and albedo sigma_t
+    int exp(-tau) dx [1] of a directional light, in the distance x [m].
+    """
+
+    piece: Index  #: the piece that each panel is a part of, (m,)
+    start: Array  #: in the variable of the integral, (m,)
+    width: Array  #: in the same variable, (m,)
+    value: Array  #: the integral by Kronrod's rule, (m, 3)
+    error: Array  #: by how much Gauss's rule differs from it, (m, 3)
+    noise: Array  #: rounding error of the value, (m, 3)
 
     def __getitem__(self, rows) -> "Panels":
         return Panels(*(getattr(self, f.name)[rows] for f in fields(self)))
@@ -37,9 +41,10 @@ def first_panels(start: Array, width: Array, widest: float) -> tuple[Index, Arra
     Parameters
     ----------
     start, width
-        Where the pieces begin and how wide they are, (pieces,), in the variable of the integral.
+        Where the pieces begin and how wide they are, (pieces,), in the variable of the integral: w [1] or x [m], see
+        `Panels`.
     widest
-        In the same unit.
+        In the same unit, above 0.
 
     Returns
     -------
@@ -75,7 +80,8 @@ def sum_panels(
     Returns
     -------
     value, error
-        (count, 3) each.
+        The integral of each ray and a bound of its error, (count, 3) each, in the unit of the panels' values, [1/m^2]
+        or [1].
     """
     panels = evaluate(*first)
     for _ in range(_HALVINGS):

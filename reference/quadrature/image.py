@@ -25,8 +25,8 @@ def quadrature_image(
     samples
         Visibility samples of each ray and light; an eighth as many random ones check the lit intervals.
     shadow_scale
-        Attenuate the leg from the light over this share of its length: 1 is the truth, 1 - epsilon what a renderer with
-        a shadow-ray epsilon converges to (DESIGN section 6.1). Such a renderer also starts its shadow rays off the
+        Attenuate the leg from the light over this share [1] of its length: 1 is the truth, 1 - epsilon what a renderer
+        with a shadow-ray epsilon converges to (DESIGN section 6.1). Such a renderer also starts its shadow rays off the
         surface, and so do those for `surface` then (`reference.visibility.surface_shadows`).
     pixel
         "centre": the radiance along the ray through the centre. "area": the mean over the pixel.
@@ -35,6 +35,11 @@ def quadrature_image(
         `reference.visibility.lit_intervals.lit_intervals`.
     progress
         Called with (done, total, what) as the work goes on.
+
+    Returns
+    -------
+    TruthImage
+        Radiances, (height, width, 3) [W/(m^2 sr)], and what is known of their errors.
 
     Raises
     ------

@@ -24,9 +24,9 @@ _UNDERFLOW = 745.0  # optical depth after which nothing is left
 class Crossed:
     """Rays of a scene and the media that they cross."""
 
-    truth: TruthScene
-    direction: Array  # of the rays, unit, (rays, 3)
-    segments: Segments
+    truth: TruthScene  #: the scene
+    direction: Array  #: of the rays, unit, (rays, 3)
+    segments: Segments  #: the media along them
 
     def medium(self, number: int) -> TruthMedium:
         """Return the medium of this number."""
@@ -42,23 +42,23 @@ class Crossed:
 class Setup(Crossed):
     """What all pieces of rays share that a point light shines on."""
 
-    light: TruthLight
-    rays: Rays
-    shadow_scale: float
-    edge: float  # relative uncertainty of the distance of an edge between light and shadow
+    light: TruthLight  #: the point or spot light
+    rays: Rays  #: in the planes with the light
+    shadow_scale: float  #: share of the leg from the light that is attenuated [1]
+    edge: float  #: relative uncertainty of the distance of an edge between light and shadow [1]
 
 
 @dataclass(frozen=True)
 class Pieces:
-    """Smooth pieces of rays, each in one medium; arrays of shape (n,) and one of (n, 3)."""
+    """Smooth pieces of rays, each in one medium."""
 
-    ray: Index
-    medium: Index
-    x0: Array
-    x1: Array
-    first: NDArray[np.bool_]  # begins where a lit interval does
-    last: NDArray[np.bool_]  # ends where a lit interval does
-    depth: Array  # optical depth between camera and x0
+    ray: Index  #: number of the ray, (n,)
+    medium: Index  #: number in `TruthScene.media`, or `AMBIENT`, (n,)
+    x0: Array  #: distance from the camera where the piece begins, (n,) [m]
+    x1: Array  #: where it ends, (n,) [m]
+    first: NDArray[np.bool_]  #: whether it begins where a lit interval does, (n,)
+    last: NDArray[np.bool_]  #: whether it ends where a lit interval does, (n,)
+    depth: Array  #: optical depth between camera and x0, (n, 3) [1]
 
     def __getitem__(self, rows) -> "Pieces":
         return Pieces(*(getattr(self, f.name)[rows] for f in fields(self)))
@@ -74,11 +74,11 @@ def cut_pieces(
     setup
         The rays.
     lit
-        Rays and distances of both ends of the lit intervals [m].
+        Rays, (intervals,), and distances of both ends of the lit intervals, (intervals,) each [m].
     kinks
-        Rays and distances of the kinks [m], in any order.
+        Rays and distances of the kinks, (kinks,) each [m], in any order.
     foot
-        Distance at which each ray is closest to the light, where rays may be endless [m].
+        Distance at which each ray is closest to the light, (rays,) [m], where rays may be endless.
     """
     return _cut(setup, _parts(setup, *lit, foot), *kinks)
 

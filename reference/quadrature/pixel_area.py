@@ -45,7 +45,7 @@ Bools = NDArray[np.bool_]
 
 _LEVELS = 4  # with an edge: squares of 1/16 of a pixel, with points in their quarters
 _DEEPEST = 8  # around a light: of 1/256
-_AROUND = 3.0  # sides of a square: a light that is closer makes it one of those
+_AROUND = 3.0  # sides of a square: squares with a light closer than this are cut so deep
 _CHUNK = 1 << 17  # rays at once
 _DEPTH = 0.05  # neighbouring depths that differ by more are of two surfaces, or of one seen edge-on
 _CLOSE = 0.05  # sides of a square: a ray that comes closer to a light says nothing of the rest of the square
@@ -101,15 +101,20 @@ def area_image(
     samples, shadow_scale, edges
         See `reference.quadrature.image.quadrature_image`.
     tolerance
-        Relative error to reach in airlight and surface, where `_LEVELS` cuts of a pixel suffice. What was reached for
-        the airlight is in `airlight_bound`: three standard deviations of an estimate, no strict bound.
+        Relative error [1] to reach in airlight and surface, where `_LEVELS` cuts of a pixel suffice. What was reached
+        for the airlight is in `airlight_bound`: three standard deviations of an estimate, no strict bound.
     progress
         Called with (done, total, what) after each of the levels.
 
+    Returns
+    -------
+    TruthImage
+        The means, (height, width, 3) [W/(m^2 sr)].
+
     Notes
     -----
-    Valid for images whose edges are straight within a pixel and further apart than its first thirteen rays, between
-    which finer thing goes unseen. Distances and angles to the light are those of the centres.
+    Valid for images whose edges are straight within a pixel and further apart than its first thirteen rays; finer
+    things between those go unseen. Distances and angles to the light are those of the centres.
     """
     trace = partial(
         _traced, truth, samples=samples, shadow_scale=shadow_scale, edges=edges, shapes=read_shapes(truth.occluders)
@@ -186,7 +191,7 @@ def _keys(positions: Array) -> Index:
 
 
 def _floor(rays: RayValues, at_centre: Index) -> Array:
-    """Return the least error worth looking at, airlight, then surface; rays close to a light are no measure of it."""
+    """Return the least error worth a cut, of airlight, then surface; rays close to a light do not count."""
     dimmest = max(1, int(0.99 * len(at_centre)))
     layers = [np.sort(layer[at_centre].mean(axis=1))[:dimmest] for layer in (rays.airlight, rays.surface)]
     means = np.array([layer[np.isfinite(layer)].mean() if np.isfinite(layer).any() else 0.0 for layer in layers])

@@ -59,20 +59,20 @@ class TruthImage:
 
 @dataclass(frozen=True)
 class RayValues:
-    """What is found along the rays of a scene."""
+    """Radiance, distance and lit intervals of each ray of a scene."""
 
-    airlight: Array  #: (rays, 3) [W/(m^2 sr)]
-    bound: Array  #: (rays, 3) [W/(m^2 sr)]
-    surface: Array  #: (rays, 3) [W/(m^2 sr)]
+    airlight: Array  #: in-scattered radiance, (rays, 3) [W/(m^2 sr)]
+    bound: Array  #: of the error of the airlight, (rays, 3) [W/(m^2 sr)]
+    surface: Array  #: radiance of the lit surface through the medium, (rays, 3) [W/(m^2 sr)]
     distance: Array  #: as it was cast, in float32, (rays,) [m]
     light_angle: Array  #: (rays,) [rad]
     intervals: NDArray[np.int64]  #: how many lit intervals a ray has, those of all lights together, (rays,)
-    transitions: int
-    random_checks: RandomChecks
+    transitions: int  #: edges between light and shadow
+    random_checks: RandomChecks  #: of the lit intervals
 
 
 def image_of(truth: TruthScene, centre: RayValues, airlight: Array, bound: Array, surface: Array) -> TruthImage:
-    """Return the image with these layers, and what else is known of the rays through the centres.
+    """Return the image with these layers; its distances, angles and checks are those of the rays through the centres.
 
     Parameters
     ----------
@@ -108,10 +108,21 @@ def ray_values(
     progress: Progress | None = None,
     shapes: Shapes | None = None,
 ) -> RayValues:
-    """Compute what is found along every ray of `truth.direction`.
+    """Compute airlight, lit surface, distances and lit intervals of every ray of `truth.direction`.
 
-    The parameters are those of `quadrature_image`, and what `reference.scene.shapes.read_shapes` returned for the
-    occluders, if that is known.
+    Parameters
+    ----------
+    truth
+        The scene, with any rays.
+    samples, shadow_scale, edges, progress
+        See `reference.quadrature.image.quadrature_image`.
+    shapes
+        What `reference.scene.shapes.read_shapes` returned for the occluders, if that is known.
+
+    Returns
+    -------
+    RayValues
+        Radiances, (rays, 3) [W/(m^2 sr)], distances, (rays,) [m], and how the lit intervals were checked.
     """
     shapes = read_shapes(truth.occluders) if shapes is None else shapes
     hits = surface_hits(truth)

@@ -5,8 +5,7 @@
 
 with f cos by `BSDF.eval` and I / r^2 by `Emitter.sample_direction`; s scales the shadow leg (see
 `reference.quadrature.ray_values`). Through bounded media the optical depth is that of both legs piece by piece. A
-directional light has its irradiance in the place of I / r^2, and its leg is endless: to be dimmed it has only bodies
-to pass.
+directional light has its irradiance in the place of I / r^2. Its leg is endless, and only bodies dim it.
 """
 
 from collections.abc import Sequence

@@ -97,7 +97,7 @@ def sums_of(owner: NDArray[np.int64], values: Array, count: int) -> Array:
     owner
         Of each row, from 0 on, (n,).
     values
-        (n, columns), in any unit.
+        (n, columns), in any unit, such as [1/m].
     count
         Number of owners.
 

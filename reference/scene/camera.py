@@ -14,16 +14,16 @@ Array = NDArray[np.float64]
 
 
 def film_directions(sensor, positions: Array, size: tuple[int, int]) -> Array:
-    """Return the unit directions through positions on the film, (n, 3).
+    """Return the unit directions through positions on the film, (n, 3) [1].
 
     Parameters
     ----------
     sensor
         A perspective sensor of Mitsuba.
     positions
-        Columns and rows in units of pixels from the upper left corner, (n, 2): pixel centres end in one half.
+        Columns and rows from the upper left corner, (n, 2) [pixels]: pixel centres end in one half.
     size
-        Width and height of the film in pixels.
+        Width and height of the film [pixels].
 
     Notes
     -----
@@ -40,11 +40,11 @@ def film_directions(sensor, positions: Array, size: tuple[int, int]) -> Array:
 
 
 def pixel_centres(size: tuple[int, int]) -> Array:
-    """Return the positions of the centres of all pixels of a film of this width and height, row by row, (pixels, 2)."""
+    """Return the centres of the pixels of a film of this width and height, row by row, (pixels, 2) [pixels]."""
     row, column = np.divmod(np.arange(size[0] * size[1]), size[0])
     return np.stack([column + 0.5, row + 0.5], axis=1)
 
 
 def camera_matrix(sensor) -> Array:
-    """Return the transform from the camera's own frame to the world, (4, 4)."""
+    """Return the transform from the camera's own frame to the world, (4, 4), both in [m]."""
     return np.array(sensor.world_transform().matrix, dtype=np.float64).reshape(4, 4)

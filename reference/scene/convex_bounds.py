@@ -77,7 +77,7 @@ def _read_sphere(shape: Any, matrix: Array) -> Sphere:
 
 
 def _read_polyhedron(shape: Any, vertices: Array, faces: Index) -> Polyhedron:
-    # Vertices that are doubled for the sake of normals or texture are one again.
+    # Merge vertices that the mesh doubles for the sake of normals or texture.
     vertices, same = np.unique(vertices, axis=0, return_inverse=True)
     faces = same.reshape(-1)[faces]
     corner = vertices[faces]

@@ -63,8 +63,8 @@ class TruthScene:
 
     scene: Any  #: the `mi.Scene`, whole
     occluders: Any  #: an `mi.Scene` of the opaque shapes alone: cast rays here
-    width: int
-    height: int
+    width: int  #: [pixels]
+    height: int  #: [pixels]
     origin: Array  #: the pinhole [m], (3,)
     direction: Array  #: unit directions through the pixel centres, (pixels, 3), row by row
     medium: TruthMedium  #: the medium without bounds, a vacuum of extinction 0 where there is none
@@ -135,7 +135,7 @@ def _sorted_shapes(scene) -> tuple[list[Any], list[Any]]:
 
 
 def scene_of(shapes: list[Any], whole):
-    """Return a scene of some of the shapes of another one, `whole`: that itself where they are all of its shapes."""
+    """Return a scene of some of the shapes of `whole`, or `whole` itself if they are all of its shapes."""
     if len(shapes) == len(whole.shapes()):
         return whole
     # The keys become the names of the shapes, in the whole scene too: they keep those they have, if these are keys.

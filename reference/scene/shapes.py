@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What hides lights, as numbers: triangles of the polygons, spheres, and the shapes that only casting rays can tell of.
+"""What hides lights, as numbers: triangles of polygons, spheres, and the shapes that only cast rays can find.
 
 Mitsuba takes a `sphere` for the sphere around the image of its centre whose radius is the length of the image of its
-first axis, whatever else the transform does to it: so does this module. Which side its normals point to matters to no
-shadow.
+first axis, whatever else the transform does to it, and so does this module. Shadows do not depend on the side to which
+normals point.
 """
 
 from dataclasses import dataclass, field

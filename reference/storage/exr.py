@@ -64,7 +64,16 @@ class Image:
 
 
 def layer(image: Image, name: str, path: str | os.PathLike[str] = "the image") -> NDArray[np.floating]:
-    """Return a layer, (height, width, 3); the empty name is the total.
+    """Return a layer in the unit of the file, radiance [W/(m^2 sr)] in ours, (height, width, 3).
+
+    Parameters
+    ----------
+    image
+        The image.
+    name
+        Of the layer; the empty name is the total.
+    path
+        What messages call the image.
 
     Raises
     ------
@@ -84,15 +93,15 @@ def layer(image: Image, name: str, path: str | os.PathLike[str] = "the image") -
 def write_exr(path: str | os.PathLike[str], image: Image, *, finite: bool = True) -> None:
     """Write an image as a single-part float32 EXR, whole or not at all.
 
-    Where there is an airlight, the total in `R`, `G`, `B` is it plus the surface, or it alone. An attribute is kept in
-    32 bits: of a float about 7 digits remain, and a number beyond their range is written as text.
+    If there is an airlight, `R`, `G`, `B` hold the total: the airlight plus the surface, or the airlight alone. The
+    format keeps attributes in 32 bits: a float keeps about 7 digits, and a number beyond their range becomes text.
 
     Raises
     ------
     InputError
-        If the layers are none, of two sizes, of another shape than (height, width, 3), or too large for float32; if a
-        `total` is given that is not the sum; if the name of an attribute is one of the format's own; for values that
-        are not finite, unless `finite` is False, as for the image of another program that is to be judged.
+        If there are no layers, or they have two sizes, another shape than (height, width, 3), or values too large for
+        float32; if a `total` is given that is not the sum; if an attribute has a name of the format's own; for values
+        that are not finite, unless `finite` is False, as for an image of another program that is to be judged.
     OSError
         If the disk is full; the file is as it was.
     """
@@ -116,7 +125,8 @@ def read_exr(path: str | os.PathLike[str]) -> Image:
     Raises
     ------
     InputError
-        If the file is missing, broken, no EXR, multi-part, tiled, deep or subsampled, or shows a part of its frame.
+        If the file is missing, broken, not an EXR file, multi-part, tiled, deep or subsampled, or shows a part of its
+        frame.
     """
     _check_kind(path)
     try:

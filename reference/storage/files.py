@@ -2,7 +2,8 @@
 """Files written whole or not at all.
 
 A file is first written under a hidden name in the folder where it belongs, flushed to the disk, and then moved over its
-final name, which POSIX and Windows both do in one step. Whoever is killed half-way leaves the old file as it was.
+final name, which POSIX and Windows both do in one step. A process that is killed half-way leaves the old file as it
+was.
 """
 
 import errno
@@ -39,7 +40,7 @@ def ensure_folder(path: str | os.PathLike[str]) -> Path:
     Raises
     ------
     InputError
-        If it is something else than a folder, or cannot be made or written.
+        If the path is not a folder, or the folder cannot be made or written.
     """
     folder = Path(path)
     try:
@@ -68,7 +69,7 @@ def ensure_writable(path: str | os.PathLike[str]) -> Path:
     """
     target = Path(path)
     try:
-        # Seen through symbolic links, so that a link keeps pointing to the file that it names.
+        # The path is resolved, so that a symbolic link keeps pointing to the file that it names.
         target = target.resolve()
         mode = target.stat().st_mode if target.exists() else stat.S_IFREG
     except (OSError, ValueError) as error:

@@ -50,7 +50,7 @@ def _medium_words(medium: Any) -> str:
 
 
 def _value_bytes(value: Any) -> bytes:
-    # By the name of the type: a colour has a `matrix` too, a swizzle that holds its first channel six times.
+    # The name of the type decides: a colour has a `matrix` too, a swizzle that holds its first channel six times.
     matrix = value.matrix if "Transform" in type(value).__name__ else value
     try:
         return np.array(matrix, dtype=np.float64).tobytes()

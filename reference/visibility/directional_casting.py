@@ -2,7 +2,7 @@
 """The legs from a directional light to points of camera rays, for the routes of `reference.visibility.lit_intervals`.
 
 A leg begins where it has passed all opaque shapes: at the plane across the light's direction that touches the box
-around them from the light's side. Its point is told by the share of the way from `first` to `last`. A smooth surface
+around them from the light's side. Its point is given by its share of the way from `first` to `last`. A smooth surface
 that the legs meet at a grazing angle changes its distance t along them as cot(angle) times their distance from one
 another, s dx = s (last - first) d(share): t over s (last - first) is what `Legs.depth` wants.
 

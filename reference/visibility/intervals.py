@@ -14,7 +14,7 @@ Doubt = tuple[Index, Array, Array]
 
 @dataclass(frozen=True)
 class RandomChecks:
-    """What fresh random shadow rays said of lit intervals."""
+    """How often fresh random shadow rays contradicted lit intervals."""
 
     checked: int = 0  #: shadow rays cast
     disagreements: int = 0  #: of these, how many contradicted the intervals further from an edge than rounding
@@ -24,7 +24,7 @@ class RandomChecks:
 
     @staticmethod
     def of_all(parts: "Sequence[RandomChecks]") -> "RandomChecks":
-        """Add up what was said of several lights or chunks of rays; of the shares the worst counts."""
+        """Add up the checks of several lights or chunks of rays; of the shares the worst counts."""
         return RandomChecks(
             sum(part.checked for part in parts),
             sum(part.disagreements for part in parts),
@@ -48,7 +48,7 @@ class LitIntervals:
 
 
 def joined_doubt(*parts: Doubt | None) -> Doubt | None:
-    """Put lists of doubtful angles together, those that there are."""
+    """Join lists of doubtful angles; None stands for an empty list."""
     known = [part for part in parts if part is not None]
     if not known:
         return None
@@ -64,7 +64,7 @@ def intersected(first: LitIntervals, second: LitIntervals, ends: tuple[Array, Ar
     first, second
         The intervals; those of one ray neither overlap nor touch.
     ends
-        Angles at the light between which the rays are looked at [rad].
+        Angles at the light between which the rays are looked at, (rays,) each [rad].
     """
     count = len(first.ray), len(second.ray)
     ray = np.concatenate([first.ray, first.ray, second.ray, second.ray])

@@ -72,8 +72,19 @@ def crossed_facets(bounds: Polyhedron, origin: Array, direction: Array) -> tuple
 def sphere_crossings(along: Array, power: Array | float) -> tuple[Array, Array]:
     """Return where lines enter and leave a sphere, the roots of t^2 - 2 along t + power, +-inf where they miss it [m].
 
-    along = d . (centre - origin), and power = |centre - origin|^2 - radius^2 is the power of the origin. The smaller
-    root in size is taken from the product of both, which is the power, so that nothing cancels.
+    The smaller root in size is taken from the product of both, which is the power, so that nothing cancels.
+
+    Parameters
+    ----------
+    along
+        direction . (centre - origin), (n,) [m], for a unit direction.
+    power
+        |centre - origin|^2 - radius^2, the power of the origin, (n,) or a scalar [m^2].
+
+    Returns
+    -------
+    low, high
+        (n,) each [m].
     """
     inner = along * along - power
     root = np.sqrt(np.maximum(inner, 0.0))
@@ -89,5 +100,18 @@ def _power(sphere: Sphere, origin: Array) -> Array:
 
 
 def half_chord(radius: Array | float, distance: Array) -> Array:
-    """Return half of the chord at a distance from a disk's centre, sqrt(radius^2 - distance^2) [m]; 0 beyond it."""
+    """Return half of the chord at a distance from a disk's centre, sqrt(radius^2 - distance^2); 0 beyond the radius.
+
+    Parameters
+    ----------
+    radius
+        Of the disk, (n,) or a scalar [m].
+    distance
+        Of the chord from the centre, (n,) [m], at least 0.
+
+    Returns
+    -------
+    array
+        (n,) [m], without cancellation where both are alike.
+    """
     return np.sqrt(np.maximum(radius - distance, 0) * (radius + distance))

@@ -7,15 +7,15 @@ unit vector from the light to the foot point), at the distance height / cos(thet
 ray passes to the light.
 
 Exact geometry (`reference.visibility.triangles`) misses nothing and is as fast as casting rays. Casting works for all
-shapes. It is done in a scene of those that geometry leaves over, and what is lit is lit in both. Every ray is sampled
-at `samples` angles; cells in which the light sees another shape at one end than at the other, or a surface that comes
-or goes too fast to be one, are cut further; wherever two neighbours disagree a transition lies between them, and is
-bisected to rounding.
+shapes; the rays are cast in a scene of those that geometry leaves over, and what is lit is lit in both. Every ray is
+sampled at `samples` angles; cells in which the light sees another shape at one end than at the other, or a surface that
+comes or goes too fast to be one, are cut further; wherever two neighbours disagree a transition lies between them, and
+is bisected to rounding.
 
 Whatever the route, fresh random shadow rays then check the intervals (`reference.visibility.random_checks`).
 
-What is done is the same for a directional light (`reference.visibility.directional_casting`); there a point of a ray
-is told by its share of the way, not by an angle. `Legs` is what differs.
+A directional light takes the same steps (`reference.visibility.directional_casting`), but a share of the way, not an
+angle, gives a point of a ray. `Legs` holds what differs.
 """
 
 from collections.abc import Callable
@@ -55,7 +55,7 @@ _STEEP = 4.0  # a surface seen within atan(1/4) = 14 degrees of grazing, or a ju
 
 @dataclass(frozen=True)
 class Legs:
-    """The legs from one light to points of camera rays, a point being told by ray number and angle."""
+    """The legs from one light to points of camera rays; ray number and angle give a point."""
 
     shadow: Callable[[Index, Array], Any]  #: Mitsuba's shadow rays, from the light on, which end just before the points
     single: Leg  #: one leg in float64: where it begins, and the way from there to the point

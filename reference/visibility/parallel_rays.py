@@ -6,8 +6,8 @@ both, with
 
     u = c w + s a,    c = w . u,    s > 0,    a the unit vector across the ray, on the light's side,
 
-a point o + z w + y a is told by (z, y); the ray is y = 0 and the leg from its point x to the light is (x + c l, s l),
-l >= 0. So what lies at (z, y) can only be on the leg of
+a point o + z w + y a has the coordinates (z, y); the ray is y = 0, and the leg from its point x to the light is
+(x + c l, s l), l >= 0. So what lies at (z, y) can only be on the leg of
 
     x = z - y c/s,    where y >= 0:
 

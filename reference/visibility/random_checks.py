@@ -5,11 +5,11 @@ Intervals that come from cast rays are mended: a sample that contradicts them li
 over. It becomes a new bracket, whose two sides are bisected; this is repeated with new random samples until a round
 finds nothing, or `_ROUNDS` have passed.
 
-Intervals that come from exact geometry need no mending, but a proof that they are right: they share no code with the
-shadow rays. Within float32 rounding of an edge the rays cannot be asked. Elsewhere a contradiction is judged by a third
-way, a float64 test of that one shadow ray against every triangle (Moeller and Trumbore 1997, Fast, minimum storage
-ray-triangle intersection, J. Graphics Tools 2(1)) and every sphere; of other shapes a ray that is cast at them alone
-tells.
+Intervals that come from exact geometry need no mending, but evidence that they are right: they share no code with the
+shadow rays. Within float32 rounding of an edge the rays decide nothing. Elsewhere a third route judges a contradiction:
+a float64 test of that one shadow ray against every triangle (Moeller and Trumbore 1997, Fast, minimum storage
+ray-triangle intersection, J. Graphics Tools 2(1)) and every sphere, and for other shapes a ray that is cast at them
+alone.
 """
 
 from collections.abc import Callable, Sequence
@@ -54,8 +54,8 @@ class Toggles:
 class Rounding:
     """How the edges of cast intervals are found: the shadow rays, and their bisection."""
 
-    visible: Visible
-    bisect: Bisect
+    visible: Visible  #: casts the shadow rays
+    bisect: Bisect  #: narrows a bracket to rounding
 
 
 def checked_cast(toggles: Toggles, found_by: Rounding, *, ends: tuple[Array, Array], checks: int) -> LitIntervals:
@@ -68,7 +68,7 @@ def checked_cast(toggles: Toggles, found_by: Rounding, *, ends: tuple[Array, Arr
     found_by
         The shadow rays that found them.
     ends
-        Angles at the light between which the rays are looked at [rad].
+        Angles at the light between which the rays are looked at, (rays,) each [rad].
     checks
         Random samples of each ray and round.
     """
@@ -111,7 +111,7 @@ def checked_geometry(
     Parameters
     ----------
     exact
-        The intervals, and what was said of the cast part of them.
+        The intervals, with the checks of that part of them that was cast.
     visible
         Shadow rays, (ray numbers, angles) -> whether the light reaches those points.
     geometry
@@ -159,7 +159,7 @@ def _cast(visible: Visible, ray: Index, theta: Array) -> Bools:
 
 
 def _predicted(toggles: Toggles, ray: Index, theta: Array) -> tuple[Bools, Array]:
-    """Return what intervals say of samples, and how far these are from the nearest edge [rad]."""
+    """Return whether intervals call samples lit, and how far these are from the nearest edge [rad]."""
     before = _edges_before(toggles, ray, theta)
     first = np.searchsorted(toggles.edge_ray, ray)
     lit = toggles.lit[np.searchsorted(toggles.ray, ray)] ^ ((before - first) % 2 == 1)

@@ -126,9 +126,19 @@ def _cones(corners: Array, camera: Array, frame: Array) -> Reaches:
 
 
 def azimuths(corners: Array, frame: Array) -> tuple[Array, Array]:
-    """Return where the azimuths of triangles about the axis begin, and how wide they are [rad].
+    """Return where the azimuths of triangles about the axis begin, and how wide they are.
 
-    The corners are relative to a point of the axis.
+    Parameters
+    ----------
+    corners
+        Of the triangles, relative to a point of the axis, (n, 3, 3) [m].
+    frame
+        From `axis_frame`, (3, 3).
+
+    Returns
+    -------
+    begin, width
+        (n,) each [rad]; the width is 2 pi where the axis meets the triangle or passes close by.
     """
     across = corners @ frame[1:].T
     azimuth = np.sort(np.arctan2(across[..., 1], across[..., 0]), axis=1)
@@ -206,7 +216,7 @@ def lit_of_chunk(shadows: Shadows, ends: tuple[Array, Array], used: Index) -> tu
     shadows
         Rows of `used`, and where hidden intervals begin and end, in any order.
     ends
-        Between which all rays are looked at, (rays,) each.
+        Between which all rays are looked at, (rays,) each: angles at the light [rad], or shares of the way [1].
     used
         Numbers of the rays of the chunk.
 

@@ -19,12 +19,12 @@ class ImageComparison(Comparison, Pictured):
     """How far an image is from a reference: the numbers of `airlight compare`, and the images."""
 
     reference: Array  #: the layer of the reference, (height, width[, channels]) [W/(m^2 sr)]
-    test: Array  #: the layer of the image that is judged
+    test: Array  #: the same layer of the image under test
     names: tuple[str, str] = ("the reference", "the test image")
 
     @property
     def passed(self) -> bool:
-        """Whether nothing is wrong with the test image; `failures` says what is."""
+        """Whether the test image has no fault; `failures` names the faults."""
         return not self.failures
 
     @cached_property
@@ -54,18 +54,18 @@ class ImageComparison(Comparison, Pictured):
 
     def _colours(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         shape = (*self.reference.shape[:2], -1)
-        one, two = (np.asarray(v, dtype=np.float64).reshape(shape) for v in (self.reference, self.test))
-        return colours(one), colours(two)
+        reference, test = (np.asarray(v, dtype=np.float64).reshape(shape) for v in (self.reference, self.test))
+        return colours(reference), colours(test)
 
     def _repr_html_(self) -> str:
         from reports.api.html import block, bullets, picture, table
         from reports.plotting.pictures import ERROR_CEILING, ERROR_FLOOR, exposure, png_bytes, tone_mapped
 
-        one, two = self._colours()
-        factor, width = exposure(one), one.shape[1]
+        reference, test = self._colours()
+        factor, width = exposure(reference), reference.shape[1]
         shown = [
             picture(png_bytes(tone_mapped(values, factor)), width, alt=f"{name}, {self.layer}", caption=name)
-            for name, values in zip(self.names, (one, two))
+            for name, values in zip(self.names, (reference, test))
         ]
         scale = f"relative error: blue too dark, red too bright, logarithmic from {ERROR_FLOOR:g} to {ERROR_CEILING:g}"
         shown.append(picture(self._png, width, alt=f"signed relative error of the {self.layer}", caption=scale))
@@ -82,7 +82,7 @@ class ImageComparison(Comparison, Pictured):
         if self.statistics is not None:
             low, high = self.statistics.relative_bias_ci
             rows.append(("95 % interval of the bias", f"{_percent(low)} to {_percent(high)}"))
-            rows.append(("bias that would have been found", _percent(self.statistics.detectable_bias)))
+            rows.append(("bias that would have been detected", _percent(self.statistics.detectable_bias)))
         if self.flip is not None:
             rows.append(("HDR-FLIP", f"none: {self.flip.note}" if self.flip.value is None else number(self.flip.value)))
         return rows

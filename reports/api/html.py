@@ -5,11 +5,11 @@ import base64
 from collections.abc import Sequence
 from html import escape
 
-from reports.tables.drawing import html
+from reports.tables.drawing import html, sentence_in_html
 from reports.tables.table import Column
 from reports.tables.table import table as make_table
 
-#: Narrower pictures are enlarged to this in whole multiples, so that single pixels can be seen [CSS pixels].
+#: Pictures narrower than this are enlarged by a whole factor, so that single pixels can be seen [CSS pixels].
 _NARROW = 240
 
 
@@ -24,13 +24,13 @@ def paragraph(text: str) -> str:
 
 
 def bullets(items: Sequence[str]) -> str:
-    """Return a list of plain texts; nothing for no items."""
-    inside = "".join(f"<li>{escape(item)}</li>" for item in items)
+    """Return a list of sentences, in which what stands in backticks is code; nothing for no items."""
+    inside = "".join(f"<li>{sentence_in_html(item)}</li>" for item in items)
     return f"<ul>{inside}</ul>" if items else ""
 
 
 def table(rows: Sequence[Sequence[str]]) -> str:
-    """Return a table of names and what there is to say of each."""
+    """Return a table of names and their values."""
     columns = (Column("name", "", words=True), Column("value", "", words=True))
     return html(make_table("", columns, rows))
 

@@ -101,7 +101,7 @@ def render(
     from validation.configurations.timing import time_frame
     from validation.estimates.images import layered_frame
 
-    activate()  # a module of the user's may want a variant when it is imported
+    activate()  # a user's module may need a variant when it is imported
     chosen = configuration(method, kernel_name(kernel), parameters)
     loaded = opened(scene, size)
     read = read_scene(loaded.scene, precision)
@@ -174,12 +174,12 @@ def compare(
     from reports.api.comparison import ImageComparison
     from validation.comparison.images import compare_images
 
-    one, first = as_image(reference, layer, "the reference")
-    two, second = as_image(test, layer, "the test image")
+    truth, truth_name = as_image(reference, layer, "the reference")
+    tested, test_name = as_image(test, layer, "the test image")
     chosen = None if mask is None else np.asarray(mask)
-    found = compare_images(
-        one,
-        two,
+    comparison = compare_images(
+        truth,
+        tested,
         layer=layer,
         mask=chosen,
         margin=margin,
@@ -187,6 +187,6 @@ def compare(
         flip=flip,
         exposure=exposure,
     )
-    kept: dict[str, Any] = {field.name: getattr(found, field.name) for field in dataclasses.fields(found)}
-    kept |= {"reference": image_layer(one, layer), "test": image_layer(two, layer)}
-    return ImageComparison(**kept, names=(first, second))
+    kept: dict[str, Any] = {field.name: getattr(comparison, field.name) for field in dataclasses.fields(comparison)}
+    kept |= {"reference": image_layer(truth, layer), "test": image_layer(tested, layer)}
+    return ImageComparison(**kept, names=(truth_name, test_name))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the functions of the Python API take: scenes, images, progress; and the one exception that they raise."""
+"""Arguments of the Python API (scenes, images, progress), and the one exception that its functions raise."""
 
 import functools
 import os
@@ -45,7 +45,7 @@ class OpenScene(LoadedScene):
         return int(width), int(height)
 
     def plan(self) -> dict[str, str]:
-        """Return what the scene needs of a method, in words; raises InputError where no method can render it."""
+        """Return the features that the scene needs, in words; raises InputError if no method can render it."""
         return dict(_described(self)[0])
 
     def _repr_html_(self) -> str:
@@ -64,7 +64,7 @@ class OpenScene(LoadedScene):
 
 
 def one_error(function: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Let a function raise `airlight.InputError` also for what the side under test refuses with its own."""
+    """Let a function raise `airlight.InputError` in place of the InputError of `realtime`."""
 
     @functools.wraps(function)
     def wrapped(*arguments: _P.args, **named: _P.kwargs) -> _R:
@@ -82,7 +82,7 @@ def opened(scene: SceneLike, size: Size | None = None) -> OpenScene:
     Raises
     ------
     InputError
-        For what is no scene, and for another size than that of a scene that is loaded already.
+        If `scene` is not a scene, or is already loaded at another size.
     """
     from reports.machine.environment import activate
 
@@ -94,7 +94,7 @@ def opened(scene: SceneLike, size: Size | None = None) -> OpenScene:
         return _as_open(load_scene(os.fspath(scene), pixels))
     loaded = _as_open(scene) if isinstance(scene, LoadedScene) else _from_mitsuba(scene)
     if pixels not in (None, loaded.size):
-        # It may have been changed since: to load it again in silence would undo that.
+        # The user may have changed the scene since; loading it again in silence would undo that.
         raise InputError(
             "size: got {}x{} for a scene that is loaded already, at {}x{}; give its name, path or dictionary with the "
             "size, or load it at that size".format(*pixels, *loaded.size)
@@ -113,6 +113,11 @@ def as_image(image: Any, layer: str, name: str) -> tuple["Image", str]:
         The layer that will be looked at.
     name
         What to call an image that has no name of its own.
+
+    Raises
+    ------
+    InputError
+        If an array is not of numbers, or a file has no such layer.
     """
     import numpy as np
 
@@ -124,7 +129,7 @@ def as_image(image: Any, layer: str, name: str) -> tuple["Image", str]:
         return image.with_total(), image.title
     if isinstance(image, str | os.PathLike):
         read = read_exr(image)
-        image_layer(read, layer, image)  # a message about a missing layer names the file
+        image_layer(read, layer, image)  # a message about a missing layer then names the file
         return read, Path(image).name
     if isinstance(image, Image):
         return image, name
@@ -138,7 +143,13 @@ def as_image(image: Any, layer: str, name: str) -> tuple["Image", str]:
 
 
 def kernel_name(kernel: str | Callable[..., Any] | None) -> str | None:
-    """Return the name of a kernel: of a function 'module:function', by which it can be found again."""
+    """Return the name of a kernel: of a function 'module:function', by which it can be imported again.
+
+    Raises
+    ------
+    InputError
+        If it is neither a name nor a function at the top of a module.
+    """
     if kernel is None or isinstance(kernel, str):
         return kernel
     module, name = getattr(kernel, "__module__", ""), getattr(kernel, "__qualname__", "")
@@ -151,7 +162,7 @@ def kernel_name(kernel: str | Callable[..., Any] | None) -> str | None:
 
 @contextmanager
 def telling(progress: Progress, title: str) -> Iterator[Callable[[float, str], None]]:
-    """Yield a function (share done, what) that tells whoever wants to know."""
+    """Yield a function (share done, what) that calls `progress`, or does nothing where it is None."""
     if progress is True:
         from reports.machine.progress import progress_bar
 

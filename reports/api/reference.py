@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from reports.api.results import Reference
     from validation.estimates.budget import Budget
 
-USUAL_SAMPLES = 2048  #: a pixel, of an estimator that samples and is given no budget
+USUAL_SAMPLES = 2048  #: samples a pixel of a sampling estimator without a budget
 
 
 @one_error
@@ -111,15 +111,15 @@ def _sampled(
     from reports.api.results import Reference, sealed
     from validation.estimates.images import monte_carlo_reference
 
-    found = monte_carlo_reference(loaded, estimator, budget=budget, seed=seed, progress=callback)
-    attributes = {name.removeprefix("airlight:"): value for name, value in found.image.attributes.items()}
+    estimate = monte_carlo_reference(loaded, estimator, budget=budget, seed=seed, progress=callback)
+    attributes = {name.removeprefix("airlight:"): value for name, value in estimate.image.attributes.items()}
     details: dict[str, Any] = {name: attributes[name] for name in ("spp", "batches", "seeds")}
-    details |= {"cached": found.cached, "masked": found.masked, "reached": found.reached}
+    details |= {"cached": estimate.cached, "masked": estimate.masked, "reached": estimate.reached}
     return Reference(
         scene=loaded.name,
-        image=sealed(found.image),
+        image=sealed(estimate.image),
         estimator=estimator,
-        relative_error=getattr(found.errors, budget.target),
+        relative_error=getattr(estimate.errors, budget.target),
         details=details,
     )
 

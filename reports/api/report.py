@@ -55,8 +55,8 @@ def report(
     Examples
     --------
     >>> import airlight
-    >>> found = airlight.report("my-report", scenes=["open-fog"], methods=["unshadowed"])  # doctest: +SKIP
-    >>> found.claims[0]  # doctest: +SKIP
+    >>> report = airlight.report("my-report", scenes=["open-fog"], methods=["unshadowed"])  # doctest: +SKIP
+    >>> report.claims[0]  # doctest: +SKIP
     'The truth is confirmed by our own Mitsuba integrator in 1 of 1 comparisons: ...'
     """
     from reference.storage.files import ensure_folder
@@ -92,20 +92,20 @@ def report(
 
 
 def _scenes_and_images(scenes: Any, images: Any, effort: str) -> tuple[list[str], dict[str, Any]]:
-    """Return the scenes to study, those of the images where only these are given; refuse what cannot be used."""
+    """Return the scenes to study, by default those of the images; refuse unusable input."""
     from realtime.scene.read_scene import read_scene
     from validation.comparison.engine_images import find_images
     from validation.frames.scene_study import EFFORTS
     from validation.scenes.registry import SCENES
 
-    asked = [os.fspath(one) for one in several(scenes)] if scenes else []
+    asked = [os.fspath(path) for path in several(scenes)] if scenes else []
     names = asked or list(EFFORTS[effort].scenes)
     shown: dict[str, Any] = {}
     if images is not None:
         shown = find_images(images, {Path(name).stem: name for name in [*SCENES, *asked]})
         names = asked or list(shown)
         stems = {Path(name).stem for name in names}
-        shown = {name: found for name, found in shown.items() if name in stems}
+        shown = {name: files for name, files in shown.items() if name in stems}
     for name in names:
         read_scene(opened(name, (8, 6)).scene)
     return names, shown

@@ -42,7 +42,7 @@ def read_only(values: Any) -> Array:
 
 
 class Pictured(ABC):
-    """What a notebook shows as the PNG file of its picture."""
+    """A result that a notebook shows as a PNG picture."""
 
     @abstractmethod
     def picture(self) -> NDArray[np.uint8]:
@@ -60,7 +60,7 @@ class Pictured(ABC):
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class LayeredImage(Pictured):
-    """What renderings and references share: layers of radiance and the depth, see the module."""
+    """Layers of radiance and the depth, shared by renderings and references; see the module."""
 
     scene: str  #: name of the scene
     image: Image  #: the layers as they are written to a file, with what made them
@@ -121,7 +121,13 @@ class LayeredImage(Pictured):
         return tone_mapped(radiance, 2.0**stops)
 
     def save(self, path: str | os.PathLike[str], exposure: float | None = None) -> Path:
-        """Write the layers as EXR or the picture of the total as PNG, by the suffix of the path, which is returned."""
+        """Write the layers as EXR or the picture of the total as PNG, by the suffix of the path; return the path.
+
+        Raises
+        ------
+        InputError
+            For another suffix, or if the file cannot be written.
+        """
         from reference.storage.exr import write_exr
         from reports.machine.environment import stamped
         from reports.plotting.pictures import write_png
@@ -138,13 +144,13 @@ class LayeredImage(Pictured):
         return target
 
     def facts(self) -> dict[str, str]:
-        """Return what there is to say of the image, in words, by name."""
+        """Return facts on the image, in words, by name."""
         width, height = self.size
         return {"scene": self.scene, "size": f"{width} x {height}"} | _levels(self)
 
     @property
     def title(self) -> str:
-        """What to call the image."""
+        """Title of the image."""
         return self.scene
 
     def _repr_html_(self) -> str:
@@ -168,28 +174,28 @@ class Rendering(LayeredImage):
 
     method: str
     kernel: str | None  #: None for a method that calls none
-    parameters: Mapping[str, Any]  #: those that differ from the method's defaults
+    parameters: Mapping[str, Any]  #: parameters that differ from the method's defaults
     label: str  #: method, kernel and parameters in one
     precision: str  #: 'single' or 'double'
     plan: Mapping[str, str]  #: what the scene needs of a method, in words
-    notes: tuple[str, ...] = ()  #: what there is to know of the scene
-    times: FrameTimes | None = None  #: what a frame costs, where it was asked for
+    notes: tuple[str, ...] = ()  #: notes on the scene
+    times: FrameTimes | None = None  #: what a frame costs, if that was measured
 
     def facts(self) -> dict[str, str]:
-        """Return what there is to say of the frame, in words, by name."""
-        found = super().facts() | {"method": self.label, "precision": self.precision}
+        """Return facts on the frame, in words, by name."""
+        facts = super().facts() | {"method": self.label, "precision": self.precision}
         if self.times is not None:
             frame = self.times.frame
-            found["a frame"] = (
+            facts["a frame"] = (
                 f"{number(frame.median_ms)} ms, quartiles {number(frame.low_ms)}..{number(frame.high_ms)}"
             )
-            found["of it airlight"] = f"{number(self.times.airlight.median_ms)} ms"
-            found["after the light moved"] = f"{number(self.times.light_moved.median_ms)} ms"
-        return found | ({"notes": " ".join(self.notes)} if self.notes else {})
+            facts["of it airlight"] = f"{number(self.times.airlight.median_ms)} ms"
+            facts["after the light moved"] = f"{number(self.times.light_moved.median_ms)} ms"
+        return facts | ({"notes": " ".join(self.notes)} if self.notes else {})
 
     @property
     def title(self) -> str:
-        """What to call the frame."""
+        """Title of the frame."""
         return f"{self.scene} by {self.label}"
 
 
@@ -198,10 +204,10 @@ class Reference(LayeredImage):
     """The truth of a scene, with its error."""
 
     estimator: str  #: 'quadrature', 'single-scatter' or 'volpath'
-    relative_error: float  #: of the airlight: mean bound over mean, or the relative standard error of the image
+    relative_error: float  #: of the airlight: the mean bound over the mean, or the relative standard error of the image
     details: Mapping[str, Any] = field(
         default_factory=dict
-    )  #: how it was made: samples, seeds, shadow rays that checked
+    )  #: how it was made: samples, seeds, shadow rays that checked the intervals
 
     @property
     def bound(self) -> Array | None:
@@ -219,7 +225,7 @@ class Reference(LayeredImage):
         return self.image.layers.get("surface_se")
 
     def facts(self) -> dict[str, str]:
-        """Return what there is to say of the truth, in words, by name."""
+        """Return facts on the truth, in words, by name."""
         kind = "mean bound of the airlight's error" if self.bound is not None else "standard error of the image"
         error = {kind: f"{number(100 * self.relative_error)} %"} if math.isfinite(self.relative_error) else {}
         words = {name.replace("_", " "): str(value) for name, value in self.details.items() if value is not None}
@@ -227,12 +233,12 @@ class Reference(LayeredImage):
 
     @property
     def title(self) -> str:
-        """What to call the truth."""
+        """Title of the truth."""
         return f"{self.scene}, the truth by {self.estimator}"
 
 
 def as_array(values: Array, dtype: DTypeLike | None, copy: bool | None) -> Array:
-    """Answer NumPy's protocol: a view unless another type or a copy is wanted."""
+    """Answer NumPy's protocol: a view, or a copy for another type; raises ValueError if a needed copy is forbidden."""
     if dtype is not None and np.dtype(dtype) != values.dtype:
         if copy is False:
             raise ValueError(f"a copy is needed to turn {values.dtype} into {np.dtype(dtype)}")
@@ -241,12 +247,12 @@ def as_array(values: Array, dtype: DTypeLike | None, copy: bool | None) -> Array
 
 
 def _levels(image: LayeredImage) -> dict[str, str]:
-    """Say how bright the layers are, and what is odd in them."""
-    found = {}
+    """Return the mean of each layer, and how many of its pixels are not finite or negative."""
+    levels = {}
     for name, values in (("airlight", image.airlight), ("surface", image.surface)):
         finite = np.isfinite(values)
         mean = float(values[finite].mean(dtype=np.float64)) if finite.any() else math.nan
         odd = [f"{int((~finite).any(axis=-1).sum())} pixels not finite"] if not finite.all() else []
         odd += [f"{int((values < 0).any(axis=-1).sum())} pixels negative"] if (values < 0).any() else []
-        found[f"mean {name}"] = ", ".join([f"{number(mean, 4)} W/(m^2 sr)", *odd])
-    return found
+        levels[f"mean {name}"] = ", ".join([f"{number(mean, 4)} W/(m^2 sr)", *odd])
+    return levels

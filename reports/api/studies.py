@@ -58,10 +58,10 @@ def integrate(
     --------
     >>> import airlight, numpy as np
     >>> rays = {"phase": "isotropic", "foot": np.linspace(-2, 2, 5), "height": 0.3, "x0": 0, "x1": np.inf}
-    >>> found = airlight.integrate(rays | {"sigma_t": 0.2}, "exact", certify=True)
-    >>> found.J.shape
+    >>> integrals = airlight.integrate(rays | {"sigma_t": 0.2}, "exact", certify=True)
+    >>> integrals.J.shape
     (5,)
-    >>> bool(abs(found.error).max() < 1e-5)
+    >>> bool(abs(integrals.error).max() < 1e-5)
     True
     """
     from analytic.cases import integrate_cases as certified
@@ -154,18 +154,19 @@ def bench(
 
     activate()
     chosen = chosen_methods(methods)
-    loaded = [opened(one, size) for one in several(scenes)]
-    read = [read_scene(one.scene) for one in loaded]  # refuse what cannot be used before the work begins
+    loaded = [opened(named, size) for named in several(scenes)]
+    # What cannot be used is refused before the work begins.
+    read = [read_scene(each.scene) for each in loaded]
     rows = []
     with telling(progress, "bench") as callback:
-        for number, (one, scene) in enumerate(zip(loaded, read)):
-            callback(number / len(loaded), f"{one.name}: the truth")
-            truth = truth_image(one.scene)
+        for number, (opened_scene, scene) in enumerate(zip(loaded, read)):
+            callback(number / len(loaded), f"{opened_scene.name}: the truth")
+            truth = truth_image(opened_scene.scene)
             useful = configurations_for(scene.features, chosen)
             for place, each in enumerate(useful):
-                callback((number + place / len(useful)) / len(loaded), f"{one.name}: {each.label}")
+                callback((number + place / len(useful)) / len(loaded), f"{opened_scene.name}: {each.label}")
                 measured = measure(scene, each, truth=truth, seconds=seconds, with_flip=flip)
-                rows.append({"scene": one.name, **_size(scene), **_numbers(measured)})
+                rows.append({"scene": opened_scene.name, **_size(scene), **_numbers(measured)})
         callback(1.0, "done")
     return BenchTable(rows=tuple(rows), environment=describe_environment())
 
@@ -181,13 +182,13 @@ def chosen_methods(methods: Any) -> "tuple[Configuration, ...]":
 
     if methods is None:
         return STANDARD
-    found: list[Configuration] = []
-    for one in several(methods):
-        if isinstance(one, Configuration):
-            found.append(one)
+    chosen: list[Configuration] = []
+    for method in several(methods):
+        if isinstance(method, Configuration):
+            chosen.append(method)
         else:
-            found += chosen_configurations([one]) if isinstance(one, str) else [configuration(one)]
-    return tuple(found)
+            chosen += chosen_configurations([method]) if isinstance(method, str) else [configuration(method)]
+    return tuple(chosen)
 
 
 def _size(scene: Any) -> dict[str, int]:

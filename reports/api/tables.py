@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-_SHOWN = 12  #: rows of integrals that a notebook shows
+_SHOWN = 12  #: rows of integrals shown in a notebook
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -30,7 +30,7 @@ class Integrals:
     kernel: str
     precision: str  #: 'single' or 'double'
     cases: Cases  #: the cases, one after the other
-    summary: Mapping[str, Any]  #: rows, and where there are values to compare with the quantiles of the relative error
+    summary: Mapping[str, Any]  #: number of rows and, with values to compare, the quantiles of the relative error
 
     @property
     def error(self) -> Array | None:
@@ -88,8 +88,8 @@ class BenchTable:
     `frame_low_ms` and `frame_high_ms`, `airlight_ms`, `surface_ms`, `light_moved_ms`, `objects_moved_ms`
     (after these moved), `light_moved_camera_kept_ms` (after the light moved, camera rays kept), `colours_changed_ms`
     (after only medium or colours changed) [ms]; of the airlight `relative_rmse`, `relative_bias`, `p50`, `p99`, `max`,
-    `nonfinite` and `negative`; `refused`, why the method cannot render the scene, and `note`. What there is
-    none of is None.
+    `nonfinite` and `negative`; `refused`, why the method cannot render the scene, and `note`. Missing values
+    are None.
     """
 
     rows: tuple[Mapping[str, Any], ...]
@@ -176,17 +176,20 @@ class Report:
 
     def _repr_html_(self) -> str:
         from reports.api.html import block, bullets, link
+        from reports.tables.drawing import html
+        from reports.tables.methods import fastest_table
 
         scenes = ", ".join(scene["name"] for scene in self.data["scenes"])
         title = f"Report on {scenes}, {self.data['created']}"
-        return block(title, bullets(self.claims), f"<p>{link(_address(self.page), str(self.page))}</p>")
+        fastest = html(fastest_table(self.data["scenes"]))
+        return block(title, bullets(self.claims), fastest, f"<p>{link(_address(self.page), str(self.page))}</p>")
 
     def __repr__(self) -> str:
         return f"Report({str(self.folder)!r}, {len(self.data['scenes'])} scenes)"
 
 
 def _address(page: Path) -> str:
-    """Return the address of a page for a notebook in the current folder, which shows no files outside of it."""
+    """Return the address of a page, relative inside the current folder: a notebook shows only files below it."""
     try:
         return page.resolve().relative_to(Path(os.getcwd()).resolve()).as_posix()
     except ValueError:

@@ -3,7 +3,7 @@
 
 Read in this order:
 
-- `main.py`: the command line: which commands there are, how mistakes are told
+- `main.py`: the command line: the commands, and how mistakes are reported
 - `printing.py`: how commands print the tables of one run
 - `baselines.py`: `airlight baselines`
 - `bench.py`: `airlight bench`

@@ -24,9 +24,9 @@ def baselines(
 ) -> None:
     """Compare the errors of every configuration with the baselines in the repository; small images of every scene.
 
-    Errors may move by rounding, both ways; a frame may take three times as many frames of `unshadowed` as before. What
-    has no baseline, and a baseline without its configuration, fails too. Exit status 1 if anything moved. With --update
-    what moved is written, with a new revision, which CHANGELOG.md must name.
+    Errors may move by rounding in either direction; a frame may take up to three times as long, relative to a frame of
+    `unshadowed`. A configuration without a baseline fails too, and so does a baseline without its configuration. Exit
+    status 1 if anything moved. --update writes what moved with a new revision, which CHANGELOG.md must name.
     """
     from analytic.errors import InputError, nearest
     from reports.machine.environment import activate
@@ -53,39 +53,40 @@ def baselines(
         raise InputError("baselines: --because is for --update; give both, or neither")
     kept = {name: read_baseline(name) for name in names}
     activate()
-    found = {}
+    measured = {}
     with progress_bar("baselines") as progress:
         for number, name in enumerate(names):
             step = part_of(progress, number / len(names), (number + 1) / len(names))
-            found[name] = measure_baseline(name, kept=kept[name], times=times, progress=step)
-    moves = {name: compare_baseline(kept[name], found[name]) for name in names}
+            measured[name] = measure_baseline(name, kept=kept[name], times=times, progress=step)
+    moves = {name: compare_baseline(kept[name], measured[name]) for name in names}
     stray = [] if scenes else stray_baselines(SCENES)
     if update:
-        # All reasons are asked for before the first file is written.
-        written = [one for one in (updated(kept[name], found[name], because) for name in names) if one is not None]
-        for one in written:
-            write_baseline(one)
+        # A missing reason is refused before the first file is written.
+        new = [updated(kept[name], measured[name], because) for name in names]
+        written = [baseline for baseline in new if baseline is not None]
+        for baseline in written:
+            write_baseline(baseline)
     if json:
         from validation.metrics.errors import plain
 
-        print_json({"scenes": found, "moves": plain(moves), "stray": stray, "updated": update})
+        print_json({"scenes": measured, "moves": plain(moves), "stray": stray, "updated": update})
     else:
-        _print_moves(found, moves, stray)
+        _print_moves(measured, moves, stray)
         if update:
             _print_updates(written, FOLDER)
     if stray or (not update and any(moves.values())):
         raise typer.Exit(1)
 
 
-def _print_moves(found: "Mapping[str, Baseline]", moves: "Mapping[str, Sequence[Move]]", stray: Sequence[str]) -> None:
+def _print_moves(after: "Mapping[str, Baseline]", moves: "Mapping[str, Sequence[Move]]", stray: Sequence[str]) -> None:
     """Print what moved, and a line for each scene."""
     from reports.tables.checks import move_table
     from reports.tables.terminal import print_table
 
-    table = move_table(one for changed in moves.values() for one in changed)
+    table = move_table(move for changed in moves.values() for move in changed)
     if table.rows:
         print_table(table)
-    for name, data in found.items():
+    for name, data in after.items():
         print(f"{name}: {len(data['configurations'])} configurations, {len(moves[name])} moved")
     for name in stray:
         print(f"{name}: a baseline without its scene: remove the file")
@@ -98,8 +99,8 @@ def _print_updates(written: "Sequence[Baseline]", folder: Path) -> None:
     if not written:
         print("nothing moved, nothing written")
         return
-    print(f"written to {folder}: {', '.join(one['scene'] for one in written)}")
-    lines = [changelog_line(one) for one in written if one["revision"] > 1]
+    print(f"written to {folder}: {', '.join(baseline['scene'] for baseline in written)}")
+    lines = [changelog_line(baseline) for baseline in written if baseline["revision"] > 1]
     if lines:
         print("say so in CHANGELOG.md, with the numbers above; a test looks for these lines:")
         print("\n".join(f"- {line}" for line in lines))

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-_BATCHES = 4096  # at most: a comparison ends before, when its interval is narrow enough
+_BATCHES = 4096  # at most: a comparison ends earlier if its interval is narrow enough
 
 
 def bench(
@@ -30,8 +30,8 @@ def bench(
     """Time every method in every scene, or every kernel on many rays, and compare it with the truth.
 
     `airlight` is the airlight alone (the kernel with its ray set-up), `frame` a frame with static geometry and light,
-    `light moved` a frame after it moved. Exit status 1 if single-scatter does not confirm the truth within +-0.05 %,
-    or volpath within +- the margin.
+    `light moved` a frame after the light moved. Exit status 1 if single-scatter does not confirm the truth within
+    +-0.05 %, or volpath within +- the margin.
     """
     if not 0 < margin < 1:
         from analytic.errors import InputError
@@ -55,25 +55,25 @@ def bench(
 
     names = methods.split(",") if methods else list(METHODS)
     if any(":" in name for name in names):
-        activate()  # one's own module may want arrays when it is imported
+        activate()  # a user's module may create arrays when it is imported
     chosen = chosen_configurations([name.strip() for name in names])
     pixels = parse_size(size) if size else None
     activate()
     names = scenes or list(SCENES)
-    for name in names:  # refuse what cannot be used before an hour of work, not after
+    for name in names:  # refuses unusable input before an hour of work, not after
         print_notes(read_scene(load_scene(name, pixels).scene).features.notes)
-    found = []
+    benched = []
     with progress_bar("bench") as progress:
         for number, name in enumerate(names):
             step = part_of(progress, number / len(names), (number + 1) / len(names))
-            found.append(_bench_scene(name, pixels, chosen, margin=margin if truth else None, progress=step))
+            benched.append(_bench_scene(name, pixels, chosen, margin=margin if truth else None, progress=step))
     if json:
         from reports.machine.environment import describe_environment
 
-        print_json({"environment": describe_environment(), "scenes": found})
+        print_json({"environment": describe_environment(), "scenes": benched})
     else:
-        _print_bench(found, markdown=markdown)
-    if any(not one["statistics"]["equivalent"] for scene in found for one in scene["agreement"].values()):
+        _print_bench(benched, markdown=markdown)
+    if any(not agreement["statistics"]["equivalent"] for scene in benched for agreement in scene["agreement"].values()):
         raise typer.Exit(1)
 
 
@@ -83,8 +83,8 @@ def _print_bench(scenes: list[dict], *, markdown: bool) -> None:
     from reports.tables.agreement import agreement_table
     from reports.tables.methods import methods_table
 
-    tables = [methods_table("{}, {} x {}".format(one["name"], *one["size"]), one["methods"]) for one in scenes]
-    compared = [(f"{one['name']}, {each['layer']}", each) for one in scenes for each in one["agreement"].values()]
+    tables = [methods_table("{}, {} x {}".format(scene["name"], *scene["size"]), scene["methods"]) for scene in scenes]
+    compared = [(f"{scene['name']}, {each['layer']}", each) for scene in scenes for each in scene["agreement"].values()]
     if compared:
         title = "Monte Carlo against the quadrature truth; volpath corrected for its shadow-ray epsilon"
         tables.append(agreement_table(title, compared))
@@ -139,9 +139,9 @@ def _bench_kernels(names: list[str] | None, *, json: bool, markdown: bool) -> No
     wanted = [split_name(name)[0].name for name in names] if names else list(KERNELS)
     activate()
     with progress_bar("bench") as progress:
-        found = bench_kernels(names, progress=counted(progress))
+        costs = bench_kernels(names, progress=counted(progress))
         rates = [convergence(name) for name in declared() if name in wanted]
-    measured, orders = plain(found), [convergence_data(one) for one in rates]
+    measured, orders = plain(costs), [convergence_data(rate) for rate in rates]
     if json:
         print_json({"environment": describe_environment(), "kernels": measured, "convergence": orders})
         return
@@ -164,19 +164,19 @@ def _bench_estimators(scenes: list[str] | None, *, size: str | None, json: bool)
     pixels = parse_size(size) if size else (160, 120)
     activate()
     names = list(scenes or SCENES)
-    loaded = {name: load_scene(name, pixels).scene for name in names}  # refuse before any work, not after
+    loaded = {name: load_scene(name, pixels).scene for name in names}  # refuses unusable input before any work
     if not scenes:
         loaded = {"open-fog, optical depth 0.2": thin_fog(pixels)} | loaded
-    found = {}
+    efficiencies = {}
     with progress_bar("bench") as progress:
         for number, (name, scene) in enumerate(loaded.items()):
             progress(number / len(loaded), name)
-            found[name] = scene_efficiency(scene)
+            efficiencies[name] = scene_efficiency(scene)
     if json:
         from validation.metrics.errors import plain
 
-        print_json({"environment": describe_environment(), "estimators": plain(found)})
+        print_json({"environment": describe_environment(), "estimators": plain(efficiencies)})
         return
-    for name, one in found.items():
+    for name, efficiency in efficiencies.items():
         print(f"{name}, {pixels[0]} x {pixels[1]}")
-        print("\n".join(f"  {line}" for line in efficiency_lines(one)))
+        print("\n".join(f"  {line}" for line in efficiency_lines(efficiency)))

@@ -22,4 +22,4 @@ def certify(
     with progress_bar("certify") as progress:
         data = certified_data(progress=progress)
     write_text(output, to_json(data))
-    print(f"{output}: {len(data['scenes'])} scenes, {sum(len(one['pixels']) for one in data['scenes'])} rays")
+    print(f"{output}: {len(data['scenes'])} scenes, {sum(len(scene['pixels']) for scene in data['scenes'])} rays")

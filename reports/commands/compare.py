@@ -48,9 +48,9 @@ def compare(
 ) -> None:
     """Compare two EXR images, or one with the truth of a scene, as `airlight describe SCENE` wants it.
 
-    Bias, error quantiles, and statistics where there are standard errors; with --scene also the factor that fits best,
-    and what may be wrong with the image as a whole. Exit status 1 if the test image has values that are not finite or
-    negative, or the bias is not shown to be within the margin.
+    Prints bias and error quantiles, statistics if there are standard errors, and with --scene also the best-fitting
+    factor and what may be wrong with the image as a whole. Exit status 1 if the test image has values that are negative
+    or not finite, or if the bias is not shown to be within the margin.
     """
     from analytic.errors import InputError
     from reports.tables.terminal import print_json
@@ -94,7 +94,7 @@ def _with_scene(scene: str, file: Path, **options):
     from reports.machine.progress import progress_bar
     from validation.comparison.engine_compare import compare_scene
 
-    read_exr(file)  # what cannot be read is refused before Mitsuba starts
+    read_exr(file)  # unreadable files are refused before Mitsuba starts
     activate()
     with progress_bar("the truth") as progress:
         return compare_scene(scene, file, progress=progress, **options)

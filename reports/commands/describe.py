@@ -15,7 +15,7 @@ def describe(
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Say all that another renderer must be told to render a scene, so that its image can be judged.
+    """Print everything that another renderer needs to render a scene, so that its image can be judged.
 
     Camera, media, lights, surfaces, what the pixels hold and what file to write. The glTF file has the same camera,
     lights and meshes; media are in its extras.
@@ -36,12 +36,12 @@ def describe(
     pixels = parse_size(size) if size else None
     activate()
     loaded = load_scene(scene, pixels)
-    found = describe_scene(loaded)
+    described = describe_scene(loaded)
     written = None if gltf is None else write_gltf(gltf, loaded)
     if json:
-        print_json(found | ({} if written is None else {"gltf": written}))
+        print_json(described | ({} if written is None else {"gltf": written}))
         return
-    print(description_text(found))
+    print(description_text(described))
     if written is not None:
         cut = ", ".join(written["tessellated"])
         print(f"{written['path']}: {written['triangles']} triangles" + (f"; cut into triangles: {cut}" if cut else ""))

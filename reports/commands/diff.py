@@ -18,23 +18,24 @@ def diff(
     ] = 0.25,
     times: Annotated[bool, typer.Option("--times/--no-times", help="Compare times too.")] = True,
     common: Annotated[
-        bool, typer.Option("--common", help="What only the old report holds is no loss: compare what both hold.")
+        bool,
+        typer.Option("--common", help="Compare what both reports hold; what is missing from the new one is no loss."),
     ] = False,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Compare two reports: what got slower or less accurate beyond the noise, what got better, what is new or gone.
 
-    Errors hardly have noise: a relative band and a floor at float32 rounding. Times have: the quartiles of both reports
-    say how busy the machine was, and what the stages of a frame share must agree; between two machines only times
-    beside the median of all are compared. Exit status 1 if anything is worse, or gone, or newly refused or not finite,
-    or the truth is no longer confirmed; so a run after each change guards a project.
+    Errors have little noise: they may change by a relative band, or by float32 rounding. Times have much: the quartiles
+    of both reports tell how busy the machine was, and a change must show in all stages that share it. Between two
+    machines, times are compared relative to the median of all. Exit status 1 if anything is worse, gone, newly refused
+    or no longer finite, or if the truth is no longer confirmed.
     """
     from reports.data.reader import read_report
     from reports.diff.compare import compare_reports
     from reports.diff.table import print_difference
     from reports.tables.terminal import print_json
 
-    found = compare_reports(
+    difference = compare_reports(
         read_report(old),
         read_report(new),
         error_tolerance=error_tolerance,
@@ -42,8 +43,8 @@ def diff(
         common=common,
     )
     if json:
-        print_json(found.to_json())
+        print_json(difference.to_json())
     else:
-        print_difference(found)
-    if found.worse:
+        print_difference(difference)
+    if difference.worse:
         raise typer.Exit(1)

@@ -26,7 +26,7 @@ def docs(
         from reports.docs.data import refresh
         from reports.machine.environment import activate
 
-        activate()  # to count what the scenes hold
+        activate()  # counting shapes and triangles loads the scenes
         for path in refresh(source / "data", report=report, kernels=kernels):
             print(path)
     problems = build_docs(source, output)

@@ -22,10 +22,10 @@ def doctor(
         packages = missing_packages()
         print(" ".join(packages), install_line(packages) if packages else "", sep="\n")
         return
-    found = diagnose()
+    diagnosis = diagnose()
     if json:
-        print_json(found)
+        print_json(diagnosis)
     else:
-        print_diagnosis(found)
-    if not found["works"]:
+        print_diagnosis(diagnosis)
+    if not diagnosis["works"]:
         raise typer.Exit(3)

@@ -10,8 +10,8 @@ import typer
 if TYPE_CHECKING:
     from types import ModuleType
 
-#: Figure -> module and what its `compute` takes: 'quick', 'report' (without which it cannot be), 'published' (a report
-#: if there is one). A figure's name is its module's `NAME`; its summary is there too.
+#: Figure -> its module, and what its `compute` takes: 'quick', 'report' (required), 'published' (a report, optional).
+#: A figure's name is its module's `NAME`; its summary is there too.
 FIGURES: dict[str, tuple[str, tuple[str, ...]]] = {
     "polynomials": ("polynomials", ("rays",)),
     "kernel-errors": ("kernel_errors", ("quick", "progress")),
@@ -63,6 +63,7 @@ def figures(
     """
     from analytic.errors import InputError, nearest
     from reference.storage.files import ensure_folder
+    from reports.figures.files import plot
     from reports.machine.progress import part_of, progress_bar
     from reports.plotting.style import WIDTHS
 
@@ -75,9 +76,9 @@ def figures(
     if source is not None:
         _redraw(names, source, ensure_folder(output or source), drawing)
         return
-    found = _report_folder(report)
-    given = {"quick": quick, "rays": rays, "report": found, "scene": scene, "methods": methods}
-    chosen = _chosen(names, found)
+    report_path = _report_folder(report)
+    given = {"quick": quick, "rays": rays, "report": report_path, "scene": scene, "methods": methods}
+    chosen = _chosen(names, report_path)
     if (scene or methods) and "strip" not in chosen:
         raise InputError(
             "--scene and --methods choose images of the figure strip, which is not asked for: leave them out"
@@ -88,7 +89,7 @@ def figures(
             progress(number / len(chosen), name)
             step = part_of(progress, number / len(chosen), (number + 1) / len(chosen), before=f"{name}: ")
             _compute(name, folder, given | {"progress": step})
-            _module(name).plot(folder, **drawing)
+            plot(_module(name), folder, **drawing)
             _print_files(name, folder)
 
 
@@ -97,7 +98,7 @@ def _module(name: str) -> "ModuleType":
 
 
 def _report_folder(report: Path | None) -> Path | None:
-    """Return the folder of the report that was asked for, or of the usual one if it is there."""
+    """Return the folder of the requested report, or the default one if it exists."""
     from reports.data.reader import read_report
     from reports.figures.report import FOLDER
 
@@ -108,7 +109,7 @@ def _report_folder(report: Path | None) -> Path | None:
 
 
 def _chosen(names: list[str] | None, report: Path | None) -> list[str]:
-    """Return the figures to make: those named, else all but those that need a report that is not there."""
+    """Return the named figures, or all except those whose report is missing."""
     from analytic.errors import InputError
     from reports.data.reader import read_report
     from reports.figures.report import FOLDER
@@ -143,14 +144,15 @@ def _compute(name: str, folder: Path, given: dict[str, Any]) -> None:
 
 
 def _redraw(names: list[str] | None, source: Path, target: Path, drawing: dict[str, Any]) -> None:
-    """Draw figures from their data: those named, or all that have data there."""
+    """Draw the named figures, or all, from data in a folder."""
     from analytic.errors import InputError
+    from reports.figures.files import plot
 
     chosen = names or [name for name in FIGURES if (source / f"{name}.csv").is_file()]
     if not chosen:
         raise InputError(f"--from: {source} holds no data of a figure; write some with `airlight figures -o {source}`")
     for name in chosen:
-        _module(name).plot(source, output=target, **drawing)
+        plot(_module(name), source, output=target, **drawing)
         _print_files(name, target)
 
 

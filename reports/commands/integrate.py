@@ -36,13 +36,15 @@ def integrate(
     check_results(read, results, kernel)
     if output is not None:
         write_results(read, results, output)
-    found = summary(read, results)
+    report = summary(read, results)
     if json:
-        print_json(found)
+        print_json(report)
         return
-    print(f"{found['rows']} rows with {kernel} in {precision} precision")
-    if found["compared"]:
-        errors = ", ".join(f"{name} {found[name]:.3g}" for name in ("p50", "p99", "max"))
-        print(f"relative error against `value`, {found['compared']} rows: {errors}; worst in row {found['worst_row']}")
-    if output is None and not found["compared"]:
+    print(f"{report['rows']} rows with {kernel} in {precision} precision")
+    if report["compared"]:
+        errors = ", ".join(f"{name} {report[name]:.3g}" for name in ("p50", "p99", "max"))
+        print(
+            f"relative error against `value`, {report['compared']} rows: {errors}; worst in row {report['worst_row']}"
+        )
+    if output is None and not report["compared"]:
         print("\n".join(f"{value:.9g}" for value in results))

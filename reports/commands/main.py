@@ -76,11 +76,12 @@ app = typer.Typer(
     add_completion=False,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
+    rich_markup_mode="markdown",  # draws `code` as code, without its marks
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 120},
 )
 for _command in _COMMANDS:
     app.command()(_command)
-# What it does not know goes on to pytest.
+# Typer hands unknown arguments on to pytest.
 app.command("test", context_settings={"allow_extra_args": True, "ignore_unknown_options": True})(run_tests)
 
 
@@ -138,7 +139,7 @@ def run(arguments: Sequence[str]) -> int:
         return _fail(f"system libraries are missing, install them with `{install_line(packages)}`", MISSING)
     except _input_errors() as error:
         return _fail(str(error), WRONG_INPUT)
-    except Exception as error:  # what Typer raises for wrong usage has its class in one of Typer's private modules
+    except Exception as error:  # Typer's class for wrong usage is in a private module
         if not hasattr(error, "format_message"):
             raise
         return _usage(error)
@@ -169,6 +170,6 @@ def _usage(error) -> int:
 
 
 def _drop_output(status: int) -> int:
-    """Let nothing more be written on the output, so that what cannot be written is not tried again at exit."""
+    """Redirect the output to nowhere, so that Python does not try again at exit what cannot be written."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return status

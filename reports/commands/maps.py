@@ -29,8 +29,8 @@ def maps(
 ) -> None:
     """Measure how the error of a method falls with the size of its shadow map, against the ray-traced truth.
 
-    With the slope of the relative RMSE, fitted to the logarithms. --flicker: a light that circles slowly, and the
-    change of the image from frame to frame less that of the truth.
+    Also prints the slope of the relative RMSE, fitted to the logarithms. With --flicker the light circles slowly, and
+    the change of the image from frame to frame is measured, less that of the truth.
     """
     from analytic.errors import InputError
     from realtime.scene.read_scene import read_scene
@@ -52,30 +52,30 @@ def maps(
     largest = configuration(method, kernel, parameters | {"map": texels[-1]})
     activate()
     loaded = [load_scene(name, pixels) for name in scenes or SCENES]
-    for one in loaded:  # refuse what cannot be used, or does not fit into the memory, before any work, not after
-        prepared(read_scene(one.scene), largest)
-    found = []
+    for opened in loaded:  # refuse unusable scenes, and maps that exceed the memory, before any work
+        prepared(read_scene(opened.scene), largest)
+    studied = []
     with progress_bar("maps") as progress:
-        for number, one in enumerate(loaded):
-            studies: list[Any] = [partial(map_errors, one.scene, method)]
+        for number, opened in enumerate(loaded):
+            studies: list[Any] = [partial(map_errors, opened.scene, method)]
             if flicker:
-                moves: dict[str, Any] = {"frames": frames, "step": step, "about": one.animation.about}
-                studies.append(partial(map_flicker, one.scene, method, **moves))
+                moves: dict[str, Any] = {"frames": frames, "step": step, "about": opened.animation.about}
+                studies.append(partial(map_flicker, opened.scene, method, **moves))
             results = []
             for study in studies:
-                part = part_of(progress, number / len(loaded), (number + 1) / len(loaded), before=f"{one.name}, ")
+                part = part_of(progress, number / len(loaded), (number + 1) / len(loaded), before=f"{opened.name}, ")
                 results.append(study(kernel=kernel, parameters=parameters, sizes=texels, progress=counted(part)))
-            found.append((one.name, results[0], results[1] if flicker else None))
+            studied.append((opened.name, results[0], results[1] if flicker else None))
     if json:
         scenes_data = [
             {"name": name, "method": errors.configuration.label, "errors": plain(errors), "flicker": plain(moving)}
-            for name, errors, moving in found
+            for name, errors, moving in studied
         ]
         print_json({"environment": describe_environment(), "size": list(pixels), "scenes": scenes_data})
         return
     if markdown:
         print_heading()
-    for name, errors, moving in found:
+    for name, errors, moving in studied:
         title = f"{name}, {pixels[0]} x {pixels[1]}, {errors.configuration.label}"
         _print_scene(title, errors, moving, markdown=markdown)
 
@@ -97,13 +97,13 @@ def parse_map_sizes(option: str, words: str) -> list[int]:
     Raises
     ------
     InputError
-        If one is none.
+        If one of them is not a size of a map.
     """
     from analytic.errors import InputError
     from realtime.shadow_maps.shadow_map import check_size
 
     try:
-        sizes = [int(one) for one in words.split(",")]
+        sizes = [int(word) for word in words.split(",")]
     except ValueError:
         raise InputError(f"{option}: got {words!r}, wanted sizes in texels, for example 128,256,512") from None
     for size in sizes:

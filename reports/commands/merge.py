@@ -14,7 +14,7 @@ def merge(
 ) -> None:
     """Merge Monte Carlo references that were computed with different seeds, for example on two machines.
 
-    Means and standard errors are those of all batches together, from the files' single precision.
+    Means and standard errors are those of all batches together, computed from the files' single precision.
     """
     from reference.storage.exr import read_exr, write_exr
     from reference.storage.files import ensure_writable

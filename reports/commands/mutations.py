@@ -25,7 +25,7 @@ def mutations(
 ) -> None:
     """Put faults of the physics into copies of the estimators and count how many the standard run catches.
 
-    Exit status 1 if fewer than nine in ten are caught, or if the unchanged copy does not agree either.
+    Exit status 1 if fewer than nine in ten are caught, or if the unchanged copy does not agree.
     """
     from reports.machine.environment import activate, describe_environment
     from reports.machine.progress import progress_bar
@@ -37,35 +37,35 @@ def mutations(
     chosen, pixels = chosen_mutations(names), parse_size(size)
     activate()
     with progress_bar("mutations") as progress:
-        found = study_mutations(chosen, size=pixels, margin=margin, progress=progress)
+        study = study_mutations(chosen, size=pixels, margin=margin, progress=progress)
     if json:
         from validation.metrics.errors import plain
 
         data = {
             "environment": describe_environment(),
-            "caught": found.caught,
-            "mutations": len(found.results),
-            "passed": found.passed,
-            "control": found.control,
-            "results": found.results,
+            "caught": study.caught,
+            "mutations": len(study.results),
+            "passed": study.passed,
+            "control": study.control,
+            "results": study.results,
         }
         print_json(plain(data))
     else:
-        _print_results(found)
-    if not found.passed:
+        _print_results(study)
+    if not study.passed:
         raise typer.Exit(1)
 
 
-def _print_results(found: "MutationStudy") -> None:
+def _print_results(study: "MutationStudy") -> None:
     from reports.commands.printing import print_tables
     from reports.tables.checks import control_table, mutation_table
     from validation.metrics.errors import plain
 
-    faults = mutation_table(plain(found.results))
+    faults = mutation_table(plain(study.results))
     shown = faults.only("name", "caught", "chance", "by", "true_bias", "bias", "interval", "margin", "meaning")
-    print_tables([replace(shown, title=""), control_table(plain(found.control))])
-    for result in found.results:
+    print_tables([replace(shown, title=""), control_table(plain(study.control))])
+    for result in study.results:
         if result.reason:
             seen = "seen by a probe alone" if result.caught else "NOT CAUGHT"
             print(f"{result.name}: {seen}: {result.reason}")
-    print(f"{found.caught} of {len(found.results)} mutations caught")
+    print(f"{study.caught} of {len(study.results)} mutations caught")

@@ -96,8 +96,8 @@ def _wanted_scenes(scenes: str | None, papers: Sequence[str]) -> list[str]:
     from validation.scenes.registry import SCENES
 
     of_paper = {
-        "biri": [one.scene for one in PUBLISHED if one.scene in SCENES],
-        "billeter": [one.scene for one in FIGURES] + [one.scene for one in TABLE],
+        "biri": [row.scene for row in PUBLISHED if row.scene in SCENES],
+        "billeter": [figure.scene for figure in FIGURES] + [view.scene for view in TABLE],
     }
     known = list(dict.fromkeys(name for paper in papers for name in of_paper[paper]))
     wanted = [name.strip() for name in scenes.split(",")] if scenes else known
@@ -115,7 +115,7 @@ def _biri(
     from validation.frames.zero_cost import zero_costs
     from validation.papers.biri import PUBLISHED, biri_rows
 
-    chosen = [one for one in PUBLISHED if one.scene in wanted]
+    chosen = [row for row in PUBLISHED if row.scene in wanted]
     if not chosen:
         return {}
     rows = biri_rows(chosen, kernels, scale=scale, progress=progress)
@@ -134,8 +134,8 @@ def _billeter(
     from validation.papers.billeter_images import FIGURES, SIZE, figure_rows
     from validation.papers.billeter_tessellation import TABLE, table_rows
 
-    images = [one for one in FIGURES if one.scene in wanted]
-    views = [one for one in TABLE if one.scene in wanted]
+    images = [figure for figure in FIGURES if figure.scene in wanted]
+    views = [view for view in TABLE if view.scene in wanted]
     if not images and not views:
         return {}
     share = len(images) / (len(images) + 3 * len(maps) * len(views))

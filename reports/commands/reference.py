@@ -32,7 +32,7 @@ class Pixel(StrEnum):
 
 
 class Target(StrEnum):
-    """The standard error that `--target-error` is about."""
+    """The standard error that `--target-error` limits."""
 
     pooled = "pooled"
     worst = "worst"
@@ -63,7 +63,7 @@ def reference(
 ) -> None:
     """Compute the ground truth of a scene and write it as layered EXR, with its error.
 
-    Finished batches are kept: a Monte Carlo run that was interrupted, or that asks for more, goes on from them.
+    Finished batches are kept: a Monte Carlo run continues from them, after an interruption or with more samples.
 
     Exit status 1 if the target error was not reached.
     """
@@ -87,23 +87,23 @@ def reference(
     activate()
     loaded = load_scene(scene, parse_size(size) if size else None)
     print_notes(camera_notes(loaded.scene))
-    found = None
+    estimate = None
     with progress_bar(f"{loaded.name}: {estimator}") as progress:
         if budget is None:
             image = quadrature_reference(loaded, pixel=pixel.value, progress=progress)
         else:
-            found = _sample(loaded, estimator, budget, seed=seed, progress=progress)
-            image = found.image
+            estimate = _sample(loaded, estimator, budget, seed=seed, progress=progress)
+            image = estimate.image
     write_exr(output, stamped(image))
     summary: dict[str, Any] = {"scene": loaded.name, "output": str(output), "estimator": str(estimator)}
     summary |= {"means": {name: layer.mean(axis=(0, 1)).tolist() for name, layer in image.layers.items()}}
-    _print_summary(summary | (_sampling(found) if found else {"pixel": str(pixel)}), json=json)
-    if found is not None and found.reached is False:
+    _print_summary(summary | (_sampling(estimate) if estimate else {"pixel": str(pixel)}), json=json)
+    if estimate is not None and estimate.reached is False:
         raise typer.Exit(1)
 
 
 def _check_options(estimator: Estimator, budgets: dict[str, Any], pixel: Pixel) -> None:
-    """Refuse what the estimator has no use for."""
+    """Refuse options that the estimator does not use."""
     from analytic.errors import InputError
 
     given = [name for name, value in budgets.items() if value is not None]
@@ -130,17 +130,17 @@ def _sample(
         raise Interrupted(str(stop)) from None
 
 
-def _sampling(found: "MonteCarloReference") -> dict[str, Any]:
-    """Return what a run says of itself, by name."""
-    attributes = {name.removeprefix("airlight:"): value for name, value in found.image.attributes.items()}
+def _sampling(sampled: "MonteCarloReference") -> dict[str, Any]:
+    """Return how a run was sampled, by name."""
+    attributes = {name.removeprefix("airlight:"): value for name, value in sampled.image.attributes.items()}
     return {
         **{name: attributes[name] for name in ("spp", "batch_spp", "batches", "seeds")},
-        "cached": found.cached,
-        "damaged": found.damaged,
-        "masked": found.masked,
-        "pooled_error": found.errors.pooled,
-        "worst_error": found.errors.worst,
-        "reached": found.reached,
+        "cached": sampled.cached,
+        "damaged": sampled.damaged,
+        "masked": sampled.masked,
+        "pooled_error": sampled.errors.pooled,
+        "worst_error": sampled.errors.worst,
+        "reached": sampled.reached,
     }
 
 

@@ -36,8 +36,8 @@ def render(
 ) -> None:
     """Render a frame, or an animation, with a real-time method and print what it costs.
 
-    An animation is one turn: lights circle, objects turn, the medium's density swings, colours go round. Only what
-    moves is made anew. Ctrl-C keeps the frames that are finished.
+    An animation is one turn: lights circle, objects turn, the medium's density swings, colours go round. Each frame
+    recomputes only what depends on the motion. Ctrl-C keeps the finished frames.
     """
     from realtime.scene.read_scene import read_scene
     from reports.commands.printing import print_notes
@@ -46,7 +46,7 @@ def render(
     from validation.scenes.loading import load_scene, parse_size
 
     if ":" in method:
-        activate()  # one's own module may want arrays when it is imported
+        activate()  # a user's module may create arrays when it is imported
     chosen = configuration(method, kernel, parse_settings(set_ or []))
     outputs = {"exr": output, "png": preview}
     _check_outputs(outputs, frames, animate)
@@ -60,12 +60,12 @@ def render(
     elif frames is None:
         _print_times(_render(loaded.name, read, chosen, outputs=outputs), variant, json=json)
     else:
-        found = _render_frames(loaded, read, chosen, frames=frames, animate=animate, outputs=outputs)
-        _print_frames(found, variant, json=json)
+        rendered = _render_frames(loaded, read, chosen, frames=frames, animate=animate, outputs=outputs)
+        _print_frames(rendered, variant, json=json)
 
 
 def _check_outputs(outputs: dict[str, Path | None], frames: int | None, animate: str | None) -> None:
-    """Refuse what could not be written, before any work."""
+    """Refuse outputs that cannot be written, before any work."""
     from analytic.errors import InputError
     from reference.storage.files import ensure_writable
     from reports.interchange.frames import check_ending, numbered
@@ -102,7 +102,7 @@ def _print_plan(scene, chosen, *, json: bool) -> None:
 
 
 def _warn(warnings) -> None:
-    """Print what is odd about the casters on the error stream, once a command."""
+    """Print warnings about the casters on the error stream, once a command."""
     for warning in warnings:
         print(f"airlight: warning: {warning}", file=sys.stderr)
 
@@ -158,11 +158,11 @@ def _render_frames(loaded, scene, chosen, *, frames: int, animate: str | None, o
         animation = replace(animation, moves=parse_moves(animate))
     renderer = _prepared(scene, chosen)
     with progress_bar(f"{loaded.name}: {frames} frames") as progress:
-        found = write_frames(
+        written = write_frames(
             loaded.name, renderer, chosen, animation, frames=frames, outputs=outputs, progress=progress
         )
     size = [scene.camera.width, scene.camera.height]
-    return {"scene": loaded.name, "method": chosen.label, "size": size} | found
+    return {"scene": loaded.name, "method": chosen.label, "size": size} | written
 
 
 def _print_times(times: dict[str, Any], variant: str, *, json: bool) -> None:
@@ -185,17 +185,17 @@ def _print_times(times: dict[str, Any], variant: str, *, json: bool) -> None:
     print(f"  {variant}, {times['threads']} threads")
 
 
-def _print_frames(found: dict[str, Any], variant: str, *, json: bool) -> None:
+def _print_frames(written: dict[str, Any], variant: str, *, json: bool) -> None:
     from reports.tables.methods import rate_words
     from reports.tables.terminal import print_json
 
     if json:
-        print_json(found | {"device": variant})
+        print_json(written | {"device": variant})
         return
-    move, rendered = found["move_ms"], found["render_ms"]
-    print(f"{found['scene']}, {found['method']}: {found['frames']} frames, {' and '.join(found['moves'])} moving")
-    print(f"  {found['files'][0]} to {found['files'][-1]}")
+    move, rendered, moves = written["move_ms"], written["render_ms"], " and ".join(written["moves"])
+    print(f"{written['scene']}, {written['method']}: {written['frames']} frames, {moves} moving")
+    print(f"  {written['files'][0]} to {written['files'][-1]}")
     print(
-        f"  {found['frame_ms']:.3g} ms a frame ({rate_words(found['frame_ms'])}): {move:.3g} ms to move, "
+        f"  {written['frame_ms']:.3g} ms a frame ({rate_words(written['frame_ms'])}): {move:.3g} ms to move, "
         f"{rendered:.3g} ms to render, keeping what stood still; {variant}"
     )

@@ -40,12 +40,14 @@ def report(
 ) -> None:
     """Measure every method in every scene and write the report: one HTML page, report.json, EXR and PNG files.
 
-    What was measured before on this machine, with the same code and scenes, is taken from the cache. Exit status 1 if
+    Results that this machine measured before, with the same code and scenes, come from the cache. Exit status 1 if
     single-scatter or volpath does not confirm the truth within the margin.
     """
     from analytic.errors import InputError
     from reports.data.claims import confirmed
-    from reports.tables.terminal import print_json
+    from reports.tables.drawing import sentence_in_text
+    from reports.tables.methods import fastest_table
+    from reports.tables.terminal import print_json, print_table
 
     if redraw is not None:
         given = {
@@ -72,7 +74,9 @@ def report(
     if json:
         print_json(data)
     else:
-        print("\n".join(f"- {claim['text']}" for claim in data["claims"]))
+        print("\n".join(f"- {sentence_in_text(claim['text'])}" for claim in data["claims"]))
+        if data["scenes"]:
+            print_table(fastest_table(data["scenes"]))
         count = len(data["scenes"])
         print(f"{target / 'report.html'}: {count} scene{'' if count == 1 else 's'}, {done}")
     if not confirmed(data["scenes"]):
@@ -99,7 +103,7 @@ def _measured(
     images: Path | None,
     fresh: bool,
 ) -> dict[str, Any]:
-    """Measure and write a report; what cannot be used is refused before the work begins."""
+    """Measure and write a report; unusable input is refused before the work begins."""
     from analytic.errors import InputError
     from realtime.scene.read_scene import read_scene
     from reference.storage.files import ensure_folder
@@ -119,7 +123,7 @@ def _measured(
         shown = find_images(images, {Path(name).stem: name for name in [*SCENES, *asked]})
         if not asked:
             names = list(shown)
-        wanted = {Path(one).stem for one in names}
+        wanted = {Path(path).stem for path in names}
         if not wanted & set(shown):
             raise InputError(
                 f"--images: {images} has no image of {', '.join(sorted(wanted))}, only of {', '.join(shown)}"

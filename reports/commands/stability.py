@@ -15,9 +15,8 @@ def stability(
 ) -> None:
     """Try every kernel on certified values, on rays of every magnitude and against exact laws, and sums of many planes.
 
-    Errors come with the ray where they are largest, ready for `airlight integrate`. Exit status 1 if a kernel that
-    claims to be exact breaks its bar, or shadow planes theirs; the latter are left out where --kernels leaves out
-    'exact'.
+    Prints the ray of each largest error in the format of `airlight integrate`. Exit status 1 if a kernel that claims to
+    be exact, or shadow planes, exceed the error that they claim; --kernels without 'exact' leaves the planes out.
     """
     from reports.machine.environment import activate, describe_environment
     from reports.machine.progress import progress_bar
@@ -31,18 +30,18 @@ def stability(
     names = None if kernels is None else [name.strip() for name in kernels.split(",") if name.strip()]
     activate()
     with progress_bar("stability") as progress:
-        found = run(names, count=rays, progress=lambda done, total, what: progress(0.9 * done / total, what))
+        results = run(names, count=rays, progress=lambda done, total, what: progress(0.9 * done / total, what))
         wanted = names is None or "exact" in names
         planes = plane_stability(progress=lambda n, m, what: progress(0.9 + 0.1 * n / m, what)) if wanted else []
     broken_planes = broken(planes)
     certified = [path.name for path in certified_files()]
     if json:
-        data = {"environment": describe_environment(), "certified": certified, "bar": Bar(), "kernels": found}
+        data = {"environment": describe_environment(), "certified": certified, "bar": Bar(), "kernels": results}
         data |= {"shadow_planes": planes, "broken_planes": broken_planes}
         print_json(plain(data))
     else:
-        print_stability(plain(found), certified=bool(certified))
+        print_stability(plain(results), certified=bool(certified))
         if planes:
             print_plane_stability(plain(planes), broken_planes)
-    if broken_planes or any(kernel.broken for kernel in found):
+    if broken_planes or any(kernel.broken for kernel in results):
         raise typer.Exit(1)

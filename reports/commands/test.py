@@ -21,8 +21,8 @@ def run_tests(
 ) -> None:
     """Run the fast tests of the source checkout, or all; other arguments go to pytest, paths are relative to it.
 
-    With --all a summary is printed, and the date, the machine and the counts go to docs/verification.md. With --all and
-    arguments for pytest, tests of all tiers run and nothing is written. Exit status 1 if anything failed.
+    --all also prints a summary and writes the date, the machine and the counts into docs/verification.md. With --all
+    and arguments for pytest, tests of all tiers run and nothing is written. Exit status 1 if anything failed.
     """
     import os
     import sys
@@ -36,7 +36,7 @@ def run_tests(
         )
     variant = prepare().variant
     shared = (2 if threads() > 1 else 0) if workers is None else workers
-    # Each process begins with its own half of the files: few kernels are compiled and few scenes loaded twice.
+    # Each process begins with its own half of the files, so that few kernels are compiled and few scenes loaded twice.
     sharing = ["-n", str(shared), "--dist", "worksteal"] if shared else []
     os.chdir(root)
     if everything and not context.args:

@@ -3,13 +3,12 @@
 
 A claim is {"kind", "text", "good"}: `good` is true or false for what is a verdict, null for what is a fact. The kinds:
 
-    truth          whether an estimator confirms the truth, with its margin and the least bias that it would have found
-    fastest        which method is fastest within a target error
+    truth          whether an estimator confirms the truth, with its margin and the least bias that it would detect
     left-out       the light that single scattering leaves out
-    image          what the images of an engine are off by
+    image          the errors of an engine's images
     failed         values that are not finite or negative, lit intervals on which shadow rays disagree
-    refused        what a method cannot do, by its own words
-    not-measured   what was left out for the time it takes, HDR-FLIP that could not be had
+    refused        which method refuses which scene
+    not-measured   what was left out for its time, HDR-FLIP that could not be computed
 """
 
 import re
@@ -17,12 +16,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from reports.tables.agreement import verdict
-from reports.tables.methods import fastest_within
 
 Claim = dict[str, Any]
 Scenes = Sequence[Mapping[str, Any]]
-
-TARGETS = (0.01, 0.001)  #: relative RMSE for which the fastest method is named
 
 _WORDS = {"volpath": "Mitsuba's volpath", "single-scatter": "our own Mitsuba integrator"}
 
@@ -31,10 +27,7 @@ def claims(scenes: Scenes) -> list[Claim]:
     """Return the claims that follow from the scenes of a report, in the order of the page."""
     if not scenes:
         return []
-    sentences = _trust(scenes)
-    for target in TARGETS:
-        sentences += _fastest(scenes, target)
-    sentences += [_left_out(scenes), *_images(scenes), *_failed(scenes)]
+    sentences = [*_trust(scenes), _left_out(scenes), *_images(scenes), *_failed(scenes)]
     refused = [m for m in _methods(scenes) if m[1]["refused"]]
     sentences += _listed("refused", "Refused, with the reason in the tables", refused, lambda m: not m.get("left_out"))
     slow = "Not measured for the time that they take, with the reason in the tables"
@@ -43,7 +36,7 @@ def claims(scenes: Scenes) -> list[Claim]:
 
 
 def unstudied(names: Sequence[str], known: Sequence[str]) -> list[Claim]:
-    """Return which built-in scenes were left out by the effort; nothing where the user named the scenes."""
+    """Return a claim on the built-in scenes that the effort leaves out, if any."""
     left = [name for name in known if name not in names]
     if not left:
         return []
@@ -101,7 +94,7 @@ def _verdict(words: str, compared: list[tuple[str, Mapping[str, Any]]]) -> Claim
         detectable = max(entry["statistics"]["detectable_bias"] for entry in good)
         text = (
             f"The truth is confirmed by {words} in {len(good)} of {len(compared)} comparisons: the 95 % interval of "
-            f"the pooled relative bias lies within ±{margin:g} %; the least bias that would have been found is at "
+            f"the pooled relative bias lies within ±{margin:g} %; the least bias that would have been detected is at "
             f"worst {100 * detectable:.2g} %."
         )
     if open_:
@@ -110,37 +103,6 @@ def _verdict(words: str, compared: list[tuple[str, Mapping[str, Any]]]) -> Claim
             f"enough there for a margin of ±{margin:g} %."
         )
     return _claim("truth", text, None if open_ else True)
-
-
-def _fastest(scenes: Scenes, target: float) -> list[Claim]:
-    """Return which method is fastest within a relative RMSE: once where it is the same everywhere, else by scene."""
-    best = {scene["name"]: fastest_within(target, scene["methods"]) for scene in scenes}
-    words = f"within {100 * target:g} % relative RMSE"
-    labels = {entry["label"] if entry else None for entry in best.values()}
-    if len(best) > 1 and len(labels) == 1:
-        (label,) = labels
-        if label is None:
-            text = f"In none of the {len(best)} scenes a method reaches a relative RMSE of {100 * target:g} %."
-            return [_claim("fastest", text)]
-        each = ", ".join(f"{name} {_rate(entry)}" for name, entry in best.items() if entry)
-        text = f"In all {len(best)} scenes the fastest method {words} is {label}: {each}."
-        return [_claim("fastest", text, True)]
-    return [_of_scene(name, entry, words, target) for name, entry in best.items()]
-
-
-def _of_scene(name: str, best: Mapping[str, Any] | None, words: str, target: float) -> Claim:
-    if best is None:
-        return _claim("fastest", f"{name}: no method reaches a relative RMSE of {100 * target:g} %.")
-    milliseconds = best["times"]["frame"]["median_ms"]
-    text = (
-        f"{name}: the fastest method {words} is {best['label']}: {milliseconds:.3g} ms a frame "
-        f"({1000 / milliseconds:.0f} frames/s)."
-    )
-    return _claim("fastest", text, True)
-
-
-def _rate(entry: Mapping[str, Any]) -> str:
-    return f"{entry['times']['frame']['median_ms']:.3g} ms"
 
 
 def _left_out(scenes: Scenes) -> Claim:
@@ -184,7 +146,7 @@ def _listed(kind: str, words: str, entries: Sequence[tuple[str, Mapping[str, Any
 
 
 def _without_flip(scenes: Scenes) -> list[Claim]:
-    """Return why there is no HDR-FLIP where it was wanted; once for each reason."""
+    """Return a claim for each reason why HDR-FLIP is missing."""
     everything = _methods(scenes) + _methods(scenes, images=True)
     reasons: dict[str, list[str]] = {}
     for name, m in everything:

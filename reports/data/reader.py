@@ -15,7 +15,7 @@ SCHEMA_FILE = Path(__file__).parent / "schema" / "report-2.json"
 
 
 def read_report(path: Path | str) -> dict[str, Any]:
-    """Read a report.json whose schema is the one that is known here; every key at its top is there.
+    """Read a report.json of the current schema; every key at its top is there.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def read_report(path: Path | str) -> dict[str, Any]:
 
 
 def load_report(path: Path | str) -> tuple[dict[str, Any], Path]:
-    """Read a report of which every key and every file is needed.
+    """Read a report and check that every key and every file is there.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def _schema() -> dict[str, Any]:
 
 
 def _fault(data: Any, schema: Mapping[str, Any]) -> str | None:
-    """Return what is wrong with a report, the place and the words; None if nothing is."""
+    """Return the first fault of a report with its place; None without a fault."""
     from jsonschema import Draft202012Validator
     from jsonschema.exceptions import best_match
 
@@ -87,7 +87,7 @@ def _fault(data: Any, schema: Mapping[str, Any]) -> str | None:
     if error is None:
         return None
     words = " ".join(error.message.split())
-    # The message begins with what was found, which may be a whole scene.
+    # The message begins with the offending value, which may be a whole scene.
     return f"{error.json_path.replace('$', 'report', 1)}: {words if len(words) < 200 else f'.. {words[-160:]}'}"
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The data of a report: plain numbers and words, ready for JSON.
 
-docs/report-schema.md explains every key of the schema "airlight-report/2". Not-a-number is null.
+docs/report-schema.md explains every key of the schema "airlight-report/2". NaN becomes null.
 """
 
 from typing import Any
@@ -16,7 +16,7 @@ from validation.metrics.errors import plain
 
 
 def scene_facts(study: SceneStudy) -> dict[str, Any]:
-    """Return what a scene is, before anything is measured in it."""
+    """Return the description of a scene."""
     loaded, effort, features = study.loaded, study.effort, study.scene.features
     baseline = None if loaded.path else read_baseline(loaded.name)
     return {
@@ -33,7 +33,7 @@ def scene_facts(study: SceneStudy) -> dict[str, Any]:
 
 
 def truth_data(truth: TruthImage) -> dict[str, Any]:
-    """Return how exact the quadrature truth is, without its images."""
+    """Return the error bounds of the quadrature truth, without its images."""
     import numpy as np
 
     finite = np.isfinite(truth.airlight)
@@ -53,7 +53,7 @@ def truth_data(truth: TruthImage) -> dict[str, Any]:
 
 
 def measurement_data(measured: Measurement) -> dict[str, Any]:
-    """Return what one configuration costs and how wrong it is."""
+    """Return times and errors of one configuration."""
     return {
         "label": measured.configuration.label,
         "kind": "function" if measured.configuration.own else "built-in",
@@ -74,7 +74,7 @@ def measurement_data(measured: Measurement) -> dict[str, Any]:
 
 
 def image_data(measured: ImageMeasurement) -> dict[str, Any]:
-    """Return how wrong an image from elsewhere is, with the keys of `measurement_data`."""
+    """Return the errors of an engine's image, with the keys of `measurement_data`."""
     return {
         "label": measured.shown.label,
         "kind": "image",
@@ -95,7 +95,7 @@ def image_data(measured: ImageMeasurement) -> dict[str, Any]:
 
 
 def mutations_data(study: Any) -> dict[str, Any]:
-    """Return what `validation.mutations.study.study_mutations` found, in full."""
+    """Return all results of `validation.mutations.study.study_mutations`."""
     return {
         "caught": study.caught,
         "count": len(study.results),

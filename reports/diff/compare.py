@@ -18,7 +18,7 @@ from validation.statistics.noise import ERROR_TOLERANCE, TIME_TOLERANCE
 
 @dataclass(frozen=True)
 class Difference:
-    """What `airlight diff` found."""
+    """All differences of two reports."""
 
     findings: tuple[Finding, ...]
     errors: int  #: numbers compared
@@ -26,7 +26,7 @@ class Difference:
 
     @property
     def worse(self) -> tuple[Finding, ...]:
-        """What makes the comparison fail."""
+        """The findings that make the comparison fail."""
         return tuple(finding for finding in self.findings if finding.verdict == "worse")
 
     def to_json(self) -> dict[str, Any]:

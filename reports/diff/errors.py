@@ -8,9 +8,9 @@ _ERRORS = ("relative_rmse", "relative_bias", "p50", "p99", "max", "nonfinite", "
 
 
 def compare_methods(old: Report, new: Report, *, tolerance: float, gone: str) -> tuple[list[Finding], int]:
-    """Compare the methods of a scene; also return how many numbers were compared."""
+    """Return the findings on the methods of a scene, and how many numbers were compared."""
     name = old["name"]
-    before, after = ({one["label"]: one for one in scene["methods"]} for scene in (old, new))
+    before, after = ({entry["label"]: entry for entry in scene["methods"]} for scene in (old, new))
     findings = [Finding(gone, name, label, "gone") for label in before if label not in after]
     findings += [Finding("note", name, label, "new") for label in after if label not in before]
     reason = _incomparable(old, new)
@@ -18,22 +18,22 @@ def compare_methods(old: Report, new: Report, *, tolerance: float, gone: str) ->
         findings.append(reason)
     compared = 0
     for label in [label for label in before if label in after]:
-        one, two = before[label], after[label]
-        if bool(one["refused"]) != bool(two["refused"]):
-            lost = two["refused"]
+        old_entry, new_entry = before[label], after[label]
+        if bool(old_entry["refused"]) != bool(new_entry["refused"]):
+            lost = new_entry["refused"]
             words = f"refused: {lost}" if lost else "no longer refused"
-            # What was left out for the time it would take is a decision of the one who measured, not a fault.
-            decided = one.get("left_out") or two.get("left_out")
+            # Leaving a method out for the time it takes is a decision of the user, not a fault.
+            decided = old_entry.get("left_out") or new_entry.get("left_out")
             findings.append(Finding("note" if decided else "worse" if lost else "better", name, label, words))
-        elif one.get("layer", "airlight") != two.get("layer", "airlight"):
+        elif old_entry.get("layer", "airlight") != new_entry.get("layer", "airlight"):
             findings.append(Finding("note", name, label, "errors not compared: they are of different layers"))
         elif reason is None:
             for layer, key in (("", "error"), ("surface ", "surface_error")):
-                found, count = _errors(one.get(key), two.get(key), tolerance, prefix=layer)
-                findings += [Finding(v, name, label, what, a, b) for v, what, a, b in found]
+                changes, count = _errors(old_entry.get(key), new_entry.get(key), tolerance, prefix=layer)
+                findings += [Finding(v, name, label, what, a, b) for v, what, a, b in changes]
                 compared += count
-            found, count = _flip(one, two, tolerance)
-            findings += [Finding(v, name, label, what, a, b) for v, what, a, b in found]
+            changes, count = _flip(old_entry, new_entry, tolerance)
+            findings += [Finding(v, name, label, what, a, b) for v, what, a, b in changes]
             compared += count
     return findings, compared
 
@@ -46,7 +46,7 @@ def _incomparable(old: Report, new: Report) -> Finding | None:
     before, after = (scene["truth"]["mean"] for scene in (old, new))
     if before is None or after is None:
         return None
-    # A bound is of the mean absolute error: the means cannot be further apart than both.
+    # Each bound limits the mean absolute error, so the means differ by at most the sum of both bounds.
     bounds = sum(scene["truth"].get("relative_bound") or 0.0 for scene in (old, new))
     if abs(after - before) > (bounds + FLOORS["mean"]) * abs(before):
         words = "the truth moved (mean radiance): another scene by this name, or another truth; errors not compared"
@@ -61,23 +61,23 @@ def _errors(old: Report | None, new: Report | None, tolerance: float, *, prefix:
     """Compare the errors of a configuration in one layer."""
     if old is None or new is None:
         return ([("worse", f"{prefix}error is gone", None, None)] if old else []), 0
-    found: list[Change] = []
+    changes: list[Change] = []
     for name in _ERRORS:
         before, after = old.get(name), new.get(name)
         what = f"{prefix}{name}"
         if before is None or after is None:
-            if before is not after:  # not-a-number is null
-                found.append(("worse" if after is None else "better", what, before, after))
+            if before is not after:  # JSON writes NaN as null
+                changes.append(("worse" if after is None else "better", what, before, after))
             continue
         band = error_band(name, before, tolerance=tolerance, pixels=old["pixels"], rmse=old.get("relative_rmse") or 0.0)
         grown = abs(after) - abs(before)
         if abs(grown) > band:
-            found.append(("worse" if grown > 0 else "better", what, before, after))
-    return found, len(_ERRORS)
+            changes.append(("worse" if grown > 0 else "better", what, before, after))
+    return changes, len(_ERRORS)
 
 
 def _flip(old: Report, new: Report, tolerance: float) -> tuple[list[Change], int]:
-    before, after = ((one.get("flip") or {}).get("value") for one in (old, new))
+    before, after = ((entry.get("flip") or {}).get("value") for entry in (old, new))
     if before is None or after is None:
         return [], 0
     if abs(after - before) <= error_band("flip", before, tolerance=tolerance):

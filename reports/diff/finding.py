@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One thing in which two reports differ."""
+"""A difference between two reports."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ Report = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that differs."""
+    """A difference between two reports."""
 
     verdict: str  #: 'worse', 'better' or 'note'
     scene: str  #: empty for what concerns the whole report

@@ -13,36 +13,40 @@ _COLUMNS = (
     Column("new", "new", digits=4),
     Column("change", "change", words=True),
 )
-_BUSY = 1.25  # a spread of quartiles from which on the machine was not quiet
+_BUSY = 1.25  # with a larger ratio of the quartiles the machine was not quiet
 
 
-def print_difference(found: Difference) -> None:
+def print_difference(difference: Difference) -> None:
     """Print the findings as a table, the worse ones first, and a sentence on what could be seen."""
-    rows = [_row(one) for one in found.findings if one.old is not None or one.new is not None or one.method]
+    rows = [_row(finding) for finding in difference.findings if _has_row(finding)]
     if rows:
         print_table(table("", _COLUMNS, rows))
-    for one in found.findings:
-        if one.old is None and one.new is None and not one.method:
-            print(f"{one.verdict}: {f'{one.scene}: ' if one.scene else ''}{one.what}")
-    print(_times_line(found))
-    better = sum(one.verdict == "better" for one in found.findings)
-    print(f"{len(found.worse)} worse, {better} better, {found.errors} errors compared")
+    for finding in difference.findings:
+        if not _has_row(finding):
+            print(f"{finding.verdict}: {f'{finding.scene}: ' if finding.scene else ''}{finding.what}")
+    print(_times_line(difference))
+    better = sum(finding.verdict == "better" for finding in difference.findings)
+    print(f"{len(difference.worse)} worse, {better} better, {difference.errors} errors compared")
 
 
-def _row(one: Finding) -> tuple[str | float | None, ...]:
-    return (one.verdict, one.scene, one.method, one.what, one.old, one.new, _change(one))
+def _has_row(finding: Finding) -> bool:
+    return bool(finding.old is not None or finding.new is not None or finding.method)
 
 
-def _change(one: Finding) -> str:
+def _row(finding: Finding) -> tuple[str | float | None, ...]:
+    return (finding.verdict, finding.scene, finding.method, finding.what, finding.old, finding.new, _change(finding))
+
+
+def _change(finding: Finding) -> str:
     """Return the change in percent, or as a factor where it is more than double or less than half."""
-    if one.old is None or one.new is None or one.old == 0:
+    if finding.old is None or finding.new is None or finding.old == 0:
         return ""
-    ratio = abs(one.new / one.old)
+    ratio = abs(finding.new / finding.old)
     return f"{100 * (ratio - 1):+.1f} %" if 0.5 < ratio < 2 else f"x {ratio:.3g}"
 
 
-def _times_line(found: Difference) -> str:
-    times = found.times
+def _times_line(difference: Difference) -> str:
+    times = difference.times
     if not times.compared:
         return "times: none compared"
     where = "one machine" if times.same_machine else "two machines, so beside the median of all frames"

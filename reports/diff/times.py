@@ -12,13 +12,13 @@ _MACHINE = ("processor", "threads", "variant", "device")
 
 @dataclass(frozen=True)
 class TimeComparison:
-    """What two reports say of the speed."""
+    """The times of two reports compared."""
 
     compared: int  #: configurations
     same_machine: bool
     machine: tuple[str, ...]  #: how the machines and versions differ, in words
-    spread: float  #: quartiles of the noisier report, upper over lower
-    least: float  #: least ratio of two times that means something
+    spread: float  #: upper over lower quartile, of the noisier report
+    least: float  #: least ratio of two times that is significant
     drift: float  #: median ratio of all frames
     findings: tuple[Finding, ...] = field(default=())
 
@@ -26,7 +26,7 @@ class TimeComparison:
 def compare_times(old: Report, new: Report, *, tolerance: float | None) -> TimeComparison:
     """Compare the times of two reports; parameters as in `reports.diff.compare.compare_reports`."""
     machine, changes = _machines(old, new)
-    notes = [Finding("note", "", "", one) for one in changes]
+    notes = [Finding("note", "", "", change) for change in changes]
     if tolerance is None:
         return TimeComparison(0, machine, changes, 1.0, 1.0, 1.0, tuple(notes))
     kept = new.get("kept")
@@ -38,8 +38,8 @@ def compare_times(old: Report, new: Report, *, tolerance: float | None) -> TimeC
     least = least_ratio(both, same_machine=machine, tolerance=tolerance)
     common = drift(pairs.values()) if pairs else 1.0
     findings = [*notes, *_drift(common, least, machine, len(pairs))]
-    for (scene, label), (one, two) in pairs.items():
-        findings += _configuration(scene, label, one, two, least=least, common=common, machine=machine)
+    for (scene, label), (old_times, new_times) in pairs.items():
+        findings += _configuration(scene, label, old_times, new_times, least=least, common=common, machine=machine)
     return TimeComparison(len(pairs), machine, changes, both, least, common, tuple(findings))
 
 
@@ -50,8 +50,8 @@ def _machines(old: Report, new: Report) -> tuple[bool, tuple[str, ...]]:
     same = not changes
     versions = before.get("versions", {}), after.get("versions", {})
     for name in sorted({*versions[0], *versions[1]}):
-        one, two = (found.get(name) for found in versions)
-        changes += [f"{name}: {one} -> {two}"] if one != two else []
+        old_version, new_version = (installed.get(name) for installed in versions)
+        changes += [f"{name}: {old_version} -> {new_version}"] if old_version != new_version else []
     if before.get("llvm") != after.get("llvm"):
         changes.append(f"llvm: {before.get('llvm')} -> {after.get('llvm')}")
     return same, tuple(changes)
@@ -61,21 +61,21 @@ Key = tuple[str, str]  # scene and label
 
 
 def _pairs(old: Report, new: Report) -> tuple[dict[Key, tuple[Times, Times]], list[Finding]]:
-    """Return the times of what both reports timed alike, and what they timed otherwise."""
+    """Return the pairs of comparable times, and a note on each time without a partner."""
     before, after = _timed(old), _timed(new)
     pairs: dict[Key, tuple[Times, Times]] = {}
     notes: dict[Finding, None] = {}
     for key in [key for key in before if key in after]:
-        (size, note, one), (new_size, new_note, two) = before[key], after[key]
+        (size, note, old_times), (new_size, new_note, new_times) = before[key], after[key]
         if size != new_size:
-            sizes = " and ".join("x".join(map(str, found or ["?"])) for found in (size, new_size))
+            sizes = " and ".join("x".join(map(str, pixels or ["?"])) for pixels in (size, new_size))
             notes[Finding("note", key[0], "", f"times not compared: the frames timed are {sizes} pixels")] = None
         elif note != new_note:
             notes[
                 Finding("note", *key, f"times not compared: {note or 'as usual'} before, {new_note or 'as usual'} now")
             ] = None
         else:
-            pairs[key] = one, two
+            pairs[key] = old_times, new_times
     return pairs, list(notes)
 
 
@@ -83,19 +83,19 @@ def _timed(report: Report) -> dict[Key, tuple[Any, str | None, Times]]:
     """Return the size of the frames that were timed, the note on how, and the times, by scene and label."""
     usual = report["settings"].get("timed")
     return {
-        (scene["name"], one["label"]): (scene.get("timed", usual), one.get("note"), one["times"])
+        (scene["name"], entry["label"]): (scene.get("timed", usual), entry.get("note"), entry["times"])
         for scene in report["scenes"]
-        for one in scene["methods"]
-        if one.get("times") and "frame" in one["times"]
+        for entry in scene["methods"]
+        if entry.get("times") and "frame" in entry["times"]
     }
 
 
 def _all_times(report: Report) -> list[Times]:
-    return [one["times"] for scene in report["scenes"] for one in scene["methods"] if one.get("times")]
+    return [entry["times"] for scene in report["scenes"] for entry in scene["methods"] if entry.get("times")]
 
 
 def _drift(common: float, least: float, machine: bool, count: int) -> list[Finding]:
-    """Judge what all frames share."""
+    """Return a finding if all frames got slower or faster together."""
     if not machine or count == 0 or 1 / least < common < least:
         return []
     words = "every frame, in the median: the machine, or what all methods share (time ratio)"

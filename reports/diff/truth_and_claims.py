@@ -3,14 +3,14 @@
 
 from collections.abc import Iterator, Mapping
 
-from reports.data.claims import TARGETS, confirmed
+from reports.data.claims import confirmed
 from reports.diff.finding import Finding, Report
 from reports.tables.agreement import verdict
-from reports.tables.methods import fastest_within
+from reports.tables.methods import TARGETS, fastest_within
 
 
 def compare_truth(old: Report, new: Report, gone: str) -> Iterator[Finding]:
-    """Compare what is known of the truth of a scene."""
+    """Compare the truth of a scene in two reports."""
     name = old["name"]
     if not confirmed([new]) and confirmed([old]):
         yield Finding("worse", name, "", "the truth is no longer confirmed")
@@ -29,7 +29,7 @@ def compare_truth(old: Report, new: Report, gone: str) -> Iterator[Finding]:
 
 
 def compare_claims(old: Report, new: Report) -> Iterator[Finding]:
-    """Compare what concerns the whole report."""
+    """Compare the parts that concern the whole report."""
     yield from _claims(old, new)
     yield from _stability(old, new)
     yield from _mutations(old, new)
@@ -69,7 +69,7 @@ def _mutations(old: Report, new: Report) -> Iterator[Finding]:
 
 
 def compare_winners(before: Mapping[str, Report], after: Mapping[str, Report]) -> Iterator[Finding]:
-    """Say where another method is the fastest; which one it is may change within the noise."""
+    """Return a note where another method is the fastest: no fault, as the noise may change the order."""
     for name in [name for name in before if name in after]:
         for target in TARGETS:
             was, is_now = (_fastest(scene, target) for scene in (before[name], after[name]))

@@ -34,7 +34,7 @@ def source_folder() -> Path:
 
 
 def build_docs(source: Path, output: Path) -> str:
-    """Build the pages and return what Sphinx complained about, nothing if all is well.
+    """Build the pages and return the warnings of Sphinx.
 
     Parameters
     ----------

@@ -74,7 +74,7 @@ def _read_object(path: Path, what: str) -> dict[str, Any]:
 
 
 def kept_of_report(report: dict[str, Any]) -> dict[str, Any]:
-    """Return what the documentation keeps of a report."""
+    """Return the parts of a report that the documentation keeps."""
     environment = report["environment"]
     return {
         "report": {
@@ -113,7 +113,7 @@ def _kept_method(entry: dict[str, Any]) -> dict[str, Any]:
 
 
 def stale_scenes(kept: dict[str, Any]) -> list[str]:
-    """Return what is older than the accuracy baselines, a line for each scene; empty where nothing is.
+    """Return a line for each scene whose numbers are older than the accuracy baselines.
 
     The images of the documentation are larger than those of the baselines, so errors cannot be compared one by one.
     But whatever moves an error gives the baseline of its scene a new revision, and a report notes the revision with
@@ -155,7 +155,7 @@ def counts(name: str) -> dict[str, int]:
 
 
 def kept_of_kernels(costs: dict[str, Any], path: Path) -> dict[str, Any]:
-    """Return what the documentation keeps of the costs of kernels."""
+    """Return the costs of kernels that the documentation keeps; raises InputError if a key is missing."""
     try:
         rows = costs["kernels"]["costs"]
         environment = costs["environment"]
@@ -199,7 +199,7 @@ def _typical(candidates: list[dict[str, Any]]) -> dict[str, Any] | None:
 
 
 def small(path: Path) -> bytes:
-    """Return a picture as a PNG file of at most `LARGEST` bytes."""
+    """Return a picture as a PNG file of at most `LARGEST` bytes; raises InputError if it cannot be read."""
     from PIL import Image, UnidentifiedImageError
 
     try:

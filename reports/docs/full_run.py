@@ -18,7 +18,7 @@ from xml.etree import ElementTree
 
 from reports.docs.verification import RECORD, duration, redraw
 
-#: Tests that two other parts repeat.
+#: Tests that other parts of the run repeat.
 REPEATED = (
     "tests/test_regression.py::test_errors_are_those_of_the_baseline",
     "tests/validation/mutations/test_study.py::test_the_standard_run_catches_nine_in_ten",
@@ -29,12 +29,12 @@ BELOW_THE_MARGIN = ("one-in-ten-thousand",)
 
 @dataclass(frozen=True)
 class Counts:
-    """What a part found."""
+    """Counts of a part of the run."""
 
     passed: int = 0
     failed: int = 0
     skipped: int = 0
-    remark: str = ""  #: what failed, or was expected not to pass
+    remark: str = ""  #: what failed, or is expected to fail
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,9 @@ class Part:
 
     name: str
     command: Sequence[str]  #: arguments of Python
-    result: str  #: "argument": the command writes the file that its last argument names; "output": what it prints
+    result: (
+        str  #: "argument": counts are in the file that the last argument names; "output": in what the command prints
+    )
     count: Callable[[bytes], Counts]
 
 
@@ -66,7 +68,7 @@ def all_parts(workers: Sequence[str]) -> tuple[Part, ...]:
     return (
         Part("unit", _pytest(tests[:2], workers, "not statistical and not slow"), "argument", count_tests),
         Part("statistical", _pytest(tests, workers, "statistical and not slow"), "argument", count_tests),
-        # Some of the slow tests compare times: they have the machine for themselves.
+        # Some of the slow tests compare times, so nothing else runs beside them.
         Part("slow", _pytest(tests, (), "slow"), "argument", count_tests),
         Part("mutations", [airlight, "mutations", "--json"], "output", count_mutations),
         Part("baselines", [airlight, "baselines", "--no-times", "--json"], "output", count_baselines),
@@ -91,7 +93,8 @@ def count_mutations(content: bytes) -> Counts:
     data = json.loads(content)
     missed = [result["name"] for result in data["results"] if not result["caught"]]
     failed = [name for name in missed if name not in BELOW_THE_MARGIN]
-    failed += [f"{one['scene']}, {one['layer']}, without a mutation" for one in data["control"] if not one["agrees"]]
+    disagreeing = [control for control in data["control"] if not control["agrees"]]
+    failed += [f"{control['scene']}, {control['layer']}, without a mutation" for control in disagreeing]
     remark = f"not caught: {', '.join(missed)}" if missed else ""
     return Counts(data["caught"], len(failed), len(missed) - len(set(missed) & set(failed)), remark)
 
@@ -105,7 +108,7 @@ def count_baselines(content: bytes) -> Counts:
 
 
 def run_part(part: Part, root: Path) -> Outcome:
-    """Run one part; a command that ends without the file that it should have written has failed."""
+    """Run one part; it has failed if its command does not write its file."""
     start = time.monotonic()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "result"
@@ -144,12 +147,13 @@ def run_all(parts: Sequence[Part], root: Path, *, machine: str) -> bool:
         outcomes.append(run_part(part, root))
     seconds = round(time.monotonic() - start, 1)
     print("--- all parts")
-    for one in outcomes:
-        words = f"{one.passed} passed, {one.failed} failed, {one.skipped} skipped, {duration(one.seconds)}"
-        print(f"{one.name}: {words}{f' ({one.remark})' if one.remark else ''}")
+    for outcome in outcomes:
+        counts = f"{outcome.passed} passed, {outcome.failed} failed, {outcome.skipped} skipped"
+        remark = f" ({outcome.remark})" if outcome.remark else ""
+        print(f"{outcome.name}: {counts}, {duration(outcome.seconds)}{remark}")
     record = {"date": date, "machine": machine, "commit": commit, "changed": changed, "seconds": seconds}
-    _write_record(root, record | {"parts": [asdict(one) for one in outcomes]})
-    return not any(one.failed for one in outcomes)
+    _write_record(root, record | {"parts": [asdict(outcome) for outcome in outcomes]})
+    return not any(outcome.failed for outcome in outcomes)
 
 
 def _write_record(root: Path, record: dict[str, Any]) -> None:

@@ -30,7 +30,7 @@ class Claim:
     topic: str
     says: str
     stated: tuple[str, ...]  #: documents with the anchor of a heading, as in README.md#limits
-    mutations: tuple[str, ...]  #: that would break it
+    mutations: tuple[str, ...]  #: mutations that would break it
 
 
 @dataclass(frozen=True)
@@ -48,9 +48,9 @@ def read_claims(root: Path = ROOT) -> dict[str, Claim]:
     """Return the claims of `docs/claims.toml` by identifier, in its order."""
     topics = tomllib.loads((root / "docs/claims.toml").read_text(encoding="utf-8"))["topic"]
     return {
-        identifier: Claim(identifier, topic["name"], one["says"], tuple(one["stated"]), tuple(one.get("mutations", ())))
+        name: Claim(name, topic["name"], claim["says"], tuple(claim["stated"]), tuple(claim.get("mutations", ())))
         for topic in topics
-        for identifier, one in topic["claim"].items()
+        for name, claim in topic["claim"].items()
     }
 
 
@@ -94,13 +94,13 @@ def _claims_in(expression: ast.expr, module: str, test: str, tier: str) -> Itera
 
 
 def _tier(expressions: Sequence[ast.expr]) -> str:
-    """Return the tiers of a test from its marks; those of single parameters leave it in the first tier too."""
-    found = []
+    """Return the tiers of a test from its marks; if only some parameters are marked, the first tier as well."""
+    tiers = []
     for expression in expressions:
         text = ast.unparse(expression)
         names = [name for name in _TIERS if f"pytest.mark.{name}" in text]
-        found += ["unit", *names] if names and "parametrize" in text else names
-    return " and ".join(dict.fromkeys(found)) or "unit"
+        tiers += ["unit", *names] if names and "parametrize" in text else names
+    return " and ".join(dict.fromkeys(tiers)) or "unit"
 
 
 def page(text: str, claims: Iterable[Claim], marks: Sequence[Mark], record: Mapping[str, Any] | None) -> str:
@@ -190,7 +190,7 @@ def duration(seconds: float) -> str:
 
 
 def current_page(root: Path = ROOT) -> str:
-    """Return what `docs/verification.md` should hold."""
+    """Return the up-to-date content of `docs/verification.md`."""
     path = root / RECORD
     record = json.loads(path.read_text(encoding="utf-8")) if path.exists() else None
     return page((root / _PAGE).read_text(encoding="utf-8"), read_claims(root).values(), read_marks(root), record)

@@ -8,13 +8,11 @@ without a bias it falls with the order 1/2. For volpath the image is that of the
 (`validation.estimates.agreement`).
 """
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from reference.storage.files import ensure_folder
-from reports.figures.files import draw_figure, name_sizes, new_figure, read_data, values, write_data
-from reports.machine.progress import counted, part_of
+from reports.figures.files import name_sizes, new_figure, read_data, values, write_data
+from reports.machine.progress import Progress, counted, part_of
 from reports.plotting.style import COLOURS, WIDTHS, kernel_style
 
 NAME = "convergence"
@@ -22,7 +20,7 @@ SUMMARY = "convergence of each kernel and of each Monte Carlo estimator, with sl
 
 SCENE = "open-fog"
 ESTIMATORS = ("single-scatter", "volpath")
-_SAMPLES = 16  # a pixel in each batch
+_SAMPLES = 16  # samples a pixel in each batch
 _HEADER = ("panel", "name", "size", "error", "kind", "declared", "measured", "power")
 _PANELS = {
     "order": ("size of the kernel [1]", "largest relative error of J [1]"),
@@ -35,25 +33,15 @@ _ESTIMATOR_STYLES = {
 }
 
 
-def compute(
-    folder: Path | str,
-    *,
-    quick: bool = False,
-    scene: str = SCENE,
-    progress: Callable[[float, str], None] | None = None,
-) -> None:
+def compute(folder: Path | str, *, quick: bool = False, scene: str = SCENE, progress: Progress | None = None) -> None:
     """Write `convergence.csv` into a folder: errors by kernel and size, by estimator and samples, with the slopes.
 
     Parameters
     ----------
-    folder
-        Where the data go.
     quick
         A smaller image and fewer samples.
     scene
         Of the estimators: a built-in scene or the path of a Mitsuba XML file.
-    progress
-        Told the share done and what comes next.
     """
     from validation.kernels.convergence import convergence, declared
 
@@ -63,9 +51,9 @@ def compute(
     rows: list[tuple] = []
     for number, (name, promise) in enumerate(promises.items()):
         step(0.4 * number / len(promises), name)
-        found = convergence(name)
-        law = (promise.kind, promise.value, found.measured, promise.power)
-        rows += [(promise.kind, name, size, error, *law) for size, error in zip(found.sizes, found.errors)]
+        measured = convergence(name)
+        law = (promise.kind, promise.value, measured.measured, promise.power)
+        rows += [(promise.kind, name, size, error, *law) for size, error in zip(measured.sizes, measured.errors)]
     image, batches = ((32, 24), 16) if quick else ((64, 48), 64)
     for number, estimator in enumerate(ESTIMATORS):
         part = counted(part_of(step, 0.4 + 0.3 * number, 0.7 + 0.3 * number))
@@ -88,20 +76,16 @@ def _estimator_rows(scene: str, image: tuple[int, int], estimator: str, batches:
     counts = [2**k for k in range(1, batches.bit_length())]
     errors = []
     for count in counts:
-        found = monte_carlo_batches(loaded, estimator, batches=count, samples=_SAMPLES, progress=progress).batches
-        mean = layer_mean(found, "airlight", mask)[mask]
+        traced = monte_carlo_batches(loaded, estimator, batches=count, samples=_SAMPLES, progress=progress).batches
+        mean = layer_mean(traced, "airlight", mask)[mask]
         errors.append(float(np.sqrt(np.mean((mean - expected) ** 2)) / expected.mean()))
     samples = [_SAMPLES * count for count in counts]
     law = ("order", 0.5, fitted_slope(samples, errors).order, 0.0)
     return [("estimator", estimator, size, error, *law) for size, error in zip(samples, errors)]
 
 
-def plot(folder: Path | str, **options: Any) -> None:
-    """Draw `convergence.pdf` and `.png` from the data; options: see `reports.figures.files.draw_figure`."""
-    draw_figure(NAME, folder, _draw, **options)
-
-
-def _draw(folder: Path, column: str):
+def draw(folder: Path, column: str):
+    """Return the figure, see `reports.figures.files.plot`."""
     rows = read_data(folder, NAME)
     width = WIDTHS[column]
     double = column == "double"

@@ -6,7 +6,7 @@ from typing import Any
 
 from reference.storage.files import ensure_folder
 from reports.data.reader import read_report
-from reports.figures.files import draw_figure, new_figure, read_csv, read_data, value, write_csv, write_data
+from reports.figures.files import new_figure, read_csv, read_data, value, write_csv, write_data
 from reports.figures.report import measured, report_origin
 from reports.plotting.style import WIDTHS, report_styles
 
@@ -33,36 +33,25 @@ def compute(folder: Path | str, *, report: Path | str) -> None:
     """Write `frame-speed.csv` into a folder: times [ms] and errors of every method in every scene of a report.
 
     `frame-speed-labels.csv` names all methods of the report in its order.
-
-    Parameters
-    ----------
-    folder
-        Where the data go.
-    report
-        The folder of the report.
     """
     target, data = ensure_folder(folder), read_report(report)
     rows = []
     for scene in data["scenes"]:
-        for one in measured(scene):
-            if not one["times"]:
+        for entry in measured(scene):
+            if not entry["times"]:
                 continue
-            frame, error = one["times"]["frame"], one["error"]
+            frame, error = entry["times"]["frame"], entry["error"]
             times = (frame["median_ms"], frame["low_ms"], frame["high_ms"])
             errors = (error["relative_rmse"], error["relative_bias"], error["p99"], error["nonfinite"])
-            rows.append((scene["name"], *scene["size"], one["label"], one["method"], *times, *errors))
-    # All labels, those without a point too: variants are numbered in the report's order, as on its page.
-    labels = dict.fromkeys((one["method"], one["label"]) for scene in data["scenes"] for one in scene["methods"])
+            rows.append((scene["name"], *scene["size"], entry["label"], entry["method"], *times, *errors))
+    # All labels, also those without a point: variants are numbered as in the report, so that its page agrees.
+    labels = dict.fromkeys((entry["method"], entry["label"]) for scene in data["scenes"] for entry in scene["methods"])
     write_csv(target / f"{NAME}-labels.csv", ("method", "label"), labels)
     write_data(target, NAME, _HEADER, rows, **report_origin(report, data), timed=data["settings"].get("timed"))
 
 
-def plot(folder: Path | str, **options: Any) -> None:
-    """Draw `frame-speed.pdf` and `.png` from the data; options: see `reports.figures.files.draw_figure`."""
-    draw_figure(NAME, folder, _draw, **options)
-
-
-def _draw(folder: Path, column: str):
+def draw(folder: Path, column: str):
+    """Return the figure, see `reports.figures.files.plot`."""
     rows = read_data(folder, NAME)
     scenes = list(dict.fromkeys(row["scene"] for row in rows))
     by_scene = {scene: [row for row in rows if row["scene"] == scene] for scene in scenes}
@@ -78,7 +67,7 @@ def _draw(folder: Path, column: str):
         for row in by_scene[scene]:
             _point(panel, row, styles[row["label"]])
         panel.set(xscale="log", yscale="log", xlabel="time of a frame [ms]")
-        panel.set_title(scene, parse_math=False)  # a dollar in a file name is a dollar
+        panel.set_title(scene, parse_math=False)  # a dollar in a file name must not begin a formula
         _plain_times(panel)
     for panel in panels.flat[len(scenes) :]:
         panel.set_axis_off()

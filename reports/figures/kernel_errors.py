@@ -6,12 +6,11 @@ the ray and the direction to the light. Its segment goes from the camera to 2 d,
 small. Kernels run in float32 with their default sizes; isotropic fog. The truth is `analytic`'s, to about 1e-12.
 """
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from reference.storage.files import ensure_folder
-from reports.figures.files import draw_figure, new_figure, read_data, write_data
+from reports.figures.files import new_figure, read_data, write_data
+from reports.machine.progress import Progress
 from reports.plotting.style import WIDTHS
 
 NAME = "kernel-errors"
@@ -20,20 +19,16 @@ SUMMARY = "relative error of each kernel over the optical depth and the angle of
 _DEPTHS = (1e-3, 30.0)  # optical depth of the distance to the light
 _ANGLES = (0.5, 179.5)  # [degrees]
 _REACH = 2.0  # length of the segment over the distance to the light
-_FLOOR, _CEILING = 1e-7, 1.0  # of the colour scale: float32's rounding, and nothing right any more
+_FLOOR, _CEILING = 1e-7, 1.0  # ends of the colour scale: the rounding of float32, and no correct digit
 
 
-def compute(folder: Path | str, *, quick: bool = False, progress: Callable[[float, str], None] | None = None) -> None:
+def compute(folder: Path | str, *, quick: bool = False, progress: Progress | None = None) -> None:
     """Write `kernel-errors.csv` into a folder: kernel, optical depth, angle, relative error.
 
     Parameters
     ----------
-    folder
-        Where the data go.
     quick
         Fewer rays.
-    progress
-        Told the share done and what comes next.
     """
     import numpy as np
 
@@ -48,10 +43,10 @@ def compute(folder: Path | str, *, quick: bool = False, progress: Callable[[floa
     for number, name in enumerate(KERNELS):
         if progress is not None:
             progress(number / len(KERNELS), name)
-        found = evaluate_cases(cases, find_kernel(name), "single")
-        if not found.accepted.any():
+        evaluated = evaluate_cases(cases, find_kernel(name), "single")
+        if not evaluated.accepted.any():
             continue
-        error = relative_error(found.J, np.asarray(cases.value), "single")
+        error = relative_error(evaluated.J, np.asarray(cases.value), "single")
         rows += [(name, *row) for row in zip(depth.tolist(), angle.tolist(), error.tolist())]
     made_by = {"rays": len(depth), "phase": "isotropic", "precision": "single", "reach": _REACH}
     write_data(target, NAME, ("kernel", "optical_depth", "angle_degrees", "relative_error"), rows, **made_by)
@@ -64,24 +59,20 @@ def _rays(columns: int, lines: int):
     from validation.kernels.rays import table, with_truth
 
     grid = np.meshgrid(np.geomspace(*_DEPTHS, columns), np.linspace(*_ANGLES, lines), indexing="ij")
-    depth, angle = (one.ravel() for one in grid)
+    depth, angle = (values.ravel() for values in grid)
     foot, height = (
         (depth * part).astype(np.float32).astype(np.float64)
         for part in (np.cos(np.radians(angle)), np.sin(np.radians(angle)))
     )
     end = (_REACH * depth).astype(np.float32).astype(np.float64)
-    zero, one = np.zeros_like(depth), np.ones_like(depth)
+    zero, ones = np.zeros_like(depth), np.ones_like(depth)
     names, tags = np.full(len(depth), "isotropic"), np.full(len(depth), "grid")
-    cases = table(names, zero, foot=foot, height=height, x0=zero, x1=end, sigma_t=one, tags=tags)
+    cases = table(names, zero, foot=foot, height=height, x0=zero, x1=end, sigma_t=ones, tags=tags)
     return with_truth(cases), depth, angle
 
 
-def plot(folder: Path | str, **options: Any) -> None:
-    """Draw `kernel-errors.pdf` and `.png` from the data; options: see `reports.figures.files.draw_figure`."""
-    draw_figure(NAME, folder, _draw, **options)
-
-
-def _draw(folder: Path, column: str):
+def draw(folder: Path, column: str):
+    """Return the figure, see `reports.figures.files.plot`."""
     import numpy as np
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import LogNorm

@@ -1,13 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The figure of the kernels' speed: nanoseconds a ray against the error, a line for each kernel over its sizes."""
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from reference.storage.files import ensure_folder
-from reports.figures.files import draw_figure, new_figure, read_data, value, write_data
-from reports.machine.progress import counted
+from reports.figures.files import new_figure, read_data, value, write_data
+from reports.machine.progress import Progress, counted
 from reports.plotting.style import WIDTHS, kernel_style
 
 NAME = "kernel-speed"
@@ -15,7 +13,7 @@ SUMMARY = "nanoseconds a ray against the error of each kernel, over its sizes"
 
 _HEADER = ("kernel", "family", "size", "phase", "rays", "ns", "ns_low", "ns_high", "median", "p99", "max", "nonfinite")
 _STATISTICS = {"median": "half of the rays", "p99": "99 % of the rays", "max": "worst ray"}
-_SHOWN = (1e-7, 10.0)  # errors; what lies outside is drawn at the edge
+_SHOWN = (1e-7, 10.0)  # errors; those outside are drawn at the edge
 
 
 def compute(
@@ -23,28 +21,24 @@ def compute(
     *,
     quick: bool = False,
     names: list[str] | None = None,
-    progress: Callable[[float, str], None] | None = None,
+    progress: Progress | None = None,
 ) -> None:
     """Write `kernel-speed.csv` into a folder: time and errors of every kernel and size, isotropic, in float32.
 
     Parameters
     ----------
-    folder
-        Where the data go.
     quick
         Fewer rays and shorter timings.
     names
         Kernels; all of them by default.
-    progress
-        Told the share done and what comes next.
     """
     from validation.kernels.benchmark import PHASES, RAYS, bench_kernels
 
     target = ensure_folder(folder)
     rays, seconds = (RAYS // 16, 0.02) if quick else (RAYS // 2, 0.1)
-    found = bench_kernels(names, phases=PHASES[:1], rays=rays, seconds=seconds, progress=counted(progress))
+    measured = bench_kernels(names, phases=PHASES[:1], rays=rays, seconds=seconds, progress=counted(progress))
     rows = []
-    for cost in found.costs:
+    for cost in measured.costs:
         time = cost.device or cost.wall
         if cost.refused or time is None:
             continue
@@ -55,12 +49,8 @@ def compute(
     write_data(target, NAME, _HEADER, rows, **made_by)
 
 
-def plot(folder: Path | str, **options: Any) -> None:
-    """Draw `kernel-speed.pdf` and `.png` from the data; options: see `reports.figures.files.draw_figure`."""
-    draw_figure(NAME, folder, _draw, **options)
-
-
-def _draw(folder: Path, column: str):
+def draw(folder: Path, column: str):
+    """Return the figure, see `reports.figures.files.plot`."""
     rows = read_data(folder, NAME)
     width = WIDTHS[column]
     double = column == "double"

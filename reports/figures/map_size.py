@@ -5,19 +5,19 @@ The lines are `validation.frames.map_size.fitted_slope`: error ~ size^-order; it
 or a little less.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from reference.storage.files import ensure_folder
-from reports.figures.files import draw_figure, name_sizes, new_figure, read_data, values, write_data
-from reports.machine.progress import counted, part_of
+from reports.figures.files import name_sizes, new_figure, read_data, values, write_data
+from reports.machine.progress import Progress, counted, part_of
 from reports.plotting.style import WIDTHS, method_style
 
 NAME = "map-size"
 SUMMARY = "error of the airlight against the size of the shadow map, with slopes"
 
-#: What is measured: a method with the parameters that leave the map alone to limit its accuracy.
+#: The methods, with parameters for which only the map limits the accuracy.
 METHODS: tuple[tuple[str, dict[str, Any]], ...] = (
     ("light-volumes", {}),
     ("min-max", {"sampling": "pixels", "slices": 4096}),
@@ -34,22 +34,18 @@ def compute(
     quick: bool = False,
     scene: str = SCENE,
     sizes: Sequence[int] | None = None,
-    progress: Callable[[float, str], None] | None = None,
+    progress: Progress | None = None,
 ) -> None:
     """Write `map-size.csv` into a folder: the errors of each method for every size of the map, and its order.
 
     Parameters
     ----------
-    folder
-        Where the data go.
     quick
         A smaller image and fewer sizes.
     scene
         A built-in scene or the path of a Mitsuba XML file.
     sizes
         Of the shadow map [texels].
-    progress
-        Told the share done and what comes next.
     """
     from validation.frames.map_size import map_errors
     from validation.scenes.loading import load_scene
@@ -61,21 +57,17 @@ def compute(
     rows: list[tuple] = []
     for number, (method, parameters) in enumerate(METHODS):
         step = counted(part_of(progress, number / len(METHODS), (number + 1) / len(METHODS)))
-        found = map_errors(loaded.scene, method, parameters=parameters, sizes=chosen, progress=step)
-        order = (found.slope.order, found.slope.standard_error)
-        name = found.configuration.label
-        for size, error in zip(found.sizes, found.metrics):
+        study = map_errors(loaded.scene, method, parameters=parameters, sizes=chosen, progress=step)
+        order = (study.slope.order, study.slope.standard_error)
+        name = study.configuration.label
+        for size, error in zip(study.sizes, study.metrics):
             errors = (error.relative_rmse, error.relative_bias, error.p99)
             rows.append((name, method, loaded.name, size, *errors, *order))
     write_data(target, NAME, _HEADER, rows, scene=scene, image=image, sizes=chosen)
 
 
-def plot(folder: Path | str, **options: Any) -> None:
-    """Draw `map-size.pdf` and `.png` from the data; options: see `reports.figures.files.draw_figure`."""
-    draw_figure(NAME, folder, _draw, **options)
-
-
-def _draw(folder: Path, column: str):
+def draw(folder: Path, column: str):
+    """Return the figure, see `reports.figures.files.plot`."""
     import numpy as np
 
     rows = read_data(folder, NAME)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The figure of the polynomials: the airlight kernel over the angle at the light, and what Biri's polynomials make of
-it.
+"""The figure of the polynomials: the airlight kernel over the angle at the light, and Biri's
+polynomials for it.
 
 `compute` writes the data, `plot` only reads them. For each phase function of Biri 2006 and some a = sigma_t height:
 
@@ -11,10 +11,9 @@ three kernels integrate to within 1 % and 10 % (`validation.kernels.biri_misprin
 """
 
 from pathlib import Path
-from typing import Any
 
 from reference.storage.files import ensure_folder
-from reports.figures.files import draw_figure, new_figure, read_data, values, write_csv, write_data
+from reports.figures.files import new_figure, read_data, values, write_csv, write_data
 from reports.plotting.style import WIDTHS, kernel_style, truth_style
 
 NAME = "polynomials"
@@ -29,8 +28,6 @@ def compute(folder: Path | str, *, rays: int = 100_000) -> None:
 
     Parameters
     ----------
-    folder
-        Where the files go.
     rays
         Quasi-random rays of which the shares are counted.
     """
@@ -46,8 +43,8 @@ def compute(folder: Path | str, *, rays: int = 100_000) -> None:
             curves = _curves(phase, a, theta)
             rows += [(phase, a, *values) for values in zip(theta, *(curves[name] for name in _CURVES))]
     shares = [
-        (one.phase, one.region, one.kernel, one.rays, one.within_1_percent, one.within_10_percent)
-        for one in printed_against_derived(rays)
+        (share.phase, share.region, share.kernel, share.rays, share.within_1_percent, share.within_10_percent)
+        for share in printed_against_derived(rays)
     ]
     header = ("phase", "region", "kernel", "rays", "within_1_percent", "within_10_percent")
     write_csv(target / f"{NAME}-shares.csv", header, shares)
@@ -64,19 +61,15 @@ def _curves(phase: str, a: float, theta):
     function = PhaseFunction(phase)
     exact = np.exp(-a * (np.tan(0.5 * theta + 0.25 * np.pi) - 1)) * function(-np.sin(theta))
     derived = np.ravel(taylor_coefficients(a, function))
-    # The annex gives c0 to c2 and, for the isotropic case, c3 and c4; what it leaves out is taken from the derivation.
+    # The annex prints c0 to c2 and, for the isotropic case, c3 and c4; the others come from the derivation.
     printed = [float(c) for c in printed_coefficients(a, phase)]
     printed += list(derived[len(printed) :])
     polynomials = {name: np.polyval(c[::-1], theta) for name, c in (("taylor", derived), ("taylor-printed", printed))}
     return {"exact": exact, **polynomials}
 
 
-def plot(folder: Path | str, **options: Any) -> None:
-    """Draw `polynomials.pdf` and `.png` from the data in a folder; options: see `reports.figures.files.draw_figure`."""
-    draw_figure(NAME, folder, _draw, **options)
-
-
-def _draw(folder: Path, column: str):
+def draw(folder: Path, column: str):
+    """Return the figure, see `reports.figures.files.plot`."""
     import numpy as np
 
     rows = read_data(folder, NAME)

@@ -6,14 +6,14 @@ rebuilt after the light moved, as published. The machines are not the same: what
 paper, and what the error of each is.
 """
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from reference.storage.files import ensure_folder
-from reports.figures.files import draw_figure, new_figure, pixels, read_data, value, write_data, write_table
+from reports.figures.files import new_figure, pixels, read_data, value, write_data
 from reports.figures.published_rows import HEADER, billeter_entries, biri_entries, measured_papers
 from reports.figures.report import reported_papers
+from reports.machine.progress import Progress
 from reports.plotting.style import WIDTHS, method_style
 from reports.tables.drawing import latex
 from reports.tables.table import Column, Measured, Table, Value, table
@@ -27,21 +27,17 @@ def compute(
     *,
     report: Path | str | None = None,
     quick: bool = False,
-    progress: Callable[[float, str], None] | None = None,
+    progress: Progress | None = None,
 ) -> None:
     """Write `published.csv` into a folder: a row for each published figure and everything that was measured for it.
 
     Parameters
     ----------
-    folder
-        Where the data go.
     report
         The folder of a report: the papers that it holds are taken from it; if it holds none, all are measured, which
         takes minutes.
     quick
         Measure at a quarter of the published size, Billeter's Table 1 for its smallest map.
-    progress
-        Told the share done and what comes next.
     """
     target = ensure_folder(folder)
     papers, origin = reported_papers(report)
@@ -51,13 +47,8 @@ def compute(
     write_data(target, NAME, HEADER, rows, **origin)
 
 
-def plot(folder: Path | str, *, output: Path | str | None = None, **options: Any) -> None:
-    """Draw `published.pdf` and `.png` and write `published.tex`; options: see `reports.figures.files.draw_figure`."""
-    draw_figure(NAME, folder, _draw, output=output, **options)
-    write_table(NAME, folder, _tabular, output)
-
-
-def _draw(folder: Path, column: str):
+def draw(folder: Path, column: str):
+    """Return the figure, see `reports.figures.files.plot`."""
     rows = read_data(folder, NAME)
     names = dict.fromkeys(row["table"] for row in rows)
     tables = {name: [row for row in rows if row["table"] == name] for name in names}
@@ -78,7 +69,7 @@ def _draw(folder: Path, column: str):
 
 
 def _scale(row: dict[str, str]) -> str:
-    """Say of what size the images are, where it is not the published one."""
+    """Return the size of the images in words, if it is not the published one."""
     scale = int(row["width"]) / int(row["published_width"])
     return "" if scale == 1 else f", here at {100 * scale:.3g} % of its size"
 
@@ -109,11 +100,12 @@ def _panel(panel, rows: list[dict[str, str]]) -> None:
 
 def _measured(panel, row: dict[str, str], height: float, style: dict[str, Any]) -> None:
     middle, low, high = (value(row, name) for name in ("fps", "fps_low", "fps_high"))
-    if middle is not None and low is not None and high is not None:  # what was not measured has its name alone
+    if middle is not None and low is not None and high is not None:  # a row without a measurement has its name alone
         panel.errorbar([middle], [height], xerr=[[middle - low], [high - middle]], **style)
 
 
-def _tabular(rows: list[dict[str, str]]) -> str:
+def tabular(rows: list[dict[str, str]]) -> str:
+    """Return the LaTeX table, see `reports.figures.files.plot`."""
     comment = (
         "Frames a second after the light moved, everything rebuilt, medians with the distances to the quartiles; the",
         "error of the airlight is against the quadrature truth.",
@@ -141,6 +133,6 @@ def _cells(row: dict[str, str]) -> tuple[Value, ...]:
     size = "" if as_published else f"{', ' if variant else ''}{pixels(row)}"
     shown = None if fps is None or low is None or high is None else Measured(fps, low, high)
     ratio = fps / published if fps and published and as_published else None
-    # A published figure has the digits that were printed.
+    # Published numbers keep the digits that were printed.
     printed = None if published is None else int(published) if published == int(published) else published
     return (row["row"], variant + size, printed, shown, ratio, value(row, "relative_rmse"))

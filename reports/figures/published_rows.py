@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Rows of the figure of the published results, from what `airlight published` measures or a report holds."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
-from reports.machine.progress import part_of
+from reports.machine.progress import Progress, part_of
 from reports.papers.billeter import SIZE, billeter_data
 from reports.papers.biri import biri_data, biri_variant
 
@@ -28,7 +28,7 @@ HEADER = (
 _LIMIT = 10.0  # a frame that takes longer is left out [s]
 
 
-def measured_papers(quick: bool, progress: Callable[[float, str], None] | None) -> dict[str, Any]:
+def measured_papers(quick: bool, progress: Progress | None) -> dict[str, Any]:
     """Measure the tables of both papers, as `published` in report.json.
 
     Parameters
@@ -36,7 +36,7 @@ def measured_papers(quick: bool, progress: Callable[[float, str], None] | None) 
     quick
         A quarter of the published width and height, and one size of the map in Billeter's Table 1.
     progress
-        Told the share done and what comes next.
+        Called with the share done and what comes next.
     """
     from validation.papers.billeter_images import figure_rows
     from validation.papers.billeter_tessellation import MAPS, table_rows
@@ -56,35 +56,37 @@ def measured_papers(quick: bool, progress: Callable[[float, str], None] | None) 
 
 def biri_entries(data: dict[str, Any]) -> list[tuple]:
     """Return the rows of Table 2 of Biri 2006 and of the scene that its section 6 adds."""
-    found = []
+    entries = []
     for row in data.get("rows", ()):
-        one = row["published"]
-        name = f"{one['scene']}, {one['where']}" + (", " + _size(one["size"]) if one["size"] != [800, 600] else "")
+        published = row["published"]
+        size = f", {_size(published['size'])}" if published["size"] != [800, 600] else ""
+        name = f"{published['scene']}, {published['where']}{size}"
         variant = biri_variant(row)
         what = ("biri", "Biri 2006, Table 2", name, variant, "shadow-planes")
-        found.append((*what, *_figures(row, one["size"], one["fps"], row["error"])))
-    return found
+        entries.append((*what, *_figures(row, published["size"], published["fps"], row["error"])))
+    return entries
 
 
 def billeter_entries(data: dict[str, Any]) -> list[tuple]:
     """Return the rows of Figures 6 and 7 and Table 1 of Billeter 2010."""
-    found = []
+    entries = []
     for row in data.get("figures", ()):
-        one = row["entry"]
-        figure = one["where"] if one["where"].startswith("Fig") else "Fig. 7"  # peers share the scene of Fig. 7
+        entry = row["entry"]
+        figure = entry["where"] if entry["where"].startswith("Fig") else "Fig. 7"  # peers share the scene of Fig. 7
         table = f"Billeter 2010, {figure.rstrip('abc')}"
-        values = dict(one["parameters"])
+        values = dict(entry["parameters"])
         variant = values.get("evaluation") or (f"{values['steps']} steps" if "steps" in values else "default")
-        what = ("billeter", table, f"{one['where']}, map {one['map']}", f"{one['method']}, {variant}", one["method"])
-        found.append((*what, *_figures(row, SIZE, one["fps"], row["error"])))
+        line, method = f"{entry['where']}, map {entry['map']}", entry["method"]
+        what = ("billeter", table, line, f"{method}, {variant}", method)
+        entries.append((*what, *_figures(row, SIZE, entry["fps"], row["error"])))
     for row in data.get("table", ()):
         name = f"{row['scene']}, map {row['map']}"
         for_table = "Billeter 2010, Table 1"
         # The published figure differs by evaluation here, so each evaluation has a line of its own.
         line = f"{name}, {row['evaluation']}"
         what = ("billeter", for_table, line, row["evaluation"], "light-volumes")
-        found.append((*what, *_figures(row, SIZE, row["published"]["fps"], None)))
-    return found
+        entries.append((*what, *_figures(row, SIZE, row["published"]["fps"], None)))
+    return entries
 
 
 def _figures(row: dict[str, Any], size: Sequence[int], fps: float | None, error: dict[str, Any] | None) -> tuple:

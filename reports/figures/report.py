@@ -11,7 +11,7 @@ FOLDER = Path("airlight-report")  #: where `airlight report` writes unless told 
 
 
 def report_origin(folder: Path | str, data: dict[str, Any]) -> dict[str, Any]:
-    """Return what `reports.figures.files.write_data` says of a report: its date and machine, not ours."""
+    """Return the date and machine of a report, for `reports.figures.files.write_data`."""
     return {
         "report": {"created": data["created"], "command": data["command"], "folder": Path(folder).name},
         "environment": data["environment"],
@@ -19,7 +19,7 @@ def report_origin(folder: Path | str, data: dict[str, Any]) -> dict[str, Any]:
 
 
 def reported_papers(folder: Path | str | None) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return what a report holds of the papers, and its origin as of `report_origin`; nothing without a report."""
+    """Return the papers' tables in a report, and its origin as of `report_origin`; two empty dicts without a report."""
     if folder is None:
         return {}, {}
     data = read_report(folder)
@@ -28,6 +28,6 @@ def reported_papers(folder: Path | str | None) -> tuple[dict[str, Any], dict[str
 
 def measured(scene: dict[str, Any], layer: str = "airlight") -> Iterator[dict[str, Any]]:
     """Yield the methods of a scene that were not refused and whose error is of a layer."""
-    for one in scene["methods"]:
-        if not one["refused"] and one["error"] and one.get("layer", "airlight") == layer:
-            yield one
+    for entry in scene["methods"]:
+        if not entry["refused"] and entry["error"] and entry.get("layer", "airlight") == layer:
+            yield entry

@@ -5,13 +5,13 @@ The shares are of the sum of the stages of a frame after the light moved. How th
 `validation.papers.biri`.
 """
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from reference.storage.files import ensure_folder
-from reports.figures.files import draw_figure, new_figure, pixels, read_data, value, values, write_data, write_table
+from reports.figures.files import new_figure, pixels, read_data, value, values, write_data
 from reports.figures.report import reported_papers
+from reports.machine.progress import Progress
 from reports.papers.biri import biri_variant
 from reports.plotting.style import COLOURS, WIDTHS
 from reports.tables.drawing import latex
@@ -23,7 +23,7 @@ SUMMARY = "share of each stage of shadow planes in a frame: Table 1 of Biri 2006
 _PAPER = "published"
 _HEADER = ("scene", "where", "row", "width", "height", "stage", "share_percent", "ms", "frame_ms", "low_ms", "high_ms")
 _COLOURS = ("purple", "sky", "blue", "orange", "vermillion")
-_HATCHES = ("", "....", "", "////", "")  # beside the colour: for prints in grey
+_HATCHES = ("", "....", "", "////", "")  # hatches tell the stages apart in grey prints
 
 
 def compute(
@@ -31,65 +31,56 @@ def compute(
     *,
     report: Path | str | None = None,
     quick: bool = False,
-    progress: Callable[[float, str], None] | None = None,
+    progress: Progress | None = None,
 ) -> None:
     """Write `stages.csv` into a folder: the share of every stage in every row of the table.
 
     Parameters
     ----------
-    folder
-        Where the data go.
     report
         The folder of a report: if it holds Biri's tables they are taken from it, else they are measured.
     quick
         Measure at a quarter of the published size.
-    progress
-        Told the share done and what comes next.
     """
     target = ensure_folder(folder)
     papers, origin = reported_papers(report)
-    found = papers.get("biri")
-    if not found or not any(row["published"]["shares"] for row in found["rows"]):
-        found, origin = _measured(0.25 if quick else 1.0, progress), {}
+    biri = papers.get("biri")
+    if not biri or not any(row["published"]["shares"] for row in biri["rows"]):
+        biri, origin = _measured(0.25 if quick else 1.0, progress), {}
     rows: list[tuple] = []
     shown = set()
-    for row in found["rows"]:
-        one = row["published"]
-        if one["shares"] is None:
+    for row in biri["rows"]:
+        published = row["published"]
+        if published["shares"] is None:
             continue
-        if one["scene"] not in shown:
-            shown.add(one["scene"])
-            named = (one["scene"], one["where"], _PAPER, *one["size"])
-            rows += [(*named, stage, share, *[None] * 4) for stage, share in zip(found["stages"], one["shares"])]
+        if published["scene"] not in shown:
+            shown.add(published["scene"])
+            named = (published["scene"], published["where"], _PAPER, *published["size"])
+            rows += [(*named, stage, share, *[None] * 4) for stage, share in zip(biri["stages"], published["shares"])]
         frame = tuple(row["light_moved"][name] for name in ("median_ms", "low_ms", "high_ms"))
-        named = (one["scene"], one["where"], biri_variant(row), *row["size"])
-        parts = zip(found["stages"], row["shares"], row["stages_ms"])
+        named = (published["scene"], published["where"], biri_variant(row), *row["size"])
+        parts = zip(biri["stages"], row["shares"], row["stages_ms"])
         rows += [(*named, stage, share, ms, *frame) for stage, share, ms in parts]
     write_data(target, NAME, _HEADER, rows, **origin)
 
 
-def _measured(scale: float, progress: Callable[[float, str], None] | None) -> dict[str, Any]:
+def _measured(scale: float, progress: Progress | None) -> dict[str, Any]:
     from reports.papers.biri import biri_data
     from validation.papers.biri import PUBLISHED, biri_rows
 
-    return biri_data(biri_rows([one for one in PUBLISHED if one.shares], scale=scale, progress=progress), [])
-
-
-def plot(folder: Path | str, *, output: Path | str | None = None, **options: Any) -> None:
-    """Draw `stages.pdf` and `.png` and write `stages.tex`; options: see `reports.figures.files.draw_figure`."""
-    draw_figure(NAME, folder, _draw, output=output, **options)
-    write_table(NAME, folder, _tabular, output)
+    return biri_data(biri_rows([row for row in PUBLISHED if row.shares], scale=scale, progress=progress), [])
 
 
 def _groups(rows: list[dict[str, str]]) -> dict[tuple[str, str], list[dict[str, str]]]:
     """Return the rows by scene and by what was measured, in their order."""
-    found: dict[tuple[str, str], list[dict[str, str]]] = {}
+    groups: dict[tuple[str, str], list[dict[str, str]]] = {}
     for row in rows:
-        found.setdefault((row["scene"], row["row"]), []).append(row)
-    return found
+        groups.setdefault((row["scene"], row["row"]), []).append(row)
+    return groups
 
 
-def _draw(folder: Path, column: str):
+def draw(folder: Path, column: str):
+    """Return the figure, see `reports.figures.files.plot`."""
     import numpy as np
 
     rows = read_data(folder, NAME)
@@ -122,7 +113,8 @@ def _words(scene: str, row: str, group: list[dict[str, str]]) -> str:
     return f"{row}, {pixels(group[0])}, {value(group[0], 'frame_ms'):.3g} ms"
 
 
-def _tabular(rows: list[dict[str, str]]) -> str:
+def tabular(rows: list[dict[str, str]]) -> str:
+    """Return the LaTeX table, see `reports.figures.files.plot`."""
     scenes: dict[str, list[list[dict[str, str]]]] = {}
     for (scene, _), group in _groups(rows).items():
         scenes.setdefault(scene, []).append(group)
@@ -133,10 +125,10 @@ def _tabular(rows: list[dict[str, str]]) -> str:
 def _table(scene: str, groups: list[list[dict[str, str]]]) -> Table:
     stages = [row["stage"] for row in groups[0]]
     columns = [Column("name", "share of a frame", words=True), *(Column(stage, stage, "%") for stage in stages)]
-    found = []
+    table_rows = []
     for group in groups:
         name, printed = group[0]["row"], group[0]["row"] == _PAPER
         cells: dict[str, Value] = {"name": name if printed else f"{name}, {pixels(group[0])}"}
         cells |= dict(zip(stages, values(group, "share_percent")))
-        found.append(Row(cells | {"frame": value(group[0], "frame_ms")}, published=printed))
-    return table(scene, [*columns, Column("frame", "frame", "ms")], found, explanation=groups[0][0]["where"])
+        table_rows.append(Row(cells | {"frame": value(group[0], "frame_ms")}, published=printed))
+    return table(scene, [*columns, Column("frame", "frame", "ms")], table_rows, explanation=groups[0][0]["where"])

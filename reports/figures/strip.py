@@ -12,15 +12,15 @@ from typing import Any
 from analytic.errors import InputError, nearest
 from reference.storage.files import ensure_folder
 from reports.data.reader import read_report
-from reports.figures.files import draw_figure, new_figure, read_data, value, write_data
+from reports.figures.files import new_figure, read_data, value, write_data
 from reports.figures.report import measured, report_origin
 from reports.plotting.style import COLOURS, WIDTHS
 
 NAME = "strip"
 SUMMARY = "reference and methods of a scene in one exposure, with insets and error maps, from a report"
 
-_MOST = 4  # methods beside the reference
-_INSET = 6  # of an image's shorter side over the side of an inset
+_MOST = 4  # most methods beside the reference
+_INSET = 6  # shorter side of an image over the side of an inset
 _HEADER = ("file", "label", "scene", "layer", "exposure", "relative_rmse", "x0", "y0", "x1", "y1", "side")
 _FRAMES = (COLOURS["orange"], COLOURS["sky"])
 
@@ -37,10 +37,6 @@ def compute(
 
     Parameters
     ----------
-    folder
-        Where the data go.
-    report
-        The folder of the report.
     scene
         Its name in the report; the first with shadows by default.
     methods
@@ -56,64 +52,64 @@ def compute(
     from reference.storage.exr import Image, write_exr
 
     target, data = ensure_folder(folder), read_report(report)
-    found = _scene(data, scene)
-    chosen = _methods(found, methods)
+    shown = _scene(data, scene)
+    chosen = _methods(shown, methods)
     layer = chosen[0].get("layer", "airlight")
-    images = [_pixels(Path(report) / found["files"]["exr"], layer)]
-    images += [_pixels(Path(report) / one["files"]["exr"], layer) for one in chosen]
+    images = [_pixels(Path(report) / shown["files"]["exr"], layer)]
+    images += [_pixels(Path(report) / entry["files"]["exr"], layer) for entry in chosen]
     side = max(4, min(images[0].shape[:2]) // _INSET)
     corners = tuple(insets) if insets else _worst_squares(images, side)
-    shared = (found["name"], layer, _exposure(images[0]))
+    shared = (shown["name"], layer, _exposure(images[0]))
     rows = []
-    for number, (image, one) in enumerate(zip(images, [None, *chosen])):
+    for number, (image, entry) in enumerate(zip(images, [None, *chosen])):
         name = f"{NAME}-{number}.exr"
         write_exr(target / name, Image({layer: image}))
-        error = one["error"]["relative_rmse"] if one else None
-        label = one["label"] if one else "reference"
+        error = entry["error"]["relative_rmse"] if entry else None
+        label = entry["label"] if entry else "reference"
         rows.append((name, label, *shared, error, *corners[0], *corners[1], side))
-    write_data(target, NAME, _HEADER, rows, **report_origin(report, data), scene=found["name"])
+    write_data(target, NAME, _HEADER, rows, **report_origin(report, data), scene=shown["name"])
 
 
 def _scene(data: dict[str, Any], name: str | None) -> dict[str, Any]:
 
-    scenes = {one["name"]: one for one in data["scenes"] if _shown(one, "airlight") or _shown(one, "total")}
+    scenes = {scene["name"]: scene for scene in data["scenes"] if _shown(scene, "airlight") or _shown(scene, "total")}
     if name is not None and name not in scenes:
         raise InputError(f"--scene: got {name!r}, wanted one of {', '.join(scenes)}" + nearest(name, scenes))
     if not scenes:
         raise InputError("the report has no scene with an image of a method: nothing to show")
-    shadowed = [one for one in scenes.values() if not str(one["plan"].get("shadows", "none")).startswith("none")]
+    shadowed = [scene for scene in scenes.values() if not str(scene["plan"].get("shadows", "none")).startswith("none")]
     return scenes[name] if name else (shadowed or list(scenes.values()))[0]
 
 
 def _methods(scene: dict[str, Any], wanted: str | Sequence[str] | None) -> list[dict[str, Any]]:
     """Return the methods to show: those that were asked for, or the most accurate of each."""
-    known = {one["label"]: one for layer in ("airlight", "total") for one in _shown(scene, layer)}
+    known = {entry["label"]: entry for layer in ("airlight", "total") for entry in _shown(scene, layer)}
     if wanted is None:
         best: dict[str, dict[str, Any]] = {}
-        for one in _shown(scene, "airlight") or _shown(scene, "total"):
-            if one["method"] not in best or _rank(one) < _rank(best[one["method"]]):
-                best[one["method"]] = one
+        for entry in _shown(scene, "airlight") or _shown(scene, "total"):
+            if entry["method"] not in best or _rank(entry) < _rank(best[entry["method"]]):
+                best[entry["method"]] = entry
         kept = sorted(best.values(), key=_rank)[:_MOST]
-        return [one for one in best.values() if one in kept]
+        return [entry for entry in best.values() if entry in kept]
     labels = [word.strip() for word in wanted.split(";")] if isinstance(wanted, str) else list(wanted)
     for label in labels:
         if label not in known:
             names = "; ".join(known)
             raise InputError(f"--methods: got {label!r}, wanted some of {names}" + nearest(label, known))
     chosen = [known[label] for label in labels]
-    if len({one.get("layer", "airlight") for one in chosen}) > 1:
+    if len({entry.get("layer", "airlight") for entry in chosen}) > 1:
         raise InputError("--methods: got images with airlight and images without layers; show them in two figures")
     return chosen
 
 
 def _shown(scene: dict[str, Any], layer: str) -> list[dict[str, Any]]:
     """Return the methods of a scene that have an image."""
-    return [one for one in measured(scene, layer) if one["files"].get("exr")]
+    return [entry for entry in measured(scene, layer) if entry["files"].get("exr")]
 
 
-def _rank(one: dict[str, Any]) -> float:
-    error = one["error"]["relative_rmse"]
-    return float("inf") if error is None or one["error"]["nonfinite"] else error
+def _rank(entry: dict[str, Any]) -> float:
+    error = entry["error"]["relative_rmse"]
+    return float("inf") if error is None or entry["error"]["nonfinite"] else error
 
 
 def _pixels(path: Path, name: str):
@@ -133,7 +129,7 @@ def _exposure(reference) -> float:
 def _worst_squares(images, side: int) -> tuple[tuple[int, int], ...]:
     """Return the corners (column, row) of two squares that do not overlap, with the largest errors of all methods.
 
-    Errors are relative to the largest of their method, so that each has its say.
+    Errors are divided by the largest of their method, so that every method counts.
     """
     import numpy as np
 
@@ -144,20 +140,16 @@ def _worst_squares(images, side: int) -> tuple[tuple[int, int], ...]:
         total += error / max(error.max(), np.finfo(float).tiny)
     sums = np.pad(total, ((1, 0), (1, 0))).cumsum(axis=0).cumsum(axis=1)
     inside = sums[side:, side:] - sums[:-side, side:] - sums[side:, :-side] + sums[:-side, :-side]
-    found = []
+    corners = []
     for _ in range(2):
-        row, column = (int(one) for one in np.unravel_index(int(inside.argmax()), inside.shape))
-        found.append((column, row))
+        row, column = (int(index) for index in np.unravel_index(int(inside.argmax()), inside.shape))
+        corners.append((column, row))
         inside[max(0, row - side) : row + side, max(0, column - side) : column + side] = -1.0
-    return tuple(found)
+    return tuple(corners)
 
 
-def plot(folder: Path | str, **options: Any) -> None:
-    """Draw `strip.pdf` and `.png` from the data in a folder; options: see `reports.figures.files.draw_figure`."""
-    draw_figure(NAME, folder, _draw, **options)
-
-
-def _draw(folder: Path, column: str):
+def draw(folder: Path, column: str):
+    """Return the figure, see `reports.figures.files.plot`."""
     import numpy as np
 
     from reports.plotting.pictures import error_map, tone_mapped

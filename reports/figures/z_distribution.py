@@ -6,45 +6,33 @@ comes from K batch means, so without a bias z follows Student's law with K - 1 d
 law. Channels of one pixel share their paths; one channel is shown, the first that is lit.
 """
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from reference.storage.files import ensure_folder
-from reports.figures.files import draw_figure, new_figure, read_data, values, write_data
-from reports.machine.progress import counted, part_of
+from reports.figures.files import new_figure, read_data, values, write_data
+from reports.machine.progress import Progress, counted, part_of
 from reports.plotting.style import COLOURS, WIDTHS, truth_style
 
 NAME = "z-distribution"
 SUMMARY = "distribution of z of single-scatter and volpath against the quadrature truth"
 
 SCENE = "open-fog"
-#: With the samples a pixel in each batch: volpath's batch means need more of them to come close to the normal law.
+#: Samples a pixel in each batch; volpath needs more of them until its batch means are nearly normal.
 ESTIMATORS = {"single-scatter": 64, "volpath": 256}
 _BATCHES = 64
-_EDGE, _BINS = 5.0, 50  # of the histogram; what lies beyond is counted in the outermost bins
+_EDGE, _BINS = 5.0, 50  # of the histogram; values beyond are counted in the outermost bins
 _HEADER = ("estimator", "low", "high", "count", "expected", "normal", "tested", "batches", "z_mean", "z_std")
 
 
-def compute(
-    folder: Path | str,
-    *,
-    quick: bool = False,
-    scene: str = SCENE,
-    progress: Callable[[float, str], None] | None = None,
-) -> None:
+def compute(folder: Path | str, *, quick: bool = False, scene: str = SCENE, progress: Progress | None = None) -> None:
     """Write `z-distribution.csv` into a folder: how many values of z fall into each bin, and how many should.
 
     Parameters
     ----------
-    folder
-        Where the data go.
     quick
         A smaller image.
     scene
         A built-in scene or the path of a Mitsuba XML file.
-    progress
-        Told the share done and what comes next.
     """
     import numpy as np
     from scipy.stats import norm, t
@@ -65,7 +53,7 @@ def compute(
         laws = (len(z) * np.diff(law) for law in (t.cdf(outer, _BATCHES - 1), norm.cdf(outer)))
         shared = (len(z), _BATCHES, float(z.mean()), float(z.std()))
         bins = zip(edges[:-1].tolist(), edges[1:].tolist(), counts.tolist(), *(law.tolist() for law in laws))
-        rows += [(estimator, *one, *shared) for one in bins]
+        rows += [(estimator, *counted_bin, *shared) for counted_bin in bins]
     write_data(target, NAME, _HEADER, rows, scene=scene, image=image, batches=_BATCHES, samples=ESTIMATORS)
 
 
@@ -78,20 +66,16 @@ def _z(scene, estimator: str, samples: int, progress):
     from validation.estimates.monte_carlo import monte_carlo_batches
 
     expected, mask = estimator_truth(scene, estimator)
-    found = monte_carlo_batches(scene, estimator, batches=_BATCHES, samples=samples, progress=progress).batches
-    estimate = batch_estimate(found, "airlight", mask)
-    error, mean = (np.asarray(one)[mask] for one in (estimate.standard_error, estimate.mean))
+    batches = monte_carlo_batches(scene, estimator, batches=_BATCHES, samples=samples, progress=progress).batches
+    estimate = batch_estimate(batches, "airlight", mask)
+    error, mean = (np.asarray(layer)[mask] for layer in (estimate.standard_error, estimate.mean))
     channel = int(np.argmax(expected.sum(axis=0) > 0))
     tested = error[:, channel] > 0
     return ((mean - expected)[:, channel] / np.where(tested, error[:, channel], 1.0))[tested]
 
 
-def plot(folder: Path | str, **options: Any) -> None:
-    """Draw `z-distribution.pdf` and `.png` from the data; options: see `reports.figures.files.draw_figure`."""
-    draw_figure(NAME, folder, _draw, **options)
-
-
-def _draw(folder: Path, column: str):
+def draw(folder: Path, column: str):
+    """Return the figure, see `reports.figures.files.plot`."""
     import numpy as np
 
     rows = read_data(folder, NAME)
@@ -106,7 +90,7 @@ def _draw(folder: Path, column: str):
         middle = 0.5 * (low + high)
         panel.bar(low, count, high - low, align="edge", color=COLOURS["sky"], label="pixels")
         panel.plot(middle, expected, label=f"Student's law, {int(chosen[0]['batches']) - 1} degrees", **truth_style())
-        # Counts of independent pixels spread like Poisson's law.
+        # Counts of independent pixels follow Poisson's law.
         panel.fill_between(
             middle,
             expected - 2 * np.sqrt(expected),

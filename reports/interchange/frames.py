@@ -14,11 +14,11 @@ STAGES = (
     "cull",
     "render",
     "passes",
-)  #: the functions of a frame that are frozen, of a `FrameRenderer`
+)  #: the frozen functions of a `FrameRenderer`
 
 
 def check_ending(option: str, path: Path, ending: str, *, instead: str = "") -> None:
-    """Refuse a file whose name says that it is something else than what will be written.
+    """Refuse a file name that ends like another kind of file.
 
     Raises
     ------
@@ -53,7 +53,7 @@ def write_frames(
     outputs
         The paths that were asked for, as 'exr' and 'png'; frames get their number before the suffix.
     progress
-        Told the share done and what was written last.
+        Called with the share done and what was written last.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def write_frames(
 
     cost: list[tuple[float, float]] = []
     kept = None
-    factor: float | None = None  # the exposure of the first frame serves for all: a lamp that fades must look so
+    factor: float | None = None  # all frames share the exposure of the first, so that a lamp that fades looks it
     done = 0
     try:
         start = time.perf_counter()

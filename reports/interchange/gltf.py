@@ -36,7 +36,7 @@ Array = NDArray[np.float64]
 
 _FLOAT, _UINT = 5126, 5125
 _VERTICES, _INDICES = 34962, 34963
-_NEAR = 1e-3  # glTF wants a near plane; the medium begins at the pinhole all the same [m]
+_NEAR = 1e-3  # glTF requires a near plane [m]; the medium begins at the pinhole all the same
 
 # Rows: where the axes of glTF's world lie in the scene's, by the axis that points up in the scene.
 _TURNS: dict[str, list[list[int]]] = {
@@ -92,8 +92,8 @@ def _document(
 ) -> tuple[dict[str, Any], bytes]:
     """Return the JSON and the binary part."""
     buffer = _Buffer()
-    materials = [_material(one) for one in described["surfaces"]]
-    materials += [_boundary(one) for one in described["bounded_media"]]
+    materials = [_material(surface) for surface in described["surfaces"]]
+    materials += [_boundary(medium) for medium in described["bounded_media"]]
     meshes = [buffer.mesh(mesh, turn, number) for number, mesh in enumerate([*opaque, *bounds])]
     nodes: list[dict[str, Any]] = [{"name": mesh["name"], "mesh": number} for number, mesh in enumerate(meshes)]
     camera = described["camera"]
@@ -161,11 +161,11 @@ _KEYS = {"W/sr": "w_per_sr", "W/m^2": "w_per_m2"}
 
 
 def _light(light: dict[str, Any]) -> dict[str, Any]:
-    # Of a directional light the format wants lux in the place of candela.
+    # For a directional light the format requires lux in place of candela.
     quantity, unit = ("irradiance", "W/m^2") if light["kind"] == "directional" else ("intensity", "W/sr")
     intensity = np.array(light[quantity])
     largest = float(intensity.max())
-    found: dict[str, Any] = {
+    punctual: dict[str, Any] = {
         "type": light["kind"],
         "intensity": largest,
         "color": (intensity / largest if largest > 0 else np.ones(3)).tolist(),
@@ -177,16 +177,16 @@ def _light(light: dict[str, Any]) -> dict[str, Any]:
     }
     if light["kind"] == "spot":
         outer = float(np.deg2rad(light["cutoff_angle"]))
-        # The format wants the inner angle below the outer one, also for a cone with a hard edge.
+        # The format requires an inner angle below the outer one, also for a cone with a hard edge.
         inner = min(float(np.deg2rad(light["beam_angle"])), outer * (1 - 1e-4))
-        found["spot"] = {"innerConeAngle": inner, "outerConeAngle": outer}
-        found["extras"] |= {key: light[key] for key in ("beam_angle", "cutoff_angle")}
-    return found
+        punctual["spot"] = {"innerConeAngle": inner, "outerConeAngle": outer}
+        punctual["extras"] |= {key: light[key] for key in ("beam_angle", "cutoff_angle")}
+    return punctual
 
 
 def _light_matrix(light: dict[str, Any], turn: Array) -> list[float]:
     """Return the transform of a light, which shines along its own -z."""
-    position = light.get("position", [0.0, 0.0, 0.0])  # one at infinity has none
+    position = light.get("position", [0.0, 0.0, 0.0])  # a directional light has no position
     if "axis" not in light:
         return _matrix(np.eye(3), position, turn)
     backward = -np.array(light["axis"])
@@ -198,7 +198,7 @@ def _light_matrix(light: dict[str, Any], turn: Array) -> list[float]:
 def _matrix(axes: Array, position: list[float], turn: Array) -> list[float]:
     """Return a transform as glTF lists it, column by column; `axes` has the node's axes as columns."""
     matrix = np.eye(4)
-    # The axes are float32 numbers; the format wants a rotation.
+    # The axes are in float32, but the format requires a rotation.
     unit, _, other = np.linalg.svd(turn @ axes)
     matrix[:3, :3] = unit @ other
     matrix[:3, 3] = turn @ np.array(position)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The shapes of a Mitsuba scene as triangle meshes, for engines that know no other.
+"""The shapes of a Mitsuba scene as triangle meshes, for engines that support nothing else.
 
 Meshes, rectangles and Mitsuba's cubes stay what they are. Round shapes are cut into `SIDES` around: no point of the
 mesh is further inside the shape than 1 - cos(pi / SIDES) = 3e-4 of the radius, twice that for spheres.
@@ -44,7 +44,7 @@ def shape_mesh(shape: Any) -> ShapeMesh:
         For a shape that cannot be made one, with its name.
     """
     unit = {"Rectangle": _rectangle, "Sphere": _sphere, "Disk": _disk, "Cylinder": _cylinder}.get(shape.class_name())
-    if unit is None and shape.is_mesh():  # Mitsuba's rectangle says that it is a mesh too, but has no vertices
+    if unit is None and shape.is_mesh():  # Mitsuba's rectangle claims to be a mesh, but has no vertices
         return _of_mesh(shape)
     if unit is None:
         raise InputError(

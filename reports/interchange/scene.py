@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a scene is, in the numbers that another renderer wants to be told."""
+"""A scene in numbers, as another renderer needs them."""
 
 from typing import Any
 
@@ -14,7 +14,7 @@ from validation.scenes.loading import LoadedScene
 
 Array = NDArray[np.float64]
 
-_POINTS = 64  # at which a reflectance is asked for, to tell a texture from a colour
+_POINTS = 64  # samples of a reflectance, to tell a texture from a colour
 
 _FALLOFF = {
     "point": "the same intensity in every direction; irradiance falls as 1/r^2, times exp(-sigma_t r)",
@@ -34,7 +34,7 @@ CONVENTION = (
 
 
 def describe_scene(loaded: LoadedScene) -> dict[str, Any]:
-    """Return all that a renderer must be told to render a scene, as plain data.
+    """Return everything that a renderer needs to render a scene, as plain data.
 
     Parameters
     ----------
@@ -159,19 +159,19 @@ def _bounds(bounds: Any) -> dict[str, Any]:
     from reference.scene.convex_bounds import Sphere
 
     if isinstance(bounds, Sphere):
-        return {"kind": "ball", "centre": _numbers(bounds.centre), "radius": _number(bounds.radius)}
+        return {"kind": "sphere", "centre": _numbers(bounds.centre), "radius": _number(bounds.radius)}
     return {"kind": "convex mesh", "facets": len(bounds.offset)}
 
 
 def _light(light: TruthLight) -> dict[str, Any]:
-    found: dict[str, Any] = {
+    described: dict[str, Any] = {
         "kind": "point",
         "position": _numbers(light.position),
         "intensity": _numbers(light.intensity),
     }
     if light.axis is None:
-        return found | {"falloff": _FALLOFF["point"]}
-    return found | {
+        return described | {"falloff": _FALLOFF["point"]}
+    return described | {
         "kind": "spot",
         "axis": _numbers(light.axis),
         "cutoff_angle": _number(np.rad2deg(light.cutoff)),
@@ -196,8 +196,8 @@ def _reflectance(shape: Any) -> tuple[list[float], bool]:
 
     number = np.arange(_POINTS)
     place = mi.Point2f((number + 0.5) / _POINTS, number * 0.6180339887 % 1)  # evenly spread: Kronecker's points
-    found = shape.sample_position(0, place)
-    interaction = mi.SurfaceInteraction3f(found, dr.zeros(mi.Color0f))
+    sample = shape.sample_position(0, place)
+    interaction = mi.SurfaceInteraction3f(sample, dr.zeros(mi.Color0f))
     interaction.wi = mi.Vector3f(0, 0, 1)
     values = np.array(shape.bsdf().eval_diffuse_reflectance(interaction), dtype=np.float64).reshape(3, -1)
     return _numbers(values.mean(axis=1)), bool(np.ptp(values, axis=1).max() > 1e-6)
@@ -210,5 +210,5 @@ def _numbers(values: Any) -> list[float]:
 def _number(value: float) -> float:
     """Return a number that float32 rounded as the one that was meant: 0.91 instead of 0.9100000262260437."""
     short = float(str(np.float32(value)))
-    # A number with more digits than float32 has stays what it is; + 0.0 takes the sign from a zero.
+    # A number with more digits than float32 holds is kept; + 0.0 removes the sign of a zero.
     return (short if abs(short - value) <= 1e-7 * abs(value) else float(value)) + 0.0

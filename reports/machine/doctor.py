@@ -99,37 +99,37 @@ def try_kernel(variant: str, patience: float = _PATIENCE) -> dict[str, Any]:
     return {"problem": f"the test kernel in {variant} failed, {how}: {words[-1] if words else 'without a word'}"}
 
 
-def print_diagnosis(found: dict[str, Any]) -> None:
+def print_diagnosis(diagnosis: dict[str, Any]) -> None:
     """Print a diagnosis as a table, plain where piped."""
     from reports.tables.table import table, words
     from reports.tables.terminal import print_table
 
-    kernel = found["kernel"] or {}
+    kernel = diagnosis["kernel"] or {}
     rows = [
-        ("Python", "yes", f"{found['versions']['python']}, {found['python']}"),
-        ("platform", "", f"{found['platform']}, {found['processor']}, {found['threads']} threads"),
+        ("Python", "yes", f"{diagnosis['versions']['python']}, {diagnosis['python']}"),
+        ("platform", "", f"{diagnosis['platform']}, {diagnosis['processor']}, {diagnosis['threads']} threads"),
     ]
     rows += [
         (name, "no" if version == "missing" else "yes", version)
-        for name, version in found["versions"].items()
+        for name, version in diagnosis["versions"].items()
         if name != "python"
     ]
-    for llvm in found["llvm"]:
+    for llvm in diagnosis["llvm"]:
         used = ", used" if llvm["used"] else ""
         rows.append((f"LLVM {llvm['version'] or '?'}", _yes(llvm["works"]), f"{llvm['path']}: {llvm['reason']}{used}"))
-    if not found["llvm"]:
+    if not diagnosis["llvm"]:
         rows.append(("LLVM", "no", "none found"))
     for key, name in {"libatomic": "libatomic.so.1", "cuda": "CUDA", "optix": "OptiX"}.items():
-        rows.append((name, _yes(found[key]["works"]), found[key]["reason"]))
-    rows.append(("variant", _yes(found["variant"] is not None), found["variant"] or "none works"))
+        rows.append((name, _yes(diagnosis[key]["works"]), diagnosis[key]["reason"]))
+    rows.append(("variant", _yes(diagnosis["variant"] is not None), diagnosis["variant"] or "none works"))
     if "epsilon" in kernel:
         loaded = f"; loaded {kernel['library']}" if kernel["library"] else ""
         rows.append(("test kernel", "yes", f"ran in {kernel['seconds']:.1f} s on {kernel['threads']} threads{loaded}"))
         rows.append(("shadow-ray epsilon", "", f"{kernel['epsilon']:.4g}, relative; measured"))
-    elif found["variant"]:
+    elif diagnosis["variant"]:
         rows.append(("test kernel", "no", "failed"))
     print_table(table("", words("what", "works", "details"), rows))
-    print("Everything that airlight needs works." if found["works"] else f"Not ready: {found['problem']}")
+    print("Everything that airlight needs works." if diagnosis["works"] else f"Not ready: {diagnosis['problem']}")
 
 
 def _yes(works: bool) -> str:

@@ -48,7 +48,7 @@ class Prepared:
     """What the check before the first kernel chose."""
 
     variant: str
-    llvm: Llvm | None  #: the one that Dr.Jit will load; None where CUDA does without
+    llvm: Llvm | None  #: the library that Dr.Jit will load; None with CUDA, which needs none
 
 
 def prepare(variant: str | None = None) -> Prepared:
@@ -95,6 +95,13 @@ def activate(variant: str | None = None) -> str:
     """Check the machine as `prepare` does and make the Mitsuba variant current; return its name.
 
     A variant of `VARIANTS` that is already current stays, unless another one is asked for.
+
+    Raises
+    ------
+    MissingError
+        If the machine lacks what Mitsuba needs; the message says what to install.
+    InputError
+        If the variant is not one of `VARIANTS`.
     """
     mitsuba = sys.modules.get("mitsuba")
     current = mitsuba.variant() if mitsuba else None
@@ -108,13 +115,13 @@ def activate(variant: str | None = None) -> str:
 
     try:
         mi.set_variant(chosen.variant)
-    except ImportError as error:  # a library that is there and cannot be loaded
+    except ImportError as error:  # the library exists but cannot be loaded
         raise MissingError(f"{chosen.variant} does not start ({error}); see `airlight doctor`") from error
     return chosen.variant
 
 
 def check_variant(variant: str) -> None:
-    """Refuse a variant that airlight cannot run in."""
+    """Raise InputError for a variant that is not one of `VARIANTS`."""
     from analytic.errors import InputError
 
     if variant not in VARIANTS:
@@ -186,13 +193,13 @@ def versions() -> dict[str, str]:
     """Return the versions of airlight, Python and the packages that make the numbers."""
     from importlib.metadata import PackageNotFoundError, version
 
-    found = {"airlight": __version__, "python": ".".join(map(str, sys.version_info[:3]))}
+    installed = {"airlight": __version__, "python": ".".join(map(str, sys.version_info[:3]))}
     for package in _PACKAGES:
         try:
-            found[package] = version(package)
+            installed[package] = version(package)
         except PackageNotFoundError:
-            found[package] = "missing"
-    return found
+            installed[package] = "missing"
+    return installed
 
 
 def stamped(image: "Image") -> "Image":
@@ -207,7 +214,7 @@ def describe_environment() -> dict[str, object]:
 
     mitsuba = sys.modules.get("mitsuba")
     variant = mitsuba.variant() if mitsuba else None
-    found: dict[str, object] = {
+    environment: dict[str, object] = {
         "versions": versions(),
         "platform": platform.platform(),
         "processor": processor(),
@@ -215,11 +222,11 @@ def describe_environment() -> dict[str, object]:
         "variant": variant or "none yet",
     }
     if variant == "cuda_ad_rgb":
-        found["device"] = cuda_status().reason
+        environment["device"] = cuda_status().reason
     llvm = next(iter(find_llvm()), None)
     if llvm is not None:
-        found["llvm"] = f"{llvm.label}, {llvm.path}"
-    return found
+        environment["llvm"] = f"{llvm.label}, {llvm.path}"
+    return environment
 
 
 def machine_in_words(environment: Mapping[str, Any]) -> str:

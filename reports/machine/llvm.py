@@ -38,7 +38,7 @@ _ASK_VERSION = (
 class Llvm:
     """A libLLVM, and whether it can be used."""
 
-    path: str  #: as Dr.Jit would be told
+    path: str  #: as `DRJIT_LIBLLVM_PATH` would name it
     version: tuple[int, int] | None  #: major and minor, None if the file does not tell
     works: bool
     reason: str  #: why it works or not, in words
@@ -80,11 +80,11 @@ def find_llvm(folders: Iterable[Path] | None = None) -> list[Llvm]:
     seen: dict[str, Llvm] = {}
     for path in _libraries(llvm_folders() if folders is None else folders):
         seen.setdefault(os.path.realpath(path), examine_llvm(str(path)))
-    found = sorted(seen.values(), key=lambda llvm: (llvm.works, llvm.version or (0, 0)), reverse=True)
+    libraries = sorted(seen.values(), key=lambda llvm: (llvm.works, llvm.version or (0, 0)), reverse=True)
     if setting:
         own = examine_llvm(setting)
-        found = [own, *(llvm for llvm in found if os.path.realpath(llvm.path) != os.path.realpath(setting))]
-    return found
+        libraries = [own, *(llvm for llvm in libraries if os.path.realpath(llvm.path) != os.path.realpath(setting))]
+    return libraries
 
 
 def examine_llvm(path: str) -> Llvm:

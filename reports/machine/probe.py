@@ -23,14 +23,14 @@ def main() -> None:
     distances = towards.t.numpy().tolist()
     if abs(distances[0] - 1.5) > 1e-5 or distances[1] < 1e30:
         sys.exit(f"wrong result: distances {distances}, wanted 1.5 and infinity")
-    found = {
+    facts = {
         "variant": variant,
         "threads": dr.thread_count(),
         "library": _loaded_llvm(),
         "epsilon": measure_shadow_epsilon(),
         "seconds": time.perf_counter() - start,
     }
-    print(json.dumps(found))
+    print(json.dumps(facts))
 
 
 def _loaded_llvm() -> str | None:

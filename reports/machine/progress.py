@@ -44,7 +44,7 @@ def part_of(progress: Progress | None, first: float, last: float, *, before: str
     """
     if progress is None:
         return lambda share, what: None
-    # Not first + share (last - first): both ends are met to the last digit.
+    # This form, unlike first + share (last - first), gives both ends exactly.
     return lambda share, what: progress((1 - share) * first + share * last, before + what)
 
 
@@ -83,7 +83,7 @@ def _rich_bar(title: str) -> Iterator[Progress]:
         if not shown and elapsed > _PATIENCE:
             shown = True
             bar.start()
-        # Rich's own column looks at the last half minute alone: one long part, and the time left jumps.
+        # Rich's own column considers the last half minute alone, so that one long part makes the estimate jump.
         left = seconds_left(elapsed, share)
         bar.update(task, completed=share, what=what, left="" if left is None else f"about {_clock(left)} left")
 

@@ -46,7 +46,7 @@ def _panel(panel, scene: dict[str, Any], styles: dict[str, dict[str, Any]]) -> N
     panel.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     panel.xaxis.set_major_formatter(FuncFormatter(lambda value, position: f"{value:g}"))
     panel.xaxis.set_minor_formatter(NullFormatter())
-    panel.set_title(scene["name"], fontsize=10, parse_math=False)  # a dollar in a file name is a dollar
+    panel.set_title(scene["name"], fontsize=10, parse_math=False)  # a dollar in a file name must not begin a formula
     panel.grid(True, which="major", linewidth=0.4, alpha=0.5)
 
 

@@ -5,20 +5,19 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from reports.tables.drawing import DASH, typeset
+from reports.tables.drawing import DASH, sentence_in_html, typeset
 from reports.tables.table import number as plain_number
 
 #: Kinds of claims as the page names them.
 KINDS = {
     "truth": "Truth",
-    "fastest": "Fastest",
     "left-out": "Left out",
     "image": "Engine",
     "failed": "Failed",
     "refused": "Refused",
     "not-measured": "Not measured",
 }
-#: By whether a claim is good: a mark, and the words for who cannot see it.
+#: By whether a claim is good: a mark, and its words for screen readers.
 MARKS = {True: ("✓", "holds"), False: ("✗", "does not hold"), None: ("·", "")}
 
 #: The keys of the page, and what they do.
@@ -54,10 +53,10 @@ def words(value: Any) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, Mapping):
-        return ", ".join(f"{key} {words(one)}" for key, one in value.items())
+        return ", ".join(f"{key} {words(entry)}" for key, entry in value.items())
     if isinstance(value, list | tuple):
-        size = len(value) == 2 and all(isinstance(one, int) for one in value)  # width and height
-        return (" \N{MULTIPLICATION SIGN} " if size else ", ").join(words(one) for one in value) or DASH
+        size = len(value) == 2 and all(isinstance(entry, int) for entry in value)  # width and height
+        return (" \N{MULTIPLICATION SIGN} " if size else ", ").join(words(entry) for entry in value) or DASH
     return str(value)
 
 
@@ -69,6 +68,13 @@ def sentence(text: str) -> str:
 def unbroken(text: str) -> str:
     """Return a text in which no line ends before a unit."""
     return re.sub(r"(?<=\d) (?=%|ms\b|frames/s)", "\N{NO-BREAK SPACE}", text)
+
+
+def with_code(text: str) -> str:
+    """Return a sentence as HTML, in which what stands in backticks is code."""
+    from markupsafe import Markup
+
+    return Markup(sentence_in_html(text))
 
 
 def kept_words(data: Mapping[str, Any]) -> str:
@@ -107,4 +113,5 @@ FILTERS: Mapping[str, Callable[..., str]] = {
     "words": words,
     "sentence": sentence,
     "unbroken": unbroken,
+    "with_code": with_code,
 }

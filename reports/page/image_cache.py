@@ -42,36 +42,36 @@ def page_images(scenes: Sequence[Mapping[str, Any]], folder: Path, limit: int) -
     """
     names = [_name(scene, folder) for scene in scenes]
     rungs = [0] * len(scenes)
-    found = [_scene_images(scene, folder, name, 0) for scene, name in zip(scenes, names)]
-    while (total := sum(len(one.data) for one in found)) > limit:
+    packed = [_scene_images(scene, folder, name, 0) for scene, name in zip(scenes, names)]
+    while (total := sum(len(images.data) for images in packed)) > limit:
         coarser = [place for place, rung in enumerate(rungs) if rung + 1 < len(LADDER)]
         if not coarser:
             raise InputError(
                 f"report: the images take {total / 1e6:.1f} MB of the page even with one pixel in {LADDER[-1][1]} "
                 f"along both axes, wanted at most {limit / 1e6:.1f} MB; report fewer scenes or methods at once"
             )
-        largest = max(coarser, key=lambda place: len(found[place].data))
+        largest = max(coarser, key=lambda place: len(packed[place].data))
         rungs[largest] += 1
-        found[largest] = _scene_images(scenes[largest], folder, names[largest], rungs[largest])
-    return found
+        packed[largest] = _scene_images(scenes[largest], folder, names[largest], rungs[largest])
+    return packed
 
 
 def _scene_images(scene: Mapping[str, Any], folder: Path, name: str, rung: int) -> SceneImages:
     """Return the images of a scene at a rung of the ladder, kept or packed now."""
     precision, stride = LADDER[rung]
     kept = f"{name}-{precision.k:g}-{stride}"
-    found = _load(kept)
-    if found is None:
-        found = packed_scene(scene, read_images(scene, folder), precision, stride)
-        _keep(kept, found)
-    return found
+    images = _load(kept)
+    if images is None:
+        images = packed_scene(scene, read_images(scene, folder), precision, stride)
+        _keep(kept, images)
+    return images
 
 
 def _name(scene: Mapping[str, Any], folder: Path) -> str:
     """Return what the packed images of a scene are kept under, without the rung of the ladder."""
-    shown = [one for one in scene["methods"] if one["files"]]
+    shown = [method for method in scene["methods"] if method["files"]]
     digest = hashlib.blake2b(digest_size=16)
-    digest.update(json.dumps([scene["name"], scene["exposure"], [one["label"] for one in shown]]).encode())
+    digest.update(json.dumps([scene["name"], scene["exposure"], [method["label"] for method in shown]]).encode())
     for path in (Path(__file__).with_name(name) for name in _CODE):
         digest.update(path.read_bytes())
     for entry in (scene, *shown):
@@ -92,7 +92,7 @@ def _load(name: str) -> SceneImages | None:
 
 
 def _keep(name: str, images: SceneImages) -> None:
-    # A page is worth having where nothing can be kept, on a full or read-only disk.
+    # On a full or read-only disk nothing can be kept, but the page can still be drawn.
     with suppress(OSError):
         data = np.frombuffer(images.data.encode("ascii"), np.uint8)
         store_arrays(name, {"index": np.array(json.dumps(images.index)), "data": data})

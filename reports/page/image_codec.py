@@ -19,8 +19,7 @@ reference in the denominator and against the exact one in the difference, so tha
 
 A plane of codes is then predicted (from nothing, from the left, from the gradient left + up - left-up), the second and
 third channel also from the first; what remains, zigzag coded (0, -1, 1, -2, ...), goes byte by byte, low bytes first,
-into zlib. All arithmetic is modulo 2^bits, so decoding is exact. `templates/codec.js` is the decoder of the page,
-`decode_planes` its twin.
+into zlib. All arithmetic is modulo 2^bits, so decoding is exact. `templates/codec.js` is the decoder of the page.
 """
 
 import zlib
@@ -35,7 +34,7 @@ Array = NDArray[np.float64]
 NONE, LEFT, GRADIENT = range(3)  #: predictors
 REFERENCE_BITS, DIFFERENCE_BITS, FLIP_BITS = 24, 16, 8
 LARGEST = 32766  #: code of the largest finite difference
-NAN, INFINITE = -32768, 32767  #: codes of what is no number; minus infinity is -INFINITE
+NAN, INFINITE = -32768, 32767  #: codes of values that are not finite; minus infinity is -INFINITE
 
 _BAND = 48  # rows on which a predictor is chosen
 
@@ -45,7 +44,7 @@ class Precision:
     """How finely differences are stored."""
 
     k: float  #: codes for each factor e of a large difference
-    s: float  #: relative difference where linear turns into logarithmic
+    s: float  #: relative difference at which the scale turns from linear to logarithmic
 
     @property
     def of_difference(self) -> float:
@@ -79,8 +78,8 @@ class Packed:
 
 
 def reference_codes(radiance: NDArray[np.floating]) -> Codes:
-    """Return the upper 24 bits of float32 values, rounded to nearest; infinities stay, every NaN becomes one."""
-    with np.errstate(over="ignore"):  # beyond float32 is infinite, as in the file
+    """Return the upper 24 bits of float32 values of any shape, rounded to nearest; every NaN has the same code."""
+    with np.errstate(over="ignore"):  # values beyond float32 become infinite, as in the file
         single = np.ascontiguousarray(radiance, dtype=np.float32)
     bits = single.view(np.uint32).astype(np.int64)
     # Rounding up the largest finite numbers may reach the pattern of infinity, never beyond.
@@ -90,12 +89,12 @@ def reference_codes(radiance: NDArray[np.floating]) -> Codes:
 
 
 def reference_values(codes: Codes) -> Array:
-    """Return the values of `reference_codes`."""
+    """Return the values that the codes of `reference_codes` stand for, in the same shape."""
     return (codes.astype(np.uint32) << np.uint32(8)).view(np.float32).astype(np.float64)
 
 
 def difference_codes(difference: Array, precision: Precision) -> tuple[Codes, float]:
-    """Return the codes of relative differences and the k that they were made with (see the module)."""
+    """Return the codes of relative differences, in the same shape, and the k of their scale (see the module)."""
     finite = np.isfinite(difference)
     scaled = np.arcsinh(np.where(finite, difference, 0) / precision.s)
     largest = float(np.abs(scaled).max(initial=0))
@@ -103,13 +102,6 @@ def difference_codes(difference: Array, precision: Precision) -> tuple[Codes, fl
     codes = np.round(k * scaled)
     codes = np.where(np.isposinf(difference), INFINITE, np.where(np.isneginf(difference), -INFINITE, codes))
     return np.where(np.isnan(difference), NAN, codes).astype(np.int32), k
-
-
-def difference_values(codes: Codes, k: float, s: float) -> Array:
-    """Return the relative differences of `difference_codes`."""
-    values = s * np.sinh(codes / k)
-    values = np.where(codes == INFINITE, np.inf, np.where(codes == -INFINITE, -np.inf, values))
-    return np.where(codes == NAN, np.nan, values)
 
 
 def pack_planes(codes: Codes, bits: int) -> Packed:
@@ -138,36 +130,6 @@ def pack_planes(codes: Codes, bits: int) -> Packed:
         residual = _residual(choices[relative][1], predictor, bits)
         parts += [(residual >> shift).astype(np.uint8).tobytes() for shift in range(0, bits, 8)]
     return Packed(zlib.compress(b"".join(parts), 6), tuple(planes))
-
-
-def decode_planes(packed: Packed, size: tuple[int, int], bits: int) -> Codes:
-    """Return the codes, (height, width, planes); those of 16 bits with their sign. The twin of the page's decoder.
-
-    Parameters
-    ----------
-    packed
-        From `pack_planes`.
-    size
-        Width and height.
-    bits
-        As given to `pack_planes`.
-    """
-    width, height = size
-    raw = np.frombuffer(zlib.decompress(packed.data), np.uint8).astype(np.int64)
-    found: list[NDArray[np.int64]] = []
-    for part, (relative, predictor) in zip(np.split(raw, len(packed.planes)), packed.planes):
-        zigzag = sum(byte << 8 * place for place, byte in enumerate(np.split(part, bits // 8)))
-        residual = np.where(zigzag & 1, -(zigzag + 1) // 2, zigzag // 2).reshape(height, width)
-        if predictor == LEFT:
-            residual = np.cumsum(residual, axis=1)
-        elif predictor == GRADIENT:
-            residual = np.cumsum(np.cumsum(residual, axis=1), axis=0)
-        codes = residual + found[0] if relative else residual
-        found.append(np.asarray(codes % (1 << bits), dtype=np.int64))
-    planes = np.stack(found, axis=-1)
-    if bits == DIFFERENCE_BITS:
-        planes = np.where(planes >> (bits - 1), planes - (1 << bits), planes)
-    return planes.astype(np.int32)
 
 
 def _residual(plane: Codes, predictor: int, bits: int) -> Codes:

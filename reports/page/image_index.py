@@ -37,8 +37,8 @@ Array = NDArray[np.float64]
 LAYERS = ("airlight", "surface")
 FLIP_LAYER = "flip"
 FLIP_LEVELS = 255  #: code of an HDR-FLIP of 1
-DARK = 1e-3  #: share of the mean of the reference below which a relative error is against that, as in the tables
-#: Precision of the differences, and which pixels are kept: from the finest down.
+DARK = 1e-3  #: share of the reference's mean; darker pixels are compared with this floor, as in the tables
+#: Precision of the differences and stride of the pixels, from the finest down.
 LADDER: tuple[tuple[Precision, int], ...] = (
     *((precision, 1) for precision in PRECISIONS),
     *((PRECISIONS[1], stride) for stride in (2, 3, 4, 6, 8, 12, 16)),
@@ -78,8 +78,8 @@ def read_images(scene: Mapping[str, Any], folder: Path) -> StoredImages:
         If a file is missing or cannot be read, or its size is not that of the reference.
     """
     reference = _layers(folder / scene["files"]["exr"])
-    files = [folder / one["files"]["exr"] for one in scene["methods"] if one["files"]]
-    methods = [_layers(path) for path in files]  # one at a time: reading turns the standard error stream off
+    files = [folder / entry["files"]["exr"] for entry in scene["methods"] if entry["files"]]
+    methods = [_layers(path) for path in files]  # not in parallel: reading turns the standard error stream off
     size = reference["airlight"].shape
     for path, layers in zip(files, methods):
         for layer in layers.values():
@@ -127,20 +127,20 @@ def packed_scene(scene: Mapping[str, Any], images: StoredImages, precision: Prec
     exact[TOTAL] = exact["airlight"] + exact["surface"]
     rounded = {name: reference_values(codes[name]) for name in LAYERS}
     rounded[TOTAL] = rounded["airlight"] + rounded["surface"]
-    shown = [one for one in scene["methods"] if one["files"]]
+    shown = [entry for entry in scene["methods"] if entry["files"]]
 
     def packed(number: int) -> dict[str, tuple[Packed, float]]:
         """Return the packed layers of a method, each with its k."""
-        found = {}
+        packed_layers = {}
         for name, layer in thin(images.methods[number]).items():
             if name == FLIP_LAYER:
                 levels = np.round(FLIP_LEVELS * np.clip(np.nan_to_num(layer[..., :1]), 0, 1)).astype(np.int32)
-                found[name] = pack_planes(levels, FLIP_BITS), float(FLIP_LEVELS)
+                packed_layers[name] = pack_planes(levels, FLIP_BITS), float(FLIP_LEVELS)
             else:
                 relative = relative_difference(exact[name], rounded[name], layer, floors[name])
                 method_codes, k = difference_codes(relative, precision)
-                found[name] = pack_planes(method_codes, DIFFERENCE_BITS), k
-        return found
+                packed_layers[name] = pack_planes(method_codes, DIFFERENCE_BITS), k
+        return packed_layers
 
     with ThreadPoolExecutor() as pool:
         references = list(pool.map(lambda name: pack_planes(codes[name], REFERENCE_BITS), LAYERS))
@@ -157,13 +157,13 @@ def packed_scene(scene: Mapping[str, Any], images: StoredImages, precision: Prec
         "s": precision.s,
         "of_difference": precision.of_difference,
         "of_value": precision.of_value,
-        "reference": {name: store.add(one) for name, one in zip(LAYERS, references)},
+        "reference": {name: store.add(plane) for name, plane in zip(LAYERS, references)},
         "methods": [
             {
-                "label": one["label"],
+                "label": entry["label"],
                 "layers": {name: store.add(what) | {"k": k} for name, (what, k) in layers.items()},
             }
-            for one, layers in zip(shown, methods)
+            for entry, layers in zip(shown, methods)
         ],
     }
     return SceneImages(index, base64.b64encode(store.bytes()).decode("ascii"))

@@ -21,7 +21,7 @@ from reports.plotting.colour_maps import signed_colours, unsigned_colours
 from reports.tables.methods import fastest_within
 
 PAGE_LIMIT = 30_000_000  #: bytes of a page
-WORDS_LIMIT = 2_500_000  #: of these for all that is not an image
+WORDS_LIMIT = 2_500_000  #: bytes of these for everything but images
 SCRIPTS = ("codec.js", "scene.js", "draw.js", "viewer.js", "page.js")
 TEMPLATES = Path(__file__).parent / "templates"
 
@@ -55,8 +55,8 @@ def render_page(data: dict[str, Any], folder: Path, *, limit: int = PAGE_LIMIT) 
     )
     environment.filters |= FILTERS
     environment.globals |= TABLES
-    # A scene of which nothing could be shown has no viewer, and no images in the page.
-    with_images = [scene for scene in data["scenes"] if any(one["files"] for one in scene["methods"])]
+    # A scene without any image has no viewer.
+    with_images = [scene for scene in data["scenes"] if any(entry["files"] for entry in scene["methods"])]
     images = page_images(with_images, Path(folder), limit - WORDS_LIMIT)
     number_of = {id(scene): number for number, scene in enumerate(with_images)}
     page = environment.get_template("report.html.j2").render(
@@ -68,13 +68,13 @@ def render_page(data: dict[str, Any], folder: Path, *, limit: int = PAGE_LIMIT) 
         chart=Markup(speed_error_chart(data["scenes"])) if data["scenes"] else "",
         css=Markup((TEMPLATES / "report.css").read_text(encoding="utf-8")),
         scripts=[Markup((TEMPLATES / name).read_text(encoding="utf-8")) for name in SCRIPTS],
-        images=Markup(_script_json({"scenes": [one.index for one in images], "maps": _maps()})),
-        pixels=[Markup(one.data) for one in images],
+        images=Markup(_script_json({"scenes": [scene_images.index for scene_images in images], "maps": _maps()})),
+        pixels=[Markup(scene_images.data) for scene_images in images],
         key_table=KEYS,
         kinds=KINDS,
         marks=MARKS,
         kept=kept_words(data),
-        precision_words=precision_words([one.index for one in images]),
+        precision_words=precision_words([scene_images.index for scene_images in images]),
     )
     if len(page.encode()) > limit:
         raise InputError(
@@ -85,7 +85,7 @@ def render_page(data: dict[str, Any], folder: Path, *, limit: int = PAGE_LIMIT) 
 
 
 def _viewer(scene: Mapping[str, Any], number: int, images: SceneImages) -> dict[str, Any]:
-    shown = [one for one in scene["methods"] if one["files"]]
+    shown = [entry for entry in scene["methods"] if entry["files"]]
     return {
         "number": number,
         "shown": shown,
@@ -99,12 +99,12 @@ def _first_shown(methods: Sequence[Mapping[str, Any]], target: float = 0.01) -> 
     """Return the place of the fastest method within the target, as the claims name it, or else of the most accurate."""
     best = fastest_within(target, methods)
     if best is not None:
-        return next(place for place, one in enumerate(methods) if one is best)
+        return next(place for place, entry in enumerate(methods) if entry is best)
 
     def error(place: int) -> float:
-        found = methods[place]["error"] or {}
-        rmse = found.get("relative_rmse")
-        return float("inf") if rmse is None or found.get("nonfinite") else rmse
+        measured = methods[place]["error"] or {}
+        rmse = measured.get("relative_rmse")
+        return float("inf") if rmse is None or measured.get("nonfinite") else rmse
 
     return min(range(len(methods)), key=error)
 

@@ -11,7 +11,7 @@ from reports.papers.biri import biri_notes, biri_tables
 from reports.tables.agreement import agreement_table
 from reports.tables.checks import left_out_table, mutation_table
 from reports.tables.drawing import html
-from reports.tables.methods import method_row, methods_table
+from reports.tables.methods import fastest_table, method_row, methods_table
 from reports.tables.stability import summary_table
 from reports.tables.table import Column, Row, Table, table
 
@@ -35,7 +35,7 @@ def methods(scene: Data, timed: Sequence[int]) -> Table:
         f"{words(scene['size'])} pixels, of the airlight against the truth, or of all light where an image has no "
         "layers (total). A method that knows no shadows is marked; its error is then the light that shadows take away."
     )
-    rows = [method_row(one, shadows=shadows) for one in scene["methods"]]
+    rows = [method_row(entry, shadows=shadows) for entry in scene["methods"]]
     return methods_table(
         f"Times and errors of the methods in {scene['name']}", rows, *_METHODS, explanation=explanation
     )
@@ -52,7 +52,7 @@ def agreement(scene: Data) -> Table:
     title = f"Monte Carlo estimators against the quadrature in {scene['name']}"
     shown = agreement_table(title, scene["agreement"].items(), *_AGREEMENT, explanation=explanation)
     # A terminal rounds a bias to 0.001 %; the page has every number of report.json.
-    columns = (replace(one, places=None) if one.key.endswith("bias") else one for one in shown.columns)
+    columns = (replace(column, places=None) if column.key.endswith("bias") else column for column in shown.columns)
     return replace(shown, columns=tuple(columns))
 
 
@@ -84,13 +84,14 @@ def _drawn(function: Callable[..., Table | Iterable[Table]]) -> Callable[..., An
         from markupsafe import Markup
 
         made = function(*arguments)
-        return Markup("\n".join(html(one) for one in ([made] if isinstance(made, Table) else made)))
+        return Markup("\n".join(html(each) for each in ([made] if isinstance(made, Table) else made)))
 
     return draw
 
 
 #: What the templates call, by name.
 TABLES: dict[str, Callable[..., Any]] = {
+    "fastest_table": _drawn(fastest_table),
     "methods_table": _drawn(methods),
     "agreement_table": _drawn(agreement),
     "stability_table": _drawn(summary_table),

@@ -75,39 +75,39 @@ def _not_measured(row: Data) -> str:
 def _image_table(rows: Sequence[Data]) -> Table:
     named = {"error_rmse": "rel. RMSE", "error_p99": "p99", "map_error_rmse": "against the map", "map_error_p99": "p99"}
     columns = (*words(name="frames a second"), *COLUMNS, *numbers(**named, how={"digits": 2, "share": True}))
-    found = []
+    table_rows = []
     for row in rows:
         values: dict[str, Value] = {"name": _image(row), **_rates(row, row["entry"]["fps"])}
         for key in ("error", "map_error"):
             error = row.get(key) or {}
             values |= {f"{key}_rmse": error.get("relative_rmse"), f"{key}_p99": error.get("p99")}
-        found.append(Row(values, _not_measured(row)))
+        table_rows.append(Row(values, _not_measured(row)))
     title = "Figures 6 and 7 of Billeter 2010 again: frames a second, and the error of the airlight"
     explanation = "The error is against the truth, and against what the shadow map stands for."
-    return table(title, columns, found, explanation=explanation)
+    return table(title, columns, table_rows, explanation=explanation)
 
 
 def _view_table(rows: Sequence[Data]) -> Table:
     error = numbers(relative_rmse="rel. RMSE to the static mesh", how={"digits": 2, "share": True})
     columns = (*words(name="frames a second"), *numbers("triangles"), *COLUMNS, *error)
-    found = []
+    table_rows = []
     for row in rows:
         values: dict[str, Value] = {"name": _view(row), "triangles": row["triangles"] or None}
         values |= _rates(row, row["published"]["fps"])
         values["relative_rmse"] = (row.get("against_static") or {}).get("relative_rmse")
-        found.append(Row(values, _not_measured(row)))
+        table_rows.append(Row(values, _not_measured(row)))
     what = dict.fromkeys(f"{row['scene']} for {row['published']['what']}" for row in rows)
-    return table(f"Table 1 of Billeter 2010 again, {'; '.join(what)}: frames a second", columns, found)
+    return table(f"Table 1 of Billeter 2010 again, {'; '.join(what)}: frames a second", columns, table_rows)
 
 
 def _pass_table(rows: Sequence[Data]) -> Table:
     columns = (*words(name="ms of each pass"), *numbers(*PASSES))
-    found = []
+    table_rows = []
     for row in rows:
         published = row["published"]["passes"]
         if published:
             name = f"{row['scene']}, map {row['map']}, {row['evaluation']}: published"
-            found.append(Row({"name": name} | {one: published.get(one) for one in PASSES}, published=True))
+            table_rows.append(Row({"name": name} | {step: published.get(step) for step in PASSES}, published=True))
         if row["passes"]:
-            found.append(Row({"name": _view(row)} | {one: row["passes"].get(one) for one in PASSES}))
-    return table("Table 1 of Billeter 2010 again: the passes", columns, found)
+            table_rows.append(Row({"name": _view(row)} | {step: row["passes"].get(step) for step in PASSES}))
+    return table("Table 1 of Billeter 2010 again: the passes", columns, table_rows)

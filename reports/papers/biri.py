@@ -43,7 +43,7 @@ def biri_tables(data: Data) -> list[Table]:
 def biri_notes(data: Data) -> list[str]:
     """Return what there is to know of the published figures, each once."""
     published = [row["published"] for row in data["rows"]]
-    return list(dict.fromkeys(f"{one['where']}: {one['note']}." for one in published if one["note"]))
+    return list(dict.fromkeys(f"{entry['where']}: {entry['note']}." for entry in published if entry["note"]))
 
 
 def biri_variant(row: Data) -> str:
@@ -89,13 +89,13 @@ def _rate_table(rows: Sequence[Data]) -> Table:
         *numbers(rays="camera rays alone", how={"whole": True}),
         *numbers(relative_rmse="rel. RMSE", relative_bias="rel. bias", p99="", how={"digits": 2, "share": True}),
     )
-    found = []
+    table_rows = []
     for row in rows:
         published = row["published"]
         beside = rates(row, published["fps"], comparable=list(row["size"]) == list(published["size"]))
         alone = per_second(measured(row.get("rays")))
-        found.append({**row["error"], **beside, "name": _name(row), "triangles": row["triangles"], "rays": alone})
-    return table("Table 2 of Biri 2006 again: frames a second, and the error of the airlight", columns, found)
+        table_rows.append({**row["error"], **beside, "name": _name(row), "triangles": row["triangles"], "rays": alone})
+    return table("Table 2 of Biri 2006 again: frames a second, and the error of the airlight", columns, table_rows)
 
 
 def _cost_table(costs: Sequence[Data]) -> Table:
@@ -105,5 +105,5 @@ def _cost_table(costs: Sequence[Data]) -> Table:
         *numbers("ratio", "quartiles", how={"places": 3}),
         *numbers("turns"),
     )
-    rows = [{**one, "quartiles": Interval(one["low"], one["high"])} for one in costs]
+    rows = [{**cost, "quartiles": Interval(cost["low"], cost["high"])} for cost in costs]
     return table("What is not needed: a frame with it against one without, in turns", columns, rows)

@@ -16,14 +16,14 @@ from numpy.typing import NDArray
 
 Colours = NDArray[np.uint8]
 
-#: Of each arm in CAM16-UCS (J', a', b'): the middle, the control point of the curve, the end.
+#: Middle, control point and end of each arm's curve, in CAM16-UCS (J', a', b').
 MIDDLE = (98.5, -1.87, -1.06)
 BLUE = ((70.0, -14.0, -35.0), (22.0, -1.5, -22.0))
 RED = ((70.0, 36.0, 24.0), (25.0, 29.0, 10.0))
 
 NOT_FINITE = (255, 0, 255)  #: magenta, which no map contains
 
-_FINE = 4097  # points along each curve before it is walked in equal steps
+_FINE = 4097  # points along each curve, from which equal steps are interpolated
 
 
 @functools.cache
@@ -32,7 +32,7 @@ def signed_colours(steps: int = 127) -> Colours:
     import colour
 
     lightness_and_hue = np.concatenate([_arm(BLUE, steps)[:0:-1], _arm(RED, steps)])
-    # The space of CAM16-UCS scales XYZ to 1; sRGB of colour-science as well.
+    # Both CAM16-UCS and the sRGB of colour-science scale XYZ to 1.
     linear = colour.XYZ_to_sRGB(colour.CAM16UCS_to_XYZ(lightness_and_hue))
     return np.round(255 * np.clip(linear, 0, 1)).astype(np.uint8)
 

@@ -22,7 +22,10 @@ def exposure(reference: NDArray[np.float64]) -> float:
 
 
 def tone_mapped(radiance: NDArray[np.float64], factor: float) -> Picture:
-    """Return linear RGB times a factor, clipped to 1 and encoded in sRGB; pixels that are not finite become magenta."""
+    """Return linear RGB, (height, width, 3), times a factor, clipped to 1 and encoded in sRGB.
+
+    Pixels that are not finite become magenta.
+    """
     import colour
 
     finite = np.all(np.isfinite(radiance), axis=-1)
@@ -34,10 +37,10 @@ def tone_mapped(radiance: NDArray[np.float64], factor: float) -> Picture:
 
 
 def error_map(reference: NDArray[np.float64], test: NDArray[np.float64]) -> Picture:
-    """Return the signed relative error in false colour: blue too dark, red too bright, white below 1e-4.
+    """Return the signed relative error of images, (height, width, 3), in false colours: blue too dark, red too bright.
 
     The error of a pixel is its largest over the channels of (test - reference) / max(reference, 0.001 mean(reference)),
-    on a scale that is logarithmic from 1e-4 to 1 on either side, so that one scale serves every method.
+    on a scale that is white below 1e-4 and logarithmic from there to 1 on either side, the same for every method.
     """
     finite = np.isfinite(reference) & np.isfinite(test)
     mean = float(reference[finite].mean()) if finite.any() else 0.0

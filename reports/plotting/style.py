@@ -4,8 +4,7 @@
 The colours are six of Okabe and Ito 2008, *Color Universal Design*, and two darker ones. Under normal sight and for
 whoever lacks one kind of cones (Machado, Oliveira, Fernandes 2009, severity 1) any two differ by more than
 `LEAST_DIFFERENCE` in CIEDE2000; no chart leaves a distinction to the colour alone, each has its marker too. Variants of
-one method (its kernel, its parameters) keep colour and marker and differ by the filling of the marker and the dashes of
-the line.
+one method (its kernel, its parameters) keep colour and marker and differ by the filling of the marker.
 
 Nothing heavy is imported at the top, and nothing is set: `figure_style` changes matplotlib's settings for a block.
 """
@@ -18,7 +17,7 @@ from typing import Any
 
 from analytic.errors import InputError
 
-#: Of any two of `COLOURS`, in CIEDE2000, under normal sight and without one kind of cones.
+#: Least difference of any two `COLOURS` in CIEDE2000, under normal sight and without one kind of cones.
 LEAST_DIFFERENCE = 10.0
 
 COLOURS: Mapping[str, str] = {
@@ -59,7 +58,6 @@ _KERNELS = {
 }
 _OTHER_KERNEL = ("navy", "h")
 _FILLS = ("full", "none", "left", "right", "top", "bottom")
-_DASHES = ("-", "--", ":", "-.")
 
 _SHEETS = Path(__file__).parent / "styles"
 
@@ -96,11 +94,6 @@ def truth_style() -> dict[str, Any]:
     return {"color": "black", "linestyle": "-", "linewidth": 1.3}
 
 
-def dashes(variant: int) -> str:
-    """Return the line style of a variant."""
-    return _DASHES[variant % len(_DASHES)]
-
-
 def report_styles(scenes: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
     """Return the marker style of every label of a report, the same in its page and in all figures made from it.
 
@@ -114,10 +107,10 @@ def report_styles(scenes: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, An
     """
     variants: dict[str, list[str]] = {}
     for scene in scenes:
-        for one in scene["methods"]:
-            labels = variants.setdefault(one["method"], [])
-            if one["label"] not in labels:
-                labels.append(one["label"])
+        for entry in scene["methods"]:
+            labels = variants.setdefault(entry["method"], [])
+            if entry["label"] not in labels:
+                labels.append(entry["label"])
     others = [method for method in variants if method not in _METHODS]
     styles = {}
     for method, labels in variants.items():

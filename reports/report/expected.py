@@ -17,8 +17,8 @@ from validation.frames.result_cache import CacheEntry, ResultCache, cache_entry,
 from validation.frames.scene_study import Effort, wants_flip
 from validation.scenes.registry import SCENES
 
-#: Roughly the seconds of a default report on two threads of an AMD EPYC: the truth, its checks, multiple scattering,
-#: and each configuration.
+#: Rough seconds of a default report on two threads of an AMD EPYC: the truth, its checks, multiple scattering, and
+#: each configuration.
 _TYPICAL: Mapping[str, tuple[float, float, float, float]] = {
     "open-fog": (1.0, 5.0, 1.5, 1.0),
     "sphere-spot": (1.5, 12.0, 10.0, 2.0),
@@ -31,11 +31,11 @@ _TYPICAL: Mapping[str, tuple[float, float, float, float]] = {
     "tangle": (20.0, 60.0, 25.0, 40.0),
     "windows": (10.0, 45.0, 25.0, 6.0),
 }
-_USUAL = (6.0, 25.0, 20.0, 4.0)  #: of another scene
+_USUAL = (6.0, 25.0, 20.0, 4.0)  #: the same of any other scene
 _OTHERS = {"stability": 20.0, "mutations": 500.0, "biri": 8.0, "zero_cost": 60.0, "billeter": 300.0}
 PAGE_SECONDS = 1.0  #: to pack the images of a scene and draw its part of the page
 _PIXELS = 320 * 240  #: of the images of these runs
-_LEAST = 0.01  #: what finding a result takes [s]
+_LEAST = 0.01  #: to read a kept result [s]
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class SceneEntries:
     def _entry(self, kind: str, asked: Mapping[str, Any], fingerprint: Mapping[str, Any] | None) -> CacheEntry:
         identity = {"scene": self.name, "path": str(self.path.resolve()) if self.path else None, "asked": asked}
         entry = cache_entry(self.cache, kind, identity=identity, fingerprint=fingerprint)
-        # Whether the user has changed a scene of their own is known when it is loaded: it may take its time again.
+        # Only loading a user's scene shows whether it has changed, so assume that it is measured again.
         return replace(entry, made_by="") if self.path and not fingerprint else entry
 
 

@@ -35,7 +35,7 @@ from validation.frames.scene_study import Effort, open_study
 from validation.metrics.errors import plain
 from validation.scenes.registry import SCENES
 
-#: Modules that make what is kept, besides the four sides.
+#: Modules on which kept results depend, besides the four packages below `reports`.
 _MAKERS = (
     "data/serialize.py",
     "plotting/pictures.py",

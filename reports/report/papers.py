@@ -19,7 +19,7 @@ class OtherPart:
     """A part of a report that belongs to no scene."""
 
     kind: str  #: 'stability', 'mutations', 'biri', 'zero_cost' or 'billeter'
-    title: str  #: for the progress
+    title: str  #: shown as the progress
     entry: CacheEntry
     compute: Callable[[Progress], Computed]
 
@@ -82,7 +82,7 @@ def _biri(effort: Effort, scenes: Sequence[str], cache: ResultCache) -> list[Oth
         )
 
     parts = [part(published) for published in PUBLISHED if published.scene in scenes]
-    if parts and "billeter" in effort.papers:  # the effort that leaves nothing out
+    if parts and "billeter" in effort.papers:  # the full effort leaves nothing out
         entry = cache_entry(cache, "zero_cost", identity={})
         costs = OtherPart(
             "zero_cost", "what is not needed", entry, lambda progress: ({"costs": plain(zero_costs())}, {})

@@ -134,7 +134,7 @@ class _Parts:
         entries = [self._entries.method(each, self._made_from | _own_source(each)) for each in chosen]
         methods = []
         workers = threads()
-        # As many at once as there are processors, for HDR-FLIP: nothing is lost of those before if this is stopped.
+        # HDR-FLIP of as many configurations at once as there are processors; Ctrl-C loses no earlier results.
         for first in range(0, len(chosen), workers):
             group = range(first, min(first + workers, len(chosen)))
             results = {number: load_result(entries[number]) for number in group}
@@ -259,7 +259,7 @@ def _own_source(chosen: Configuration) -> dict[str, Any]:
         return _flip_version()
     module = chosen.method.rpartition(":")[0]
     file = module if module.endswith(".py") or os.sep in module else getattr(sys.modules.get(module), "__file__", None)
-    # Of a function typed into a notebook there is no file: its results are never found again.
+    # A function typed into a notebook has no file, so its results cannot be kept.
     source = Path(file).read_bytes().hex() if file else f"no file, {time.time_ns()}"
     return _flip_version() | {"own": source}
 

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 _PREFIX = ".airlight-report-"
-_STALE = 86400.0  # seconds after which what a killed run left belongs to nobody
+_STALE = 86400.0  # seconds after which the remains of a killed run are removed
 
 
 @contextmanager
@@ -37,7 +37,7 @@ def staged(target: Path) -> Iterator[Path]:
     try:
         yield hidden
         files = [path for path in hidden.rglob("*") if path.is_file()]
-        for path in sorted(files, key=lambda one: (one.parent == hidden, one)):
+        for path in sorted(files, key=lambda file: (file.parent == hidden, file)):
             place = target / path.relative_to(hidden)
             place.parent.mkdir(parents=True, exist_ok=True)
             os.replace(path, place)

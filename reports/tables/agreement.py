@@ -54,18 +54,18 @@ def agreement_table(
     keys
         Of `COLUMNS`; `BENCH` by default.
     """
-    rows = (_values(name, one) for name, one in compared)
+    rows = (_values(name, comparison) for name, comparison in compared)
     return table(title, COLUMNS, rows, explanation=explanation).only(*(keys or BENCH))
 
 
-def _values(name: str, one: Mapping[str, Any]) -> Mapping[str, Any]:
-    width, height, batches, samples = (one[key] for key in ("width", "height", "batches", "samples"))
+def _values(name: str, comparison: Mapping[str, Any]) -> Mapping[str, Any]:
+    width, height, batches, samples = (comparison[key] for key in ("width", "height", "batches", "samples"))
     return {
-        **one,
-        **one["statistics"],
+        **comparison,
+        **comparison["statistics"],
         "name": name,
         "samples": width * height * batches * samples / 1e6,
-        "interval": Interval.of(one["statistics"]["relative_bias_ci"]),
+        "interval": Interval.of(comparison["statistics"]["relative_bias_ci"]),
         "effort": f"{width} x {height} pixels, {batches} x {samples} spp",
-        "agrees": Verdict(verdict(one)),
+        "agrees": Verdict(verdict(comparison)),
     }

@@ -55,18 +55,20 @@ def control_table(controls: Iterable[Entry]) -> Table:
     """Return what the same comparisons find without a fault."""
     alarms = numbers(chance="false alarms", how={"percent": True, "digits": 2})
     rows = (
-        {**_seen(one), "control": _comparison(one), "chance": one["chance"], "agrees": Verdict(one["agrees"])}
-        for one in controls
+        _seen(control)
+        | {"control": _comparison(control), "chance": control["chance"], "agrees": Verdict(control["agrees"])}
+        for control in controls
     )
     return table("without a mutation", (*words("control"), *_SEEN, *alarms, *numbers("agrees")), rows)
 
 
-def _seen(one: Entry) -> dict[str, Value]:
-    return {"bias": one["relative_bias"], "interval": Interval(*one["interval"]), "margin": one["margin"]}
+def _seen(comparison: Entry) -> dict[str, Value]:
+    interval = Interval(*comparison["interval"])
+    return {"bias": comparison["relative_bias"], "interval": interval, "margin": comparison["margin"]}
 
 
-def _comparison(one: Entry) -> str:
-    return f"{one['scene']}, {one['layer']}, {one['against']}"
+def _comparison(comparison: Entry) -> str:
+    return f"{comparison['scene']}, {comparison['layer']}, {comparison['against']}"
 
 
 def left_out_table(scenes: Iterable[Entry], *, code: bool = False) -> Table:

@@ -43,7 +43,7 @@ class _Style:
     between: str = ".."  #: the ends of an interval
     percent: str = " %"
     shares: bool = False  #: in per cent
-    zeros: bool = False  #: at the end of numbers are kept: they say how exact a number is
+    zeros: bool = False  #: whether zeros at the end of numbers are kept: they say how exact a number is
 
 
 def text(table: Table, *, width: int | None = None, styled: bool = False) -> str:
@@ -131,7 +131,7 @@ def latex(tables: Sequence[Table], *, comment: Sequence[str] = ()) -> str:
     for place, table in enumerate(tables):
         lines += [r"\addlinespace"] if place else []
         if table.title:
-            about = re.sub(r"\b([\d.]+e-?\d+)\b", lambda found: _num(found[1]), _in_latex(table.explanation))
+            about = re.sub(r"\b([\d.]+e-?\d+)\b", lambda match: _num(match[1]), _in_latex(table.explanation))
             title = rf"\textit{{{_in_latex(table.title)}}}{f', {about}' if about else ''}"
             lines.append(rf"\multicolumn{{{len(columns)}}}{{l}}{{{title}}} \\")
         for row in table.rows:
@@ -217,7 +217,7 @@ def _with_spreads(columns: Iterable[Column]) -> list[Column]:
 def _open_rows(table: Table, style: _Style) -> Iterator[list[str]]:
     for row in table.rows:
         if row.reason and all(row.values.get(column.key) is None for column in table.columns[1:]):
-            continue  # nothing but a name: the line below the table says it
+            continue  # the row has nothing but a name: a line below the table gives the reason
         cells = []
         for column in table.columns:
             value = row.values.get(column.key)
@@ -234,6 +234,11 @@ def _below(table: Table) -> list[str]:
     return [
         f"{text_of(row.values.get(key))}: {said}" for row in table.rows for said in (*row.remarks, row.reason) if said
     ]
+
+
+def sentence_in_text(sentence: str) -> str:
+    """Return a sentence without the backticks around code."""
+    return sentence.replace("`", "")
 
 
 def _in_markdown(words: str) -> str:
@@ -261,6 +266,11 @@ def _until_reason(row: Row, columns: Sequence[Column]) -> tuple[Sequence[Column]
 def _in_html(words: str) -> str:
     """Return text in which nothing is a mark of HTML, with the sign of multiplication in sizes of images."""
     return escape(re.sub(r"(?<=\d) x(?= \d|$)|^ x$", " \N{MULTIPLICATION SIGN}", words))
+
+
+def sentence_in_html(sentence: str) -> str:
+    """Return a sentence as HTML; what stands in backticks is code."""
+    return re.sub(r"`([^`]+)`", r"<code>\1</code>", escape(sentence))
 
 
 def _name_in_html(name: Name) -> str:

@@ -72,24 +72,24 @@ def level_table(title: str, levels: Iterable[Entry]) -> Table:
 def order_table(convergences: Iterable[Entry], *, code: bool = False) -> Table:
     """Return the declared and the measured order of convergence."""
     rows = []
-    for one in convergences:
-        declared = one["declared"] or {}
-        name = Name(one["kernel"]) if code else one["kernel"]
-        sizes = Interval(one["sizes"][0], one["sizes"][-1])
-        rows.append((name, declared.get("kind"), declared.get("value"), one["measured"], sizes))
+    for rate in convergences:
+        declared = rate["declared"] or {}
+        name = Name(rate["kernel"]) if code else rate["kernel"]
+        sizes = Interval(rate["sizes"][0], rate["sizes"][-1])
+        rows.append((name, declared.get("kind"), declared.get("value"), rate["measured"], sizes))
     columns = (*words("kernel", "law"), *numbers("declared", "measured", "sizes"))
     return table("convergence in float64", columns, rows)
 
 
-def convergence_data(found: Any) -> dict[str, Any]:
+def convergence_data(rate: Any) -> dict[str, Any]:
     """Return a `validation.kernels.convergence.Convergence` for JSON: what is declared and measured, not the rays."""
     from validation.metrics.errors import plain
 
-    declared = found.declared
+    declared = rate.declared
     return {
-        "kernel": found.kernel,
-        "sizes": list(found.sizes),
-        "errors": plain(found.errors),
+        "kernel": rate.kernel,
+        "sizes": list(rate.sizes),
+        "errors": plain(rate.errors),
         "declared": {"kind": declared.kind, "value": declared.value, "power": declared.power} if declared else None,
-        "measured": plain(found.measured),
+        "measured": plain(rate.measured),
     }

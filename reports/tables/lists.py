@@ -18,8 +18,8 @@ def method_list() -> Table:
     from realtime.methods.registry import METHODS
 
     rows = [
-        (one.name, one.summary, one.uses_kernel, one.shadows, _defaults(one.defaults), one.source)
-        for one in METHODS.values()
+        (method.name, method.summary, method.uses_kernel, method.shadows, _defaults(method.defaults), method.source)
+        for method in METHODS.values()
     ]
     return table("", words("name", "what", "kernel", "shadows", "parameters", "source", how=_LONG), rows)
 
@@ -28,7 +28,7 @@ def kernel_list() -> Table:
     """Return the airlight kernels with the defaults of their parameters."""
     from realtime.kernels.registry import KERNELS
 
-    rows = [(one.name, one.summary, _defaults(one.parameters), one.source) for one in KERNELS.values()]
+    rows = [(kernel.name, kernel.summary, _defaults(kernel.parameters), kernel.source) for kernel in KERNELS.values()]
     return table("", words("name", "what", "parameters", "source", how=_LONG), rows)
 
 

@@ -15,7 +15,7 @@ _SHARES = {"digits": 2, "share": True}
 def error_table(title: str, errors: "MapErrors") -> Table:
     """Return the errors by size of the map."""
     shares = numbers(relative_rmse="rel. RMSE", relative_bias="rel. bias", p50="", p99="", max="", how=_SHARES)
-    rows = ({"map": size, **vars(one)} for size, one in zip(errors.sizes, errors.metrics, strict=True))
+    rows = ({"map": size, **vars(metrics)} for size, metrics in zip(errors.sizes, errors.metrics, strict=True))
     return table(f"{title}: error", (*numbers("map"), *shares), rows)
 
 

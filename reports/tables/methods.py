@@ -4,7 +4,20 @@
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from reports.tables.table import Measured, Row, Table, Value, digits_of, measured, numbers, words
+from reports.tables.table import (
+    Column,
+    Measured,
+    Name,
+    Row,
+    Table,
+    Value,
+    digits_of,
+    measured,
+    number,
+    numbers,
+    table,
+    words,
+)
 
 Entry = Mapping[str, Any]  #: of a method in a scene, as in report.json
 
@@ -27,6 +40,7 @@ COLUMNS = {
         *numbers(nonfinite="not finite", how={"alarm": True}),
     )
 }
+TARGETS = (0.01, 0.001)  #: relative RMSE for which the fastest method is named
 #: Columns of what `bench` prints.
 BENCH = (
     *("label", "frame", "frame_rate", "airlight", "airlight_rate", "light_moved"),
@@ -46,7 +60,7 @@ def methods_table(title: str, methods: Iterable[Entry | Row], *keys: str, explan
     keys
         Of `COLUMNS`; `BENCH` by default.
     """
-    rows = tuple(one if isinstance(one, Row) else method_row(one) for one in methods)
+    rows = tuple(entry if isinstance(entry, Row) else method_row(entry) for entry in methods)
     return Table(title, tuple(COLUMNS.values()), rows, explanation).only(*(keys or BENCH))
 
 
@@ -94,8 +108,37 @@ def fastest_within(error: float, entries: Iterable[Entry]) -> Entry | None:
     """
 
     def reaches(entry: Entry) -> bool:
-        found = entry.get("error") or {}
-        rmse = found.get("relative_rmse")
-        return bool(entry.get("times")) and rmse is not None and rmse <= error and not found.get("nonfinite")
+        errors = entry.get("error") or {}
+        rmse = errors.get("relative_rmse")
+        return bool(entry.get("times")) and rmse is not None and rmse <= error and not errors.get("nonfinite")
 
     return min(filter(reaches, entries), key=lambda entry: entry["times"]["frame"]["median_ms"], default=None)
+
+
+def fastest_table(scenes: Iterable[Entry], *, code: bool = False) -> Table:
+    """Return for every scene of a report the fastest method within each relative RMSE of `TARGETS`.
+
+    Parameters
+    ----------
+    scenes
+        Of report.json.
+    code
+        Whether the names of scenes are code.
+    """
+    columns = [Column(f"within_{target:g}", f"within {100 * target:g} %", words=True) for target in TARGETS]
+    rows = (
+        (
+            Name(scene["name"]) if code else scene["name"],
+            *(_name_and_time(fastest_within(target, scene["methods"])) for target in TARGETS),
+        )
+        for scene in scenes
+    )
+    explanation = "Relative RMSE of the airlight; median time of a frame with static geometry."
+    return table("The fastest method within an error", (*words("scene"), *columns), rows, explanation=explanation)
+
+
+def _name_and_time(entry: Entry | None) -> str:
+    if entry is None:
+        return "none"
+    milliseconds = entry["times"]["frame"]["median_ms"]
+    return f"{entry['label']}: {number(milliseconds)} ms, {rate_words(milliseconds)}"

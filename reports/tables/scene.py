@@ -8,43 +8,43 @@ from typing import Any
 from reports.tables.drawing import text
 from reports.tables.table import Column, Table, table
 
-_LISTED = 12  # surfaces that are shown one by one; the others are in the JSON
+_LISTED = 12  # surfaces that have a row; the others are in the JSON
 _WIDTH = 120
 
 Cells = tuple[str, str, str]  # what it is, which part of it, and its value
 
 
-def description_text(found: dict[str, Any]) -> str:
+def description_text(described: dict[str, Any]) -> str:
     """Return what `reports.interchange.scene.describe_scene` found for a terminal, and how to judge the image."""
-    command = shlex.join(["airlight", "compare", "--scene", found["source"], found["file"]["name"]])
+    command = shlex.join(["airlight", "compare", "--scene", described["source"], described["file"]["name"]])
     # The command is never folded: it is there to be copied.
-    return f"{text(description_table(found), width=_WIDTH)}\nto judge it: {command}"
+    return f"{text(description_table(described), width=_WIDTH)}\nto judge it: {command}"
 
 
-def description_table(found: dict[str, Any]) -> Table:
+def description_table(described: dict[str, Any]) -> Table:
     """Return what `reports.interchange.scene.describe_scene` found, a row for each number to set."""
-    width, height = found["camera"]["size"]
-    title = f"{found['scene']}, {width} x {height} pixels. {found['purpose']}"
+    width, height = described["camera"]["size"]
+    title = f"{described['scene']}, {width} x {height} pixels. {described['purpose']}"
     columns = (
         Column("what", "", words=True),
         Column("part", "", words=True),
         Column("value", "", words=True, long=True),
     )
-    return table(title, columns, _rows(found))
+    return table(title, columns, _rows(described))
 
 
-def _rows(found: dict[str, Any]) -> Iterator[Cells]:
-    yield "units", "", f"metres, 1/m, W/sr, W/(m^2 sr); right-handed axes, {found['up']} up"
-    yield from _camera(found["camera"])
-    around = "around all bodies" if found["bounded_media"] else "everywhere"
-    yield from _medium(around, found["medium"])
-    for body in found["bounded_media"]:
-        yield from _medium(f"in {body['name']}", body)
-    for light in found["lights"]:
+def _rows(described: dict[str, Any]) -> Iterator[Cells]:
+    yield "units", "", f"metres, 1/m, W/sr, W/(m^2 sr); right-handed axes, {described['up']} up"
+    yield from _camera(described["camera"])
+    around = "around the bounded media" if described["bounded_media"] else "everywhere"
+    yield from _medium(around, described["medium"])
+    for bounded in described["bounded_media"]:
+        yield from _medium(f"in {bounded['name']}", bounded)
+    for light in described["lights"]:
         yield from _light(light)
-    yield from _surfaces(found["surfaces"])
-    yield "radiance", "", found["radiance"]
-    file = found["file"]
+    yield from _surfaces(described["surfaces"])
+    yield "radiance", "", described["radiance"]
+    file = described["file"]
     yield "file to write", "", f"{file['name']}: {file['format']}; {'; '.join(file['layers'].values())}"
 
 
@@ -65,8 +65,10 @@ def _medium(name: str, medium: dict[str, Any] | None) -> Iterator[Cells]:
     yield "medium", "", name
     if "bounds" in medium:
         bounds = medium["bounds"]
-        ball = f"a ball about {_vector(bounds['centre'])}, radius {bounds['radius']:.7g}" if "radius" in bounds else ""
-        yield "", "bounds", ball or f"a convex mesh of {bounds['facets']} facets; --gltf writes it"
+        if "radius" in bounds:
+            yield "", "bounds", f"a sphere about {_vector(bounds['centre'])}, radius {bounds['radius']:.7g}"
+        else:
+            yield "", "bounds", f"a convex mesh of {bounds['facets']} facets; --gltf writes it"
     yield "", "extinction", f"sigma_t {_colour(medium['sigma_t'])} 1/m"
     yield "", "albedo", _colour(medium["albedo"])
     yield "", "scattering", f"sigma_s = albedo sigma_t = {_colour(medium['sigma_s'])} 1/m"
@@ -96,13 +98,14 @@ def _surfaces(surfaces: list[dict[str, Any]]) -> Iterator[Cells]:
     if not surfaces:
         yield "surfaces", "", "none"
         return
-    triangles = sum(one["triangles"] or 0 for one in surfaces)
+    triangles = sum(surface["triangles"] or 0 for surface in surfaces)
     yield "surfaces", "", f"{len(surfaces)}, {triangles} triangles; diffuse: radiance = reflectance / pi irradiance"
-    for one in surfaces[:_LISTED]:
-        what = f"{one['triangles']} triangles" if one["triangles"] is not None else one["kind"].lower()
-        sides = "two-sided" if one["two_sided"] else "black from behind"
-        notes = ", textured: its mean" * one["textured"] + ", not diffuse: its diffuse part" * (not one["diffuse"])
-        yield "", one["name"], f"{what}, reflectance {_colour(one['reflectance'])}{notes}, {sides}"
+    for surface in surfaces[:_LISTED]:
+        what = f"{surface['triangles']} triangles" if surface["triangles"] is not None else surface["kind"].lower()
+        sides = "two-sided" if surface["two_sided"] else "black from behind"
+        notes = ", textured: its mean" if surface["textured"] else ""
+        notes += "" if surface["diffuse"] else ", not diffuse: its diffuse part"
+        yield "", surface["name"], f"{what}, reflectance {_colour(surface['reflectance'])}{notes}, {sides}"
     left = len(surfaces) - _LISTED
     if left > 0:
         yield "", "", f"and {left} more: --json lists them"

@@ -36,9 +36,9 @@ def print_stability(kernels: Sequence[Entry], *, certified: bool) -> None:
         print(f"\n=== {kernel['kernel']}{claim} ===")
         for phase, reason in kernel["refused"].items():
             print(f"refuses {phase}: {reason}")
-        for one in kernel["sets"]:
-            print_table(set_table(one))
-            _print_worst(one)
+        for rays in kernel["sets"]:
+            print_table(set_table(rays))
+            _print_worst(rays)
         print_table(gamma_table(kernel["gamma"]))
         print_table(law_table(kernel["laws"]))
         for reason in kernel["broken"]:
@@ -67,17 +67,17 @@ def summary_table(kernels: Iterable[Entry]) -> Table:
         *numbers(double="float64 largest", how={"digits": 2}),
     )
 
-    def row(kernel: Entry, one: Entry) -> Entry:
-        single = one["single"]["all"]
+    def row(kernel: Entry, rays: Entry) -> Entry:
+        single = rays["single"]["all"]
         odd = single["nan"] + single["infinite"] + single["negative"]
-        largest = one["double"]["all"]["max"]
-        return {**single, "kernel": kernel["kernel"], "set": one["name"], "odd": odd, "double": largest}
+        largest = rays["double"]["all"]["max"]
+        return {**single, "kernel": kernel["kernel"], "set": rays["name"], "odd": odd, "double": largest}
 
-    rows = (row(kernel, one) for kernel in kernels for one in kernel["sets"])
+    rows = (row(kernel, rays) for kernel in kernels for rays in kernel["sets"])
     return table("Stability of the kernels", columns, rows, explanation="All rays of each set together.")
 
 
-def set_table(one: Entry) -> Table:
+def set_table(rays: Entry) -> Table:
     """Return the errors of a kernel on one set of rays, by group."""
     columns = (
         *words(group="rays"),
@@ -89,13 +89,13 @@ def set_table(one: Entry) -> Table:
     )
 
     def rows() -> Iterator[Entry]:
-        for group, single in one["single"].items():
-            double, both = one["double"][group], one["single_against_double"][group]["max"]
+        for group, single in rays["single"].items():
+            double, both = rays["double"][group], rays["single_against_double"][group]["max"]
             written = {"single": in_epsilons(single, "single"), "double": in_epsilons(double, "double")}
             odd = {"odd": _odd(single), "double_odd": _odd(double)}
             yield {**single, **written, **odd, "group": group, "refused": single["refused"] or "", "both": both}
 
-    return table(one["name"], columns, rows())
+    return table(rays["name"], columns, rows())
 
 
 def in_epsilons(errors: Entry, precision: str) -> str:
@@ -111,11 +111,11 @@ def _odd(errors: Entry) -> str:
     return "/".join(map(str, counts)) if any(counts) else ""
 
 
-def _print_worst(one: Entry) -> None:
+def _print_worst(rays: Entry) -> None:
     """Print the worst rays as a file that `airlight integrate` reads."""
-    worst = [line for line in (one["single"]["all"]["worst"], one["double"]["all"]["worst"]) if line is not None]
+    worst = [line for line in (rays["single"]["all"]["worst"], rays["double"]["all"]["worst"]) if line is not None]
     if worst:
-        print("\n".join(["worst rays, float32 then float64:", one["columns"], *worst]))
+        print("\n".join(["worst rays, float32 then float64:", rays["columns"], *worst]))
 
 
 def gamma_table(by_precision: Mapping[str, Entry]) -> Table:
@@ -128,13 +128,13 @@ def gamma_table(by_precision: Mapping[str, Entry]) -> Table:
     )
     rows = [
         {
-            **one["difference"],
+            **study["difference"],
             "precision": precision,
-            "direct": in_epsilons(one["direct"], precision),
-            "difference": in_epsilons(one["difference"], precision),
-            "rounding": f"Max = {number(one['max_rounding'])} (Median = {number(one['median_rounding'])})",
+            "direct": in_epsilons(study["direct"], precision),
+            "difference": in_epsilons(study["difference"], precision),
+            "rounding": f"Max = {number(study['max_rounding'])} (Median = {number(study['median_rounding'])})",
         }
-        for precision, one in by_precision.items()
+        for precision, study in by_precision.items()
     ]
     return table("cancellation: thin lit slivers far from the light", columns, rows)
 

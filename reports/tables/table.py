@@ -39,7 +39,7 @@ class Verdict:
     """Whether a check passed; None where it was not decided within its time."""
 
     good: bool | None
-    words: str = ""  #: said behind it
+    words: str = ""  #: words behind the verdict
 
 
 @dataclass(frozen=True)
@@ -61,11 +61,11 @@ class Column:
     heading: str
     unit: str = ""  #: behind the heading
     words: bool = False  #: text, to the left; numbers stand to the right
-    long: bool = False  #: sentences, which may be broken
-    digits: int = 3  #: significant ones
-    places: int | None = None  #: digits behind the point in place of significant ones
-    whole: bool = False  #: from ten on without digits behind the point, below with one: rates
-    sign: bool = False  #: a plus before what is positive
+    long: bool = False  #: sentences, which may be wrapped
+    digits: int = 3  #: significant digits
+    places: int | None = None  #: digits behind the point, in place of significant digits
+    whole: bool = False  #: rates: no digits behind the point from ten on, one digit below
+    sign: bool = False  #: positive numbers have a plus
     percent: bool = False  #: a share, written in per cent
     share: bool = False  #: a share that HTML writes in per cent and the others as it is
     after: str = ""  #: behind every number, such as a multiplication sign
@@ -84,7 +84,7 @@ class Row:
 
     values: Mapping[str, Value]
     reason: str = ""  #: why the row ends early
-    remarks: tuple[str, ...] = ()  #: on what is in the first column
+    remarks: tuple[str, ...] = ()  #: remarks on what the first column names
     published: bool = False  #: printed in a paper, not measured
 
 
@@ -200,7 +200,7 @@ def digits_of(value: float, column: Column, *, zeros: bool = False, percent: boo
     elif column.whole:
         text = f"{shown:.0f}" if abs(shown) >= 10 else f"{shown:.1f}"
     else:
-        # A share in per cent is read with three digits at least.
+        # Shares in per cent have at least three digits.
         text = number(shown, max(column.digits, 3) if percent and column.share else column.digits, zeros=zeros)
     return f"+{text}" if column.sign and shown > 0 else text
 

@@ -124,18 +124,18 @@ class Calibration:
             "coverage": 0.95,
             "coverage_batches": 0.95,
         }
-        found = []
+        departures = []
         for name, share in expected.items():
             trials = self.runs * self.pixels if name == "exceeding" else self.runs
             low, high = share_interval(share, trials, level)
             if not low <= getattr(self, name) <= high:
-                found.append(f"{name} is {getattr(self, name):.4g}, expected {share:g} ({low:.4g} to {high:.4g})")
+                departures.append(f"{name} is {getattr(self, name):.4g}, expected {share:g} ({low:.4g} to {high:.4g})")
         if self.exceeding_alarms > share_interval(LEVEL, self.runs, level)[1]:
-            found.append(f"exceeding_alarms is {self.exceeding_alarms:.4g}, expected at most {LEVEL:g}")
+            departures.append(f"exceeding_alarms is {self.exceeding_alarms:.4g}, expected at most {LEVEL:g}")
         for name in ("bias_uniformity", "uniformity_uniformity"):
             if getattr(self, name) < level:
-                found.append(f"{name} is {getattr(self, name):.2g}")
-        return tuple(found)
+                departures.append(f"{name} is {getattr(self, name):.2g}")
+        return tuple(departures)
 
 
 @dataclass(frozen=True)
@@ -177,24 +177,24 @@ def calibrate(experiment: Experiment, *, spread: float = 0.3) -> Calibration:
     spread
         Relative standard deviation of one batch in one pixel.
     """
-    found = _comparisons(experiment, 0.0, spread)
+    comparisons = _comparisons(experiment, 0.0, spread)
 
     def covered(name: str) -> float:
-        return float(np.mean([getattr(s, name)[0] <= 0 <= getattr(s, name)[1] for s in found]))
+        return float(np.mean([getattr(s, name)[0] <= 0 <= getattr(s, name)[1] for s in comparisons]))
 
     return Calibration(
         runs=experiment.runs,
         pixels=experiment.size**2,
         batches=experiment.batches,
-        pixel_alarms=float(np.mean([s.rejected > 0 for s in found])),
-        block_alarms=float(np.mean([s.rejected_blocks > 0 for s in found])),
-        exceeding=sum(s.exceeding for s in found) / sum(s.tested for s in found),
-        exceeding_alarms=float(np.mean([s.exceeding_p < LEVEL for s in found])),
-        uniformity_alarms=float(np.mean([s.uniformity_p < LEVEL for s in found])),
+        pixel_alarms=float(np.mean([s.rejected > 0 for s in comparisons])),
+        block_alarms=float(np.mean([s.rejected_blocks > 0 for s in comparisons])),
+        exceeding=sum(s.exceeding for s in comparisons) / sum(s.tested for s in comparisons),
+        exceeding_alarms=float(np.mean([s.exceeding_p < LEVEL for s in comparisons])),
+        uniformity_alarms=float(np.mean([s.uniformity_p < LEVEL for s in comparisons])),
         coverage=covered("relative_bias_ci"),
         coverage_batches=covered("relative_bias_ci_batches"),
-        bias_uniformity=uniformity_p(np.array([s.relative_bias_p for s in found])),
-        uniformity_uniformity=uniformity_p(np.array([s.uniformity_p for s in found])),
+        bias_uniformity=uniformity_p(np.array([s.relative_bias_p for s in comparisons])),
+        uniformity_uniformity=uniformity_p(np.array([s.uniformity_p for s in comparisons])),
     )
 
 
@@ -220,13 +220,13 @@ def check_power(bias: float, experiment: Experiment, *, spread: float | None = N
         raise InputError(f"bias: got {bias}, wanted a relative bias such as 0.005, not 0 and above -1")
     if spread is None:
         spread = spread_to_detect(bias, experiment)
-    found = _comparisons(experiment, bias, spread)
-    predicted = [power(bias / s.relative_bias_se, s.relative_bias_freedom) for s in found]
+    comparisons = _comparisons(experiment, bias, spread)
+    predicted = [power(bias / s.relative_bias_se, s.relative_bias_freedom) for s in comparisons]
     return PowerCheck(
         bias=bias,
-        detectable=float(np.mean([s.detectable_bias for s in found])),
+        detectable=float(np.mean([s.detectable_bias for s in comparisons])),
         predicted=float(np.mean(predicted)),
-        measured=float(np.mean([s.relative_bias_p < 0.05 for s in found])),
+        measured=float(np.mean([s.relative_bias_p < 0.05 for s in comparisons])),
         runs=experiment.runs,
     )
 
@@ -260,12 +260,12 @@ def _comparisons(experiment: Experiment, bias: float, spread: float) -> list[Sta
         error = images.std(axis=0, ddof=1) / np.sqrt(experiment.batches)
         return Estimate(images.mean(axis=0), error, experiment.batches, images.mean(axis=(1, 2)))
 
-    found = []
+    comparisons = []
     for _ in range(experiment.runs):
         test = estimate((1 + bias) * truth)
         reference = estimate(truth) if experiment.noisy_reference else Estimate(truth)
-        found.append(compare_statistics(reference, test, family_level=LEVEL, plain_level=LEVEL))
-    return found
+        comparisons.append(compare_statistics(reference, test, family_level=LEVEL, plain_level=LEVEL))
+    return comparisons
 
 
 def _profile(size: int) -> Array:

@@ -14,7 +14,7 @@ _TURN = rotation((0.3, 1.0, -0.2), 27.1)
 
 
 def closed_sphere(levels: int = 2) -> Mesh:
-    """Return a closed ball of 20 * 4^levels triangles, 0.83 m wide."""
+    """Return a closed sphere of 20 * 4^levels triangles, 0.83 m wide."""
     vertices, faces = icosphere(levels)
     return placed((0.415 * vertices, faces), (0.13, -0.07, 0.19), _TURN)
 
@@ -79,7 +79,7 @@ def boxes_sharing_a_corner() -> Mesh:
 
 
 def doubled_faces() -> Mesh:
-    """Return a closed ball whose first seven faces occur twice, the copies with their corners rotated."""
+    """Return a closed sphere whose first seven faces occur twice, the copies with their corners rotated."""
     vertices, faces = closed_sphere(1)
     return vertices, np.concatenate([faces, np.roll(faces[:7], 1, axis=1)])
 
@@ -101,13 +101,13 @@ def sliver() -> Mesh:
 
 
 def inside_out() -> Mesh:
-    """Return a closed ball whose faces all run clockwise seen from outside."""
+    """Return a closed sphere whose faces all run clockwise seen from outside."""
     vertices, faces = closed_sphere(2)
     return vertices, faces[:, ::-1].copy()
 
 
 def mixed_winding() -> Mesh:
-    """Return a closed ball every fifth face of which is turned over."""
+    """Return a closed sphere every fifth face of which is turned over."""
     vertices, faces = closed_sphere(2)
     faces = faces.copy()
     faces[::5] = faces[::5, ::-1]
@@ -115,12 +115,12 @@ def mixed_winding() -> Mesh:
 
 
 def crossing_spheres() -> Mesh:
-    """Return two closed balls that run into one another: each is sound, but no edge runs where they meet."""
+    """Return two closed spheres that run into one another: each is sound, but no edge runs where they meet."""
     return joined([closed_sphere(2), placed(closed_sphere(2), (0.37, 0.11, -0.07), rotation((1, 0.2, 0.5), 31.0))])
 
 
 def nested_spheres() -> Mesh:
-    """Return a small closed ball within a large one: shadow planes of the inner one do not count."""
+    """Return a small closed sphere within a large one: shadow planes of the inner one do not count."""
     vertices, faces = closed_sphere(2)
     centre = vertices.mean(axis=0)
     return joined([(vertices, faces), (centre + 0.41 * (vertices - centre), faces)])

@@ -36,8 +36,8 @@ def import_graph(sources: Mapping[str, str]) -> dict[str, set[str]]:
     graph = {}
     for module, source in sources.items():
         names = imported(source)
-        found = {name if name in sources else name.rpartition(".")[0] for name in names}
-        graph[module] = {name for name in found if name in sources and name != module}
+        candidates = {name if name in sources else name.rpartition(".")[0] for name in names}
+        graph[module] = {name for name in candidates if name in sources and name != module}
     return graph
 
 
@@ -56,10 +56,10 @@ def reached(graph: Mapping[str, Iterable[str]], starts: Iterable[str]) -> set[st
 def folder_graph(graph: Mapping[str, Iterable[str]], files: Mapping[str, Path]) -> dict[str, set[str]]:
     """Return by folder which other folders its modules import from."""
     folders = {module: path.parent.relative_to(ROOT).as_posix() for module, path in files.items()}
-    found: dict[str, set[str]] = {folder: set() for folder in folders.values()}
+    imported_folders: dict[str, set[str]] = {folder: set() for folder in folders.values()}
     for module, others in graph.items():
-        found[folders[module]] |= {folders[other] for other in others} - {folders[module]}
-    return found
+        imported_folders[folders[module]] |= {folders[other] for other in others} - {folders[module]}
+    return imported_folders
 
 
 def inside(module: str, folder: str) -> bool:

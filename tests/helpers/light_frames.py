@@ -102,12 +102,12 @@ def render(loaded, method="light-volumes", precision="single", **parameters):
 def render_both(loaded, precision="single", **parameters):
     """Render the same height field, as published, by both evaluations."""
     shared = {"precision": precision, "walls": "slanted"} | parameters
-    return [render(loaded, evaluation=one, **shared) for one in EVALUATIONS]
+    return [render(loaded, evaluation=evaluation, **shared) for evaluation in EVALUATIONS]
 
 
-def differ(found, wanted):
+def differ(image, expected):
     """Return the largest difference, relative to the largest value."""
-    return np.max(np.abs(found - wanted)) / np.max(wanted)
+    return np.max(np.abs(image - expected)) / np.max(expected)
 
 
 def twin_of(loaded, frame, size, precision="single", *, walls="slanted"):

@@ -18,7 +18,7 @@ def casters_of(*names):
 
 
 def index_of(casters, light=LIGHT, camera=CAMERA, precision="single"):
-    """Return the index of the shadow planes of all bodies."""
+    """Return the index of the shadow planes of all components."""
     from realtime.numerics.array_types import array_types
 
     used = np.ones(len(casters.closed), dtype=bool)
@@ -119,13 +119,13 @@ def listed_planes(lists):
     from realtime.methods.shadow_planes.plane_table import FIRST, FULL, NUMBER
 
     entries, source = np.array(lists.entries), lists.source
-    found = []
+    by_tile = []
     for first, count, before in zip(*(np.array(part) for part in (source.first, source.count, source.all_before))):
         place = np.arange(first, first + count)
         entry = entries[place]
         counts = ((entry & FIRST) != 0) | (place < before)
-        found.append((entry[counts] & NUMBER, (entry[counts] & FULL) != 0))
-    return found
+        by_tile.append((entry[counts] & NUMBER, (entry[counts] & FULL) != 0))
+    return by_tile
 
 
 def rays_of(index, lists, ways):

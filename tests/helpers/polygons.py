@@ -23,9 +23,9 @@ def rays_of(truth, light=0):
     return lamp, (direction, normal, height), (np.maximum(np.arctan2(-foot, height), cone[0]), np.minimum(end, cone[1]))
 
 
-def lit_lengths(found, ends):
+def lit_lengths(intervals, ends):
     """Return how much of the angle at the light is lit on each ray."""
-    return np.bincount(found.ray, found.high - found.low, len(ends[0]))
+    return np.bincount(intervals.ray, intervals.high - intervals.low, len(ends[0]))
 
 
 def box(centre, size, **changes):
@@ -37,6 +37,6 @@ def box(centre, size, **changes):
 
 
 def box_scene(**changes):
-    """A scene of polygons: the ball of the tiny scene replaced by boxes."""
+    """A scene of polygons: the sphere of the tiny scene replaced by boxes."""
     boxes = {"tower": box((0.1, 0.1, 0.7), (0.43, 0.37, 1.4)), "beam": box((0.6, 0.3, 1.1), (0.9, 0.11, 0.13))}
     return tiny_scene(ball=None, **boxes, **changes)

@@ -225,7 +225,7 @@ def times(frame_ms: float, rng: np.random.Generator | None = None, *, busy: floa
     Without a generator exact ones. A machine that is busy now and then, by the share `busy`, adds up to three times the
     work to whole timings, and to single repetitions of the others: both were seen.
     """
-    found = {}
+    stages = {}
     for stage, share in _STAGES.items():
         count = 40 if share <= 1 else 12
         samples = np.full(count, frame_ms * share)
@@ -235,8 +235,8 @@ def times(frame_ms: float, rng: np.random.Generator | None = None, *, busy: floa
                 samples *= 1 + rng.uniform(0.3, 1.0)
             hit = rng.random(count) < busy * rng.uniform(0.5, 2.0)
             samples += hit * frame_ms * share * rng.uniform(0.5, 3.0, size=count)
-        found[stage] = sampled(samples)
-    return found
+        stages[stage] = sampled(samples)
+    return stages
 
 
 def report(seed: int | None = None, *, busy: float = 0.0, machine: float = 1.0) -> dict[str, Any]:
@@ -260,13 +260,13 @@ def report(seed: int | None = None, *, busy: float = 0.0, machine: float = 1.0) 
 
 
 def method(data: dict[str, Any], scene: str = "hall", label: str = "shadow-planes (exact)") -> dict[str, Any]:
-    (one,) = (one for one in data["scenes"] if one["name"] == scene)
-    (found,) = (found for found in one["methods"] if found["label"] == label)
-    return found
+    (entry,) = (entry for entry in data["scenes"] if entry["name"] == scene)
+    (configuration,) = (configuration for configuration in entry["methods"] if configuration["label"] == label)
+    return configuration
 
 
-def slow_down(one: dict[str, Any], factor: float, stages: tuple[str, ...] = tuple(_STAGES)) -> None:
+def slow_down(configuration: dict[str, Any], factor: float, stages: tuple[str, ...] = tuple(_STAGES)) -> None:
     """Make stages of a method slower."""
     for stage in stages:
         for name in ("median_ms", "low_ms", "high_ms"):
-            one["times"][stage][name] *= factor
+            configuration["times"][stage][name] *= factor

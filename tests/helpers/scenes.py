@@ -5,7 +5,7 @@ from typing import Any
 
 
 def tiny_scene(*, size=(16, 12), **changes: Any) -> dict[str, Any]:
-    """Return a ball over a floor in fog, lit by a point light; `changes` replace or (with None) remove entries."""
+    """Return a sphere over a floor in fog, lit by a point light; `changes` replace or (with None) remove entries."""
     import mitsuba as mi
 
     scene: dict[str, Any] = {
@@ -44,7 +44,7 @@ def tiny_scene(*, size=(16, 12), **changes: Any) -> dict[str, Any]:
 
 
 def spot(*, cutoff=33.0, beam=33.0) -> dict[str, Any]:
-    """Return a spot light above the ball."""
+    """Return a spot light above the sphere."""
     import mitsuba as mi
 
     return {
@@ -56,7 +56,9 @@ def spot(*, cutoff=33.0, beam=33.0) -> dict[str, Any]:
     }
 
 
-def body(shape: dict[str, Any], sigma_t: Any, albedo: tuple[float, float, float], **medium: Any) -> dict[str, Any]:
+def bounded_medium(
+    shape: dict[str, Any], sigma_t: Any, albedo: tuple[float, float, float], **medium: Any
+) -> dict[str, Any]:
     """Return a shape that lets light pass and is filled with a homogeneous medium; `sigma_t` is grey or RGB [1/m]."""
     colour = not isinstance(sigma_t, float)
     inside = {

@@ -11,7 +11,7 @@ def box(centre=(0.0, 0.0, 0.0), half=(1.0, 1.0, 1.0)) -> dict:
     return {"type": "cube", "to_world": transform}
 
 
-def ball(centre=(0.0, 0.0, 0.0), radius=1.0) -> dict:
+def sphere(centre=(0.0, 0.0, 0.0), radius=1.0) -> dict:
     return {"type": "sphere", "center": list(centre), "radius": radius}
 
 

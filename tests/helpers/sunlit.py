@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Bodies of fog under a directional light, and their airlight summed over equal steps in NumPy."""
+"""Bounded media under a directional light, and their airlight summed over equal steps in NumPy."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tests.helpers.scenes import body, clear_scene, tiny_scene
+from tests.helpers.scenes import bounded_medium, clear_scene, tiny_scene
 from validation.scenes.parts import medium_boundary, placed, rotation
 from validation.scenes.solids import box
 
@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 TURN = rotation((0.4, 1.0, 0.1), 33.0)
 SIDES = np.array([1.1, 0.9, 1.4])
 CUBE_AT = (0.7, 0.5, 0.8)
-BALL_AT, BALL_RADIUS = (-0.9, 0.1, 1.6), 0.55
+SPHERE_AT, SPHERE_RADIUS = (-0.9, 0.1, 1.6), 0.55
 PLANK_AT, PLANK_SIDES = (-0.5, 0.2, 2.1), np.array([1.3, 0.8, 0.25])
 ALONG = (0.51, 0.29, -0.81)
 
@@ -47,13 +47,13 @@ def plank() -> dict[str, Any]:
     return cube(centre=PLANK_AT, sides=PLANK_SIDES, sigma_t=1.7, g=0.0)
 
 
-def ball(**medium: Any) -> dict[str, Any]:
-    shape = {"type": "sphere", "center": list(BALL_AT), "radius": BALL_RADIUS}
-    return body(shape, (0.9, 0.5, 0.7), (0.9, 0.4, 0.3), **medium)
+def fog_sphere(**medium: Any) -> dict[str, Any]:
+    shape = {"type": "sphere", "center": list(SPHERE_AT), "radius": SPHERE_RADIUS}
+    return bounded_medium(shape, (0.9, 0.5, 0.7), (0.9, 0.4, 0.3), **medium)
 
 
 def shaded(*, size=(16, 12), **changes: Any) -> dict[str, Any]:
-    """Return the box of fog over the floor with a solid ball between it and the sun."""
+    """Return the box of fog over the floor with a solid sphere between it and the sun."""
     solid = {"type": "sphere", "center": [0.33, 0.27, 1.35], "radius": 0.29}
     things = {"lamp": sun(), "cube": cube(), "solid": solid, "floor": tiny_scene()["floor"]}
     return clear_scene(size=size, **(things | changes))
@@ -79,8 +79,8 @@ def render(scene, method="unshadowed", *, precision="double", **parameters):
     return render_frame(frame_renderer(scene, chosen, kernel=kernel, **parameters))
 
 
-def relative_rmse(one, two) -> float:
-    return float(np.sqrt(np.mean((np.asarray(one, dtype=np.float64) - two) ** 2)) / np.mean(two))
+def relative_rmse(image, reference) -> float:
+    return float(np.sqrt(np.mean((np.asarray(image, dtype=np.float64) - reference) ** 2)) / np.mean(reference))
 
 
 def rays(scene) -> tuple[Array, Array]:
@@ -97,7 +97,7 @@ def rays(scene) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class Part:
-    """A body as the sum over steps knows it."""
+    """A bounded medium as the sum over steps knows it."""
 
     chord: Any  #: (start, direction) -> distances at which lines are in it, the first not below 0
     sigma_t: Array
@@ -111,9 +111,9 @@ def box_part(centre=CUBE_AT, sides=SIDES, sigma_t=1.1, g=0.4, turn=TURN) -> Part
     def chord(start, direction):
         p, d = (start - np.asarray(centre)) @ turn, np.broadcast_to(direction, start.shape) @ turn
         with np.errstate(divide="ignore", invalid="ignore"):
-            one, other = (-0.5 * np.asarray(sides) - p) / d, (0.5 * np.asarray(sides) - p) / d
-        low = np.maximum(np.fmin(one, other).max(axis=-1), 0)
-        return low, np.maximum(np.fmax(one, other).min(axis=-1), low)
+            low_sides, high_sides = (-0.5 * np.asarray(sides) - p) / d, (0.5 * np.asarray(sides) - p) / d
+        low = np.maximum(np.fmin(low_sides, high_sides).max(axis=-1), 0)
+        return low, np.maximum(np.fmax(low_sides, high_sides).min(axis=-1), low)
 
     return Part(chord, np.full(3, sigma_t), np.array([0.2, 0.5, 0.9]), g)
 
@@ -122,12 +122,12 @@ def plank_part() -> Part:
     return box_part(PLANK_AT, PLANK_SIDES, 1.7, 0.0)
 
 
-def ball_part() -> Part:
-    """Return the ball by the quadratic formula."""
+def sphere_part() -> Part:
+    """Return the sphere by the quadratic formula."""
 
     def chord(start, direction):
-        w = start - np.asarray(BALL_AT)
-        b, c = np.sum(w * direction, axis=-1), np.sum(w * w, axis=-1) - BALL_RADIUS**2
+        w = start - np.asarray(SPHERE_AT)
+        b, c = np.sum(w * direction, axis=-1), np.sum(w * w, axis=-1) - SPHERE_RADIUS**2
         root = np.sqrt(np.maximum(b * b - c, 0))
         low = np.maximum(-b - root, 0)
         return low, np.where(b * b > c, np.maximum(-b + root, low), low)

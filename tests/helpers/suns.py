@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from tests.helpers.scenes import body, clear_scene, tiny_scene
+from tests.helpers.scenes import bounded_medium, clear_scene, tiny_scene
 
 TOWARDS = np.array([-0.37, 0.23, 0.81]) / np.linalg.norm([-0.37, 0.23, 0.81])
 
@@ -30,23 +30,25 @@ def brick(sigma_t: Any = (0.9, 0.5, 0.2), albedo=(0.9, 0.4, 0.3), **medium: Any)
     import mitsuba as mi
 
     at = mi.ScalarTransform4f().translate(BRICK[0].tolist()).scale(BRICK[1].tolist())
-    return body({"type": "cube", "to_world": at}, sigma_t, albedo, **medium)
+    return bounded_medium({"type": "cube", "to_world": at}, sigma_t, albedo, **medium)
 
 
 def pearl(sigma_t: Any = 1.3, albedo=(0.2, 0.5, 0.8), **medium: Any) -> dict[str, Any]:
-    """Return a ball of fog."""
-    return body({"type": "sphere", "center": PEARL[0].tolist(), "radius": PEARL[1]}, sigma_t, albedo, **medium)
+    """Return a sphere of fog."""
+    return bounded_medium(
+        {"type": "sphere", "center": PEARL[0].tolist(), "radius": PEARL[1]}, sigma_t, albedo, **medium
+    )
 
 
 def sunny(*, size=(12, 9), **changes: Any) -> dict[str, Any]:
     """Return a camera in clear air and a sun; `changes` add or replace entries."""
     scene = clear_scene(size=size, lamp=None, sun=sun()) | changes
-    scene["sensor"] |= {"fov": 25.0}  # both bodies fill most of the view
+    scene["sensor"] |= {"fov": 25.0}  # both media fill most of the view
     return scene
 
 
 def ball_over_floor() -> dict[str, Any]:
-    """Return the entries of the ball and the floor of the tiny scene."""
+    """Return the entries of the sphere and the floor of the tiny scene."""
     return {name: tiny_scene()[name] for name in ("ball", "floor")}
 
 
@@ -58,8 +60,8 @@ def chord(name: str, origin, direction) -> tuple[Any, Any]:
         root = np.sqrt(np.maximum(b * b - c, 0))
         return np.where(b * b > c, -b - root, 0), np.where(b * b > c, -b + root, 0)
     with np.errstate(divide="ignore"):
-        one, two = ((BRICK[0] + sign * BRICK[1] - origin) / direction for sign in (-1, 1))
-    low, high = np.minimum(one, two).max(axis=-1), np.maximum(one, two).min(axis=-1)
+        low_sides, high_sides = ((BRICK[0] + sign * BRICK[1] - origin) / direction for sign in (-1, 1))
+    low, high = np.minimum(low_sides, high_sides).max(axis=-1), np.maximum(low_sides, high_sides).min(axis=-1)
     return np.where(high > low, low, 0), np.where(high > low, high, 0)
 
 

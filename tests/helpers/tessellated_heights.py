@@ -48,10 +48,10 @@ def _weights(fan, step: int, size: int):
     row, column = (part.ravel() for part in np.mgrid[: step + 1, : step + 1])
     point = np.stack([column * 2 / step, row * 2 / step, np.ones(len(row))])
     weights = np.zeros((len(row), 8))
-    for one in fan:
-        corners = np.array([(*RING[k], 1) for k in one], dtype=float).T
+    for triangle in fan:
+        corners = np.array([(*RING[k], 1) for k in triangle], dtype=float).T
         barycentric = np.linalg.solve(corners, point).T
         inside = np.all(barycentric > -1e-9, axis=1)
         weights[inside] = 0
-        weights[np.ix_(inside, one)] = barycentric[inside]
+        weights[np.ix_(inside, triangle)] = barycentric[inside]
     return weights, row * (size + 1) + column

@@ -54,8 +54,10 @@ def test_what_cannot_be_used_is_refused_with_what_is_wanted(given, words):
 
 
 def test_words_become_values():
-    found = read_parameters("fog", Fog, {"steps": " 0 ", "share": "0.25", "word": "uneven", "on": "no", "free": -1})
-    assert values(found) == {"steps": 0, "share": 0.25, "word": "uneven", "on": False, "free": -1.0}
+    parameters = read_parameters(
+        "fog", Fog, {"steps": " 0 ", "share": "0.25", "word": "uneven", "on": "no", "free": -1}
+    )
+    assert values(parameters) == {"steps": 0, "share": 0.25, "word": "uneven", "on": False, "free": -1.0}
     assert values(read_parameters("fog", Fog, {})) == defaults(Fog)
 
 

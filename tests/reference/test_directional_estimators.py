@@ -33,7 +33,7 @@ def caster():
 
 
 CASES = {
-    "box and ball": lambda: sunny(
+    "box and sphere": lambda: sunny(
         size=(16, 12), brick=brick(**HG), pearl=pearl(), caster=caster(), **ball_over_floor()
     ),
     "thick, light from behind": lambda: sunny(
@@ -51,7 +51,7 @@ CASES = {
 
 @pytest.mark.claim("single-scatter-agrees", tolerance="four to six standard errors")
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[] if name == "box and ball" else pytest.mark.statistical) for name in CASES]
+    "name", [pytest.param(name, marks=[] if name == "box and sphere" else pytest.mark.statistical) for name in CASES]
 )
 def test_single_scatter_agrees_with_the_quadrature(variant, name):
     """Rationale: legs are walked from boundary to boundary, distances are random: no derivation is shared.
@@ -107,7 +107,7 @@ def test_enclosed_scene_is_exactly_dark(variant):
 
 @pytest.mark.claim("volpath-agrees")
 @pytest.mark.statistical
-@pytest.mark.parametrize("name", ["box and ball", "thick, light from behind"])
+@pytest.mark.parametrize("name", ["box and sphere", "thick, light from behind"])
 def test_volpath_agrees(variant, name):
     """Rationale: Mitsuba's own path tracer, which finds the media by walking towards the light.
 
@@ -133,9 +133,9 @@ def test_medium_without_bounds_is_refused(variant, estimator, bounded):
     scene = mi.load_dict(tiny_scene(lamp=None, sun=sun(), **body))
     medium = scene.sensors()[0].get_medium()
     read = {"quadrature": lambda: read_truth(scene), "single-scatter": lambda: read_task(scene, medium, 4)}[estimator]
-    with pytest.raises(InputError, match=r"light 'sun' is directional: .* give the medium bounds") as found:
+    with pytest.raises(InputError, match=r"light 'sun' is directional: .* give the medium bounds") as refusal:
         read()
-    assert "\n" not in str(found.value)
+    assert "\n" not in str(refusal.value)
 
 
 def test_medium_of_no_extinction_around_bodies_is_clear_air(variant):

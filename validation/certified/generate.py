@@ -61,8 +61,8 @@ _CONVENTIONS = {
     "intensity": "radiant intensity [W/sr], of a spot that on its axis; from `beam` to `cutoff` [degrees off the axis] "
     "it falls linearly in the angle to 0",
     "medium": "homogeneous, without bounds; sigma_t is the extinction [1/m], the scattering coefficient albedo sigma_t",
-    "occluders": "black; ball: centre, radius; box: centre + a u + b v + c w with -1 <= a, b, c <= 1; screen: the same "
-    "with u and v alone; half_edges holds u, v, w",
+    "occluders": "black; sphere: centre, radius; box: centre + a u + b v + c w with -1 <= a, b, c <= 1; screen: the "
+    "same with u and v alone; half_edges holds u, v, w",
     "matrix": "in a Mitsuba dictionary {'matrix': rows} stands for a transform, applied to column vectors",
     "numbers": "inputs are JSON numbers, exact in float32 (directions: in float64); results are decimal words",
 }
@@ -247,7 +247,7 @@ def _light_data(light: FogLight) -> dict[str, Any]:
 
 
 def _occluder_data(shape: FogSphere | FogBox | FogScreen) -> dict[str, Any]:
-    names = {FogSphere: "ball", FogBox: "box", FogScreen: "screen"}
+    names = {FogSphere: "sphere", FogBox: "box", FogScreen: "screen"}
     return {"type": names[type(shape)]} | asdict(shape)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Exact lit intervals of camera rays among balls, boxes and screens, in mpmath.
+"""Exact lit intervals of camera rays among spheres, boxes and screens, in mpmath.
 
 A point X(x) = origin + x d of a ray is lit where the open segment from the light L to X meets no occluder and, for a
 spot, X lies in the cone. As x grows this can only change at the distances below, all in closed form. Write
@@ -10,8 +10,8 @@ the tangents make the angle acos(T/|v|) with v: u lies on their cone where u . v
 
     (u . v)^2 = T^2 |u|^2.                                                                                      (cone)
 
-On a line through L inside the cone, L is in front of the ball; a ray changes from in front of the ball to behind it
-either across the cone or through the ball, and then it has ended.
+On a line through L inside the cone, L is in front of the sphere; a ray changes from in front of the sphere to behind it
+either across the cone or through the sphere, and then it has ended.
 
 **Cone** of a spot: the same equation with v the axis, of unit length, and T the cosine of the half angle.
 
@@ -23,8 +23,8 @@ edges. The ray crosses the plane through L and an edge from A to B where det(u, 
 All edges are taken; those that are no silhouettes only add distances at which nothing changes. The same holds for the
 other half of a cone and for the other side of a plane.
 
-Between two neighbours of all these distances a ray is lit or dark as a whole, and its middle tells which: there the
-definition itself is evaluated, the segment against every occluder. Nothing here is shared with
+Between two neighbours of all these distances a ray is lit or dark as a whole. The definition itself, evaluated in the
+middle for the segment against every occluder, tells which. Nothing here is shared with
 `reference.visibility.triangles`, which projects triangles on the plane of ray and light, nor with the casting of rays.
 """
 
@@ -40,11 +40,11 @@ Number = Any  # mpmath.mpf
 Vector = tuple[Number, Number, Number]
 Occluder = FogSphere | FogBox | FogScreen
 
-_SAME = 1e-25  # distances closer than this are one [m]: they come with 40 digits
+_SAME = 1e-25  # distances closer than this count as equal [m]: they come with 40 digits
 
 
 def vector(values: Sequence[float]) -> Vector:
-    """Return a vector of mpmath numbers; floats count as exact."""
+    """Return `values`, (3,) in any unit such as [m], as a vector of mpmath numbers; floats count as exact."""
     x, y, z = (mpf(value) for value in values)
     return x, y, z
 

@@ -18,7 +18,7 @@ _BLACK = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.0, 0.0, 
 
 @dataclass(frozen=True)
 class FogSphere:
-    """A ball."""
+    """A sphere."""
 
     centre: Point  #: [m]
     radius: float  #: [m]
@@ -138,6 +138,6 @@ def _transform(rows: Sequence[Sequence[float]]) -> dict[str, Any]:
 
 
 def unit(vector: Sequence[float]) -> list[float]:
-    """Return the vector of length 1."""
+    """Return the vector, (3,) in any unit, scaled to length 1 [1]."""
     length = math.sqrt(sum(value * value for value in vector))
     return [value / length for value in vector]

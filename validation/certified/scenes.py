@@ -15,7 +15,6 @@ import numpy as np
 from validation.certified.model import FogBox, FogLight, FogScene, FogScreen, FogSphere, Matrix, unit
 
 _GRID = 1024  # coordinates are multiples of its reciprocal
-_WIDE = 52.0  # degrees
 
 
 def _grid(values: Sequence[float]) -> Any:
@@ -32,7 +31,7 @@ def _look(origin: Sequence[float], target: Sequence[float]) -> Matrix:
     return (*(tuple(row) for row in rows), (0.0, 0.0, 0.0, 1.0))
 
 
-def _ball(centre: Sequence[float], radius: float) -> FogSphere:
+def _sphere(centre: Sequence[float], radius: float) -> FogSphere:
     return FogSphere(_grid(centre), _grid([radius])[0])
 
 
@@ -61,188 +60,133 @@ def _spot(
     return FogLight(_grid(position), _grid(intensity), _look(position, target), cutoff, beam)
 
 
+def _view(
+    origin: Sequence[float] = (0.2, -4.3, 1.4), target: Sequence[float] = (0.1, 0.0, 0.7), fov: float = 52.0
+) -> dict[str, Any]:
+    return {"camera": _look(origin, target), "fov": fov}
+
+
+def _fog(sigma_t: Sequence[float], albedo: Sequence[float], phase: str = "isotropic", g: float = 0.0) -> dict[str, Any]:
+    """Return the medium; one number for the extinction counts for all three colours."""
+    extinction = tuple(float(np.float32(value)) for value in sigma_t) * (3 // len(sigma_t))
+    return {"sigma_t": extinction, "albedo": _grid(albedo), "phase": phase, "g": g}
+
+
 def _scene(
     name: str,
     words: str,
-    camera: tuple[Sequence[float], Sequence[float]],
+    view: dict[str, Any],
+    fog: dict[str, Any],
     *,
-    sigma_t: Sequence[float],
-    albedo: Sequence[float],
     lights: Sequence[FogLight],
     occluders: Sequence[FogSphere | FogBox | FogScreen] = (),
-    phase: str = "isotropic",
-    g: float = 0.0,
-    fov: float = _WIDE,
 ) -> FogScene:
-    extinction = tuple(float(np.float32(value)) for value in sigma_t)
-    return FogScene(
-        name,
-        words,
-        _look(*camera),
-        fov,
-        extinction if len(extinction) == 3 else extinction * 3,
-        _grid(albedo),
-        phase,
-        g,
-        tuple(lights),
-        tuple(occluders),
-    )
+    return FogScene(name, words, **view, **fog, lights=tuple(lights), occluders=tuple(occluders))
 
 
 _FLOOR = _screen([0.3, 0.5, 0.0], [6.25, 1.5, 0], [-1.5, 6.25, 0])
-_CAMERA = ([0.2, -4.3, 1.4], [0.1, 0.0, 0.7])
 
 
 def fog_scenes() -> tuple[FogScene, ...]:
     """Return the twelve scenes."""
-    return (*_open_scenes(), *_ball_scenes(), *_box_scenes(), *_spot_scenes())
-
-
-def _open_scenes() -> tuple[FogScene, ...]:
     return (
         _scene(
             "thin-open",
             "Thin grey haze without end, a point light in front of the camera, nothing else. Every ray is endless.",
-            ([0.2, -4.3, 1.4], [0.1, 0.0, 1.2]),
-            sigma_t=[0.004],
-            albedo=[0.9, 0.8, 0.7],
+            _view([0.2, -4.3, 1.4], [0.1, 0.0, 1.2]),
+            _fog([0.004], [0.9, 0.8, 0.7]),
             lights=[_point([0.37, 0.61, 1.53], [5.0, 4.0, 3.0])],
         ),
         _scene(
             "near-light",
             "Coloured, forward scattering fog; a point light 0.3 m before the camera, which one ray passes at 13 mm.",
-            ([1.1, 0.4, 0.9], [1.3, 0.9, 1.0]),
-            sigma_t=[0.21, 0.34, 0.55],
-            albedo=[0.95, 0.85, 0.75],
+            _view([1.1, 0.4, 0.9], [1.3, 0.9, 1.0]),
+            _fog([0.21, 0.34, 0.55], [0.95, 0.85, 0.75], "hg", 0.625),
             lights=[_point([1.22, 0.67, 0.963], [0.31, 0.27, 0.22])],
-            phase="hg",
-            g=0.625,
         ),
         _scene(
             "light-behind",
             "A point light behind the camera, in fog that scatters by Rayleigh's law: light is only scattered back.",
-            ([0.2, -1.3, 1.4], [0.4, 2.0, 1.1]),
-            sigma_t=[0.37],
-            albedo=[0.99, 0.98, 0.97],
+            _view([0.2, -1.3, 1.4], [0.4, 2.0, 1.1]),
+            _fog([0.37], [0.99, 0.98, 0.97], "rayleigh"),
             lights=[_point([-0.45, -2.17, 2.03], [7.0, 8.0, 9.0])],
-            phase="rayleigh",
         ),
-    )
-
-
-def _ball_scenes() -> tuple[FogScene, ...]:
-    return (
         _scene(
-            "ball-shadow",
-            "A ball between the camera and a point light: the camera looks along the cone of its shadow.",
-            _CAMERA,
-            fov=25.0,
-            sigma_t=[0.31],
-            albedo=[0.9, 0.8, 0.7],
+            "sphere-shadow",
+            "A sphere between the camera and a point light: the camera looks along the cone of its shadow.",
+            _view(fov=25.0),
+            _fog([0.31], [0.9, 0.8, 0.7]),
             lights=[_point([0.33, 2.41, 1.17], [11.0, 9.0, 8.0])],
-            occluders=[_ball([0.21, 0.43, 0.92], 0.57)],
+            occluders=[_sphere([0.21, 0.43, 0.92], 0.57)],
         ),
         _scene(
-            "thick-ball",
-            "Thick fog: two balls, the larger one 3, 5 and 8 mean free paths from the camera in the three colours.",
-            ([0.1, -2.9, 1.2], [0.2, 0.0, 0.8]),
-            fov=37.0,
-            sigma_t=[1.3, 2.1, 3.4],
-            albedo=[0.5, 0.75, 0.98],
+            "thick-spheres",
+            "Thick fog: two spheres, the larger one 3, 5 and 8 mean free paths from the camera in the three colours.",
+            _view([0.1, -2.9, 1.2], [0.2, 0.0, 0.8], fov=37.0),
+            _fog([1.3, 2.1, 3.4], [0.5, 0.75, 0.98]),
             lights=[_point([-0.83, -1.12, 1.74], [900.0, 800.0, 700.0])],
-            occluders=[_ball([0.27, 0.12, 0.71], 0.63), _ball([-0.62, -0.71, 1.33], 0.21)],
+            occluders=[_sphere([0.27, 0.12, 0.71], 0.63), _sphere([-0.62, -0.71, 1.33], 0.21)],
         ),
         _scene(
-            "three-balls",
-            "Three balls about a point light, one of them a hand's breadth from it, in backward scattering fog.",
-            _CAMERA,
-            fov=29.0,
-            sigma_t=[0.23],
-            albedo=[0.7, 0.8, 0.9],
+            "three-spheres",
+            "Three spheres about a point light, one of them a hand's breadth from it, in backward scattering fog.",
+            _view(fov=29.0),
+            _fog([0.23], [0.7, 0.8, 0.9], "hg", -0.3125),
             lights=[_point([0.16, 0.22, 1.08], [4.0, 4.5, 5.0])],
             occluders=[
-                _ball([0.52, -0.31, 0.97], 0.24),
-                _ball([-0.61, 0.93, 0.55], 0.41),
-                _ball([0.1, 0.3, 1.31], 0.13),
+                _sphere([0.52, -0.31, 0.97], 0.24),
+                _sphere([-0.61, 0.93, 0.55], 0.41),
+                _sphere([0.1, 0.3, 1.31], 0.13),
             ],
-            phase="hg",
-            g=-0.3125,
         ),
-    )
-
-
-def _box_scenes() -> tuple[FogScene, ...]:
-    return (
         _scene(
             "box-floor",
             "A leaning box on a floor, a point light above and to the side.",
-            _CAMERA,
-            fov=37.0,
-            sigma_t=[0.19],
-            albedo=[0.9, 0.9, 0.8],
+            _view(fov=37.0),
+            _fog([0.19], [0.9, 0.9, 0.8]),
             lights=[_point([1.41, 0.37, 2.23], [8.0, 7.0, 6.0])],
             occluders=[_FLOOR, _box([0.13, 0.11, 0.62], [0.41, 0.13, 0], [-0.11, 0.37, 0.06], [0.09, 0.04, 0.55])],
         ),
         _scene(
             "needles",
             "Nine leaning needles, each 1/64 m wide, before a point light: shadows that a coarse march steps over.",
-            _CAMERA,
-            fov=42.0,
-            sigma_t=[0.27],
-            albedo=[0.85, 0.9, 0.95],
+            _view(fov=42.0),
+            _fog([0.27], [0.85, 0.9, 0.95], "hg", 0.75),
             lights=[_point([0.31, 0.72, 1.19], [6.0, 6.0, 7.0])],
             occluders=[_post(-1.13 + 0.27 * k, -0.42 + 0.031 * k * k, 1.61 + 0.07 * k) for k in range(9)],
-            phase="hg",
-            g=0.75,
         ),
         _scene(
             "camera-in-shadow",
             "A screen hides the light from the camera, and the fog up to 1 to 5 m before it; Rayleigh scattering.",
-            ([0.4, -2.2, 1.1], [0.1, 1.0, 0.9]),
-            sigma_t=[0.12, 0.18, 0.41],
-            albedo=[0.99, 0.95, 0.9],
+            _view([0.4, -2.2, 1.1], [0.1, 1.0, 0.9]),
+            _fog([0.12, 0.18, 0.41], [0.99, 0.95, 0.9], "rayleigh"),
             lights=[_point([-1.93, 2.31, 1.87], [12.0, 14.0, 18.0])],
             occluders=[_screen([-1.37, 0.24, 1.04], [0.93, 0.42, 0.03], [0.11, -0.21, 1.17])],
-            phase="rayleigh",
         ),
-    )
-
-
-def _spot_scenes() -> tuple[FogScene, ...]:
-    return (
         _scene(
             "hard-spot",
-            "A spot with a hard edge shines on a ball over a floor.",
-            _CAMERA,
-            fov=41.0,
-            sigma_t=[0.33],
-            albedo=[0.9, 0.7, 0.6],
+            "A spot with a hard edge shines on a sphere over a floor.",
+            _view(fov=41.0),
+            _fog([0.33], [0.9, 0.7, 0.6], "rayleigh"),
             lights=[_spot([1.52, -0.83, 2.74], [0.1, 0.2, 0.5], intensity=[21.0, 19.0, 17.0], cutoff=23.5, beam=23.5)],
-            occluders=[_FLOOR, _ball([0.24, 0.07, 0.81], 0.37)],
-            phase="rayleigh",
+            occluders=[_FLOOR, _sphere([0.24, 0.07, 0.81], 0.37)],
         ),
         _scene(
             "soft-spot",
             "A spot that fades from 11 to 29 degrees off its axis shines on a box and a needle; no floor.",
-            _CAMERA,
-            fov=39.0,
-            sigma_t=[0.29],
-            albedo=[0.8, 0.9, 0.95],
+            _view(fov=39.0),
+            _fog([0.29], [0.8, 0.9, 0.95], "hg", 0.5),
             lights=[_spot([-1.24, 0.73, 2.47], [0.3, -0.1, 0.6], intensity=[16.0, 18.0, 20.0], cutoff=29.0, beam=11.0)],
             occluders=[
                 _box([-0.22, 0.31, 1.21], [0.21, 0.02, 0], [0.01, 0.17, 0.03], [0, -0.05, 0.24]),
                 _post(0.3, 0.1, 1.3),
             ],
-            phase="hg",
-            g=0.5,
         ),
         _scene(
             "many-lights",
-            "Two point lights, one behind the camera, and a spot about a box, a ball, a needle and a floor.",
-            _CAMERA,
-            fov=41.0,
-            sigma_t=[0.16],
-            albedo=[0.95, 0.9, 0.85],
+            "Two point lights, one behind the camera, and a spot about a box, a sphere, a needle and a floor.",
+            _view(fov=41.0),
+            _fog([0.16], [0.95, 0.9, 0.85]),
             lights=[
                 _point([1.17, 0.84, 1.71], [5.0, 1.0, 0.5]),
                 _point([-0.92, -4.93, 2.31], [2.0, 9.0, 3.0]),
@@ -251,7 +195,7 @@ def _spot_scenes() -> tuple[FogScene, ...]:
             occluders=[
                 _FLOOR,
                 _box([0.61, 0.24, 0.47], [0.31, -0.12, 0], [0.1, 0.33, 0.02], [0.02, 0.03, 0.43]),
-                _ball([-0.47, 0.13, 0.68], 0.33),
+                _sphere([-0.47, 0.13, 0.68], 0.33),
                 _post(0.05, -1.1, 1.52),
             ],
         ),

@@ -67,5 +67,5 @@ def flip_line(f: Flip) -> str:
 
 
 def percent(value: float) -> str:
-    """Return a share in percent."""
+    """Return a share, `value` [1], as text in percent: '0.12 %' for 0.0012."""
     return f"{100 * value:.4g} %"

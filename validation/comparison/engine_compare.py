@@ -108,7 +108,7 @@ def compare_scene(
     mask, all_metrics, flip, exposure
         See `validation.comparison.images.compare_files`.
     margin
-        Largest relative bias that counts as agreement; where the file has standard errors, what can be shown counts.
+        Largest relative bias [1] that counts as agreement; with standard errors, what they can show counts.
     progress
         Called with (share done, what) while the truth is computed.
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What may be wrong with an image as a whole: a constant factor, another way up, a gamma, values that stop at one.
 
-Such a fault of set-up hides everything else. For each combination of suspects the root mean square error is computed
-again with the fault taken back; those are named that make it ten times smaller, the fewest first. The factor that fits
-best, in the sense of that same error, is k = sum(t r)/sum(t^2), with t the test image and r the reference.
+Such a fault of set-up hides everything else. For each combination of suspects this module takes the faults back,
+computes the root mean square error again, and names those that make it ten times smaller, the fewest first. The factor
+that fits best, in the sense of that same error, is k = sum(t r)/sum(t^2), with t the test image and r the reference.
 """
 
 import math

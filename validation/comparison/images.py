@@ -25,14 +25,14 @@ BATCHES = "airlight:batches"  #: header attribute: how many batch means gave the
 class Comparison:
     """What `airlight compare` prints."""
 
-    layer: str
-    metrics: Metrics
+    layer: str  #: the layer that was compared
+    metrics: Metrics  #: of all pixels that the mask leaves
     statistics: Statistics | None  #: None where neither image has standard errors
     masked: int = 0  #: pixels that the mask leaves out
     errors: PublishedErrors | None = None  #: as other tools print them
     errors_normalised: PublishedErrors | None = None  #: the same with the mean of the reference as the unit
-    colour: ColourDifference | None = None
-    flip: Flip | None = None
+    colour: ColourDifference | None = None  #: None if it was not asked for
+    flip: Flip | None = None  #: None if it was not asked for
 
     @property
     def failures(self) -> tuple[str, ...]:
@@ -139,8 +139,14 @@ def compare_files(
 
     Parameters
     ----------
+    reference, test
+        The EXR files.
+    layer
+        The layer to compare, (height, width, 3) [W/(m^2 sr)].
     mask
         An EXR file; pixels whose R, G and B (or Y) are all zero there are left out.
+    margin, all_metrics, flip, exposure
+        See `compare_images`.
 
     Raises
     ------
@@ -199,7 +205,7 @@ def _compare(
 
 
 def read_mask(path: str | os.PathLike[str]) -> NDArray[np.bool_]:
-    """Return where the plain channels of an EXR file are not zero, (height, width).
+    """Return where the plain channels of an EXR file are not zero: truth values [1], (height, width).
 
     Raises
     ------

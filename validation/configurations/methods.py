@@ -19,9 +19,9 @@ from validation.configurations.kernel_names import find_kernel
 class Configuration:
     """A method, its kernel (None if it calls none) and the parameters that differ from their defaults."""
 
-    method: str
-    kernel: str | None = None
-    parameters: tuple[tuple[str, int | float | str], ...] = ()
+    method: str  #: name in the registry, or one's own as 'module:function'
+    kernel: str | None = None  #: see `validation.configurations.kernel_names.find_kernel`
+    parameters: tuple[tuple[str, int | float | str], ...] = ()  #: names and values
 
     @property
     def label(self) -> str:

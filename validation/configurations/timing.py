@@ -40,10 +40,10 @@ _TURNS = 1.5  # approximate time for the one to five frames that are timed stage
 class Timing:
     """Repeated measurements of one piece of work [ms]."""
 
-    median_ms: float
+    median_ms: float  #: median
     low_ms: float  #: first quartile
     high_ms: float  #: third quartile
-    repetitions: int
+    repetitions: int  #: number of measurements
 
 
 def time_repeated(work: Callable[[], Any], *, seconds: float = 0.6, least: int = 5, most: int = 200) -> Timing:
@@ -54,9 +54,14 @@ def time_repeated(work: Callable[[], Any], *, seconds: float = 0.6, least: int =
     work
         A function without arguments that evaluates its results.
     seconds
-        Stop after about this long, but not before `least` repetitions.
+        Stop after about this long [s], but not before `least` repetitions.
     least, most
         Bounds of the number of repetitions.
+
+    Returns
+    -------
+    Timing
+        Median and quartiles [ms].
     """
     (timing,) = time_in_turns([work], seconds=seconds, least=least, most=most)
     return timing
@@ -65,7 +70,13 @@ def time_repeated(work: Callable[[], Any], *, seconds: float = 0.6, least: int =
 def time_in_turns(
     works: Sequence[Callable[[], Any]], *, seconds: float = 3.0, least: int = 5, most: int = 200
 ) -> list[Timing]:
-    """Time several pieces of work in turns, with the parameters of `times_in_turns`, and return a timing for each."""
+    """Time several pieces of work in turns, and return median and quartiles [ms] of each.
+
+    Parameters
+    ----------
+    works, seconds, least, most
+        See `times_in_turns`.
+    """
     times = times_in_turns(works, seconds=seconds, least=least, most=most)
     quartiles = np.percentile(times, [25, 50, 75], axis=0).T
     return [Timing(float(median), float(low), float(high), len(times)) for low, median, high in quartiles]
@@ -81,7 +92,7 @@ def times_in_turns(
     works
         Functions without arguments that evaluate their results.
     seconds
-        Stop after about this long, but not before `least` turns.
+        Stop after about this long [s], but not before `least` turns.
     least, most
         Bounds of the number of turns.
     alternate

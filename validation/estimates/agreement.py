@@ -44,9 +44,9 @@ class Agreement:
 
     estimator: str  #: 'volpath' or 'single-scatter'
     layer: str  #: 'airlight' or 'surface'
-    width: int
-    height: int
-    batches: int
+    width: int  #: of the image [pixels]
+    height: int  #: of the image [pixels]
+    batches: int  #: traced or taken from the cache
     samples: int  #: a pixel and batch
     epsilon: float  #: the shadow-ray epsilon that was corrected for; 0 for single-scatter, which has none
     masked: int  #: pixels left out because a light is close to their ray
@@ -169,11 +169,11 @@ def agreements(
     scene
         The `mi.Scene`.
     margins
-        By estimator, the margin.
+        By estimator, the margin of the relative bias [1].
     samples
         By estimator, see `agreement`; its default otherwise.
     batches, seconds
-        Of each estimator, see `agreement`.
+        How many batches at most, and how long [s], for each estimator; see `agreement`.
     progress
         Called with (share done, what).
 
@@ -213,7 +213,7 @@ def layer_masks(truth: TruthScene, image: TruthImage) -> dict[str, Mask]:
 
 
 def layer_mean(batches: Batches, layer: str, mask: Mask) -> Array:
-    """Return the mean image of a layer, (height, width, 3), for a mask of the whole image."""
+    """Return the mean image of a layer, (height, width, 3) [W/(m^2 sr)]; the mask, (height, width), gives its size."""
     return batches.mean[LAYERS.index(layer)].reshape(*mask.shape, 3)
 
 
@@ -230,13 +230,13 @@ def batch_estimate(batches: Batches, layer: str, mask: Mask) -> Estimate:
 
 
 def widest_interval(statistics: Statistics) -> tuple[float, float]:
-    """Return the wider of the 95 % intervals of the relative bias."""
+    """Return the ends of the wider of the 95 % intervals of the relative bias [1]."""
     intervals = [statistics.relative_bias_ci, statistics.relative_bias_ci_batches]
     return max((pair for pair in intervals if pair is not None), key=lambda pair: pair[1] - pair[0])
 
 
 def width_to_reach(statistics: Statistics, margin: float) -> float:
-    """Return the half width of the wider interval over 0.4 times the margin: runs stop where it is below 1."""
+    """Return the half width of the wider interval over 0.4 times `margin` [1], both relative: runs stop below 1."""
     low, high = widest_interval(statistics)
     return 0.5 * (high - low) / (0.4 * margin)
 

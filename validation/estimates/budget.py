@@ -80,14 +80,14 @@ def _power_of_two(number: int) -> int:
 
 @dataclass(frozen=True)
 class RelativeErrors:
-    """Relative standard errors of an image, see the module; 0 where nothing is lit, infinite where one is no number."""
+    """Relative standard errors of an image [1], see the module; 0 in the dark, infinite for what is not finite."""
 
-    pooled: float
-    worst: float
+    pooled: float  #: of the sum of all pixels' errors, the largest of all layers and channels
+    worst: float  #: of a single pixel
 
 
 def relative_errors(batches: Batches, near: NDArray[np.bool_]) -> RelativeErrors:
-    """Return the errors of some batches; `near` are the pixels beside a light, (pixels,)."""
+    """Return the relative errors [1] of some batches, without the airlight of pixels `near` a light, (pixels,)."""
     pooled = worst = 0.0
     for number, layer in enumerate(LAYERS):
         keep = ~near if layer == "airlight" else np.ones_like(near)

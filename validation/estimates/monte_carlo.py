@@ -4,8 +4,8 @@
 Every batch is kept as soon as it is finished, so a run that was interrupted or killed goes on from there. Eight batches
 whose seeds begin at a multiple of eight are kept as one block, which takes a quarter of the room. What a run returns
 depends on its seeds and their number alone, never on what was in the cache: blocks and the batches in them are always
-added up in the same order, and who asks for fewer batches than are kept gets those alone (up to seven that are only
-kept within a block are traced again).
+added up in the same order, and a run of fewer batches than are kept gets those alone (up to seven that are only kept
+within a block are traced again).
 """
 
 import errno
@@ -61,7 +61,7 @@ def monte_carlo_batches(
     go_on: Callable[[int], bool] | None = None,
     progress: Progress | None = None,
 ) -> Run:
-    """Return batches of a Mitsuba scene at its own size.
+    """Return batches, radiances [W/(m^2 sr)], of a Mitsuba scene at its own size.
 
     Parameters
     ----------

@@ -25,7 +25,7 @@ def truth_image(
     pixel: str = "centre",
     progress: Progress | None = None,
 ) -> TruthImage:
-    """Return the quadrature truth of a Mitsuba scene at its own size.
+    """Return the quadrature truth of a Mitsuba scene at its own size, (height, width, 3) [W/(m^2 sr)].
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def truth_image(
     InputError
         For a scene that cannot be read, and for radiance that is not finite, see `validation.estimates.light_on_ray`.
     """
-    # Only what differs from the usual is named, so that images that were kept before are found.
+    # The key names only what differs from the usual, so that images that were kept before are found.
     settings: dict[str, Any] = {"samples": samples, "shadow_scale": shadow_scale}
     settings |= {} if pixel == "centre" else {"pixel": pixel}
     # What a renderer's own shadow rays see also depends on where they start.

@@ -43,11 +43,11 @@ Baseline = Mapping[str, Any]
 class Move:
     """One number, or one configuration, that is not what the baseline says."""
 
-    scene: str
+    scene: str  #: name of the scene
     label: str  #: of the configuration; empty for the scene itself
     what: str  #: the number, such as 'airlight relative_rmse', or a sentence on what is missing
-    old: float | None = None
-    new: float | None = None
+    old: float | None = None  #: what the baseline holds
+    new: float | None = None  #: what was measured
     allowed: float | None = None  #: largest difference that is no move
 
 
@@ -99,7 +99,7 @@ def compare_baseline(kept: Baseline | None, measured: Baseline, *, tolerance: fl
     measured
         The new measurement. Entries without a time are compared without it.
     tolerance
-        Relative band of errors.
+        Relative band of errors [1].
     """
     scene = measured["scene"]
     if kept is None:

@@ -29,7 +29,7 @@ _LONG = 25.0  # after a longer first frame, compilation included, no larger fram
 class Measurement:
     """The cost and the error of one configuration in one scene."""
 
-    configuration: Configuration
+    configuration: Configuration  #: what was measured
     frame: Frame | None  #: None if the method refused the scene
     times: FrameTimes | None
     error: Metrics | None  #: of the airlight

@@ -99,7 +99,8 @@ def fitted_slope(sizes: ArrayLike, errors: ArrayLike) -> Slope:
     Parameters
     ----------
     sizes, errors
-        (n,) each. Errors that are not positive and finite are left out.
+        Texels along an edge of the map and relative errors, (n,) each [1]. Errors that are not positive and finite
+        are left out.
     """
     n, e = np.asarray(sizes, dtype=np.float64), np.asarray(errors, dtype=np.float64)
     counts = (e > 0) & np.isfinite(e)

@@ -47,21 +47,21 @@ class ResultCache:
 class CacheEntry:
     """Where a result belongs, and what it must have been made from."""
 
-    key: str
-    fingerprint: str
+    key: str  #: name in the cache: the digest of the identity
+    fingerprint: str  #: digest of all that the numbers depend on
     made_by: str  #: digest of source and versions alone, without the scene
-    fresh: bool = False
+    fresh: bool = False  #: whether to compute it although it is kept
 
 
 @dataclass(frozen=True)
 class CachedResult:
     """A result, and whether it was there already."""
 
-    data: dict[str, Any]
-    files: Mapping[str, bytes] = field(repr=False)
+    data: dict[str, Any]  #: what JSON can hold
+    files: Mapping[str, bytes] = field(repr=False)  #: contents by name
     measured: str  #: date and time of the computation
-    seconds: float  #: that the computation took
-    cached: bool
+    seconds: float  #: that the computation took [s]
+    cached: bool  #: whether it was there already
 
 
 def result_cache(machine: Mapping[str, str], *, more: Sequence[Path] = (), fresh: bool = False) -> ResultCache:
@@ -131,7 +131,7 @@ def load_result(entry: CacheEntry) -> CachedResult | None:
 
 
 def store_result(entry: CacheEntry, computed: Computed, seconds: float) -> CachedResult:
-    """Keep what was computed in so many seconds, in place of what was there."""
+    """Keep what was computed in `seconds` [s], in place of what was there."""
     data, files = computed
     about = {"data": data, "measured": now(), "seconds": round(seconds, 3)}
     about |= {"fingerprint": entry.fingerprint, "made_by": entry.made_by}
@@ -155,12 +155,12 @@ def cached_result(entry: CacheEntry, compute: Callable[[], Computed]) -> CachedR
 
 
 def expected_seconds(entry: CacheEntry) -> float | None:
-    """Return how long a result will take: none where it is kept, else as long as the last time on this machine.
+    """Return how long a result will take [s]: 0 where it is kept, else as long as the last time on this machine.
 
     Returns
     -------
     float or None
-        None where the machine never computed it [s].
+        None where this machine never computed it.
     """
     about = peek_array(entry.key, "about")
     if about is None:

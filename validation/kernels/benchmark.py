@@ -127,7 +127,7 @@ def bench_kernels(
     rays
         Number of rays that are timed.
     seconds
-        How long each is timed.
+        How long each is timed [s].
     progress
         Called with (done, total, what) before every kernel.
     """
@@ -142,7 +142,7 @@ def bench_kernels(
             before = None
             for size in sizes if number == 0 else (default,):
                 before = measure(family, size, truth=truth, timed=timed, seconds=seconds, before=before)
-                if before.refused is None or size == default:  # sizes that a kernel does not have are no news
+                if before.refused is None or size == default:  # a size that the kernel does not have is left out
                     costs.append(before)
     return KernelBench(tuple(costs), speed_against_error(costs))
 

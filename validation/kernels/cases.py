@@ -23,7 +23,7 @@ _TINY = 1e-37  # below this float32 has no normal numbers: such values are compa
 
 
 def integrate_cases(cases: Cases, kernel: str, precision: str) -> Array:
-    """Return J of every case by a kernel [1/m].
+    """Return J of every case by a kernel, (cases,) [1/m].
 
     Parameters
     ----------

@@ -26,14 +26,14 @@ class Errors:
     """Relative errors of one group of rays [1]; the quantiles are of the finite ones, None where there is none."""
 
     rays: int  #: that the kernel did not refuse
-    refused: int
+    refused: int  #: rays that it refused
     median: float | None
-    p99: float | None
+    p99: float | None  #: 99 % quantile
     max: float | None
     mean: float | None
-    nan: int
-    infinite: int  #: where the truth is finite
-    negative: int
+    nan: int  #: rays with a NaN
+    infinite: int  #: rays with an infinity where the truth is finite
+    negative: int  #: rays with a negative value
     worst: str | None  #: the ray with the largest error, or the first that is not finite, as a line of CSV
 
 
@@ -67,7 +67,7 @@ def relative_error(results: Array, expected: Array, precision: str, allowance: A
 def errors_by_group(
     cases: Cases, values: Values, precision: str, rows: Mapping[str, Rows], *, expected: Array | None = None
 ) -> dict[str, Errors]:
-    """Return the errors of each group of rows.
+    """Return the relative errors [1] of each group of rows.
 
     Parameters
     ----------
@@ -80,7 +80,12 @@ def errors_by_group(
     rows
         The groups, see `groups`.
     expected
-        What to compare with instead of the truth.
+        What to compare with instead of the truth, (cases,) [1/m].
+
+    Raises
+    ------
+    ValueError
+        If the cases have no `value` and nothing is expected.
     """
     expected = cases.value if expected is None else expected
     if expected is None:

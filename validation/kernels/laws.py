@@ -20,8 +20,8 @@ scattering is the same both ways. With dV = |CP|^2 dx dw, summed over all direct
 
     int J_{C,L}(w) dw = int_B exp(-sigma_t (|CP| + |PL|)) p(cos) / (|CP|^2 |PL|^2) dV = int J_{L,C}(w) dw
 
-where J runs over the part of each ray inside B. Here B is a ball of radius R whose centre lies on the line CL, b from C
-and e from L. At the angle asin(R sin(u)/b) to the axis the ray is inside between b cos - R cos u and b cos + R cos u,
+where J runs over the part of each ray inside B. Here B is a sphere of radius R whose centre lies on the line CL, b from
+C and e from L. At the angle asin(R sin(u)/b) to the axis the ray is inside between b cos - R cos u and b cos + R cos u,
 so that a Gauss-Legendre rule in u converges at once: "swap" compares the two sums. For a body that both see alike,
 all of space for one, it would hold by symmetry and prove nothing, so b and e differ.
 """
@@ -182,8 +182,8 @@ def _with_phase(cases: Cases, phase: str) -> Cases:
     return replace(cases, phase=(phase,) * len(cases.x0), g=np.zeros(len(cases.x0)))
 
 
-#: b, e and R of the balls, sigma_t; b and e on either side of the ball or both on one.
-_BALLS = (
+#: b, e and R of the spheres, sigma_t; b and e on either side of the sphere or both on one.
+_SPHERES = (
     (2.0, 3.25, 1.25, 0.5, 1),
     (1.75, 5.0, 1.5, 0.125, 1),
     (6.0, 2.5, 2.0, 0.0, 1),
@@ -194,24 +194,24 @@ _SWAP_PHASES = (("isotropic", 0.0), ("rayleigh", 0.0), ("hazy", 0.0), ("hg", 0.5
 
 
 def _swap(tried: _Tried) -> tuple[Array, Array]:
-    return _seen_balls(tried, _BALLS), _seen_balls(tried, tuple((e, b, *others) for b, e, *others in _BALLS))
+    return _seen_spheres(tried, _SPHERES), _seen_spheres(tried, tuple((e, b, *others) for b, e, *others in _SPHERES))
 
 
-def _seen_balls(tried: _Tried, balls) -> Array:
-    """Return int J dw over balls of radius R at a distance b from the camera, for every phase function.
+def _seen_spheres(tried: _Tried, spheres) -> Array:
+    """Return int J dw over spheres of radius R at a distance b from the camera, for every phase function.
 
-    The light is at e behind the ball (side 1) or before it (-1); behind the camera where e > b.
+    The light is at e behind the sphere (side 1) or before it (-1); behind the camera where e > b.
     """
     nodes, weights = np.polynomial.legendre.leggauss(64)
     u, weights = 0.25 * np.pi * (nodes + 1), 0.25 * np.pi * weights
-    b, e, R, sigma_t, side = np.array(balls).T[:, None, :, None]
+    b, e, R, sigma_t, side = np.array(spheres).T[:, None, :, None]
     sine = R / b * np.sin(u)
     cosine = np.sqrt(1 - sine**2)
     light = b + side * e  # where it lies on the axis
     # dw = 2 pi sin d(angle), d(angle) = (R/b) cos u / cos du
     weights = 2 * np.pi * weights * sine * (R / b) * np.cos(u) / cosine
     columns = (light * cosine, np.abs(light) * sine, b * cosine - R * np.cos(u), b * cosine + R * np.cos(u), sigma_t)
-    shape = (len(_SWAP_PHASES), len(balls), len(u))
+    shape = (len(_SWAP_PHASES), len(spheres), len(u))
     foot, height, x0, x1, sigma_t = (np.broadcast_to(column, shape).ravel() for column in columns)
     rows = shape[1] * shape[2]
     phase, g = (np.repeat(column, rows) for column in zip(*_SWAP_PHASES))

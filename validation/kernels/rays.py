@@ -82,7 +82,17 @@ def slivers(count: int = 8192) -> Cases:
 
 
 def wide_rays(count: int, phase: str = "isotropic", g: float = 0.0, *, truth: bool = True) -> Cases:
-    """Return the set W for one phase function, extinction 1; without the true J if only times matter."""
+    """Return the set W (see the module) for one phase function, with the extinction 1/m.
+
+    Parameters
+    ----------
+    count
+        Number of rays.
+    phase, g
+        The phase function and its mean cosine [1].
+    truth
+        Whether to compute the true J [1/m]; it costs time, and timings need none.
+    """
     u = _sobol(count, 3)
     distance = _log(u[:, 0], 1e-4, 60.0)
     angle = np.radians(1e-3 + (180.0 - 2e-3) * u[:, 1])

@@ -74,11 +74,11 @@ class Bar:
     flushes to zero on the way is no error: `validation.kernels.underflow` derives how much that can be.
     """
 
-    single_max: float = 3e-5  #: for |g| <= 0.9
-    single_max_sharp: float = 1e-4  #: for |g| up to 0.95
-    single_p99: float = 3e-6
-    single_median: float = 3e-7
-    double_max: float = 1e-10
+    single_max: float = 3e-5  #: in float32, for |g| <= 0.9
+    single_max_sharp: float = 1e-4  #: in float32, for |g| up to 0.95
+    single_p99: float = 3e-6  #: 99 % quantile in float32
+    single_median: float = 3e-7  #: median in float32
+    double_max: float = 1e-10  #: in float64
 
 
 def certified_files() -> tuple[Path, ...]:

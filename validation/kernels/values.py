@@ -72,7 +72,7 @@ def evaluate_rows(
     table: ArrayLike = TABLE,
     intensity: float = 1.0,
 ) -> Array:
-    """Return J of cases that share a phase function [1/m].
+    """Return J of cases that share a phase function, (rows,) [1/m].
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ def aligned_array(scalar: Any, numbers: NDArray[Any]) -> Any:
 
 
 def take(cases: Cases, rows: NDArray[Any]) -> Cases:
-    """Return some rows of cases."""
+    """Return the cases of some `rows`, (n,): numbers, or truth values of all cases; units [m, 1/m] stay."""
     numbers = np.arange(len(cases.phase))[rows]
 
     def words(column: Sequence[Any] | None):

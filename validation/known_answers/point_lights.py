@@ -19,8 +19,8 @@ With L = albedo sigma_t / (4 pi) int I p exp(-sigma_t (x + r)) / r^2 dx, summed 
 
       phi = albedo sigma_t / (4 pi r) int_r^inf exp(-sigma_t u) log((u + r)/(u - r)) / u du.
 
-- An absorbing medium has no airlight and dims a surface by exp(-sigma_t path); the path through a ball of radius R is a
-  chord of length 2 sqrt(R^2 - b^2), b the distance of its centre from the ray.
+- An absorbing medium has no airlight and dims a surface by exp(-sigma_t path); the path through a sphere of radius R is
+  a chord of length 2 sqrt(R^2 - b^2), b the distance of its centre from the ray.
 - A light in a closed box gives exactly nothing outside.
 - What directional lights obey is in `validation.known_answers.directional`.
 
@@ -71,7 +71,7 @@ def known_answers() -> list[KnownAnswer]:
     answers = [law(estimator) for law in (albedo_linear, intensity_linear, units, enclosed) for estimator in ESTIMATORS]
     quadrature = (lights_add_up, turned, moved, mirrored, vacuum_limit, vacuum, fluence, absorbing_medium)
     answers += [law() for law in quadrature]
-    answers += [absorbing_ball(estimator) for estimator in ("quadrature", "single-scatter")]
+    answers += [absorbing_sphere(estimator) for estimator in ("quadrature", "single-scatter")]
     return answers + directional_answers()
 
 
@@ -209,25 +209,31 @@ def absorbing_medium() -> KnownAnswer:
     return KnownAnswer("an absorbing medium", "quadrature", difference, 1e-6, "relative: surfaces are met in float32")
 
 
-def absorbing_ball(estimator: str = "quadrature") -> KnownAnswer:
-    """Look at a wall through a ball that absorbs, its light beside the wall: exp(-sigma_t chord)."""
+def absorbing_sphere(estimator: str = "quadrature") -> KnownAnswer:
+    """Look at a wall through a sphere that absorbs, its light beside the wall: exp(-sigma_t chord)."""
     sigma_t, centre, radius = 0.75, np.array([0.125, 0.0625, 1.25]), 0.75
     scene = _wall_scene()
     clear = _white(mitsuba_dict(scene))
     del clear["fog"], clear["sensor"]["medium"]
     medium = mitsuba_dict(replace(scene, sigma_t=(sigma_t,) * 3, albedo=(0.0,) * 3))["fog"]
-    ball = {"type": "sphere", "center": centre.tolist(), "radius": radius, "bsdf": {"type": "null"}, "interior": medium}
-    empty = ball | {"interior": medium | {"sigma_t": {"type": "rgb", "value": [0.0, 0.0, 0.0]}}}
+    sphere = {
+        "type": "sphere",
+        "center": centre.tolist(),
+        "radius": radius,
+        "bsdf": {"type": "null"},
+        "interior": medium,
+    }
+    empty = sphere | {"interior": medium | {"sigma_t": {"type": "rgb", "value": [0.0, 0.0, 0.0]}}}
     images = []
-    for sphere in (empty, ball):
-        truth = read_truth(load_fog(clear | {"ball": sphere}))
+    for inside in (empty, sphere):
+        truth = read_truth(load_fog(clear | {"sphere": inside}))
         images.append(layers(truth, estimator)[1])
     towards = centre - truth.origin
     closest = np.linalg.norm(np.cross(towards, truth.direction), axis=1)
     chord = 2 * np.sqrt(np.maximum(radius**2 - closest**2, 0))
     difference = float(np.max(np.abs(images[1] / images[0] / np.exp(-sigma_t * chord)[:, None] - 1)))
-    bound, reason = (1e-6, "relative: float32 ball") if estimator == "quadrature" else FLOAT32
-    return KnownAnswer("an absorbing ball", estimator, difference, bound, reason)
+    bound, reason = (1e-6, "relative: float32 sphere") if estimator == "quadrature" else FLOAT32
+    return KnownAnswer("an absorbing sphere", estimator, difference, bound, reason)
 
 
 def enclosed(estimator: str = "quadrature") -> KnownAnswer:
@@ -259,7 +265,7 @@ def _mapped(scene: FogScene, matrix: Array) -> FogScene:
 
     def placed(shape: FogSphere | FogBox | FogScreen) -> FogSphere | FogBox | FogScreen:
         if isinstance(shape, FogSphere):
-            raise TypeError("balls are met in float32; the laws are tried on polygons")
+            raise TypeError("spheres are met in float32; the laws are tried on polygons")
         return replace(shape, centre=point(shape.centre), half_edges=edges(shape.half_edges))
 
     lights = tuple(

@@ -23,10 +23,10 @@ _SAMPLES = 32
 class KnownAnswer:
     """How far an estimator is from an answer that is known."""
 
-    name: str
-    estimator: str
+    name: str  #: what is known
+    estimator: str  #: 'quadrature', 'single-scatter' or 'volpath'
     measured: float  #: largest difference, relative to the largest pixel unless the reason says otherwise
-    bound: float
+    bound: float  #: the most that it may be [1]
     reason: str  #: why the bound is what it is
 
     @property
@@ -36,7 +36,7 @@ class KnownAnswer:
 
 
 def layers(truth: TruthScene, estimator: str) -> Array:
-    """Return airlight and surface by an estimator, (2, pixels, 3)."""
+    """Return airlight and surface by an estimator, (2, pixels, 3) [W/(m^2 sr)]."""
     if estimator == "quadrature":
         image = quadrature_image(truth)
         return np.stack([image.airlight, image.surface]).reshape(2, -1, 3)

@@ -115,7 +115,14 @@ def error_metrics(reference: ArrayLike, test: ArrayLike, *, mask: ArrayLike | No
 def compared(
     reference: ArrayLike, test: ArrayLike, mask: ArrayLike | None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
-    """Return two images as float64 (height, width, channels) and the pixels to compare (height, width).
+    """Return two images as float64, (height, width, channels), and the pixels to compare, (height, width).
+
+    Parameters
+    ----------
+    reference, test
+        Two images of one unit, such as [W/(m^2 sr)], (height, width) or (height, width, channels).
+    mask
+        Pixels to compare, (height, width) of truth values; None for all.
 
     Raises
     ------
@@ -138,7 +145,7 @@ def compared(
 
 
 def colours(image: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return an image (height, width, channels) as one of three channels; one channel becomes grey.
+    """Return an `image`, (height, width, channels) [any unit], with three channels; one channel becomes grey.
 
     Raises
     ------

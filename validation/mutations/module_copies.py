@@ -24,7 +24,13 @@ _NUMBERS = count()
 
 
 def module_source(name: str) -> str:
-    """Return the source text of one of our modules."""
+    """Return the source text of one of our modules.
+
+    Raises
+    ------
+    ValueError
+        If the module has no file, as a folder without a page.
+    """
     path = importlib.import_module(name).__file__
     if path is None:
         raise ValueError(f"{name} has no source file; wanted a module of {', '.join(PACKAGES)}")

@@ -239,8 +239,8 @@ _SHADOWS = (
         "return row, np.minimum(angle_a, angle_b) + 0.01, np.maximum(angle_a, angle_b) + 0.01",
     ),
     _quadrature(
-        "no-ball-shadows",
-        "the fog lit through balls",
+        "no-sphere-shadows",
+        "the fog lit through spheres",
         "reference.visibility.spheres",
         "dark = (c_y - disk <= height) & (c_y + disk > 0)",
         "dark = np.zeros(len(ray), dtype=bool)",

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 class Mutation:
     """One fault."""
 
-    name: str
+    name: str  #: by which reports and claims name it
     meaning: str  #: what it stands for
     estimator: str  #: 'quadrature' or 'single-scatter'
-    module: str
-    old: str
-    new: str
+    module: str  #: the module that is changed
+    old: str  #: its text, which occurs once
+    new: str  #: what stands in its place
     remark: str = ""  #: why the built-in scenes need not show it
 
 

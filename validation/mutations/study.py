@@ -3,8 +3,8 @@
 
 The standard run is what a report does: the images of one estimator are compared with those of another, layer by layer
 on small images of the built-in scenes, and agree where the 95 % interval of the pooled relative bias lies inside the
-margin (`validation.estimates.agreement`). A mutation is caught where that verdict is no longer given. What it is not
-given for without any mutation proves nothing, so the unchanged copy is run through the same machinery first: the
+margin (`validation.estimates.agreement`). A mutation is caught where they no longer agree. If they did not agree
+without any mutation, that would prove nothing, so the unchanged copy runs through the same machinery first: the
 control.
 """
 

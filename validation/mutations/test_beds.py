@@ -64,7 +64,7 @@ def loaded_stage(name: str, size: tuple[int, int]):
 
 
 def stage_of(name: str, scene, *, margin: float) -> Stage:
-    """Return a Mitsuba scene with its unchanged images; `margin` is that against volpath.
+    """Return a Mitsuba scene with its unchanged images; `margin` is that of the relative bias [1] against volpath.
 
     Both Monte Carlo estimators run until the half width of their intervals is below 0.4 times the margin, as in
     `validation.estimates.agreement`: a rule that looks at the spread alone, so that stopping favours no verdict.
@@ -141,7 +141,7 @@ def batch_statistics(opponent: Opponent, layer: str, batches: Batches, mask: NDA
     layer
         'airlight' or 'surface'.
     batches
-        What may be changed.
+        Those that may be changed; radiances [W/(m^2 sr)].
     mask
         Pixels to compare, (height, width).
     """

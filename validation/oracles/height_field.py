@@ -33,11 +33,18 @@ class HeightField:
 
 
 def height_field(shadow_map: ShadowMap, walls: NDArray[np.uint32] | None = None) -> HeightField:
-    """Return the height field of a shadow map, with the numbers that `realtime.methods.light_volumes.jump_search`
-    gives its texels' walls.
+    """Return the height field of a shadow map.
 
     With k = axis + u across + v up the first surface is at k / s = k distance / |k| from the light, so s = |k| /
     distance, and 0 where the distance is infinite.
+
+    Parameters
+    ----------
+    shadow_map
+        The map, with distances [m].
+    walls
+        Numbers of its texels' walls from `realtime.methods.light_volumes.jump_search`, (faces size size,), if the
+        field has walls.
 
     Raises
     ------
@@ -102,5 +109,5 @@ def by_ray(first: Index, first_angle: Array, second: Index, second_angle: Array)
 
 
 def zero_angle(cosine: Array, sine: Array) -> Array:
-    """Return where cosine cos(theta) + sine sin(theta) = 0, from -pi/2 to pi/2 [rad]."""
+    """Return where `cosine` cos(theta) + `sine` sin(theta) = 0, from -pi/2 to pi/2 [rad], in the shape of both."""
     return np.arctan2(np.where(sine < 0, cosine, -cosine), np.abs(sine))

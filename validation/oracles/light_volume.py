@@ -65,8 +65,8 @@ def traced_walls(scene: Scene, shadow_maps: Sequence[ShadowMap]) -> list[NDArray
     Returns
     -------
     list
-        For each light the numbers of the walls of its map's texels, as `realtime.methods.light_volumes.jump_search`
-        gives them.
+        For each light the numbers [1] of the walls of its map's texels, (texels,), as
+        `realtime.methods.light_volumes.jump_search` gives them.
     """
     pairs = zip(shadow_maps, scene.lights, strict=True)
     return [

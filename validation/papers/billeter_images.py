@@ -100,16 +100,12 @@ FIGURES: tuple[FigureEntry, ...] = (
 class FigureRow:
     """One image, measured; if it could not be measured, `missing` says why and all times and errors are None."""
 
-    entry: FigureEntry
+    entry: FigureEntry  #: what the paper published
     size: tuple[int, int]  #: [pixels]
     light_moved: Timing | None = None  #: a frame after the light moved: shadow map, volume, all stages
     static: Timing | None = None  #: a frame with static light and geometry, of a camera that moved
-    light_moved_camera_kept: Timing | None = (
-        None  #: a frame after the light moved, the camera rays of the last one kept
-    )
-    colours_changed: Timing | None = (
-        None  #: a frame after only medium or colours changed: map, tiles, camera rays are kept
-    )
+    light_moved_camera_kept: Timing | None = None  #: after the light moved, with the camera rays of the last frame
+    colours_changed: Timing | None = None  #: after only medium or colours changed: map, tiles, camera rays are kept
     error: Metrics | None = None  #: of the airlight against the truth
     map_error: Metrics | None = None  #: of the airlight against the volume that the shadow map bounds
     missing: str | None = None

@@ -88,13 +88,13 @@ TABLE = (
 class TableRow:
     """A view at a size of the map with one evaluation; if it has no times, `missing` says why."""
 
-    published: PublishedTable
+    published: PublishedTable  #: the view in the paper
     map: int  #: [texels]
     evaluation: str  #: of `EVALUATIONS`
     size: tuple[int, int]  #: of the frame [pixels]
     faces: int = 1  #: of the shadow map
     triangles: int = 0  #: of the light volume; 0 where it has none
-    light_moved: Timing | None = None
+    light_moved: Timing | None = None  #: times as in `validation.papers.billeter_images.FigureRow`
     static: Timing | None = None
     light_moved_camera_kept: Timing | None = None
     colours_changed: Timing | None = None

@@ -36,7 +36,7 @@ from realtime.frame.renderer import (
 )
 from realtime.methods.shadow_planes.method import PlanePreparation
 from realtime.methods.shadow_planes.silhouettes import silhouette
-from realtime.methods.shadow_planes.view_culling import bodies_in_view
+from realtime.methods.shadow_planes.view_culling import components_in_view
 from realtime.scene.camera import read_camera
 from realtime.scene.read_scene import Scene, read_scene
 from realtime.tiles.layout import SIDE
@@ -62,10 +62,10 @@ KERNELS = ("exact", "taylor")
 class Published:
     """The published results for a scene."""
 
-    scene: str
-    where: str
-    size: tuple[int, int]
-    fps: float
+    scene: str  #: name of the built-in scene that stands for it
+    where: str  #: table, figure or section of the paper
+    size: tuple[int, int]  #: of the frame [pixels]
+    fps: float  #: frames a second [1/s]
     shares: tuple[float, ...] | None = None  #: of the stages in Table 1 [%]
     note: str = ""
     cone: int = 0  #: edges of the paper's cone over the spot; 0: no spot
@@ -252,4 +252,4 @@ def _silhouettes(renderer: FrameRenderer, scene: Scene) -> None:
     casters, camera = renderer.prepare.standing(scene), read_camera(scene.camera)
     for light in scene.lights:
         position = np.array(light.position, dtype=np.float64).ravel()
-        silhouette(casters, position, used=bodies_in_view(casters, camera, position))
+        silhouette(casters, position, used=components_in_view(casters, camera, position))

@@ -26,10 +26,10 @@ class LoadedScene:
 
     name: str  #: name of the built-in scene, or stem of the file
     scene: Any  #: the `mi.Scene`
-    purpose: str
-    published: str
-    path: Path | None = None
-    animation: Animation = field(default_factory=Animation)
+    purpose: str  #: one sentence: what the scene is for
+    published: str  #: the published figure that it stands for; empty for a file
+    path: Path | None = None  #: of the file; None for a built-in scene
+    animation: Animation = field(default_factory=Animation)  #: what moves in it
 
 
 def load_scene(name_or_path: str, size: tuple[int, int] | None = None) -> LoadedScene:

@@ -91,7 +91,7 @@ def placed(mesh: Mesh, position: Sequence[float], turn: NDArray[np.float64] | No
 
 
 def scaled(mesh: Mesh, factor: float | Sequence[float]) -> Mesh:
-    """Return a mesh scaled about the origin, by one factor or by one for each axis."""
+    """Return a mesh scaled about the origin, by one `factor` [1] or by one for each axis, (3,)."""
     vertices, faces = mesh
     return vertices * factor, faces
 
@@ -106,7 +106,7 @@ def joined(meshes: Sequence[Mesh]) -> Mesh:
 
 
 def mitsuba_mesh(name: str, mesh: Mesh, reflectance: Sequence[float]):
-    """Return a Mitsuba mesh with flat shading and a two-sided diffuse material of an RGB reflectance, 0 to 1."""
+    """Return a Mitsuba mesh with flat shading and a two-sided diffuse material of RGB `reflectance` [1], 0 to 1."""
     diffuse = {"type": "diffuse", "reflectance": {"type": "rgb", "value": list(reflectance)}}
     return _mesh(name, mesh, {"mesh_bsdf": {"type": "twosided", "bsdf": diffuse}})
 
@@ -159,7 +159,7 @@ def fog(
 
 
 def point_light(position: Sequence[float], intensity: Sequence[float]) -> dict[str, Any]:
-    """Return a point light at a position [m] with an RGB intensity [W/sr]."""
+    """Return a point light at `position`, (3,) [m], with the RGB `intensity`, (3,) [W/sr]."""
     return {"type": "point", "position": list(position), "intensity": {"type": "rgb", "value": list(intensity)}}
 
 

@@ -30,7 +30,7 @@ def many_lights() -> dict[str, Any]:
         },
         "lamp": point_light((-1.37, 1.29, 2.03), (7.3, 8.9, 6.1)),
         "behind": point_light((0.83, -5.39, 2.11), (13.7, 11.3, 12.9)),
-        "ball": {
+        "sphere": {
             "type": "sphere",
             "center": [0.17, 0.13, 0.79],
             "radius": 0.43,
@@ -68,14 +68,14 @@ def sun() -> dict[str, Any]:
             "center": [0.61, 0.13, 0.59],
             "radius": 0.49,
             "bsdf": clear,
-            "interior": fog((1.37, 1.13, 0.83), (0.67, 0.79, 0.91), {"type": "hg", "g": -0.29}) | {"id": "in-ball"},
+            "interior": fog((1.37, 1.13, 0.83), (0.67, 0.79, 0.91), {"type": "hg", "g": -0.29}) | {"id": "in-pearl"},
         },
         "slab": {
             "type": "cube",
             "to_world": transform.translate([-1.13, -0.11, 1.43]).rotate([0, 0, 1], 31).scale([0.19, 0.23, 0.037]),
             "bsdf": grey,
         },
-        "ball": {"type": "sphere", "center": [-0.19, -0.27, 1.31], "radius": 0.17, "bsdf": grey},
+        "sphere": {"type": "sphere", "center": [-0.19, -0.27, 1.31], "radius": 0.17, "bsdf": grey},
         "floor": {"type": "rectangle", "to_world": transform.scale(7.1), "bsdf": grey},
     }
 

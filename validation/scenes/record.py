@@ -27,4 +27,4 @@ class SceneRecord:
     build: Callable[[], dict[str, Any]]  #: the dictionary for `mi.load_dict`; needs an active Mitsuba variant
     purpose: str  #: one sentence: what the scene is for
     published: str  #: the published figure that the scene stands for
-    animation: Animation = field(default_factory=Animation)
+    animation: Animation = field(default_factory=Animation)  #: what moves in it

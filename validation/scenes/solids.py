@@ -132,7 +132,13 @@ def arch(radii: tuple[float, float], depth: float, steps: int) -> Mesh:
 
 
 def gable(corner: Sequence[float], across: Sequence[float], up: Sequence[float], cells: tuple[int, int]) -> Mesh:
-    """Return a wall as of `parts.grid` with a gable of half its height: 2 cells[0] cells[1] + cells[0] triangles."""
+    """Return a wall with a gable of half its height: 2 cells[0] cells[1] + cells[0] triangles.
+
+    Parameters
+    ----------
+    corner, across, up, cells
+        Of the wall below the gable, (3,) each [m], see `validation.scenes.parts.grid`.
+    """
     vertices, faces = grid(corner, across, up, cells)
     apex = np.asarray(corner) + 0.5 * np.asarray(across) + 1.5 * np.asarray(up)
     eaves = np.arange(cells[0] + 1) * (cells[1] + 1) + cells[1]

@@ -81,7 +81,7 @@ def _casters() -> list[tuple[str, Mesh, tuple[float, float, float]]]:
         ("bar", placed(box((5.93, 0.17, 0.13)), (0.07, 0.09, 1.37), rotation((0.1, 1, 0.3), 3.7)), brown),
         ("ring-within", placed(torus(0.43, 0.067, (67, 24)), (-1.83, 0.17, 1.87), rotation((1, 0.4, 0), 31.3)), gold),
         ("ring-above", placed(torus(0.31, 0.053, (59, 22)), (-1.49, 0.37, 3.19), rotation((1, 0.3, 0), 23.9)), gold),
-        ("ball", placed(scaled(icosphere(3), 0.19), (-2.23, 0.31, 2.97)), white),
+        ("sphere", placed(scaled(icosphere(3), 0.19), (-2.23, 0.31, 2.97)), white),
         ("star", placed(prism(star(0.19, 0.47, 7), 0.091), (0.17, -0.13, 1.93), rotation((1, 0.7, 0), 21.1)), white),
         ("slats", placed(joined(slats), (0.07, 0.11, 3.13), rotation((0.3, 0.1, 1), 19.3)), brown),
         ("spindle", placed(spindle, (2.03, 0.17, 0.79), rotation((0.3, 1, 0), 11.9)), white),

@@ -130,7 +130,7 @@ def _things() -> list[tuple[str, Mesh, tuple[float, float, float]]]:
         ("table", placed(_table(), (0.37, 0.83, 0.0), rotation((0, 0, 1), 21.7)), _WOOD),
         ("vase", placed(vase, (0.47, 0.91, 0.797)), _CLAY),
         ("ring", placed(torus(0.37, 0.047, (23, 9)), (-0.71, -0.13, 2.03), rotation((1, 0.4, 0.2), 63.1)), _BRASS),
-        ("ball", placed(scaled(icosphere(1), 0.23), (-1.13, 1.37, 1.31)), _BRASS),
+        ("sphere", placed(scaled(icosphere(1), 0.23), (-1.13, 1.37, 1.31)), _BRASS),
         ("stone", placed(scaled(gem(7, 4), (0.41, 0.33, 0.37)), (1.53, -0.71, 0.31)), _STONE),
         ("post", placed(prism(star(0.11, 0.19, 6), 3.37), (-1.57, 2.63, -0.017)), _WOOD),
         ("beam", placed(box((0.17, 5.61, 0.21)), (0.83, _FRONT + 0.5 * _DEPTH, 2.97), rotation((0, 0, 1), 2.3)), _WOOD),

@@ -172,9 +172,9 @@ def compare_statistics(
         are left out too: `error_metrics` counts them. Batch means are then ignored, as they would not be of these
         pixels.
     margin
-        Largest relative bias that counts as agreement, such as 0.005.
+        Largest relative bias [1] that counts as agreement, such as 0.005.
     family_level
-        Probability that a comparison of agreeing images rejects any pixel, and likewise any block.
+        Probability [1] that a comparison of agreeing images rejects any pixel, and likewise any block.
     plain_level
         Level at which exceeding values are counted.
 

@@ -78,20 +78,20 @@ Times = Mapping[str, Timing]  #: by stage
 def error_band(
     name: str, old: float, *, tolerance: float = ERROR_TOLERANCE, pixels: int = 0, rmse: float = 0.0
 ) -> float:
-    """Return how far an error may move.
+    """Return how far an error may move [1].
 
     Parameters
     ----------
     name
         A field of `validation.metrics.errors.Metrics` without a unit, 'mean' (relative to itself) or 'flip'.
     old
-        What it was.
+        What it was [1].
     tolerance
-        The relative band; that of the maximum is twice as wide.
+        The relative band [1]; that of the maximum is twice as wide.
     pixels
-        Of the image, for counts.
+        Number of pixels of the image, for counts.
     rmse
-        The relative RMSE of the same image, for a bias.
+        The relative RMSE [1] of the same image, for a bias.
     """
     if name == "nonfinite":
         return 0.0
@@ -104,7 +104,7 @@ def error_band(
 
 
 def spread(times: Iterable[Times]) -> float:
-    """Return the geometric mean of upper over lower quartile of all timings; 1 where none has quartiles."""
+    """Return the geometric mean of upper over lower quartile of all timings [1]; 1 where none has quartiles."""
     ratios = [
         timing["high_ms"] / timing["low_ms"]
         for stages in times
@@ -115,13 +115,23 @@ def spread(times: Iterable[Times]) -> float:
 
 
 def drift(pairs: Iterable[tuple[Times, Times]]) -> float:
-    """Return the median ratio of new to old frames; 1 where there are none."""
+    """Return the median ratio [1] of the times of new to old frames; 1 where there are none."""
     ratios = [new["frame"]["median_ms"] / old["frame"]["median_ms"] for old, new in pairs]
     return math.exp(float(np.median(np.log(ratios)))) if ratios else 1.0
 
 
 def least_ratio(spread_of_both: float, *, same_machine: bool, tolerance: float = TIME_TOLERANCE) -> float:
-    """Return the least ratio of two times that means something."""
+    """Return the least ratio [1] of two times that means something.
+
+    Parameters
+    ----------
+    spread_of_both
+        By how much the machine's noise alone moves the ratio, at least 1: the larger `spread` of both.
+    same_machine
+        Whether one machine took both times; the band is four times as wide where not.
+    tolerance
+        Relative band of a time on one machine [1].
+    """
     return (1 + tolerance * (1 if same_machine else 4)) * spread_of_both
 
 
@@ -133,9 +143,9 @@ def slower_stages(old: Times, new: Times, *, least: float, scale: float) -> list
     old, new
         The times of one configuration in two reports.
     least
-        From `least_ratio`.
+        Least ratio of two times that means something [1], from `least_ratio`.
     scale
-        How much slower than before everything else is: at least 1 on the same machine.
+        How much slower than before everything else is [1]: at least 1 on the same machine.
 
     Notes
     -----

@@ -24,23 +24,32 @@ def satterthwaite(variance: ArrayLike, spread: ArrayLike) -> Array:
     Parameters
     ----------
     variance
-        V.
+        V, of any shape and in any unit, such as [1].
     spread
-        sum(v^2 / (K - 1)); 0 for variances known exactly, which gives an infinite nu.
+        sum(v^2 / (K - 1)), in the shape of V and the square of its unit; 0 for variances known exactly, which gives an
+        infinite nu.
+
+    Returns
+    -------
+    array
+        nu [1], in their shape.
     """
     v, s = np.asarray(variance, dtype=np.float64), np.asarray(spread, dtype=np.float64)
     return np.divide(v**2, s, out=np.full(np.broadcast_shapes(v.shape, s.shape), np.inf), where=s > 0)
 
 
 def two_sided_p(z: Array, freedom: Array) -> Array:
-    """Return P(|Z| >= |z|) of Student's law; of the normal law where the degrees of freedom are infinite."""
+    """Return P(|Z| >= |z|) of Student's law; of the normal law where the degrees of freedom are infinite.
+
+    `z` and `freedom` have one shape, (n,) [1].
+    """
     tail = -np.abs(z)
     finite = np.isfinite(freedom)
     return 2 * np.where(finite, stdtr(np.where(finite, freedom, 1.0), tail), ndtr(tail))
 
 
 def student_quantile(probability: float, freedom: float) -> float:
-    """Return a quantile of Student's law, of the normal law for infinite degrees of freedom."""
+    """Return the quantile [1] at a `probability` of Student's law; of the normal law for an infinite `freedom`."""
     return float(stdtrit(freedom, probability) if np.isfinite(freedom) else ndtri(probability))
 
 
@@ -58,24 +67,27 @@ def power(effect: float, freedom: float, level: float = 0.05) -> float:
 
 
 def sidak(level: float, tests: int) -> float:
-    """Return the level of each of m independent tests of which none rejects with probability 1 - level.
+    """Return the level [1] of each of m independent `tests` of which none rejects with probability 1 - `level`.
 
-    1 - (1 - A)^(1/m) (Sidak 1967), without cancellation for large m.
+    1 - (1 - level)^(1/m) (Sidak 1967), without cancellation for large m.
     """
     return float(-np.expm1(np.log1p(-level) / max(tests, 1)))
 
 
 def binomial_p(successes: int, trials: int, probability: float) -> float:
-    """Return min(1, 2 min(P(X <= k), P(X >= k))) of the binomial law: too few count as well as too many."""
+    """Return min(1, 2 min(P(X <= k), P(X >= k))) of the binomial law: too few count as well as too many.
+
+    X is the number of `successes` k in `trials`, each of a `probability` [1].
+    """
     lower, upper = binom.cdf(successes, trials, probability), binom.sf(successes - 1, trials, probability)
     return float(min(1.0, 2 * min(lower, upper)))
 
 
 def uniformity_p(p: Array) -> float:
-    """Return the p-value of Kolmogorov and Smirnov's test that p-values are uniform in [0, 1]."""
+    """Return the p-value of Kolmogorov and Smirnov's test that p-values `p`, of shape (n,), are uniform in [0, 1]."""
     return float(kstest(p, "uniform").pvalue)
 
 
 def bonferroni(p: Sequence[float]) -> float:
-    """Return a p-value for the least of several p-values that may depend on one another; NaN for none."""
+    """Return a p-value [1] for the least of several p-values `p` that may depend on one another; NaN for none."""
     return min(1.0, len(p) * min(p)) if p else float("nan")

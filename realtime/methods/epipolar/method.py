@@ -234,7 +234,8 @@ def _sampled_shares(view: View, number: int, kernel, samples: Samples, heights: 
 
     lane = spread(dr.width(marked))
     if view.features.bounded:
-        # The planes of bodies are written to a table first, which no branch may do: empty room repeats the last sample.
+        # The planes of bounded media are written to a table first, which no branch may do: empty room repeats the last
+        # sample.
         computed(dr.minimum(lane, dr.maximum(count, 1) - 1))
     else:
         # Most of the room is empty: a branch steps over it.
@@ -270,6 +271,6 @@ def _yardstick(airlight: RayAirlight):
 
 def _interpolated(airlight: RayAirlight, samples: Samples, shares, heights: SliceHeights, point):
     """Return the integral of every pixel: the share of the samples around it, or its own where they do not fit."""
-    share, found = between_samples(samples, shares, point, airlight.view.distance)
-    own = _lit_integral(airlight, heights, _nearest(samples.slices, point), ~found)
-    return dr.select(found, share * _yardstick(airlight), own)
+    share, fits = between_samples(samples, shares, point, airlight.view.distance)
+    own = _lit_integral(airlight, heights, _nearest(samples.slices, point), ~fits)
+    return dr.select(fits, share * _yardstick(airlight), own)

@@ -93,30 +93,30 @@ def slice_heights(shadow_map: ShadowMap, heights, slices: Slices, light: Light) 
 
 
 def line_point(heights: SliceHeights, number, q):
-    """Return (k_x, k_y) at `q`, counted in leaves, of slices."""
+    """Return (k_x, k_y) at `q`, counted in leaves, of the slices of a `number`."""
     q = q * (1.0 / heights.size)
     if heights.chord is None:
         kx = 1 - q
         return kx, 1 - dr.abs(kx)
-    x0, y0, x1, y1 = (dr.gather(type(q), one, number) for one in heights.chord)
+    x0, y0, x1, y1 = (dr.gather(type(q), coordinate, number) for coordinate in heights.chord)
     return dr.fma(q, x1 - x0, x0), dr.fma(q, y1 - y0, y0)
 
 
-def _tree(heights: SliceHeights, one, other):
-    """Return the trees over leaves that have `one` and `other` at their ends."""
+def _tree(heights: SliceHeights, at_begin, at_end):
+    """Return the trees over leaves with the heights `at_begin` and `at_end` at their ends."""
     count, leaves = heights.slices.count, heights.leaves
-    Pair = two_numbers(type(one))
-    # Written only: reading from what is being written would copy it at every level.
-    tree = dr.empty(type(one), 2 * count * 2 * leaves)
+    Pair = two_numbers(type(at_begin))
+    # The tree is only written here: if a kernel read it too, Dr.Jit would copy it at every level.
+    tree = dr.empty(type(at_begin), 2 * count * 2 * leaves)
     index = dr.arange(mi.UInt32, count * leaves)
-    dr.scatter(tree, Pair(one, other), index + (index // leaves + 1) * leaves)
-    low, high = dr.minimum(one, other), dr.maximum(one, other)
+    dr.scatter(tree, Pair(at_begin, at_end), index + (index // leaves + 1) * leaves)
+    low, high = dr.minimum(at_begin, at_end), dr.maximum(at_begin, at_end)
     dr.eval(low, high, tree)
     for level in range(1, heights.top + 1):
         nodes = leaves >> level
         index = dr.arange(mi.UInt32, count * nodes)
-        low = dr.minimum(*(dr.gather(type(one), low, 2 * index + k) for k in (0, 1)))
-        high = dr.maximum(*(dr.gather(type(one), high, 2 * index + k) for k in (0, 1)))
+        low = dr.minimum(*(dr.gather(type(at_begin), low, 2 * index + k) for k in (0, 1)))
+        high = dr.maximum(*(dr.gather(type(at_begin), high, 2 * index + k) for k in (0, 1)))
         number = index // nodes
         dr.scatter(tree, Pair(low, high), number * (2 * leaves) + (index - number * nodes + nodes))
         dr.eval(low, high, tree)
@@ -135,8 +135,8 @@ def _height(shadow_map: ShadowMap, heights, direction):
     else:
         face, u, v = cube_coordinates(direction)
         depth = dr.maximum(dr.maximum(dr.abs(direction.x), dr.abs(direction.y)), dr.abs(direction.z))
-    u, v = (dr.clip(dr.fma(0.5 * size, one, 0.5 * size), 0, size) for one in (u, v))
-    column, row = (dr.minimum(mi.UInt32(one), size - 1) for one in (u, v))
+    u, v = (dr.clip(dr.fma(0.5 * size, coordinate, 0.5 * size), 0, size) for coordinate in (u, v))
+    column, row = (dr.minimum(mi.UInt32(coordinate), size - 1) for coordinate in (u, v))
     x, y = u - type(u)(column), v - type(v)(row)
     # The two triangles of a texel share its diagonal and differ in the third corner.
     corner = (face * (size + 1) + row) * (size + 1) + column
@@ -176,7 +176,7 @@ def _band(slices: Slices, shadow_map: ShadowMap):
         begin = dr.select(slope == 0, begin, dr.maximum(begin, (-side - start) / slope))
         end = dr.select(slope == 0, end, dr.minimum(end, (side - start) / slope))
     margin = (2 / shadow_map.size) * dr.rcp(dr.maximum(dr.abs(a), dr.abs(b)))
-    # A slice that misses the map has a band of no use, beside it.
+    # A slice that misses the map gets a band beside it, which no ray uses.
     begin = dr.maximum(begin - margin, 0)
     end = dr.maximum(end + margin, begin + margin)
     height = height + dr.zeros(Float, slices.count)
@@ -184,7 +184,7 @@ def _band(slices: Slices, shadow_map: ShadowMap):
 
 
 def node_pair(heights: SliceHeights, number, place, level):
-    """Return the pair of the node of a level that begins at a leaf."""
+    """Return the pair [1/m] of the node of a level that begins at the leaf `place`, of the slices of a `number`."""
     heap = (mi.UInt32(heights.leaves) + place) >> level
     pair = dr.gather(two_numbers(type(heights.tree)), heights.tree, number * (2 * heights.leaves) + heap)
     return pair.x, pair.y

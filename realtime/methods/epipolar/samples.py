@@ -88,19 +88,19 @@ def marked_samples(samples: Samples):
     slices = samples.slices.count
     number = dr.popcnt(samples.bits)
     place = dr.prefix_sum(number)
-    found = dr.empty(mi.UInt32, slices * samples.count)
+    marked = dr.empty(mi.UInt32, slices * samples.count)
     index = dr.arange(mi.UInt32, dr.width(samples.bits))
     word = index // slices
     first = (index - word * slices) * samples.count + word * WORD
 
     def body(bits, place):
-        dr.scatter(found, first + dr.tzcnt(bits), place)
+        dr.scatter(marked, first + dr.tzcnt(bits), place)
         return bits & (bits - 1), place + 1
 
     dr.while_loop(state=(+samples.bits, place), cond=lambda bits, place: bits != 0, body=body, labels=("bits", "place"))
     total = dr.sum(number)
-    dr.eval(found, total)
-    return found, total
+    dr.eval(marked, total)
+    return marked, total
 
 
 def spread(width: int):
@@ -123,7 +123,7 @@ def sample_ray(samples: Samples, sample):
 
 
 def no_value(like):
-    """Return what stands for the value of a sample whose ray meets no light."""
+    """Return what stands for the value of a sample whose ray meets no light, an array `like` the values."""
     return type(like)(_BESIDE)
 
 
@@ -143,7 +143,7 @@ def between_samples(samples: Samples, values, point, depth):
     -------
     value
         The weighted mean.
-    found
+    fits
         Whether enough of the samples agree in their depth.
     """
     place = slice_coordinate(samples.slices, *point)
@@ -167,16 +167,19 @@ def _on_slice(samples: Samples, values, number, point, depth):
     k = dr.minimum(mi.UInt32(along), samples.count - 2)
     share = along - type(along)(k)
     left, right = _marked_about(samples, number, k)
-    one, other = (dr.gather(type(values), values, number * samples.count + at) for at in (left, right))
-    has_one, has_other = (_first(value) >= 0 for value in (one, other))
-    one, other = dr.select(has_one, one, other), dr.select(has_other, other, one)
+    left_value, right_value = (dr.gather(type(values), values, number * samples.count + at) for at in (left, right))
+    has_left, has_right = (_first(value) >= 0 for value in (left_value, right_value))
+    left_value, right_value = (
+        dr.select(has_left, left_value, right_value),
+        dr.select(has_right, right_value, left_value),
+    )
     pace = dr.rcp(type(along)(right - left))
-    found = []
+    weighted = []
     for step, near in ((0, 1 - share), (1, share)):
-        value = one + (other - one) * (type(along)(k + step - left) * pace)
+        value = left_value + (right_value - left_value) * (type(along)(k + step - left) * pace)
         agreement = _agreement(depth, _sample_depth(samples, ends, mi.Int32(k) + step))
-        found.append((value, dr.select(has_one | has_other, near * agreement, 0)))
-    return found
+        weighted.append((value, dr.select(has_left | has_right, near * agreement, 0)))
+    return weighted
 
 
 def _marked_about(samples: Samples, number, k):
@@ -205,18 +208,18 @@ def _sample_depth(samples: Samples, ends, k):
     return dr.gather(type(samples.depth), samples.depth, pixel)
 
 
-def _difference(one, other):
+def _difference(first, second):
     """Return the relative difference of two depths, by their inverses: they may be infinite."""
-    a, b = dr.rcp(one), dr.rcp(other)
+    a, b = dr.rcp(first), dr.rcp(second)
     return dr.abs(a - b) / dr.maximum(dr.maximum(a, b), 1e-20)
 
 
-def _apart(one, other):
-    return _difference(one, other) > AGREES
+def _apart(first, second):
+    return _difference(first, second) > AGREES
 
 
-def _agreement(one, other):
-    close = dr.minimum(AGREES / dr.maximum(_difference(one, other), 1e-6), 1)
+def _agreement(first, second):
+    close = dr.minimum(AGREES / dr.maximum(_difference(first, second), 1e-6), 1)
     return dr.square(dr.square(close))
 
 

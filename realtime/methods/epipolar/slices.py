@@ -36,7 +36,7 @@ class Slices:
 
     count: int
     width: int  #: of the image [pixels]
-    height: int
+    height: int  #: of the image [pixels]
     epipole: tuple[Any, Any, Any]  #: a, b, c, and all times -1 where c < 0; one entry each
     sides: tuple[tuple[Any, Any], ...]  #: of the border: where it begins along those that face away, and if it does
     length: Any  #: of those sides [pixels], one entry
@@ -75,9 +75,9 @@ def image_slices(camera: Camera, light: Light, count: int) -> Slices:
     a = dr.dot(v, camera.left) / dr.squared_norm(camera.left)
     b = dr.dot(v, camera.up) / dr.squared_norm(camera.up)
     c = dr.dot(v, camera.forward)
-    epipole = tuple(dr.select(c < 0, -one, one) for one in (a, b, c))
+    epipole = tuple(dr.select(c < 0, -component, component) for component in (a, b, c))
     sides, length, closed = _border(camera.width, camera.height, epipole)
-    found = Slices(
+    slices = Slices(
         count,
         camera.width,
         camera.height,
@@ -93,19 +93,19 @@ def image_slices(camera: Camera, light: Light, count: int) -> Slices:
         ends=None,
     )
     place = (Float(dr.arange(mi.UInt32, count)) + 0.5) * (length / count)
-    leave = _at_border(found, place)
-    enter = _entry(found, *leave)
+    leave = _at_border(slices, place)
+    enter = _entry(slices, *leave)
     out = camera.forward + camera.left * leave[0] + camera.up * leave[1]
     across = _at_right_angles(out, towards, camera)
     ends = dr.empty(Float, 4 * count)
     dr.scatter(ends, four_numbers(Float)(*enter, *leave), dr.arange(mi.UInt32, count))
-    found = replace(found, across=across, ends=ends)
-    dr.eval(found)
-    return found
+    slices = replace(slices, across=across, ends=ends)
+    dr.eval(slices)
+    return slices
 
 
 def image_point(camera: Camera, direction):
-    """Return (i, j) of rays [pixels]."""
+    """Return (i, j) of rays along `direction` [pixels], to the left of and above the middle of the image."""
     depth = dr.rcp(dr.dot(direction, camera.forward))
     i = dr.dot(direction, camera.left) / dr.squared_norm(camera.left)
     j = dr.dot(direction, camera.up) / dr.squared_norm(camera.up)
@@ -113,20 +113,20 @@ def image_point(camera: Camera, direction):
 
 
 def pixel_number(slices: Slices, i, j):
-    """Return the number, row times width plus column, of the pixel that holds an image point, or of the nearest."""
+    """Return the number, row times width plus column, of the pixel that holds a point (i, j), or of the nearest."""
     column = dr.clip(0.5 * slices.width - i, 0, slices.width - 1)
     row = dr.clip(0.5 * slices.height - j, 0, slices.height - 1)
     return mi.UInt32(row) * slices.width + mi.UInt32(column)
 
 
 def slice_coordinate(slices: Slices, i, j):
-    """Return the place of image points among the slices: 0 on the first, 1 on the second, and so on.
+    """Return the place of image points (i, j) [pixels] among the slices: 0 on the first, 1 on the second, and so on.
 
     Beyond the first and the last it goes on to -1/2 and count - 1/2, where all four sides face away round the circle.
     """
     x, y = 0.5 * slices.width, 0.5 * slices.height
     di, dj = _towards_epipole(slices.epipole, i, j)
-    # Away from E, to whichever side comes first.
+    # The half line from E leaves the image through the side that it meets first.
     to_i = dr.select(di < 0, x - i, x + i) / dr.abs(di)
     to_j = dr.select(dj < 0, y - j, y + j) / dr.abs(dj)
     t = dr.minimum(to_i, to_j)
@@ -134,7 +134,7 @@ def slice_coordinate(slices: Slices, i, j):
     first, second, third, fourth = (begin for begin, _ in slices.sides)
     along_i = dr.select(di < 0, first + (at_j + y), third + (y - at_j))
     along_j = dr.select(dj < 0, second + (x - at_i), fourth + (at_i + x))
-    # On E itself any slice will do.
+    # A point on E itself belongs to every slice: take any.
     here = (di == 0) & (dj == 0)
     place = dr.select(here, 0, dr.select(to_i <= to_j, along_i, along_j))
     return dr.clip(place, 0, slices.length) * (slices.count / slices.length) - 0.5
@@ -208,11 +208,11 @@ def _entry(slices: Slices, i, j):
 def _at_right_angles(vector, axis, camera: Camera):
     """Return the unit vector across `axis` on the side of `vector`; any across it where the two are parallel."""
 
-    def across(one):
-        normal = dr.cross(axis, one)
+    def across(side):
+        normal = dr.cross(axis, side)
         return dr.cross(normal, axis)
 
-    found = across(vector)
-    flat = dr.squared_norm(found) <= 1e-12 * dr.squared_norm(vector)
+    across_vector = across(vector)
+    flat = dr.squared_norm(across_vector) <= 1e-12 * dr.squared_norm(vector)
     other = dr.select(dr.squared_norm(across(camera.left)) > 0.1 * dr.squared_norm(camera.left), camera.left, camera.up)
-    return dr.normalize(dr.select(flat, across(other), found))
+    return dr.normalize(dr.select(flat, across(other), across_vector))

@@ -69,7 +69,7 @@ def sum_lit_intervals(
     width = dr.width(zero)
     x0 = x0 + dr.zeros(type(x1), width)
     distance = heights.slices.distance
-    # A ray through the light: next to it, it sees the same.
+    # A ray through the light has no height: a ray next to it sees the same.
     height = dr.maximum(geometry.height, 1e-12 * distance)
     ray = (geometry.foot, height, dr.square(distance))
     begin, end = (_position(heights, number, ray, x) for x in segment)

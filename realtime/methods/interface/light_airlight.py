@@ -42,7 +42,10 @@ class RayAirlight:
         return self.geometry.lit_segment(type(self.view.distance)(0), self.view.distance)
 
     def integral(self, x0, x1):
-        """Return the integral over a segment; `radiance` knows its units."""
+        """Return the integral over the segment [x0, x1] [m].
+
+        It is J [1/m] in one medium, and albedo sigma_t J [1/m^2] in bounded ones; `radiance` knows which.
+        """
         if self.media:
             return self.media.airlight(x0, x1)
         return airlight_integral(self.kernel, self.geometry, x0, x1, medium=self.view.medium, light=self.light)
@@ -54,7 +57,7 @@ class RayAirlight:
         )
 
     def gamma(self, x):
-        """Return the integral from the camera on."""
+        """Return the `integral` from the camera to the distance `x` [m]."""
         if self.media:
             return self.integral(type(x)(0), x)
         return gamma(self.kernel, self.geometry, x, medium=self.view.medium, light=self.light)

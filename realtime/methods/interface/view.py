@@ -8,8 +8,8 @@ from typing import Any
 import drjit as dr
 
 from realtime.bounded_media.airlight import LitRay, lit_ray
-from realtime.bounded_media.body_views import MediaSides
 from realtime.bounded_media.ray_segments import camera_pieces
+from realtime.bounded_media.views import MediaViews
 from realtime.numerics.array_types import Metres, PerRay
 from realtime.scene.camera import Camera
 from realtime.scene.features import SceneFeatures
@@ -41,7 +41,7 @@ class View:
     rays: Callable[[Any], tuple[Any, Any]]  #: lanes -> the directions of their rays, and their low parts
     visible_triangle: Callable[[], tuple[Any, Any, Any]]  #: -> corners [m], barycentric weights, whether there is one
     part: Callable[[], Callable[..., "View"]]  #: -> (pixel, distance, tile, layout) -> the view of some of the rays
-    sides: MediaSides | None = None  #: bodies of media, where they are known before the rays
+    media_views: MediaViews | None = None  #: of bounded media, where they are known before the rays
     prepared: Any = ()  #: for a user's plain function: what its `prepare` made
 
 
@@ -55,15 +55,17 @@ def rays_in_media(view: View, form: str = "exact") -> tuple[LitRay, ...]:
     """Return the rays of a view in bounded media, by light; `form` is one of
     `realtime.bounded_media.airlight.FORMS`.
     """
-    pieces = camera_pieces(view.medium, view.origin, view.direction, view.sides.camera if view.sides else None)
+    pieces = camera_pieces(
+        view.medium, view.origin, view.direction, view.media_views.camera if view.media_views else None
+    )
     place = {"origin": view.origin, "direction": view.direction, "low": view.direction_low}
-    sides = view.sides.lights if view.sides else [None] * len(view.lights)
+    light_views = view.media_views.lights if view.media_views else [None] * len(view.lights)
     return tuple(
-        lit_ray(view.medium, light, **place, pieces=pieces, form=form, sides=one)
-        for light, one in zip(view.lights, sides, strict=True)
+        lit_ray(view.medium, light, **place, pieces=pieces, form=form, views=views)
+        for light, views in zip(view.lights, light_views, strict=True)
     )
 
 
 def bounded_radiance(light: Light, scattered):
-    """Return the radiance of what `airlight` of a ray in bounded media returns [W/(m^2 sr)]."""
+    """Return the radiance of `scattered`, what `airlight` of a ray in bounded media returns [W/(m^2 sr)]."""
     return light.intensity * (scattered * (0.25 * dr.inv_pi))

@@ -82,11 +82,11 @@ def _jumping_sides(heights: InverseDepthField):
     lane = dr.arange(mi.UInt32, dr.width(leaf) * _SIDES)
     of_leaf, side = dr.gather(mi.UInt32, leaf, lane // _SIDES), lane % _SIDES
     edge = _edge_of(heights, of_leaf, side)
-    one, other = _ends(heights, edge)
+    begin_height, end_height = _ends(heights, edge)
     # The far border of a leaf belongs to the next one, but for the last.
     outer = dr.select(edge.upright, edge.i, edge.j)
     own = (side % (_SIDES // 2) < LEAF * LEAF) | (outer == heights.size)
-    some = dr.compress(own & (dr.abs(one - other) > _JUMP * dr.maximum(one, other)))
+    some = dr.compress(own & (dr.abs(begin_height - end_height) > _JUMP * dr.maximum(begin_height, end_height)))
     return dr.gather(mi.UInt32, of_leaf, some), dr.gather(mi.UInt32, side, some)
 
 
@@ -104,28 +104,28 @@ def _ends(heights: InverseDepthField, edge: _Edge):
 def _trace(heights: InverseDepthField, scene, light: Light, sides, walls):
     """Find the walls on sides and write them to both texels of each; return the numbers of these texels."""
     edge = _edge_of(heights, *sides)
-    one, other = _ends(heights, edge)
+    begin_height, end_height = _ends(heights, edge)
     Double, size = mi.Float64, heights.size
 
-    def halve(step, number, one, other):
+    def halve(step, number, begin_height, end_height):
         middle = (2 * Double(number) + 1) / Double(2 << step)
         column, row = Double(edge.i), Double(edge.j)
         u = dr.fma(dr.select(edge.upright, column, column + middle), 2.0 / size, -1.0)
         v = dr.fma(dr.select(edge.upright, row + middle, row), 2.0 / size, -1.0)
         distance = cast_map_rays(scene, light, (edge.face, u, v))
-        height = heights.projection.inverse_depth((type(one)(u), type(one)(v)), distance)
-        far = dr.abs(height - one) < dr.abs(height - other)
+        height = heights.projection.inverse_depth((type(begin_height)(u), type(begin_height)(v)), distance)
+        far = dr.abs(height - begin_height) < dr.abs(height - end_height)
         number = (number << 1) + dr.select(far, mi.UInt32(1), mi.UInt32(0))
-        return step + 1, number, dr.select(far, height, one), dr.select(far, other, height)
+        return step + 1, number, dr.select(far, height, begin_height), dr.select(far, end_height, height)
 
-    step = dr.zeros(mi.UInt32, dr.width(one))
+    step = dr.zeros(mi.UInt32, dr.width(begin_height))
     _, number, low, high = dr.while_loop(
-        state=(step, step + 0, one + 0, other + 0),
+        state=(step, step + 0, begin_height + 0, end_height + 0),
         cond=lambda step, *_: step < _HALVINGS,
         body=halve,
-        labels=("step", "number", "one", "other"),
+        labels=("step", "number", "begin_height", "end_height"),
     )
-    jumps = dr.abs(low - high) > _KEPT * dr.abs(one - other)
+    jumps = dr.abs(low - high) > _KEPT * dr.abs(begin_height - end_height)
     behind = (edge.face * size + edge.j) * size + edge.i
     before = behind - dr.select(edge.upright, mi.UInt32(1), mi.UInt32(size))
     place = dr.select(edge.upright, edge.i, edge.j)

@@ -40,12 +40,12 @@ def packed(node: Node):
 
 
 def unpacked(entry) -> Node:
-    """Return the node that `packed` made a number of."""
+    """Return the node that `packed` made the number `entry` of."""
     return Node(entry >> 26, entry & 0x1FFF, (entry >> 13) & 0x1FFF)
 
 
 def descend(heights: InverseDepthField, planes: BeamPlanes, face, leaf, count, write, active):
-    """Count and write the nodes of level `leaf` that beams may meet."""
+    """Count, from `count` on, and `write` the nodes of level `leaf` of a face that beams may meet."""
 
     def body(node: Node, count, going):
         met, box = meets(heights, planes, face, node, going)
@@ -79,7 +79,7 @@ def descend(heights: InverseDepthField, planes: BeamPlanes, face, leaf, count, w
 
 
 def meets(heights: InverseDepthField, planes: BeamPlanes, face, node: Node, active):
-    """Return whether a beam may meet the height field over a node, and what it was found from."""
+    """Return whether a beam may meet the height field over a node of a face, and what that was decided from."""
     low, high = node_bounds(heights, face, node.level, node.i, node.j, active)
     half = _half(type(low), node.level)
     u = dr.fma(dr.fma(2.0, type(low)(node.i), 1.0), half, -1.0)

@@ -33,8 +33,8 @@ _STEEP = 1e30  # stands for 1/0: lines that are never crossed lie far beyond [0,
 class FaceRay:
     """A ray in a face; the coordinates are those of its line at t = 0 and t = 1."""
 
-    begin: Any  #: the part of the ray in the face [m]
-    end: Any
+    begin: Any  #: of the part of the ray in the face [m]
+    end: Any  #: of that part [m]
     walks: Any  #: whether any of it lies beyond the nearest height
     u: tuple[Any, Any]  #: columns [texels]
     v: tuple[Any, Any]  #: rows [texels]
@@ -48,7 +48,10 @@ class FaceRay:
 
 
 def in_face(heights: InverseDepthField, face, away, direction, segment):
-    """Return the part of a segment of rays that lies in a face, x0 >= x1 where none does; see `face_ray`."""
+    """Return the part of a segment of rays [m] that lies in a face, x0 >= x1 where none does.
+
+    `away` and `direction` as for `face_ray`.
+    """
     a0, b0, s0, c0 = heights.projection.homogeneous(face, away, 1)
     da, db, ds, dc = heights.projection.homogeneous(face, direction, 0)
     begin, end = segment
@@ -122,7 +125,7 @@ def _coordinates(size: int, x, origin, direction, nearest):
     a, b, c = (dr.select(finite, dr.fma(at, d, o), d) for o, d in zip(origin, direction))
     inverse = dr.rcp(dr.select(finite, dr.maximum(c, nearest), c))
     half = 0.5 * size
-    # Just within the last column and row: a line along the far border would lie in none.
+    # Stay just within the last column and row: a line along the far border would lie in none.
     last = size * (1 - dr.epsilon(type(x)))
     u, v = (dr.clip(dr.fma(half * p, inverse, half), 0, last) for p in (a, b))
     return u, v, dr.select(finite, inverse, 0), dr.select(finite, at * inverse, inverse)
@@ -143,7 +146,7 @@ def _inverse(length):
 
 
 def at_line(pair, t):
-    """Return a coordinate of the line at t."""
+    """Return a coordinate of the line at t; `pair` is that coordinate at its ends."""
     return dr.fma(t, pair[1], dr.fma(-t, pair[0], pair[0]))
 
 

@@ -33,8 +33,8 @@ from realtime.shadow_maps.inverse_depth_field import texel_heights, texel_walls
 class Passage:
     """A ray's line over a texel, by the texel's own borders and heights alone."""
 
-    place: tuple[Any, Any]  #: column and row of the texel
-    four: Any  #: its heights s00, s10, s01, s11
+    place: tuple[Any, Any]  #: column and row of the texel [texels]
+    four: Any  #: its heights s00, s10, s01, s11 [1/m]
     walls: Any  #: its walls, see `realtime.methods.light_volumes.jump_search`; None where no texel has any
     t: tuple[Any, Any]  #: where the line enters and leaves the texel, or begins and ends in it
     excess: tuple[Any, Any]  #: D there
@@ -57,7 +57,7 @@ class TexelCrossings:
 
 
 def passage(heights, face, line: Line, texel) -> Passage:
-    """Return the passage of a ray over a texel."""
+    """Return the passage of a ray over a texel of a face of the `heights`."""
     ray = line.ray
     Float = type(ray.begin)
     place = column, row = Float(texel[0]), Float(texel[1])

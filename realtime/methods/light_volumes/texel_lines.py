@@ -31,7 +31,7 @@ class Line:
 
 
 def line_of(heights: InverseDepthField, face, ray: FaceRay) -> Line:
-    """Return the line of a ray; D at its ends is that of the texel whose own borders are on either side of them."""
+    """Return the line of a ray in a face; D at its ends is that of the texel whose borders lie about them."""
     right, up = ray.per_u > 0, ray.per_v > 0
     excess, cells, slack = [], [], type(ray.begin)(0)
     for t in (0, 1):
@@ -68,7 +68,10 @@ def _height_in(heights, texel, four, x, y):
 
 
 def cell_at(pair, per, t, low, side):
-    """Return the column (or row) of a strip of texels whose own borders are on either side of t."""
+    """Return the column (or row) of a strip of texels whose own borders are on either side of t.
+
+    The strip begins at texel `low`; `pair` is the coordinate at the ends of the line and `per` its inverse change.
+    """
     first, last = mi.Int32(low), mi.Int32(low + side) - 1
     cell = dr.clip(mi.Int32(dr.floor(at_line(pair, t))), first, last)
     # Rounding may have put it one too far, or not far enough.
@@ -78,9 +81,12 @@ def cell_at(pair, per, t, low, side):
 
 
 def borders(low, start, per, across=1.0):
-    """Return the t at which a line enters and leaves a strip of texels."""
-    one, other = (low - start) * per, (low + across - start) * per
-    return dr.minimum(one, other), dr.maximum(one, other)
+    """Return the t at which a line enters and leaves the strip from `low` to `low + across` [texels].
+
+    The line is at `start` [texels] for t = 0 and needs `per` for a texel.
+    """
+    at_low, at_high = (low - start) * per, (low + across - start) * per
+    return dr.minimum(at_low, at_high), dr.maximum(at_low, at_high)
 
 
 def slope_of(line: Line, size: int):
@@ -93,7 +99,7 @@ def slope_of(line: Line, size: int):
 
 
 def texels_on(line: Line, slope, node):
-    """Return bit 4 row + column of each texel of a leaf near the line of a ray."""
+    """Return bit 4 row + column of each texel of the leaf `node` near the line of a ray; `slope` is its `slope_of`."""
     ray = line.ray
     Float = type(ray.begin)
     per_column, below, above = slope
@@ -104,6 +110,6 @@ def texels_on(line: Line, slope, node):
     bits = mi.UInt32(0)
     for k in range(4):
         # One bit in four for each row.
-        first, end = (mi.UInt32(dr.clip(dr.fma(step, float(k), one), 0, 20)) for one in (low, high))
+        first, end = (mi.UInt32(dr.clip(dr.fma(step, float(k), offset), 0, 20)) for offset in (low, high))
         bits |= ((mi.UInt32(1) << end) - (mi.UInt32(1) << first)) & (0x1111 << k)
     return bits

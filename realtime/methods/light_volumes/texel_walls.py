@@ -41,7 +41,7 @@ class Side:
     """The wall on a side of a texel, which goes from its corner of lower u or v to the other."""
 
     stands: Any  #: whether there is one
-    place: Any  #: where, from 0 to 1
+    place: Any  #: where, from 0 to 1 [1]
 
 
 def side_of(walls, side, Float) -> Side:
@@ -68,9 +68,9 @@ def parts_of(four, walls, Float) -> Parts:
     cut = _cuts_corner(sides)
     upright = bottom.stands & top.stands
     level = left.stands & right.stands & ~upright
-    zero, one = Float(0), Float(1)
-    line = _select(upright, (-bottom.place, one, bottom.place - top.place), (zero, one, -one))
-    line = _select(level, (-left.place, left.place - right.place, one), line)
+    zero, unit = Float(0), Float(1)
+    line = _select(upright, (-bottom.place, unit, bottom.place - top.place), (zero, unit, -unit))
+    line = _select(level, (-left.place, left.place - right.place, unit), line)
     line = _select(cut, _cut_line(bottom, top, left, right), line)
     below, above, before, behind = s10 - s00, s11 - s01, s01 - s00, s11 - s10
     corner = dr.select(right.stands, dr.select(top.stands, s11, s10), dr.select(top.stands, s01, s00))
@@ -109,23 +109,23 @@ def _cut_line(bottom: Side, top: Side, left: Side, right: Side) -> Numbers:
     return -1 - corner_x * per_x - corner_y * per_y, per_x, per_y
 
 
-def _select(condition, one: Numbers, other: Numbers) -> Numbers:
-    a, b, c = (dr.select(condition, *pair) for pair in zip(one, other))
+def _select(condition, chosen: Numbers, otherwise: Numbers) -> Numbers:
+    a, b, c = (dr.select(condition, *pair) for pair in zip(chosen, otherwise))
     return a, b, c
 
 
 def value_at(numbers: Numbers, x, y):
-    """Return c0 + cx x + cy y."""
+    """Return c0 + cx x + cy y at a point (x, y) of a texel, each from 0 to 1 [1/m]."""
     return dr.fma(numbers[1], x, dr.fma(numbers[2], y, numbers[0]))
 
 
 def height_at(parts: Parts, second, x, y):
-    """Return the height at a point by the plane of the second part, or of the first."""
+    """Return the height at (x, y) by the plane of the second part, or of the first [1/m]."""
     return dr.select(second, value_at(parts.second, x, y), value_at(parts.first, x, y))
 
 
 def height_in(parts: Parts, x, y):
-    """Return the height at a point of a texel."""
+    """Return the height at the point (x, y) of a texel, each from 0 to 1 [1/m]."""
     return height_at(parts, value_at(parts.line, x, y) > 0, x, y)
 
 

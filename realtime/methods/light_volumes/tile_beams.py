@@ -77,7 +77,7 @@ def make_beam(directions, end, light, axis=None) -> Beam:
     middle = dr.normalize(sum(directions[1:], directions[0]))
     across = directions[-1] - directions[0]
     across -= middle * dr.dot(across, middle)
-    # A tile of one ray, or of a row of pixels, has no extent in some direction: any other will do.
+    # A tile of one ray, or of a row of pixels, has no extent in some direction: take any.
     other = dr.cross(middle, dr.select(dr.abs(middle.x) < 0.7, type(middle)(1, 0, 0), type(middle)(0, 1, 0)))
     across = dr.normalize(dr.select(dr.squared_norm(across) > 1e-12, across, other))
     up = dr.cross(middle, across)
@@ -190,7 +190,11 @@ def may_meet(planes: BeamPlanes, values, low, high):
 
 
 def parts_within(planes: BeamPlanes, values, half, low, high):
-    """Return bit 4 row + column of each of the 4 x 4 parts of a square that is not beyond a plane through the light."""
+    """Return bit 4 row + column of each of the 4 x 4 parts of a square that is not beyond a plane through the light.
+
+    `values` are those of the planes at the middle of the square, `half` is half its side, and `low` and `high` bound
+    the heights over it [1/m].
+    """
     low, high = dr.fma(-1e-5, high, low), dr.fma(1e-5, high, high)
     sides = []
     for k in _NARROW:

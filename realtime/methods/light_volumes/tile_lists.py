@@ -122,7 +122,7 @@ def _tile_lists(heights: InverseDepthField, beam: Beam, passed, entries, of_bloc
             again &= (count > room) & (level > 0)
             return dr.select(again, level - 1, level), count, again
 
-        # No list, or no room: down from the top, to leaves of twice the size and more if need be.
+        # Tiles without a list or room walk down from the top, to leaves of twice the size or more.
         full = count > room
         level = dr.select(full, mi.UInt32(max(0, heights.finest - 1)), heights.finest)
         level, count, _ = dr.while_loop(
@@ -176,7 +176,7 @@ def _writer(target, first, room):
             dr.scatter(target, entry, place)
             return entry
 
-        # A branch: most steps of a walk write nothing, and a scatter costs much even so.
+        # Branch: most steps of a walk write nothing, and a masked scatter still costs much.
         args = packed(node), first + count
         dr.if_stmt(args=args, cond=active & (count < room), true_fn=store, false_fn=lambda entry, place: entry)
         return dr.select(active, count + 1, count)

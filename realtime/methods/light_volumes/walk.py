@@ -72,7 +72,7 @@ def sum_lit_intervals(
         passes = begin < end
         place = tile * heights.faces + face
         first, last = (dr.gather(mi.UInt32, ends, place, passes) for ends in (leaves.first, leaves.last))
-        # All lit, and one interval with what was lit before, unless that lies elsewhere.
+        # The whole part is lit. It joins the interval before it, unless that lies elsewhere.
         lit = passes & ((first & LIT) != 0) & (~intervals.waits | (intervals.end == begin))
         intervals = close_interval(intervals, end, lit, begin=dr.select(intervals.waits, intervals.begin, begin))
 

@@ -41,7 +41,7 @@ from realtime.methods.shadow_planes.published_mesh import mesh_gamma, surface_ga
 from realtime.methods.shadow_planes.spot_pyramid import cone_ring
 from realtime.methods.shadow_planes.sweep import RayPlanes, ray_planes, sum_lit_intervals
 from realtime.methods.shadow_planes.tile_lists import Lists, tile_lists
-from realtime.methods.shadow_planes.view_culling import bodies_in_view
+from realtime.methods.shadow_planes.view_culling import components_in_view
 from realtime.numerics.array_types import ArrayTypes, types_of
 from realtime.parameters import Parameters, parameter
 from realtime.scene.camera import HostCamera, read_camera
@@ -171,7 +171,7 @@ def plane_finder(
     seen = None if ring is not None else read_spot(light)
 
     def find() -> PlaneIndex:
-        used = bodies_in_view(casters, camera, position)
+        used = components_in_view(casters, camera, position)
         aim = partial(aim_at, camera, spot=seen, types=types)
         return index_planes(casters, position, camera.origin, used=used, types=types, ring=ring, aim=aim)
 
@@ -200,6 +200,11 @@ def shadow_planes(
         An airlight kernel, see `realtime.kernels`.
     parameters
         Values of the parameters.
+
+    Raises
+    ------
+    InputError
+        For an evaluation that does not know bounded media.
 
     Notes
     -----

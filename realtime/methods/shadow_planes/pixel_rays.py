@@ -101,7 +101,7 @@ class HostSpot:
 
 
 def read_spot(light: Light) -> HostSpot | None:
-    """Bring what only a spot has to the host; None for other lights."""
+    """Read the fields of a spot to the host; None for other lights."""
     if light.cone is None:
         return None
     sines = [
@@ -128,7 +128,7 @@ def aim_at(camera: HostCamera, axes: Array, spot: HostSpot | None, types: ArrayT
     middle = np.array([(camera.width - 1) / 2 - column, (camera.height - 1) / 2 - row])
     base = axes @ (camera.forward + middle[0] * camera.left + middle[1] * camera.up)
     across, down = -(axes @ camera.left), -(axes @ camera.up)
-    way = Affine(*(types.vector(*(float(one) for one in vector)) for vector in (base, across, down)))
+    way = Affine(*(types.vector(*(float(component) for component in vector)) for vector in (base, across, down)))
     place = types.scalar(column), types.scalar(row)
     if spot is None:
         return Aim(*place, way)
@@ -136,7 +136,7 @@ def aim_at(camera: HostCamera, axes: Array, spot: HostSpot | None, types: ArrayT
     vectors = [base, across, down]
     cutoff = _tangents(axis, spot.cutoff, vectors, types)
     beam = None if spot.beam is None else _tangents(axis, spot.beam, vectors, types)
-    return Aim(*place, way, types.vector(*(float(one) for one in axis)), cutoff, beam)
+    return Aim(*place, way, types.vector(*(float(component) for component in axis)), cutoff, beam)
 
 
 def seen_rays(aim: Aim, camera: Camera, pixel, distance, light: Light) -> SeenRay:
@@ -165,7 +165,7 @@ def seen_rays(aim: Aim, camera: Camera, pixel, distance, light: Light) -> SeenRa
 
 
 def seen_ways(aim: Aim, camera: Camera, pixel):
-    """Return the unit directions of rays in the frame, three arrays."""
+    """Return the unit directions of the rays of pixel numbers `pixel` in the light's basis, three arrays."""
     _, _, w = _aimed(aim, camera, pixel)
     return tuple(w * dr.rsqrt(dr.squared_norm(w)))
 
@@ -179,7 +179,7 @@ def _aimed(aim: Aim, camera: Camera, pixel):
 
 
 def _in_cone(aim: Aim, place, way, geometry: RayGeometry, *, light: Light, distance) -> RayGeometry:
-    """Add to a geometry what only a spot has."""
+    """Return a geometry with the fields that only a spot has."""
     x, y, z, scale = way
     a = aim.axis
     square = dr.fma(x, x, dr.square(y))
@@ -196,8 +196,10 @@ def _in_cone(aim: Aim, place, way, geometry: RayGeometry, *, light: Light, dista
 
     def interval(tangents: Tangents | None, cone):
         assert tangents is not None
-        one, other = (_at(high, *place) + _at(low, *place) for high, low in zip(tangents.high, tangents.low))
-        form = dr.fma(one * scale, other * scale, tangents.share * square)
+        first_form, second_form = (
+            _at(high, *place) + _at(low, *place) for high, low in zip(tangents.high, tangents.low)
+        )
+        form = dr.fma(first_form * scale, second_form * scale, tangents.share * square)
         enter, leave = cone_roots(ray, form * dr.square(distance), cone)
         return geometry.foot + enter, geometry.foot + leave
 
@@ -217,7 +219,7 @@ def _image_of(camera: HostCamera, direction: Array) -> tuple[float, float]:
     """Return the pixel next to the image of a direction and its opposite, which may be far beside the image."""
     sizes = np.array([camera.width, camera.height], dtype=float)
     ahead = direction @ camera.forward
-    sides = np.array([direction @ one / (one @ one) for one in (camera.left, camera.up)])
+    sides = np.array([direction @ axis / (axis @ axis) for axis in (camera.left, camera.up)])
     with np.errstate(divide="ignore", invalid="ignore"):
         place = np.nan_to_num((sizes - 1) / 2 - sides / ahead, nan=0.0, posinf=np.inf, neginf=-np.inf)
     column, row = np.round(np.clip(place, -_FAR * sizes, (_FAR + 1) * sizes))
@@ -244,7 +246,7 @@ def _split(values: Array, types: ArrayTypes) -> tuple[Affine, Affine]:
     largest = float(np.max(np.abs(values[1:])))
     unit = 2.0 ** (np.ceil(np.log2(largest)) - _BITS) if largest > 0 and is_single(types.scalar) else 1.0
     high = np.round(values / unit) * unit
-    few, rest = (Affine(*(types.scalar(float(one)) for one in part)) for part in (high, values - high))
+    few, rest = (Affine(*(types.scalar(float(component)) for component in part)) for part in (high, values - high))
     return few, rest
 
 

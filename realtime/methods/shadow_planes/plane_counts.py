@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the casters of a scene ask of shadow planes, and what is left out for this camera."""
+"""How many shadow planes the casters of a scene have, and how many of them this camera needs."""
 
 from dataclasses import dataclass
 
 from realtime.methods.shadow_planes.plane_table import light_basis, shadow_planes
 from realtime.methods.shadow_planes.silhouettes import silhouette
-from realtime.methods.shadow_planes.view_culling import bodies_in_view
+from realtime.methods.shadow_planes.view_culling import components_in_view
 from realtime.scene.camera import HostCamera, read_camera
 from realtime.scene.lights import host_position
 from realtime.scene.mesh_adjacency import Casters, read_casters, with_positions
@@ -17,7 +17,7 @@ class LightPlan:
     """The shadow planes of one light."""
 
     edges: int  #: silhouette edges of all casters
-    bodies: int  #: connected parts whose shadow can be seen
+    components: int  #: connected components whose shadow can be seen
     planes: int  #: planes of those parts: what a frame works with
 
 
@@ -26,7 +26,7 @@ class CasterPlan:
     """The casters of a scene and, by light, their planes."""
 
     shapes: int
-    bodies: int  #: connected parts
+    components: int  #: connected components
     closed: int  #: of which without border
     triangles: int
     lights: tuple[LightPlan, ...]
@@ -46,7 +46,7 @@ def caster_plan(scene: Scene) -> CasterPlan:
     lights = tuple(_light_plan(casters, camera, light) for light in scene.lights)
     return CasterPlan(
         shapes=len(casters.shapes),
-        bodies=len(casters.closed),
+        components=len(casters.closed),
         closed=int(casters.closed.sum()),
         triangles=len(casters.triangles),
         lights=lights,
@@ -60,10 +60,10 @@ def describe_casters(plan: CasterPlan) -> dict[str, str]:
         return {"casters": "none: no silhouettes, no planes; one integral a ray and light"}
     words = {
         "shadows": "silhouettes and planes: no shadow rays",
-        "casters": f"{plan.shapes} shapes, {plan.triangles} triangles in {plan.bodies} parts, {plan.closed} closed",
+        "casters": f"{plan.shapes} shapes, {plan.triangles} triangles in {plan.components} parts, {plan.closed} closed",
     }
     for number, light in enumerate(plan.lights):
-        out = plan.bodies - light.bodies
+        out = plan.components - light.components
         left = f"{out} parts left out, their shadows miss the view" if out else "every part's shadow can be seen"
         name = "planes" if len(plan.lights) == 1 else f"planes of light {number + 1}"
         words[name] = f"{light.planes} of {light.edges} silhouette edges; {left}"
@@ -72,7 +72,7 @@ def describe_casters(plan: CasterPlan) -> dict[str, str]:
 
 def _light_plan(casters: Casters, camera: HostCamera, light) -> LightPlan:
     position = host_position(light)
-    used = bodies_in_view(casters, camera, position)
+    used = components_in_view(casters, camera, position)
     seen = silhouette(casters, position, used=used)
     every = len(silhouette(casters, position).edges)
     return LightPlan(

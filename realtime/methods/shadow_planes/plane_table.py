@@ -141,7 +141,7 @@ def edge_planes(vertices: Array, coefficient: NDArray[np.int8], *, w: int = 1) -
     # layers left of an edge that leads to the left lie below it, at larger psi.
     gain = np.where(ahead, coefficient, -coefficient).astype(np.int8)
     cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-    # An edge that meets the axis itself: any tiny number keeps the loop closed.
+    # The edge meets the axis itself: any tiny number keeps the loop closed.
     cross = np.where(cross == 0, 1e-12 * np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1), cross)
     with np.errstate(divide="ignore", invalid="ignore"):
         lines = np.stack(
@@ -201,15 +201,17 @@ def _chosen(planes: Planes, which: NDArray[np.bool_]) -> Planes:
     return Planes(*(getattr(planes, field.name)[which] for field in fields(Planes)))
 
 
-def _joined(one: Planes, other: Planes) -> Planes:
-    return Planes(*(np.concatenate([getattr(part, field.name) for part in (one, other)]) for field in fields(Planes)))
+def _joined(first: Planes, second: Planes) -> Planes:
+    return Planes(
+        *(np.concatenate([getattr(part, field.name) for part in (first, second)]) for field in fields(Planes))
+    )
 
 
 def layers_between(casters: Casters, light: Array, basis: LightBasis, *, used: NDArray[np.bool_]) -> int:
     """Return how many layers lie between a light and the camera of their basis.
 
-    A closed body counts the larger number of its triangles that face the light and that are averted: the two differ
-    where the light or the camera is inside, and then all beyond is dark.
+    A closed component counts the larger number of its triangles that face the light and that are averted: the two
+    differ where the light or the camera is inside, and then all beyond is dark. `used` says which components count.
     """
     l, w = place_and_weight(light)  # noqa: E741
     axes = basis.axes
@@ -229,16 +231,19 @@ def layers_between(casters: Casters, light: Array, basis: LightBasis, *, used: N
     # The axis runs through x = y = 0: most triangles lie aside, all three corners beyond it on one of four sides.
     x, y = axes[:2] @ casters.vertices.T - (axes[:2] @ start)[:, None]
     sides = (x > 0) | (x < 0).view(np.uint8) << 1 | (y > 0).view(np.uint8) << 2 | (y < 0).view(np.uint8) << 3
-    number = np.flatnonzero(near[casters.body])
-    one, other, third = casters.triangles[number].T
-    number = number[sides[one] & sides[other] & sides[third] == 0]
+    number = np.flatnonzero(near[casters.component])
+    first, second, third = casters.triangles[number].T
+    number = number[sides[first] & sides[second] & sides[third] == 0]
     if not len(number):
         return 0
     crossed = number[_crosses(casters, number, (start, direction), reach)]
     sign = np.sign(casters.normals[crossed] @ l - w * casters.offsets[crossed])
-    body = casters.body[crossed]
-    bodies = len(casters.closed)
-    front, back = np.bincount(body[sign > 0], minlength=bodies), np.bincount(body[sign < 0], minlength=bodies)
+    component = casters.component[crossed]
+    components = len(casters.closed)
+    front, back = (
+        np.bincount(component[sign > 0], minlength=components),
+        np.bincount(component[sign < 0], minlength=components),
+    )
     return int(np.where(casters.closed, np.maximum(front, back), front + back).sum())
 
 
@@ -285,7 +290,7 @@ def index_planes(
     camera
         Position of the camera [m].
     used
-        By body, whether its shadow can be seen.
+        By component, whether its shadow can be seen.
     types
         The array types to use, see `realtime.numerics.array_types`.
     ring

@@ -30,7 +30,7 @@ class Buffer:
     white: float  #: radiance that fills it [W/(m^2 sr)]
 
     def stored(self, value):
-        """Return what the buffer keeps of a radiance."""
+        """Return what the buffer keeps of a radiance `value` [W/(m^2 sr)]."""
         return dr.round(dr.clip(value, 0, self.white) * (255 / self.white)) * (self.white / 255)
 
 

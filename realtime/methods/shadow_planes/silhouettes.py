@@ -14,10 +14,10 @@ changes the count only inside its own projection, which has no area; and the cou
 
 Layers:
 
-* a closed body counts its triangles that face the light, w = 1, or just as well those that are averted: both have the
-  same cycle. Edges between a facing and an averted triangle get c = +-1: the silhouette of the paper.
-* an open body (border edges, or faces that are not consistently oriented) counts all of its triangles, each turned to
-  the light: w = +1 or -1. Its folds get c = +-2, its border edges c = +-1.
+* a closed component counts its triangles that face the light, w = 1, or just as well those that are averted: both have
+  the same cycle. Edges between a facing and an averted triangle get c = +-1: the silhouette of the paper.
+* an open component (border edges, or faces that are not consistently oriented) counts all of its triangles, each turned
+  to the light: w = +1 or -1. Its folds get c = +-2, its border edges c = +-1.
 * a triangle whose plane holds the light counts nothing, w = 0.
 
 With the light at (l, 1), or (l, 0) where it is at infinity (`realtime.scene.lights`), the front of a triangle with the
@@ -54,11 +54,14 @@ def facing(casters: Casters, light: Array) -> NDArray[np.int8]:
 
 
 def layers(casters: Casters, light: Array) -> NDArray[np.int8]:
-    """Return the number of layers that each triangle stands for, and a last 0 for no triangle."""
+    """Return the number of layers that each triangle stands for, (triangles + 1,), with a last 0 for no triangle.
+
+    `light` is a homogeneous position, (4,), or a place, (3,) [m].
+    """
     sign = facing(casters, light)
     if casters.closed.all():
         return np.maximum(sign, 0)
-    is_open = np.append(~casters.closed[casters.body], False)
+    is_open = np.append(~casters.closed[casters.component], False)
     return np.where(is_open, sign, np.maximum(sign, 0))
 
 
@@ -72,7 +75,7 @@ def silhouette(casters: Casters, light: Array, *, used: NDArray[np.bool_] | None
     light
         Homogeneous position of the light, (4,), or its place, (3,) [m].
     used
-        By body, which ones to look at; all by default.
+        By component, which ones to look at; all by default.
 
     Notes
     -----
@@ -81,10 +84,10 @@ def silhouette(casters: Casters, light: Array, *, used: NDArray[np.bool_] | None
     """
     weight = layers(casters, light)
     if used is not None and not used.all():
-        weight[:-1][~used[casters.body]] = 0
+        weight[:-1][~used[casters.component]] = 0
     right = weight[casters.right]
     if casters.same_way.any():
         right = np.where(casters.same_way, -right, right)
     coefficient = weight[casters.left] - right
-    found = np.flatnonzero(coefficient)
-    return Silhouette(casters.edges[found], coefficient[found])
+    on_silhouette = np.flatnonzero(coefficient)
+    return Silhouette(casters.edges[on_silhouette], coefficient[on_silhouette])

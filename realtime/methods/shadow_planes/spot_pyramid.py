@@ -42,7 +42,7 @@ def ring_edges(ring: Array) -> Array:
 
 
 def is_outside(ring: Array, direction: Array) -> bool:
-    """Return whether a direction from the light is outside the pyramid of a ring."""
+    """Return whether a direction from the light, (3,), of any length [1], is outside the pyramid of a ring, (n, 3)."""
     # The axis is on the other side of every plane of the pyramid: seen along it the ring runs counter-clockwise.
     normals = np.cross(ring, np.roll(ring, -1, axis=0))
     return bool(np.any(normals @ direction > 0))

@@ -34,14 +34,14 @@ from realtime.numerics.array_types import two_numbers
 from realtime.numerics.diamond_angle import diamond_angle
 
 FEW, MANY = 2, 8  #: crossings that wait for others which may come before them, or are collected at once
-_DUE = 3  # in the last bits of a place: there waiting integrals are asked for
+_DUE = 3  # marks in the last bits of a place where waiting integrals are added
 
 
 @dataclass(frozen=True)
 class RayPlanes:
     """A camera ray in the frame of an index of planes."""
 
-    x: Any  #: direction
+    x: Any  #: components of the unit direction
     y: Any
     z: Any
     azimuth: Any  #: diamond angle
@@ -50,7 +50,10 @@ class RayPlanes:
 
 
 def ray_planes(lists: Lists, x, y, z, *, tile) -> RayPlanes:
-    """Return camera rays, directions in the frame of a light, with the planes of their tiles; see `View.tile`."""
+    """Return camera rays, unit directions (x, y, z) in the basis of a light, with the planes of their tiles.
+
+    `tile` is that of `View`.
+    """
     source = dr.gather(Source, lists.source, tile)
     return RayPlanes(x, y, z, diamond_angle(x, y), source, dr.gather(mi.Bool, lists.sorted, tile))
 
@@ -133,7 +136,7 @@ def sum_lit_intervals(index: PlaneIndex, lists: Lists, ray: RayPlanes, segment, 
 
 @dataclass(frozen=True)
 class _Sweep:
-    """What does not change on a walk."""
+    """What stays the same during a walk."""
 
     index: PlaneIndex
     lists: Lists
@@ -221,7 +224,7 @@ def _walk(sweep: _Sweep, active, *, places: int):
         passed = _pass_plane(sweep, passed, nearest, gained, crosses=crosses, due=due)
         return place + 1, waiting, passed, lost
 
-    # What comes out of the queue first has no place and no gain: nothing happens there.
+    # The first entries that leave the queue have no place and no gain, and change nothing.
     nothing_waits = filled(dr.inf, places, Float, width)
     _, _, passed, lost = dr.while_loop(
         state=(dr.zeros(mi.UInt32, width), nothing_waits, _start(sweep), dr.full(mi.Bool, False, width)),

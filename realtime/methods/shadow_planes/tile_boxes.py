@@ -27,7 +27,7 @@ _SLACK = 1e-5  # of the terms of a sum: float32 rounding, with room to spare
 class Box:
     """Boxes about directions, in the frame of the light."""
 
-    x: Any  #: centre
+    x: Any  #: components of the centre, of unit directions
     y: Any
     z: Any
     x_half: Any  #: half the width
@@ -102,7 +102,10 @@ def _azimuths(centre, half):
 
 
 def touches(index: PlaneIndex, box: Box, entry, active):
-    """Return whether a ray of the box could cross a plane, whether all that reach it do, and D/x at the centre."""
+    """Return whether a ray of the box could cross the plane of an `entry`, whether all that reach it do, and D/x there.
+
+    D/x is that of the centre of the box.
+    """
     Float = type(box.x)
     number = entry & NUMBER
     a, b, p, q = dr.gather(four_numbers(Float), index.lines, number, active)

@@ -33,7 +33,7 @@ class Source:
 
 
 def entry_at(entries, source: Source, k, active):
-    """Return the k-th entry of a source and whether it counts there."""
+    """Return the k-th of the `entries` of a source and whether it counts there."""
     place = source.first + k
     active = active & (k < source.count)
     entry = dr.gather(mi.UInt32, entries, place, active)
@@ -48,7 +48,7 @@ def tile_lists(index: PlaneIndex, rays, distance, *, order: str, square: bool) -
     index
         The planes.
     rays, distance, square
-        See `tile_boxes`.
+        See `tile_boxes` [m].
     order
         See `listed`.
     """
@@ -220,6 +220,6 @@ def _write_sorted(pool, unsorted: _Unsorted, source: Source, behind: int, total)
         return place
 
     place = dr.arange(mi.UInt32, dr.width(unsorted.entry))
-    # Most of the room is empty: a branch steps over it without reading.
+    # Most places are empty: a branch skips them without reading.
     dr.if_stmt(args=(place,), cond=place < total, true_fn=placed, false_fn=lambda place: place)
     dr.eval(pool)

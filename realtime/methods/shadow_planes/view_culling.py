@@ -17,8 +17,8 @@ from realtime.scene.mesh_adjacency import Casters
 Array = NDArray[np.float64]
 
 
-def bodies_in_view(casters: Casters, camera: HostCamera, light: Array) -> NDArray[np.bool_]:
-    """Return by body whether its shadow can be seen; `light` is a homogeneous position, (4,), or a place, (3,) [m]."""
+def components_in_view(casters: Casters, camera: HostCamera, light: Array) -> NDArray[np.bool_]:
+    """Return by component whether its shadow can be seen; `light` is a homogeneous position, (4,), or a place, (3,)."""
     l, w = place_and_weight(light)  # noqa: E741
     origin, normals = view_planes(camera)
     choose = np.array([[i >> k & 1 for k in range(3)] for i in range(8)])

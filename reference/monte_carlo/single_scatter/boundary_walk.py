@@ -3,14 +3,14 @@
 
 A bounded medium is a closed shape with the material `null` that names the media on both sides; it neither reflects nor
 refracts. A ray is followed from one such boundary to the next with `ray_intersect`, and the media are the scene's own
-pointers. A boundary met a second time by rounding says the same again. One missed close to the end of a leg, where the
-point lies in or just beneath it, costs a stretch as short as that, since what is counted is the medium that the leg is
-in, from the light on, never the one that the point is thought to be in.
+pointers. A boundary that rounding makes a ray meet twice names the same medium both times. A boundary that a leg misses
+close to its end, where the point lies in or just beneath it, costs a stretch as short as that: the walk knows the
+medium from the light on and never asks in which medium the point may lie.
 
-Stretches are measured along the one straight ray, from the light to the point: what a continued ray is moved beyond a
-boundary, so that it does not meet it again, is never left out of the optical depth. Visibility rays stop a relative
-1e-5 before the point, since a point on a surface must not be hidden by that surface; the attenuation counts the whole
-distance (volpath's does not, DESIGN section 6.1).
+Stretches are measured along the one straight ray, from the light to the point. A continued ray starts a little beyond a
+boundary, so that it does not meet it again; the optical depth counts that little way too. Visibility rays stop a
+relative 1e-5 before the point, since a point on a surface must not be hidden by that surface; the attenuation counts
+the whole distance (volpath's does not, DESIGN section 6.1).
 """
 
 from dataclasses import dataclass
@@ -107,10 +107,10 @@ def step_beyond(point):
 
 
 def medium_at(around: Surroundings, position, known_position, known_medium, active):
-    """Return the medium at a point, a light's, from the one at another, a camera's: pointers.
+    """Return the medium at one point, such as a light, given that at another, such as the camera, as pointers.
 
-    The way to the other point is followed, through surfaces too, to the first boundary, which names the medium on its
-    near side; where there is none both points lie in the same medium.
+    The walk follows the way to the other point, through surfaces too, to the first boundary, which names the medium on
+    its near side. Without a boundary both points lie in the same medium.
     """
     way = known_position - position
     distance = dr.norm(way)

@@ -36,7 +36,7 @@ class Light:
 class Task:
     """What is fixed while a scene is traced."""
 
-    around: Surroundings
+    around: Surroundings  #: what rays can meet
     lights: tuple[Light, ...]  #: point and spot lights
     directional: tuple[Any, ...]  #: Mitsuba's directional emitters
     samples: int  #: distances for each ray, light and medium

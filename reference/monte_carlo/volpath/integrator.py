@@ -54,6 +54,11 @@ def volpath_batch(
     counts
         Samples of each pixel, (layers, pixels), for `max_depth` 2; all have `samples` by default.
 
+    Raises
+    ------
+    ValueError
+        If `samples` or `max_depth` is out of range, or `counts` come with another `max_depth` than 2.
+
     Notes
     -----
     Batches of one seed but another `max_depth` are not independent: their airlight paths begin alike, so that the

@@ -18,7 +18,7 @@ async function inflated(bytes) {
 // Returns one Int32Array of codes for each plane, modulo 2^bits.
 function decodedPlanes(raw, planes, width, height, bits) {
   const count = width * height, bytes = bits / 8, mask = (1 << bits) - 1;
-  const found = [];
+  const decoded = [];
   planes.forEach(([relative, predictor], number) => {
     const start = number * bytes * count;
     const codes = new Int32Array(count);
@@ -34,10 +34,10 @@ function decodedPlanes(raw, planes, width, height, bits) {
         codes[i] = value;
       }
     }
-    for (let i = 0; i < count; i++) codes[i] = (codes[i] + (relative ? found[0][i] : 0)) & mask;
-    found.push(codes);
+    for (let i = 0; i < count; i++) codes[i] = (codes[i] + (relative ? decoded[0][i] : 0)) & mask;
+    decoded.push(codes);
   });
-  return found;
+  return decoded;
 }
 
 // The radiance of 24-bit codes: the upper bits of float32.

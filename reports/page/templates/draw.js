@@ -66,10 +66,10 @@ const MAPS = {
       return table[Math.round(middle * (1 + Math.sign(error) * decade(Math.abs(error), floor)))];
     },
     ticks(floor) {
-      const one = decadesFrom(floor);
-      const up = one.slice(1).map(([place, label]) => [0.5 + place / 2, "+" + label]);
-      const down = one.slice(1).map(([place, label]) => [0.5 - place / 2, "\u2212" + label]).reverse();
-      return [...down, [0.5, "\u00b1" + one[0][1]], ...up];
+      const decades = decadesFrom(floor);
+      const up = decades.slice(1).map(([place, label]) => [0.5 + place / 2, "+" + label]);
+      const down = decades.slice(1).map(([place, label]) => [0.5 - place / 2, "\u2212" + label]).reverse();
+      return [...down, [0.5, "\u00b1" + decades[0][1]], ...up];
     },
   },
   relative: {

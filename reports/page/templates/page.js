@@ -58,7 +58,7 @@
   let queue = Promise.resolve();
   const near = new IntersectionObserver((entries) => {
     for (const {target, isIntersecting} of entries) {
-      const viewer = viewers.find((one) => one.element === target);
+      const viewer = viewers.find((candidate) => candidate.element === target);
       viewer.visible = isIntersecting;
       if (!isIntersecting) continue;
       look(viewer);
@@ -94,7 +94,7 @@
       const box = viewer.element.getBoundingClientRect();
       return Math.abs((box.top + box.bottom) / 2 - innerHeight / 2);
     };
-    return viewers.reduce((best, one) => (best && middle(best) <= middle(one) ? best : one), null);
+    return viewers.reduce((best, viewer) => (best && middle(best) <= middle(viewer) ? best : viewer), null);
   }
 
   function cycled(values, value, step = 1) {

@@ -88,9 +88,9 @@ class SceneImages {
   worst(number, layer, i) {
     let worst = 0;
     for (let c = 0; c < 3; c++) {
-      const one = this.difference(number, layer, c, i);
-      if (!Number.isFinite(one) || !Number.isFinite(this.reference[layer][c][i])) return NaN;
-      if (Math.abs(one) > Math.abs(worst)) worst = one;
+      const error = this.difference(number, layer, c, i);
+      if (!Number.isFinite(error) || !Number.isFinite(this.reference[layer][c][i])) return NaN;
+      if (Math.abs(error) > Math.abs(worst)) worst = error;
     }
     return worst;
   }

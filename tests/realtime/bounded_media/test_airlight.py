@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from realtime.errors import InputError
-from tests.helpers.scenes import body, clear_scene, spot, tiny_scene
+from tests.helpers.scenes import bounded_medium, clear_scene, spot, tiny_scene
 from validation.scenes.parts import medium_boundary, placed, rotation
 from validation.scenes.solids import box
 
@@ -13,8 +13,10 @@ TURN = rotation((0.4, 1.0, 0.1), 33.0)
 SIDES = np.array([1.1, 0.9, 1.4])
 
 
-def ball(centre=(-0.8, 0.4, 0.7), radius=0.6, sigma_t=(0.9, 0.5, 0.7), **medium):
-    return body({"type": "sphere", "center": list(centre), "radius": radius}, sigma_t, (0.9, 0.4, 0.3), **medium)
+def fog_sphere(centre=(-0.8, 0.4, 0.7), radius=0.6, sigma_t=(0.9, 0.5, 0.7), **medium):
+    return bounded_medium(
+        {"type": "sphere", "center": list(centre), "radius": radius}, sigma_t, (0.9, 0.4, 0.3), **medium
+    )
 
 
 def cube(centre=(0.9, 0.5, 0.6), *, sigma_t=1.1, phase=None):
@@ -41,12 +43,12 @@ def render(scene, method="unshadowed", *, precision="double", **parameters):
     return render_frame(frame_renderer(read, chosen, kernel=kernel, **parameters))
 
 
-def relative_rmse(one, two):
-    return np.sqrt(np.mean((np.asarray(one, dtype=np.float64) - two) ** 2)) / np.mean(two)
+def relative_rmse(image, expected):
+    return np.sqrt(np.mean((np.asarray(image, dtype=np.float64) - expected) ** 2)) / np.mean(expected)
 
 
-def in_ball(start, end, centre, radius):
-    """Return where lines enter and leave a ball, as shares between 0 and 1, by the quadratic formula."""
+def in_sphere(start, end, centre, radius):
+    """Return where lines enter and leave a sphere, as shares between 0 and 1, by the quadratic formula."""
     d, w = end - start, start - centre
     a, b, c = np.sum(d * d, -1), np.sum(d * w, -1), np.sum(w * w, -1) - radius**2
     root = np.sqrt(np.maximum(b * b - a * c, 0))
@@ -57,9 +59,9 @@ def in_box(start, end, centre):
     """Return where lines enter and leave the box, as shares between 0 and 1, slab by slab in its own frame."""
     p, d = (start - centre) @ TURN, (end - start) @ TURN
     with np.errstate(divide="ignore"):
-        one, other = (-0.5 * SIDES - p) / d, (0.5 * SIDES - p) / d
-    low = np.clip(np.minimum(one, other).max(axis=-1), 0, 1)
-    return low, np.maximum(np.clip(np.maximum(one, other).min(axis=-1), 0, 1), low)
+        low_planes, high_planes = (-0.5 * SIDES - p) / d, (0.5 * SIDES - p) / d
+    low = np.clip(np.minimum(low_planes, high_planes).max(axis=-1), 0, 1)
+    return low, np.maximum(np.clip(np.maximum(low_planes, high_planes).min(axis=-1), 0, 1), low)
 
 
 def share(part, start, end):
@@ -94,7 +96,12 @@ def summed(scene, parts, *, steps=500, leg=True):
     return image.reshape(truth.height, truth.width, 3)
 
 
-BALL = (lambda a, b: in_ball(a, b, np.array([-0.8, 0.4, 0.7]), 0.6), np.array([0.9, 0.5, 0.7]), (0.9, 0.4, 0.3), 0.0)
+SPHERE = (
+    lambda a, b: in_sphere(a, b, np.array([-0.8, 0.4, 0.7]), 0.6),
+    np.array([0.9, 0.5, 0.7]),
+    (0.9, 0.4, 0.3),
+    0.0,
+)
 CUBE = (lambda a, b: in_box(a, b, np.array([0.9, 0.5, 0.6])), np.array([1.1, 1.1, 1.1]), (0.2, 0.5, 0.9), 0.4)
 
 
@@ -102,10 +109,10 @@ CUBE = (lambda a, b: in_box(a, b, np.array([0.9, 0.5, 0.6])), np.array([1.1, 1.1
 @pytest.mark.parametrize(
     "lamp", [(0.9, 0.7, 1.9), (-2.9, 0.6, 0.5), (0.8, 0.6, 0.7)], ids=["above", "through one to the other", "within"]
 )
-def test_two_bodies_against_sums_over_small_steps(variant, lamp):
+def test_two_media_against_sums_over_small_steps(variant, lamp):
     light = tiny_scene()["lamp"] | {"position": list(lamp)}
-    scene = clear_scene(lamp=light, ball=ball(), cube=cube())
-    expected = summed(scene, [BALL, CUBE])
+    scene = clear_scene(lamp=light, ball=fog_sphere(), cube=cube())
+    expected = summed(scene, [SPHERE, CUBE])
     # 24 nodes leave the kinks that the edges of the box put into the leg's length, 10 nodes more of them.
     assert relative_rmse(render(scene).airlight, expected) < 3e-4
     assert relative_rmse(render(scene, precision="single").airlight, expected) < 1.5e-3
@@ -115,8 +122,8 @@ def test_two_bodies_against_sums_over_small_steps(variant, lamp):
     "changes", [{}, pytest.param({"lamp": "spot"}, marks=pytest.mark.slow), {"sensor": "inside"}, {"fog": "around"}]
 )
 def test_nodes_against_marching_with_many_steps(variant, changes):
-    """Media around the bodies, a soft spot, the camera within a body: the marcher decides each by where a point is."""
-    scene = clear_scene(ball=ball(phase={"type": "rayleigh"}), cube=cube())
+    """Fog around bounded media, a soft spot, the camera within one: the marcher decides each by where a point is."""
+    scene = clear_scene(ball=fog_sphere(phase={"type": "rayleigh"}), cube=cube())
     if "lamp" in changes:
         scene["lamp"] = spot(cutoff=41.0, beam=23.0)
     if "fog" in changes:
@@ -127,8 +134,8 @@ def test_nodes_against_marching_with_many_steps(variant, changes):
         scene["ball"] |= {"exterior": {"type": "ref", "id": "fog"}}
     if "sensor" in changes:
         del scene["cube"]
-        scene["inside"] = ball()["interior"] | {"id": "inside"}
-        scene["ball"] = ball(centre=(0.1, -3.5, 1.2), radius=1.3) | {"interior": {"type": "ref", "id": "inside"}}
+        scene["inside"] = fog_sphere()["interior"] | {"id": "inside"}
+        scene["ball"] = fog_sphere(centre=(0.1, -3.5, 1.2), radius=1.3) | {"interior": {"type": "ref", "id": "inside"}}
         scene["sensor"] |= {"medium": {"type": "ref", "id": "inside"}}
         order = ["type", "inside", "sensor", "lamp", "ball"]
         scene = {name: scene[name] for name in order}
@@ -137,7 +144,7 @@ def test_nodes_against_marching_with_many_steps(variant, changes):
     assert relative_rmse(render(scene).airlight, marched.airlight) < 1.5e-3
 
 
-def test_a_huge_body_is_a_medium_without_bounds(variant):
+def test_huge_bounds_are_a_medium_without_bounds(variant):
     scene = tiny_scene(ball=None, floor=None)
     fog = scene["fog"] | {"id": "inside"}
     huge = {"type": "sphere", "center": [3.0, 2.0, 1.0], "radius": 400.0, "bsdf": {"type": "null"}}
@@ -148,63 +155,63 @@ def test_a_huge_body_is_a_medium_without_bounds(variant):
     assert relative_rmse(render(bounded).airlight, render(scene).airlight) < 1e-4
 
 
-def test_bodies_of_nothing_scatter_nothing(variant):
-    frame = render(clear_scene(ball=ball(sigma_t=0.0)))
+def test_media_of_no_extinction_scatter_nothing(variant):
+    frame = render(clear_scene(ball=fog_sphere(sigma_t=0.0)))
     assert np.all(frame.airlight == 0)
 
 
-def test_bodies_out_of_each_others_light_and_view_add_up(variant):
+def test_media_out_of_each_others_light_and_view_add_up(variant):
     light = tiny_scene()["lamp"] | {"position": [0.0, -0.5, 6.0]}
-    one = render(clear_scene(lamp=light, ball=ball())).airlight
-    other = render(clear_scene(lamp=light, cube=cube())).airlight
-    both = render(clear_scene(lamp=light, ball=ball(), cube=cube())).airlight
-    assert np.all((one > 0).sum(axis=(0, 1)) > 0)
-    assert np.abs(both - one - other).max() < 1e-12 * both.max()
+    of_sphere = render(clear_scene(lamp=light, ball=fog_sphere())).airlight
+    of_cube = render(clear_scene(lamp=light, cube=cube())).airlight
+    both = render(clear_scene(lamp=light, ball=fog_sphere(), cube=cube())).airlight
+    assert np.all((of_sphere > 0).sum(axis=(0, 1)) > 0)
+    assert np.abs(both - of_sphere - of_cube).max() < 1e-12 * both.max()
 
 
 @pytest.mark.claim("mean-distance-of-the-paper", tolerance="relative RMSE 1e-4")
 def test_the_mean_distance_of_the_paper_is_a_constant_in_the_exponent(variant):
     """With R for the light's leg the sum over the chord has one factor more, exp(-sigma_t R)."""
-    scene = clear_scene(ball=ball(sigma_t=0.7))
-    found = render(scene, "shadow-planes", media="paper").airlight
+    scene = clear_scene(ball=fog_sphere(sigma_t=0.7))
+    airlight = render(scene, "shadow-planes", media="paper").airlight
 
-    part = (BALL[0], np.array([0.7] * 3), BALL[2], 0.0)
+    part = (SPHERE[0], np.array([0.7] * 3), SPHERE[2], 0.0)
     expected = summed(scene, [part], leg=False) * np.exp(-0.7 * 1.2 * 0.6)
     # Six nodes on smooth chords, against 500 steps: 1e-5 each.
-    assert relative_rmse(found, expected) < 1e-4
+    assert relative_rmse(airlight, expected) < 1e-4
 
 
-def test_surfaces_are_seen_and_lit_through_the_bodies(variant):
-    """A floor with and without a body between: the ratio is the transmittance of both legs."""
+def test_surfaces_are_seen_and_lit_through_bounded_media(variant):
+    """A floor with and without a medium between: the ratio is the transmittance of both legs."""
     floor = tiny_scene()["floor"]
-    seen = render(clear_scene(floor=floor, ball=ball()))
-    clear = render(clear_scene(floor=floor, ball=ball(sigma_t=0.0)))
+    seen = render(clear_scene(floor=floor, ball=fog_sphere()))
+    clear = render(clear_scene(floor=floor, ball=fog_sphere(sigma_t=0.0)))
     assert np.array_equal(seen.distance, clear.distance)
     import mitsuba as mi
 
     from reference.scene.read import read_truth
 
-    truth = read_truth(mi.load_dict(clear_scene(floor=floor, ball=ball())))
+    truth = read_truth(mi.load_dict(clear_scene(floor=floor, ball=fog_sphere())))
     distance = seen.distance.ravel()
     hit = np.isfinite(distance) & (clear.surface[..., 0].ravel() > 0)
     point = truth.origin + distance[hit, None] * truth.direction[hit]
     light = truth.lights[0].position
-    length = share(BALL[0], truth.origin, point) * distance[hit]
-    length += share(BALL[0], light, point) * np.linalg.norm(point - light, axis=1)
+    length = share(SPHERE[0], truth.origin, point) * distance[hit]
+    length += share(SPHERE[0], light, point) * np.linalg.norm(point - light, axis=1)
     ratio = (seen.surface / np.where(clear.surface > 0, clear.surface, 1)).reshape(-1, 3)[hit]
     assert np.any(length > 0.3)
     # Mitsuba's rays are float32; distances to the floor are good to 1e-6.
-    assert ratio == pytest.approx(np.exp(-length[:, None] * BALL[1]), rel=1e-4)
+    assert ratio == pytest.approx(np.exp(-length[:, None] * SPHERE[1]), rel=1e-4)
 
 
 @pytest.mark.slow
 def test_shadow_planes_in_bounded_media_against_marching(variant):
-    # A smooth sphere has no silhouette edges; the wall throws a shadow through both bodies.
+    # A smooth sphere has no silhouette edges; the wall throws a shadow through both media.
     import mitsuba as mi
 
     to_world = mi.ScalarTransform4f().translate([0.3, 0.6, 1.4]).rotate([1, 0.3, 0], 37).scale([0.43, 0.33, 0.05])
     wall = {"type": "cube", "to_world": to_world}
-    scene = clear_scene(ball=ball(), cube=cube(), wall=wall)
+    scene = clear_scene(ball=fog_sphere(), cube=cube(), wall=wall)
     planes = render(scene, "shadow-planes").airlight
     marched = render(scene, "ray-march", steps=3000).airlight
     assert relative_rmse(render(scene).airlight, planes) > 0.02  # there is a shadow
@@ -217,15 +224,15 @@ def test_shadow_planes_in_bounded_media_against_marching(variant):
     assert relative_rmse(differences, planes) < 3e-3
 
 
-def test_an_ambient_field_fills_the_bodies(variant):
-    scene = clear_scene(ball=ball(sigma_t=0.7))
+def test_an_ambient_field_fills_bounded_media(variant):
+    scene = clear_scene(ball=fog_sphere(sigma_t=0.7))
     gain = render(scene, "shadow-planes", ambient=0.3).airlight - render(scene, "shadow-planes").airlight
     import mitsuba as mi
 
     from reference.scene.read import read_truth
 
     truth = read_truth(mi.load_dict(scene))
-    chord = 9.0 * share(BALL[0], truth.origin, truth.origin + 9.0 * truth.direction)
+    chord = 9.0 * share(SPHERE[0], truth.origin, truth.origin + 9.0 * truth.direction)
     expected = 0.3 * np.array([0.9, 0.4, 0.3]) * (1 - np.exp(-0.7 * chord))[:, None]
     assert gain.reshape(-1, 3) == pytest.approx(expected, abs=1e-6)
 
@@ -233,9 +240,9 @@ def test_an_ambient_field_fills_the_bodies(variant):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        (lambda: {"ball": ball(), "other": ball(centre=(-0.5, 0.4, 0.7))}, "overlap"),
+        (lambda: {"ball": fog_sphere(), "other": fog_sphere(centre=(-0.5, 0.4, 0.7))}, "overlap"),
         (lambda: {"cube": cube(phase={"type": "blendphase", "weight": 0.5})}, "phase|Phase|child"),
-        (lambda: {"ball": ball(centre=(0.2, -4.1, 1.3))}, "inside of shape"),
+        (lambda: {"ball": fog_sphere(centre=(0.2, -4.1, 1.3))}, "inside of shape"),
         (
             lambda: {
                 "ball": {
@@ -246,8 +253,8 @@ def test_an_ambient_field_fills_the_bodies(variant):
             },
             "HeterogeneousMedium",
         ),
-        (lambda: {"flat": body({"type": "rectangle"}, 0.5, (0.5, 0.5, 0.5))}, "not a closed surface"),
-        (lambda: {"disk": body({"type": "disk"}, 0.5, (0.5, 0.5, 0.5))}, "is a Disk"),
+        (lambda: {"flat": bounded_medium({"type": "rectangle"}, 0.5, (0.5, 0.5, 0.5))}, "not a closed surface"),
+        (lambda: {"disk": bounded_medium({"type": "disk"}, 0.5, (0.5, 0.5, 0.5))}, "is a Disk"),
     ],
 )
 def test_refusals_name_what_is_in_the_way(variant, changes, message):
@@ -260,10 +267,10 @@ def test_refusals_name_what_is_in_the_way(variant, changes, message):
 )
 def test_parameters_that_do_not_fit_are_refused(variant, parameters, message):
     with pytest.raises(InputError, match=message):
-        render(clear_scene(ball=ball()), "shadow-planes", **parameters)
+        render(clear_scene(ball=fog_sphere()), "shadow-planes", **parameters)
 
 
-def test_scenes_without_bodies_plan_none(variant):
+def test_scenes_without_bounded_media_plan_none(variant):
     import mitsuba as mi
 
     from realtime.scene.read_scene import read_scene
@@ -272,7 +279,7 @@ def test_scenes_without_bodies_plan_none(variant):
     read = read_scene(scene)
     assert not read.features.bounded
     assert read.geometry is scene
-    bounded = read_scene(mi.load_dict(clear_scene(ball=ball())))
+    bounded = read_scene(mi.load_dict(clear_scene(ball=fog_sphere())))
     assert bounded.features.bounded
     assert not bounded.features.surfaces
     assert len(bounded.geometry.shapes()) == 0
@@ -300,17 +307,17 @@ def test_three_media_against_the_truth(variant):
     assert relative_rmse(render(scene, "shadow-planes", precision="single", media="paper").airlight, truth.airlight) > 1
 
 
-def test_a_thicker_medium_has_thicker_bodies(variant):
+def test_a_thicker_medium_has_thicker_bounded_media(variant):
     import mitsuba as mi
 
     from realtime.scene.animate import thicker_medium
     from realtime.scene.read_scene import read_scene
 
-    medium = read_scene(mi.load_dict(clear_scene(ball=ball(), cube=cube())), "double").medium
+    medium = read_scene(mi.load_dict(clear_scene(ball=fog_sphere(), cube=cube())), "double").medium
     thicker = thicker_medium(medium, 1.7)
     assert all(float(value[0]) == 0 for value in thicker.sigma_t)
-    for one, other in zip(thicker.bodies, medium.bodies, strict=True):
+    for thick, plain in zip(thicker.bounded_media, medium.bounded_media, strict=True):
         # Mitsuba holds extinctions in float32.
-        expected = [1.7 * float(value[0]) for value in other.medium.sigma_t]
-        assert [float(value[0]) for value in one.medium.sigma_t] == pytest.approx(expected, rel=1e-12)
-        assert len(one.medium.sigma_t) == 3
+        expected = [1.7 * float(value[0]) for value in plain.medium.sigma_t]
+        assert [float(value[0]) for value in thick.medium.sigma_t] == pytest.approx(expected, rel=1e-12)
+        assert len(thick.medium.sigma_t) == 3

@@ -14,11 +14,11 @@ def test_a_thin_medium_does_not_care_for_r(variant):
 
 
 @pytest.mark.claim("mean-distance-of-the-paper", tolerance="5 % of the bias")
-def test_a_ball_lit_from_afar_is_too_dark_as_the_mean_leg_says(variant):
+def test_a_sphere_lit_from_afar_is_too_dark_as_the_mean_leg_says(variant):
     """To first order in sigma_t the bias is that of the mean leg: -sigma_t (1.2 - 0.75) radius."""
-    (found,) = constant_distance_study(sizes=(0.01,), optical_depths=(0.02,), image=(48, 36))
+    (row,) = constant_distance_study(sizes=(0.01,), optical_depths=(0.02,), image=(48, 36))
     # Second order: sigma_t times the radius is 0.01. The pixels' chords stand in for the volume: a few per cent.
-    assert found.relative_bias == pytest.approx(-0.01 * 0.45, rel=0.05)
+    assert row.relative_bias == pytest.approx(-0.01 * 0.45, rel=0.05)
 
 
 def test_error_grows_with_optical_depth_and_no_factor_mends_it(variant):

@@ -8,12 +8,11 @@ from realtime.errors import InputError
 from tests.helpers.scenes import clear_scene, tiny_scene
 from tests.helpers.sunlit import (
     ALONG,
-    BALL_AT,
     CUBE_AT,
-    ball,
-    ball_part,
+    SPHERE_AT,
     box_part,
     cube,
+    fog_sphere,
     plank,
     plank_part,
     rays,
@@ -21,6 +20,7 @@ from tests.helpers.sunlit import (
     relative_rmse,
     render,
     shaded,
+    sphere_part,
     summed,
     sun,
     unit,
@@ -48,12 +48,15 @@ def test_a_box_under_light_from_above_has_a_closed_form(variant, precision):
     sides, centre, sigma, g = np.array([1.5, 2.0, 1.25]), np.array([0.25, 0.5, 0.75]), 0.8125, 0.4
     fog = cube(centre=tuple(centre), sides=sides, turn=np.eye(3), sigma_t=sigma, g=g)
     scene = read(clear_scene(lamp=sun((0, 0, -1)), cube=fog), precision)
-    found = render(scene).airlight.reshape(-1, 3)
+    airlight = render(scene).airlight.reshape(-1, 3)
 
     origin, direction = rays(scene)
     with np.errstate(divide="ignore"):
-        one, other = (centre - 0.5 * sides - origin) / direction, (centre + 0.5 * sides - origin) / direction
-    enter, leave = np.minimum(one, other).max(axis=1), np.maximum(one, other).min(axis=1)
+        low_planes, high_planes = (
+            (centre - 0.5 * sides - origin) / direction,
+            (centre + 0.5 * sides - origin) / direction,
+        )
+    enter, leave = np.minimum(low_planes, high_planes).max(axis=1), np.maximum(low_planes, high_planes).min(axis=1)
     chord, height = np.maximum(leave - enter, 0), (origin + enter[:, None] * direction)[:, 2]
     k = sigma * (1 - direction[:, 2])
     integral = np.exp(-sigma * (centre[2] + 0.5 * sides[2] - height)) * -np.expm1(-k * chord) / k
@@ -62,12 +65,12 @@ def test_a_box_under_light_from_above_has_a_closed_form(variant, precision):
     expected = expected * np.array([0.2, 0.5, 0.9]) * np.array([3.0, 2.0, 1.0]) / (4 * np.pi)
     assert np.count_nonzero(chord) > 10
     # The albedo and g are float32 numbers of Mitsuba's, 6e-8 each; chords of float32 rays near an edge lose more.
-    assert relative_rmse(found, expected) < (1e-6 if precision == "double" else 1e-5)
+    assert relative_rmse(airlight, expected) < (1e-6 if precision == "double" else 1e-5)
 
 
 CASES = {
     "two boxes": ({"cube": cube, "plank": plank}, (box_part, plank_part), ALONG),
-    "box and ball": ({"cube": cube, "ball": ball}, (box_part, ball_part), ALONG),
+    "box and sphere": ({"cube": cube, "ball": fog_sphere}, (box_part, sphere_part), ALONG),
     "from behind": ({"cube": cube, "plank": plank}, (box_part, plank_part), (-0.2, -1.0, 0.3)),
     "along a face": (
         {"cube": cube, "plank": plank},
@@ -79,11 +82,11 @@ CASES = {
 
 @pytest.mark.claim("directional-light-volumes")
 @pytest.mark.parametrize("case", CASES)
-def test_bodies_against_sums_over_small_steps(variant, case):
-    bodies, parts, along = CASES[case]
-    scene = clear_scene(size=SMALL, lamp=sun(along), **{name: make() for name, make in bodies.items()})
+def test_bounded_media_against_sums_over_small_steps(variant, case):
+    shapes, parts, along = CASES[case]
+    scene = clear_scene(size=SMALL, lamp=sun(along), **{name: make() for name, make in shapes.items()})
     expected = summed(read(scene), [make() for make in parts], along=along)
-    # Steps across the edges of the other body's shade: 1e-4 of a chord, on few of the rays. Corners of bodies are
+    # Steps across the edges of the other medium's shade: 1e-4 of a chord, on few of the rays. Corners of media are
     # float32 numbers, 1e-7.
     assert relative_rmse(render(scene).airlight, expected) < 1e-5
     assert relative_rmse(render(scene, precision="single").airlight, expected) < 3e-5
@@ -93,13 +96,13 @@ def test_marching_converges_to_the_sum_between_bends(variant):
     scene = clear_scene(size=SMALL, lamp=sun(), cube=cube(), plank=plank())
     exact = render(scene).airlight
     errors = [relative_rmse(render(scene, "ray-march", steps=steps).airlight, exact) for steps in (50, 800)]
-    # Midpoint steps, but for the ends of the bodies, which fall between steps: order 1.
+    # Midpoint steps, but for the ends of the media, which fall between steps: order 1.
     assert errors[1] < 0.15 * errors[0]
     assert errors[1] < 2e-3
 
 
-def test_bodies_of_many_planes_have_nodes(variant):
-    """A faceted ball of 80 planes against steps of its own: the bends within the nodes are small."""
+def test_media_of_many_planes_have_nodes(variant):
+    """A faceted sphere of 80 planes against steps of its own: the bends within the nodes are small."""
     from validation.scenes.parts import medium_boundary
     from validation.scenes.solids import icosphere
 
@@ -119,44 +122,44 @@ def test_a_ray_along_the_light(variant, sense):
     """The middle ray runs with the light, or against it."""
     axis = unit(ALONG)
     sensor = look(np.asarray(CUBE_AT) - 4 * sense * axis, CUBE_AT, size=(5, 5))
-    scene = clear_scene(sensor=sensor, lamp=sun(), cube=cube(), ball=ball())
-    expected = summed(read(scene), [box_part(), ball_part()])
+    scene = clear_scene(sensor=sensor, lamp=sun(), cube=cube(), ball=fog_sphere())
+    expected = summed(read(scene), [box_part(), sphere_part()])
     for method in ("unshadowed", "light-volumes"):
-        found = render(scene, method).airlight
-        assert found[2, 2].min() > 0
-        assert found[2, 2] == pytest.approx(expected[2, 2], rel=1e-5)
-        assert relative_rmse(found, expected) < 1e-5
+        airlight = render(scene, method).airlight
+        assert airlight[2, 2].min() > 0
+        assert airlight[2, 2] == pytest.approx(expected[2, 2], rel=1e-5)
+        assert relative_rmse(airlight, expected) < 1e-5
 
 
-def test_a_camera_within_a_body(variant):
+def test_a_camera_within_a_bounded_medium(variant):
     inside = {"type": "ref", "id": "inside"}
-    sensor = look(np.asarray(BALL_AT) + np.array([0.2, 0.1, -0.15]), (0.4, 0.5, 0.9)) | {"medium": inside}
-    within = ball() | {"interior": inside}
-    parts = {"inside": ball()["interior"] | {"id": "inside"}, "sensor": sensor, "lamp": sun(), "ball": within}
+    sensor = look(np.asarray(SPHERE_AT) + np.array([0.2, 0.1, -0.15]), (0.4, 0.5, 0.9)) | {"medium": inside}
+    within = fog_sphere() | {"interior": inside}
+    parts = {"inside": fog_sphere()["interior"] | {"id": "inside"}, "sensor": sensor, "lamp": sun(), "ball": within}
     scene = {"type": "scene"} | parts | {"cube": cube()}
-    expected = summed(read(scene), [box_part(), ball_part()])
+    expected = summed(read(scene), [box_part(), sphere_part()])
     assert np.all(expected > 0)
     assert relative_rmse(render(scene).airlight, expected) < 1e-5
 
 
 def test_irradiance_is_a_factor(variant):
-    bodies = {"size": SMALL, "cube": cube(), "ball": ball(), "floor": tiny_scene()["floor"]}
-    one = render(clear_scene(lamp=sun(), **bodies))
-    four = render(clear_scene(lamp=sun(irradiance=(12.0, 8.0, 4.0)), **bodies))
-    assert np.abs(four.airlight - 4 * one.airlight).max() < 1e-12 * four.airlight.max()
-    assert np.abs(four.surface - 4 * one.surface).max() < 1e-12 * four.surface.max()
+    shapes = {"size": SMALL, "cube": cube(), "ball": fog_sphere(), "floor": tiny_scene()["floor"]}
+    single = render(clear_scene(lamp=sun(), **shapes))
+    fourfold = render(clear_scene(lamp=sun(irradiance=(12.0, 8.0, 4.0)), **shapes))
+    assert np.abs(fourfold.airlight - 4 * single.airlight).max() < 1e-12 * fourfold.airlight.max()
+    assert np.abs(fourfold.surface - 4 * single.surface).max() < 1e-12 * fourfold.surface.max()
 
 
 @pytest.mark.slow
 def test_lights_of_both_kinds_add_up(variant):
-    bodies = {"size": SMALL, "cube": cube(), "ball": ball(), "floor": tiny_scene()["floor"]}
+    shapes = {"size": SMALL, "cube": cube(), "ball": fog_sphere(), "floor": tiny_scene()["floor"]}
     lamp = tiny_scene()["lamp"]
-    one, point = render(clear_scene(lamp=sun(), **bodies)), render(clear_scene(lamp=lamp, **bodies))
-    both = render(clear_scene(lamp=lamp, other=sun(), **bodies))
-    assert np.abs(both.airlight - one.airlight - point.airlight).max() < 1e-12 * both.airlight.max()
-    assert np.abs(both.surface - one.surface - point.surface).max() < 1e-12 * both.surface.max()
-    volumes = render(clear_scene(lamp=lamp, other=sun(), **bodies), "light-volumes", map=256)
-    # Nothing stands between the lights and the bodies: a map has nothing to be wrong by.
+    directional, point = render(clear_scene(lamp=sun(), **shapes)), render(clear_scene(lamp=lamp, **shapes))
+    both = render(clear_scene(lamp=lamp, other=sun(), **shapes))
+    assert np.abs(both.airlight - directional.airlight - point.airlight).max() < 1e-12 * both.airlight.max()
+    assert np.abs(both.surface - directional.surface - point.surface).max() < 1e-12 * both.surface.max()
+    volumes = render(clear_scene(lamp=lamp, other=sun(), **shapes), "light-volumes", map=256)
+    # Nothing stands between the lights and the media: a map has nothing to be wrong by.
     assert relative_rmse(volumes.airlight, both.airlight) < 1e-6
 
 
@@ -176,18 +179,18 @@ def test_a_scene_may_be_turned(variant):
     plain, turned = frames(np.eye(3)), frames(turn)
     # Vertices and the camera are float32 numbers; near an edge the chord is a difference of such.
     assert relative_rmse(turned[0], plain[0]) < 1e-5
-    # The map lies otherwise over the ball: each is wrong by about a texel along its edge.
+    # The map lies otherwise over the sphere: each is wrong by about a texel along its edge.
     assert relative_rmse(turned[1], plain[1]) < 0.02
 
 
 def test_surfaces_have_lambert_s_law_and_both_legs(variant):
-    scene = shaded(solid=None, cube=None, ball=ball())
+    scene = shaded(solid=None, cube=None, ball=fog_sphere())
     frame = render(scene)
     origin, direction = rays(read(scene))
     distance = frame.distance.ravel()
     seen = np.isfinite(distance)
     point = origin + distance[seen, None] * direction[seen]
-    part, axis = ball_part(), unit(ALONG)
+    part, axis = sphere_part(), unit(ALONG)
     near, far = part.chord(np.broadcast_to(origin, point.shape), direction[seen])
     depth = np.clip(distance[seen] - near, 0, far - near)
     near, far = part.chord(point, -axis)
@@ -213,12 +216,12 @@ def test_a_medium_without_bounds_is_refused(variant, method):
         render(tiny_scene(lamp=sun()), method)
 
 
-def test_a_medium_around_the_bodies_is_refused(variant):
+def test_a_medium_around_bounded_media_is_refused(variant):
     fog = {"type": "homogeneous", "id": "fog", "sigma_t": 0.23, "albedo": 0.7}
     reference = {"type": "ref", "id": "fog"}
     scene = clear_scene(size=SMALL, lamp=sun())
     sensor = scene["sensor"] | {"medium": reference}
-    parts = {"fog": fog, "sensor": sensor, "lamp": sun(), "ball": ball() | {"exterior": reference}}
+    parts = {"fog": fog, "sensor": sensor, "lamp": sun(), "ball": fog_sphere() | {"exterior": reference}}
     with pytest.raises(InputError, match="medium without bounds"):
         render({"type": "scene"} | parts)
 

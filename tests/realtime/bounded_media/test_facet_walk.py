@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Walks over the facets of a body: against the least over all planes, which asks for no neighbours."""
+"""Walks over the facets of a medium: against the least over all planes, which asks for no neighbours."""
 
 import numpy as np
 import pytest
@@ -25,21 +25,21 @@ def bounds_of(name):
     return mesh_bounds(name, vertices.astype(np.float32).astype(np.float64), faces)
 
 
-def seen_body(name, light, precision="double"):
+def seen_medium(name, light, precision="double"):
     from realtime.bounded_media.convex_clip import seen_from
     from realtime.numerics.array_types import array_types
     from realtime.scene.medium import Medium
     from realtime.scene.phase import named_phase
-    from realtime.scene.read_media import convex_body
+    from realtime.scene.read_media import make_bounded_medium
 
     types = array_types(precision)
     medium = Medium((types.scalar(1.0),), types.color(1.0), named_phase("isotropic"))
-    body = convex_body(medium, bounds_of(name), types)
-    return seen_from(body, types.vector(*(float(c) for c in light))), types
+    bounded_medium = make_bounded_medium(medium, bounds_of(name), types)
+    return seen_from(bounded_medium, types.vector(*(float(c) for c in light))), types
 
 
 def lines_in(name, light, *, count=400, seed=5):
-    """Return lines from random places through the body: v_0 and d, and where they are in it, by the slabs of planes."""
+    """Return lines from random places through the medium: v_0 and d, and where they are in it, by its planes."""
     rng = np.random.default_rng(seed)
     bounds = bounds_of(name)
     origin = CENTRE + rng.normal(size=(count, 3)) * 3
@@ -70,7 +70,7 @@ def test_a_walk_meets_the_least_of_all_planes_everywhere(variant, name, light, p
     from realtime.bounded_media.facet_walk import entry_planes, first_entry, next_facet_change
 
     light = np.array(light)
-    seen, types = seen_body(name, light, precision)
+    seen, types = seen_medium(name, light, precision)
     start, direction, low, high = lines_in(name, light)
     planes = entry_planes(seen)
     v0, d = (types.vector(*(aligned_array(types.scalar, c) for c in v.T)) for v in (start, direction))
@@ -84,31 +84,31 @@ def test_a_walk_meets_the_least_of_all_planes_everywhere(variant, name, light, p
         end = np.minimum(np.array(until, dtype=np.float64), high)
         for share in (0.01, 0.5, 0.99):
             at = x + share * (end - x)
-            found = np.array(entry.constant, dtype=np.float64) + np.array(entry.slope, dtype=np.float64) * at
+            walked = np.array(entry.constant, dtype=np.float64) + np.array(entry.slope, dtype=np.float64) * at
             expected, _ = least_of_all(name, light, start + at[:, None] * direction)
             # Rounding of v, a few units in the last place of some metres, times g: large where the light is nearly in
             # the plane.
-            assert found == pytest.approx(expected, rel=2e-4 if precision == "single" else 1e-9)
+            assert walked == pytest.approx(expected, rel=2e-4 if precision == "single" else 1e-9)
         bends += np.sum(end < high)
         x, entry = end, dr.select(aligned_array(types.scalar, end) < aligned_array(types.scalar, high), beyond, entry)
     assert np.all(x == high)
     assert bends > 10
 
 
-def test_a_light_in_the_body_has_no_plane_to_enter_by(variant):
+def test_a_light_in_the_medium_has_no_plane_to_enter_by(variant):
     from realtime.bounded_media.facet_walk import entry_planes
 
-    assert entry_planes(seen_body("gem", CENTRE + 0.1)[0]).within[0]
-    assert not entry_planes(seen_body("gem", CENTRE + 3.0)[0]).within[0]
-    assert entry_planes(seen_body("gem", CENTRE + 3.0)[0]).sides == 3
+    assert entry_planes(seen_medium("gem", CENTRE + 0.1)[0]).within[0]
+    assert not entry_planes(seen_medium("gem", CENTRE + 3.0)[0]).within[0]
+    assert entry_planes(seen_medium("gem", CENTRE + 3.0)[0]).sides == 3
 
 
 @pytest.mark.parametrize("name", SOLIDS)
-def test_no_leg_to_a_segment_that_is_called_clear_meets_the_body(variant, name):
+def test_no_leg_to_a_segment_that_is_called_clear_meets_the_medium(variant, name):
     from realtime.bounded_media.facet_walk import clear_of, entry_planes, exit_planes
 
     light = np.array([1.7, 0.4, 2.9])
-    seen, types = seen_body(name, light)
+    seen, types = seen_medium(name, light)
     rng = np.random.default_rng(9)
     start = CENTRE + rng.normal(size=(900, 3)) * 1.7 - light
     direction = rng.normal(size=(900, 3))
@@ -129,14 +129,14 @@ def test_no_leg_to_a_segment_that_is_called_clear_meets_the_body(variant, name):
 @pytest.mark.parametrize("light", [(1.7, 0.4, 2.9), (0.15, 0.1, 0.4)])
 @pytest.mark.parametrize("name", SOLIDS)
 def test_lines_enter_and_leave_by_the_planes_that_all_planes_name(variant, name, light):
-    """From outside and from within the body, towards it, past it and away from it."""
+    """From outside and from within the medium, towards it, past it and away from it."""
     from realtime.bounded_media.facet_walk import entry_planes, exit_planes, line_crossings
 
     light = np.array(light)
-    seen, types = seen_body(name, light)
+    seen, types = seen_medium(name, light)
     v = CENTRE - light + np.random.default_rng(3).normal(size=(3000, 3)) * 1.3
-    found = line_crossings((entry_planes(seen), exit_planes(seen)), types.vector(*v.T))
-    enter, leave = (np.array(one) for one in found)
+    inverses = line_crossings((entry_planes(seen), exit_planes(seen)), types.vector(*v.T))
+    enter, leave = (np.array(inverse) for inverse in inverses)
     first, last = least_of_all(name, light, v)
     hits = (first > 0) & (first > last)
     assert hits.sum() > 0

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""As few panels as a segment in a body needs: against many more, smaller ones."""
+"""As few panels as a segment in a medium needs: against many more, smaller ones."""
 
 import numpy as np
 import pytest
 
-from tests.realtime.bounded_media.test_facet_walk import CENTRE, lines_in, seen_body
+from tests.realtime.bounded_media.test_facet_walk import CENTRE, lines_in, seen_medium
 from validation.kernels.values import aligned_array
 
 PHASES = [
@@ -17,14 +17,14 @@ PHASES = [
 
 
 def segments(name, light, phase, *, sigma_t, precision="double"):
-    """Return chords of a body, a part of each for every other one, with all that their integrals need."""
-    from realtime.bounded_media.panels import BodySegment
+    """Return chords of a medium, a part of each for every other one, with all that their integrals need."""
+    from realtime.bounded_media.panels import MediumSegment
     from realtime.rays.ray_light import ray_geometry
     from realtime.scene.lights import Light
     from realtime.scene.medium import Medium
     from realtime.scene.phase import named_phase
 
-    seen, types = seen_body(name, light, precision)
+    seen, types = seen_medium(name, light, precision)
     start, direction, low, high = lines_in(name, light)
     part = np.where(np.arange(len(low)) % 2, 0.37, 1.0) * (high - low)
     kind, g = phase
@@ -36,7 +36,7 @@ def segments(name, light, phase, *, sigma_t, precision="double"):
     from realtime.bounded_media.facet_walk import entry_planes
 
     x0 = aligned_array(types.scalar, low)
-    one = BodySegment(
+    segment = MediumSegment(
         medium=medium,
         around=None,
         light=lamp,
@@ -48,44 +48,44 @@ def segments(name, light, phase, *, sigma_t, precision="double"):
         seen=seen,
         planes=entry_planes(seen),
     )
-    return one, x0, aligned_array(types.scalar, low + part)
+    return segment, x0, aligned_array(types.scalar, low + part)
 
 
-def integral(one, x0, x1):
-    from realtime.bounded_media.panels import body_integral
+def integral(segment, x0, x1):
+    from realtime.bounded_media.panels import medium_integral
 
-    return np.array(body_integral(one, x0, x1).x, dtype=np.float64)
+    return np.array(medium_integral(segment, x0, x1).x, dtype=np.float64)
 
 
 @pytest.mark.parametrize("phase", PHASES)
 @pytest.mark.parametrize("away", [0.1, 0.9, 3.3, 30.0])
 @pytest.mark.parametrize("name", ["icosphere", "box"])
 def test_panels_of_three_nodes_leave_little(variant, monkeypatch, name, away, phase):
-    """Lights within, at and far from the body; optical depths of a body from 0.3 to 15."""
+    """Lights within, at and far from the medium; optical depths of it from 0.3 to 15."""
     from realtime.bounded_media import panels as media_panels
 
     light = CENTRE + away * np.array([0.36, 0.48, 0.8])
     for sigma_t in (0.2, 9.0):
-        one, x0, x1 = segments(name, light, phase, sigma_t=sigma_t)
+        segment, x0, x1 = segments(name, light, phase, sigma_t=sigma_t)
         monkeypatch.setattr(media_panels, "_NODES_DOUBLE", 12)
-        truth = integral(one, x0, x1)
+        truth = integral(segment, x0, x1)
         monkeypatch.setattr(media_panels, "_NODES_DOUBLE", 3)
-        found = integral(one, x0, x1)
+        three_nodes = integral(segment, x0, x1)
         assert np.all(truth > 0)
         seen = truth > 1e-6 * truth.max()
         # Rounding left aside: 2e-5 where the light is close to a facet and dense fog about it, else 5e-6.
-        assert np.abs(found / truth - 1)[seen].max() < 3e-5
+        assert np.abs(three_nodes / truth - 1)[seen].max() < 3e-5
 
 
 @pytest.mark.parametrize("name", ["icosphere", "gem", "column"])
 def test_panels_against_a_sum_over_small_steps(variant, name):
-    """What the leg leaves before the body by the least of all planes; midpoints of 40 000 steps."""
+    """What the leg leaves before the medium by the least of all planes; midpoints of 40 000 steps."""
     from tests.realtime.bounded_media.test_facet_walk import least_of_all
 
     light, sigma_t = np.array([1.7, 0.4, 2.9]), 1.3
     for precision, close in (("double", 1e-6), ("single", 2e-5)):
-        one, x0, x1 = segments(name, light, ("hg", 0.6), sigma_t=sigma_t, precision=precision)
-        found = integral(one, x0, x1)
+        segment, x0, x1 = segments(name, light, ("hg", 0.6), sigma_t=sigma_t, precision=precision)
+        panels = integral(segment, x0, x1)
         start, direction, low, _ = lines_in(name, light)
         begin, end = np.array(x0, dtype=np.float64), np.array(x1, dtype=np.float64)
         for ray in range(0, len(low), 41):
@@ -97,20 +97,20 @@ def test_panels_against_a_sum_over_small_steps(variant, name):
             cosine = -(v @ direction[ray]) / r
             phase = (1 - 0.36) / (1.36 - 1.2 * cosine) ** 1.5
             expected = sigma_t * np.mean(phase * np.exp(-depth) / r**2) * (end[ray] - begin[ray])
-            assert found[ray] == pytest.approx(expected, rel=close)
+            assert panels[ray] == pytest.approx(expected, rel=close)
 
 
-def test_a_ball_is_cut_where_legs_graze_it(variant):
-    """From light to shade along the ball the part of the leg within rises like a root."""
+def test_a_sphere_is_cut_where_legs_graze_it(variant):
+    """From light to shade along the sphere the part of the leg within rises like a root."""
     import mitsuba as mi
 
     from realtime.bounded_media import panels as media_panels
     from realtime.scene.read_scene import read_scene
     from tests.helpers.scenes import clear_scene
-    from tests.realtime.bounded_media.test_airlight import ball, relative_rmse, render
+    from tests.realtime.bounded_media.test_airlight import fog_sphere, relative_rmse, render
 
-    scene = clear_scene(size=(64, 48), ball=ball(sigma_t=1.9))
-    assert read_scene(mi.load_dict(scene)).medium.bodies[0].neighbours is None
+    scene = clear_scene(size=(64, 48), ball=fog_sphere(sigma_t=1.9))
+    assert read_scene(mi.load_dict(scene)).medium.bounded_media[0].neighbours is None
     single = render(scene, precision="single").airlight
     saved = media_panels._STEEP, media_panels._LEAST
     try:

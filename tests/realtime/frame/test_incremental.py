@@ -34,7 +34,7 @@ def built_in(name: str) -> Scene:
     return read_scene(load_scene(name, (32, 24)).scene)
 
 
-def ball() -> Scene:
+def sphere_scene() -> Scene:
     """A scene whose surfaces Mitsuba is asked for."""
     import mitsuba as mi
 
@@ -42,7 +42,7 @@ def ball() -> Scene:
 
 
 def cube_of_fog() -> Scene:
-    """A body of fog beside a caster, over a floor; the kernels of `three-media` take ten times as long to compile."""
+    """A cube of fog beside a caster, over a floor; the kernels of `three-media` take ten times as long to compile."""
     import mitsuba as mi
 
     turned = mi.ScalarTransform4f().translate([0.7, 0.4, 0.5]).rotate([1, 2, 3], 40).scale(0.17)
@@ -101,9 +101,13 @@ CASES = [
         ("light", "medium", "camera", "colour"),
         id="bounded media",
     ),
-    pytest.param(ball, "light-volumes", {"map": 64}, ("light", "medium", "camera", "colour"), id="surfaces of Mitsuba"),
-    pytest.param(ball, "light-volumes", {"map": 64, "evaluation": "mesh"}, ("light", "colour", "camera"), id="mesh"),
-    pytest.param(ball, "ray-march", {"steps": 8}, ("light", "medium", "camera"), id="shadow rays"),
+    pytest.param(
+        sphere_scene, "light-volumes", {"map": 64}, ("light", "medium", "camera", "colour"), id="surfaces of Mitsuba"
+    ),
+    pytest.param(
+        sphere_scene, "light-volumes", {"map": 64, "evaluation": "mesh"}, ("light", "colour", "camera"), id="mesh"
+    ),
+    pytest.param(sphere_scene, "ray-march", {"steps": 8}, ("light", "medium", "camera"), id="shadow rays"),
     pytest.param(lambda: built_in("open-fog"), "shadow-planes", {}, ("light", "medium", "camera"), id="no surfaces"),
 ]
 
@@ -116,12 +120,12 @@ def test_images_are_those_of_frames_made_afresh(variant, scene, method, paramete
     last = host(renderer, stages)
     for now, moved in frames(renderer.scene, steps):
         stages, kept = next_frame(renderer, now, kept, **moved)
-        found = host(renderer, stages)
+        images = host(renderer, stages)
         wanted = host(afresh, run_stages(replace(afresh, scene=now), afresh.prepare(now)))
-        for name, image in found.items():
+        for name, image in images.items():
             np.testing.assert_array_equal(image, wanted[name], err_msg=f"{name} after {moved}")
-        assert np.any(found["airlight"] != last["airlight"]), moved  # each step does change the image
-        last = found
+        assert np.any(images["airlight"] != last["airlight"]), moved  # each step does change the image
+        last = images
 
 
 def counting(renderer: FrameRenderer, counts: Counter) -> FrameRenderer:
@@ -171,7 +175,7 @@ def test_what_a_method_of_ones_own_prepares_is_made_anew_unless_it_says_otherwis
         return Layers(type(view.medium.albedo)(state[0] + 0 * view.direction.x))
 
     own = replace(METHODS["unshadowed"], render=render, prepare=of_medium, uses_kernel=False)
-    renderer = frame_renderer(ball(), own)
+    renderer = frame_renderer(sphere_scene(), own)
     _, kept = next_frame(renderer, renderer.scene, None, **STILL)
     thick = replace(renderer.scene, medium=thicker_medium(renderer.scene.medium, 2.0))
     stages, _ = next_frame(renderer, thick, kept, **STILL)

@@ -21,8 +21,8 @@ def render(method, *, kernel=None, precision="single", scene=None, **parameters)
     return render_frame(frame_renderer(read, METHODS[method], kernel=function, **parameters))
 
 
-def relative_rmse(one, two):
-    return np.sqrt(np.mean((np.asarray(one, dtype=np.float64) - two) ** 2)) / np.mean(two)
+def relative_rmse(image, expected):
+    return np.sqrt(np.mean((np.asarray(image, dtype=np.float64) - expected) ** 2)) / np.mean(expected)
 
 
 SCENES = {
@@ -127,8 +127,8 @@ def test_radiance_scales_with_light_and_length(variant):
 
     base = tiny_scene(ball=None, floor=None)
     bright = base | {"lamp": base["lamp"] | {"intensity": {"type": "rgb", "value": [15.0, 12.0, 9.0]}}}
-    one = render("unshadowed", kernel="quadrature", scene=base).airlight
-    assert render("unshadowed", kernel="quadrature", scene=bright).airlight == pytest.approx(3 * one, rel=1e-6)
+    airlight = render("unshadowed", kernel="quadrature", scene=base).airlight
+    assert render("unshadowed", kernel="quadrature", scene=bright).airlight == pytest.approx(3 * airlight, rel=1e-6)
     large = base | {
         "fog": base["fog"] | {"sigma_t": 0.31 / 4},
         "lamp": base["lamp"] | {"position": [3.6, 2.8, 7.6]},
@@ -136,7 +136,7 @@ def test_radiance_scales_with_light_and_length(variant):
         | {"to_world": mi.ScalarTransform4f().look_at([0.8, -16.4, 5.2], [0.4, 0.0, 2.4], [0, 0, 1])},
     }
     scaled = render("unshadowed", kernel="quadrature", scene=large).airlight
-    assert scaled == pytest.approx(one / 16, rel=1e-4)  # float32 of the camera's matrix, amplified near the light
+    assert scaled == pytest.approx(airlight / 16, rel=1e-4)  # float32 of the camera's matrix, amplified near the light
 
 
 @pytest.mark.claim("frames-are-replayed")

@@ -46,9 +46,9 @@ def start(layers, places):
 
 
 def check(total, layers, places, gains):
-    found = np.array(total, dtype=np.float64).T
+    totals = np.array(total, dtype=np.float64).T
     wanted = [expected(*ray) for ray in zip(layers, places, gains)]
-    np.testing.assert_array_equal(found, [sums[:3] for sums in wanted])  # small integers: exact
+    np.testing.assert_array_equal(totals, [sums[:3] for sums in wanted])  # small integers: exact
 
 
 @pytest.mark.claim("sum-over-lit-intervals", tolerance="none: whole numbers")
@@ -105,9 +105,9 @@ def test_nothing_is_integrated_where_nothing_waits(variant, lit, active):
     def integral(a, b):
         return (b - a) / dr.select(b > a, 1, 0)
 
-    zero, one = dr.zeros(mi.Float, RAYS), dr.full(mi.Float, 1, RAYS)
-    intervals = close_interval(no_intervals(zero, zero), one, mi.Bool(lit))
+    zero, unit = dr.zeros(mi.Float, RAYS), dr.full(mi.Float, 1, RAYS)
+    intervals = close_interval(no_intervals(zero, zero), unit, mi.Bool(lit))
     np.testing.assert_array_equal(np.array(add_waiting(intervals, integral, mi.Bool(active)).total), lit & active)
     ends = {"opened": +zero, "lit": mi.Bool(lit), "active": mi.Bool(active)}
-    total = sum_at_end(no_intervals(zero, zero), integral, one, **ends)
+    total = sum_at_end(no_intervals(zero, zero), integral, unit, **ends)
     np.testing.assert_array_equal(np.array(total), lit & active)

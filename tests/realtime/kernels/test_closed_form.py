@@ -163,8 +163,8 @@ def test_renders_in_colour_like_the_quadrature(variant):
         "phase": {"type": "rayleigh"},
     }
     scene = read_scene(mi.load_dict(tiny_scene(fog=fog)), "double")
-    one, two = (
+    closed, summed = (
         render_frame(frame_renderer(scene, METHODS["unshadowed"], kernel=kernel)).airlight
         for kernel in (closed_form, quadrature)
     )
-    assert one == pytest.approx(two, rel=2e-5)  # sixteen nodes
+    assert closed == pytest.approx(summed, rel=2e-5)  # sixteen nodes

@@ -85,11 +85,14 @@ def test_a_frame_in_a_bounded_medium_takes_it(variant):
     lamp = {"type": "point", "position": [-0.3, -0.7, 1.9], "intensity": {"type": "rgb", "value": 3.0}}
     for light in ({}, {"sun": lamp}):
         scene = read_scene(mi.load_dict(sunny(brick=brick(), pearl=pearl(), size=(6, 4), **light)), "double")
-        bodies = tuple(replace(one, medium=replace(one.medium, phase=oval())) for one in scene.medium.bodies)
-        scene = replace(scene, medium=replace(scene.medium, bodies=bodies))
+        bounded_media = tuple(
+            replace(bounded_medium, medium=replace(bounded_medium.medium, phase=oval()))
+            for bounded_medium in scene.medium.bounded_media
+        )
+        scene = replace(scene, medium=replace(scene.medium, bounded_media=bounded_media))
         kernel = KERNELS["exact"].function
-        found = render_frame(frame_renderer(scene, METHODS["unshadowed"], kernel=kernel)).airlight
+        airlight = render_frame(frame_renderer(scene, METHODS["unshadowed"], kernel=kernel)).airlight
         marched = frame_renderer(scene, METHODS["ray-march"], shadow="none", steps=600)
         wanted = render_frame(marched).airlight
         assert wanted.max() > 0
-        assert np.max(np.abs(found - wanted)) < 5e-3 * wanted.max()
+        assert np.max(np.abs(airlight - wanted)) < 5e-3 * wanted.max()

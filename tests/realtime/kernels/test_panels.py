@@ -149,7 +149,7 @@ def test_no_seam_where_a_segment_takes_another_panel(variant, name, g):
 
     x1 = np.linspace(0.05, 40, 4000).astype(np.float32).astype(np.float64)
     for height, sigma_t in ((0.01, 0.05), (0.3, 0.3), (2.0, 1.5)):
-        rays = [np.full(x1.shape, np.float64(np.float32(one))) for one in (3.0, height, 0.0, 0.0, sigma_t)]
+        rays = [np.full(x1.shape, np.float64(np.float32(number))) for number in (3.0, height, 0.0, 0.0, sigma_t)]
         rays[3] = x1
         expected, _ = airlight_segments(*rays, PhaseFunction(name, g=g))
         error = kernel_values(rays, name, g) / expected - 1
@@ -200,7 +200,7 @@ def test_float32_is_float64_up_to_rounding(variant, height, cos, start, length, 
     """Largest error stated for float32: 3e-5."""
     height, foot = 10**height, cos / np.sqrt(1 - cos**2) * 10**height
     sigma_t = 10**thickness / (start + np.hypot(start - foot, height))
-    rays = [np.float64(np.float32(one)) for one in (foot, height, start, start + 10**length, sigma_t)]
+    rays = [np.float64(np.float32(number)) for number in (foot, height, start, start + 10**length, sigma_t)]
     single, double = (kernel_values(rays, *phase, precision=precision) for precision in ("single", "double"))
     assert single == pytest.approx(double, rel=3e-5, abs=1e-37)
 
@@ -217,7 +217,9 @@ def test_the_colours_of_a_medium_are_those_of_grey_ones(variant, name, g, extinc
 
     types = array_types("single")
     foot, height, x0, x1, _ = many_rays(2000, 9)
-    medium = Medium(tuple(types.scalar(one) for one in extinctions), types.color(1), phase_of(name, g, types))
+    medium = Medium(
+        tuple(types.scalar(extinction) for extinction in extinctions), types.color(1), phase_of(name, g, types)
+    )
     rays = RayGeometry(types.scalar(foot), types.scalar(height))
     light = Light(None, None)
     colour = np.array(exact(rays, types.scalar(x0), types.scalar(x1), medium, light), dtype=np.float64)
@@ -268,7 +270,7 @@ def test_soft_spots_against_the_truth(variant, cutoff, beam):
     foot = -np.sum(origin * direction, axis=0)
     height = np.linalg.norm(np.cross(origin.T, direction.T), axis=1)
     enter, leave, first, last = (
-        np.clip(np.array(one), 0, 9) for one in (rays.enter, rays.leave, rays.beam_enter, rays.beam_leave)
+        np.clip(np.array(end), 0, 9) for end in (rays.enter, rays.leave, rays.beam_enter, rays.beam_leave)
     )
     closest = np.clip(foot - origin[2] / direction[2], enter, leave)
     ends = np.sort(np.stack([enter, np.clip(first, enter, leave), np.clip(last, enter, leave), leave, closest]), axis=0)

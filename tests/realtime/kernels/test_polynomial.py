@@ -145,10 +145,10 @@ def test_weights_and_antiderivatives_are_exact_for_polynomials():
             exact = 2 / (1 - k * k) if k % 2 == 0 else 0.0
             chebyshev = np.cos(k * np.arccos(points))
             assert weights @ chebyshev == pytest.approx(exact, abs=1e-14)  # int_{-1}^1 T_k
-            found = np.polynomial.chebyshev.Chebyshev([0, *_antiderivative(list(chebyshev))])
+            antiderivative = np.polynomial.chebyshev.Chebyshev([0, *_antiderivative(list(chebyshev))])
             expected = np.polynomial.chebyshev.Chebyshev.basis(k).integ()
             y = np.linspace(-1, 1, 7)
-            np.testing.assert_allclose(found(y) - found(-1), expected(y) - expected(-1), atol=1e-14)
+            np.testing.assert_allclose(antiderivative(y) - antiderivative(-1), expected(y) - expected(-1), atol=1e-14)
         assert np.all(weights > 0)
 
 

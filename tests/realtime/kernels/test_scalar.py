@@ -35,11 +35,11 @@ print(json.dumps(found))
 
 def test_kernels_run_on_python_floats(data_folder):
     script = [sys.executable, "-c", SCRIPT, str(data_folder / "airlight_integral.csv")]
-    found = json.loads(subprocess.run(script, capture_output=True, text=True, check=True, timeout=120).stdout)
-    assert max(found["exact"]) < 1e-10
-    assert len(found["exact"]) == 28
+    errors = json.loads(subprocess.run(script, capture_output=True, text=True, check=True, timeout=120).stdout)
+    assert max(errors["exact"]) < 1e-10
+    assert len(errors["exact"]) == 28
     for name in ("quadrature", "quadrature-theta", "equiangular", "polynomial"):
-        assert sorted(found[name])[14] < 1e-3, name  # the median; what each is good for, its own tests say
-    assert found["closed-form"]
-    assert found["taylor"]
-    assert found["table"] == found["table-tail"] == []  # refused by name: no arrays to hold a table
+        assert sorted(errors[name])[14] < 1e-3, name  # the median; what each is good for, its own tests say
+    assert errors["closed-form"]
+    assert errors["taylor"]
+    assert errors["table"] == errors["table-tail"] == []  # refused by name: no arrays to hold a table

@@ -61,8 +61,8 @@ def test_last_column_of_the_published_table():
 
     u = np.linspace(0, 10, 64)[1:-1]
     si, ci = sici(u)
-    found = table_records("sun", 64)[:, 1].reshape(63, 63)[1:, -1]
-    assert found == pytest.approx(ci * np.sin(u) + (np.pi / 2 - si) * np.cos(u), rel=1e-12)
+    column = table_records("sun", 64)[:, 1].reshape(63, 63)[1:, -1]
+    assert column == pytest.approx(ci * np.sin(u) + (np.pi / 2 - si) * np.cos(u), rel=1e-12)
 
 
 @pytest.mark.claim("table-edge")
@@ -209,9 +209,9 @@ def test_frozen_and_in_colour(variant, form, precision):
     frozen = dr.freeze(kernel)
     for count, extinctions in ((7, (0.11, 0.4, 0.9)), (7, (0.2, 0.5, 0.7)), (12, (0.3, 0.1, 1.3))):
         given = arguments(count, extinctions)
-        found = np.array(frozen(*given, tables))
-        assert found.shape == (3, count)
-        for row, sigma_t in zip(found, extinctions):
+        channels = np.array(frozen(*given, tables))
+        assert channels.shape == (3, count)
+        for row, sigma_t in zip(channels, extinctions):
             grey = Medium((types.scalar(sigma_t),), types.color(1), Isotropic())
             alone = np.array(kernel(*given[:-1], grey, None))  # uploads a table of its own
             # Recorded code may fuse differently: roundings, of reads of which half cancels.
@@ -236,7 +236,7 @@ try:
 except RuntimeError as error:
     print(error.__cause__)
 """
-    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False)
-    assert "table is not on the device; call realtime.kernels.preparation.prepare_kernel before" in found.stdout, (
-        found.stderr
+    process = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False)
+    assert "table is not on the device; call realtime.kernels.preparation.prepare_kernel before" in process.stdout, (
+        process.stderr
     )

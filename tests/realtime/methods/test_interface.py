@@ -109,11 +109,11 @@ def test_a_frame_is_composed_by_the_formula(scene, veil):
         return Layers(type(view.medium.albedo)(0), tuple(True for _ in view.lights))
 
     plain = frame(scene, replace(veil, render=nothing, passes=()))
-    found = frame(scene, veil, share=0.3, veil=0.6)
+    veiled = frame(scene, veil, share=0.3, veil=0.6)
     behind = np.where(np.isfinite(plain.distance)[..., None], 0, np.array([0.3, 0.4, 0.5]))
     assert np.max(plain.surface) > 0
     assert np.max(behind) > 0
-    np.testing.assert_allclose(found.surface, 0.6 * (0.3 * plain.surface + behind), rtol=1e-5, atol=1e-8)
+    np.testing.assert_allclose(veiled.surface, 0.6 * (0.3 * plain.surface + behind), rtol=1e-5, atol=1e-8)
 
 
 def test_layers_that_say_nothing_record_what_a_plain_frame_records(scene, veil):
@@ -129,6 +129,6 @@ def test_layers_that_say_nothing_record_what_a_plain_frame_records(scene, veil):
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
         dr.kernel_history_clear()
         run_stages(renderer, ())
-        assert len([one for one in dr.kernel_history() if one["type"] == dr.KernelType.JIT]) == 2
+        assert len([launch for launch in dr.kernel_history() if launch["type"] == dr.KernelType.JIT]) == 2
     assert renderer.passes is None
     assert renderer.lane is None

@@ -105,14 +105,14 @@ def test_a_built_in_name_gives_the_record_itself():
 
 @pytest.mark.claim("own-method-parameters")
 def test_the_signature_decides(own):
-    found = find_method(f"{own}:calls")
-    assert found.uses_kernel
-    assert found.defaults == {"steps": 7, "share": 0.5, "word": "a", "on": True}
-    assert (found.shadows, found.frozen({}), found.casts_rays({})) == (False, True, True)
-    found = find_method(f"{own}:divides")
-    assert not found.uses_kernel
-    assert (found.defaults, found.shadows, found.frozen({})) == ({}, True, False)
-    assert (found.summary, found.source) == ("Divide by zero.", own)
+    method = find_method(f"{own}:calls")
+    assert method.uses_kernel
+    assert method.defaults == {"steps": 7, "share": 0.5, "word": "a", "on": True}
+    assert (method.shadows, method.frozen({}), method.casts_rays({})) == (False, True, True)
+    method = find_method(f"{own}:divides")
+    assert not method.uses_kernel
+    assert (method.defaults, method.shadows, method.frozen({})) == ({}, True, False)
+    assert (method.summary, method.source) == ("Divide by zero.", own)
 
 
 @pytest.mark.claim("own-method-results")
@@ -269,8 +269,8 @@ def test_a_record_keeps_what_it_says(tmp_path):
         mine = replace(METHODS["ray-march"], name="mine")
     """)
     )
-    found = find_method(f"{path}:mine")
-    assert isinstance(found, Method)
-    assert found.name == "mine"
-    assert found.parameters == METHODS["ray-march"].parameters
-    assert found.prepare is METHODS["ray-march"].prepare
+    method = find_method(f"{path}:mine")
+    assert isinstance(method, Method)
+    assert method.name == "mine"
+    assert method.parameters == METHODS["ray-march"].parameters
+    assert method.prepare is METHODS["ray-march"].prepare

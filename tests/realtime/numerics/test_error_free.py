@@ -34,7 +34,7 @@ def test_sums_and_products_keep_all_digits(variant, precision):
     a, b = a.astype(real), b.astype(real)
     for operation, wanted in ((two_sum, Fraction.__add__), (two_product, Fraction.__mul__)):
         high, low = (exact(np.array(part)) for part in operation(types.scalar(a), types.scalar(b)))
-        assert [one + other for one, other in zip(high, low)] == [wanted(x, y) for x, y in zip(exact(a), exact(b))]
+        assert [value + error for value, error in zip(high, low)] == [wanted(x, y) for x, y in zip(exact(a), exact(b))]
 
 
 def test_vector_products_keep_twice_the_digits(variant):

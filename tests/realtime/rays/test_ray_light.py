@@ -51,7 +51,7 @@ def test_rounding_of_light_and_direction_is_no_height(variant, kind):
 
     types = array_types()
     rng = np.random.default_rng(8)
-    light, origin = (with_low(one, types)[0] for one in ((1.237, -2.519, 3.751), (-0.33, 0.71, 0.123)))
+    light, origin = (with_low(place, types)[0] for place in ((1.237, -2.519, 3.751), (-0.33, 0.71, 0.123)))
     direction = light - origin + 10.0 ** rng.uniform(-4, 0, (2000, 1)) * rng.normal(size=(2000, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     high, low = with_low(direction, types)
@@ -160,7 +160,7 @@ def test_falloff_near_the_axis_and_the_edge(variant, cutoff, beam):
 
     types = array_types()
     rng = np.random.default_rng(12)
-    light, origin = (with_low(one, types)[0] for one in ((1.237, -2.519, 3.751), (-0.33, 0.71, 0.123)))
+    light, origin = (with_low(place, types)[0] for place in ((1.237, -2.519, 3.751), (-0.33, 0.71, 0.123)))
     axis = np.array([0.48, 0.6, -0.64])
     angle = np.deg2rad(cutoff)
     fields = spot_fields(axis, float(angle), float(np.deg2rad(beam)), types)
@@ -173,15 +173,15 @@ def test_falloff_near_the_axis_and_the_edge(variant, cutoff, beam):
     x = np.linalg.norm(point - origin, axis=1)
     direction = (point - origin) / x[:, None]
     high, low = with_low(direction, types)
-    at = types.vector(*(float(one) for one in origin))
+    at = types.vector(*(float(component) for component in origin))
     geometry = ray_geometry(at, types.vector(high.T), lamp, low=types.vector(low.T))
     x = x.astype(np.float32).astype(np.float64)
     away = origin + x[:, None] * direction - light
     exact = np.arctan2(np.linalg.norm(np.cross(axis, away), axis=1), away @ axis)
     wanted = np.clip((angle - exact) / (angle - np.deg2rad(beam)), 0, 1)
-    found = np.array(falloff(geometry, lamp, types.scalar(x)))
+    profile = np.array(falloff(geometry, lamp, types.scalar(x)))
     # Distances of up to 10 m, rounded, over a distance from the light of 0.5 m or more; measured 9e-7.
-    assert np.max(np.abs(found - wanted)) * (angle - np.deg2rad(beam)) < 2e-6
+    assert np.max(np.abs(profile - wanted)) * (angle - np.deg2rad(beam)) < 2e-6
     assert np.mean((wanted > 0) & (wanted < 1)) > 0.05
 
 
@@ -197,6 +197,6 @@ def test_falloff_along_the_axis_and_through_the_light(variant):
     origin = np.array([(0.5, 0.0, -2.0), (0.0, 0.0, -2.0), (-1.2, 0.0, -1.6)])
     direction = np.array([(0.0, 0.0, 1.0), (0.0, 0.0, 1.0), (0.6, 0.0, 0.8)])
     geometry = ray_geometry(types.vector(origin.T), types.vector(direction.T), light)
-    found = np.array(falloff(geometry, light, types.scalar(3.0)))
+    profile = np.array(falloff(geometry, light, types.scalar(3.0)))
     angle = np.array([np.arctan2(0.5, 1.0), 0.0, np.arctan2(0.6, 0.8)])
-    np.testing.assert_allclose(found, np.clip((1 - angle) / 0.75, 0, 1), atol=1e-6)
+    np.testing.assert_allclose(profile, np.clip((1 - angle) / 0.75, 0, 1), atol=1e-6)

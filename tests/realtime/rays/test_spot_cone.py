@@ -65,17 +65,17 @@ def ends_of(direction, degrees, precision):
     high, low = with_low(direction, types)
     origin = types.vector(*(float(x) for x in CAMERA))
     geometry = ray_geometry(origin, types.vector(high.T), light, low=types.vector(low.T))
-    found = np.array([np.array(geometry.enter, dtype=np.float64), np.array(geometry.leave, dtype=np.float64)])
-    enter, leave, foot, height = np.array([exact_interval(one, angle) for one in direction]).T
-    return found, np.array([enter, leave]), foot, height
+    ends = np.array([np.array(geometry.enter, dtype=np.float64), np.array(geometry.leave, dtype=np.float64)])
+    enter, leave, foot, height = np.array([exact_interval(ray, angle) for ray in direction]).T
+    return ends, np.array([enter, leave]), foot, height
 
 
-def largest_error(found, wanted, foot, height):
+def largest_error(ends, wanted, foot, height):
     """Return the larger error of both ends by ray: of the distance, or of the angle at the light if that is less.
 
     Ends far beyond the light are ill-posed as distances: there A is close to 0, and they may be found at infinity.
     """
-    there = np.arctan((found - foot) / height), np.arctan((wanted - foot) / height)
+    there = np.arctan((ends - foot) / height), np.arctan((wanted - foot) / height)
     cosine, sine = np.cos(there[1]), np.abs(np.sin(there[1]))
     return np.max(
         np.abs(there[0] - there[1]) / (cosine**2 * (1 + np.abs(foot) / height) + sine * cosine + sine**2), axis=0
@@ -90,10 +90,10 @@ def test_rays_that_graze_the_cone(variant, degrees, precision):
     n = 300
     excess = rng.choice([-1, 1], n) * 10.0 ** rng.uniform(-9, -0.1, n)
     direction = aimed(degrees, excess, 10.0 ** rng.uniform(-1, 1, n), rng)
-    found, wanted, foot, height = ends_of(direction, degrees, precision)
-    assert np.array_equal(np.isneginf(found[1]), np.isneginf(wanted[1]))
+    ends, wanted, foot, height = ends_of(direction, degrees, precision)
+    assert np.array_equal(np.isneginf(ends[1]), np.isneginf(wanted[1]))
     assert 0.1 < np.mean(np.isneginf(wanted[1])) < 0.9
-    error = largest_error(found, wanted, foot, height) * np.cos(np.deg2rad(degrees)) ** 2
+    error = largest_error(ends, wanted, foot, height) * np.cos(np.deg2rad(degrees)) ** 2
     if precision == "single":
         # One rounding of the distances; A and C lose up to 2/cos^2 (see `realtime.rays.spot_cone`). Measured 1.5.
         assert np.max(error) < 4 * np.finfo(np.float32).eps
@@ -116,12 +116,12 @@ def test_all_sorts_of_rays(variant, degrees, precision):
     along = np.cos(spread) * AXIS + np.sin(spread) * across + 10.0 ** rng.uniform(-7, -3, (200, 1)) * every
     direction = np.concatenate([every, near, within, along, -along])
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    found, wanted, foot, height = ends_of(direction, degrees, precision)
+    ends, wanted, foot, height = ends_of(direction, degrees, precision)
     # A ray nearly along a line on the cone meets it at the end of the world, or does not.
-    hit = ~np.isneginf(np.array([found[1], wanted[1]]))
-    either = np.where(hit[0], found, wanted)[:, hit[0] != hit[1]]
+    hit = ~np.isneginf(np.array([ends[1], wanted[1]]))
+    either = np.where(hit[0], ends, wanted)[:, hit[0] != hit[1]]
     assert np.all(np.min(np.abs(either), axis=0) > 1e6)
-    error = largest_error(found, wanted, foot, height) * np.cos(spread) ** 2
+    error = largest_error(ends, wanted, foot, height) * np.cos(spread) ** 2
     if precision == "double":
         # The rounding errors of the test's own directions are not known: of nearly tangent rays, h / sqrt(D) is lost.
         across = np.cross(LIGHT - CAMERA, direction) @ AXIS

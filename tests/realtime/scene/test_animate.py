@@ -46,7 +46,7 @@ def test_a_spot_turns_with_its_axis_and_keeps_all_else(scene):
     np.testing.assert_allclose(host(turned.position), [0.5, 0.7, 2.6], rtol=1e-6)
     x, y, z = host(light.axis)
     np.testing.assert_allclose(host(turned.axis), [-y, x, z], rtol=1e-5, atol=1e-7)
-    whole, before = (host(one.axis) + host(one.axis_low) for one in (turned, light))
+    whole, before = (host(spot.axis) + host(spot.axis_low) for spot in (turned, light))
     x, y, z = before
     np.testing.assert_allclose(whole, [-y, x, z], rtol=0, atol=1e-14)  # twice the digits of float32
     assert turned.kind == light.kind
@@ -84,8 +84,8 @@ def test_turned_objects_are_where_rays_meet_them_and_where_casters_are(pens):
     here = with_positions(casters, moved.positions)
     assert np.abs(here.vertices - casters.vertices).max() > 0.1
     # The vertices come in another order, the triangles may begin at another corner: compare what has no order.
-    for one, other in ((here.vertices, again.vertices), (here.boxes[:, 0], again.boxes[:, 0])):
-        np.testing.assert_array_equal(np.unique(one, axis=0), np.unique(other, axis=0))
+    for turned, reread in ((here.vertices, again.vertices), (here.boxes[:, 0], again.boxes[:, 0])):
+        np.testing.assert_array_equal(np.unique(turned, axis=0), np.unique(reread, axis=0))
     np.testing.assert_allclose(np.sort(here.offsets), np.sort(again.offsets), rtol=0, atol=1e-15)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Convex bounds against bodies whose planes, volume and mean distance are known."""
+"""Convex bounds of shapes whose planes, volume and mean distance are known."""
 
 import numpy as np
 import pytest
@@ -12,30 +12,30 @@ from validation.scenes.solids import box, icosphere, prism, star
 TURN = rotation((0.3, 1.0, 0.2), 27.3)
 
 
-def bounds(mesh, name="body"):
+def bounds(mesh, name="solid"):
     vertices, faces = mesh
     return mesh_bounds(name, vertices.astype(np.float32).astype(np.float64), faces)
 
 
-def ball(centre, radius):
-    return Bounds("ball", np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3, 3)), np.array(centre), radius)
+def sphere_bounds(centre, radius):
+    return Bounds("sphere", np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3, 3)), np.array(centre), radius)
 
 
 def test_a_box_has_six_planes_not_twelve():
-    found = bounds(placed(box((1.3, 0.7, 2.1)), (3.1, -2.3, 0.9), TURN))
-    assert len(found.offsets) == 6
+    six_planes = bounds(placed(box((1.3, 0.7, 2.1)), (3.1, -2.3, 0.9), TURN))
+    assert len(six_planes.offsets) == 6
     # Each plane lies half an edge from the middle, along a column of the rotation.
-    distance = found.offsets - found.normals @ np.array([3.1, -2.3, 0.9])
+    distance = six_planes.offsets - six_planes.normals @ np.array([3.1, -2.3, 0.9])
     assert np.sort(distance) == pytest.approx([0.35, 0.35, 0.65, 0.65, 1.05, 1.05], abs=1e-6)
-    assert np.abs(found.normals @ TURN).max(axis=1) == pytest.approx(1.0, abs=1e-6)
+    assert np.abs(six_planes.normals @ TURN).max(axis=1) == pytest.approx(1.0, abs=1e-6)
 
 
 def test_what_the_half_spaces_hold_is_what_the_box_holds():
-    found = bounds(placed(box((1.3, 0.7, 2.1)), (3.1, -2.3, 0.9), TURN))
+    half_spaces = bounds(placed(box((1.3, 0.7, 2.1)), (3.1, -2.3, 0.9), TURN))
     points = np.random.default_rng(5).uniform(-2, 2, (200, 3)) + np.array([3.1, -2.3, 0.9])
     own = (points - (3.1, -2.3, 0.9)) @ TURN
     expected = np.all(np.abs(own) < (0.65, 0.35, 1.05), axis=1)
-    assert [holds(found, point) for point in points] == expected.tolist()
+    assert [holds(half_spaces, point) for point in points] == expected.tolist()
     assert 0 < expected.sum() < len(points)
 
 
@@ -47,37 +47,37 @@ def test_many_facets_stay_many_planes():
 @pytest.mark.parametrize(
     ("mesh", "message"),
     [
-        (lambda: prism(star(0.3, 0.9, 5), 0.4), "'body' bounds a medium and is not convex"),
+        (lambda: prism(star(0.3, 0.9, 5), 0.4), "'solid' bounds a medium and is not convex"),
         (lambda: (box((1.0, 1.1, 1.2))[0], box((1.0, 1.1, 1.2))[1][:, ::-1]), "inside out"),
         (lambda: (box((1.0, 1.1, 1.2))[0], box((1.0, 1.1, 1.2))[1][1:]), "not a closed surface"),
         (lambda: (box((1.0, 1.1, 1.2))[0] * (1, 1, 0), box((1.0, 1.1, 1.2))[1]), "has no volume|not a closed"),
     ],
 )
-def test_refusals_name_the_body_and_the_flaw(mesh, message):
+def test_refusals_name_the_shape_and_the_flaw(mesh, message):
     with pytest.raises(InputError, match=message):
         bounds(mesh())
 
 
 @pytest.mark.parametrize("gap", [-0.01, 0.01])
-def test_bodies_overlap_as_soon_as_they_do(gap):
+def test_bounds_overlap_as_soon_as_they_do(gap):
     """Pairs at a distance known from their sizes."""
-    ball_one = ball((0.0, 0.0, 0.0), 0.7)
+    sphere = sphere_bounds((0.0, 0.0, 0.0), 0.7)
     cube = box((1.0, 1.2, 1.4))
-    assert overlap(ball_one, ball((1.2 + gap, 0.0, 0.0), 0.5)) == (gap < 0)
-    assert overlap(ball_one, bounds(placed(cube, (1.2 + gap, 0.1, 0.0)))) == (gap < 0)
-    # At an edge of the cube: its distance from the centre of the ball counts, not its planes'.
+    assert overlap(sphere, sphere_bounds((1.2 + gap, 0.0, 0.0), 0.5)) == (gap < 0)
+    assert overlap(sphere, bounds(placed(cube, (1.2 + gap, 0.1, 0.0)))) == (gap < 0)
+    # At an edge of the cube: its distance from the centre of the sphere counts, not its planes'.
     corner = (0.7 + gap) / np.sqrt(2)
-    assert overlap(bounds(placed(cube, (0.5 + corner, 0.6 + corner, 0.0))), ball_one) == (gap < 0)
+    assert overlap(bounds(placed(cube, (0.5 + corner, 0.6 + corner, 0.0))), sphere) == (gap < 0)
     assert overlap(bounds(cube), bounds(placed(cube, (1.0 + gap, 0.3, 0.2)))) == (gap < 0)
 
 
-def test_a_body_within_another_overlaps_it():
+def test_bounds_within_another_overlaps_it():
     assert overlap(bounds(box((2.0, 2.1, 2.2))), bounds(box((0.2, 0.3, 0.4))))
-    assert overlap(ball((0.1, 0.0, 0.0), 0.2), bounds(box((2.0, 2.1, 2.2))))
+    assert overlap(sphere_bounds((0.1, 0.0, 0.0), 0.2), bounds(box((2.0, 2.1, 2.2))))
 
 
-def test_mean_distance_of_a_ball_is_six_fifths_of_its_radius():
-    assert mean_distance(ball((1.0, 2.0, 3.0), 0.83)) == pytest.approx(1.2 * 0.83)
+def test_mean_distance_of_a_sphere_is_six_fifths_of_its_radius():
+    assert mean_distance(sphere_bounds((1.0, 2.0, 3.0), 0.83)) == pytest.approx(1.2 * 0.83)
     # 1280 facets lie within 0.5 % of the sphere, the sum over random pairs within 0.2 % (one standard error).
     assert mean_distance(bounds(icosphere(3))) == pytest.approx(1.2, rel=0.01)
 

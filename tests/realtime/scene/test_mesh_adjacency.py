@@ -43,10 +43,10 @@ def test_opposite_half_edges_are_paired_first(name):
         for k in range(3):
             a, b = t[k], t[(k + 1) % 3]
             lonely[min(a, b), max(a, b)] += 1 if a < b else -1
-    found: Counter = Counter()
+    unpaired: Counter = Counter()
     for (a, b), right, same in zip(casters.edges.tolist(), casters.right, casters.same_way):
-        found[min(a, b), max(a, b)] += 1 if right == casters.none else 2 if same else 0
-    assert found == {edge: abs(rest) for edge, rest in lonely.items()}
+        unpaired[min(a, b), max(a, b)] += 1 if right == casters.none else 2 if same else 0
+    assert unpaired == {edge: abs(rest) for edge, rest in lonely.items()}
 
 
 @pytest.mark.parametrize("name", SOUND)
@@ -95,12 +95,12 @@ def test_edge_of_four_triangles_is_two_entries():
     assert len(casters.closed) == 1
 
 
-def test_bodies_are_the_connected_parts():
+def test_components_are_connected():
     casters = casters_of(SOUND["nested spheres"](), closed_box(), open_grid())
-    assert np.bincount(casters.body).tolist() == [320, 320, 12, 40]
+    assert np.bincount(casters.component).tolist() == [320, 320, 12, 40]
     assert casters.closed.tolist() == [True, True, True, False]
-    for body, (low, high) in enumerate(casters.boxes):
-        corners = casters.vertices[casters.triangles[casters.body == body]]
+    for component, (low, high) in enumerate(casters.boxes):
+        corners = casters.vertices[casters.triangles[casters.component == component]]
         assert np.array_equal(low, corners.min(axis=(0, 1)))
         assert np.array_equal(high, corners.max(axis=(0, 1)))
 
@@ -141,7 +141,7 @@ def test_triangles_of_mitsuba_shapes(variant):
 
     cube = {"type": "cube", "to_world": mi.ScalarTransform4f().translate([0.1, 0.2, 0.7]).scale([0.3, 0.4, 0.5])}
     casters = read_casters(mi.load_dict(tiny_scene(ball=None, cube=cube)))
-    assert sorted(np.bincount(casters.body).tolist()) == [2, 12]
+    assert sorted(np.bincount(casters.component).tolist()) == [2, 12]
     assert len(casters.vertices) == 8 + 4
     box = casters.boxes[int(np.argmax(casters.closed))]
     assert box == pytest.approx(np.array([[-0.2, -0.2, 0.2], [0.4, 0.6, 1.2]]), abs=1e-6)

@@ -70,7 +70,7 @@ def test_what_a_table_cannot_say_is_left_to_mitsuba(variant):
     from realtime.scene.read_scene import read_scene
 
     assert read_scene(mi.load_dict(mesh_scene())).facets is not None
-    assert read_scene(mi.load_dict(tiny_scene())).facets is None  # a ball
+    assert read_scene(mi.load_dict(tiny_scene())).facets is None  # a sphere
     textured = mesh_scene()
     textured["floor"]["bsdf"] = {"type": "diffuse", "reflectance": {"type": "checkerboard"}}
     assert read_scene(mi.load_dict(textured)).facets is None

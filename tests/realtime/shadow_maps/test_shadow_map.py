@@ -44,13 +44,13 @@ def test_both_precisions_cast_the_same_rays(variant, kind):
     for precision in ("single", "double"):
         scene = read_scene(loaded, precision)
         maps.append(cast_shadow_map(scene.geometry, scene.lights[0], 256))
-    single, double = (np.array(one.distance, dtype=np.float64) for one in maps)
+    single, double = (np.array(shadow_map.distance, dtype=np.float64) for shadow_map in maps)
     # Of a ray in 1e7, a coordinate lies so close to the middle of two numbers that 1e-15 decides.
     assert np.mean(single != double) < 1e-4
     assert np.isfinite(single).any()
     if maps[0].projection.basis and maps[1].projection.basis:
-        for one, other in zip(maps[0].projection.basis, maps[1].projection.basis):
-            np.testing.assert_array_equal(np.array(one), np.array(other).astype(np.float32))
+        for shadow_map, other in zip(maps[0].projection.basis, maps[1].projection.basis):
+            np.testing.assert_array_equal(np.array(shadow_map), np.array(other).astype(np.float32))
 
 
 def test_cube_coordinates_invert_the_directions(variant):
@@ -63,10 +63,10 @@ def test_cube_coordinates_invert_the_directions(variant):
     u, v = rng.uniform(-0.999, 0.999, (2, 6000))
     face = np.arange(6000) % 6
     direction = cube_direction(mi.Vector3f, mi.UInt32(face.astype(np.uint32)), mi.Float(u), mi.Float(v))
-    found, u_found, v_found = cube_coordinates(dr.normalize(direction))
-    assert np.array_equal(np.array(found), face)
-    assert np.array(u_found) == pytest.approx(u, abs=1e-6)
-    assert np.array(v_found) == pytest.approx(v, abs=1e-6)
+    face_again, u_again, v_again = cube_coordinates(dr.normalize(direction))
+    assert np.array_equal(np.array(face_again), face)
+    assert np.array(u_again) == pytest.approx(u, abs=1e-6)
+    assert np.array(v_again) == pytest.approx(v, abs=1e-6)
 
 
 @pytest.mark.parametrize("kind", ["point", "spot"])

@@ -75,18 +75,18 @@ def test_the_mean_is_the_same_and_spreads_less(variant):
 
     def run(first, count, counts=None):
         batches = [volpath_batch(truth, first + number, 32, counts=counts) for number in range(count)]
-        found = batches[0]
+        pooled = batches[0]
         for batch in batches[1:]:
-            found = merged(found, batch)
-        return found
+            pooled = merged(pooled, batch)
+        return pooled
 
     counts = allocated(run(1000, 16), 32, shape=shape, masks=masks)
     assert counts.max() > 2 * counts.min()
     equal, unequal = run(0, 64), run(200, 64, counts)
     for number in range(len(LAYERS)):
-        means = [found.mean[number].mean() for found in (equal, unequal)]
+        means = [pooled.mean[number].mean() for pooled in (equal, unequal)]
         errors = [
-            np.sqrt((found.standard_error[number][:, 1] ** 2).sum()) / len(counts[0]) for found in (equal, unequal)
+            np.sqrt((pooled.standard_error[number][:, 1] ** 2).sum()) / len(counts[0]) for pooled in (equal, unequal)
         ]
         assert means[0] > 0
         assert abs(means[0] - means[1]) < 4 * np.hypot(*errors)

@@ -2,7 +2,7 @@
 import numpy as np
 import pytest
 
-from tests.helpers.scenes import body, clear_scene, spot, tiny_scene
+from tests.helpers.scenes import bounded_medium, clear_scene, spot, tiny_scene
 from tests.helpers.volpath import assert_volpath_agrees
 
 STEPS = 200_000
@@ -27,11 +27,11 @@ def brick(sigma_t=(0.9, 0.5, 0.2), albedo=(0.9, 0.4, 0.3), **medium):
     import mitsuba as mi
 
     half = mi.ScalarTransform4f().translate([-0.5, 0.125, 0.59375]).scale([0.3125, 0.4375, 0.375])
-    return body({"type": "cube", "to_world": half}, sigma_t, albedo, **medium)
+    return bounded_medium({"type": "cube", "to_world": half}, sigma_t, albedo, **medium)
 
 
 def pearl(sigma_t=1.3, albedo=(0.2, 0.5, 0.8), centre=(0.5, 0.1875, 0.59375), **medium):
-    return body({"type": "sphere", "center": list(centre), "radius": 0.4375}, sigma_t, albedo, **medium)
+    return bounded_medium({"type": "sphere", "center": list(centre), "radius": 0.4375}, sigma_t, albedo, **medium)
 
 
 def in_fog(shape):
@@ -52,9 +52,9 @@ def chord(name, origin, direction):
         root = np.sqrt(np.maximum(b * b - c, 0))
         return np.where(b * b > c, -b - root, 0), np.where(b * b > c, -b + root, 0)
     with np.errstate(divide="ignore"):
-        one = ([-0.8125, -0.3125, 0.21875] - origin) / direction
-        two = ([-0.1875, 0.5625, 0.96875] - origin) / direction
-    low, high = np.minimum(one, two).max(axis=-1), np.maximum(one, two).min(axis=-1)
+        low_sides = ([-0.8125, -0.3125, 0.21875] - origin) / direction
+        high_sides = ([-0.1875, 0.5625, 0.96875] - origin) / direction
+    low, high = np.minimum(low_sides, high_sides).max(axis=-1), np.maximum(low_sides, high_sides).min(axis=-1)
     return np.where(high > low, low, 0), np.where(high > low, high, 0)
 
 
@@ -101,7 +101,7 @@ CASES = {
     "lamp inside": lambda: clear_scene(
         size=(12, 9), brick=brick(), pearl=pearl(), lamp=tiny_scene()["lamp"] | {"position": [-0.6, 0.3, 0.71]}
     ),
-    "lamp inside of a ball": lambda: clear_scene(
+    "lamp inside of a sphere": lambda: clear_scene(
         size=(12, 9), brick=brick(), pearl=pearl(), lamp=tiny_scene()["lamp"] | {"position": [0.41, 0.3, 0.71]}
     ),
     "in fog": lambda: everywhere(brick=in_fog(brick(**TABLE)), pearl=in_fog(pearl(2.7))),
@@ -114,8 +114,8 @@ CASES = {
 def test_airlight_is_the_sum_over_small_steps(variant, case):
     """Rationale: nothing is shared with the estimator but the rays: own chords, own rule, no kinks looked for.
 
-    Expected: to 1e-8; the rule's error at a kink is of the order of 1/200000^2, at a tangent of a ball 1/200000^1.5. In
-    fog parts are up to 60 m long, and steps longer: 2e-7 there; with 16 times as many both agree to 3e-9.
+    Expected: to 1e-8; the rule's error at a kink is of the order of 1/200000^2, at a tangent of a sphere 1/200000^1.5.
+    In fog, parts are up to 60 m long, and steps longer: 2e-7 there; with 16 times as many both agree to 3e-9.
     """
     rtol = 2e-7 if "fog" in case else 1e-8
     truth, image = truth_and_image(CASES[case]())
@@ -170,13 +170,13 @@ def test_no_extinction_no_airlight(variant):
     assert not image.airlight_bound.any()
 
 
-def test_absorbing_ball_before_a_wall(variant):
-    """The wall behind a ball of albedo 0 is darker by exp(-sigma_t chord), and the ball itself is black."""
+def test_absorbing_sphere_before_a_wall(variant):
+    """The wall behind a sphere of albedo 0 is darker by exp(-sigma_t chord), and the sphere itself is black."""
     import mitsuba as mi
 
     at = mi.ScalarTransform4f().translate([0, 1.9, 0]).rotate([1, 0, 0], 90).scale(9.0)
     wall = {"type": "rectangle", "to_world": at, "bsdf": {"type": "twosided", "bsdf": {"type": "diffuse"}}}
-    lamp = tiny_scene()["lamp"] | {"position": [1.9, 1.1, 2.9]}  # behind the ball: its legs to the wall miss it
+    lamp = tiny_scene()["lamp"] | {"position": [1.9, 1.1, 2.9]}  # behind the sphere: its legs to the wall miss it
     truth, image = truth_and_image(clear_scene(wall=wall, lamp=lamp, pearl=pearl(1.3, (0.0, 0.0, 0.0))))
     _, clear = truth_and_image(clear_scene(wall=wall, lamp=lamp, pearl=pearl(0.0)))
     near, far = chord("pearl", truth.origin, truth.direction)
@@ -188,7 +188,7 @@ def test_absorbing_ball_before_a_wall(variant):
 
 @pytest.mark.claim("lit-surface", tolerance="1e-6 relative")
 def test_leg_of_the_surface_is_darkened_too(variant):
-    """A lamp above the ball: the floor below it is darker by the chord of the leg and of the view."""
+    """A lamp above the sphere: the floor below it is darker by the chord of the leg and of the view."""
     changes = {"floor": tiny_scene()["floor"], "lamp": tiny_scene()["lamp"] | {"position": [0.6, 0.4, 2.3]}}
     truth, image = truth_and_image(clear_scene(pearl=pearl(), **changes))
     _, clear = truth_and_image(clear_scene(pearl=pearl(0.0), **changes))
@@ -262,7 +262,7 @@ def test_ray_through_a_lamp(variant):
 def test_agrees_with_volpath(variant, inside):
     """Rationale: Mitsuba's path tracer finds the media by walking from boundary to boundary.
 
-    Setup: brick and pearl, a ball that casts a shadow through the pearl, a floor; 16 x 12 pixels, 16 batches of 256.
+    Setup: brick and pearl, a sphere that casts a shadow through the pearl, a floor; 16 x 12 pixels, 16 batches of 256.
     Expected: pooled relative bias within four standard errors (a false alarm in 16 000 runs), which are below 3 %.
     """
     import mitsuba as mi
@@ -276,7 +276,7 @@ def test_agrees_with_volpath(variant, inside):
     if inside:
         huge = {"type": "cube", "to_world": mi.ScalarTransform4f().translate([0.1, -3.5, 1.1]).scale(1.5)}
         scene["sensor"] = tiny_scene()["sensor"]
-        scene["near"] = body(huge, 0.0, (0.0, 0.0, 0.0)) | {"interior": {"type": "ref", "id": "fog"}}
+        scene["near"] = bounded_medium(huge, 0.0, (0.0, 0.0, 0.0)) | {"interior": {"type": "ref", "id": "fog"}}
         scene = {"type": "scene", "fog": tiny_scene()["fog"]} | scene
     truth = read_truth(mi.load_dict(scene))
     assert_volpath_agrees(truth, batches=16, least_precision=0.03)

@@ -35,7 +35,7 @@ CASES = {
 def test_airlight_is_the_sum_over_small_steps(variant, case):
     """Rationale: nothing is shared with the estimator but the rays: own chords, own rule, no kinks looked for.
 
-    Expected: to 2e-8; the rule's error at a kink is of the order of 1/200000^2, at a tangent of a ball 1/200000^1.5,
+    Expected: to 2e-8; the rule's error at a kink is of the order of 1/200000^2, at a tangent of a sphere 1/200000^1.5,
     where the light enters a face or passes beside it 1/200000.
     """
     rtol = 2e-5 if case == "light along an axis" else 2e-8
@@ -65,7 +65,7 @@ def test_ray_through_a_box_in_closed_form(variant, way):
     directions = {"across": [0.0, 0.0, -1.0], "with the ray": [0.0, 1.0, 0.0], "against it": [0.0, -1.0, 0.0]}
     truth, _ = truth_and_image(sunny(brick=brick(**HG), sun=sun(directions[way])))
     around = replace(truth, origin=origin, direction=direction[None], width=1, height=1)
-    found = ray_values(around)
+    values = ray_values(around)
     (medium,) = truth.media
     sigma_t, length = medium.sigma_t, 2 * BRICK[1][1]
     cos_scatter = -float(np.dot(directions[way], direction))
@@ -79,8 +79,8 @@ def test_ray_through_a_box_in_closed_form(variant, way):
     g = float(np.float32(0.6))
     p = (1 - g * g) / (1 + g * g - 2 * g * cos_scatter) ** 1.5
     expected = truth.directional[0].irradiance / (4 * np.pi) * medium.albedo * sigma_t * p * integral
-    assert found.airlight[0] == pytest.approx(expected, rel=1e-12)  # the closed form, but for rounding
-    assert np.all(found.bound < 1e-6 * found.airlight)
+    assert values.airlight[0] == pytest.approx(expected, rel=1e-12)  # the closed form, but for rounding
+    assert np.all(values.bound < 1e-6 * values.airlight)
 
 
 @pytest.mark.claim("directional-truth", tolerance="2e-9 relative")
@@ -101,22 +101,22 @@ def test_panels_give_the_closed_form(variant):
     rays = parallel_rays(truth.origin, truth.direction, light, scattering_range(segments))
     lit = directional_intervals(truth, rays)
     scale = edge_scale(truth, rays)
-    one, other = (
+    by_exponential, by_panels = (
         sum_directional(truth, light, rays, lit, segments, scale=scale, closed=closed)[0] for closed in (True, False)
     )
     assert lit.transitions > 10
-    assert one.max() > 0
-    assert other == pytest.approx(one, rel=2e-9)  # 1e-9 is asked of the panels
+    assert by_exponential.max() > 0
+    assert by_panels == pytest.approx(by_exponential, rel=2e-9)  # 1e-9 is asked of the panels
 
 
-def test_whole_light_scattered_out_of_a_thin_ball(variant):
+def test_whole_light_scattered_out_of_a_thin_sphere(variant):
     """As sigma_t goes to 0 the airlight is albedo sigma_t E p chord / (4 pi)."""
     sigma_t = 2.0**-30
     truth, image = truth_and_image(sunny(pearl=pearl(sigma_t, (0.5, 0.5, 0.5))))
     near, far = chord("pearl", truth.origin, truth.direction)
     expected = 0.5 * sigma_t * (far - near)[:, None] * truth.directional[0].irradiance / (4 * np.pi)
     assert np.sum(far > near) > 5
-    # tau is below 4e-10, chords are those of a float64 ball.
+    # tau is below 4e-10, chords are those of a float64 sphere.
     assert image.airlight.reshape(-1, 3) == pytest.approx(expected, rel=2e-9)
 
 
@@ -135,8 +135,8 @@ def test_camera_inside_of_a_body(variant):
         assert airlight[pixel] == pytest.approx(midpoint_airlight(truth, 0, pixel), rel=2e-8)
 
 
-def test_shadow_of_a_ball_in_fog(variant):
-    """A ball between sun and box: of points by the distance of the ball's centre from their legs, and the plain sum."""
+def test_shadow_of_a_sphere_in_fog(variant):
+    """A sphere between sun and box: points by the distance of its centre from their legs, and the plain sum."""
     centre, radius = np.array([-0.71875, 0.25, 1.21875]), 0.1875
     caster = {"type": "sphere", "center": centre.tolist(), "radius": radius}
     truth, image = truth_and_image(sunny(brick=brick(), caster=caster))
@@ -176,7 +176,7 @@ def test_enclosed_medium_is_dark(variant):
 
 
 def test_surface_is_dimmed_by_the_bodies_before_it_and_above(variant):
-    """The floor below the ball of fog: E cos albedo/pi, less the chords of the leg and of the view."""
+    """The floor below the sphere of fog: E cos albedo/pi, less the chords of the leg and of the view."""
     import mitsuba as mi
 
     floor = {"type": "rectangle", "to_world": mi.ScalarTransform4f().scale(6.3), "bsdf": {"type": "diffuse"}}
@@ -194,7 +194,7 @@ def test_surface_is_dimmed_by_the_bodies_before_it_and_above(variant):
     assert np.sum(depth > 0.1) > 5
     assert image.surface.reshape(-1, 3)[hit] == pytest.approx(
         expected, rel=2e-5
-    )  # surfaces are met in float32, and the ball at a grazing angle
+    )  # surfaces are met in float32, and the sphere at a grazing angle
 
 
 def test_mean_over_pixels(variant):

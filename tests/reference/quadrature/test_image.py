@@ -36,11 +36,11 @@ def test_unshadowed_pixels_are_the_adaptive_integral(variant):
 
 
 @pytest.mark.claim("attenuation-and-falloff", "bound-in-every-pixel", tolerance="3e-5 relative")
-def test_shadow_of_a_ball_against_its_closed_form(variant):
+def test_shadow_of_a_sphere_against_its_closed_form(variant):
     """The shadow of a sphere is a cone cut by a cap: the lit set of a ray in closed form, sampled finely.
 
-    A point P is in shadow where the segment from the light to P meets the ball. The airlight is then a one-dimensional
-    integral with the indicator of that set, by the midpoint rule with 200 000 steps in theta.
+    A point P is in shadow where the segment from the light to P meets the sphere. The airlight is then an integral
+    with the indicator of that set, by the midpoint rule with 200 000 steps in theta.
     """
     truth, image = truth_of(floor=None, size=(12, 9))
     light, sigma_t = truth.lights[0], truth.medium.sigma_t[0]
@@ -64,7 +64,7 @@ def test_shadow_of_a_ball_against_its_closed_form(variant):
         x = foot + height * np.tan(theta)
         value = np.sum(np.exp(-sigma_t * (x + r)) * ~shadowed) * (high - low) / steps / height
         expected = truth.medium.albedo * sigma_t * light.intensity * value / (4 * np.pi)
-        # One step more or less at an edge, and the float32 surface of the ball that Embree sees.
+        # One step more or less at an edge, and the float32 surface of the sphere that Embree sees.
         assert image.airlight.reshape(-1, 3)[pixel] == pytest.approx(expected, rel=3e-5), pixel
     assert image.transitions > 0
 

@@ -43,8 +43,8 @@ def test_directions_through_the_middles_are_those_of_the_image(variant):
     truth = truth_of(tiny_scene())
     row, column = np.divmod(np.arange(truth.width * truth.height), truth.width)
     positions = np.stack([column + 0.5, row + 0.5], axis=1)
-    found = film_directions(truth.scene.sensors()[0], positions, (truth.width, truth.height))
-    assert found == pytest.approx(truth.direction, abs=1e-15)
+    directions = film_directions(truth.scene.sensors()[0], positions, (truth.width, truth.height))
+    assert directions == pytest.approx(truth.direction, abs=1e-15)
 
 
 @pytest.mark.claim("pixel-area", tolerance="1e-4 relative, the tolerance asked for")

@@ -4,7 +4,7 @@ import pytest
 
 from reference.quadrature.segments import AMBIENT, camera_segments, leg_kinks, optical_depth, scattering_range
 from reference.visibility.line_crossings import crossings
-from tests.helpers.scenes import body, clear_scene, tiny_scene
+from tests.helpers.scenes import bounded_medium, clear_scene, tiny_scene
 
 FOG = {"type": "homogeneous", "id": "fog", "sigma_t": 0.11, "albedo": 0.6, "has_spectral_extinction": False}
 
@@ -14,8 +14,10 @@ def shapes(**extra):
 
     turn = mi.ScalarTransform4f().translate([-0.5, 0.1, 0.5]).rotate([0, 0, 1], 27.0).scale([0.31, 0.43, 0.37])
     return {
-        "brick": body({"type": "cube", "to_world": turn} | extra, (0.9, 0.5, 0.2), (0.9, 0.4, 0.3)),
-        "pearl": body({"type": "sphere", "center": [0.6, 0.2, 0.6], "radius": 0.43} | extra, 1.3, (0.2, 0.5, 0.8)),
+        "brick": bounded_medium({"type": "cube", "to_world": turn} | extra, (0.9, 0.5, 0.2), (0.9, 0.4, 0.3)),
+        "pearl": bounded_medium(
+            {"type": "sphere", "center": [0.6, 0.2, 0.6], "radius": 0.43} | extra, 1.3, (0.2, 0.5, 0.8)
+        ),
     }
 
 
@@ -52,14 +54,14 @@ def test_optical_depth_is_the_sum_over_small_steps(variant, ambient):
     start, end = rng.uniform(-1.2, 1.2, (40, 3)), rng.uniform(-1.2, 1.2, (40, 3))
     start[20:], end[20:] = start[20:] * 0.2 + [-0.5, 0.1, 0.5], end[20:] * 0.2 + [0.6, 0.2, 0.6]
     length = np.linalg.norm(end - start, axis=1)
-    found = optical_depth(truth, start, (end - start) / length[:, None], np.zeros(40), length)
+    depth = optical_depth(truth, start, (end - start) / length[:, None], np.zeros(40), length)
     share = midpoints(0, 1, 20_000)[None, :, None]
     points = start[:, None] + share * (end - start)[:, None]
     where = {medium.name: inside(medium.name, points).mean(axis=1) * length for medium in truth.media}
     expected = (length - sum(where.values()))[:, None] * truth.medium.sigma_t
     expected += sum(where[medium.name][:, None] * medium.sigma_t for medium in truth.media)
-    assert found == pytest.approx(expected, abs=4 * 1.3 * 4 / 20_000)  # a step at each of up to four boundaries
-    assert np.ptp(found) > 0.3
+    assert depth == pytest.approx(expected, abs=4 * 1.3 * 4 / 20_000)  # a step at each of up to four boundaries
+    assert np.ptp(depth) > 0.3
 
 
 @pytest.mark.parametrize("ambient", [False, True])
@@ -72,17 +74,17 @@ def test_segments_cover_what_scatters(variant, ambient):
     number = np.full(points.shape[:2], AMBIENT)
     for index, medium in enumerate(truth.media):
         number[inside(medium.name, points)] = index
-    found = np.full_like(number, AMBIENT if ambient else -2)
+    media = np.full_like(number, AMBIENT if ambient else -2)
     covered = np.zeros(number.shape, int)
     for start, end, medium in zip(segments.start, segments.end, segments.medium, strict=True):
         part = (x >= start[:, None]) & (x < end[:, None])
         covered += part
-        found = np.where(part, medium[:, None], found)
+        media = np.where(part, medium[:, None], media)
     expected = number if ambient else np.where(number == AMBIENT, -2, number)
-    assert np.mean(found != expected) < 1e-3  # a step at a boundary
+    assert np.mean(media != expected) < 1e-3  # a step at a boundary
     assert covered.max() == 1
     assert np.all(covered == 1) if ambient else np.mean(covered) < 0.5
-    assert len(np.unique(found)) == 3
+    assert len(np.unique(media)) == 3
     low, high = scattering_range(segments)
     assert np.all(low[high > low] >= 0)
     assert np.array_equal(high > low, np.any(covered > 0, axis=1))
@@ -92,7 +94,7 @@ def test_between_its_kinks_the_chord_of_the_leg_is_smooth(variant):
     """Rationale: a kink that is not found costs digits. Second differences jump there, and nowhere else.
 
     The part of the leg inside of a body, for legs to points 2e-4 m apart on rays that pass beyond it: its second
-    differences are 4e-8 m^2 times its curvature, which is below 50/m but beside the tangents of a ball.
+    differences are 4e-8 m^2 times its curvature, which is below 50/m but beside the tangents of a sphere.
     """
     truth = truth_of()
     light, step = np.array([-0.9, 0.7, 1.4]), 2e-4
@@ -131,7 +133,7 @@ def test_the_digest_of_a_scene_tells_its_media_apart(variant):
 
     def pearl(sigma_t, **medium):
         return {
-            "pearl": body(
+            "pearl": bounded_medium(
                 {"type": "sphere", "center": [0.6, 0.2, 0.6], "radius": 0.43}, sigma_t, (0.2, 0.5, 0.8), **medium
             )
         }

@@ -4,8 +4,8 @@ import pytest
 
 from analytic.errors import InputError
 from reference.scene.convex_bounds import Polyhedron, Sphere, overlap, read_bounds
-from tests.helpers.scenes import body, clear_scene, tiny_scene
-from tests.helpers.shapes import ball, bounds_of, box
+from tests.helpers.scenes import bounded_medium, clear_scene, tiny_scene
+from tests.helpers.shapes import bounds_of, box, sphere
 
 GREY = (0.7, 0.7, 0.7)
 
@@ -48,21 +48,21 @@ OVERLAPS = [
     (lambda: (box(), box((2.0, 0, 0))), False),  # touching
     (lambda: (box(), box((1.99, 0, 0))), True),
     (lambda: (box(), box((0, 0, 0), (0.2, 0.2, 0.2))), True),  # nested
-    (lambda: (box(), ball((2.3, 0, 0), 1.29)), False),
-    (lambda: (box(), ball((2.3, 0, 0), 1.31)), True),
-    (lambda: (ball((2, 2, 2), 1.73), box()), False),  # the corner is sqrt(3) = 1.732 away
-    (lambda: (ball((2, 2, 2), 1.74), box()), True),
-    (lambda: (ball(), box((0, 0, 0), (5.0, 5.0, 5.0))), True),
-    (lambda: (ball(), ball((0, 0, 2.1), 1.09)), False),
-    (lambda: (ball(), ball((0, 0, 2.1), 1.11)), True),
+    (lambda: (box(), sphere((2.3, 0, 0), 1.29)), False),
+    (lambda: (box(), sphere((2.3, 0, 0), 1.31)), True),
+    (lambda: (sphere((2, 2, 2), 1.73), box()), False),  # the corner is sqrt(3) = 1.732 away
+    (lambda: (sphere((2, 2, 2), 1.74), box()), True),
+    (lambda: (sphere(), box((0, 0, 0), (5.0, 5.0, 5.0))), True),
+    (lambda: (sphere(), sphere((0, 0, 2.1), 1.09)), False),
+    (lambda: (sphere(), sphere((0, 0, 2.1), 1.11)), True),
 ]
 
 
 @pytest.mark.parametrize(("make", "expected"), OVERLAPS)
 def test_overlap(variant, make, expected):
-    one, other = (bounds_of(shape) for shape in make())
-    assert overlap(one, other) is expected
-    assert overlap(other, one) is expected
+    first, second = (bounds_of(shape) for shape in make())
+    assert overlap(first, second) is expected
+    assert overlap(second, first) is expected
 
 
 L_SHAPE = [(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)]
@@ -90,7 +90,7 @@ def test_refused_meshes(variant):
     with pytest.raises(InputError, match="is a Rectangle"):
         bounds_of({"type": "rectangle"})
     with pytest.raises(InputError, match="inside out"):
-        bounds_of(ball() | {"flip_normals": True})
+        bounds_of(sphere() | {"flip_normals": True})
 
 
 def test_rounding_of_the_corners_is_not_a_dent(variant):
@@ -105,7 +105,7 @@ def test_rounding_of_the_corners_is_not_a_dent(variant):
 
 
 def glass(shape):
-    return body(shape, 0.3, GREY) | {"bsdf": {"type": "dielectric"}}
+    return bounded_medium(shape, 0.3, GREY) | {"bsdf": {"type": "dielectric"}}
 
 
 AMBIENT = {"type": "homogeneous", "sigma_t": 0.2, "albedo": 0.5}
@@ -116,12 +116,15 @@ AMBIENT = {"type": "homogeneous", "sigma_t": 0.2, "albedo": 0.5}
     ("changes", "message"),
     [
         (lambda: {"a": glass(box())}, "'a' bounds a medium and has a SmoothDielectric material"),
-        (lambda: {"a": body(box(), 0.3, GREY), "b": body(ball(radius=0.3), 0.3, GREY)}, "'b' and 'a' overlap"),
-        (lambda: {"a": body(box((0, -4.0, 1.0)), 0.3, GREY)}, "the camera is inside of shape 'a'"),
-        (lambda: {"a": body(box(), 0.3, GREY) | {"exterior": AMBIENT}}, "exterior medium of shape 'a'"),
+        (
+            lambda: {"a": bounded_medium(box(), 0.3, GREY), "b": bounded_medium(sphere(radius=0.3), 0.3, GREY)},
+            "'b' and 'a' overlap",
+        ),
+        (lambda: {"a": bounded_medium(box((0, -4.0, 1.0)), 0.3, GREY)}, "the camera is inside of shape 'a'"),
+        (lambda: {"a": bounded_medium(box(), 0.3, GREY) | {"exterior": AMBIENT}}, "exterior medium of shape 'a'"),
         (lambda: {"a": box() | {"bsdf": {"type": "null"}, "exterior": AMBIENT}}, "'a' is a hole in a medium"),
         (lambda: {"a": box() | {"bsdf": {"type": "mask", "opacity": 0.5, "nested": {"type": "diffuse"}}}}, "partly"),
-        (lambda: {"a": body({"type": "cylinder"}, 0.3, GREY)}, "is a Cylinder"),
+        (lambda: {"a": bounded_medium({"type": "cylinder"}, 0.3, GREY)}, "is a Cylinder"),
         (lambda: {}, "references no medium"),
     ],
 )

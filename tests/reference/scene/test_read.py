@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from tests.helpers.scenes import body, clear_scene, spot, tiny_scene
+from tests.helpers.scenes import bounded_medium, clear_scene, spot, tiny_scene
 
 
 def test_both_sides_read_the_same_scene(variant):
@@ -66,8 +66,8 @@ def test_reading_a_scene_renames_none_of_its_shapes(variant):
     from reference.scene.read import read_truth
     from reference.storage.scene_digest import scene_digest
 
-    ball = body({"type": "sphere", "center": [0.2, 0.1, 0.9], "radius": 0.4}, 0.7, (0.5, 0.5, 0.5))
-    scene = mi.load_dict(clear_scene(size=(4, 3), mist=ball, floor=tiny_scene()["floor"]))
+    sphere = bounded_medium({"type": "sphere", "center": [0.2, 0.1, 0.9], "radius": 0.4}, 0.7, (0.5, 0.5, 0.5))
+    scene = mi.load_dict(clear_scene(size=(4, 3), mist=sphere, floor=tiny_scene()["floor"]))
     before = scene_digest(scene)
     truth = read_truth(scene)
     assert [shape.id() for shape in truth.occluders.shapes()] == ["floor"]

@@ -7,8 +7,8 @@ from tests.helpers.scenes import spot, tiny_scene
 
 
 @pytest.mark.parametrize("scale", [[2.0, 1.0, 1.0], [1.0, 2.0, 0.5], [-1.5, 1.5, 1.5]])
-def test_a_stretched_sphere_is_the_ball_that_mitsuba_makes_of_it(variant, scale):
-    """Mitsuba warns of it, and intersects a ball whose radius is the first of the scales."""
+def test_a_stretched_sphere_is_the_sphere_that_mitsuba_makes_of_it(variant, scale):
+    """Mitsuba warns of it, and intersects a sphere whose radius is the first of the scales."""
     import mitsuba as mi
 
     from reference.scene.shapes import read_shapes
@@ -20,8 +20,8 @@ def test_a_stretched_sphere_is_the_ball_that_mitsuba_makes_of_it(variant, scale)
     direction = np.random.default_rng(3).normal(size=(3, 50))
     direction /= np.linalg.norm(direction, axis=0)
     start = shapes.centre[0][:, None] + 7 * direction
-    found = scene.ray_intersect_preliminary(mi.Ray3f(mi.Point3f(start), mi.Vector3f(-direction)), coherent=False)
-    assert np.array(found.t) == pytest.approx(7 - shapes.radius.item(), rel=1e-5)
+    hit = scene.ray_intersect_preliminary(mi.Ray3f(mi.Point3f(start), mi.Vector3f(-direction)), coherent=False)
+    assert np.array(hit.t) == pytest.approx(7 - shapes.radius.item(), rel=1e-5)
 
 
 def test_shapes_are_sorted_and_others_refused_by_name(variant):

@@ -43,7 +43,7 @@ CHANGES = {
     "blue reflectance": lambda: changed("ball", bsdf={"type": "diffuse", "reflectance": rgb(0.6, 0.5, 0.31)}),
     "both sides": lambda: changed("ball", bsdf={"type": "twosided", "bsdf": tiny_scene()["ball"]["bsdf"]}),
     "turned inside out": lambda: changed("ball", flip_normals=True),
-    "without the ball": lambda: load(ball=None),
+    "without the sphere": lambda: load(ball=None),
     "field of view": lambda: changed("sensor", fov=49.5),
     "size": lambda: changed("sensor", film=tiny_scene(size=(6, 4))["sensor"]["film"]),
 }
@@ -83,11 +83,11 @@ UNNAMED = """<scene version="3.0.0">
 def test_plugins_without_a_name_have_the_same_digest_at_every_load(variant):
     import mitsuba as mi
 
-    one = mi.load_string(UNNAMED)
+    first = mi.load_string(UNNAMED)
     keep = [mi.load_dict({"type": "sphere"}) for _ in range(7)]  # so that the next scene lies elsewhere in memory
-    two = mi.load_string(UNNAMED)
+    second = mi.load_string(UNNAMED)
     assert len(keep) == 7
-    assert scene_digest(one) == scene_digest(two)
+    assert scene_digest(first) == scene_digest(second)
     assert scene_digest(load()) == scene_digest(load())
 
 
@@ -106,10 +106,10 @@ def test_digest_is_the_same_in_another_process(variant, tmp_path):
     )
     here = os.path.dirname(os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)))))
     environment = os.environ | {"PYTHONHASHSEED": "4711", "PYTHONPATH": here}
-    found = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", script, variant, UNNAMED], env=environment, capture_output=True, text=True, check=True
     )
-    assert found.stdout.split()[-1] == scene_digest(mi.load_string(UNNAMED))
+    assert process.stdout.split()[-1] == scene_digest(mi.load_string(UNNAMED))
 
 
 def test_key_depends_on_estimator_and_settings(variant):
@@ -136,19 +136,19 @@ def test_key_depends_on_the_version_of_mitsuba(variant, monkeypatch):
 def test_arrays_come_back_bit_by_bit():
     given = {"image": np.array([[1 / 3, -0.0], [np.inf, np.nan]]), "count": np.int64(7), "word": "fog"}
     store_arrays("round-trip", given)
-    found = load_arrays("round-trip")
-    assert found is not None
-    assert set(found) == set(given)
-    assert found["image"].tobytes() == given["image"].tobytes()
-    assert (int(found["count"]), str(found["word"])) == (7, "fog")
+    loaded = load_arrays("round-trip")
+    assert loaded is not None
+    assert set(loaded) == set(given)
+    assert loaded["image"].tobytes() == given["image"].tobytes()
+    assert (int(loaded["count"]), str(loaded["word"])) == (7, "fog")
 
 
 def test_storing_again_replaces():
     store_arrays("twice", {"a": np.zeros(3), "b": np.zeros(1)})
     store_arrays("twice", {"a": np.ones(2)})
-    found = load_arrays("twice")
-    assert found is not None
-    assert {name: value.tolist() for name, value in found.items()} == {"a": [1.0, 1.0]}
+    loaded = load_arrays("twice")
+    assert loaded is not None
+    assert {name: value.tolist() for name, value in loaded.items()} == {"a": [1.0, 1.0]}
     assert [path.name for path in cache_folder().glob("*twice*")] == ["twice.npz"]
 
 
@@ -224,9 +224,9 @@ def test_nothing_half_written_stays_behind(monkeypatch):
     monkeypatch.setattr(reference.storage.files.os, "replace", killed)
     with pytest.raises(KeyboardInterrupt):
         store_arrays("killed", {"a": np.ones(3)})
-    found = load_arrays("killed")
-    assert found is not None
-    assert found["a"].tolist() == [0.0, 0.0, 0.0]
+    loaded = load_arrays("killed")
+    assert loaded is not None
+    assert loaded["a"].tolist() == [0.0, 0.0, 0.0]
     assert len(list(cache_folder().glob("*killed*"))) == 1
 
 
@@ -237,9 +237,9 @@ def test_fields_of_a_truth_image_are_what_the_cache_keeps(variant):
 
     scene = load()
     truth_image(scene, samples=16)
-    found = load_arrays(cache_key(scene, "quadrature", {"samples": 16, "shadow_scale": 1.0}))
-    assert found is not None
-    assert set(found) == {field.name for field in fields(TruthImage)}
+    loaded = load_arrays(cache_key(scene, "quadrature", {"samples": 16, "shadow_scale": 1.0}))
+    assert loaded is not None
+    assert set(loaded) == {field.name for field in fields(TruthImage)}
 
 
 @pytest.mark.parametrize("change", ["a number", "a name", "a shape", "a kind", "one more", "no digest"])

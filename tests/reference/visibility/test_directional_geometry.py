@@ -25,11 +25,11 @@ def unit(vector):
     return np.asarray(vector) / np.linalg.norm(vector)
 
 
-def samples(rays, found, count, seed):
-    """Return random points of rays, whether `found` calls them lit, and their distance from the nearest edge [m]."""
+def samples(rays, intervals, count, seed):
+    """Return random points of rays, whether the intervals call them lit, and their distance from the next edge [m]."""
     share = np.random.default_rng(seed).random((len(rays.first), count))
     lit, gap = np.zeros(share.shape, bool), np.full(share.shape, np.inf)
-    for ray, low, high in zip(found.ray, found.low, found.high, strict=True):
+    for ray, low, high in zip(intervals.ray, intervals.low, intervals.high, strict=True):
         lit[ray] |= (share[ray] > low) & (share[ray] < high)
         gap[ray] = np.minimum(gap[ray], np.minimum(np.abs(share[ray] - low), np.abs(share[ray] - high)))
     x = rays.first[:, None] + share * (rays.last - rays.first)[:, None]
@@ -50,9 +50,9 @@ def hits_triangles(point, towards, triangles):
     return hit
 
 
-def hits_balls(point, towards, balls):
+def hits_spheres(point, towards, spheres):
     hit = np.zeros(point.shape[:-1], bool)
-    for centre, radius in balls:
+    for centre, radius in spheres:
         off = centre - point
         along = off @ towards
         inside = np.sum(off**2, axis=-1) < radius**2
@@ -63,7 +63,7 @@ def hits_balls(point, towards, balls):
 @pytest.mark.claim("directional-truth")
 @pytest.mark.parametrize("towards", [(0.3, -0.5, 0.7), (0.0, 0.0, 1.0), (-0.9, 0.02, 0.0)])
 def test_random_points_by_the_definition(towards):
-    """Triangles and balls all around the camera, one ball around it: points far from an edge are lit or not."""
+    """Triangles and spheres all around the camera, one sphere around it: points far from an edge are lit or not."""
     from reference.scene.shapes import Shapes
     from reference.visibility.directional_geometry import parallel_intervals
 
@@ -71,12 +71,12 @@ def test_random_points_by_the_definition(towards):
     triangles = generator.uniform(-4, 4, (60, 1, 3)) + generator.normal(size=(60, 3, 3)) * 0.6
     centres, radii = generator.uniform(-4, 4, (9, 3)), generator.uniform(0.1, 0.9, 9)
     rays = random_rays(900, 7, towards)
-    found = parallel_intervals(rays, Shapes(triangles, centres, radii))
-    point, lit, gap = samples(rays, found, 60, 2)
-    hidden = hits_triangles(point, towards, triangles) | hits_balls(point, towards, list(zip(centres, radii)))
-    assert found.transitions > 500
+    intervals = parallel_intervals(rays, Shapes(triangles, centres, radii))
+    point, lit, gap = samples(rays, intervals, 60, 2)
+    hidden = hits_triangles(point, towards, triangles) | hits_spheres(point, towards, list(zip(centres, radii)))
+    assert intervals.transitions > 500
     assert 0.1 < hidden.mean() < 0.9
-    # Where a plane all but touches a ball, or a ray is all but along the light, rounding is worth more.
+    # Where a plane all but touches a sphere, or a ray is all but along the light, rounding is worth more.
     assert not np.any((lit == hidden)[gap > 1e-9])
 
 
@@ -96,11 +96,11 @@ def test_one_triangle_in_closed_form():
         (((4.0, 0.0, -2.0), (6.0, 0.0, 2.0)), (4.5, 5.0)),  # half of it lies on the dark side
     ):
         a, b = (np.array(end) for end in ends)
-        found = parallel_intervals(rays, Shapes(np.array([[a + out, a - out, b]])))
+        intervals = parallel_intervals(rays, Shapes(np.array([[a + out, a - out, b]])))
         low, high = expected
-        assert 10 * found.low == pytest.approx([0, high], abs=1e-13)
-        assert 10 * found.high == pytest.approx([low, 10], abs=1e-13)
-        assert found.transitions == 2
+        assert 10 * intervals.low == pytest.approx([0, high], abs=1e-13)
+        assert 10 * intervals.high == pytest.approx([low, 10], abs=1e-13)
+        assert intervals.transitions == 2
         below = parallel_intervals(rays, Shapes(np.array([[a + out, a - out, b]]) * [1, 1, -1]))
         assert len(below.ray) == (1 if ends[0][2] > 0 else 2)
 
@@ -118,11 +118,11 @@ def test_rays_along_the_light(sign):
     rays = parallel_rays(np.zeros(3), sign * towards[None], light, (np.array([0.5]), np.array([2.0])))
     for distance, count in ((3.0, 0), (-3.0, 1)):  # along the way to the light, from the camera
         plate = distance * towards + np.array([[1.0, 0.1, -0.3], [-0.7, 0.8, 0.1], [-0.2, -0.9, 0.4]])
-        found = parallel_intervals(rays, Shapes(plate[None]))
+        intervals = parallel_intervals(rays, Shapes(plate[None]))
         # Looking away from the light, what is before the camera lies behind it as seen from the light.
-        assert len(found.ray) == count, (sign, distance)
-        ball = parallel_intervals(rays, Shapes(np.empty((0, 3, 3)), distance * towards[None], np.array([0.3])))
-        assert len(ball.ray) == count
+        assert len(intervals.ray) == count, (sign, distance)
+        sphere = parallel_intervals(rays, Shapes(np.empty((0, 3, 3)), distance * towards[None], np.array([0.3])))
+        assert len(sphere.ray) == count
 
 
 def scene_of_many(**changes):
@@ -163,7 +163,7 @@ def test_cast_rays_find_the_edges_of_the_geometry(variant):
     assert exact.transitions > 100
     assert exact.random_checks.checked == 32 * np.sum(rays.last > rays.first)
     assert exact.random_checks.left == cast.random_checks.left == 0
-    lit = [lit_lengths(found, rays.ends) * (rays.last - rays.first) for found in (exact, cast)]
+    lit = [lit_lengths(intervals, rays.ends) * (rays.last - rays.first) for intervals in (exact, cast)]
     # Legs and their ends are rounded to 2e-6 of some metres. One shadow is so thin that all samples step over it.
     assert np.sum(np.abs(lit[0] - lit[1]) > 2e-5) <= 1
 
@@ -176,15 +176,15 @@ def test_shapes_of_other_kinds_are_cast_at(variant):
 
     disk = {"type": "disk", "to_world": mi.ScalarTransform4f().translate([-0.6, 0.2, 1.3]).scale(0.2)}
     truth, rays = rays_and_truth(sunny(brick=brick(), disk=disk, **ball_over_floor(), size=(24, 18)))
-    found = directional_intervals(truth, rays)
+    intervals = directional_intervals(truth, rays)
     towards = -truth.directional[0].direction
-    point, lit, gap = samples(rays, found, 50, 3)
+    point, lit, gap = samples(rays, intervals, 50, 3)
     height = (1.3 - point[..., 2]) / towards[2]
     on_disk = np.linalg.norm((point + height[..., None] * towards)[..., :2] - [-0.6, 0.2], axis=-1) < 0.2
-    ball = hits_balls(point, towards, [(np.array([0.1, 0.1, 0.7]), 0.41)])
+    sphere = hits_spheres(point, towards, [(np.array([0.1, 0.1, 0.7]), 0.41)])
     used = (rays.last > rays.first)[:, None] & (gap > 1e-5)
-    assert found.transitions > 10
-    assert not np.any((lit == (on_disk | ball))[used])
+    assert intervals.transitions > 10
+    assert not np.any((lit == (on_disk | sphere))[used])
 
 
 def test_wrong_geometry_is_left_in_doubt(variant, monkeypatch):

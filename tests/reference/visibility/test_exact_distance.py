@@ -24,7 +24,7 @@ def test_distance_to_a_plane_is_exact(variant):
 
 
 @pytest.mark.parametrize("inside", [False, True], ids=["outside", "inside"])
-def test_distance_to_a_ball_is_exact(variant, inside):
+def test_distance_to_a_sphere_is_exact(variant, inside):
     """The points lie on the sphere in float64, and they are those that were cast."""
     import mitsuba as mi
 
@@ -33,8 +33,8 @@ def test_distance_to_a_ball_is_exact(variant, inside):
     from reference.scene.shapes import read_shapes
     from reference.visibility.exact_distance import exact_distance
 
-    ball = {"type": "sphere", "center": [0.1, -3.9, 1.2], "radius": 1.9} if inside else tiny_scene()["ball"]
-    truth = read_truth(mi.load_dict(tiny_scene(ball=ball, floor=None)))
+    sphere = {"type": "sphere", "center": [0.1, -3.9, 1.2], "radius": 1.9} if inside else tiny_scene()["ball"]
+    truth = read_truth(mi.load_dict(tiny_scene(ball=sphere, floor=None)))
     hits = surface_hits(truth)
     distance = exact_distance(truth, hits.interaction, hits.distance)
     met = np.isfinite(hits.distance)
@@ -46,10 +46,10 @@ def test_distance_to_a_ball_is_exact(variant, inside):
     assert np.isinf(distance[~met]).all()
 
 
-def test_rays_that_touch_a_ball_keep_the_distance_that_was_cast(variant):
+def test_rays_that_touch_a_sphere_keep_the_distance_that_was_cast(variant):
     from reference.scene.convex_bounds import Sphere
     from reference.visibility.exact_distance import _to_sphere
 
-    ball = Sphere(np.array([0.0, 0.0, 5.0]), 1.0)
+    sphere = Sphere(np.array([0.0, 0.0, 5.0]), 1.0)
     direction = np.array([[np.sin(a), 0.0, np.cos(a)] for a in (0.0, np.arcsin(0.2) + 1e-9)])
-    assert _to_sphere(ball, np.zeros(3), direction, np.array([4.00001, 4.9])).tolist() == [4.0, 4.9]
+    assert _to_sphere(sphere, np.zeros(3), direction, np.array([4.00001, 4.9])).tolist() == [4.0, 4.9]

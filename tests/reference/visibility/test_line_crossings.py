@@ -6,7 +6,7 @@ import pytest
 
 from reference.scene.convex_bounds import holds
 from reference.visibility.line_crossings import crossings, sphere_crossings
-from tests.helpers.shapes import ball, bounds_of, box
+from tests.helpers.shapes import bounds_of, box, sphere
 
 
 def rays(count=400, spread=1.7):
@@ -15,7 +15,7 @@ def rays(count=400, spread=1.7):
     return rng.uniform(-spread, spread, (count, 3)), direction / np.linalg.norm(direction, axis=1, keepdims=True)
 
 
-@pytest.mark.parametrize("make", [box, ball])
+@pytest.mark.parametrize("make", [box, sphere])
 def test_crossings_are_where_membership_changes(variant, make):
     """Rationale: the chord of a convex body, found by stepping along the line. Expected: to one step."""
     bounds = bounds_of(make((0.3, -0.2, 0.1)))
@@ -33,7 +33,7 @@ def test_crossings_are_where_membership_changes(variant, make):
     assert all(holds(bounds, point) for point in middle)
 
 
-def test_ball_seen_from_far_away_keeps_its_digits():
+def test_sphere_seen_from_far_away_keeps_its_digits():
     """The near root is the power over the far one; the difference b - sqrt(b^2 - c) would lose six digits here."""
     low, high = sphere_crossings(np.array([1e6]), np.array([2e6 * 1e-3]))
     assert low[0] == pytest.approx(1e-3 * (1 + 0.5e-9), rel=1e-14)

@@ -19,7 +19,7 @@ def setup(scene):
 
 
 def cylinder(**changes):
-    """Return a pipe beside the ball."""
+    """Return a pipe beside the sphere."""
     return {"type": "cylinder", "p0": [0.7, -0.2, 0.1], "p1": [0.8, 0.1, 1.3], "radius": 0.1} | changes
 
 
@@ -40,19 +40,19 @@ def test_polygons_and_balls_are_exact_and_other_shapes_are_cast(variant):
 
 
 def test_mixed_scenes_keep_needles_exact_beside_shapes_that_are_cast(variant):
-    """A needle that few samples meet, a ball and a pipe: the intersection is what all three leave, needle and all."""
+    """A needle that few samples meet, a sphere and a pipe: the intersection is what all three leave, needle and all."""
     from reference.visibility.lit_intervals import lit_intervals
     from reference.visibility.triangles import geometric_intervals
 
     needle = box((0.5, -0.3, 0.9), (2e-4, 2e-4, 8.0))
     truth, light, rays, ends = setup(tiny_scene(pipe=cylinder(), needle=needle))
-    found = lit_intervals(truth, light, rays, ends=ends, samples=32)
-    assert found.random_checks.left == 0
-    assert found.doubt is None
+    intervals = lit_intervals(truth, light, rays, ends=ends, samples=32)
+    assert intervals.random_checks.left == 0
+    assert intervals.doubt is None
     # Cast densely, without the needle, whose shadow is narrower than what edges of cast rays leave open.
     bare, *_ = setup(tiny_scene(pipe=cylinder()))
     dense = lit_intervals(bare, light, rays, ends=ends, samples=1024, edges="rays")
-    lost = lit_lengths(dense, ends) - lit_lengths(found, ends)
+    lost = lit_lengths(dense, ends) - lit_lengths(intervals, ends)
     assert lost.min() > -2e-5  # 2e-6 of the distance at each of a few edges, some of them grazing
     alone, *_ = setup(tiny_scene(ball=None, floor=None, needle=needle))
     of_needle = (ends[1] - ends[0]).clip(0) - lit_lengths(geometric_intervals(alone, light, rays, ends=ends), ends)
@@ -80,17 +80,17 @@ def test_what_is_lit_in_both(variant):
     ends = np.zeros(5), np.ones(5)
     ray, low, high = np.array([0, 0, 1, 2, 4]), np.array([0.0, 0.5, 0.2, 0.0, 0.0]), np.array([0.4, 1, 0.8, 0.5, 1])
     doubt = np.array([1]), np.array([0.3]), np.array([0.01])
-    one = LitIntervals(ray, low, high, 5, edge=1e-11, doubt=doubt)
+    first = LitIntervals(ray, low, high, 5, edge=1e-11, doubt=doubt)
     ray, low, high = np.array([0, 1, 1, 2, 3]), np.array([0.3, 0.0, 0.6, 0.5, 0.0]), np.array([0.6, 0.4, 1.0, 1, 1])
-    other = LitIntervals(ray, low, high, 5, random_checks=RandomChecks(7, 2, 1, 1, 0.1))
-    for pair in ((one, other), (other, one)):
-        found = intersected(*pair, ends)
-        assert found.ray.tolist() == [0, 0, 1, 1]
-        assert found.low.tolist() == [0.3, 0.5, 0.2, 0.6]
-        assert found.high.tolist() == [0.4, 0.6, 0.4, 0.8]
-        assert (found.transitions, found.edge) == (8, 2e-6)
-        assert found.random_checks == RandomChecks(7, 2, 1, 1, 0.1)
-        assert [part.tolist() for part in found.doubt] == [[1], [0.3], [0.01]]
+    second = LitIntervals(ray, low, high, 5, random_checks=RandomChecks(7, 2, 1, 1, 0.1))
+    for pair in ((first, second), (second, first)):
+        both = intersected(*pair, ends)
+        assert both.ray.tolist() == [0, 0, 1, 1]
+        assert both.low.tolist() == [0.3, 0.5, 0.2, 0.6]
+        assert both.high.tolist() == [0.4, 0.6, 0.4, 0.8]
+        assert (both.transitions, both.edge) == (8, 2e-6)
+        assert both.random_checks == RandomChecks(7, 2, 1, 1, 0.1)
+        assert [part.tolist() for part in both.doubt] == [[1], [0.3], [0.01]]
 
 
 @pytest.mark.claim("shadow-ray-certificate")
@@ -120,12 +120,12 @@ def test_slivers_that_random_samples_meet_are_mended(variant):
     used = np.flatnonzero(ends[1] > ends[0])
     nothing = Toggles(used, np.ones(len(used), bool), np.empty(0, np.int64), np.empty(0))
     found_by = Rounding(visibility_test(truth.occluders, light.position, rays), _bisect)
-    found = checked_cast(nothing, found_by, ends=ends, checks=128)
-    known = found.random_checks
+    mended = checked_cast(nothing, found_by, ends=ends, checks=128)
+    known = mended.random_checks
     assert known.disagreements > 1000
     assert known.refined == known.disagreements - known.left
     assert known.left < 0.05 * known.disagreements  # rays with more slivers than rounds
-    shadow = [(ends[1] - ends[0])[used] - lit_lengths(f, ends)[used] for f in (exact, found)]
+    shadow = [(ends[1] - ends[0])[used] - lit_lengths(f, ends)[used] for f in (exact, mended)]
     assert np.abs(shadow[1] - shadow[0]).sum() < 0.05 * shadow[0].sum()
 
 
@@ -134,12 +134,12 @@ def test_intervals_stay_sorted_and_apart_after_mending(variant):
 
     posts = {f"post{i}": box((-0.9 + 0.31 * i, 0.1, 0.9), (0.017, 0.017, 3.0)) for i in range(6)}
     truth, light, rays, ends = setup(tiny_scene(ball=None, **posts))
-    found = lit_intervals(truth, light, rays, ends=ends, samples=16, edges="rays")
-    assert np.all(np.diff(found.ray) >= 0)
-    assert np.all(found.high >= found.low)
-    same = np.diff(found.ray) == 0
-    assert np.all(found.low[1:][same] >= found.high[:-1][same])
-    assert np.all((found.low >= ends[0][found.ray]) & (found.high <= ends[1][found.ray]))
+    intervals = lit_intervals(truth, light, rays, ends=ends, samples=16, edges="rays")
+    assert np.all(np.diff(intervals.ray) >= 0)
+    assert np.all(intervals.high >= intervals.low)
+    same = np.diff(intervals.ray) == 0
+    assert np.all(intervals.low[1:][same] >= intervals.high[:-1][same])
+    assert np.all((intervals.low >= ends[0][intervals.ray]) & (intervals.high <= ends[1][intervals.ray]))
 
 
 @pytest.mark.claim("shadow-ray-certificate")
@@ -155,10 +155,10 @@ def test_wrong_geometry_is_found_and_left_in_doubt(variant):
     shapes = read_shapes(truth.occluders)
     wrong = geometric_intervals(truth, light, rays, ends=ends, shapes=Shapes(shapes.triangles[12:]))
     visible = visibility_test(truth.occluders, light.position, rays)
-    found = checked_geometry(wrong, visible, (point_leg(light.position, rays), shapes), ends=ends, checks=16)
-    assert found.random_checks.left > 20
-    assert found.doubt is not None
-    assert len(found.doubt[0]) == found.random_checks.left
+    checked = checked_geometry(wrong, visible, (point_leg(light.position, rays), shapes), ends=ends, checks=16)
+    assert checked.random_checks.left > 20
+    assert checked.doubt is not None
+    assert len(checked.doubt[0]) == checked.random_checks.left
     # Shadow rays that are wrong themselves are overruled by the float64 test.
     right = geometric_intervals(truth, light, rays, ends=ends, shapes=shapes)
 
@@ -167,10 +167,10 @@ def test_wrong_geometry_is_found_and_left_in_doubt(variant):
         lit[::701] ^= True
         return lit
 
-    found = checked_geometry(right, unreliable, (point_leg(light.position, rays), shapes), ends=ends, checks=4)
-    assert found.random_checks.disagreements > 0
-    assert found.random_checks.left == 0
-    assert found.doubt is None
+    checked = checked_geometry(right, unreliable, (point_leg(light.position, rays), shapes), ends=ends, checks=4)
+    assert checked.random_checks.disagreements > 0
+    assert checked.random_checks.left == 0
+    assert checked.doubt is None
 
 
 @pytest.mark.claim("shadow-ray-certificate")
@@ -182,8 +182,8 @@ def test_doubt_widens_the_bound(variant, monkeypatch):
     compute = quadrature.lit_intervals
 
     def doubtful(*arguments, **settings):
-        found = compute(*arguments, **settings)
-        return replace(found, doubt=(np.array([5]), np.array([0.1]), np.array([1e-3])))
+        intervals = compute(*arguments, **settings)
+        return replace(intervals, doubt=(np.array([5]), np.array([0.1]), np.array([1e-3])))
 
     monkeypatch.setattr(quadrature, "lit_intervals", doubtful)
     doubted = quadrature.ray_values(truth)

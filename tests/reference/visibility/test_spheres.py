@@ -31,7 +31,7 @@ def surface_crossed(point, centre, radius):
 @pytest.mark.claim("exact-shadows", tolerance="1e-9 of an angle about each edge")
 @pytest.mark.parametrize("radius", [0.02, 0.7, 1.69, 1.71, 3.0], ids=["small", "plain", "close", "inside", "large"])
 def test_samples_against_the_definition(radius):
-    """Random points of random rays; the light is 1.7 from the centre, so in the last two it is inside of the ball."""
+    """Random points of random rays; the light is 1.7 from the centre, so in the last two it is inside of the sphere."""
     from reference.visibility.spheres import sphere_shadows
 
     centre = np.array([0.5, 1.5, np.sqrt(1.7**2 - 2.5)])
@@ -49,12 +49,12 @@ def test_samples_against_the_definition(radius):
             hidden[r] |= (theta[r] > a) & (theta[r] < b)
         point = height[:, None, None] * (direction[:, None] * np.tan(theta)[..., None] + normal[:, None])
         wrong = hidden != surface_crossed(point, centre, radius)
-        # 3e-9 of the rays' planes touch the ball so closely that an angle is worth less than 1e-9.
+        # 3e-9 of the rays' planes touch the sphere so closely that an angle is worth less than 1e-9.
         assert wrong.sum() <= 1
 
 
 def test_in_the_plane_of_the_centre():
-    """Ball, ray and light in one plane: tangents at asin(R/D), and a ray through the ball enters where it should."""
+    """Sphere, ray and light in one plane: tangents at asin(R/D), and a ray through it enters where it should."""
     from reference.visibility.spheres import sphere_shadows
 
     direction, normal = np.array([[0.0, 0.0, 1.0]]), np.array([[0.0, 1.0, 0.0]])
@@ -70,8 +70,8 @@ def test_in_the_plane_of_the_centre():
         assert not len(sphere_shadows((centre, np.array([0.3])), direction, normal, hidden_from)[0])
 
 
-def test_a_ball_against_a_mesh_of_it(variant):
-    """A ball and a fine mesh within it differ by what the mesh lacks: 1 - cos of half the angle of an edge."""
+def test_a_sphere_against_a_mesh_of_it(variant):
+    """A sphere and a fine mesh within it differ by what the mesh lacks: 1 - cos of half the angle of an edge."""
     import mitsuba as mi
 
     from reference.scene.read import read_truth
@@ -86,11 +86,11 @@ def test_a_ball_against_a_mesh_of_it(variant):
     points = np.array([0.1, 0.1, 0.7]) + 0.41 * points
     a, b, c, d = points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:]
     mesh = np.concatenate([np.stack([a, b, c], axis=2), np.stack([a, c, d], axis=2)]).reshape(-1, 3, 3)
-    ball = Shapes(np.empty((0, 3, 3)), np.array([[0.1, 0.1, 0.7]]), np.array([0.41]))
+    sphere = Shapes(np.empty((0, 3, 3)), np.array([[0.1, 0.1, 0.7]]), np.array([0.41]))
     lit = []
-    for shapes in (ball, Shapes(mesh)):
-        found = geometric_intervals(truth, light, rays, ends=ends, shapes=shapes)
-        lit.append(lit_lengths(found, ends))
+    for shapes in (sphere, Shapes(mesh)):
+        intervals = geometric_intervals(truth, light, rays, ends=ends, shapes=shapes)
+        lit.append(lit_lengths(intervals, ends))
     assert np.sum(lit[0] < ends[1] - ends[0]) > 20
     assert np.all(lit[0] <= lit[1] + 1e-12)
     # Both triangles of a quad are at most 2 (1 - cos(pi/128)) R inside; a shadow that just touches loses its root.
@@ -102,7 +102,7 @@ def test_a_ball_against_a_mesh_of_it(variant):
 @pytest.mark.claim("shadow-ray-certificate")
 @pytest.mark.parametrize("place", ["outside", "light", "camera", "both"])
 def test_random_shadow_rays_contradict_nothing(variant, place):
-    """Balls, one around the light, the camera or both of them: no shadow ray of Mitsuba says otherwise."""
+    """Spheres, one around the light, the camera or both of them: no shadow ray of Mitsuba says otherwise."""
     from dataclasses import replace
 
     import mitsuba as mi
@@ -123,13 +123,13 @@ def test_random_shadow_rays_contradict_nothing(variant, place):
     second = {"type": "sphere", "center": [0.5, 0.2, 1.3], "radius": 0.15}
     truth = read_truth(mi.load_dict(tiny_scene(second=second, size=(32, 24), **more)))
     light, rays, ends = rays_of(truth)
-    found = lit_intervals(truth, light, rays, ends=ends, samples=800)
-    assert found.edge == EXACT_EDGE
-    assert found.random_checks.checked == 100 * np.sum(ends[1] > ends[0])
-    assert found.random_checks.left == 0
-    assert found.random_checks.missed < 1e-4  # float32 rays where a plane grazes a ball, settled in float64
-    assert (found.transitions > 100) == (place in ("outside", "both"))
-    # Were the second ball forgotten, the check would tell.
+    intervals = lit_intervals(truth, light, rays, ends=ends, samples=800)
+    assert intervals.edge == EXACT_EDGE
+    assert intervals.random_checks.checked == 100 * np.sum(ends[1] > ends[0])
+    assert intervals.random_checks.left == 0
+    assert intervals.random_checks.missed < 1e-4  # float32 rays where a plane grazes a sphere, settled in float64
+    assert (intervals.transitions > 100) == (place in ("outside", "both"))
+    # Were the second sphere forgotten, the check would tell.
     shapes = read_shapes(truth.occluders)
     keep = shapes.radius != shapes.radius.min()
     fewer = replace(shapes, centre=shapes.centre[keep], radius=shapes.radius[keep])

@@ -40,10 +40,10 @@ def test_edges_of_shadows_move(variant):
     x = -0.5 + np.array([-FAR, NEAR, FAR])
     interaction = on_the_floor(scene, x)
     # By hand: rays start 1e-4 (1 + 0.5) up, where the shadow ends 7.5e-5 further to the right.
-    found = reached_by_shadow_rays(
+    corrected = reached_by_shadow_rays(
         interaction, LIGHT, np.array([False, True, True]), scene=scene, shapes=read_shapes(scene)
     )
-    assert found.tolist() == [False, False, True]
+    assert corrected.tolist() == [False, False, True]
 
 
 def test_a_wrong_interval_is_not_excused(variant):
@@ -51,20 +51,20 @@ def test_a_wrong_interval_is_not_excused(variant):
     scene = half_covered_floor()
     interaction = on_the_floor(scene, -0.5 + np.array([-0.2, 0.2]))
     wrong = np.array([True, False])
-    found = reached_by_shadow_rays(interaction, LIGHT, wrong, scene=scene, shapes=read_shapes(scene))
-    assert found.tolist() == [False, True]
+    corrected = reached_by_shadow_rays(interaction, LIGHT, wrong, scene=scene, shapes=read_shapes(scene))
+    assert corrected.tolist() == [False, True]
 
 
 def test_what_agrees_stays(variant):
     scene = half_covered_floor()
     interaction = on_the_floor(scene, np.linspace(-1.7, 1.3, 40))
     reached = np.linspace(-1.7, 1.3, 40) > -0.5
-    found = reached_by_shadow_rays(interaction, LIGHT, reached, scene=scene, shapes=read_shapes(scene))
-    assert np.array_equal(found, reached)
+    corrected = reached_by_shadow_rays(interaction, LIGHT, reached, scene=scene, shapes=read_shapes(scene))
+    assert np.array_equal(corrected, reached)
 
 
 def test_segments_are_blocked_as_rays_are(variant):
-    """Against Mitsuba's rays, among triangles and balls of all sizes; float32 errs on edges, one in a million."""
+    """Against Mitsuba's rays, among triangles and spheres of all sizes; float32 errs on edges, one in a million."""
     import mitsuba as mi
 
     scene = mi.load_dict(tiny_scene())
@@ -91,7 +91,7 @@ def test_triangles_that_are_left_out_block_nothing(monkeypatch):
     start = random.uniform(-1.4, 1.4, (700, 3))
     start[::7] = LIGHT  # no way at all: no direction
     end = np.broadcast_to(LIGHT, start.shape)
-    found = segments_blocked(start, end, shapes)
+    blocked = segments_blocked(start, end, shapes)
     corner = triangles[:, 0]
     longest = np.linalg.norm(triangles - corner[:, None], axis=2).max(axis=1)
     groups = list(module._groups(start))
@@ -99,8 +99,8 @@ def test_triangles_that_are_left_out_block_nothing(monkeypatch):
     assert sorted(np.concatenate(groups).tolist()) == list(range(700))
     assert np.median(left) < 250
     monkeypatch.setattr(module, "_SLACK", np.inf)
-    assert np.array_equal(found, segments_blocked(start, end, shapes))
-    assert 0.2 < found.mean() < 0.8
+    assert np.array_equal(blocked, segments_blocked(start, end, shapes))
+    assert 0.2 < blocked.mean() < 0.8
 
 
 def test_no_segments_are_no_trouble():
@@ -111,17 +111,17 @@ def test_no_segments_are_no_trouble():
 @pytest.mark.parametrize(
     ("start", "end", "blocked"),
     [
-        ((0, 0, -2), (0, 0, 2), True),  # through the ball
+        ((0, 0, -2), (0, 0, 2), True),  # through the sphere
         ((0, 0, 0), (0, 0, 2), True),  # out of it
         ((0, 0, 0), (0, 0, 0.9), False),  # within
         ((0, 0, -2), (0, 0, -1.1), False),  # before it
         ((1.1, 0, -2), (1.1, 0, 2), False),  # past it
     ],
 )
-def test_balls(start, end, blocked):
-    ball = Shapes(np.empty((0, 3, 3)), np.zeros((1, 3)), np.ones(1))
-    found = segments_blocked(np.array([start], dtype=float), np.array([end], dtype=float), ball)
-    assert found.tolist() == [blocked]
+def test_spheres(start, end, blocked):
+    sphere = Shapes(np.empty((0, 3, 3)), np.zeros((1, 3)), np.ones(1))
+    hit = segments_blocked(np.array([start], dtype=float), np.array([end], dtype=float), sphere)
+    assert hit.tolist() == [blocked]
 
 
 @pytest.mark.claim("shadow-rays-start-off-the-surface")

@@ -6,7 +6,7 @@ from tests.helpers.polygons import box, box_scene, lit_lengths, rays_of
 from tests.helpers.scenes import spot, tiny_scene
 
 
-def shadow_rays_disagree(truth, lamp, rays, ends, found, count=400):
+def shadow_rays_disagree(truth, lamp, rays, ends, intervals, count=400):
     """Return how many random shadow rays contradict the intervals further than 1e-5 rad from an edge."""
     from tests.helpers.visibility import visibility_test
 
@@ -15,7 +15,7 @@ def shadow_rays_disagree(truth, lamp, rays, ends, found, count=400):
     theta = ends[0][ray] + (ends[1] - ends[0])[ray] * np.random.default_rng(7).random(len(ray))
     lit = visibility_test(truth.occluders, lamp.position, rays)(ray, theta)
     expected, near = np.zeros(len(ray), bool), np.zeros(len(ray), bool)
-    for interval in zip(found.ray, found.low, found.high, strict=True):
+    for interval in zip(intervals.ray, intervals.low, intervals.high, strict=True):
         mine = slice(*np.searchsorted(ray, [interval[0], interval[0] + 1]))
         expected[mine] |= (theta[mine] > interval[1]) & (theta[mine] < interval[2])
         near[mine] |= np.minimum(np.abs(theta[mine] - interval[1]), np.abs(theta[mine] - interval[2])) < 1e-5
@@ -31,9 +31,9 @@ def test_shadow_rays_agree_with_the_geometry_of_boxes(variant, lamp):
 
     truth = read_truth(mi.load_dict(box_scene(**({} if lamp is None else {"lamp": spot()}))))
     light, rays, ends = rays_of(truth)
-    found = geometric_intervals(truth, light, rays, ends=ends)
-    assert found.transitions > 30
-    assert shadow_rays_disagree(truth, light, rays, ends, found) == 0
+    intervals = geometric_intervals(truth, light, rays, ends=ends)
+    assert intervals.transitions > 30
+    assert shadow_rays_disagree(truth, light, rays, ends, intervals) == 0
 
 
 @pytest.mark.claim("exact-shadows")
@@ -45,9 +45,9 @@ def test_shadow_rays_agree_with_the_geometry_of_built_in_scenes(variant, name):
 
     truth = read_truth(load_scene(name, size=(24, 18)).scene)
     light, rays, ends = rays_of(truth)
-    found = geometric_intervals(truth, light, rays, ends=ends)
-    assert found.transitions > 100
-    assert shadow_rays_disagree(truth, light, rays, ends, found) == 0
+    intervals = geometric_intervals(truth, light, rays, ends=ends)
+    assert intervals.transitions > 100
+    assert shadow_rays_disagree(truth, light, rays, ends, intervals) == 0
 
 
 @pytest.mark.claim("cast-shadows", tolerance="2e-5, median 1e-6: where shadow rays stop")
@@ -63,7 +63,7 @@ def test_edges_by_geometry_are_those_by_bisection(variant):
     light, rays, ends = rays_of(truth)
     exact = geometric_intervals(truth, light, rays, ends=ends)
     cast = lit_intervals(truth, light, rays, ends=ends, edges="rays")
-    lit = [lit_lengths(found, ends) for found in (exact, cast)]
+    lit = [lit_lengths(intervals, ends) for intervals in (exact, cast)]
     # Edges of boxes that a plane cuts at a grazing angle magnify the rounding of 1e-7; 2e-6 is where shadow rays stop.
     assert np.abs(lit[0] - lit[1]).max() < 2e-5
     assert np.median(np.abs(lit[0] - lit[1])) < 1e-6
@@ -82,11 +82,11 @@ def test_a_needle_is_found_where_regular_samples_step_over_it(variant):
     scene = tiny_scene(ball=None, floor=None, needle=box((0.3, -0.1, 0.9), (width, width, 8.0)))
     truth = read_truth(mi.load_dict(scene))
     light, rays, ends = rays_of(truth)
-    found = geometric_intervals(truth, light, rays, ends=ends)
+    intervals = geometric_intervals(truth, light, rays, ends=ends)
     shadowed = np.setdiff1d(
-        np.arange(len(ends[0])), found.ray[(found.high - found.low) > (ends[1] - ends[0])[found.ray]]
+        np.arange(len(ends[0])), intervals.ray[(intervals.high - intervals.low) > (ends[1] - ends[0])[intervals.ray]]
     )
-    gaps = (ends[1] - ends[0]) - lit_lengths(found, ends)
+    gaps = (ends[1] - ends[0]) - lit_lengths(intervals, ends)
     crossed = np.flatnonzero(gaps > 1e-6)
     assert len(crossed) > 50
     assert len(shadowed) >= len(crossed)
@@ -98,8 +98,8 @@ def test_a_needle_is_found_where_regular_samples_step_over_it(variant):
     assert np.mean(lit.reshape(theta.shape).all(axis=1)) > 0.9  # regular samples see no shadow at all
 
     # The middle of each gap is in the needle's shadow, and a little beside it is not.
-    first = found.ray[:-1] == found.ray[1:]
-    ray, low, high = found.ray[:-1][first], found.high[:-1][first], found.low[1:][first]
+    first = intervals.ray[:-1] == intervals.ray[1:]
+    ray, low, high = intervals.ray[:-1][first], intervals.high[:-1][first], intervals.low[1:][first]
     visible = visibility_test(truth.occluders, light.position, rays)
     assert not visible(ray, 0.5 * (low + high)).any()
     assert visible(ray, low - (high - low)).all()
@@ -121,15 +121,15 @@ def test_one_triangle_against_its_closed_form(variant):
     b = light.position + 0.4 * height[0] * (np.cos(0.5) * normal[0] + np.sin(0.5) * direction[0])
     across = np.cross(direction[0], normal[0])
     corners = np.array([[a + 0.3 * across, a - 0.3 * across, b]])  # the plane cuts it from a to b
-    found = geometric_intervals(truth, light, (direction, normal, height), ends=ends, shapes=Shapes(corners))
-    assert found.low == pytest.approx([ends[0][0], 0.5], abs=1e-12)
-    assert found.high == pytest.approx([0.2, ends[1][0]], abs=1e-12)
+    intervals = geometric_intervals(truth, light, (direction, normal, height), ends=ends, shapes=Shapes(corners))
+    assert intervals.low == pytest.approx([ends[0][0], 0.5], abs=1e-12)
+    assert intervals.high == pytest.approx([0.2, ends[1][0]], abs=1e-12)
     # Behind the ray, as seen from the light, it hides nothing; on the other side of the light neither.
     for factor in (4.0, -1.0):
         moved = light.position + factor * (corners - light.position)
-        found = geometric_intervals(truth, light, (direction, normal, height), ends=ends, shapes=Shapes(moved))
-        assert found.low == pytest.approx([ends[0][0]])
-        assert found.high == pytest.approx([ends[1][0]])
+        intervals = geometric_intervals(truth, light, (direction, normal, height), ends=ends, shapes=Shapes(moved))
+        assert intervals.low == pytest.approx([ends[0][0]])
+        assert intervals.high == pytest.approx([ends[1][0]])
 
 
 def test_order_of_triangles_and_rays_does_not_matter(variant):

@@ -47,9 +47,9 @@ def test_the_import_is_light_and_the_variant_is_chosen_on_first_use():
 
 @pytest.mark.parametrize("module", ["airlight", "reports.api.images", "reports.api.reference"])
 def test_examples_of_the_docstrings(module, variant):
-    found = doctest.testmod(importlib.import_module(module))
-    assert found.attempted
-    assert not found.failed
+    outcome = doctest.testmod(importlib.import_module(module))
+    assert outcome.attempted
+    assert not outcome.failed
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
@@ -83,7 +83,7 @@ def test_a_scene_by_name_dictionary_mitsuba_scene_and_again(variant):
     named = airlight.load_scene(SCENES["open-fog"].build(), TINY)
     assert named.size == TINY
     assert airlight.load_scene(mi.load_dict(SCENES["open-fog"].build())).size == (800, 600)
-    by_name, by_dictionary = (airlight.render(one, "unshadowed") for one in (scene, named))
+    by_name, by_dictionary = (airlight.render(described, "unshadowed") for described in (scene, named))
     np.testing.assert_array_equal(by_name.airlight, by_dictionary.airlight)
     assert "1 point" in scene._repr_html_()
 
@@ -171,7 +171,7 @@ def test_a_frame_is_that_of_the_parts_it_is_made_of(variant):
 @pytest.mark.claim("one-source-two-precisions")
 def test_precision_decides_the_type(variant):
     single, double = (
-        airlight.render("open-fog", "unshadowed", size=TINY, precision=one) for one in ("single", "double")
+        airlight.render("open-fog", "unshadowed", size=TINY, precision=name) for name in ("single", "double")
     )
     assert (single.airlight.dtype, double.airlight.dtype) == (np.float32, np.float64)
     np.testing.assert_allclose(single.airlight, double.airlight, rtol=1e-4)  # float32, beside the light
@@ -273,13 +273,13 @@ def test_what_an_estimator_has_no_use_for_is_refused(arguments, words, variant):
 def test_images_files_and_arrays_compare_alike(variant, tmp_path):
     truth = airlight.reference("sphere-spot", size=TINY)
     frame = airlight.render("sphere-spot", "ray-march", size=TINY, steps=16)
-    one, two = truth.save(tmp_path / "truth.exr"), frame.save(tmp_path / "frame.exr")
+    truth_file, frame_file = truth.save(tmp_path / "truth.exr"), frame.save(tmp_path / "frame.exr")
     direct = airlight.compare(truth, frame)
     assert direct.metrics == airlight.error_metrics(truth.airlight, frame.airlight)
     assert airlight.compare(truth.airlight, frame.airlight).metrics == direct.metrics
-    assert airlight.compare(truth, airlight.read_exr(two)).metrics == direct.metrics
+    assert airlight.compare(truth, airlight.read_exr(frame_file)).metrics == direct.metrics
     # A file keeps float32.
-    files = airlight.compare(one, two)
+    files = airlight.compare(truth_file, frame_file)
     assert files.metrics.relative_rmse == pytest.approx(direct.metrics.relative_rmse, rel=1e-5)
     assert files.names == ("truth.exr", "frame.exr")
     total = airlight.compare(truth, frame, "total")

@@ -78,12 +78,12 @@ RESULTS = {"rendering": rendering, "reference": truth, "comparison": lambda: com
 def test_a_notebook_is_given_valid_html_and_a_png(name):
     result = RESULTS[name]()
     html = result._repr_html_()
-    found = parsed(html)
-    assert not [tag for tag, _ in found.seen if tag in ("script", "link", "style", "iframe")]
+    document = parsed(html)
+    assert not [tag for tag, _ in document.seen if tag in ("script", "link", "style", "iframe")]
     assert all(image["src"].startswith("data:image/png;base64,") and image["alt"] for image in tags(html, "img"))
     assert tags(html, "img")
     assert all(header["scope"] in ("row", "col") for header in tags(html, "th"))
-    assert any("<made & up>" in text for text in found.text)  # escaped on the way, so that it is text again
+    assert any("<made & up>" in text for text in document.text)  # escaped on the way, so that it is text again
     png = result._repr_png_()
     assert png.startswith(b"\x89PNG\r\n\x1a\n")
     assert Picture.open(io.BytesIO(png)).size == (6, 4)
@@ -176,22 +176,22 @@ def test_times_and_oddities_stand_in_the_table():
 
 
 def test_the_error_of_a_comparison_by_hand():
-    found = compare(np.full((2, 2, 3), 2.0), np.full((2, 2, 3), 3.0))
-    np.testing.assert_array_equal(found.error, np.full((2, 2, 3), 0.5))
-    np.testing.assert_array_equal(np.asarray(found), found.error)
-    assert found.metrics.relative_rmse == 0.5
-    assert found.passed
+    comparison = compare(np.full((2, 2, 3), 2.0), np.full((2, 2, 3), 3.0))
+    np.testing.assert_array_equal(comparison.error, np.full((2, 2, 3), 0.5))
+    np.testing.assert_array_equal(np.asarray(comparison), comparison.error)
+    assert comparison.metrics.relative_rmse == 0.5
+    assert comparison.passed
     # The whole map is one red: too bright.
-    red, green, blue = found.picture()[0, 0]
+    red, green, blue = comparison.picture()[0, 0]
     assert red > green
     assert red > blue
 
 
 def test_a_failed_comparison_says_so():
-    found = compare(np.ones((2, 2, 3)), np.full((2, 2, 3), -1.0))
-    assert not found.passed
-    assert "4 pixels of the test image are negative" in repr(found)
-    assert any("negative" in text for text in parsed(found._repr_html_()).text)
+    comparison = compare(np.ones((2, 2, 3)), np.full((2, 2, 3), -1.0))
+    assert not comparison.passed
+    assert "4 pixels of the test image are negative" in repr(comparison)
+    assert any("negative" in text for text in parsed(comparison._repr_html_()).text)
 
 
 def test_small_pictures_are_enlarged_in_whole_multiples():
@@ -218,26 +218,28 @@ def row(label, frame_ms, error, **more):
 def test_the_fastest_row_is_finite_and_within_the_error():
     refused = row("d", None, None, refused="no <lights>", nonfinite=None)
     rows = (row("a", 9.0, 1e-4), row("b", 2.0, 1e-4, nonfinite=3), row("c", 1.0, 0.2), refused)
-    found = BenchTable(rows=rows, environment={"processor": "p", "threads": 2, "variant": "v"})
-    assert found.fastest(0.01)["label"] == "a"
-    assert found.fastest(0.5)["label"] == "c"
-    assert found.fastest(1e-6) is None
-    assert found.fastest(0.5, scene="other") is None
-    assert len(found) == 4
-    assert found[1]["label"] == "b"
-    assert found.to_dict()["label"] == ["a", "b", "c", "d"]
-    assert any("no <lights>" in text for text in parsed(found._repr_html_()).text)
+    benched = BenchTable(rows=rows, environment={"processor": "p", "threads": 2, "variant": "v"})
+    assert benched.fastest(0.01)["label"] == "a"
+    assert benched.fastest(0.5)["label"] == "c"
+    assert benched.fastest(1e-6) is None
+    assert benched.fastest(0.5, scene="other") is None
+    assert len(benched) == 4
+    assert benched[1]["label"] == "b"
+    assert benched.to_dict()["label"] == ["a", "b", "c", "d"]
+    assert any("no <lights>" in text for text in parsed(benched._repr_html_()).text)
 
 
 def test_a_report_shows_its_claims_and_leads_to_the_page(tmp_path, monkeypatch):
-    scenes = [{"name": "fog", "agreement": {"x": {"statistics": {"equivalent": False}}}}]
-    data = {"claims": [{"kind": "truth", "text": "It is <so>.", "good": True}], "scenes": scenes, "created": "today"}
-    found = Report(folder=tmp_path / "out", data=data)
-    assert found.claims == ("It is <so>.",)
-    assert not found.confirmed
-    assert any("It is <so>." in text for text in parsed(found._repr_html_()).text)
-    (link,) = tags(found._repr_html_(), "a")
+    scenes = [{"name": "fog", "agreement": {"x": {"statistics": {"equivalent": False}}}, "methods": []}]
+    claims = [{"kind": "truth", "text": "It is <so>: `--full`.", "good": True}]
+    data = {"claims": claims, "scenes": scenes, "created": "today"}
+    report = Report(folder=tmp_path / "out", data=data)
+    assert report.claims == ("It is <so>: `--full`.",)
+    assert not report.confirmed
+    assert "It is &lt;so&gt;: <code>--full</code>." in report._repr_html_()
+    assert "The fastest method within an error" in report._repr_html_()
+    (link,) = tags(report._repr_html_(), "a")
     assert link["href"] == (tmp_path / "out" / "report.html").as_uri()
     monkeypatch.chdir(tmp_path)
-    (link,) = tags(found._repr_html_(), "a")
+    (link,) = tags(report._repr_html_(), "a")
     assert link["href"] == "out/report.html"  # a notebook shows no files by an absolute address

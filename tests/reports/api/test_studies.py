@@ -17,41 +17,41 @@ from tests.helpers.api import FUNCTIONS, ROOT, TINY, brighter, third
 
 
 def test_examples_of_the_docstrings(variant):
-    found = doctest.testmod(api_studies)
-    assert found.attempted
-    assert not found.failed
+    outcome = doctest.testmod(api_studies)
+    assert outcome.attempted
+    assert not outcome.failed
 
 
 def test_integrals_of_a_file_and_of_its_columns(data_folder, variant):
     path = data_folder / "airlight_integral.csv"
-    found = airlight.integrate(path)
-    assert found.summary["max"] < 4e-6  # the README's figure for the kernel `exact`
-    assert found.J.shape == (2004,)
+    integrals = airlight.integrate(path)
+    assert integrals.summary["max"] < 4e-6  # the README's figure for the kernel `exact`
+    assert integrals.J.shape == (2004,)
     cases = read_cases(path)
     columns = {name: getattr(cases, name) for name in ("phase", "g", "foot", "height", "x0", "x1", "sigma_t", "value")}
     again = airlight.integrate(columns)
-    np.testing.assert_array_equal(again.J, found.J)
-    np.testing.assert_array_equal(airlight.integrate(found.to_dict()).J, found.J)
-    assert np.nanmax(np.abs(again.error)) == pytest.approx(found.summary["max"])
-    assert "and 1992 more" in found._repr_html_()
-    assert not found.J.flags.writeable
+    np.testing.assert_array_equal(again.J, integrals.J)
+    np.testing.assert_array_equal(airlight.integrate(integrals.to_dict()).J, integrals.J)
+    assert np.nanmax(np.abs(again.error)) == pytest.approx(integrals.summary["max"])
+    assert "and 1992 more" in integrals._repr_html_()
+    assert not integrals.J.flags.writeable
 
 
 def test_integrals_of_rays_given_as_vectors(data_folder, variant):
     cases = read_cases(data_folder / "airlight_integral_rays.csv")
     named = ("phase", "g", "origin", "direction", "light", "x0", "x1", "sigma_t")
-    found = airlight.integrate({name: getattr(cases, name) for name in named}, precision="double")
-    np.testing.assert_array_equal(found.J, airlight.integrate(cases, precision="double").J)
-    assert found.value is found.error is None
+    integrals = airlight.integrate({name: getattr(cases, name) for name in named}, precision="double")
+    np.testing.assert_array_equal(integrals.J, airlight.integrate(cases, precision="double").J)
+    assert integrals.value is integrals.error is None
 
 
 def test_integrals_have_the_shape_of_the_columns_and_a_certified_value(variant):
     foot, height = np.linspace(-1, 2, 5)[:, None], np.array([0.1, 0.7, 2.0])
     rays = {"phase": "hg", "g": 0.4, "foot": foot, "height": height, "x0": 0.0, "x1": np.inf, "sigma_t": 0.3}
-    found = airlight.integrate(rays, "quadrature-32", precision="double", certify=True)
-    assert found.J.shape == found.value.shape == found.error.shape == (5, 3)
-    assert np.abs(found.error).max() < 1e-4
-    assert np.asarray(found).shape == (5, 3)
+    integrals = airlight.integrate(rays, "quadrature-32", precision="double", certify=True)
+    assert integrals.J.shape == integrals.value.shape == integrals.error.shape == (5, 3)
+    assert np.abs(integrals.error).max() < 1e-4
+    assert np.asarray(integrals).shape == (5, 3)
     # By a kernel of one's own.
     own = airlight.integrate(rays, third, precision="double")
     assert own.kernel.endswith(":third")
@@ -59,7 +59,7 @@ def test_integrals_have_the_shape_of_the_columns_and_a_certified_value(variant):
     # One of them alone.
     alone = airlight.integrate(rays | {"foot": foot[3, 0], "height": 0.7}, "quadrature-32", precision="double")
     assert alone.J.shape == ()
-    assert float(alone.J) == found.J[3, 1]
+    assert float(alone.J) == integrals.J[3, 1]
 
 
 @pytest.mark.parametrize(
@@ -130,18 +130,19 @@ def test_report_hands_on_what_it_was_given(variant, tmp_path, monkeypatch):
         return {"claims": [{"text": "so"}], "scenes": [], "created": ""}
 
     monkeypatch.setattr("reports.report.measure.write_report", write)
-    found = airlight.report(tmp_path / "out", scenes=["open-fog"], methods=["min-max", brighter])
-    assert found.folder == tmp_path / "out"
-    assert found.claims == ("so",)
+    report = airlight.report(tmp_path / "out", scenes=["open-fog"], methods=["min-max", brighter])
+    assert report.folder == tmp_path / "out"
+    assert report.claims == ("so",)
     assert given["scenes"] == ["open-fog"]
     assert given["effort"].name == "quick"
-    assert [one.method.rpartition(":")[2] for one in given["configurations"]] == ["min-max", "brighter"]
+    names = [configuration.method.rpartition(":")[2] for configuration in given["configurations"]]
+    assert names == ["min-max", "brighter"]
     assert given["images"] == {}
     assert not given["fresh"]
     airlight.render("open-fog", "unshadowed", size=TINY).save(tmp_path / "open-fog.engine.exr")
     airlight.report(tmp_path / "out", images=tmp_path, fresh=True)
     assert given["scenes"] == ["open-fog"]
-    assert [one.label for one in given["images"]["open-fog"]] == ["engine"]
+    assert [image.label for image in given["images"]["open-fog"]] == ["engine"]
     assert given["fresh"]
     with pytest.raises(airlight.InputError, match="did you mean 'full'"):
         airlight.report(tmp_path, effort="ful")
@@ -162,10 +163,10 @@ def test_ctrl_c_in_a_report_is_ctrl_c(variant, tmp_path, monkeypatch):
 
 @pytest.mark.slow
 def test_a_report_from_python(variant, tmp_path):
-    found = airlight.report(tmp_path / "out", scenes=["open-fog"], methods=["unshadowed", brighter])
-    assert found.page.is_file()
-    assert found.confirmed
-    assert [one["method"].rpartition(":")[2] for one in found.data["scenes"][0]["methods"]] == [
+    report = airlight.report(tmp_path / "out", scenes=["open-fog"], methods=["unshadowed", brighter])
+    assert report.page.is_file()
+    assert report.confirmed
+    assert [entry["method"].rpartition(":")[2] for entry in report.data["scenes"][0]["methods"]] == [
         "unshadowed",
         "unshadowed",
         "unshadowed",
@@ -194,14 +195,14 @@ def test_the_tutorial_runs(tmp_path):
     assert ran.returncode == 0, ran.stderr
     printed = ran.stdout.split("-- end of snippet --\n")
     expected = [text for code, text in blocks if "airlight.report(" not in code]
-    for said, found in zip(expected, printed):
+    for said, printed_now in zip(expected, printed):
         words, numbers = _parts(said)
-        assert _parts(found)[0] == words
+        assert _parts(printed_now)[0] == words
         # Nothing here depends on the machine but rounding, and what samples and kernels make of it.
-        np.testing.assert_allclose(_parts(found)[1], numbers, rtol=0.5, atol=2e-3)
+        np.testing.assert_allclose(_parts(printed_now)[1], numbers, rtol=0.5, atol=2e-3)
 
 
 def _parts(text):
     """Return a text without its numbers, and these."""
     pattern = r"[-+]?\d+(?:\.\d+)?(?:e[-+]\d+)?"
-    return re.sub(pattern, "#", text), [float(one) for one in re.findall(pattern, text)]
+    return re.sub(pattern, "#", text), [float(digits) for digits in re.findall(pattern, text)]

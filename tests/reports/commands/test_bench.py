@@ -21,7 +21,7 @@ def test_the_margin_is_that_of_volpath_alone(variant, capfd, monkeypatch, option
     assert cli.run([*arguments, *options]) == 0
     (scene,) = json.loads(capfd.readouterr().out)["scenes"]
     assert scene["agreement"] == {}
-    assert {one["method"] for one in scene["methods"]} == {"unshadowed"}
+    assert {entry["method"] for entry in scene["methods"]} == {"unshadowed"}
     assert asked == [{"single-scatter": 0.0005, "volpath": expected}]
 
 

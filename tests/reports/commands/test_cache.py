@@ -32,7 +32,7 @@ def test_place_size_and_kinds_are_shown(filled, capsys, monkeypatch):
     size = sum(path.stat().st_size for path in filled.rglob("*.npz"))
     numbers = json.loads(printed(capsys, "--json").out)
     assert (numbers["folder"], numbers["limit"], numbers["bytes"]) == (str(filled), 2**30, size)
-    assert {kind: one["entries"] for kind, one in numbers["kinds"].items()} == {
+    assert {kind: counts["entries"] for kind, counts in numbers["kinds"].items()} == {
         "method": 2,
         "quadrature": 2,
         "truth": 2,

@@ -11,8 +11,8 @@ from tests.helpers.reports import agreement, checked, errors, method, report, sl
 
 
 def words(difference, verdict="worse"):
-    found = [one for one in difference.findings if one.verdict == verdict]
-    return [" ".join(part for part in (one.scene, one.method, one.what) if part) for one in found]
+    chosen = [finding for finding in difference.findings if finding.verdict == verdict]
+    return [" ".join(part for part in (finding.scene, finding.method, finding.what) if part) for finding in chosen]
 
 
 @pytest.fixture
@@ -48,9 +48,9 @@ def test_twice_the_time_is_found_on_a_quiet_machine():
     for seed in range(0, 40, 2):
         new = report(seed + 1)
         slow_down(method(new), 2.0)
-        found = compare_reports(report(seed), new)
-        assert {one.method for one in found.worse} == {"shadow-planes (exact)"}
-        assert {one.what for one in found.worse} >= {"frame [ms]", "airlight [ms]"}
+        difference = compare_reports(report(seed), new)
+        assert {finding.method for finding in difference.worse} == {"shadow-planes (exact)"}
+        assert {finding.what for finding in difference.worse} >= {"frame [ms]", "airlight [ms]"}
 
 
 def test_what_cannot_be_seen_on_a_busy_machine_is_said(files, capsys):
@@ -72,20 +72,20 @@ def test_brackets_are_printed(files, capsys):
 
 def test_everything_slower_is_one_finding():
     new = report(machine=2.0)
-    found = compare_reports(report(), new)
-    (one,) = found.worse
-    assert "every frame" in one.what
-    assert one.new == pytest.approx(2.0)
-    assert words(compare_reports(new, report()), "better") == [one.what]
+    difference = compare_reports(report(), new)
+    (finding,) = difference.worse
+    assert "every frame" in finding.what
+    assert finding.new == pytest.approx(2.0)
+    assert words(compare_reports(new, report()), "better") == [finding.what]
 
 
 def test_two_machines_are_compared_beside_the_median_of_all():
     new = report(machine=3.0)
     new["environment"]["threads"] = 16
-    found = compare_reports(report(), new)
-    assert words(found) == []
-    assert not found.times.same_machine
-    assert "threads: 2 -> 16" in words(found, "note")
+    difference = compare_reports(report(), new)
+    assert words(difference) == []
+    assert not difference.times.same_machine
+    assert "threads: 2 -> 16" in words(difference, "note")
     slow_down(method(new), 2.5)  # more than 1 + 4 times the tolerance
     assert words(compare_reports(report(), new))[0].startswith("hall shadow-planes (exact)")
 
@@ -94,9 +94,9 @@ def test_another_version_is_said_and_compared():
     new = report()
     new["environment"]["versions"]["drjit"] = "1.6.0"
     slow_down(method(new), 2.0)
-    found = compare_reports(report(), new)
-    assert "drjit: 1.5.0 -> 1.6.0" in words(found, "note")
-    assert found.worse
+    difference = compare_reports(report(), new)
+    assert "drjit: 1.5.0 -> 1.6.0" in words(difference, "note")
+    assert difference.worse
 
 
 @pytest.mark.claim("diff")
@@ -106,7 +106,7 @@ def test_three_times_the_error_is_found_and_named(files, capsys):
     paths = files(report(), new)
     assert run(["diff", *paths, "--json"]) == 1
     data = json.loads(capsys.readouterr().out)
-    assert {one["what"] for one in data["findings"]} >= {"relative_rmse", "relative_bias", "p50", "p99", "max"}
+    assert {finding["what"] for finding in data["findings"]} >= {"relative_rmse", "relative_bias", "p50", "p99", "max"}
     assert data["worse"] == 5
     assert run(["diff", paths[1], paths[0]]) == 0
     assert "5 better" in capsys.readouterr().out
@@ -131,9 +131,9 @@ def test_errors_of_the_surface_and_flip_count():
     new = report()
     method(new)["surface_error"] = errors(1e-3)
     method(new)["flip"]["value"] = 0.06
-    found = words(compare_reports(report(), new))
-    assert "hall shadow-planes (exact) surface relative_rmse" in found
-    assert "hall shadow-planes (exact) HDR-FLIP" in found
+    worse = words(compare_reports(report(), new))
+    assert "hall shadow-planes (exact) surface relative_rmse" in worse
+    assert "hall shadow-planes (exact) HDR-FLIP" in worse
 
 
 def test_a_bias_of_the_other_sign_is_not_worse():
@@ -163,8 +163,8 @@ def test_what_is_gone_fails_unless_only_the_common_is_compared(files):
     new = report()
     new["scenes"] = new["scenes"][:2]
     del new["scenes"][0]["methods"][1]
-    found = compare_reports(report(), new)
-    assert words(found) == ["fog ray-march (steps=100) gone", "pens the scene is gone"]
+    difference = compare_reports(report(), new)
+    assert words(difference) == ["fog ray-march (steps=100) gone", "pens the scene is gone"]
     assert run(["diff", *files(report(), new), "--common"]) == 0
     assert {"fog ray-march (steps=100) new", "pens the scene is new"} <= set(
         words(compare_reports(new, report()), "note")
@@ -198,8 +198,8 @@ def test_another_scene_by_the_same_name_is_not_compared():
     new = report()
     new["scenes"][0]["truth"]["mean"] *= 1.001
     method(new, "fog")["error"] = errors(0.9)
-    (one,) = compare_reports(report(), new).worse
-    assert "the truth moved" in one.what
+    (finding,) = compare_reports(report(), new).worse
+    assert "the truth moved" in finding.what
 
 
 def test_lit_intervals_on_which_shadow_rays_disagree():
@@ -219,15 +219,15 @@ def test_kernels_and_mutations():
     new = report()
     new["stability"][0]["broken"] = ["float32 maximum 0.1 > 0.01"]
     new["mutations"]["caught"] = 19
-    found = words(compare_reports(report(), new))
-    assert found == ["exact breaks its bar: float32 maximum 0.1 > 0.01", "faults that nothing catches"]
+    worse = words(compare_reports(report(), new))
+    assert worse == ["exact breaks its bar: float32 maximum 0.1 > 0.01", "faults that nothing catches"]
 
 
 def test_another_method_is_the_fastest_is_a_note():
     new = report()
     method(new, "fog", "ray-march (steps=100)")["error"] = errors(1e-4)
-    found = words(compare_reports(report(), new), "note")
-    assert found == ["fog fastest within 0.1 %: shadow-planes (exact) before, ray-march (steps=100) now"]
+    notes = words(compare_reports(report(), new), "note")
+    assert notes == ["fog fastest within 0.1 %: shadow-planes (exact) before, ray-march (steps=100) now"]
 
 
 def test_images_of_an_engine_have_no_times():
@@ -239,7 +239,7 @@ def test_images_of_an_engine_have_no_times():
     assert len(compare_reports(old, new).worse) == 5
     method(new)["layer"] = "airlight"
     assert words(compare_reports(old, new)) == []
-    assert any("different layers" in one for one in words(compare_reports(old, new), "note"))
+    assert any("different layers" in note for note in words(compare_reports(old, new), "note"))
 
 
 def test_other_sizes_are_not_compared_and_said():
@@ -249,9 +249,9 @@ def test_other_sizes_are_not_compared_and_said():
     for scene in new["scenes"]:
         scene["timed"] = [640, 480]
     slow_down(method(new), 9.0)
-    found = compare_reports(report(), new)
-    assert words(found) == []
-    notes = " ".join(words(found, "note"))
+    difference = compare_reports(report(), new)
+    assert words(difference) == []
+    notes = " ".join(words(difference, "note"))
     assert "errors not compared: the images are 320x240 and 640x480 pixels" in notes
     assert "times not compared: the frames timed are 320x240 and 640x480 pixels" in notes
     for scene in new["scenes"]:
@@ -264,20 +264,20 @@ def test_a_method_timed_at_another_size_is_not_compared():
     new = report()
     slow_down(method(new), 9.0)
     method(new)["note"] = "timed at 320 x 240: larger frames take minutes"
-    found = compare_reports(report(), new)
-    assert words(found) == []
-    assert found.times.compared == 11
-    assert any("times not compared: as usual before, timed at 320 x 240" in one for one in words(found, "note"))
+    difference = compare_reports(report(), new)
+    assert words(difference) == []
+    assert difference.times.compared == 11
+    assert any("times not compared: as usual before, timed at 320 x 240" in note for note in words(difference, "note"))
 
 
 def test_each_scene_may_have_a_size_of_its_own():
     old, new = report(), report()
     old["scenes"][1]["timed"], new["scenes"][1]["timed"] = [320, 240], [640, 480]
     slow_down(method(new), 9.0)
-    found = compare_reports(old, new)
-    assert words(found) == []
-    assert found.times.compared == 8
-    assert "hall times not compared: the frames timed are 320x240 and 640x480 pixels" in words(found, "note")
+    difference = compare_reports(old, new)
+    assert words(difference) == []
+    assert difference.times.compared == 8
+    assert "hall times not compared: the frames timed are 320x240 and 640x480 pixels" in words(difference, "note")
 
 
 def test_times_can_be_left_out(files, capsys):
@@ -289,7 +289,7 @@ def test_times_can_be_left_out(files, capsys):
 
 
 def test_results_that_were_kept_are_named():
-    assert any("3 results" in one for one in words(compare_reports(report(), report() | {"kept": 3}), "note"))
+    assert any("3 results" in note for note in words(compare_reports(report(), report() | {"kept": 3}), "note"))
 
 
 def test_the_reports_of_these_tests_keep_to_the_schema():

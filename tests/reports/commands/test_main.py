@@ -104,7 +104,9 @@ def test_no_command_shows_the_help(capfd):
 def test_every_command_has_help(command, capfd):
     name = {"run_tests": "test"}.get(command, command)
     assert cli.run([*filter(None, [name]), "--help"]) == 0
-    assert "Usage: airlight" in capfd.readouterr().out
+    printed = capfd.readouterr().out
+    assert "Usage: airlight" in printed
+    assert "`" not in printed  # code is drawn as code
 
 
 def test_version(capfd):

@@ -10,12 +10,12 @@ from reports.commands.maps import parse_map_sizes
 def test_command_prints_errors_with_their_slope(variant, capfd):
     arguments = ["maps", "omni-box", "--size", "32x24", "--sizes", "64,256,128"]
     assert cli.run([*arguments, "--json"]) == 0
-    found = json.loads(capfd.readouterr().out)
-    (scene,) = found["scenes"]
+    printed = json.loads(capfd.readouterr().out)
+    (scene,) = printed["scenes"]
     errors = scene["errors"]
     assert (scene["name"], scene["method"]) == ("omni-box", "light-volumes (exact)")
     assert errors["sizes"] == [64, 128, 256]
-    rmse = [one["relative_rmse"] for one in errors["metrics"]]
+    rmse = [metrics["relative_rmse"] for metrics in errors["metrics"]]
     assert rmse[0] > rmse[1] > rmse[2] > 0
     # 1.5 by corners of outlines; a map of 64 texels resolves few of these, and 768 pixels scatter.
     assert 1.2 < errors["slope"]["order"] < 2.2

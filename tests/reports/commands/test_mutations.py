@@ -33,12 +33,12 @@ def study(monkeypatch, variant):
     asked = {}
 
     def replace_by(*seen):
-        def found(mutations, **arguments):
+        def judge_all(mutations, **arguments):
             asked.update(arguments, mutations=[mutation.name for mutation in mutations])
-            results = tuple(judged(mutation, [one]) for mutation, one in zip(mutations, seen, strict=True))
+            results = tuple(judged(mutation, [outcome]) for mutation, outcome in zip(mutations, seen, strict=True))
             return MutationStudy((RIGHT,), results)
 
-        monkeypatch.setattr("validation.mutations.study.study_mutations", found)
+        monkeypatch.setattr("validation.mutations.study.study_mutations", judge_all)
         return asked
 
     return replace_by

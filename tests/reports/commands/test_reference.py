@@ -63,34 +63,34 @@ def test_header_and_words_name_the_batches(variant, tmp_path, capfd):
 
 @pytest.mark.claim("targets-of-a-run")
 def test_target_error_is_reached_and_no_more(variant, tmp_path, capfd):
-    found = summary(tmp_path / "a.exr", capfd, "--target-error", "0.03")
-    assert found["reached"] is True
-    assert found["pooled_error"] <= 0.03
-    assert found["batches"] >= 32
+    reached = summary(tmp_path / "a.exr", capfd, "--target-error", "0.03")
+    assert reached["reached"] is True
+    assert reached["pooled_error"] <= 0.03
+    assert reached["batches"] >= 32
     # It would not have been reached eight batches earlier, but for the least number of batches.
-    assert found["batches"] == 32 or found["pooled_error"] > 0.03 * (1 - 8 / found["batches"]) ** 0.5 * 0.9
+    assert reached["batches"] == 32 or reached["pooled_error"] > 0.03 * (1 - 8 / reached["batches"]) ** 0.5 * 0.9
     again = summary(tmp_path / "b.exr", capfd, "--target-error", "0.03")
-    assert again["cached"] == found["batches"]
+    assert again["cached"] == reached["batches"]
     assert (tmp_path / "a.exr").read_bytes() == (tmp_path / "b.exr").read_bytes()
 
 
 @pytest.mark.slow
 def test_worst_pixel_asks_for_more_than_the_image(variant, tmp_path, capfd):
-    found = summary(tmp_path / "a.exr", capfd, "--target-error", "0.25", "--target", "worst")
-    assert found["pooled_error"] < 0.1 < found["worst_error"] <= 0.25
+    printed = summary(tmp_path / "a.exr", capfd, "--target-error", "0.25", "--target", "worst")
+    assert printed["pooled_error"] < 0.1 < printed["worst_error"] <= 0.25
 
 
 @pytest.mark.slow
 def test_time_budget_is_kept(variant, tmp_path, capfd):
     run(tmp_path / "warm.exr", "--spp", "64")  # the kernels are compiled by now
     start = time.monotonic()
-    found = summary(tmp_path / "a.exr", capfd, "--time-budget", "2")
-    assert found["batches"] >= 2
+    first = summary(tmp_path / "a.exr", capfd, "--time-budget", "2")
+    assert first["batches"] >= 2
     # Loading the scene comes on top, and the machine may be busy.
     assert time.monotonic() - start < 8
     more = summary(tmp_path / "a.exr", capfd, "--time-budget", "1")
-    assert more["cached"] == found["batches"]
-    assert more["batches"] >= found["batches"]
+    assert more["cached"] == first["batches"]
+    assert more["batches"] >= first["batches"]
 
 
 @pytest.mark.parametrize(
@@ -116,8 +116,8 @@ def test_mistakes_are_one_line(variant, tmp_path, capfd, arguments, words):
 
 
 def test_quadrature_needs_no_budget(variant, tmp_path, capfd):
-    found = summary(tmp_path / "a.exr", capfd, estimator="quadrature")
-    assert found["pixel"] == "centre"
+    printed = summary(tmp_path / "a.exr", capfd, estimator="quadrature")
+    assert printed["pixel"] == "centre"
     assert read_exr(tmp_path / "a.exr").attributes["airlight:pixel"] == "centre"
 
 
@@ -125,11 +125,11 @@ def test_quadrature_needs_no_budget(variant, tmp_path, capfd):
 @pytest.mark.parametrize("estimator", ["single-scatter"])
 def test_single_scatter_agrees_with_the_quadrature(variant, tmp_path, capfd, estimator):
     exact = summary(tmp_path / "q.exr", capfd, estimator="quadrature")["means"]
-    found = summary(tmp_path / "s.exr", capfd, "--spp", "256", estimator=estimator)
+    sampled = summary(tmp_path / "s.exr", capfd, "--spp", "256", estimator=estimator)
     # The largest over channels and layers, at six standard errors; 1e-5 for the surface's float32.
-    tolerance = 6 * found["pooled_error"] + 1e-5
+    tolerance = 6 * sampled["pooled_error"] + 1e-5
     for layer in ("airlight", "surface"):
-        np.testing.assert_allclose(found["means"][layer], exact[layer], rtol=tolerance)
+        np.testing.assert_allclose(sampled["means"][layer], exact[layer], rtol=tolerance)
 
 
 @pytest.mark.claim("runs-go-on")
@@ -179,8 +179,8 @@ def test_merged_files_of_two_machines(variant, tmp_path, monkeypatch, capfd):
     capfd.readouterr()
     files = [str(tmp_path / f"{name}.exr") for name in "ab"]
     assert cli.run(["merge", *files, "-o", str(tmp_path / "m.exr"), "--json"]) == 0
-    found = json.loads(capfd.readouterr().out)
-    assert (found["seeds"], found["batches"], found["spp"]) == ("0-63", 64, 128)
+    summed = json.loads(capfd.readouterr().out)
+    assert (summed["seeds"], summed["batches"], summed["spp"]) == ("0-63", 64, 128)
     run(tmp_path / "whole.exr", "--spp", "127")  # 64 batches of 2 as well
     merged, whole = read_exr(tmp_path / "m.exr"), read_exr(tmp_path / "whole.exr")
     assert merged.attributes["airlight:seeds"] == whole.attributes["airlight:seeds"]
@@ -195,7 +195,9 @@ def test_merged_files_of_two_machines(variant, tmp_path, monkeypatch, capfd):
 def start(output, *arguments, before=""):
     """Run the command in a process of its own; `before` is Python to run in it first."""
     command = ["reference", *SCENE, "--estimator", "volpath", "-o", str(output), *arguments]
-    code = f"import sys\n{before}\nfrom reports.commands.main import run\nsys.exit(run({command!r}))"
+    # What a shell starts in the background ignores Ctrl-C, and so would its children; a command at a terminal does not.
+    heeded = "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)"
+    code = f"import sys\n{heeded}\n{before}\nfrom reports.commands.main import run\nsys.exit(run({command!r}))"
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     return subprocess.Popen([sys.executable, "-c", code], env=environment, cwd=ROOT, text=True, **pipes)

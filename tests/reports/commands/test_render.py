@@ -25,12 +25,12 @@ def test_numbers_have_four_digits_or_more(tmp_path):
 def test_frames_are_numbered_files_that_differ(variant, tmp_path, capfd):
     output, preview = tmp_path / "fog.exr", tmp_path / "fog.png"
     run("open-fog", *SMALL, "--frames", "3", "-o", str(output), "--preview", str(preview), "--json")
-    found = json.loads(capfd.readouterr().out)
+    printed = json.loads(capfd.readouterr().out)
     names = [f"fog-000{number}.{kind}" for kind in ("exr", "png") for number in (1, 2, 3)]
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names)
-    assert [path.rsplit("/", 1)[-1] for path in found["files"]] == names
-    assert found["moves"] == ["light"]
-    assert found["frame_ms"] == pytest.approx(found["move_ms"] + found["render_ms"])
+    assert [path.rsplit("/", 1)[-1] for path in printed["files"]] == names
+    assert printed["moves"] == ["light"]
+    assert printed["frame_ms"] == pytest.approx(printed["move_ms"] + printed["render_ms"])
     images = [read_exr(tmp_path / f"fog-000{number}.exr").layers["airlight"] for number in (1, 2, 3)]
     assert not np.array_equal(images[0], images[1])
     assert not np.array_equal(images[1], images[2])
@@ -39,8 +39,8 @@ def test_frames_are_numbered_files_that_differ(variant, tmp_path, capfd):
 def test_first_frame_is_the_scene_as_it_stands(variant, tmp_path):
     run("sphere-spot", *SMALL, "--method", "shadow-planes", "-o", str(tmp_path / "one.exr"))
     run("sphere-spot", *SMALL, "--method", "shadow-planes", "--frames", "2", "-o", str(tmp_path / "many.exr"))
-    one, first = (read_exr(tmp_path / name).layers for name in ("one.exr", "many-0001.exr"))
-    np.testing.assert_array_equal(one["airlight"], first["airlight"])
+    single, first = (read_exr(tmp_path / name).layers for name in ("one.exr", "many-0001.exr"))
+    np.testing.assert_array_equal(single["airlight"], first["airlight"])
 
 
 def test_ctrl_c_keeps_the_finished_frames_and_says_so(variant, tmp_path, capfd, monkeypatch):

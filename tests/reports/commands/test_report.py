@@ -38,10 +38,16 @@ def handed_on(monkeypatch):
 
     def write(folder, **options):
         given.update(options, folder=folder)
-        return {"claims": [], "scenes": [], "seconds": 1.2, "kept": 0, "computed": 3, "measured": None}
+        claims = [{"text": "`--full` has all."}]
+        return {"claims": claims, "scenes": [], "seconds": 1.2, "kept": 0, "computed": 3, "measured": None}
 
     monkeypatch.setattr("reports.report.measure.write_report", write)
     return given
+
+
+def test_claims_are_printed_without_marks(variant, handed_on, capsys):
+    assert run(["report", "--quick"]) == 0
+    assert "- --full has all.\n" in capsys.readouterr().out
 
 
 def refused(capsys, *arguments):
@@ -72,7 +78,7 @@ def test_faults_of_ones_own_method_are_one_line_before_any_work(variant, mine, c
 def test_ones_own_methods_come_after_the_others(variant, mine, handed_on, capsys):
     own = ["--method", "fog_of_mine:half", "--method", "fog_of_mine.py:half"]
     assert run(["report", "--quick", "--scenes", "open-fog", "--methods", "min-max", *own]) == 0
-    names = [one.method for one in handed_on["configurations"]]
+    names = [configuration.method for configuration in handed_on["configurations"]]
     assert names == ["min-max", "fog_of_mine:half", "fog_of_mine.py:half"]
     assert handed_on["configurations"][1].kernel == "exact"
     assert "3 results in 1 s" in capsys.readouterr().out
@@ -99,7 +105,7 @@ def images(tmp_path):
 def test_with_images_alone_their_scenes_are_studied(variant, images, handed_on):
     assert run(["report", "--quick", "--images", str(images)]) == 0
     assert sorted(handed_on["scenes"]) == ["omni-box", "open-fog"]
-    labels = {name: [one.label for one in several] for name, several in handed_on["images"].items()}
+    labels = {name: [image.label for image in several] for name, several in handed_on["images"].items()}
     assert labels == {"omni-box": ["engine"], "open-fog": ["a", "b"]}
 
 
@@ -141,12 +147,12 @@ def test_images_and_ones_own_method_in_one_report(variant, mine, images, capsys)
     assert run(["report", "--quick", "--images", str(images), *options]) == 0
     (scene,) = json.loads((mine / "out" / "report.json").read_text())["scenes"]
     assert scene["size"] == scene["timed"] == [32, 24]
-    found = {one["label"]: one for one in scene["methods"]}
-    assert found["fog_of_mine:half (exact)"]["kind"] == "function"
-    assert found["fog_of_mine:half (exact)"]["error"]["relative_bias"] == pytest.approx(-0.5, abs=1e-5)
-    assert found["a"]["kind"] == found["b"]["kind"] == "image"
-    assert found["a"]["times"] is None
+    entries = {entry["label"]: entry for entry in scene["methods"]}
+    assert entries["fog_of_mine:half (exact)"]["kind"] == "function"
+    assert entries["fog_of_mine:half (exact)"]["error"]["relative_bias"] == pytest.approx(-0.5, abs=1e-5)
+    assert entries["a"]["kind"] == entries["b"]["kind"] == "image"
+    assert entries["a"]["times"] is None
     # float32 in the file
-    assert found["a"]["error"]["relative_rmse"] == pytest.approx(0, abs=1e-7)
-    assert found["b"]["error"]["relative_bias"] == pytest.approx(-0.1, abs=1e-6)
+    assert entries["a"]["error"]["relative_rmse"] == pytest.approx(0, abs=1e-7)
+    assert entries["b"]["error"]["relative_bias"] == pytest.approx(-0.1, abs=1e-6)
     assert "The image b of open-fog, judged by its airlight" in capsys.readouterr().out

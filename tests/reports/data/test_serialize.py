@@ -22,8 +22,8 @@ def test_plain_makes_what_json_can_hold():
         "sample": Sample(np.float64(0.5), (np.int64(3), np.float32(0.25))),
         1: [np.bool_(True), None, "word", float("nan"), float("-inf"), np.float32("inf")],
     }
-    found = plain(given)
-    assert json.loads(json.dumps(found, allow_nan=False)) == {
+    written = plain(given)
+    assert json.loads(json.dumps(written, allow_nan=False)) == {
         "sample": {"number": 0.5, "pair": [3, 0.25]},
         "1": [True, None, "word", None, None, None],
     }

@@ -37,14 +37,15 @@ class Loaded(HTMLParser):
         self.resources, self.formulas, self.without_words = [], 0, []
 
     def handle_starttag(self, tag, attributes):
-        found = dict(attributes)
+        values = dict(attributes)
         self.formulas += tag == "math"
-        if tag == "link" and found.get("rel") not in ("index", "search", "next", "prev", "canonical"):
-            self.resources.append(found["href"])
+        if tag == "link" and values.get("rel") not in ("index", "search", "next", "prev", "canonical"):
+            self.resources.append(values["href"])
         if tag in ("script", "img", "iframe", "source", "video", "audio", "embed", "object", "use"):
-            self.resources += [found[name] for name in ("src", "data", "srcset", "href", "xlink:href") if name in found]
-        if tag == "img" and not found.get("alt"):
-            self.without_words.append(found["src"])
+            addresses = ("src", "data", "srcset", "href", "xlink:href")
+            self.resources += [values[name] for name in addresses if name in values]
+        if tag == "img" and not values.get("alt"):
+            self.without_words.append(values["src"])
 
 
 @pytest.fixture(scope="module")
@@ -68,12 +69,12 @@ def test_pages_hold_everything_and_load_nothing_from_a_network(built):
     for name, text in pages.items():
         loaded[name] = Loaded()
         loaded[name].feed(text)
-        outside = [one for one in loaded[name].resources if re.match(r"(https?:)?//", one)]
+        outside = [address for address in loaded[name].resources if re.match(r"(https?:)?//", address)]
         assert not outside, (name, outside)
         assert not loaded[name].without_words, (name, loaded[name].without_words)
-        for one in loaded[name].resources:
-            local = one.split("?")[0].split("#")[0]
-            assert not local or local.startswith("data:") or (built / local).exists(), (name, one)
+        for address in loaded[name].resources:
+            local = address.split("?")[0].split("#")[0]
+            assert not local or local.startswith("data:") or (built / local).exists(), (name, address)
     for path in built.rglob("*.css"):
         text = path.read_text(encoding="utf-8")
         assert not re.search(r"(url\(\s*['\"]?|@import\s+['\"])(https?:)?//", text), path
@@ -81,7 +82,7 @@ def test_pages_hold_everything_and_load_nothing_from_a_network(built):
         assert "How wrong it is".lower() in pages[name].lower(), name
         assert f'href="{name}.html"' in pages["methods"], name
         assert loaded[name].resources, name
-    for name, where in [*((one, "kernels") for one in KERNELS), *((one, "scenes") for one in SCENES)]:
+    for name, where in [*((kernel, "kernels") for kernel in KERNELS), *((scene, "scenes") for scene in SCENES)]:
         assert f">{name}<" in pages[where], name
     for name in typer.main.get_group(app).commands:
         assert f'id="airlight-{name}"' in pages["commands"], name
@@ -145,20 +146,19 @@ def test_a_method_s_table_holds_the_numbers_of_the_report(extension):
 
     measured = extension("measured")
     table = measured.method("shadow-planes")
-    found = [
-        (scene["name"], one)
+    entries = [
+        (scene["name"], entry)
         for scene in measured.data()["scenes"]
-        for one in scene["methods"]
-        if one["method"] == "shadow-planes" and one["error"]
+        for entry in scene["methods"]
+        if entry["method"] == "shadow-planes" and entry["error"]
     ]
-    assert found
-    for scene, one in found:
-        row = next(
-            line for line in table.splitlines() if line.startswith(f"| `{scene}` | {measured._inside(one['label'])} |")
-        )
-        assert f"| {number(one['error']['relative_rmse'], 2)} |" in row
-        if one["times"]:
-            assert f"| {number(one['times']['frame']['median_ms'])} |" in row
+    assert entries
+    for scene, entry in entries:
+        beginning = f"| `{scene}` | {measured._inside(entry['label'])} |"
+        row = next(line for line in table.splitlines() if line.startswith(beginning))
+        assert f"| {number(entry['error']['relative_rmse'], 2)} |" in row
+        if entry["times"]:
+            assert f"| {number(entry['times']['frame']['median_ms'])} |" in row
     assert measured.data()["report"]["created"][:10] in table
     assert "did not measure" in measured.method("no-such-method")
 
@@ -247,9 +247,9 @@ def test_the_kernel_of_the_page_on_adding_one(variant, tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(tmp_path))
     cases = read_cases(DOCS.parent / "tests/data/airlight_integral.csv")
     kernels = ("twelve_steps_of_a_page:midpoint", "equiangular-12")
-    found, expected = (integrate_cases(cases, kernel, "double") for kernel in kernels)
-    both = np.isfinite(found) & np.isfinite(expected)
+    own, expected = (integrate_cases(cases, kernel, "double") for kernel in kernels)
+    both = np.isfinite(own) & np.isfinite(expected)
     assert both.mean() > 0.9
     # Operations in another order; where theta nears pi/2 the tangent makes more of their rounding.
-    difference = np.abs(found - expected)[both] / np.maximum(np.abs(expected[both]), 1e-300)
+    difference = np.abs(own - expected)[both] / np.maximum(np.abs(expected[both]), 1e-300)
     assert np.percentile(difference, 90) < 1e-9

@@ -53,17 +53,17 @@ def test_a_report_is_kept_without_what_is_not_shown(variant, folder, tmp_path):
     data = tmp_path / "data"
     written = refresh(data, report=folder)
     assert {path.name for path in written} == {path.name for path in data.iterdir()}
-    found = json.loads((data / "report.json").read_text())
-    assert found["schema"] == "airlight-docs/1"
-    assert found["claims"] == ["All is well."]
-    (scene,) = found["scenes"]  # the user's own is nobody's documentation, and so is his method
-    assert [one["method"] for one in scene["methods"]] == ["unshadowed", "unshadowed", "min-max"]
+    kept = json.loads((data / "report.json").read_text())
+    assert kept["schema"] == "airlight-docs/1"
+    assert kept["claims"] == ["All is well."]
+    (scene,) = kept["scenes"]  # the user's own is nobody's documentation, and so is his method
+    assert [shown["method"] for shown in scene["methods"]] == ["unshadowed", "unshadowed", "min-max"]
     assert scene["counts"] == {"shapes": 0, "triangles": 0, "lights": 1}
     assert scene["baseline"] == 7
     assert scene["methods"][2]["refused"] == "not in this fog"
     assert set(scene["methods"][0]["times"]) == {"frame", "airlight", "light_moved"}
-    assert found["pictures"]["unshadowed"]["label"] == "unshadowed (exact)"  # the one that shows the method best
-    assert "min-max" not in found["pictures"]
+    assert kept["pictures"]["unshadowed"]["label"] == "unshadowed (exact)"  # the one that shows the method best
+    assert "min-max" not in kept["pictures"]
     assert (data / "method-unshadowed-error.png").exists()
 
 
@@ -84,7 +84,7 @@ def test_costs_of_kernels_come_and_stay(variant, folder, tmp_path):
     refresh(data, kernels=costs)
     refresh(data, report=folder)
     kept = json.loads((data / "report.json").read_text())["kernels"]["costs"]
-    assert [one["kernel"] for one in kept] == ["taylor-4"]
+    assert [cost["kernel"] for cost in kept] == ["taylor-4"]
     costs.write_text("{}")
     with pytest.raises(InputError, match=r"kernels.json.*bench --kernels --json"):
         refresh(data, kernels=costs)
@@ -154,7 +154,7 @@ def test_pictures_are_small(tmp_path):
     large, little = tmp_path / "large.png", tmp_path / "little.png"
     Image.fromarray(noise(300, 500)).save(large)
     Image.fromarray(noise(6, 8)).save(little)
-    found = small(large)
-    assert len(found) <= LARGEST
-    assert Image.open(io.BytesIO(found)).width < WIDTH
+    reduced = small(large)
+    assert len(reduced) <= LARGEST
+    assert Image.open(io.BytesIO(reduced)).width < WIDTH
     assert Image.open(io.BytesIO(small(little))).size == (8, 6)

@@ -76,8 +76,8 @@ def test_one_failure_fails_the_run_and_the_other_parts_still_run(checkout):
     ],
 )
 def test_a_part_that_dies_has_failed(tmp_path, code, failed, remark):
-    found = run_part(Part("unit", ["-c", code], "argument", full_run.count_tests), tmp_path)
-    assert (found.failed, found.remark) == (failed, remark)
+    outcome = run_part(Part("unit", ["-c", code], "argument", full_run.count_tests), tmp_path)
+    assert (outcome.failed, outcome.remark) == (failed, remark)
 
 
 def mutation_data(caught, control=True):
@@ -88,8 +88,8 @@ def mutation_data(caught, control=True):
 
 def test_mutations_are_counted(tmp_path):
     def counted(data, status=0):
-        found = run_part(output_part(data, full_run.count_mutations, status), tmp_path)
-        return found.passed, found.failed, found.skipped, found.remark
+        outcome = run_part(output_part(data, full_run.count_mutations, status), tmp_path)
+        return outcome.passed, outcome.failed, outcome.skipped, outcome.remark
 
     below = BELOW_THE_MARGIN[0]
     assert counted(mutation_data(["no-four-pi"])) == (1, 0, 1, f"not caught: {below}")
@@ -98,13 +98,13 @@ def test_mutations_are_counted(tmp_path):
 
 
 def test_baselines_are_counted(tmp_path):
-    found = run_part(
+    outcome = run_part(
         output_part({"moves": {"hall": [], "windows": []}, "stray": []}, full_run.count_baselines), tmp_path
     )
-    assert (found.passed, found.failed, found.remark) == (2, 0, "")
+    assert (outcome.passed, outcome.failed, outcome.remark) == (2, 0, "")
     data = {"moves": {"hall": [], "windows": [{"label": "exact"}]}, "stray": ["attic"]}
-    found = run_part(output_part(data, full_run.count_baselines, 1), tmp_path)
-    assert (found.passed, found.failed, found.remark) == (1, 2, "moved: windows, attic")
+    outcome = run_part(output_part(data, full_run.count_baselines, 1), tmp_path)
+    assert (outcome.passed, outcome.failed, outcome.remark) == (1, 2, "moved: windows, attic")
 
 
 def test_the_command_runs_every_part_and_its_status_is_theirs(checkout, monkeypatch):

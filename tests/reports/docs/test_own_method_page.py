@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from reports.commands.main import run
-from tests.helpers.scenes import body, tiny_scene
+from tests.helpers.scenes import bounded_medium, tiny_scene
 from validation.configurations.methods import configuration
 
 PAGE = Path(__file__).parents[3] / "docs" / "own-method.md"
@@ -38,16 +38,16 @@ def test_the_worked_example_is_measured_like_a_built_in_method(fog, variant):
     loaded = mi.load_dict(tiny_scene())
     scene, truth = read_scene(loaded), truth_image(loaded)
 
-    def found(method, **parameters):
-        one = measure(scene, configuration(method, None, parameters), truth=truth, seconds=0.01)
-        assert (one.refused, one.note) == (None, None)
-        assert one.times.airlight.median_ms > 0
-        return one
+    def measured(method, **parameters):
+        measurement = measure(scene, configuration(method, None, parameters), truth=truth, seconds=0.01)
+        assert (measurement.refused, measurement.note) == (None, None)
+        assert measurement.times.airlight.median_ms > 0
+        return measurement
 
-    own, built_in = found(f"{fog}:interleaved", steps=16, jitter="no"), found("ray-march", steps=16)
+    own, built_in = measured(f"{fog}:interleaved", steps=16, jitter="no"), measured("ray-march", steps=16)
     # The same sum in another order, in float32.
     np.testing.assert_allclose(own.frame.airlight, built_in.frame.airlight, rtol=2e-5)
-    shifted, finer = (found(f"{fog}:interleaved", steps=steps).error.relative_rmse for steps in (16, 64))
+    shifted, finer = (measured(f"{fog}:interleaved", steps=steps).error.relative_rmse for steps in (16, 64))
     assert finer < 0.5 * shifted < 0.05
 
 
@@ -57,11 +57,11 @@ def test_the_worked_example_refuses_by_name_what_it_cannot_do(fog, variant):
     from realtime.scene.read_scene import read_scene
     from validation.frames.benchmark import measure
 
-    ball = body({"type": "sphere", "center": [0.1, 0.1, 0.7], "radius": 0.41}, 0.8, (0.5, 0.5, 0.5))
+    ball = bounded_medium({"type": "sphere", "center": [0.1, 0.1, 0.7], "radius": 0.41}, 0.8, (0.5, 0.5, 0.5))
     scene = tiny_scene(fog=None, ball=ball)
     scene["sensor"] = {key: entry for key, entry in scene["sensor"].items() if key != "medium"}
-    found = measure(read_scene(mi.load_dict(scene)), configuration(f"{fog}:interleaved"), truth=None)
-    assert found.refused == "interleaved: wanted one medium without bounds, and spots without a soft edge"
+    measurement = measure(read_scene(mi.load_dict(scene)), configuration(f"{fog}:interleaved"), truth=None)
+    assert measurement.refused == "interleaved: wanted one medium without bounds, and spots without a soft edge"
 
 
 @pytest.mark.claim("own-method")

@@ -11,6 +11,7 @@ from reports.figures import kernel_errors as figure_kernel_errors
 from reports.figures import kernel_speed as figure_kernel_speed
 from reports.figures import map_size as figure_map_size
 from reports.figures import z_distribution as figure_z_distribution
+from reports.figures.files import plot
 
 
 def rows_of(path):
@@ -21,7 +22,7 @@ def rows_of(path):
 def drawn(module, folder):
     coarse = folder / "coarse.mplstyle"
     coarse.write_text("savefig.dpi: 50\n")
-    module.plot(folder, extra=(str(coarse),))
+    plot(module, folder, extra=(str(coarse),))
     return [(folder / f"{module.NAME}{suffix}").read_bytes() for suffix in (".pdf", ".png")]
 
 
@@ -82,6 +83,6 @@ def test_z_follows_its_law(variant, tmp_path):
     assert count.sum() == pytest.approx(float(rows[0]["tested"]))
     assert expected.sum() == pytest.approx(float(rows[0]["tested"]), rel=1e-6)
     large = expected >= 5
-    count, expected = (np.append(one[large], one[~large].sum()) for one in (count, expected))
+    count, expected = (np.append(counts[large], counts[~large].sum()) for counts in (count, expected))
     assert np.sum((count - expected) ** 2 / expected) < chi2.isf(1e-4, len(count) - 1)
     assert drawn(figure_z_distribution, tmp_path) == drawn(figure_z_distribution, tmp_path)

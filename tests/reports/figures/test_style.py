@@ -37,9 +37,9 @@ def test_any_two_colours_differ_for_every_sight(sight):
     import colour
 
     seen = {name: lab(value, sight) for name, value in (COLOURS | {"truth": "#000000", "paper": "#ffffff"}).items()}
-    for one, other in combinations(seen, 2):
-        difference = float(colour.delta_E(seen[one], seen[other], method="CIE 2000"))
-        assert difference > LEAST_DIFFERENCE, (one, other, sight, difference)
+    for first, other in combinations(seen, 2):
+        difference = float(colour.delta_E(seen[first], seen[other], method="CIE 2000"))
+        assert difference > LEAST_DIFFERENCE, (first, other, sight, difference)
 
 
 def test_the_simulation_sees_what_such_eyes_do_not():
@@ -48,7 +48,7 @@ def test_the_simulation_sees_what_such_eyes_do_not():
 
     pair = ("#b8711a", "#7f8b1a")
     normal, without = (
-        float(colour.delta_E(*(lab(one, sight) for one in pair), method="CIE 2000"))
+        float(colour.delta_E(*(lab(colour_name, sight) for colour_name in pair), method="CIE 2000"))
         for sight in ("normal", "Deuteranomaly")
     )
     assert normal > 2 * LEAST_DIFFERENCE > 2 * without

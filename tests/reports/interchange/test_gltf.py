@@ -8,7 +8,7 @@ import pytest
 from analytic.errors import InputError
 from reports.interchange.gltf import write_gltf
 from reports.interchange.meshes import SIDES, shape_mesh
-from tests.helpers.scenes import body, spot, tiny_scene
+from tests.helpers.scenes import bounded_medium, spot, tiny_scene
 from validation.scenes.loading import LoadedScene, load_scene
 
 
@@ -35,13 +35,13 @@ def parts(path):
 
 def arrays(document, binary):
     """Return the vertices, normals (or None) and faces of every mesh."""
-    found = []
+    meshes = []
     for mesh in document["meshes"]:
         (primitive,) = mesh["primitives"]
         attributes = primitive["attributes"]
         numbers = [attributes["POSITION"], attributes.get("NORMAL"), primitive["indices"]]
-        found.append([None if number is None else accessor(document, binary, number) for number in numbers])
-    return found
+        meshes.append([None if number is None else accessor(document, binary, number) for number in numbers])
+    return meshes
 
 
 def accessor(document, binary, number):
@@ -74,28 +74,28 @@ def test_vertices_are_in_the_image_where_mitsuba_has_them(variant, tmp_path, up)
 
     sensor = tiny_scene(size=(40, 24))["sensor"]
     view = mi.ScalarTransform4f().look_at([0.2, -4.1, 1.3], [0.1, 0.2, 0.6], list(up))
-    one = loaded(
+    cube = loaded(
         sensor=sensor | {"to_world": view}, ball={"type": "cube", "to_world": mi.ScalarTransform4f().scale(0.4)}
     )
-    write_gltf(tmp_path / "tiny.glb", one)
+    write_gltf(tmp_path / "tiny.glb", cube)
     document, binary = parts(tmp_path / "tiny.glb")
     number = next(k for k, mesh in enumerate(document["meshes"]) if mesh["name"] == "ball")
-    found = project(document, arrays(document, binary)[number][0].astype(np.float64))
-    shape = next(shape for shape in one.scene.shapes() if shape.id() == "ball")
+    projected = project(document, arrays(document, binary)[number][0].astype(np.float64))
+    shape = next(shape for shape in cube.scene.shapes() if shape.id() == "ball")
     interaction = mi.Interaction3f()
     interaction.p = mi.Point3f(mi.traverse(shape)["vertex_positions"].numpy().reshape(-1, 3).T.copy())
-    sample, _ = one.scene.sensors()[0].sample_direction(interaction, mi.Point2f(0.5))
+    sample, _ = cube.scene.sensors()[0].sample_direction(interaction, mi.Point2f(0.5))
     wanted = np.array(sample.uv, dtype=np.float64).T / [40, 24]
     assert wanted.min() > 0
-    np.testing.assert_allclose(found, wanted, atol=1e-6)
+    np.testing.assert_allclose(projected, wanted, atol=1e-6)
 
 
 @pytest.mark.claim("gltf")
 def test_trimesh_reads_it_back(variant, tmp_path):
     import trimesh
 
-    one = load_scene("sphere-spot")
-    written = write_gltf(tmp_path / "scene.glb", one)
+    scene = load_scene("sphere-spot")
+    written = write_gltf(tmp_path / "scene.glb", scene)
     assert written["triangles"] == 1090
     assert written["bytes"] == (tmp_path / "scene.glb").stat().st_size
     assert written["tessellated"] == []
@@ -115,8 +115,8 @@ def test_trimesh_reads_it_back(variant, tmp_path):
 
 @pytest.mark.claim("gltf")
 def test_lights_are_those_of_the_scene(variant, tmp_path):
-    one = loaded(spot=spot(cutoff=40.0, beam=25.0), hard=spot())
-    write_gltf(tmp_path / "tiny.glb", one)
+    scene = loaded(spot=spot(cutoff=40.0, beam=25.0), hard=spot())
+    write_gltf(tmp_path / "tiny.glb", scene)
     document, _ = parts(tmp_path / "tiny.glb")
     lights = document["extensions"]["KHR_lights_punctual"]["lights"]
     assert [light["type"] for light in lights] == ["point", "spot", "spot"]
@@ -139,9 +139,9 @@ def test_lights_are_those_of_the_scene(variant, tmp_path):
 
 
 def test_every_number_in_the_file_is_in_its_bounds(variant, tmp_path):
-    bubble = body({"type": "sphere", "center": [2.0, 0.3, 1.1], "radius": 0.3}, 0.5, (0.5, 0.5, 0.5))
-    one = loaded(bubble=bubble | {"exterior": {"type": "ref", "id": "fog"}})
-    write_gltf(tmp_path / "tiny.glb", one)
+    bubble = bounded_medium({"type": "sphere", "center": [2.0, 0.3, 1.1], "radius": 0.3}, 0.5, (0.5, 0.5, 0.5))
+    scene = loaded(bubble=bubble | {"exterior": {"type": "ref", "id": "fog"}})
+    write_gltf(tmp_path / "tiny.glb", scene)
     document, binary = parts(tmp_path / "tiny.glb")
     assert document["buffers"] == [{"byteLength": len(binary)}]
     for view in document["bufferViews"]:
@@ -211,7 +211,7 @@ def test_shapes_become_meshes_that_lie_on_them(variant, kind, transform, flipped
     start *= 4 / np.linalg.norm(start, axis=0)
     aim = rng.uniform(-0.6, 0.6, (3, 4096)) - start
     ray = mi.Ray3f(mi.Point3f(start), mi.Vector3f(aim / np.linalg.norm(aim, axis=0)))
-    scenes = [mi.load_dict({"type": "scene", "shape": one}) for one in (shape, twin)]
+    scenes = [mi.load_dict({"type": "scene", "shape": surface}) for surface in (shape, twin)]
     hits = [scene.ray_intersect(ray) for scene in scenes]
     distance = [np.array(hit.t, dtype=np.float64) for hit in hits]
     both = np.isfinite(distance[0]) & np.isfinite(distance[1])

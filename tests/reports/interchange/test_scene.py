@@ -8,7 +8,7 @@ import pytest
 from reports.commands.main import run
 from reports.interchange.scene import describe_scene, up_axis
 from reports.tables.scene import description_text
-from tests.helpers.scenes import body, spot, tiny_scene
+from tests.helpers.scenes import bounded_medium, spot, tiny_scene
 from validation.scenes.loading import LoadedScene, load_scene
 from validation.scenes.registry import SCENES
 
@@ -57,19 +57,21 @@ def test_phase_functions_have_their_numbers(variant):
 
 
 def test_bodies_of_media_are_listed_with_their_bounds(variant):
-    ball = body({"type": "sphere", "center": [2.0, 0.3, 1.1], "radius": 0.3}, (0.5, 0.25, 1.0), (0.5, 0.4, 0.3))
-    cube = body({"type": "cube"}, 0.7, (0.5, 0.4, 0.3))
+    ball = bounded_medium(
+        {"type": "sphere", "center": [2.0, 0.3, 1.1], "radius": 0.3}, (0.5, 0.25, 1.0), (0.5, 0.4, 0.3)
+    )
+    cube = bounded_medium({"type": "cube"}, 0.7, (0.5, 0.4, 0.3))
     sensor = {key: entry for key, entry in tiny_scene()["sensor"].items() if key != "medium"}
-    found = described(fog=None, sensor=sensor, haze=ball, box=cube, ball=None)
-    assert found["medium"] is None
-    assert [one["name"] for one in found["bounded_media"]] == ["haze", "box"]
-    haze, box = found["bounded_media"]
-    assert haze["bounds"] == {"kind": "ball", "centre": [2.0, 0.3, 1.1], "radius": 0.3}
+    description = described(fog=None, sensor=sensor, haze=ball, box=cube, ball=None)
+    assert description["medium"] is None
+    assert [medium["name"] for medium in description["bounded_media"]] == ["haze", "box"]
+    haze, box = description["bounded_media"]
+    assert haze["bounds"] == {"kind": "sphere", "centre": [2.0, 0.3, 1.1], "radius": 0.3}
     assert haze["sigma_t"] == [0.5, 0.25, 1.0]
     assert box["bounds"]["kind"] == "convex mesh"
-    text = description_text(found)
-    assert "around all bodies: none, clear air" in text
-    assert "a ball about (2, 0.3, 1.1), radius 0.3" in text
+    text = description_text(description)
+    assert "around the bounded media: none, clear air" in text
+    assert "a sphere about (2, 0.3, 1.1), radius 0.3" in text
 
 
 def test_lights_have_what_their_kind_needs(variant):
@@ -137,17 +139,17 @@ def test_text_says_what_the_numbers_are(variant):
 
 def test_long_lists_are_cut_in_the_text_alone(variant):
     many = {f"ball{k}": tiny_scene()["ball"] | {"center": [0.1 * k, 3.0, 1.0]} for k in range(20)}
-    found = described(**many)
-    assert len(found["surfaces"]) == 22
-    assert "and 10 more: --json lists them" in description_text(found)
+    description = described(**many)
+    assert len(description["surfaces"]) == 22
+    assert "and 10 more: --json lists them" in description_text(description)
 
 
 def test_command_prints_json_and_writes_gltf(capsys, tmp_path):
     glb = tmp_path / "fog.glb"
     assert run(["describe", "open-fog", "--size", "64x48", "--json", "--gltf", str(glb)]) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert (found["scene"], found["camera"]["size"]) == ("open-fog", [64, 48])
-    assert found["gltf"]["bytes"] == glb.stat().st_size
+    printed = json.loads(capsys.readouterr().out)
+    assert (printed["scene"], printed["camera"]["size"]) == ("open-fog", [64, 48])
+    assert printed["gltf"]["bytes"] == glb.stat().st_size
     assert run(["describe", "open-fog", "--gltf", str(tmp_path / "fog.gltf")]) == 2
     assert "wanted a name that ends in .glb" in capsys.readouterr().err
     assert run(["describe", "open-frog"]) == 2

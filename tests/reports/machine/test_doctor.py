@@ -41,8 +41,8 @@ def test_a_missing_library_is_shown_with_what_to_do(monkeypatch, capsys):
     monkeypatch.setattr(doctor, "prepare", missing)
     monkeypatch.setattr(doctor, "find_llvm", lambda: [])
     assert run(["doctor", "--json"]) == 3
-    found = json.loads(capsys.readouterr().out)
-    assert (found["works"], found["problem"], found["llvm"]) == (False, "no libLLVM found: install it", [])
+    printed = json.loads(capsys.readouterr().out)
+    assert (printed["works"], printed["problem"], printed["llvm"]) == (False, "no libLLVM found: install it", [])
     assert run(["doctor"]) == 3
     assert "Not ready: no libLLVM found: install it" in capsys.readouterr().out
 

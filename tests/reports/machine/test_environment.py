@@ -66,8 +66,8 @@ class TestFindLlvm:
     )
     def test_version_from_name(self, only, name, version, works):
         _library(only, name)
-        (found,) = find_llvm()
-        assert (found.version, found.works) == (version, works)
+        (library,) = find_llvm()
+        assert (library.version, library.works) == (version, works)
 
     def test_version_through_links_and_folders(self, tmp_path, only):
         real = _library(only, "libLLVM.so.19.1")
@@ -84,7 +84,7 @@ class TestFindLlvm:
         for name in ("libLLVM-14.so.1", "libLLVM.so.18.1", "libLLVM.so.20.1", "libLLVM.so.19.1"):
             _library(only, name)
         (only / "libLLVM-19.so").symlink_to(only / "libLLVM.so.19.1")
-        assert [found.version for found in find_llvm()] == [(20, 1), (19, 1), (18, 1), (14, 0)]
+        assert [library.version for library in find_llvm()] == [(20, 1), (19, 1), (18, 1), (14, 0)]
 
     def test_what_is_no_whole_llvm_is_not_listed(self, only):
         for name in ("libLLVMCore.so.19.1", "libLLVMX86CodeGen.a", "libLLVM.a", "libclang-19.so"):
@@ -99,11 +99,11 @@ class TestFindLlvm:
         assert "no such file" in examine_llvm(str(only / "libLLVM.so.17.1")).reason
 
     def test_a_library_that_does_not_tell_is_asked_in_another_process(self, only):
-        found = examine_llvm(str(_library(only, "libLLVM.so")))  # a header alone cannot be loaded
-        assert (found.version, found.works) == (None, False)
+        library = examine_llvm(str(_library(only, "libLLVM.so")))  # a header alone cannot be loaded
+        assert (library.version, library.works) == (None, False)
 
     def test_asking_and_naming_agree_on_this_machine(self):
-        here = [found for found in find_llvm() if found.works]
+        here = [library for library in find_llvm() if library.works]
         if not here:
             pytest.skip("no libLLVM that works on this machine")
         asked = llvm._version_asked(here[0].path)
@@ -200,9 +200,9 @@ def test_drjit_loads_the_library_that_was_chosen(variant):
         pytest.skip("needs the LLVM backend and a system that tells what a process has loaded")
     from reports.machine.doctor import try_kernel
 
-    found = try_kernel(variant)
-    assert os.path.realpath(found["library"]) == os.path.realpath(os.environ["DRJIT_LIBLLVM_PATH"])
-    assert found["threads"] >= 1
+    kernel = try_kernel(variant)
+    assert os.path.realpath(kernel["library"]) == os.path.realpath(os.environ["DRJIT_LIBLLVM_PATH"])
+    assert kernel["threads"] >= 1
 
 
 def test_activate_keeps_a_current_variant(variant):
@@ -265,23 +265,23 @@ def test_cuda_by_what_the_driver_says(driver, works, word, monkeypatch):
 
 
 def test_optix_needs_its_library_and_a_driver_that_is_not_refused(monkeypatch):
-    found = {"libcuda.so.1": _Driver(version=12070)}
-    monkeypatch.setattr(gpu, "_load", lambda name, variable: found.get(name))
+    libraries = {"libcuda.so.1": _Driver(version=12070)}
+    monkeypatch.setattr(gpu, "_load", lambda name, variable: libraries.get(name))
     assert "565" in gpu.optix_status().reason
-    found["libcuda.so.1"] = _Driver()
+    libraries["libcuda.so.1"] = _Driver()
     assert "libnvoptix.so.1 cannot be loaded" in gpu.optix_status().reason
-    found["libnvoptix.so.1"] = type("OptiX", (), {"optixQueryFunctionTable": None})()
+    libraries["libnvoptix.so.1"] = type("OptiX", (), {"optixQueryFunctionTable": None})()
     assert gpu.optix_status().works
 
 
 def test_versions_and_description_are_json_ready(variant):
     import json
 
-    found = versions()
-    assert found["mitsuba"].startswith("3.9.")
-    assert "missing" not in found.values()
+    installed = versions()
+    assert installed["mitsuba"].startswith("3.9.")
+    assert "missing" not in installed.values()
     described = json.loads(json.dumps(describe_environment()))
-    assert described["versions"] == found
+    assert described["versions"] == installed
     assert described["variant"] == variant
 
 

@@ -7,9 +7,10 @@ import pytest
 from analytic.errors import InputError
 from reference.storage.exr import Image, read_exr, write_exr
 from reports.page.image_cache import page_images
-from reports.page.image_codec import DIFFERENCE_BITS, REFERENCE_BITS, Packed, decode_planes, difference_values
+from reports.page.image_codec import DIFFERENCE_BITS, REFERENCE_BITS, Packed
 from reports.page.image_codec import reference_values as values_of
 from reports.page.image_index import DARK, LADDER, relative_difference
+from tests.helpers.decoding import decode_planes, difference_values
 from tests.helpers.page import HEIGHT, WIDTH, engine_image, images, report_data, write_files
 
 
@@ -27,59 +28,59 @@ def scene_images(scene, folder, limit):
     return page_images([scene], folder, limit)[0]
 
 
-def planes(found, entry, bits):
-    raw = base64.b64decode(found.data)[entry["at"] : entry["at"] + entry["bytes"]]
-    size = tuple(found.index["size"])
+def planes(stored, entry, bits):
+    raw = base64.b64decode(stored.data)[entry["at"] : entry["at"] + entry["bytes"]]
+    size = tuple(stored.index["size"])
     return decode_planes(Packed(raw, tuple(map(tuple, entry["planes"]))), size, bits)
 
 
-def difference(found, number, layer):
-    entry = found.index["methods"][number]["layers"][layer]
-    return difference_values(planes(found, entry, DIFFERENCE_BITS), entry["k"], found.index["s"])
+def difference(stored, number, layer):
+    entry = stored.index["methods"][number]["layers"][layer]
+    return difference_values(planes(stored, entry, DIFFERENCE_BITS), entry["k"], stored.index["s"])
 
 
 def test_page_has_the_reference_and_each_difference_from_it(scene, folder):
-    found = scene_images(scene, folder, 10**8)
+    stored = scene_images(scene, folder, 10**8)
     exact = read_exr(folder / "s" / "reference.exr").layers["airlight"].astype(np.float64)
-    back = values_of(planes(found, found.index["reference"]["airlight"], REFERENCE_BITS))
+    back = values_of(planes(stored, stored.index["reference"]["airlight"], REFERENCE_BITS))
     np.testing.assert_allclose(back, exact, rtol=2.0**-16)
     floor = DARK * exact.mean()
-    assert found.index["floors"]["airlight"] == pytest.approx(floor, rel=1e-12)
+    assert stored.index["floors"]["airlight"] == pytest.approx(floor, rel=1e-12)
     for number, name in enumerate(("good", "flat")):
         test = read_exr(folder / "s" / f"{name}.exr").layers["airlight"].astype(np.float64)
         wanted = (test - exact) / np.maximum(back, floor)
-        got = difference(found, number, "airlight")
+        got = difference(stored, number, "airlight")
         # Of a large difference 1 / 2000, of a small one 2.5e-8.
         np.testing.assert_allclose(got, wanted, rtol=6e-4, atol=3e-8, equal_nan=True)
-    assert np.isnan(difference(found, 1, "airlight")[5, 7, 1])
+    assert np.isnan(difference(stored, 1, "airlight")[5, 7, 1])
 
 
 def test_error_of_a_good_method_is_its_own(scene, folder):
     """The reference is rounded to 1.5e-5, the method is wrong by 3e-6: the one must not show in the other."""
-    found = scene_images(scene, folder, 10**8)
+    stored = scene_images(scene, folder, 10**8)
     lit = slice(2, None)
-    assert np.std(difference(found, 0, "airlight")[lit]) == pytest.approx(3e-6, rel=0.05)
+    assert np.std(difference(stored, 0, "airlight")[lit]) == pytest.approx(3e-6, rel=0.05)
 
 
 def test_equal_images_are_stored_once(scene, folder):
-    found = scene_images(scene, folder, 10**8)
+    stored = scene_images(scene, folder, 10**8)
     twice = scene | {"methods": [*scene["methods"], *scene["methods"]]}
-    assert len(scene_images(twice, folder, 10**8).data) == len(found.data)
+    assert len(scene_images(twice, folder, 10**8).data) == len(stored.data)
 
 
 def test_image_with_its_total_alone_is_compared_with_the_total(scene, folder):
-    found = scene_images(scene | {"methods": [engine_image()]}, folder, 10**8)
-    got = difference(found, 0, "total")
+    stored = scene_images(scene | {"methods": [engine_image()]}, folder, 10**8)
+    got = difference(stored, 0, "total")
     lit = np.s_[2:, :]
     np.testing.assert_allclose(got[lit], -0.1, rtol=6e-4)
 
 
 def test_flip_map_is_kept_to_a_two_hundred_fifty_fifth(scene, folder):
-    found = scene_images(scene, folder, 10**8)
-    entry = found.index["methods"][1]["layers"]["flip"]
+    stored = scene_images(scene, folder, 10**8)
+    entry = stored.index["methods"][1]["layers"]["flip"]
     wanted = images()["flat"]["flip"][..., :1]
-    np.testing.assert_allclose(planes(found, entry, 8) / entry["k"], wanted, atol=0.5 / 255 + 1e-7)
-    assert "flip" not in found.index["methods"][0]["layers"]
+    np.testing.assert_allclose(planes(stored, entry, 8) / entry["k"], wanted, atol=0.5 / 255 + 1e-7)
+    assert "flip" not in stored.index["methods"][0]["layers"]
 
 
 def test_limit_is_kept_by_coarser_differences_then_fewer_pixels(scene, folder):
@@ -88,13 +89,13 @@ def test_limit_is_kept_by_coarser_differences_then_fewer_pixels(scene, folder):
     limit = len(whole.data)
     while True:
         try:
-            found = scene_images(scene, folder, limit)
+            stored = scene_images(scene, folder, limit)
         except InputError as error:
             assert "one pixel in 16" in str(error)  # noqa: PT017 - the loop goes on until one limit is refused
             break
-        assert len(found.data) <= limit
-        seen.append((found.index["stride"], found.index["of_difference"]))
-        limit = len(found.data) - 1
+        assert len(stored.data) <= limit
+        seen.append((stored.index["stride"], stored.index["of_difference"]))
+        limit = len(stored.data) - 1
     strides = [stride for stride, _ in seen]
     assert strides == sorted(strides)
     whole_pixels = [rounding for stride, rounding in seen if stride == 1]
@@ -115,7 +116,7 @@ def test_kept_pixels_are_those_of_the_file_and_the_floor_is_that_of_the_whole(sc
     assert thin.index["floors"] == whole.index["floors"]
     names = "reference", "airlight"
     few, all_of_them = (
-        values_of(planes(found, found.index[names[0]][names[1]], REFERENCE_BITS)) for found in (thin, whole)
+        values_of(planes(stored, stored.index[names[0]][names[1]], REFERENCE_BITS)) for stored in (thin, whole)
     )
     np.testing.assert_array_equal(few, all_of_them[::2, ::2])
 
@@ -162,6 +163,6 @@ def test_damaged_entry_is_made_again(scene, tmp_path, own_cache):
 def test_largest_scene_gives_way_first(scene, folder):
     small = scene | {"methods": scene["methods"][:1]}
     both = page_images([small, scene], folder, 10**8)
-    fitted = page_images([small, scene], folder, sum(len(one.data) for one in both) - 1)
+    fitted = page_images([small, scene], folder, sum(len(packed.data) for packed in both) - 1)
     assert fitted[0] == both[0]
     assert fitted[1].index["of_difference"] > both[1].index["of_difference"]

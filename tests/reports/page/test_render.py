@@ -9,6 +9,7 @@ from reports.page.chart import speed_error_chart
 from reports.page.filters import DASH, kept_words, number, percent, words
 from reports.page.render import SCRIPTS, render_page
 from reports.plotting.pictures import png_bytes
+from reports.tables.methods import fastest_table
 from tests.helpers.page import (
     DATA,
     Page,
@@ -54,9 +55,16 @@ def test_page_shows_the_numbers_of_the_data(page):
         assert shown in text, shown
     for claim in DATA["claims"]:
         assert claim["text"] in text
+    for row in fastest_table(DATA["scenes"]).rows:
+        assert all(cell in text for cell in row.values.values())
     assert "Answers to: Billeter 2010." in text
     assert "airlight report --quick" in text
     assert "mitsuba 3.9.1" in text
+
+
+def test_code_in_a_claim_is_drawn_as_code(data, folder):
+    data["claims"].append({"kind": "not-measured", "text": "`--scenes` names <them>.", "good": None})
+    assert "<code>--scenes</code> names &lt;them&gt;." in render(data, folder).source
 
 
 @pytest.mark.claim("report-stands-alone")
@@ -75,7 +83,7 @@ def test_page_needs_nothing_but_itself(page):
 def test_images_are_data_and_every_canvas_has_words(page):
     index = json.loads(page.script("images"))
     (scene,) = index["scenes"]
-    assert [one["label"] for one in scene["methods"]] == ["good (k)", "flat"]
+    assert [entry["label"] for entry in scene["methods"]] == ["good (k)", "flat"]
     assert set(scene["methods"][1]["layers"]) == {"airlight", "surface", "flip"}
     assert len(page.script("pixels-0")) > 1000
     pictures = [attributes for attributes in page.attributes("canvas") if "aria-hidden" not in attributes]
@@ -87,7 +95,7 @@ def test_images_are_data_and_every_canvas_has_words(page):
 
 def test_tables_have_headers_and_captions(page):
     # Probe, methods, agreement, multiple scattering, environment, times of parts, settings, keys.
-    assert len(page.tables) == 8
+    assert len(page.tables) == 9
     for table in page.tables:
         assert any(tag == "caption" for tag, _ in table)
         headers = [attributes for tag, attributes in table if tag == "th"]
@@ -170,7 +178,7 @@ def test_missing_values_are_dashes(data, folder):
 def test_scene_without_agreement_and_published_figure(data, folder):
     data["scenes"][0] |= {"agreement": {}, "published": ""}
     page = render(data, folder)
-    assert len(page.tables) == 7
+    assert len(page.tables) == 8
     assert "Answers to" not in page.text
 
 
@@ -178,7 +186,7 @@ def test_scene_of_which_everything_was_refused_has_no_viewer(data, folder):
     blank = report_data()["scenes"][0] | {"name": "dark", "methods": [refused("x", "too dark")]}
     page = render(data | {"scenes": [blank, data["scenes"][0]]}, folder)
     assert len([1 for _, attributes in page.tags if attributes.get("class") == "viewer"]) == 1
-    assert [one["name"] for one in json.loads(page.script("images"))["scenes"]] == ["hall"]
+    assert [scene["name"] for scene in json.loads(page.script("images"))["scenes"]] == ["hall"]
     assert "viewer-0" in {attributes.get("id") for _, attributes in page.tags}
 
 

@@ -52,7 +52,7 @@ def simulated(cache, *, speed=1.0):
     for name, (*parts, method) in COSTS.items():
         expected = scene_seconds(SceneEntries.of(cache, name, EFFORT), STANDARD, complete=True)
         inner = {part: part_of(steps[name], *share) for part, share in shares(expected).items()}
-        costs = dict(zip(("truth", "agreement", "multiple"), parts)) | {one.label: method for one in STANDARD}
+        costs = dict(zip(("truth", "agreement", "multiple"), parts)) | {each.label: method for each in STANDARD}
         for part, seconds in costs.items():
             inner[part](0.0, part)
             now += seconds / speed

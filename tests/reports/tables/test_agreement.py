@@ -14,7 +14,7 @@ def compared(interval, *, equivalent=False, finished=True):
 
 
 @pytest.mark.parametrize(
-    ("one", "good", "words"),
+    ("comparison", "good", "words"),
     [
         (compared([-0.001, 0.003], equivalent=True), True, "yes"),
         (compared([-0.001, 0.03]), False, "NO"),
@@ -23,10 +23,10 @@ def compared(interval, *, equivalent=False, finished=True):
         (compared([None, None], finished=False), False, "NO"),
     ],
 )
-def test_the_verdict_stands_in_the_table(one, good, words):
-    assert verdict(one) is good
-    row = markdown(agreement_table("", [("fog, airlight", one)])).splitlines()[-1]
-    low, high = one["statistics"]["relative_bias_ci"]
+def test_the_verdict_stands_in_the_table(comparison, good, words):
+    assert verdict(comparison) is good
+    row = markdown(agreement_table("", [("fog, airlight", comparison)])).splitlines()[-1]
+    low, high = comparison["statistics"]["relative_bias_ci"]
     interval = "-" if low is None else f"{100 * low:+.3f}..{100 * high:+.3f} %"
     shown = f"| fog, airlight | volpath | 2 M | +0.100 % | {interval} | 0.5 % | 0.01 % | -0.200 % | {words} |"
     assert row == shown

@@ -109,13 +109,14 @@ def test_five_ways_carry_the_same_cells(rows):
     """Words come back as they went in, numbers to the digits of their column."""
     columns = (Column("name", "name", words=True), Column("value", "value", digits=4), Column("count", "count"))
     drawn = table("", columns, rows)
-    found = [markdown_rows(markdown(drawn)), html_rows(html(drawn)), latex_rows(latex([drawn]))]
-    found.append([list(row.values()) for row in csv_rows(csv(drawn))])
-    assert [len(one) for one in found] == [len(rows)] * 4
+    drawings = [markdown_rows(markdown(drawn)), html_rows(html(drawn)), latex_rows(latex([drawn]))]
+    drawings.append([list(row.values()) for row in csv_rows(csv(drawn))])
+    assert [len(drawing) for drawing in drawings] == [len(rows)] * 4
     for place, (name, value, count) in enumerate(rows):
-        words = [found[0][place][0], found[1][place][0], unescaped_latex(found[2][place][0]), found[3][place][0]]
-        assert {" ".join(re.sub(r" \N{MULTIPLICATION SIGN}(?= \d|$)", " x", one).split()) for one in words} == {name}
-        for cells in (one[place] for one in found):
+        words = [drawing[place][0] for drawing in drawings]
+        words[2] = unescaped_latex(words[2])
+        assert {" ".join(re.sub(r" \N{MULTIPLICATION SIGN}(?= \d|$)", " x", word).split()) for word in words} == {name}
+        for cells in (drawing[place] for drawing in drawings):
             shown = as_number(cells[1])
             assert shown is None if value is None else shown == pytest.approx(value, rel=1e-3)
             assert int(as_number(cells[2])) == count

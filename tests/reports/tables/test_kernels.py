@@ -28,8 +28,8 @@ def test_costs_and_levels_are_printed():
         KernelCost("uniform-8", "uniform", 8, "isotropic", 0.0, 0, SPREAD, SPREAD, 0.1, 0.5, 0.9),
         KernelCost("closed-form", "closed-form", None, "isotropic", 0.0, refused="not today"),
     )
-    found = plain(KernelBench(costs, speed_against_error(costs)))
-    printed = "".join(text(table) for table in kernel_tables(found["costs"], found["levels"]))
+    bench = plain(KernelBench(costs, speed_against_error(costs)))
+    printed = "".join(text(table) for table in kernel_tables(bench["costs"], bench["levels"]))
     assert "closed-form: refused: not today" in printed
     exact, uniform = (next(line for line in printed.splitlines() if name in line) for name in ("exact", "uniform-8"))
     assert exact.split()[:3] == ["exact", "7.5", "7.25..8"]
@@ -67,8 +67,8 @@ def test_command_prints_json_with_the_bar(variant, few_laws, capsys):
     command(kernels="taylor-1", rays=64, json=True)
     data = json.loads(capsys.readouterr().out)
     assert data["bar"]["single_max"] == 3e-5
-    assert [one["kernel"] for one in data["kernels"]] == ["taylor-1"]
-    assert [one["name"] for one in data["kernels"][0]["sets"]] == [*data["certified"], "generated"]
+    assert [kernel["kernel"] for kernel in data["kernels"]] == ["taylor-1"]
+    assert [rays["name"] for rays in data["kernels"][0]["sets"]] == [*data["certified"], "generated"]
 
 
 @pytest.mark.claim("exact-keeps-its-bar")

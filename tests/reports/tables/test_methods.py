@@ -6,7 +6,7 @@ import re
 import pytest
 
 from reports.tables.drawing import csv, html, latex, markdown, text
-from reports.tables.methods import COLUMNS, TIMES, fastest_within, method_row, methods_table, rate_words
+from reports.tables.methods import COLUMNS, TIMES, fastest_table, fastest_within, method_row, methods_table, rate_words
 
 MEDIANS = {name: 2.0 + place for place, name in enumerate(TIMES)}  # no two alike
 
@@ -18,8 +18,8 @@ def timing(median):
 def entry(label="a", *, rmse=0.01, frame=2.0, nonfinite=0, **more):
     error = {"relative_rmse": rmse, "relative_bias": 0.0, "p50": 0.1, "p99": 0.2, "max": 0.3, "nonfinite": nonfinite}
     times = {name: timing(median) for name, median in MEDIANS.items()} | {"frame": timing(frame)}
-    found = {"label": label, "kind": "built-in", "refused": None, "note": None, "knows_shadows": True, "times": times}
-    return found | {"error": error} | more
+    fields = {"label": label, "kind": "built-in", "refused": None, "note": None, "knows_shadows": True, "times": times}
+    return fields | {"error": error} | more
 
 
 @pytest.mark.parametrize("name", TIMES)
@@ -56,6 +56,37 @@ def test_the_fastest_is_within_the_error_and_finite():
     assert fastest_within(0.01, everything) is slow
     assert fastest_within(0.5, everything) is fast
     assert fastest_within(1e-6, everything) is None
+
+
+def fastest_of(*methods):
+    """The cells of the table of the fastest methods for a scene."""
+    (row,) = fastest_table([{"name": "fog", "methods": methods}]).rows
+    return tuple(row.values.values())
+
+
+@pytest.mark.claim("claims-follow")
+def test_the_fastest_method_within_each_error_has_a_cell():
+    fast, good, slow = entry("fast", rmse=0.02, frame=1.0), entry("good", rmse=0.004), entry("slow", rmse=1e-4, frame=8)
+    assert fastest_of(fast, good, slow) == ("fog", "good: 2 ms, 500 frames/s", "slow: 8 ms, 125 frames/s")
+    assert fastest_of(fast, good) == ("fog", "good: 2 ms, 500 frames/s", "none")
+    assert fastest_of() == ("fog", "none", "none")
+    # An error of just the target counts.
+    assert fastest_of(entry("edge", rmse=0.01)) == ("fog", "edge: 2 ms, 500 frames/s", "none")
+
+
+@pytest.mark.claim("claims-follow")
+@pytest.mark.parametrize(
+    "never",
+    [
+        entry("no error", rmse=None, frame=0.1),  # a black truth has no relative error
+        entry("refused", refused="no series", times=None, error=None),
+        entry("not finite", rmse=1e-5, frame=0.1, nonfinite=3),  # its RMSE leaves out the very pixels that are wrong
+        entry("image", kind="image", rmse=1e-5, times=None),
+    ],
+    ids=lambda never: never["label"],
+)
+def test_what_has_no_finite_error_or_no_time_is_never_the_fastest(never):
+    assert fastest_of(never, entry("best", rmse=0.0009)) == ("fog", *["best: 2 ms, 500 frames/s"] * 2)
 
 
 def test_rates_are_whole_from_ten_on():

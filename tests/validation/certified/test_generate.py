@@ -16,12 +16,12 @@ from validation.certified.scenes import fog_scenes
 ROOT = Path(__file__).resolve().parents[3]
 NAMES = [scene.name for scene in fog_scenes()]
 SCENES = {scene.name: scene for scene in fog_scenes()}
-# One ray of each kind: endless, near a light, ended by a ball, among needles, in the fading part of a spot, dark.
+# One ray of each kind: endless, near a light, ended by a sphere, among needles, in the fading part of a spot, dark.
 SOME = {
     "thin-open": 27,
     "near-light": 36,
-    "ball-shadow": 9,
-    "three-balls": 29,
+    "sphere-shadow": 9,
+    "three-spheres": 29,
     "box-floor": 34,
     "needles": 20,
     "camera-in-shadow": 0,
@@ -114,18 +114,20 @@ def test_corners_are_exact_in_mitsuba(variant):
     for scene in fog_scenes():
         # Mitsuba merges meshes of one material, and then screens are among them.
         parameters = [mi.traverse(shape) for shape in load_fog(mitsuba_dict(scene)).shapes()]
-        vertices = [np.array(one["vertex_positions"]).reshape(-1, 3) for one in parameters if "vertex_positions" in one]
-        found = {tuple(map(float, corner)) for part in vertices for corner in part}
+        vertices = [
+            np.array(mesh["vertex_positions"]).reshape(-1, 3) for mesh in parameters if "vertex_positions" in mesh
+        ]
+        mesh_corners = {tuple(map(float, corner)) for part in vertices for corner in part}
         boxes = set().union(*(corners(shape) for shape in scene.occluders if isinstance(shape, FogBox)))
         screens = set().union(*(corners(shape) for shape in scene.occluders if isinstance(shape, FogScreen)))
-        assert boxes <= found <= boxes | screens, scene.name
+        assert boxes <= mesh_corners <= boxes | screens, scene.name
 
 
 @pytest.mark.claim("certified-fog", tolerance="none: equal digits")
 @pytest.mark.parametrize(("name", "pixel"), SOME.items())
 def test_some_rays_come_out_the_same(certified, name, pixel):
-    found = json.loads(json.dumps(asdict(certify_pixel(SCENES[name], directions(SCENES[name])[pixel]))))
-    assert found == certified[name]["pixels"][pixel]
+    certificate = json.loads(json.dumps(asdict(certify_pixel(SCENES[name], directions(SCENES[name])[pixel]))))
+    assert certificate == certified[name]["pixels"][pixel]
 
 
 @pytest.mark.claim("certified-fog", tolerance="none: equal digits")
@@ -140,7 +142,7 @@ def test_all_rays_come_out_the_same(certified, name):
 @pytest.mark.claim("certified-fog", tolerance="the bound of the pixel, 1e-9 of the largest at most")
 @pytest.mark.parametrize("name", NAMES)
 def test_quadrature_agrees_within_its_own_bound(variant, certified, name):
-    """The route that shares nothing: lit intervals of triangles and balls in a plane, panels of Kronrod in float64."""
+    """The route that shares nothing: lit intervals of triangles and spheres in a plane, Kronrod's panels in float64."""
     from reference.quadrature.image import quadrature_image
 
     image = quadrature_image(truth_of(certified[name]))
@@ -166,10 +168,10 @@ def test_single_scatter_agrees_within_its_noise(variant, certified, name):
 
     truth = truth_of(certified[name])
     batches = [single_scatter_batch(truth, seed, 256) for seed in range(24)]
-    found = batches[0]
+    pooled = batches[0]
     for batch in batches[1:]:
-        found = merged(found, batch)
-    totals = found.totals[:, 0] / radiance(certified[name]).mean(axis=0) - 1
+        pooled = merged(pooled, batch)
+    totals = pooled.totals[:, 0] / radiance(certified[name]).mean(axis=0) - 1
     error = totals.std(axis=0, ddof=1) / np.sqrt(len(totals))
     assert np.all(error < 2e-3)
     # Beside the noise the intensities, which this estimator asks Mitsuba for in float32.

@@ -53,23 +53,27 @@ def write(tmp_path):
 
 @pytest.mark.claim("engine-layers")
 def test_airlight_is_compared_where_there_is_one(scene, truth, write):
-    found = compare_scene(scene, write(airlight=truth.airlight, surface=2 * truth.surface))
-    assert (found.scene, found.size, found.expected, found.comparison.layer) == ("own", (16, 12), *["airlight"] * 2)
-    assert found.comparison.metrics.relative_rmse < 1e-6  # the file is float32
-    assert (found.failures, found.hints.words) == ((), ())
-    assert 0 <= found.truth_error < 1e-6
-    found = compare_scene(scene, write(airlight=truth.airlight, surface=2 * truth.surface), layer="surface")
-    np.testing.assert_allclose(found.comparison.metrics.relative_bias, 1, rtol=1e-6)
+    verdict = compare_scene(scene, write(airlight=truth.airlight, surface=2 * truth.surface))
+    assert (verdict.scene, verdict.size, verdict.expected, verdict.comparison.layer) == (
+        "own",
+        (16, 12),
+        *["airlight"] * 2,
+    )
+    assert verdict.comparison.metrics.relative_rmse < 1e-6  # the file is float32
+    assert (verdict.failures, verdict.hints.words) == ((), ())
+    assert 0 <= verdict.truth_error < 1e-6
+    verdict = compare_scene(scene, write(airlight=truth.airlight, surface=2 * truth.surface), layer="surface")
+    np.testing.assert_allclose(verdict.comparison.metrics.relative_bias, 1, rtol=1e-6)
 
 
 @pytest.mark.claim("engine-layers")
 def test_plain_channels_are_compared_with_all_light(scene, truth, write):
     total = truth_layer(truth, "total")
     for layers in ({"total": total}, {"Final__Combined": total}):
-        found = compare_scene(scene, write(**layers))
-        assert found.expected == "total"
-        assert found.comparison.metrics.relative_rmse < 1e-6
-    assert "airlight + surface, at pixel centres" in found.summary()
+        verdict = compare_scene(scene, write(**layers))
+        assert verdict.expected == "total"
+        assert verdict.comparison.metrics.relative_rmse < 1e-6
+    assert "airlight + surface, at pixel centres" in verdict.summary()
 
 
 def test_one_kind_of_light_alone_is_recognised(scene, truth, write):
@@ -94,10 +98,10 @@ def test_margin_decides_without_standard_errors(scene, truth, write):
 def test_standard_errors_of_the_file_are_used(scene, truth, write):
     error = 0.01 * truth.airlight
     noisy = truth.airlight + error * np.random.default_rng(6).standard_normal(error.shape)
-    found = compare_scene(scene, write(airlight=noisy, airlight_se=error), margin=0.01)
-    assert found.comparison.statistics is not None
-    assert found.comparison.statistics.equivalent
-    assert found.failures == ()
+    verdict = compare_scene(scene, write(airlight=noisy, airlight_se=error), margin=0.01)
+    assert verdict.comparison.statistics is not None
+    assert verdict.comparison.statistics.equivalent
+    assert verdict.failures == ()
 
 
 def test_pixels_can_be_means(scene, truth, write):
@@ -109,11 +113,16 @@ def test_pixels_can_be_means(scene, truth, write):
 
 
 def test_json_has_every_number_once(scene, truth, write):
-    found = compare_scene(scene, write(airlight=2 * truth.airlight), margin=0.5).to_json()
-    assert (found["scene"], found["size"], found["expected"], found["pixel"]) == ("own", [16, 12], "airlight", "centre")
-    np.testing.assert_allclose([found["factor"], found["relative_bias"]], [0.5, 1], rtol=1e-6)
-    assert "2 times as bright" in found["hints"][0]
-    assert found["failures"] == ["the relative bias, +1, is not within +-0.5"]
+    as_json = compare_scene(scene, write(airlight=2 * truth.airlight), margin=0.5).to_json()
+    assert (as_json["scene"], as_json["size"], as_json["expected"], as_json["pixel"]) == (
+        "own",
+        [16, 12],
+        "airlight",
+        "centre",
+    )
+    np.testing.assert_allclose([as_json["factor"], as_json["relative_bias"]], [0.5, 1], rtol=1e-6)
+    assert "2 times as bright" in as_json["hints"][0]
+    assert as_json["failures"] == ["the relative bias, +1, is not within +-0.5"]
 
 
 @pytest.mark.parametrize("size", [(32, 24), (16, 12), (64, 48), (31, 23), (33, 25), (8, 6), (1, 1)])

@@ -48,11 +48,11 @@ def test_the_right_image_raises_no_suspicion(truth):
     ],
 )
 def test_each_fault_is_named_and_nothing_else(truth, change, words):
-    found = find_hints(truth, change(truth)).words
-    assert len(found) == len(words)
-    for one, word in zip(found, words):
-        assert word in one
-    assert found[-1].endswith(f"instead of {relative_rmse(truth, change(truth)):.3g}")
+    hints = find_hints(truth, change(truth)).words
+    assert len(hints) == len(words)
+    for hint, word in zip(hints, words):
+        assert word in hint
+    assert hints[-1].endswith(f"instead of {relative_rmse(truth, change(truth)):.3g}")
 
 
 def relative_rmse(truth, image):

@@ -26,8 +26,8 @@ def test_files_are_found_by_the_name_of_their_scene(tmp_path):
     for name in ("open-fog.exr", "hall.godot.exr", "hall.unreal 5.4.exr", "hall.small.exr", "mine.EXR"):
         write(tmp_path, "x.exr").rename(tmp_path / name)
     (tmp_path / "notes.txt").write_text("not an image")
-    found = find_images(tmp_path, SCENES)
-    labels = {scene: [one.label for one in several] for scene, several in found.items()}
+    images = find_images(tmp_path, SCENES)
+    labels = {scene: [image.label for image in several] for scene, several in images.items()}
     assert labels == {
         "hall": ["godot", "unreal 5.4"],
         "hall.small": [tmp_path.name],
@@ -50,13 +50,13 @@ def test_a_folder_without_images_is_refused(tmp_path):
 
 
 def test_images_of_a_scene_have_one_size(tmp_path):
-    one, two = write(tmp_path, "hall.a.exr"), write(tmp_path, "hall.b.exr")
+    first, second = write(tmp_path, "hall.a.exr"), write(tmp_path, "hall.b.exr")
     images = tuple(find_images(tmp_path, SCENES)["hall"])
     assert images_size(images) == (6, 4)
-    write_exr(two, Image({"total": np.ones((4, 8, 3), dtype=np.float32)}))
+    write_exr(second, Image({"total": np.ones((4, 8, 3), dtype=np.float32)}))
     with pytest.raises(InputError, match=r"hall\.b\.exr is 8 x 4 pixels and .*hall\.a\.exr 6 x 4"):
         images_size(images)
-    assert one.is_file()
+    assert first.is_file()
 
 
 def shown(path):
@@ -65,20 +65,20 @@ def shown(path):
 
 def test_a_layer_of_airlight_is_judged_as_such(tmp_path):
     path = write(tmp_path, "hall.exr", airlight=1.1 * AIRLIGHT, surface=SURFACE)
-    found = measure_image(shown(path), TRUTH, surfaces=True)
-    assert found.layer == "airlight"
+    judged = measure_image(shown(path), TRUTH, surfaces=True)
+    assert judged.layer == "airlight"
     # The file holds float32: 6e-8.
-    assert found.error.relative_bias == pytest.approx(0.1, abs=1e-7)
-    assert found.surface_error.relative_rmse == pytest.approx(0, abs=1e-7)
-    np.testing.assert_allclose(found.light, 1.1 * AIRLIGHT + SURFACE, rtol=1e-6)
+    assert judged.error.relative_bias == pytest.approx(0.1, abs=1e-7)
+    assert judged.surface_error.relative_rmse == pytest.approx(0, abs=1e-7)
+    np.testing.assert_allclose(judged.light, 1.1 * AIRLIGHT + SURFACE, rtol=1e-6)
     assert measure_image(shown(path), TRUTH, surfaces=False).surface_error is None
 
 
 def test_plain_channels_are_judged_against_all_light(tmp_path):
     path = write(tmp_path, "hall.exr", total=0.9 * (AIRLIGHT + SURFACE))
-    found = measure_image(shown(path), TRUTH, surfaces=True)
-    assert (found.layer, found.surface_error) == ("total", None)
-    assert found.error.relative_bias == pytest.approx(-0.1, abs=1e-7)
+    judged = measure_image(shown(path), TRUTH, surfaces=True)
+    assert (judged.layer, judged.surface_error) == ("total", None)
+    assert judged.error.relative_bias == pytest.approx(-0.1, abs=1e-7)
 
 
 def test_what_the_reader_left_out_is_noted(tmp_path):
@@ -100,7 +100,7 @@ def test_a_file_without_any_light_is_refused(tmp_path):
 
 def test_there_is_no_flip_where_the_surface_is_missing(tmp_path):
     path = write(tmp_path, "hall.exr", airlight=AIRLIGHT)
-    found = measure_image(shown(path), TRUTH, surfaces=True)
-    assert image_flip(found, TRUTH) is None
+    judged = measure_image(shown(path), TRUTH, surfaces=True)
+    assert image_flip(judged, TRUTH) is None
     dark = SimpleNamespace(airlight=AIRLIGHT, surface=np.zeros(SHAPE))
-    assert image_flip(replace(found, surface_error=None), dark) is not None
+    assert image_flip(replace(judged, surface_error=None), dark) is not None

@@ -153,10 +153,10 @@ def test_zero_reference_and_both_variances_are_shown(pair):
 
 def test_all_metrics_are_those_of_their_modules(pair):
     comparison = compare_images(*pair, all_metrics=True, exposure=-1.0)
-    one, two = (image.layers["airlight"] for image in pair)
-    assert comparison.errors == published_errors(one, two)
-    assert comparison.errors_normalised == published_errors(one, two, unit=None)
-    assert comparison.colour == colour_difference(one, two, exposure=-1.0)
+    reference, test = (image.layers["airlight"] for image in pair)
+    assert comparison.errors == published_errors(reference, test)
+    assert comparison.errors_normalised == published_errors(reference, test, unit=None)
+    assert comparison.colour == colour_difference(reference, test, exposure=-1.0)
     values = json.loads(json.dumps(comparison.to_json(), allow_nan=False))
     assert values["errors"]["mrse_pbrt"] == comparison.errors.mrse_pbrt
     assert values["colour"]["exposure"] == -1

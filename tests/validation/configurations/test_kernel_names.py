@@ -13,9 +13,9 @@ def test_names_of_the_registry_are_their_functions():
 
 
 def test_number_behind_a_name_sets_the_first_parameter():
-    found = find_kernel("quadrature-24")
-    assert found.func is quadrature
-    assert found.keywords == {"nodes": 24}
+    kernel = find_kernel("quadrature-24")
+    assert kernel.func is quadrature
+    assert kernel.keywords == {"nodes": 24}
     assert find_kernel("taylor-6").keywords == {"degree": 6}
     # The longest name of the registry wins: 'quadrature-theta-8' is no 'quadrature' of size 'theta-8'.
     assert split_name("quadrature-theta-8") == (KERNELS["quadrature-theta"], 8)

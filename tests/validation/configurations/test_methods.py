@@ -88,19 +88,23 @@ def test_label_says_all(chosen, label):
 
 
 def test_standard_configurations_are_valid_and_tell_apart():
-    assert [configuration(one.method, one.kernel, dict(one.parameters)) for one in STANDARD] == list(STANDARD)
-    assert len({one.label for one in STANDARD}) == len(STANDARD)
+    assert [
+        configuration(standard.method, standard.kernel, dict(standard.parameters)) for standard in STANDARD
+    ] == list(STANDARD)
+    assert len({standard.label for standard in STANDARD}) == len(STANDARD)
 
 
 def test_every_method_has_a_standard_configuration():
-    assert {one.method for one in STANDARD} == set(METHODS)
-    assert {one.method for one in QUICK} == set(METHODS)
+    assert {standard.method for standard in STANDARD} == set(METHODS)
+    assert {standard.method for standard in QUICK} == set(METHODS)
     assert set(QUICK) <= set(STANDARD)
-    assert {one.kernel for one in STANDARD} - {None} <= set(KERNELS)
+    assert {standard.kernel for standard in STANDARD} - {None} <= set(KERNELS)
 
 
 def test_chosen_methods_bring_their_standard_configurations():
-    assert chosen_configurations(["unshadowed"]) == tuple(one for one in STANDARD if one.method == "unshadowed")
+    assert chosen_configurations(["unshadowed"]) == tuple(
+        standard for standard in STANDARD if standard.method == "unshadowed"
+    )
     assert set(chosen_configurations(list(METHODS))) == set(STANDARD)
     with refused("did you mean"):
         chosen_configurations(["unshadowed", "unshadwed"])

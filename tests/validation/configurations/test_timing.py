@@ -191,12 +191,12 @@ def test_a_slow_frame_is_timed_a_few_times(variant, monkeypatch, spent, turns):
         times.light_moved_camera_kept,
         times.colours_changed,
     )
-    assert {one.repetitions for one in each} == {turns}
+    assert {spread.repetitions for spread in each} == {turns}
     assert times.frame.median_ms <= times.light_moved.median_ms <= times.objects_moved.median_ms
     assert times.colours_changed.median_ms <= times.light_moved_camera_kept.median_ms
     if turns == 1:
         assert times.frame.median_ms == pytest.approx(times.surface.median_ms + times.airlight.median_ms)
-        assert all(one.low_ms == one.median_ms == one.high_ms for one in each)
+        assert all(spread.low_ms == spread.median_ms == spread.high_ms for spread in each)
 
 
 def test_frames_above_the_usual_limit_are_slow(variant, monkeypatch):

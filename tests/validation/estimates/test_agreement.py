@@ -32,12 +32,12 @@ def false_truth(monkeypatch, change):
 
 @pytest.mark.claim("volpath-agrees")
 def test_volpath_agrees_with_the_truth(scene):
-    found = agreement(scene, **BUDGET)
-    assert set(found) == {"airlight", "surface"}
-    for layer, one in found.items():
-        assert (one.layer, one.width, one.height, one.samples) == (layer, 24, 18, 64)
-        assert 32 <= one.batches <= 40
-        statistics = one.statistics
+    verdicts = agreement(scene, **BUDGET)
+    assert set(verdicts) == {"airlight", "surface"}
+    for layer, verdict in verdicts.items():
+        assert (verdict.layer, verdict.width, verdict.height, verdict.samples) == (layer, 24, 18, 64)
+        assert 32 <= verdict.batches <= 40
+        statistics = verdict.statistics
         # The half width is 0.7 %: a right truth would be called wrong once in 10 000 seeds, and the seeds are fixed.
         assert statistics.equivalent is True, layer
         assert statistics.rejected == 0
@@ -53,11 +53,11 @@ def test_volpath_agrees_with_the_truth(scene):
 def test_truth_that_is_five_per_cent_off_does_not_agree(scene, monkeypatch, layer, factor):
     """In one layer alone; the other one still agrees."""
     false_truth(monkeypatch, lambda image: replace(image, **{layer: factor * getattr(image, layer)}))
-    found = agreement(scene, **BUDGET)
-    assert found[layer].statistics.equivalent is False
-    assert found[layer].statistics.relative_bias == pytest.approx(1 / factor - 1, abs=0.015)
-    (other,) = set(found) - {layer}
-    assert found[other].statistics.equivalent is True
+    verdicts = agreement(scene, **BUDGET)
+    assert verdicts[layer].statistics.equivalent is False
+    assert verdicts[layer].statistics.relative_bias == pytest.approx(1 / factor - 1, abs=0.015)
+    (other,) = set(verdicts) - {layer}
+    assert verdicts[other].statistics.equivalent is True
 
 
 def test_truth_that_is_wrong_in_a_corner_is_rejected_there(scene, monkeypatch):
@@ -78,17 +78,17 @@ def test_leg_from_the_light_that_is_too_short_does_not_agree(scene, monkeypatch)
     import validation.estimates.agreement
 
     monkeypatch.setattr(validation.estimates.agreement, "measure_shadow_epsilon", lambda: 0.1)
-    found = agreement(scene, **BUDGET)
-    assert not any(one.statistics.equivalent for one in found.values())
-    assert found["airlight"].epsilon == 0.1
+    verdicts = agreement(scene, **BUDGET)
+    assert not any(verdict.statistics.equivalent for verdict in verdicts.values())
+    assert verdicts["airlight"].epsilon == 0.1
 
 
 @pytest.mark.claim("corrected-for-the-epsilon")
 def test_correction_for_the_epsilon_is_the_difference_of_the_two_biases(scene):
     """The truth of the shortened leg is brighter by about sigma_t epsilon r = 0.31 * 8.94e-4 * 2."""
-    for one in agreement(scene, **BUDGET).values():
-        shift = one.uncorrected_bias - one.statistics.relative_bias
-        assert shift == pytest.approx(0.31 * one.epsilon * 2, rel=0.5)
+    for verdict in agreement(scene, **BUDGET).values():
+        shift = verdict.uncorrected_bias - verdict.statistics.relative_bias
+        assert shift == pytest.approx(0.31 * verdict.epsilon * 2, rel=0.5)
 
 
 @pytest.mark.claim("pixels-beside-a-light")
@@ -96,10 +96,10 @@ def test_pixels_near_a_light_are_left_out(scene):
     from validation.estimates.quadrature import truth_image
 
     near = truth_image(scene).light_angle <= MASK_PIXELS * pixel_angle(read_truth(scene))
-    found = agreement(scene, **BUDGET)
-    assert found["airlight"].masked == near.sum()
+    verdicts = agreement(scene, **BUDGET)
+    assert verdicts["airlight"].masked == near.sum()
     assert 4 <= near.sum() <= 16  # a disc of two pixels' radius
-    assert found["surface"].masked == 0
+    assert verdicts["surface"].masked == 0
 
 
 def test_pixel_angle_is_that_of_the_middle(scene):
@@ -110,10 +110,10 @@ def test_pixel_angle_is_that_of_the_middle(scene):
 def test_scene_without_surfaces_has_the_airlight_alone(variant):
     import mitsuba as mi
 
-    found = agreement(mi.load_dict(tiny_scene(size=(12, 9), ball=None, floor=None)), margin=0.5, samples=4)
-    assert set(found) == {"airlight"}
+    verdicts = agreement(mi.load_dict(tiny_scene(size=(12, 9), ball=None, floor=None)), margin=0.5, samples=4)
+    assert set(verdicts) == {"airlight"}
     # A margin that wide is met at once: the least number of batches is what it takes.
-    assert found["airlight"].batches == 32
+    assert verdicts["airlight"].batches == 32
 
 
 def test_progress_is_told(variant):
@@ -136,14 +136,14 @@ def test_progress_is_told(variant):
 
 def test_out_of_time_is_said_and_is_no_verdict(scene, own_cache):
     """Two batches are traced whatever the time; they do not decide about a bias of one in ten million."""
-    found = agreement(scene, estimator="single-scatter", margin=1e-7, batches=40, samples=4, seconds=0.0)
-    assert {one.batches for one in found.values()} == {2}
-    assert not found["airlight"].finished
-    assert found["airlight"].statistics.equivalent is False
+    verdicts = agreement(scene, estimator="single-scatter", margin=1e-7, batches=40, samples=4, seconds=0.0)
+    assert {verdict.batches for verdict in verdicts.values()} == {2}
+    assert not verdicts["airlight"].finished
+    assert verdicts["airlight"].statistics.equivalent is False
 
 
 def test_what_became_narrow_enough_is_finished(scene):
-    assert all(one.finished for one in agreement(scene, **BUDGET).values())
+    assert all(verdict.finished for verdict in agreement(scene, **BUDGET).values())
     # Out of batches, not of time, before the interval was narrow: the same.
     short = agreement(scene, margin=1e-6, batches=3, samples=4)
     assert not short["airlight"].finished

@@ -60,12 +60,12 @@ def test_errors_by_hand():
     airlight_error = [[0.3, 0.0, 0.0], [0.4, 0.0, 0.0]]  # red: sqrt(0.09 + 0.16)/4; the worst is 0.3 of 1
     surface = [[5.0, 5.0, 5.0], [0.0, 5.0, 5.0]]
     surface_error = [[0.5, 0.0, 0.0], [0.0, 0.0, 0.5]]  # 0.5 of 5 and of 10
-    found = batches([airlight, surface], [airlight_error, surface_error])
-    errors = relative_errors(found, np.zeros(2, dtype=bool))
+    traced = batches([airlight, surface], [airlight_error, surface_error])
+    errors = relative_errors(traced, np.zeros(2, dtype=bool))
     assert errors.pooled == pytest.approx(0.125, rel=1e-12)
     assert errors.worst == pytest.approx(0.3, rel=1e-12)
     # Without the first pixel of the airlight: 0.4/3 pooled and worst.
-    errors = relative_errors(found, np.array([True, False]))
+    errors = relative_errors(traced, np.array([True, False]))
     assert (errors.pooled, errors.worst) == pytest.approx((0.4 / 3, 0.4 / 3), rel=1e-12)
 
 
@@ -74,27 +74,30 @@ def test_a_dim_pixel_counts_against_a_thousandth_of_the_mean():
     mean[:, 0] = 1e-9
     error = np.zeros_like(mean)
     error[0, 0] = 1e-6
-    found = relative_errors(batches(mean, error), np.zeros(1000, dtype=bool))
-    assert found.worst == pytest.approx(1e-6 / (1e-3 * 0.999), rel=1e-6)
+    errors = relative_errors(batches(mean, error), np.zeros(1000, dtype=bool))
+    assert errors.worst == pytest.approx(1e-6 / (1e-3 * 0.999), rel=1e-6)
 
 
 def test_the_unit_of_radiance_changes_nothing():
     rng = np.random.default_rng(5)
     mean, error = rng.exponential(size=(2, 9, 3)), rng.exponential(size=(2, 9, 3))
     near = np.zeros(9, dtype=bool)
-    one, two = relative_errors(batches(mean, error), near), relative_errors(batches(mean * 1e-30, error * 1e-30), near)
-    assert (two.pooled, two.worst) == pytest.approx((one.pooled, one.worst), rel=1e-9)
+    errors, rescaled = (
+        relative_errors(batches(mean, error), near),
+        relative_errors(batches(mean * 1e-30, error * 1e-30), near),
+    )
+    assert (rescaled.pooled, rescaled.worst) == pytest.approx((errors.pooled, errors.worst), rel=1e-9)
 
 
 @pytest.mark.parametrize("near", [[False, False], [True, True]])
 def test_no_light_has_no_error(near):
-    found = relative_errors(batches(np.zeros((2, 2, 3)), np.zeros((2, 2, 3))), np.array(near))
-    assert (found.pooled, found.worst) == (0.0, 0.0)
+    errors = relative_errors(batches(np.zeros((2, 2, 3)), np.zeros((2, 2, 3))), np.array(near))
+    assert (errors.pooled, errors.worst) == (0.0, 0.0)
 
 
 @pytest.mark.claim("pixels-beside-a-light")
 def test_pixels_beside_a_light_are_those_that_the_truth_names(variant):
-    """The same pixels as from the quadrature's own angles; a light in view, one behind us, one in the ball."""
+    """The same pixels as from the quadrature's own angles; a light in view, one behind us, one in the sphere."""
     import mitsuba as mi
 
     from reference.quadrature.surface import surface_hits

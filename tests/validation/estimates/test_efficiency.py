@@ -30,13 +30,15 @@ def _noise(deviation, seconds):
 
 def test_ratio_of_known_estimators():
     """Rationale: half the time and a tenth of the deviation make 200 times the efficiency."""
-    found = efficiency(_Truth(), {"good": (_noise(0.01, 0.01), 8), "bad": (_noise(0.1, 0.02), 8)}, EXPECTED, batches=24)
+    measured = efficiency(
+        _Truth(), {"good": (_noise(0.01, 0.01), 8), "bad": (_noise(0.1, 0.02), 8)}, EXPECTED, batches=24
+    )
     # 1800 values with 23 degrees of freedom each: the variances are good to 0.7 %; the sleeps to a few per cent.
-    assert found.fast.variance == pytest.approx(1e-4, rel=0.03)
-    assert found.slow.variance == pytest.approx(1e-2, rel=0.03)
-    assert found.ratio == pytest.approx(200, rel=0.2)
-    assert found.fast.variance_error < 0.05
-    assert "times faster (airlight, 600 pixels)" in efficiency_lines(found)[-1]
+    assert measured.fast.variance == pytest.approx(1e-4, rel=0.03)
+    assert measured.slow.variance == pytest.approx(1e-2, rel=0.03)
+    assert measured.ratio == pytest.approx(200, rel=0.2)
+    assert measured.fast.variance_error < 0.05
+    assert "times faster (airlight, 600 pixels)" in efficiency_lines(measured)[-1]
 
 
 def test_mask_leaves_pixels_out():
@@ -44,24 +46,26 @@ def test_mask_leaves_pixels_out():
     expected[3] = 0.0
     mask = np.ones((20, 30), dtype=bool)
     mask[5, :7] = False
-    found = efficiency(_Truth(), {"a": (_noise(0.01, 0), 8), "b": (_noise(0.1, 0), 8)}, expected, mask=mask, batches=4)
-    assert (found.pixels, found.masked) == (600 - 30 - 7, 7)
-    assert "7 next to a light left out" in efficiency_lines(found)[-1]
+    measured = efficiency(
+        _Truth(), {"a": (_noise(0.01, 0), 8), "b": (_noise(0.1, 0), 8)}, expected, mask=mask, batches=4
+    )
+    assert (measured.pixels, measured.masked) == (600 - 30 - 7, 7)
+    assert "7 next to a light left out" in efficiency_lines(measured)[-1]
 
 
 def test_estimator_without_noise_is_infinitely_better():
-    found = efficiency(_Truth(), {"exact": (_noise(0.0, 0), 1), "b": (_noise(0.1, 0), 1)}, EXPECTED, batches=4)
-    assert found.ratio == np.inf
+    measured = efficiency(_Truth(), {"exact": (_noise(0.0, 0), 1), "b": (_noise(0.1, 0), 1)}, EXPECTED, batches=4)
+    assert measured.ratio == np.inf
 
 
 def test_bad_arguments_are_refused():
-    one = (_noise(0.1, 0), 1)
+    estimator = (_noise(0.1, 0), 1)
     with pytest.raises(ValueError, match="got 1, wanted two"):
-        efficiency(_Truth(), {"one": one}, EXPECTED)
+        efficiency(_Truth(), {"one": estimator}, EXPECTED)
     with pytest.raises(ValueError, match="batches: got 3, wanted at least 4"):
-        efficiency(_Truth(), {"one": one, "two": one}, EXPECTED, batches=3)
+        efficiency(_Truth(), {"one": estimator, "two": estimator}, EXPECTED, batches=3)
     with pytest.raises(ValueError, match="'airlight' of the scene is black"):
-        efficiency(_Truth(), {"one": one, "two": one}, 0 * EXPECTED)
+        efficiency(_Truth(), {"one": estimator, "two": estimator}, 0 * EXPECTED)
 
 
 @pytest.mark.statistical
@@ -85,9 +89,9 @@ def test_single_scatter_against_volpath(variant):
     image = quadrature_image(truth)
     mask = image.light_angle > MASK_PIXELS * pixel_angle(truth)
     estimators = {"single-scatter": (single_scatter_batch, 64), "volpath": (volpath_batch, 64)}
-    found = efficiency(truth, estimators, image.airlight, mask=mask)
-    assert found.fast.name == "single-scatter"
-    assert found.ratio > 100
+    measured = efficiency(truth, estimators, image.airlight, mask=mask)
+    assert measured.fast.name == "single-scatter"
+    assert measured.ratio > 100
 
 
 def test_thin_fog_has_the_optical_depth_that_it_names(variant):

@@ -41,15 +41,15 @@ def loaded(variant, monkeypatch, own_cache, clock):
 
 def run(loaded, budget):
     told = []
-    found = monte_carlo_reference(loaded, "volpath", budget=budget, progress=lambda *args: told.append(args))
-    return found, told
+    reference = monte_carlo_reference(loaded, "volpath", budget=budget, progress=lambda *args: told.append(args))
+    return reference, told
 
 
 def test_progress_shows_the_error_falling_to_its_target(loaded):
     # One batch has the pooled error 0.4/sqrt(12) = 0.115, K batches 0.115/sqrt(K): some 133 for 0.01.
-    found, told = run(loaded, Budget(error=0.01))
-    batches = found.image.attributes["airlight:batches"]
-    assert found.reached
+    reference, told = run(loaded, Budget(error=0.01))
+    batches = reference.image.attributes["airlight:batches"]
+    assert reference.reached
     assert 100 < batches < 200
     assert batches % 8 == 0
     shares = [share for share, _ in told]
@@ -65,16 +65,16 @@ def test_progress_shows_the_error_falling_to_its_target(loaded):
 
 @pytest.mark.claim("targets-of-a-run")
 def test_no_run_stops_on_a_target_before_its_error_is_known(loaded):
-    found, _ = run(loaded, Budget(error=0.5))
-    assert found.image.attributes["airlight:batches"] == 32
+    reference, _ = run(loaded, Budget(error=0.5))
+    assert reference.image.attributes["airlight:batches"] == 32
 
 
 @pytest.mark.claim("targets-of-a-run")
 def test_time_budget_never_starts_a_batch_that_would_end_too_late(loaded):
-    found, told = run(loaded, Budget(seconds=10.5))
-    assert found.image.attributes["airlight:batches"] == 10
+    reference, told = run(loaded, Budget(seconds=10.5))
+    assert reference.image.attributes["airlight:batches"] == 10
     assert [share for share, _ in told] == pytest.approx([n / 10.5 for n in range(1, 11)])
-    assert found.reached is None
+    assert reference.reached is None
     again, told = run(loaded, Budget(seconds=3.2))
     # What is kept costs no time.
     assert (again.cached, again.image.attributes["airlight:batches"]) == (10, 13)
@@ -82,8 +82,8 @@ def test_time_budget_never_starts_a_batch_that_would_end_too_late(loaded):
 
 
 def test_two_batches_are_traced_however_short_the_time(loaded):
-    found, _ = run(loaded, Budget(seconds=0.1))
-    assert found.image.attributes["airlight:batches"] == 2
+    reference, _ = run(loaded, Budget(seconds=0.1))
+    assert reference.image.attributes["airlight:batches"] == 2
 
 
 def test_given_samples_count_up_to_one(loaded):

@@ -47,22 +47,22 @@ A, B, C = (range(4), "0-3"), ((4, 5, 9), "4-5,9"), ((6, 7, 8, 10, 11), "6-8,10-1
 
 @pytest.mark.claim("merge")
 def test_moments_are_those_of_all_batches():
-    found = merged_references([(words, reference(seeds, words)) for seeds, words in (A, B, C)])
+    merged = merged_references([(words, reference(seeds, words)) for seeds, words in (A, B, C)])
     means = batch_means(range(12))
     for number, name in enumerate(("airlight", "surface")):
-        np.testing.assert_allclose(found.layers[name], means[:, number].mean(axis=0), rtol=1e-13)
+        np.testing.assert_allclose(merged.layers[name], means[:, number].mean(axis=0), rtol=1e-13)
         error = means[:, number].std(axis=0, ddof=1) / np.sqrt(12)
-        np.testing.assert_allclose(found.layers[f"{name}_se"], error, rtol=1e-12)
+        np.testing.assert_allclose(merged.layers[f"{name}_se"], error, rtol=1e-12)
     expected = {"spp": 192, "batches": 12, "seed": 0, "seeds": "0-11", "merged": 3, "estimator": "volpath"}
-    assert {name: found.attributes[f"airlight:{name}"] for name in expected} == expected
+    assert {name: merged.attributes[f"airlight:{name}"] for name in expected} == expected
 
 
 def test_order_and_grouping_do_not_matter():
     files = [(words, reference(seeds, words)) for seeds, words in (A, B, C)]
-    one, two = merged_references(files), merged_references(files[::-1])
+    forwards, backwards = merged_references(files), merged_references(files[::-1])
     steps = merged_references([("ab", merged_references(files[:2])), files[2]])
-    for name, layer in one.layers.items():
-        np.testing.assert_array_equal(layer, two.layers[name])
+    for name, layer in forwards.layers.items():
+        np.testing.assert_array_equal(layer, backwards.layers[name])
         np.testing.assert_allclose(layer, steps.layers[name], rtol=1e-13)
     assert steps.attributes["airlight:seeds"] == "0-11"
 
@@ -72,11 +72,11 @@ def test_files_lose_only_their_rounding(tmp_path):
     for seeds, words in (A, B):
         write_exr(tmp_path / f"{words}.exr", reference(seeds, words))
         files.append((words, read_exr(tmp_path / f"{words}.exr")))
-    found = merged_references(files)
+    merged = merged_references(files)
     means = batch_means([*A[0], *B[0]])[:, 0]
     # Means and errors are rounded to float32 once, 6e-8; the error between the means takes the difference of two.
-    np.testing.assert_allclose(found.layers["airlight"], means.mean(axis=0), rtol=1e-7)
-    np.testing.assert_allclose(found.layers["airlight_se"], means.std(axis=0, ddof=1) / np.sqrt(7), rtol=1e-6)
+    np.testing.assert_allclose(merged.layers["airlight"], means.mean(axis=0), rtol=1e-7)
+    np.testing.assert_allclose(merged.layers["airlight_se"], means.std(axis=0, ddof=1) / np.sqrt(7), rtol=1e-6)
 
 
 @pytest.mark.claim("merge")

@@ -43,10 +43,10 @@ def volpath(scene, **options):
     return monte_carlo_batches(scene, "volpath", **({"samples": 4} | options))
 
 
-def assert_same(one, two):
+def assert_same(actual, expected):
     for field in fields(Batches):
-        np.testing.assert_array_equal(getattr(one, field.name), getattr(two, field.name), err_msg=field.name)
-        assert type(getattr(one, field.name)) is type(getattr(two, field.name))
+        np.testing.assert_array_equal(getattr(actual, field.name), getattr(expected, field.name), err_msg=field.name)
+        assert type(getattr(actual, field.name)) is type(getattr(expected, field.name))
 
 
 @pytest.mark.claim("runs-go-on", tolerance="none: equal")
@@ -65,14 +65,14 @@ def test_the_cache_never_changes_what_is_returned(scene, traced, monkeypatch, tm
 
 
 def test_moments_are_those_of_all_batches(scene, traced):
-    found = volpath(scene, batches=21, first_seed=5).batches
+    pooled = volpath(scene, batches=21, first_seed=5).batches
     means = np.stack(
         [validation.estimates.monte_carlo.volpath_batch(read_truth(scene), seed, 4).mean for seed in range(5, 26)]
     )
     # Sums of 21 numbers in another order: a few roundings.
-    np.testing.assert_allclose(found.mean, means.mean(axis=0), rtol=1e-13)
-    np.testing.assert_allclose(found.standard_error, means.std(axis=0, ddof=1) / np.sqrt(21), rtol=1e-12)
-    np.testing.assert_array_equal(found.totals, means.mean(axis=2))
+    np.testing.assert_allclose(pooled.mean, means.mean(axis=0), rtol=1e-13)
+    np.testing.assert_allclose(pooled.standard_error, means.std(axis=0, ddof=1) / np.sqrt(21), rtol=1e-12)
+    np.testing.assert_array_equal(pooled.totals, means.mean(axis=2))
 
 
 def test_full_blocks_are_kept_as_one_file(scene, traced):
@@ -111,12 +111,12 @@ def test_an_interrupted_run_goes_on_where_it_stopped(scene, traced, stop):
 
 
 def test_settings_are_kept_apart(scene, traced):
-    one = volpath(scene, batches=2)
+    plain = volpath(scene, batches=2)
     deep = volpath(scene, batches=2, max_depth=9)
     fine = volpath(scene, batches=2, samples=8)
     assert traced == [0, 1] * 3
-    assert not np.array_equal(one.batches.mean, deep.batches.mean)
-    assert not np.array_equal(one.batches.mean, fine.batches.mean)
+    assert not np.array_equal(plain.batches.mean, deep.batches.mean)
+    assert not np.array_equal(plain.batches.mean, fine.batches.mean)
 
 
 @pytest.mark.claim("damaged-cache")
@@ -133,9 +133,9 @@ def test_damage_is_found_counted_and_mended(scene, traced, damage, name):
         volpath(scene, batches=8, first_seed=16)
         content = bytearray((folder / ("000016-000023.npz" if "-" in name else "000008.npz")).read_bytes())
     path.write_bytes(content[: {"truncated": len(content) // 3, "empty": 0}.get(damage, len(content))])
-    found = volpath(scene, batches=11)
-    assert_same(found.batches, whole.batches)
-    assert found.damaged == 1
+    mended = volpath(scene, batches=11)
+    assert_same(mended.batches, whole.batches)
+    assert mended.damaged == 1
     assert volpath(scene, batches=11).damaged == 0
 
 
@@ -148,9 +148,9 @@ def test_numbers_edited_by_hand_are_not_believed(scene, traced):
         arrays = {name: stored[name] for name in stored.files}
     arrays["mean"][0, 0, 0] *= 1.001
     np.savez(path, **arrays)
-    found = volpath(scene, batches=BLOCK)
-    assert (found.damaged, found.cached) == (1, 0)
-    assert_same(found.batches, whole.batches)
+    mended = volpath(scene, batches=BLOCK)
+    assert (mended.damaged, mended.cached) == (1, 0)
+    assert_same(mended.batches, whole.batches)
 
 
 @pytest.mark.parametrize("failing", [2, 7])
@@ -177,14 +177,14 @@ def test_a_full_disk_says_what_was_kept(scene, traced, monkeypatch, failing):
 def test_enough_is_asked_at_the_end_of_blocks_and_sees_the_same_from_the_cache(scene, traced):
     asked = []
 
-    def enough(found):
-        asked.append(found)
-        return len(found.seeds) >= 16
+    def enough(batches):
+        asked.append(batches)
+        return len(batches.seeds) >= 16
 
     first = volpath(scene, batches=40, enough=enough)
     volpath(scene, batches=40)
     second = volpath(scene, batches=40, enough=enough)
-    assert [len(found.seeds) for found in asked] == [8, 16, 8, 16]
+    assert [len(batches.seeds) for batches in asked] == [8, 16, 8, 16]
     assert_same(asked[1], asked[3])
     assert_same(first.batches, second.batches)
 
@@ -192,7 +192,7 @@ def test_enough_is_asked_at_the_end_of_blocks_and_sees_the_same_from_the_cache(s
 def test_enough_needs_two_batches(scene, traced):
     """A first seed of 7 makes a first block of one batch, which has no standard error."""
     asked = []
-    volpath(scene, batches=20, first_seed=7, enough=lambda found: asked.append(len(found.seeds)))
+    volpath(scene, batches=20, first_seed=7, enough=lambda batches: asked.append(len(batches.seeds)))
     assert asked == [9, 17]
 
 
@@ -240,9 +240,9 @@ def test_single_scatter_goes_the_same_way(scene, own_cache):
     from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
 
     truth = read_truth(scene)
-    found = monte_carlo_batches(scene, "single-scatter", batches=3, samples=4, first_seed=2)
+    pooled = monte_carlo_batches(scene, "single-scatter", batches=3, samples=4, first_seed=2)
     batches = [single_scatter_batch(truth, seed, 4) for seed in (2, 3, 4)]
-    assert_same(found.batches, merged(merged(batches[0], batches[1]), batches[2]))
+    assert_same(pooled.batches, merged(merged(batches[0], batches[1]), batches[2]))
     assert next(cache_folder().iterdir()).name.startswith("single-scatter-")
 
 
@@ -287,28 +287,28 @@ def test_more_batches_add_to_those_that_are_there(scene, own_cache):
 
 @pytest.mark.claim("standard-errors")
 def test_mean_and_standard_error_are_those_of_the_batches(scene, own_cache):
-    found = volpath(scene, batches=4, first_seed=7).batches
+    pooled = volpath(scene, batches=4, first_seed=7).batches
     means = np.stack([volpath_batch(read_truth(scene), seed, 4).mean for seed in range(7, 11)])
-    np.testing.assert_allclose(found.mean, means.mean(axis=0), rtol=1e-12, atol=1e-15)
-    np.testing.assert_allclose(found.standard_error, means.std(axis=0, ddof=1) / 2, rtol=1e-9, atol=1e-12)
-    np.testing.assert_allclose(found.totals.mean(axis=0), found.mean.mean(axis=1), rtol=1e-12)
+    np.testing.assert_allclose(pooled.mean, means.mean(axis=0), rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(pooled.standard_error, means.std(axis=0, ddof=1) / 2, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(pooled.totals.mean(axis=0), pooled.mean.mean(axis=1), rtol=1e-12)
 
 
 def test_other_samples_and_seeds_are_kept_apart(scene, own_cache):
-    one = volpath(scene, batches=2).batches
-    two = volpath(scene, batches=2, samples=5).batches
-    three = volpath(scene, batches=2, first_seed=2).batches
-    assert (one.samples, two.samples) == (4, 5)
-    assert three.seeds == (2, 3)
-    assert not np.array_equal(one.mean, three.mean)
+    plain = volpath(scene, batches=2).batches
+    finer = volpath(scene, batches=2, samples=5).batches
+    later = volpath(scene, batches=2, first_seed=2).batches
+    assert (plain.samples, finer.samples) == (4, 5)
+    assert later.seeds == (2, 3)
+    assert not np.array_equal(plain.mean, later.mean)
 
 
 def test_enough_is_asked_at_every_eighth_batch(scene, own_cache):
     asked = []
 
-    def enough(found):
-        asked.append(len(found.seeds))
-        return len(found.seeds) >= 16
+    def enough(batches):
+        asked.append(len(batches.seeds))
+        return len(batches.seeds) >= 16
 
     assert len(volpath(scene, batches=40, samples=1, enough=enough).batches.seeds) == 16
     assert asked == [8, 16]

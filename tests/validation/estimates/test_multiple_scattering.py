@@ -26,7 +26,7 @@ def test_the_nth_scattering_grows_with_the_nth_power_of_the_albedo(variant):
     """With the same seed the same paths are traced, so this holds path by path, to float32 rounding."""
     full = [layers(0.8, depth)[0] for depth in (2, 3, 4)]
     half = [layers(0.4, depth)[0] for depth in (2, 3, 4)]
-    orders = [(one[0], one[1] - one[0], one[2] - one[1]) for one in (full, half)]
+    orders = [(sums[0], sums[1] - sums[0], sums[2] - sums[1]) for sums in (full, half)]
     for order, (of_full, of_half) in enumerate(zip(*orders), start=1):
         assert of_full.sum() > 0
         # Differences of float32 numbers: sums over 16 samples, relative 1e-6 of the whole.
@@ -34,9 +34,9 @@ def test_the_nth_scattering_grows_with_the_nth_power_of_the_albedo(variant):
 
 
 def test_more_scattering_adds_light_and_never_takes_any(variant):
-    one, two, many = (layers(0.9, depth)[0] for depth in (2, 3, 9))
-    assert (two - one).min() >= -1e-7 * one.max()
-    assert (many - two).min() >= -1e-6 * one.max()
+    single, double, many = (layers(0.9, depth)[0] for depth in (2, 3, 9))
+    assert (double - single).min() >= -1e-7 * single.max()
+    assert (many - double).min() >= -1e-6 * single.max()
 
 
 def test_black_surfaces_leave_the_airlight_alone(variant):
@@ -56,9 +56,9 @@ def test_share_grows_with_the_optical_depth(variant):
 
 @pytest.mark.claim("left-out-share")
 def test_a_medium_that_only_absorbs_has_no_share(variant):
-    found = multiple_scattering_share(scene(albedo=0.0), max_depth=3, batches=2, samples=4)
-    assert found.medium.value == 0.0
-    assert found.medium.interval == (0.0, 0.0)
+    share = multiple_scattering_share(scene(albedo=0.0), max_depth=3, batches=2, samples=4)
+    assert share.medium.value == 0.0
+    assert share.medium.interval == (0.0, 0.0)
 
 
 def test_one_scattering_is_refused(variant):

@@ -33,10 +33,10 @@ def computed(monkeypatch):
     return calls
 
 
-def assert_same(one, two):
-    for field in fields(one):
-        np.testing.assert_array_equal(getattr(one, field.name), getattr(two, field.name), err_msg=field.name)
-        assert type(getattr(one, field.name)) is type(getattr(two, field.name))
+def assert_same(actual, expected):
+    for field in fields(actual):
+        np.testing.assert_array_equal(getattr(actual, field.name), getattr(expected, field.name), err_msg=field.name)
+        assert type(getattr(actual, field.name)) is type(getattr(expected, field.name))
 
 
 def test_second_call_reads_the_same_numbers(scene, own_cache, computed):
@@ -70,10 +70,10 @@ def test_other_phase_function_has_another_truth(scene, own_cache, computed):
     import mitsuba as mi
 
     fog = tiny_scene()["fog"] | {"phase": {"type": "rayleigh"}}
-    one = truth_image(scene, samples=32)
-    two = truth_image(mi.load_dict(tiny_scene(size=(8, 6), fog=fog)), samples=32)
+    plain = truth_image(scene, samples=32)
+    rayleigh = truth_image(mi.load_dict(tiny_scene(size=(8, 6), fog=fog)), samples=32)
     assert len(computed) == 2
-    assert np.abs(two.airlight / one.airlight - 1).max() > 0.05
+    assert np.abs(rayleigh.airlight / plain.airlight - 1).max() > 0.05
 
 
 @pytest.mark.parametrize("damage", ["truncated", "bit flipped", "other arrays"])
@@ -127,10 +127,10 @@ def test_volpath_reference_has_layers_with_standard_errors(loaded, own_cache):
     from validation.estimates.images import volpath_reference
 
     image = volpath_reference(loaded, samples=3, seed=5)
-    found = monte_carlo_batches(loaded.scene, "volpath", batches=3, samples=1, first_seed=5).batches
+    batches = monte_carlo_batches(loaded.scene, "volpath", batches=3, samples=1, first_seed=5).batches
     assert set(image.layers) == {"airlight", "airlight_se", "surface", "surface_se"}
-    np.testing.assert_array_equal(image.layers["surface"].reshape(-1, 3), found.mean[1])
-    np.testing.assert_array_equal(image.layers["airlight_se"].reshape(-1, 3), found.standard_error[0])
+    np.testing.assert_array_equal(image.layers["surface"].reshape(-1, 3), batches.mean[1])
+    np.testing.assert_array_equal(image.layers["airlight_se"].reshape(-1, 3), batches.standard_error[0])
     attributes = image.attributes
     assert [attributes[f"airlight:{name}"] for name in ("estimator", "spp", "batches", "seed")] == ["volpath", 3, 3, 5]
     np.testing.assert_array_equal(image.depth, truth_image(loaded.scene, samples=16).distance)
@@ -162,8 +162,8 @@ def test_volpath_reference_compares_with_the_quadrature_by_its_standard_errors(l
     from validation.comparison.images import compare_images
     from validation.estimates.images import quadrature_reference, volpath_reference
 
-    found = compare_images(quadrature_reference(loaded), volpath_reference(loaded, samples=512), layer="surface")
-    assert found.statistics is not None
+    comparison = compare_images(quadrature_reference(loaded), volpath_reference(loaded, samples=512), layer="surface")
+    assert comparison.statistics is not None
     # 32 batches: the standard deviation of z is sqrt(31/29) = 1.03; some 60 values, so +-0.1.
-    assert found.statistics.z_std == pytest.approx(1.03, abs=0.35)
-    assert found.statistics.rejected == 0
+    assert comparison.statistics.z_std == pytest.approx(1.03, abs=0.35)
+    assert comparison.statistics.rejected == 0

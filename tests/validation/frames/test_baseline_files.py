@@ -117,8 +117,12 @@ def test_a_missing_baseline_fails():
 def test_configurations_and_baselines_without_each_other_fail():
     fewer = baseline()
     del fewer["configurations"]["good (exact)"]
-    assert [one.what for one in compare_baseline(baseline(1), fewer)] == ["a baseline without its configuration"]
-    assert [one.what for one in compare_baseline(fewer, baseline())] == ["a configuration without baseline"]
+    assert [difference.what for difference in compare_baseline(baseline(1), fewer)] == [
+        "a baseline without its configuration"
+    ]
+    assert [difference.what for difference in compare_baseline(fewer, baseline())] == [
+        "a configuration without baseline"
+    ]
 
 
 @pytest.mark.parametrize(
@@ -129,7 +133,7 @@ def test_configurations_and_baselines_without_each_other_fail():
     ],
 )
 def test_what_else_moves(path, value, words):
-    assert words in [one.what for one in compare_baseline(baseline(1), changed(path, value))]
+    assert words in [difference.what for difference in compare_baseline(baseline(1), changed(path, value))]
 
 
 def test_files_are_small_text_with_a_number_on_a_line(tmp_path):
@@ -230,16 +234,18 @@ def measured(monkeypatch, tmp_path):
     import validation.frames.baseline_files
     import validation.frames.baseline_runs
 
-    found = baseline() | {"scene": "open-fog"}
+    measurement = baseline() | {"scene": "open-fog"}
     monkeypatch.setattr(reports.machine.environment, "activate", lambda: "llvm_ad_rgb")
-    monkeypatch.setattr(validation.frames.baseline_runs, "measure_baseline", lambda name, **_: copy.deepcopy(found))
+    monkeypatch.setattr(
+        validation.frames.baseline_runs, "measure_baseline", lambda name, **_: copy.deepcopy(measurement)
+    )
     monkeypatch.setattr(validation.frames.baseline_files, "FOLDER", tmp_path)
     for name in ("read_baseline", "write_baseline"):
         function = getattr(validation.frames.baseline_files, name)
         monkeypatch.setattr(
-            validation.frames.baseline_files, name, lambda one, function=function: function(one, tmp_path)
+            validation.frames.baseline_files, name, lambda scene, function=function: function(scene, tmp_path)
         )
-    return found
+    return measurement
 
 
 def test_the_command_from_the_first_baseline_to_a_moved_one(measured, tmp_path, capsys):

@@ -66,7 +66,7 @@ def test_error_is_that_of_the_frame_against_the_truth(loaded, measured):
 
 
 def test_surface_is_compared_too(measured):
-    # A pixel at the rim of the ball may see it with one method's rays and the floor with the other's.
+    # A pixel at the rim of the sphere may see it with one method's rays and the floor with the other's.
     assert measured[MARCH].surface_error.p50 < 1e-4
     assert measured[MARCH].surface_error.relative_bias == pytest.approx(0, abs=0.02)
 
@@ -79,11 +79,11 @@ def test_other_size_is_timed_without_changing_what_is_compared(loaded, measured,
 
     large = read_scene(mi.load_dict(tiny_scene(size=(160, 120))))
     scene, truth = read_scene(loaded.scene), truth_image(loaded.scene)
-    found = measure(scene, MARCH, truth=truth, timed=large, seconds=0.02)
-    assert found.frame.airlight.shape == (12, 16, 3)
-    assert found.error == measured[MARCH].error
+    measurement = measure(scene, MARCH, truth=truth, timed=large, seconds=0.02)
+    assert measurement.frame.airlight.shape == (12, 16, 3)
+    assert measurement.error == measured[MARCH].error
     # A hundred times the pixels; small frames cost a constant, so that much less than 100 is left of it.
-    assert found.times.airlight.median_ms > 2 * measured[MARCH].times.airlight.median_ms
+    assert measurement.times.airlight.median_ms > 2 * measured[MARCH].times.airlight.median_ms
 
 
 @pytest.mark.claim("refusals-stand-in-the-report")
@@ -99,31 +99,33 @@ def test_refusal_is_kept_and_not_raised(variant):
             size=(4, 3), fog=tiny_scene()["fog"] | {"phase": {"type": "tabphase", "values": "0.3, 0.2, 0.4, 0.9, 2.0"}}
         )
     )
-    found = measure(read_scene(scene), Configuration("unshadowed", "taylor"), truth=truth_image(scene, samples=16))
-    assert found.frame is None
-    assert found.times is None
-    assert found.error is None
-    assert "tab" in found.refused
-    assert "\n" not in found.refused
+    measurement = measure(
+        read_scene(scene), Configuration("unshadowed", "taylor"), truth=truth_image(scene, samples=16)
+    )
+    assert measurement.frame is None
+    assert measurement.times is None
+    assert measurement.error is None
+    assert "tab" in measurement.refused
+    assert "\n" not in measurement.refused
 
 
 def test_bench_measures_one_after_the_other_and_tells(loaded):
     told = []
-    found = list(bench(loaded, [UNSHADOWED, MARCH], progress=lambda *args: told.append(args)))
-    assert [one.configuration for _, one in found] == [UNSHADOWED, MARCH]
+    measurements = list(bench(loaded, [UNSHADOWED, MARCH], progress=lambda *args: told.append(args)))
+    assert [measurement.configuration for _, measurement in measurements] == [UNSHADOWED, MARCH]
     assert told == [(1, 2, "tiny"), (2, 2, "tiny")]
-    assert found[0][0].camera.width == 16
+    assert measurements[0][0].camera.width == 16
 
 
 def test_variants_of_shadows_are_left_out_where_nothing_casts_one():
     assert configurations_for(replace(FEATURES, bounded=True, clear=True)) == STANDARD
     unbounded = configurations_for(FEATURES)
-    (left_out,) = (one for one in STANDARD if one not in unbounded)
+    (left_out,) = (configuration for configuration in STANDARD if configuration not in unbounded)
     assert dict(left_out.parameters) == {"media": "paper"}
     left = configurations_for(replace(FEATURES, shadows=False))
     assert 0 < len(left) < len(STANDARD)
-    assert all(not {"shadow", "map"} & set(dict(one.parameters)) for one in left)
-    assert {one.method for one in left} == {one.method for one in STANDARD}
+    assert all(not {"shadow", "map"} & set(dict(configuration.parameters)) for configuration in left)
+    assert {configuration.method for configuration in left} == {configuration.method for configuration in STANDARD}
 
 
 def test_configuration_says_whether_it_knows_shadows():
@@ -190,18 +192,18 @@ def probed(loaded, monkeypatch, chosen, *, seconds, limit):
 
 def test_what_would_take_too_long_is_left_out_with_what_it_would_take(loaded, monkeypatch):
     # 16 x 12 pixels are four times 8 x 6: 0.05 s there are at least 0.2 s here.
-    found = probed(loaded, monkeypatch, MARCH, seconds=0.05, limit=0.1)
-    assert found.left_out
-    assert found.frame is found.times is found.error is None
-    assert "by a frame of 8 x 6 pixels" in found.refused
-    assert "more than the limit of 0.1 s" in found.refused
+    measurement = probed(loaded, monkeypatch, MARCH, seconds=0.05, limit=0.1)
+    assert measurement.left_out
+    assert measurement.frame is measurement.times is measurement.error is None
+    assert "by a frame of 8 x 6 pixels" in measurement.refused
+    assert "more than the limit of 0.1 s" in measurement.refused
 
 
 def test_what_takes_less_than_the_limit_is_measured(loaded, monkeypatch):
-    found = probed(loaded, monkeypatch, MARCH, seconds=0.05, limit=60.0)
-    assert not found.left_out
-    assert found.refused is None
-    assert found.error.relative_rmse < 0.02
+    measurement = probed(loaded, monkeypatch, MARCH, seconds=0.05, limit=60.0)
+    assert not measurement.left_out
+    assert measurement.refused is None
+    assert measurement.error.relative_rmse < 0.02
 
 
 def test_a_quick_preparation_asks_for_no_small_frame(loaded, measured, monkeypatch):

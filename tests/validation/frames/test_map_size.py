@@ -24,9 +24,9 @@ def small_scene(**changes):
 
 def test_slope_of_a_power_is_its_exponent():
     sizes = np.array([32, 64, 256, 4096])
-    found = fitted_slope(sizes, 3.1 * sizes**-1.7)
-    assert found.order == pytest.approx(1.7, rel=1e-12)
-    assert found.standard_error < 1e-12
+    fit = fitted_slope(sizes, 3.1 * sizes**-1.7)
+    assert fit.order == pytest.approx(1.7, rel=1e-12)
+    assert fit.standard_error < 1e-12
     assert math.isnan(fitted_slope(sizes[:2], [0.2, 0.1]).standard_error)
 
 
@@ -36,9 +36,9 @@ def test_slope_agrees_with_linear_regression():
     rng = np.random.default_rng(6)
     sizes = 2.0 ** np.arange(5, 13)
     errors = sizes**-0.8 * np.exp(0.2 * rng.normal(size=8))
-    found, other = fitted_slope(sizes, errors), linregress(np.log(sizes), np.log(errors))
-    assert found.order == pytest.approx(-other.slope, rel=1e-12)
-    assert found.standard_error == pytest.approx(other.stderr, rel=1e-12)
+    fit, regression = fitted_slope(sizes, errors), linregress(np.log(sizes), np.log(errors))
+    assert fit.order == pytest.approx(-regression.slope, rel=1e-12)
+    assert fit.standard_error == pytest.approx(regression.stderr, rel=1e-12)
 
 
 def test_what_has_no_logarithm_is_left_out():
@@ -51,12 +51,12 @@ def test_what_has_no_logarithm_is_left_out():
 def test_errors_of_a_map_are_of_first_order(variant, lamp):
     """The scatter of an order fitted to these 768 pixels is 0.04; grazing rays take up to 0.1 from 1."""
     scene = small_scene(**({"lamp": spot()} if lamp == "spot" else {}))
-    found = map_errors(scene, "ray-march", parameters=MARCH, sizes=(16, 32, 64, 128, 256))
-    assert found.sizes == (16, 32, 64, 128, 256)
-    assert found.slope.order == pytest.approx(1, abs=0.2)
-    assert 0 < found.slope.standard_error < 0.1
-    assert found.errors[0] < 0.04
-    assert all(metrics.nonfinite == 0 for metrics in found.metrics)
+    study = map_errors(scene, "ray-march", parameters=MARCH, sizes=(16, 32, 64, 128, 256))
+    assert study.sizes == (16, 32, 64, 128, 256)
+    assert study.slope.order == pytest.approx(1, abs=0.2)
+    assert 0 < study.slope.standard_error < 0.1
+    assert study.errors[0] < 0.04
+    assert all(metrics.nonfinite == 0 for metrics in study.metrics)
 
 
 @pytest.mark.claim("error-by-size-of-the-map", tolerance="order 1 within 0.2")
@@ -75,8 +75,8 @@ def test_errors_of_the_height_field_are_of_first_order(variant):
 
 def test_too_few_steps_hide_the_order(variant):
     """Sixteen steps leave an error of their own, which no map mends."""
-    found = map_errors(small_scene(), "ray-march", parameters=MARCH | {"steps": 16}, sizes=(64, 128, 256))
-    assert found.slope.order < 0.5
+    study = map_errors(small_scene(), "ray-march", parameters=MARCH | {"steps": 16}, sizes=(64, 128, 256))
+    assert study.slope.order < 0.5
 
 
 @pytest.mark.claim("flicker", tolerance="order 1/2 within 0.2")
@@ -84,29 +84,29 @@ def test_too_few_steps_hide_the_order(variant):
 def test_flicker_of_fractions_of_a_texel_is_of_order_one_half(variant, lamp):
     """A share of the edges jumps a frame: the fits of three steps and two lights scatter by 0.06 about 0.5."""
     scene = small_scene(**({"lamp": spot()} if lamp == "spot" else {}))
-    found = map_flicker(scene, "ray-march", parameters=MARCH, sizes=(32, 64, 128, 256), frames=17, step=2e-3)
-    assert found.texels == pytest.approx([2e-3 * size / 2 for size in found.sizes], rel=1e-3)
-    assert max(found.texels) < 0.3
-    assert found.slope.order == pytest.approx(0.5, abs=0.2)
-    assert found.nonfinite == 0
+    study = map_flicker(scene, "ray-march", parameters=MARCH, sizes=(32, 64, 128, 256), frames=17, step=2e-3)
+    assert study.texels == pytest.approx([2e-3 * size / 2 for size in study.sizes], rel=1e-3)
+    assert max(study.texels) < 0.3
+    assert study.slope.order == pytest.approx(0.5, abs=0.2)
+    assert study.nonfinite == 0
 
 
 @pytest.mark.claim("flicker", tolerance="0.8 to 1.1 of sqrt(2)")
 def test_flicker_over_texels_is_that_of_independent_frames(variant):
     """The difference of two independent errors has sqrt(2) of their RMS; the few frames here have much in common."""
-    found = map_flicker(small_scene(), "ray-march", parameters=MARCH, sizes=(128, 256), frames=7, step=0.05)
-    assert min(found.texels) > 3
-    for flicker, error in zip(found.flicker, found.errors, strict=True):
+    study = map_flicker(small_scene(), "ray-march", parameters=MARCH, sizes=(128, 256), frames=7, step=0.05)
+    assert min(study.texels) > 3
+    for flicker, error in zip(study.flicker, study.errors, strict=True):
         assert 0.8 * math.sqrt(2) < flicker / error < 1.1 * math.sqrt(2)
 
 
 def test_no_shadow_no_flicker(variant):
     """Without occluders the image changes as the truth does, but for the float32 sum of the steps."""
     scene = small_scene(ball=None, floor=None)
-    found = map_flicker(scene, "ray-march", parameters=MARCH, sizes=(32,), frames=3, step=1e-2)
-    assert found.flicker[0] < 1e-5
-    assert found.truth_change > 0.01
-    assert math.isnan(found.slope.order)
+    study = map_flicker(scene, "ray-march", parameters=MARCH, sizes=(32,), frames=3, step=1e-2)
+    assert study.flicker[0] < 1e-5
+    assert study.truth_change > 0.01
+    assert math.isnan(study.slope.order)
 
 
 def test_what_cannot_be_studied_is_refused(variant):
@@ -128,6 +128,6 @@ def test_what_cannot_be_studied_is_refused(variant):
 def test_a_sun_moves_in_the_truth_too(variant):
     from validation.scenes.loading import load_scene
 
-    found = map_flicker(load_scene("windows", (16, 12)).scene, "ray-march", parameters=MARCH, sizes=(64,), frames=3)
-    assert found.truth_change > 1e-4  # of the mean: the shafts moved
-    assert found.nonfinite == 0
+    study = map_flicker(load_scene("windows", (16, 12)).scene, "ray-march", parameters=MARCH, sizes=(64,), frames=3)
+    assert study.truth_change > 1e-4  # of the mean: the shafts moved
+    assert study.nonfinite == 0

@@ -18,17 +18,17 @@ def study(cases):
         patch.setattr("validation.frames.plane_stability.hard_cases", lambda: cases)
         result = plane_stability(size=(20, 16), progress=lambda *progress: told.append(progress))
     assert [done for done, *_ in told] == list(range(len(cases)))
-    assert {one.case for one in result} == set(cases)
+    assert {row.case for row in result} == set(cases)
     return result
 
 
 @pytest.fixture(scope="module")
-def found(variant):
+def rows(variant):
     return study({name: hard_cases()[name] for name in FEW})
 
 
-def test_default_keeps_its_bar(found):
-    assert broken(found) == []
+def test_default_keeps_its_bar(rows):
+    assert broken(rows) == []
 
 
 @pytest.mark.slow
@@ -39,20 +39,20 @@ def test_default_keeps_its_bar_in_every_case(variant):
         assert_gamma_loses_more(every, case)
 
 
-def test_float64_of_either_sum_is_the_truth(found):
+def test_float64_of_either_sum_is_the_truth(rows):
     """What float64 leaves is the kernel's tolerance and float32 distances to surfaces."""
-    assert max(one.p99 for one in found if one.precision == "double") < 1e-6
+    assert max(row.p99 for row in rows if row.precision == "double") < 1e-6
 
 
 @pytest.mark.claim("differences-of-gamma")
 @pytest.mark.parametrize("case", FEW)
-def test_adding_up_gamma_loses_more(found, case):
+def test_adding_up_gamma_loses_more(rows, case):
     """Cancellation: little within a segment, whose two Gammas share their rounding, much where all planes add up."""
-    assert_gamma_loses_more(found, case)
+    assert_gamma_loses_more(rows, case)
 
 
-def assert_gamma_loses_more(found, case):
-    by_sum = {one.sum: one for one in found if one.case == case and one.precision == "single"}
+def assert_gamma_loses_more(rows, case):
+    by_sum = {row.sum: row for row in rows if row.case == case and row.precision == "single"}
     assert by_sum["gamma"].p99 > by_sum["segments"].p99
     assert by_sum["planes"].p99 > 20 * by_sum["segments"].p99
 
@@ -61,15 +61,15 @@ def test_errors_are_counted_in_units_of_the_true_value():
     truth = np.full((2, 5), 2.0)
     image = truth.copy()
     image[0, :3] = 2.0 + 2e-3, -1.0, np.nan
-    one = _compared(("case", "segments", "single"), image, truth, scale=truth)
-    assert (one.pixels, one.beyond, one.negative, one.nonfinite, one.max, one.median) == (10, 2, 1, 1, 1.5, 0.0)
-    words = broken([one, replace(one, sum="gamma")])
+    row = _compared(("case", "segments", "single"), image, truth, scale=truth)
+    assert (row.pixels, row.beyond, row.negative, row.nonfinite, row.max, row.median) == (10, 2, 1, 1, 1.5, 0.0)
+    words = broken([row, replace(row, sum="gamma")])
     assert len(words) == 3
     assert any("case, single: 1 negative" in line for line in words)
 
 
-def test_table_names_what_is_broken(found, capsys):
-    print_plane_stability(plain(found), ["deep stack, single: 3 negative"])
+def test_table_names_what_is_broken(rows, capsys):
+    print_plane_stability(plain(rows), ["deep stack, single: 3 negative"])
     text = capsys.readouterr().out
     assert "deep stack" in text
     assert "BROKEN: shadow planes, deep stack, single: 3 negative" in text

@@ -116,14 +116,14 @@ def test_an_exception_leaves_nothing(own_cache):
 
 
 def test_source_is_digested_by_content_and_name(tmp_path):
-    one, two = tmp_path / "one.py", tmp_path / "two.py"
-    one.write_text("x = 1\n")
-    two.write_text("x = 1\n")
-    assert source_digest([one]) != source_digest([two])
-    before = source_digest([one, two])
-    assert source_digest([two, one]) == before
-    two.write_text("x = 2\n")
-    assert source_digest([one, two]) != before
+    first, second = tmp_path / "one.py", tmp_path / "two.py"
+    first.write_text("x = 1\n")
+    second.write_text("x = 1\n")
+    assert source_digest([first]) != source_digest([second])
+    before = source_digest([first, second])
+    assert source_digest([second, first]) == before
+    second.write_text("x = 2\n")
+    assert source_digest([first, second]) != before
 
 
 def test_every_side_that_computes_is_part_of_the_source():

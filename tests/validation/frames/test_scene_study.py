@@ -25,7 +25,7 @@ def test_every_effort_studies_scenes_that_there_are():
 )
 def test_flip_is_asked_for_by_kind(flip, count):
     effort = replace(TINY, flip=flip)
-    assert sum(wants_flip(effort, one) for one in {*QUICK, *STANDARD, OWN}) == count
+    assert sum(wants_flip(effort, configuration) for configuration in {*QUICK, *STANDARD, OWN}) == count
 
 
 def test_flip_is_computed_where_it_is_asked_for_and_there_is_a_frame(monkeypatch):
@@ -39,9 +39,11 @@ def test_flip_is_computed_where_it_is_asked_for_and_there_is_a_frame(monkeypatch
         Measurement(Configuration("ray-march", None, (("steps", 3),)), frame, None, None, None),
     ]
     truth = SimpleNamespace(airlight=black + 5, surface=black)
-    found = with_flips(SimpleNamespace(effort=replace(TINY, flip="kinds"), truth=truth), measured, workers=2)
-    assert [one.flip for one in found] == ["flip", None, None]
-    assert [one.configuration for one in found] == [one.configuration for one in measured]
+    complete = with_flips(SimpleNamespace(effort=replace(TINY, flip="kinds"), truth=truth), measured, workers=2)
+    assert [measurement.flip for measurement in complete] == ["flip", None, None]
+    assert [measurement.configuration for measurement in complete] == [
+        measurement.configuration for measurement in measured
+    ]
     assert asked == [(5.0, 3.0)]
 
 
@@ -59,9 +61,9 @@ def test_frames_are_timed_at_their_own_size(variant):
 
 
 def test_the_digest_is_that_of_the_content(variant):
-    one, two = (open_study(name, TINY).digest for name in ("open-fog", "sphere-spot"))
-    assert one != two
-    assert one == open_study("open-fog", TINY).digest
+    open_fog, sphere_spot = (open_study(name, TINY).digest for name in ("open-fog", "sphere-spot"))
+    assert open_fog != sphere_spot
+    assert open_fog == open_study("open-fog", TINY).digest
 
 
 def test_without_patience_the_clock_decides_nothing(variant, own_cache, monkeypatch):
@@ -79,4 +81,4 @@ def test_without_patience_the_clock_decides_nothing(variant, own_cache, monkeypa
     assert quiet
     assert busy == quiet
     impatient = study.check_truth(open_study("open-fog", replace(TINY, margins={"volpath": 1e-6}, patience=1.0)))
-    assert not any(one.finished for one in impatient.values())
+    assert not any(verdict.finished for verdict in impatient.values())

@@ -18,7 +18,7 @@ def kernels(renderer):
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
         dr.kernel_history_clear()
         run_stages(renderer, ready)
-        return [(one["type"], one.get("hash"), one["size"]) for one in dr.kernel_history()]
+        return [(kernel["type"], kernel.get("hash"), kernel["size"]) for kernel in dr.kernel_history()]
 
 
 @pytest.mark.claim("without-occluders")
@@ -29,10 +29,10 @@ def test_without_casters_shadow_planes_run_the_kernels_of_unshadowed(variant):
 
     scene = read_scene(load_scene("open-fog", (16, 12)).scene)
     planes, plain = (prepared(scene, Configuration(method, "exact")) for method in ("shadow-planes", "unshadowed"))
-    found = kernels(planes)
-    assert found
+    recorded = kernels(planes)
+    assert recorded
     # The numbers of the pixels come from NumPy: with the alignment of that memory the code that loads them differs.
-    assert found == kernels(replace(plain, pixel=planes.pixel))
+    assert recorded == kernels(replace(plain, pixel=planes.pixel))
 
 
 @pytest.mark.claim("not-needed-costs-nothing")

@@ -23,21 +23,21 @@ COSTS = (
 )
 
 
-def level(found, statistic, value):
-    return next(one for one in found if one.statistic == statistic and one.level == value)
+def level(levels, statistic, value):
+    return next(entry for entry in levels if entry.statistic == statistic and entry.level == value)
 
 
 def test_cheapest_kernel_of_each_level_and_what_its_rivals_cost():
-    found = speed_against_error(COSTS)
-    assert len(found) == 12
-    coarse, fine, finest = (level(found, "max", value) for value in (1e-1, 1e-2, 1e-6))
+    levels = speed_against_error(COSTS)
+    assert len(levels) == 12
+    coarse, fine, finest = (level(levels, "max", value) for value in (1e-1, 1e-2, 1e-6))
     assert (coarse.cheapest, coarse.rivals) == ("table-64", {"uniform": "uniform-1000", "table": "table-64"})
     assert coarse.ratios == {"uniform": 250.0, "table": 1.0}
     assert (fine.cheapest, fine.ratios) == ("quadrature-8", {"uniform": 200.0, "table": None})
     assert (finest.cheapest, finest.ns, finest.ratios) == (None, None, {"uniform": None, "table": None})
     # 99 % of the rays are ten times better here.
-    assert level(found, "p99", 1e-1).rivals["uniform"] == "uniform-100"
-    assert level(found, "p99", 1e-6).cheapest == "quadrature-16"
+    assert level(levels, "p99", 1e-1).rivals["uniform"] == "uniform-100"
+    assert level(levels, "p99", 1e-6).cheapest == "quadrature-16"
 
 
 def test_level_at_the_error_itself_is_reached():
@@ -50,15 +50,15 @@ def test_values_that_are_not_finite_reach_no_level():
 
 
 def test_wall_clock_stands_in_where_the_device_does_not_tell():
-    one = cost("table", 64, 4.0, 0.05, device=None, wall=Spread(6.0, 5.0, 7.0, 5))
-    assert one.ns == 6.0
+    timed = cost("table", 64, 4.0, 0.05, device=None, wall=Spread(6.0, 5.0, 7.0, 5))
+    assert timed.ns == 6.0
 
 
 def test_phase_functions_are_judged_apart():
     other = KernelCost("x", "x", None, "hg", 0.8, 10, None, Spread(1.0, 1.0, 1.0, 5), 1e-8, 1e-8, 1e-8)
-    found = speed_against_error([*COSTS, other])
-    assert len(found) == 24
-    assert {one.phase for one in found if one.cheapest == "x"} == {"hg"}
+    levels = speed_against_error([*COSTS, other])
+    assert len(levels) == 24
+    assert {entry.phase for entry in levels if entry.cheapest == "x"} == {"hg"}
 
 
 def test_measured_errors_and_times_are_those_of_the_kernel(variant):
@@ -76,15 +76,15 @@ def test_measured_errors_and_times_are_those_of_the_kernel(variant):
 
 def test_refusing_kernel_is_recorded(variant):
     truth = wide_rays(64, "tabulated")
-    found = measure("taylor", 4, truth=truth, timed=truth, seconds=0.01)
-    assert "tabulated" in found.refused
-    assert (found.ns, found.max) == (None, None)
+    measured = measure("taylor", 4, truth=truth, timed=truth, seconds=0.01)
+    assert "tabulated" in measured.refused
+    assert (measured.ns, measured.max) == (None, None)
 
 
 def test_kernels_with_tables_can_be_frozen(variant):
-    found = measure("table", 32, truth=wide_rays(64), timed=wide_rays(256, truth=False), seconds=0.01)
-    assert found.refused is None
-    assert found.ns > 0
+    measured = measure("table", 32, truth=wide_rays(64), timed=wide_rays(256, truth=False), seconds=0.01)
+    assert measured.refused is None
+    assert measured.ns > 0
 
 
 def test_long_work_is_done_on_fewer_rays_or_extrapolated(variant):
@@ -108,14 +108,14 @@ def test_names_stand_for_all_sizes_or_one(variant, monkeypatch):
     monkeypatch.setitem(kernel_bench.SIZES, "nodes", (2, 8))
     monkeypatch.setattr(kernel_bench, "ERROR_RAYS", 64)
     told = []
-    found = bench_kernels(
+    study = bench_kernels(
         ["quadrature", "taylor-3"],
         phases=(("isotropic", 0.0), ("rayleigh", 0.0)),
         rays=256,
         seconds=0.01,
         progress=lambda *progress: told.append(progress),
     )
-    assert [(one.kernel, one.phase) for one in found.costs] == [
+    assert [(row.kernel, row.phase) for row in study.costs] == [
         ("quadrature-2", "isotropic"),
         ("quadrature-8", "isotropic"),
         ("quadrature-16", "isotropic"),
@@ -130,12 +130,12 @@ def test_names_stand_for_all_sizes_or_one(variant, monkeypatch):
 def test_sizes_that_a_kernel_does_not_have_are_left_out(variant, monkeypatch):
     monkeypatch.setitem(kernel_bench.SIZES, "degree", (4, 6))
     monkeypatch.setattr(kernel_bench, "ERROR_RAYS", 64)
-    found = bench_kernels(["taylor-printed"], phases=(("isotropic", 0.0), ("hg", 0.5)), rays=256, seconds=0.01)
-    assert [(one.kernel, one.phase) for one in found.costs] == [
+    study = bench_kernels(["taylor-printed"], phases=(("isotropic", 0.0), ("hg", 0.5)), rays=256, seconds=0.01)
+    assert [(row.kernel, row.phase) for row in study.costs] == [
         ("taylor-printed-4", "isotropic"),
         ("taylor-printed-4", "hg"),
     ]
-    assert [one.refused is None for one in found.costs] == [True, False]
+    assert [row.refused is None for row in study.costs] == [True, False]
 
 
 def test_unknown_kernel_is_refused_before_any_work(monkeypatch):

@@ -89,18 +89,18 @@ SHORT = "phase,t,h,x0,x1,sigma_t,value\n" + "isotropic,1,2,0,inf,0.5,1.0\n" * 4
 
 def test_summary_finds_the_worst_row_of_the_file(tmp_path):
     cases = read_cases(table(tmp_path, SHORT))
-    found = summary(cases, np.array([1.0, 1.1, 0.7, 1.2]))
+    counts = summary(cases, np.array([1.0, 1.1, 0.7, 1.2]))
     # Line 1 of the file is its header, so the third case is in line 4.
-    assert (found["rows"], found["compared"], found["nonfinite"], found["worst_row"]) == (4, 4, 0, 4)
-    assert found["max"] == pytest.approx(0.3)
-    assert found["p50"] == pytest.approx(0.15)
+    assert (counts["rows"], counts["compared"], counts["nonfinite"], counts["worst_row"]) == (4, 4, 0, 4)
+    assert counts["max"] == pytest.approx(0.3)
+    assert counts["p50"] == pytest.approx(0.15)
 
 
 def test_summary_counts_what_is_not_finite(tmp_path):
     cases = read_cases(table(tmp_path, SHORT))
-    found = summary(cases, np.array([np.nan, 1.0, np.inf, 1.5]))
-    assert (found["rows"], found["compared"], found["nonfinite"], found["worst_row"]) == (4, 2, 2, 5)
-    assert found["max"] == pytest.approx(0.5)
+    counts = summary(cases, np.array([np.nan, 1.0, np.inf, 1.5]))
+    assert (counts["rows"], counts["compared"], counts["nonfinite"], counts["worst_row"]) == (4, 2, 2, 5)
+    assert counts["max"] == pytest.approx(0.5)
     nothing = summary(cases, np.full(4, np.nan))
     assert (nothing["compared"], nothing["nonfinite"]) == (0, 4)
 
@@ -121,8 +121,8 @@ def test_written_rows_are_those_of_the_source_with_their_results(data_folder, tm
     cases = read_cases(source)
     results = np.random.default_rng(3).lognormal(size=len(cases.x0)) / 3
     write_results(cases, results, tmp_path / "out.csv")
-    with open(source, newline="") as one, open(tmp_path / "out.csv", newline="") as two:
-        before, after = list(csv.DictReader(one)), list(csv.DictReader(two))
+    with open(source, newline="") as given, open(tmp_path / "out.csv", newline="") as written:
+        before, after = list(csv.DictReader(given)), list(csv.DictReader(written))
     assert [row | {"result": repr(float(value))} for row, value in zip(before, results, strict=True)] == after
     assert list(after[0])[-1] == "result"
     np.testing.assert_array_equal([float(row["result"]) for row in after], results)

@@ -16,9 +16,9 @@ BANDS = {"quadrature": 0.04, "quadrature-theta": 0.04, "taylor": 0.02, "uniform"
 @pytest.mark.claim("declared-orders")
 @pytest.mark.parametrize("kernel", BANDS)
 def test_measured_rate_is_the_declared_one(variant, kernel):
-    found = convergence(kernel)
-    assert found.measured == pytest.approx(found.declared.value, rel=BANDS[kernel])
-    assert found.measured == (found.rate if found.declared.kind == "rate" else found.order)
+    study = convergence(kernel)
+    assert study.measured == pytest.approx(study.declared.value, rel=BANDS[kernel])
+    assert study.measured == (study.rate if study.declared.kind == "rate" else study.order)
 
 
 def test_tables_interpolate_linearly(variant):
@@ -46,12 +46,14 @@ def test_rate_does_not_depend_on_the_unit_or_the_half_plane():
 
 
 def test_own_rays_and_sizes_declare_nothing(variant):
-    one = np.array([1.0])
-    cases = table(["isotropic"], 0 * one, foot=one, height=one, x0=0 * one, x1=2 * one, sigma_t=0.3 * one, tags=["own"])
-    found = convergence("uniform", (16, 32, 64), cases=with_truth(cases))
-    assert found.order == pytest.approx(2, abs=0.01)
-    assert found.declared is found.measured is None
-    assert len(found.errors) == 3
+    unit = np.array([1.0])
+    cases = table(
+        ["isotropic"], 0 * unit, foot=unit, height=unit, x0=0 * unit, x1=2 * unit, sigma_t=0.3 * unit, tags=["own"]
+    )
+    study = convergence("uniform", (16, 32, 64), cases=with_truth(cases))
+    assert study.order == pytest.approx(2, abs=0.01)
+    assert study.declared is study.measured is None
+    assert len(study.errors) == 3
 
 
 def test_kernel_without_a_declaration_needs_rays():
@@ -61,8 +63,10 @@ def test_kernel_without_a_declaration_needs_rays():
 
 def test_exact_values_leave_no_slope(variant):
     """A vacuum is constant in the angle: nothing but rounding is left at any size."""
-    one = np.array([1.0])
-    cases = table(["isotropic"], 0 * one, foot=one, height=one, x0=0 * one, x1=2 * one, sigma_t=0 * one, tags=["own"])
-    found = convergence("equiangular", (4, 8), cases=with_truth(cases))
-    assert max(found.errors) < 1e-14
-    assert (found.order, found.rate) == (None, None)
+    unit = np.array([1.0])
+    cases = table(
+        ["isotropic"], 0 * unit, foot=unit, height=unit, x0=0 * unit, x1=2 * unit, sigma_t=0 * unit, tags=["own"]
+    )
+    study = convergence("equiangular", (4, 8), cases=with_truth(cases))
+    assert max(study.errors) < 1e-14
+    assert (study.order, study.rate) == (None, None)

@@ -37,7 +37,7 @@ def test_laws_hold_for_an_accurate_kernel(variant):
     assert law["swap"].double < 1e-13
     # What is left are the kinks of the table and lobes sharper than the nodes, not rounding.
     assert law["additivity"].double < 0.02
-    assert min(one.rows for one in law.values()) >= 30
+    assert min(outcome.rows for outcome in law.values()) >= 30
 
 
 def test_absolute_epsilon_breaks_unit_scaling(variant):

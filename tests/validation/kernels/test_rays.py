@@ -97,8 +97,8 @@ def test_row_of_a_case_can_be_read_and_run_again(rays, tmp_path, variant):
     for name in (*COLUMNS, "value"):
         assert getattr(again, name)[0] == getattr(rays, name)[k]
     function = find_kernel("quadrature")
-    one = take(rays, np.array([k]))
-    assert evaluate_cases(again, function, "single").J == evaluate_cases(one, function, "single").J
+    row = take(rays, np.array([k]))
+    assert evaluate_cases(again, function, "single").J == evaluate_cases(row, function, "single").J
 
 
 def test_row_of_a_file_is_its_text(data_folder):

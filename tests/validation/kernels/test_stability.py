@@ -45,24 +45,24 @@ def four_rays():
 def test_errors_are_counted_by_group():
     rays = four_rays()
     values = Values(np.array([1.1, 2.0, -4.0, 8.0]), {}, np.ones(4, dtype=bool))
-    found = errors_by_group(rays, values, "single", groups(rays))
-    assert list(found) == ["all", "a", "b", "phase hg", "phase isotropic"]
-    assert found["all"].max == 2.0
-    assert found["all"].negative == 1
-    assert found["all"].worst.startswith("b,isotropic,0.0,1.0,1.0,0.0,3.0,1.0,4.0")
-    assert found["a"].max == pytest.approx(0.1)
-    assert found["a"].mean == pytest.approx(0.05)
-    assert (found["phase hg"].rays, found["phase hg"].max) == (1, 0.0)
+    errors = errors_by_group(rays, values, "single", groups(rays))
+    assert list(errors) == ["all", "a", "b", "phase hg", "phase isotropic"]
+    assert errors["all"].max == 2.0
+    assert errors["all"].negative == 1
+    assert errors["all"].worst.startswith("b,isotropic,0.0,1.0,1.0,0.0,3.0,1.0,4.0")
+    assert errors["a"].max == pytest.approx(0.1)
+    assert errors["a"].mean == pytest.approx(0.05)
+    assert (errors["phase hg"].rays, errors["phase hg"].max) == (1, 0.0)
 
 
 def test_what_is_not_finite_is_counted_and_shown_as_the_worst():
     rays = four_rays()
-    found = errors_by_group(
+    errors = errors_by_group(
         rays, Values(np.array([9.0, np.nan, np.inf, 8.0]), {}, np.ones(4, dtype=bool)), "double", groups(rays)
     )["all"]
-    assert (found.nan, found.infinite, found.negative) == (1, 1, 0)
-    assert found.max == 8.0
-    assert ",2.0,1.0,2.0" in found.worst
+    assert (errors.nan, errors.infinite, errors.negative) == (1, 1, 0)
+    assert errors.max == 8.0
+    assert ",2.0,1.0,2.0" in errors.worst
     nothing = errors_by_group(rays, Values(np.full(4, np.nan), {}, np.ones(4, dtype=bool)), "single", groups(rays))
     assert (nothing["all"].max, nothing["all"].median, nothing["all"].nan) == (None, None, 4)
 
@@ -70,16 +70,16 @@ def test_what_is_not_finite_is_counted_and_shown_as_the_worst():
 def test_infinite_where_the_truth_is_infinite_is_right():
     rays = replace(four_rays(), value=np.array([np.inf, 2.0, 4.0, 8.0]))
     values = Values(np.array([np.inf, 2.0, 4.0, 8.0]), {}, np.ones(4, dtype=bool))
-    found = errors_by_group(rays, values, "single", groups(rays))["all"]
-    assert (found.infinite, found.max) == (0, 0.0)
+    errors = errors_by_group(rays, values, "single", groups(rays))["all"]
+    assert (errors.infinite, errors.max) == (0, 0.0)
 
 
 def test_refused_rays_are_neither_errors_nor_failures():
     rays = four_rays()
     values = Values(np.array([1.0, 2.0, 4.0, np.nan]), {"hg": "no"}, np.array([True, True, True, False]))
-    found = errors_by_group(rays, values, "single", groups(rays))
-    assert (found["all"].rays, found["all"].refused, found["all"].nan) == (3, 1, 0)
-    assert (found["phase hg"].rays, found["phase hg"].worst) == (0, None)
+    errors = errors_by_group(rays, values, "single", groups(rays))
+    assert (errors["all"].rays, errors["all"].refused, errors["all"].nan) == (3, 1, 0)
+    assert (errors["phase hg"].rays, errors["phase hg"].worst) == (0, None)
 
 
 @pytest.mark.parametrize("error", [InputError, RealtimeInputError])
@@ -89,11 +89,11 @@ def test_refusal_keeps_the_words_of_the_kernel(variant, error):
             raise error("no lobes here")
         return gauss(geometry, x0, x1, medium, light)
 
-    found = evaluate_cases(four_rays(), refuses, "single")
-    assert found.refused == {"hg": "no lobes here"}
-    assert found.accepted.tolist() == [True, True, True, False]
-    assert np.isnan(found.J[3])
-    assert np.isfinite(found.J[:3]).all()
+    values = evaluate_cases(four_rays(), refuses, "single")
+    assert values.refused == {"hg": "no lobes here"}
+    assert values.accepted.tolist() == [True, True, True, False]
+    assert np.isnan(values.J[3])
+    assert np.isfinite(values.J[:3]).all()
 
 
 def test_faults_of_a_kernel_are_not_refusals(variant):
@@ -115,23 +115,23 @@ def test_small_relative_mistake_is_found_where_it_is(variant, no_laws):
         J = quadrature(geometry, x0, x1, medium, light, nodes=16)
         return dr.select(geometry.foot < 0, 1.001 * J, J)
 
-    found = study(wrong_behind)
-    tags = found.sets[0].double
+    verdict = study(wrong_behind)
+    tags = verdict.sets[0].double
     assert tags["behind"].median == pytest.approx(1e-3, rel=1e-3)
     assert tags["thin"].max < 1e-4
-    assert found.sets[0].single["all"].worst.split(",")[0] in ("behind", "infinite")
+    assert verdict.sets[0].single["all"].worst.split(",")[0] in ("behind", "infinite")
     # Both precisions have the same mistake: they agree.
-    assert found.sets[0].single_against_double["behind"].median < 1e-6
-    assert (found.exact, found.broken) == (False, ())
+    assert verdict.sets[0].single_against_double["behind"].median < 1e-6
+    assert (verdict.exact, verdict.broken) == (False, ())
 
 
 @pytest.mark.claim("exact-keeps-its-bar")
 def test_kernel_that_claims_to_be_exact_is_held_to_it(variant, no_laws):
-    found = study(gauss, "exact")
-    assert found.exact
-    assert any("float32 maximum, |g| up to 0.9" in words and "isotropic" in words for words in found.broken)
-    assert any("float64 maximum" in words for words in found.broken)
-    assert not any("NaN" in words or "negative" in words for words in found.broken)
+    verdict = study(gauss, "exact")
+    assert verdict.exact
+    assert any("float32 maximum, |g| up to 0.9" in words and "isotropic" in words for words in verdict.broken)
+    assert any("float64 maximum" in words for words in verdict.broken)
+    assert not any("NaN" in words or "negative" in words for words in verdict.broken)
 
 
 def test_negative_and_missing_values_break_the_claim(variant, no_laws):
@@ -143,17 +143,17 @@ def test_negative_and_missing_values_break_the_claim(variant, no_laws):
 
     words = study(bad, "exact").broken
     for precision in ("float32", "float64"):
-        assert any(precision in one and "negative" in one for one in words)
-        assert any(precision in one and "NaN" in one for one in words)
+        assert any(precision in sentence and "negative" in sentence for sentence in words)
+        assert any(precision in sentence and "NaN" in sentence for sentence in words)
 
 
 @pytest.mark.claim("differences-of-gamma")
 def test_differences_of_gamma_lose_what_theory_says(variant):
     """Rounding of the two terms, each to about half an epsilon, over their difference."""
-    found = gamma_difference(gauss, slivers(256), "single")
-    assert found.direct.max < 1e-4
-    assert found.difference.median > 1e-3
-    assert 0.05 < found.median_rounding < 5
+    loss = gamma_difference(gauss, slivers(256), "single")
+    assert loss.direct.max < 1e-4
+    assert loss.difference.median > 1e-3
+    assert 0.05 < loss.median_rounding < 5
 
 
 @pytest.mark.claim("exact-keeps-its-bar")
@@ -176,12 +176,12 @@ def test_study_runs_kernels_by_name(variant, monkeypatch):
     """Without the certified files, as from a wheel."""
     monkeypatch.setattr(module, "certified_files", lambda: ())
     told = []
-    found = stability(["taylor-2"], count=256, progress=lambda *progress: told.append(progress))
-    assert [one.kernel for one in found] == ["taylor-2"]
-    assert [one.name for one in found[0].sets] == [GENERATED]
-    assert found[0].refused.keys() == {"tabulated"}
+    verdicts = stability(["taylor-2"], count=256, progress=lambda *progress: told.append(progress))
+    assert [verdict.kernel for verdict in verdicts] == ["taylor-2"]
+    assert [rays.name for rays in verdicts[0].sets] == [GENERATED]
+    assert verdicts[0].refused.keys() == {"tabulated"}
     assert told == [(0, 1, "taylor-2")]
-    assert found[0].sets[0].single["phase tabulated"].rays == 0
+    assert verdicts[0].sets[0].single["phase tabulated"].rays == 0
 
 
 def test_wrong_name_is_refused_before_any_work(monkeypatch):

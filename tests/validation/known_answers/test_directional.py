@@ -11,9 +11,9 @@ EXACT_FOR_ALL = ("albedo_linear", "irradiance_linear", "units", "enclosed")
 @pytest.mark.claim("known-answers")
 @pytest.mark.parametrize("law", ["lights_add_up", "turned", "vertical_light"])
 def test_quadrature_obeys(variant, law):
-    found = getattr(directional_answers, law)()
-    assert found.passed, found
-    assert found.reason
+    answer = getattr(directional_answers, law)()
+    assert answer.passed, answer
+    assert answer.reason
 
 
 @pytest.mark.claim("known-answers")
@@ -24,8 +24,8 @@ def test_quadrature_obeys(variant, law):
     [pytest.param(name, marks=pytest.mark.slow) if name == "volpath" else name for name in ESTIMATORS],
 )
 def test_all_estimators_obey(variant, law, estimator):
-    found = getattr(directional_answers, law)(estimator)
-    assert found.passed, found
+    answer = getattr(directional_answers, law)(estimator)
+    assert answer.passed, answer
 
 
 def test_the_laws_are_tried_on_a_scene_with_shadows_and_colours(variant):

@@ -20,9 +20,9 @@ OF_QUADRATURE = (
 )
 
 
-def assert_passed(found: KnownAnswer):
-    assert found.passed, found
-    assert found.reason
+def assert_passed(answer: KnownAnswer):
+    assert answer.passed, answer
+    assert answer.reason
 
 
 @pytest.mark.claim("known-answers")
@@ -44,8 +44,8 @@ def test_all_estimators_obey(variant, law, estimator):
 
 @pytest.mark.claim("known-answers")
 @pytest.mark.parametrize("estimator", ["quadrature", "single-scatter"])
-def test_absorbing_ball(variant, estimator):
-    assert_passed(known_answers.absorbing_ball(estimator))
+def test_absorbing_sphere(variant, estimator):
+    assert_passed(known_answers.absorbing_sphere(estimator))
 
 
 def test_the_laws_are_tried_on_a_scene_that_has_it_all(variant):

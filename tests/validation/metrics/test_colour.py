@@ -59,57 +59,60 @@ def grey(value):
 
 
 def test_published_pairs_of_ciede2000():
-    found = ciede2000(SHARMA[:, :3], SHARMA[:, 3:6])
-    assert found == pytest.approx(SHARMA[:, 6], abs=0.5e-4 + 1e-9)  # half a unit of the last digit
+    difference = ciede2000(SHARMA[:, :3], SHARMA[:, 3:6])
+    assert difference == pytest.approx(SHARMA[:, 6], abs=0.5e-4 + 1e-9)  # half a unit of the last digit
 
 
 def test_published_pairs_through_the_whole_chain():
-    one, two = linear_rgb(SHARMA[:, :3]), linear_rgb(SHARMA[:, 3:6])
-    shown = ((one >= 0) & (one <= 1) & (two >= 0) & (two <= 1)).all(axis=1)
+    first, second = linear_rgb(SHARMA[:, :3]), linear_rgb(SHARMA[:, 3:6])
+    shown = ((first >= 0) & (first <= 1) & (second >= 0) & (second <= 1)).all(axis=1)
     # Pairs of opposite hues sit on a branch of the formula, which the fifth digit of the white decides.
     shown &= np.abs(SHARMA[:, 1:3] + SHARMA[:, 4:6]).max(axis=1) > 0.01
     assert shown.sum() >= 10
-    for a, b, expected in zip(one[shown], two[shown], SHARMA[shown, 6]):
-        found = colour_difference(a[None, None], b[None, None], exposure=0.0)
-        assert found.clipped == 0
+    for a, b, expected in zip(first[shown], second[shown], SHARMA[shown, 6]):
+        difference = colour_difference(a[None, None], b[None, None], exposure=0.0)
+        assert difference.clipped == 0
         # The whites of four and of five digits shift neutral colours by some thousandths of a unit.
-        assert found.ciede2000_mean == pytest.approx(expected, rel=3e-3, abs=3e-3)
+        assert difference.ciede2000_mean == pytest.approx(expected, rel=3e-3, abs=3e-3)
 
 
 def test_published_pair_of_delta_e_itp():
     # The example of colour-science, BT.2124's own formula: dI = 0.00137, dT = 0.00172, dP = -0.00114.
-    one = np.array([0.4885468072, -0.04739350675, 0.07475401302])
-    two = np.array([0.4899203231, -0.04567508203, 0.07361341775])
+    first = np.array([0.4885468072, -0.04739350675, 0.07475401302])
+    second = np.array([0.4899203231, -0.04567508203, 0.07361341775])
     by_hand = 720 * np.sqrt(0.0013735159**2 + (0.00171842472 / 2) ** 2 + 0.00114059527**2)
-    assert delta_e_itp(one, two) == pytest.approx(by_hand, rel=1e-8)
+    assert delta_e_itp(first, second) == pytest.approx(by_hand, rel=1e-8)
     assert by_hand == pytest.approx(1.42657228, rel=1e-8)
 
 
 @pytest.mark.parametrize(("a", "b"), [(0.5, 0.6), (0.01, 0.02), (1.0, 4.0)])
 def test_grey_differs_in_lightness_alone(a, b):
-    found = colour_difference(grey(a), grey(b), exposure=0.0)
+    difference = colour_difference(grey(a), grey(b), exposure=0.0)
     expected = 720 * abs(perceptual_quantiser(203 * a) - perceptual_quantiser(203 * b))
     # The rounded matrices give white a luminance that is wrong by 1e-4.
-    assert found.itp_mean == pytest.approx(expected, rel=2e-3)
+    assert difference.itp_mean == pytest.approx(expected, rel=2e-3)
     light = [116 * np.cbrt(min(v, 1.0)) - 16 for v in (a, b)]
     if a > 0.01:
         middle = sum(light) / 2
         weight = 1 + 0.015 * (middle - 50) ** 2 / np.sqrt(20 + (middle - 50) ** 2)
-        assert found.ciede2000_mean == pytest.approx(abs(light[1] - light[0]) / weight, rel=1e-3, abs=1e-9)
+        assert difference.ciede2000_mean == pytest.approx(abs(light[1] - light[0]) / weight, rel=1e-3, abs=1e-9)
 
 
 def test_reference_white_has_the_published_pq_value():
     # BT.2408: 203 cd/m^2 is 58 % of PQ.
-    found = colour_difference(grey(0.0), grey(1.0), exposure=0.0)
-    assert found.itp_mean == pytest.approx(720 * 0.5807, rel=1e-3)
-    assert found.ciede2000_mean == pytest.approx(100, rel=1e-3)
+    difference = colour_difference(grey(0.0), grey(1.0), exposure=0.0)
+    assert difference.itp_mean == pytest.approx(720 * 0.5807, rel=1e-3)
+    assert difference.ciede2000_mean == pytest.approx(100, rel=1e-3)
 
 
 def test_exposure_is_a_factor_of_two_a_stop():
     rng = np.random.default_rng(1)
-    one = rng.random((4, 5, 3)) / 8
-    two = one * rng.normal(1, 0.1, one.shape)
-    bright, dim = colour_difference(8 * one, 8 * two, exposure=0.0), colour_difference(one, two, exposure=3.0)
+    reference = rng.random((4, 5, 3)) / 8
+    test = reference * rng.normal(1, 0.1, reference.shape)
+    bright, dim = (
+        colour_difference(8 * reference, 8 * test, exposure=0.0),
+        colour_difference(reference, test, exposure=3.0),
+    )
     assert dim.itp_max == pytest.approx(bright.itp_max, rel=1e-12)
     assert dim.ciede2000_p99 == pytest.approx(bright.ciede2000_p99, rel=1e-12)
     assert dim.exposure == 3
@@ -118,45 +121,45 @@ def test_exposure_is_a_factor_of_two_a_stop():
 @pytest.mark.parametrize("factor", [1e-30, 1e30])
 def test_the_default_exposure_takes_the_unit_out(factor):
     rng = np.random.default_rng(2)
-    one = rng.gamma(0.7, 1.0, (16, 12, 3))
-    two = one * rng.normal(1, 0.05, one.shape)
-    here, there = colour_difference(one, two), colour_difference(factor * one, factor * two)
+    reference = rng.gamma(0.7, 1.0, (16, 12, 3))
+    test = reference * rng.normal(1, 0.05, reference.shape)
+    here, there = colour_difference(reference, test), colour_difference(factor * reference, factor * test)
     assert there.exposure == pytest.approx(here.exposure - np.log2(factor), abs=1e-9)
     for name in ("ciede2000_mean", "ciede2000_max", "itp_mean", "itp_max", "clipped", "clipped_itp"):
         assert getattr(there, name) == pytest.approx(getattr(here, name), rel=1e-9), name
-    assert 0.9 / np.percentile(one, 99) == pytest.approx(2.0**here.exposure, rel=1e-12)
+    assert 0.9 / np.percentile(reference, 99) == pytest.approx(2.0**here.exposure, rel=1e-12)
 
 
 def test_equal_images_look_the_same_and_arguments_stay():
-    one = np.random.default_rng(3).random((3, 4, 3))
-    kept = one.copy()
-    found = colour_difference(one, one.copy())
-    assert (found.ciede2000_max, found.itp_max) == (0, 0)
-    assert (one == kept).all()
+    image = np.random.default_rng(3).random((3, 4, 3))
+    kept = image.copy()
+    difference = colour_difference(image, image.copy())
+    assert (difference.ciede2000_max, difference.itp_max) == (0, 0)
+    assert (image == kept).all()
 
 
 def test_one_channel_is_grey():
-    one, two = np.array([[0.2, 0.4]]), np.array([[0.25, 0.4]])
-    three = colour_difference(*(np.repeat(v[..., None], 3, axis=2) for v in (one, two)), exposure=0.0)
-    assert colour_difference(one, two, exposure=0.0) == three
-    assert colour_difference(one[..., None], two[..., None], exposure=0.0) == three
+    reference, test = np.array([[0.2, 0.4]]), np.array([[0.25, 0.4]])
+    three = colour_difference(*(np.repeat(v[..., None], 3, axis=2) for v in (reference, test)), exposure=0.0)
+    assert colour_difference(reference, test, exposure=0.0) == three
+    assert colour_difference(reference[..., None], test[..., None], exposure=0.0) == three
 
 
 def test_what_no_screen_shows_is_counted():
-    one = np.array([[0.5, 2.0, -0.1, 9.0]])  # 9 is 1827 cd/m^2, above the peak
-    found = colour_difference(one, one, exposure=0.0)
-    assert (found.clipped, found.clipped_itp) == (3, 2)
-    assert found.itp_max == 0
+    image = np.array([[0.5, 2.0, -0.1, 9.0]])  # 9 is 1827 cd/m^2, above the peak
+    difference = colour_difference(image, image, exposure=0.0)
+    assert (difference.clipped, difference.clipped_itp) == (3, 2)
+    assert difference.itp_max == 0
 
 
 def test_nonfinite_pixels_are_left_out_and_counted():
-    one = np.array([[0.5, np.nan, 0.2, 0.2]])
-    two = np.array([[0.4, 0.1, -np.inf, 0.2]])
-    found = colour_difference(one, two, exposure=0.0)
-    assert (found.pixels, found.nonfinite) == (4, 2)
-    alone = colour_difference(one[:, ::3], two[:, ::3], exposure=0.0)
-    assert (found.itp_mean, found.ciede2000_mean) == (alone.itp_mean, alone.ciede2000_mean)
-    masked = colour_difference(one, two, exposure=0.0, mask=np.array([[True, False, False, True]]))
+    reference = np.array([[0.5, np.nan, 0.2, 0.2]])
+    test = np.array([[0.4, 0.1, -np.inf, 0.2]])
+    difference = colour_difference(reference, test, exposure=0.0)
+    assert (difference.pixels, difference.nonfinite) == (4, 2)
+    alone = colour_difference(reference[:, ::3], test[:, ::3], exposure=0.0)
+    assert (difference.itp_mean, difference.ciede2000_mean) == (alone.itp_mean, alone.ciede2000_mean)
+    masked = colour_difference(reference, test, exposure=0.0, mask=np.array([[True, False, False, True]]))
     assert (masked.pixels, masked.nonfinite, masked.itp_mean) == (2, 0, alone.itp_mean)
 
 

@@ -66,10 +66,10 @@ def test_relative_numbers_have_no_unit(factor):
     rng = np.random.default_rng(6)
     reference = rng.gamma(0.4, 1.3, (11, 13, 3))
     test = reference * rng.normal(1, 0.1, reference.shape)
-    one, two = error_metrics(reference, test), error_metrics(factor * reference, factor * test)
+    plain, scaled = error_metrics(reference, test), error_metrics(factor * reference, factor * test)
     for name in ("relative_bias", "relative_rmse", "p50", "p99", "max"):
-        assert getattr(two, name) == pytest.approx(getattr(one, name), rel=1e-11), name
-    assert two.rmse == pytest.approx(factor * one.rmse, rel=1e-11)
+        assert getattr(scaled, name) == pytest.approx(getattr(plain, name), rel=1e-11), name
+    assert scaled.rmse == pytest.approx(factor * plain.rmse, rel=1e-11)
 
 
 @pytest.mark.claim("not-finite-is-counted")

@@ -50,20 +50,20 @@ def answer(expression):
 def test_the_value_is_that_of_the_package(pair):
     import flip_evaluator
 
-    found = flip_hdr(*pair)
+    flip = flip_hdr(*pair)
     parameters = {
-        "ppd": found.pixels_per_degree,
-        "startExposure": found.start_exposure,
-        "stopExposure": found.stop_exposure,
-        "numExposures": found.exposures,
+        "ppd": flip.pixels_per_degree,
+        "startExposure": flip.start_exposure,
+        "stopExposure": flip.stop_exposure,
+        "numExposures": flip.exposures,
         "tonemapper": "aces",
     }
     single = [image.astype(np.float32) for image in pair]
     _, mean, _ = flip_evaluator.evaluate(*single, "HDR", applyMagma=False, parameters=parameters)
     # Scaling by a power of two changes no digit of the image, but the exposure is added to it in float32.
-    assert found.value == pytest.approx(mean, abs=1e-5)
-    assert found.note == ""
-    assert found.error_map.shape == SHAPE[:2]
+    assert flip.value == pytest.approx(mean, abs=1e-5)
+    assert flip.note == ""
+    assert flip.error_map.shape == SHAPE[:2]
 
 
 @real
@@ -88,9 +88,9 @@ def test_equal_images_have_none_and_larger_errors_more(pair):
 @pytest.mark.slow
 @real
 def test_a_single_exposure_is_used_alone(pair):
-    found = flip_hdr(*pair, exposure=1.0)
-    assert (found.start_exposure, found.stop_exposure, found.exposures) == (1, 1, 2)
-    assert 0.01 < found.value < flip_hdr(*pair).value + 1e-5
+    flip = flip_hdr(*pair, exposure=1.0)
+    assert (flip.start_exposure, flip.stop_exposure, flip.exposures) == (1, 1, 2)
+    assert 0.01 < flip.value < flip_hdr(*pair).value + 1e-5
 
 
 @pytest.mark.slow
@@ -132,9 +132,9 @@ def test_one_channel_is_grey(pair):
 def test_bad_pixels_are_a_note(pair, side, bad, what):
     images = dict(zip(("reference", "test image"), (image.copy() for image in pair)))
     images[side][3, 4:6, 1] = bad
-    found = flip_hdr(images["reference"], images["test image"])
-    assert found.value is None
-    assert f"2 pixels of the {side} are {what}" in found.note
+    flip = flip_hdr(images["reference"], images["test image"])
+    assert flip.value is None
+    assert f"2 pixels of the {side} are {what}" in flip.note
 
 
 def test_a_black_reference_is_a_note_and_a_black_test_is_not(pair, fake):
@@ -184,10 +184,10 @@ def test_a_black_image_has_no_range():
 )
 def test_a_package_that_fails_is_a_note(pair, fake, body, note):
     fake(body)
-    found = flip_hdr(*pair)
-    assert found.value is None
-    assert note in found.note
-    assert "\n" not in found.note
+    flip = flip_hdr(*pair)
+    assert flip.value is None
+    assert note in flip.note
+    assert "\n" not in flip.note
 
 
 def test_a_test_image_beyond_float32_is_a_note(pair):
@@ -197,9 +197,9 @@ def test_a_test_image_beyond_float32_is_a_note(pair):
 def test_a_package_that_hangs_is_ended(pair, fake):
     fake("import time\ntime.sleep(600)")
     began = time.perf_counter()
-    found = flip_hdr(*pair, timeout=1.0)
+    flip = flip_hdr(*pair, timeout=1.0)
     assert time.perf_counter() - began < 30
-    assert found.note == "flip-evaluator did not answer within 1 s and was ended"
+    assert flip.note == "flip-evaluator did not answer within 1 s and was ended"
 
 
 def test_json_has_no_map(pair, fake):

@@ -50,26 +50,26 @@ def test_trimming_leaves_out_the_largest_thousandth():
     reference = np.ones((20, 50, 3))  # 3000 values: three go
     test = reference.copy()
     test[0, :4, 0] += [5.0, 4.0, 3.0, 2.0]
-    found = published_errors(reference, test)
-    assert found.relmse_trim == pytest.approx(4 / 1.01 / 2997, rel=EXACT)
-    assert found.relmse == pytest.approx((25 + 16 + 9 + 4) / 1.01 / 3000, rel=EXACT)
+    errors = published_errors(reference, test)
+    assert errors.relmse_trim == pytest.approx(4 / 1.01 / 2997, rel=EXACT)
+    assert errors.relmse == pytest.approx((25 + 16 + 9 + 4) / 1.01 / 3000, rel=EXACT)
 
 
 def test_dark_values_are_counted_and_judged_in_absolute_terms():
     # mean(r) = 1: below 0.001 lie the black value, wrong by 0.02, and the dim one, wrong by 0.01.
     reference = np.array([[0.0, 0.0005, 1.5, 2.4995]])
-    found = published_errors(reference, reference + np.array([[0.02, -0.01, 0.15, 0.0]]))
-    assert (found.values, found.dark) == (4, 2)
-    assert found.dark_max == pytest.approx(0.02, rel=EXACT)
-    assert found.relative == pytest.approx(0.1 / 2, rel=EXACT)
-    assert found.relative_max == pytest.approx(0.1, rel=EXACT)
+    errors = published_errors(reference, reference + np.array([[0.02, -0.01, 0.15, 0.0]]))
+    assert (errors.values, errors.dark) == (4, 2)
+    assert errors.dark_max == pytest.approx(0.02, rel=EXACT)
+    assert errors.relative == pytest.approx(0.1 / 2, rel=EXACT)
+    assert errors.relative_max == pytest.approx(0.1, rel=EXACT)
 
 
 def test_the_unit_divides_both_images():
-    found = published_errors(50 * REFERENCE, 50 * TEST, unit=50.0)
+    errors = published_errors(50 * REFERENCE, 50 * TEST, unit=50.0)
     for name, value in published_errors(REFERENCE, TEST).to_json().items():
         if name != "unit":
-            assert getattr(found, name) == pytest.approx(value, rel=1e-12), name
+            assert getattr(errors, name) == pytest.approx(value, rel=1e-12), name
 
 
 @pytest.mark.parametrize("factor", [1e-30, 1e30])
@@ -77,17 +77,17 @@ def test_with_the_mean_as_unit_nothing_has_a_unit(factor):
     rng = np.random.default_rng(3)
     reference = rng.gamma(0.5, 0.01, (12, 9, 3))
     test = reference * rng.normal(1, 0.1, reference.shape)
-    one, two = (published_errors(f * reference, f * test, unit=None) for f in (1.0, factor))
-    assert two.unit == pytest.approx(factor * one.unit, rel=1e-12)
+    plain, scaled = (published_errors(f * reference, f * test, unit=None) for f in (1.0, factor))
+    assert scaled.unit == pytest.approx(factor * plain.unit, rel=1e-12)
     for field in fields(PublishedErrors)[1:]:
         # 1e-11: the rounding of the factor, squared and divided.
-        assert getattr(two, field.name) == pytest.approx(getattr(one, field.name), rel=1e-11), field.name
+        assert getattr(scaled, field.name) == pytest.approx(getattr(plain, field.name), rel=1e-11), field.name
 
 
 def test_equal_images_have_no_error_and_a_psnr_that_json_cannot_hold():
-    found = published_errors(REFERENCE, REFERENCE)
-    assert found.psnr == np.inf
-    as_json = json.loads(json.dumps(found.to_json(), allow_nan=False))
+    errors = published_errors(REFERENCE, REFERENCE)
+    assert errors.psnr == np.inf
+    as_json = json.loads(json.dumps(errors.to_json(), allow_nan=False))
     assert as_json["psnr"] is None
     for name in ("mse", "mae", "relmse", "relmse_trim", "smape", "relative", "relative_max", "dark_max"):
         assert as_json[name] == 0, name
@@ -99,30 +99,30 @@ def test_nonfinite_pixels_are_left_out_and_counted(bad, side):
     reference, test = (np.repeat(image[..., None], 3, axis=2) for image in (REFERENCE, TEST))
     wide = {"reference": np.concatenate([reference, reference]), "test": np.concatenate([test, test])}
     wide[side][1, :, 1] = bad
-    found = published_errors(wide["reference"], wide["test"])
-    assert (found.nonfinite, found.values) == (3, 9)
-    assert found.smape == pytest.approx(published_errors(reference, test).smape, rel=EXACT)
+    errors = published_errors(wide["reference"], wide["test"])
+    assert (errors.nonfinite, errors.values) == (3, 9)
+    assert errors.smape == pytest.approx(published_errors(reference, test).smape, rel=EXACT)
 
 
 def test_nothing_finite_gives_nan():
-    found = published_errors(np.full((2, 2), np.nan), np.ones((2, 2)))
-    assert (found.values, found.nonfinite) == (0, 4)
-    assert all(value is None for value in list(found.to_json().values())[4:])
+    errors = published_errors(np.full((2, 2), np.nan), np.ones((2, 2)))
+    assert (errors.values, errors.nonfinite) == (0, 4)
+    assert all(value is None for value in list(errors.to_json().values())[4:])
 
 
 def test_black_reference_has_absolute_errors_and_those_with_an_epsilon():
-    found = published_errors(np.zeros((2, 2)), np.full((2, 2), 0.1))
-    assert (found.mse, found.mae) == pytest.approx((0.01, 0.1), rel=EXACT)
-    assert found.mrse_pbrt == pytest.approx(0.01 / 0.0001, rel=EXACT)
-    assert found.dark == 4
-    assert np.isnan([found.psnr, found.relative, found.relative_max, found.dark_max]).all()
+    errors = published_errors(np.zeros((2, 2)), np.full((2, 2), 0.1))
+    assert (errors.mse, errors.mae) == pytest.approx((0.01, 0.1), rel=EXACT)
+    assert errors.mrse_pbrt == pytest.approx(0.01 / 0.0001, rel=EXACT)
+    assert errors.dark == 4
+    assert np.isnan([errors.psnr, errors.relative, errors.relative_max, errors.dark_max]).all()
     assert published_errors(np.zeros((2, 2)), np.ones((2, 2)), unit=None).unit == 1
 
 
 def test_negative_values_stay_in_and_are_not_clamped():
-    found = published_errors(np.array([[1.0, 1.0]]), np.array([[-1.0, 1.0]]))
-    assert found.mae == 1
-    assert found.smape == pytest.approx(4 / 2.02 / 2, rel=EXACT)
+    errors = published_errors(np.array([[1.0, 1.0]]), np.array([[-1.0, 1.0]]))
+    assert errors.mae == 1
+    assert errors.smape == pytest.approx(4 / 2.02 / 2, rel=EXACT)
     # A reference of exactly -0.01 makes pbrt's and tev's denominators zero: infinite, None in JSON.
     singular = published_errors(np.array([[-0.01, 1.0]]), np.array([[0.0, 1.0]]))
     assert singular.mrse_pbrt == np.inf

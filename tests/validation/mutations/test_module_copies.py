@@ -54,9 +54,9 @@ def test_a_module_imported_as_a_whole_cannot_be_copied():
 
 
 def test_users():
-    found = users_of("analytic.panels", TOPS)
-    assert {"analytic.panels", "reference.quadrature.unbounded", "reference.quadrature.image"} <= found
-    assert "reference.scene.read" not in found
+    users = users_of("analytic.panels", TOPS)
+    assert {"analytic.panels", "reference.quadrature.unbounded", "reference.quadrature.image"} <= users
+    assert "reference.scene.read" not in users
     assert imported_modules("from reference.visibility import lit_intervals\nimport numpy\n") == {
         "reference.visibility",
         "reference.visibility.lit_intervals",

@@ -35,7 +35,7 @@ def test_the_catalogue_is_large_enough_and_its_names_are_its_own():
 
 def test_mutations_are_chosen_by_name():
     assert chosen_mutations(None) == MUTATIONS
-    assert [one.name for one in chosen_mutations(["near-clip", "no-four-pi"])] == ["near-clip", "no-four-pi"]
+    assert [mutation.name for mutation in chosen_mutations(["near-clip", "no-four-pi"])] == ["near-clip", "no-four-pi"]
     with pytest.raises(InputError, match="did you mean 'near-clip'"):
         chosen_mutations(["near-clop"])
 
@@ -65,7 +65,7 @@ def test_the_copy_without_a_mutation_gives_the_same_image(images):
 def _change(image, truth) -> float:
     """Return the largest relative change of a layer."""
     pairs = [(getattr(image, layer), getattr(truth, layer)) for layer in ("airlight", "surface")]
-    return max(np.abs(one - other).sum() / other.sum() for one, other in pairs if other.any())
+    return max(np.abs(mutated - original).sum() / original.sum() for mutated, original in pairs if original.any())
 
 
 @pytest.mark.claim("mutations-are-caught")
@@ -87,16 +87,18 @@ def stage(variant):
 @pytest.mark.statistical
 def test_the_control_agrees(stage):
     control = seen(None, [stage])
-    pairs = [(one.against, one.layer) for one in control]
+    pairs = [(sighting.against, sighting.layer) for sighting in control]
     assert pairs == [(name, layer) for name in ("volpath", "single-scatter") for layer in ("airlight", "surface")]
-    for one in control:
-        assert one.agrees
-        assert not one.built_in
-        assert one.nonfinite == 0
-        assert one.margin == (0.02 if one.against == "volpath" else 0.001)
-        assert -one.margin < one.interval[0] <= one.relative_bias <= one.interval[1] < one.margin
-        assert one.interval[1] - one.interval[0] < 0.8 * one.margin
-        assert one.true_bias == 0
+    for sighting in control:
+        assert sighting.agrees
+        assert not sighting.built_in
+        assert sighting.nonfinite == 0
+        assert sighting.margin == (0.02 if sighting.against == "volpath" else 0.001)
+        assert (
+            -sighting.margin < sighting.interval[0] <= sighting.relative_bias <= sighting.interval[1] < sighting.margin
+        )
+        assert sighting.interval[1] - sighting.interval[0] < 0.8 * sighting.margin
+        assert sighting.true_bias == 0
 
 
 @pytest.mark.claim("mutations-are-caught")
@@ -131,21 +133,21 @@ def test_a_fault_inside_the_margin_is_not_caught_and_the_reason_says_so(stage):
     result = judged(small, seen(small, [stage]))
     assert not result.caught
     assert result.reason == "the fault changes tiny, airlight, by +0.02 %, no other more; its margin there is ±0.1 %"
-    assert [one.true_bias for one in result.sightings] == pytest.approx([0.0002, 0.0] * 2, abs=1e-9)
+    assert [sighting.true_bias for sighting in result.sightings] == pytest.approx([0.0002, 0.0] * 2, abs=1e-9)
 
 
 @pytest.mark.statistical
 def test_the_chance_is_that_of_the_rule(stage):
     """Against a simulation of the rule: noise of the size seen, and an interval of the width seen."""
     whole = BY_NAME["one-per-cent"]
-    one = seen(replace(whole, new=f"{whole.old} * 1.015"), [stage])[0]
-    assert (one.against, one.layer) == ("volpath", "airlight")
-    half = 0.5 * (one.interval[1] - one.interval[0])
+    sighting = seen(replace(whole, new=f"{whole.old} * 1.015"), [stage])[0]
+    assert (sighting.against, sighting.layer) == ("volpath", "airlight")
+    half = 0.5 * (sighting.interval[1] - sighting.interval[0])
     noise = np.random.default_rng(5).normal(0.015, half / 1.96, 40_000)
     agrees = (noise - half > -0.02) & (noise + half < 0.02)
-    assert one.true_bias == pytest.approx(0.015, abs=1e-9)
+    assert sighting.true_bias == pytest.approx(0.015, abs=1e-9)
     # The standard deviation of the simulated share is at most 0.0025.
-    assert one.chance == pytest.approx(1 - agrees.mean(), abs=0.01)
+    assert sighting.chance == pytest.approx(1 - agrees.mean(), abs=0.01)
 
 
 @pytest.mark.statistical
@@ -160,20 +162,20 @@ def test_what_becomes_infinite_is_caught(stage):
 @pytest.mark.statistical
 def test_a_study_passes_only_if_the_control_agrees_and_nine_in_ten_are_caught(stage):
     control = seen(None, [stage])
-    one = judged(BY_NAME["no-four-pi"], seen(BY_NAME["no-four-pi"], [stage]))
-    missed = replace(one, caught=False)
+    caught = judged(BY_NAME["no-four-pi"], seen(BY_NAME["no-four-pi"], [stage]))
+    missed = replace(caught, caught=False)
     assert LEAST_CAUGHT == 0.9
-    assert MutationStudy(control, (one,) * 18 + (missed,) * 2).passed
-    assert not MutationStudy(control, (one,) * 17 + (missed,) * 3).passed
-    assert not MutationStudy((replace(control[0], agrees=False),), (one,) * 20).passed
+    assert MutationStudy(control, (caught,) * 18 + (missed,) * 2).passed
+    assert not MutationStudy(control, (caught,) * 17 + (missed,) * 3).passed
+    assert not MutationStudy((replace(control[0], agrees=False),), (caught,) * 20).passed
 
 
 @pytest.mark.claim("mutations-are-caught")
 @pytest.mark.slow
 @pytest.mark.statistical
 def test_the_standard_run_catches_nine_in_ten(variant):
-    found = study_mutations()
-    assert found.passed
+    study = study_mutations()
+    assert study.passed
     # The margin against single-scatter is 0.05 %: one fault of the catalogue is smaller, on purpose.
-    assert [result.name for result in found.results if not result.caught] == ["one-in-ten-thousand"]
-    assert all(result.reason for result in found.results if not result.caught_by_built_in)
+    assert [result.name for result in study.results if not result.caught] == ["one-in-ten-thousand"]
+    assert all(result.reason for result in study.results if not result.caught_by_built_in)

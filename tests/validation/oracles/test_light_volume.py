@@ -13,7 +13,7 @@ from reference.quadrature.unbounded import Rays
 from reference.scene.read import TruthLight, read_truth
 from reference.visibility.spot_cone import perpendicular
 from tests.helpers.changes_of_variables import theta_of_x, x_of_theta
-from tests.helpers.scenes import body, spot, tiny_scene
+from tests.helpers.scenes import bounded_medium, spot, tiny_scene
 from validation.estimates.quadrature import truth_image
 from validation.metrics.errors import error_metrics
 from validation.oracles.light_volume import height_field, oracle_airlight, volume_intervals
@@ -52,10 +52,10 @@ def test_nothing_hides_nothing(variant, lamp):
 
 def test_floor_below_a_spot_is_exact(variant):
     """The height of a plane is linear: nothing but the float32 distances of the map is left, 6e-8 of each."""
-    found = twin_error(tiny_scene(size=(32, 24), ball=None, lamp=spot()), 8)
-    assert found.relative_rmse < 5e-7
+    error = twin_error(tiny_scene(size=(32, 24), ball=None, lamp=spot()), 8)
+    assert error.relative_rmse < 5e-7
     # In the last pixels of the cone the light is a short way long, of which these roundings are a larger share.
-    assert found.max < 1e-4
+    assert error.max < 1e-4
 
 
 def plane_below(depth, size):
@@ -80,7 +80,7 @@ def test_shadow_of_a_plane_is_exact(variant, level, surface):
 
     truth = read_truth(mi.load_dict(tiny_scene(size=(24, 18), ball=None, floor=None)))
     light, direction = truth.lights[0], truth.direction
-    found = oracle_airlight(
+    airlight = oracle_airlight(
         truth, [plane_below(light.position[2] - level, 8)], distance=np.full((truth.height, truth.width), surface)
     )
     reaches = (level - truth.origin[2]) / direction[:, 2]
@@ -96,7 +96,7 @@ def test_shadow_of_a_plane_is_exact(variant, level, surface):
     J, _ = airlight_segments(foot, height, x0, x1, sigma_t, truth.medium.phase)
     expected = J[:, None] * truth.medium.albedo * sigma_t * light.intensity / (4 * np.pi)
     # The angles of crossings are rounded, the integrals right to 1e-10.
-    assert found.reshape(-1, 3) == pytest.approx(expected, rel=1e-9, abs=1e-10 * expected.max())
+    assert airlight.reshape(-1, 3) == pytest.approx(expected, rel=1e-9, abs=1e-10 * expected.max())
 
 
 @pytest.mark.parametrize("kind", ["point", "spot"])
@@ -123,9 +123,9 @@ def test_lit_points_are_before_the_displaced_triangles(kind):
         among = known.any(axis=1)
         ends = np.where(known, theta, np.inf).min(axis=1), np.where(known, theta, -np.inf).max(axis=1)
         ends = np.where(among, ends[0], 0.0), np.where(among, ends[1], -1.0)
-    found = volume_intervals(field, Rays(direction, normal, foot, height), ends)
+    intervals = volume_intervals(field, Rays(direction, normal, foot, height), ends)
     inside = np.zeros(theta.shape, dtype=int)
-    for ray, low, high in zip(found.ray, found.low, found.high, strict=True):
+    for ray, low, high in zip(intervals.ray, intervals.low, intervals.high, strict=True):
         inside[ray] += (theta[ray] >= low) & (theta[ray] <= high)
     assert inside.max() == 1
     assert 0.2 < np.mean(lit[known]) < 0.9
@@ -142,8 +142,8 @@ def cube_directions(size):
     """Return axis + u across + v up at the corners of the texels of six faces, written out face by face."""
     at = np.linspace(-1, 1, size + 1)
     v, u = np.meshgrid(at, at, indexing="ij")
-    one = np.ones_like(u)
-    faces = [(one, u, v), (-one, u, v), (v, one, u), (v, -one, u), (u, v, one), (u, v, -one)]
+    unit = np.ones_like(u)
+    faces = [(unit, u, v), (-unit, u, v), (v, unit, u), (v, -unit, u), (u, v, unit), (u, v, -unit)]
     return np.stack([np.stack(face, axis=-1) for face in faces])
 
 
@@ -203,7 +203,8 @@ def test_lights_add_up(variant):
     scene = mi.load_dict(tiny_scene(second=spot()))
     truth, maps = read_truth(scene), maps_of(scene, 16)
     each = [
-        oracle_airlight(replace(truth, lights=(light,)), [one]) for light, one in zip(truth.lights, maps, strict=True)
+        oracle_airlight(replace(truth, lights=(light,)), [shadow_map])
+        for light, shadow_map in zip(truth.lights, maps, strict=True)
     ]
     assert all(np.max(image) > 0 for image in each)
     assert oracle_airlight(truth, maps) == pytest.approx(sum(each), rel=1e-14)
@@ -217,8 +218,8 @@ def test_what_cannot_be_done_is_refused(variant):
         oracle_airlight(read_truth(scene), [])
     with pytest.raises(InputError, match="got a distance of 0, wanted distances above 0"):
         height_field(ShadowMap(4, np.zeros(150), Projection(None)))
-    ball = body({"type": "sphere", "center": [0, 0, 1], "radius": 0.3}, 0.4, (0.9, 0.9, 0.9))
-    ball["exterior"] = {"type": "ref", "id": "fog"}
-    bounded = mi.load_dict(tiny_scene(ball=ball))
+    sphere = bounded_medium({"type": "sphere", "center": [0, 0, 1], "radius": 0.3}, 0.4, (0.9, 0.9, 0.9))
+    sphere["exterior"] = {"type": "ref", "id": "fog"}
+    bounded = mi.load_dict(tiny_scene(ball=sphere))
     with pytest.raises(InputError, match="medium 'ball' has bounds"):
         oracle_airlight(read_truth(bounded), maps_of(scene, 4))

@@ -29,7 +29,7 @@ ENDLESS = 1e9  # seconds that a frame may take: what is measured must not hang o
 
 @pytest.mark.claim("published-figures")
 def test_published_figures_are_those_of_the_paper():
-    rates = {(one.where, one.map): one.fps for one in FIGURES if one.fps}
+    rates = {(figure.where, figure.map): figure.fps for figure in FIGURES if figure.fps}
     assert rates == {
         ("Fig. 6a", 32): 230,
         ("Fig. 6b", 128): 165,
@@ -44,7 +44,7 @@ def test_published_figures_are_those_of_the_paper():
 
 
 def test_adaptive_pays_from_4096_on_in_the_paper():
-    assert [pays_from(one.fps) for one in TABLE] == [4096, 4096]
+    assert [pays_from(row.fps) for row in TABLE] == [4096, 4096]
     assert pays_from({1024: (10, 12), 2048: (10, 9), 4096: (10, 20)}) == 4096
     assert pays_from({1024: (10, 12), 2048: (10, 11)}) == 1024
     assert pays_from({1024: (10, 12), 2048: (10, 10.1)}) is None
@@ -123,7 +123,7 @@ def test_what_takes_too_long_is_left_out_and_said(variant):
     assert all(row.light_moved is None for row in rows)
     assert "more than the limit" in rows[0].missing
     assert rows[4].missing.startswith("not begun after map 16: a frame takes")
-    assert any("could not be compared" in one for one in conclusions([], rows))
+    assert any("could not be compared" in sentence for sentence in conclusions([], rows))
 
 
 def test_a_row_that_must_be_expected_to_take_too_long_is_not_begun(variant, monkeypatch):
@@ -164,9 +164,9 @@ def table_row(size: int, evaluation: str, milliseconds: float) -> TableRow:
 def test_conclusion_about_adaptive_is_that_of_the_measurement():
     times = {1024: (100, 100), 2048: (200, 150), 4096: (800, 300)}
     rows = [
-        table_row(size, name, one)
+        table_row(size, name, milliseconds)
         for size, pair in times.items()
-        for name, one in zip(("static", "adaptive"), pair, strict=True)
+        for name, milliseconds in zip(("static", "adaptive"), pair, strict=True)
     ]
     (sentence,) = conclusions([], rows)
     assert "faster than static from 2048 on" in sentence
@@ -191,11 +191,13 @@ def figure_row(entry: FigureEntry, milliseconds: float, error: float, map_error:
 @pytest.mark.claim("conclusions-follow")
 @pytest.mark.parametrize(("milliseconds", "map_error", "reached"), [(10.0, 1e-4, True), (11.0, 1e-4, False)])
 def test_conclusions_about_marching(milliseconds, map_error, reached):
-    found = {(one.where, dict(one.parameters).get("evaluation")): one for one in FIGURES if not one.upright}
+    figures = {
+        (figure.where, dict(figure.parameters).get("evaluation")): figure for figure in FIGURES if not figure.upright
+    }
     rows = [
-        figure_row(found["Fig. 7b", None], 101.0, 0.05, 0.01),
-        figure_row(found["Fig. 7c", "walk"], milliseconds, 0.05, map_error),
-        figure_row(found["Fig. 7c", "mesh"], 50.0, 0.05, map_error),
+        figure_row(figures["Fig. 7b", None], 101.0, 0.05, 0.01),
+        figure_row(figures["Fig. 7c", "walk"], milliseconds, 0.05, map_error),
+        figure_row(figures["Fig. 7c", "mesh"], 50.0, 0.05, map_error),
     ]
     first, goal, equal = conclusions(rows, [])
     assert f"takes {101 / milliseconds:.3g} times as long as the light volume (published: 9.6)" in first
@@ -206,8 +208,8 @@ def test_conclusions_about_marching(milliseconds, map_error, reached):
 
 @pytest.mark.claim("conclusions-follow")
 def test_conclusions_about_walls():
-    found = {dict(one.parameters).get("walls"): one for one in FIGURES if one.where == "Fig. 6b"}
-    rows = [figure_row(found["slanted"], 20.0, 0.05, 1e-5), figure_row(found["upright"], 23.0, 0.002, 1e-5)]
+    figures = {dict(figure.parameters).get("walls"): figure for figure in FIGURES if figure.where == "Fig. 6b"}
+    rows = [figure_row(figures["slanted"], 20.0, 0.05, 1e-5), figure_row(figures["upright"], 23.0, 0.002, 1e-5)]
     (words, *rest) = conclusions(rows, [])
     assert words.startswith("omni-box, map 128: with upright walls a frame takes 1.15 times as long as with slanted")
     assert words.endswith("and has 0.04 of their error against the truth.")
@@ -239,13 +241,13 @@ def test_command_prints_the_table(variant, quick, capfd):
     assert "tangle: adaptive tessellation is faster than static" in out
     assert "the paper has no figures for these maps" in out
     assert cli.run([*arguments, "--json"]) == 0
-    found = json.loads(capfd.readouterr().out)
-    assert set(found) == {"environment", "billeter"}
-    rows = found["billeter"]["table"]
+    printed = json.loads(capfd.readouterr().out)
+    assert set(printed) == {"environment", "billeter"}
+    rows = printed["billeter"]["table"]
     assert [row["evaluation"] for row in rows] == 2 * ["static", "adaptive", "walk", "upright"]
     assert rows[0]["scene"] == "tangle"
-    assert found["billeter"]["figures"] == []
-    assert found["billeter"]["conclusions"]
+    assert printed["billeter"]["figures"] == []
+    assert printed["billeter"]["conclusions"]
 
 
 def test_command_prints_the_figures(variant, quick, monkeypatch, capfd):
@@ -261,10 +263,10 @@ def test_command_prints_the_figures(variant, quick, monkeypatch, capfd):
 
 
 def test_what_is_not_measured_is_printed_with_its_reason():
-    peer = next(one for one in FIGURES if one.where == "peer")
+    peer = next(figure for figure in FIGURES if figure.where == "peer")
     figures = [FigureRow(peer, (8, 8), missing="no room")]
     table = [TableRow(TABLE[1], 4096, "static", (8, 8), missing="too slow")]
-    out = "".join(text(one) for one in billeter_tables(billeter_data(figures, table)))
+    out = "".join(text(drawn) for drawn in billeter_tables(billeter_data(figures, table)))
     assert "peer, colonnade, 8 x 8: min-max (map=512): not measured: no room" in out
     assert "tangle, 8 x 8, map 4096: static: not measured: too slow" in out
     assert "96.3" in out  # the pass that was published for this row
@@ -288,10 +290,14 @@ def test_wrong_options_are_refused(arguments, words, capfd):
 
 def test_rows_by_tiles_are_compared_with_their_own_and_are_not_those_of_the_paper():
     """A marcher, whose frames are shorter by tiles, is not the one that the paper's conclusion is about."""
-    entries = [one for one in FIGURES if one.scene == "colonnade" and one.method == "ray-march"]
-    assert [one.where for one in entries] == ["Fig. 7a", "Fig. 7b", TILES]
-    volume = next(one for one in FIGURES if one.where == "Fig. 7c" and one.upright)
-    rows = [figure_row(one, ms, 0.1, 0.1) for one, ms in ((volume, 100.0), (entries[1], 900.0), (entries[2], 300.0))]
-    found = conclusions(rows, [])
-    assert any("marching with 400 samples takes 9 times as long" in one for one in found)
-    assert [one for one in found if "corners of tiles" in one and "takes 0.33 of the time" in one]
+    entries = [figure for figure in FIGURES if figure.scene == "colonnade" and figure.method == "ray-march"]
+    assert [figure.where for figure in entries] == ["Fig. 7a", "Fig. 7b", TILES]
+    volume = next(figure for figure in FIGURES if figure.where == "Fig. 7c" and figure.upright)
+    rows = [
+        figure_row(figure, ms, 0.1, 0.1) for figure, ms in ((volume, 100.0), (entries[1], 900.0), (entries[2], 300.0))
+    ]
+    sentences = conclusions(rows, [])
+    assert any("marching with 400 samples takes 9 times as long" in sentence for sentence in sentences)
+    assert [
+        sentence for sentence in sentences if "corners of tiles" in sentence and "takes 0.33 of the time" in sentence
+    ]

@@ -9,12 +9,12 @@ from validation.papers.biri import PUBLISHED, STAGES, biri_row, biri_rows
 
 @pytest.mark.claim("published-figures")
 def test_published_figures_are_those_of_the_paper():
-    rates = {(one.scene, one.size): one.fps for one in PUBLISHED}
+    rates = {(figure.scene, figure.size): figure.fps for figure in PUBLISHED}
     assert [rates[name, (800, 600)] for name in ("two-pens", "three-media", "clutter", "hall")] == [23, 35, 25, 12]
     assert (rates["sphere-spot", (800, 600)], rates["sphere-spot", (1024, 768)]) == (120, 107)
-    for one in PUBLISHED:
+    for figure in PUBLISHED:
         # Table 1 is printed with one decimal at most: its rows add up to 100 within 5 x 0.05.
-        assert one.shares is None or sum(one.shares) == pytest.approx(100, abs=0.25)
+        assert figure.shares is None or sum(figure.shares) == pytest.approx(100, abs=0.25)
 
 
 def test_a_row_has_every_stage_and_its_error(variant):
@@ -25,8 +25,8 @@ def test_a_row_has_every_stage_and_its_error(variant):
     assert sum(row.shares) == pytest.approx(100)
     assert row.error.relative_rmse < 1e-3  # the target of the method in every built-in scene
     assert all(
-        one.median_ms > 0
-        for one in (row.light_moved, row.static, row.light_moved_camera_kept, row.colours_changed, row.rays)
+        times.median_ms > 0
+        for times in (row.light_moved, row.static, row.light_moved_camera_kept, row.colours_changed, row.rays)
     )
 
 
@@ -59,9 +59,9 @@ def test_command_prints_both_tables_beside_the_published_figures(variant, monkey
     assert "two-pens, 24 x 16 (exact) | 34549 | 23 |" in out
     assert "more than 35" in out
     assert cli.run([*arguments, "--json"]) == 0
-    found = json.loads(capfd.readouterr().out)
-    assert found["rows"][0]["published"]["fps"] == 23
-    assert len(found["rows"][0]["shares"]) == len(found["stages"]) == 5
+    printed = json.loads(capfd.readouterr().out)
+    assert printed["rows"][0]["published"]["fps"] == 23
+    assert len(printed["rows"][0]["shares"]) == len(printed["stages"]) == 5
 
 
 def test_unknown_scene_is_refused(capfd):

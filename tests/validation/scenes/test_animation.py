@@ -93,7 +93,7 @@ def test_frames_record_nothing_and_compile_nothing(variant, name, moves):
         with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
             dr.kernel_history_clear()
             _, kept = next_frame(renderer, moved, kept, **moved_parts(animation))
-            compiled = [one for one in dr.kernel_history() if one.get("cache_hit") is False]
+            compiled = [kernel for kernel in dr.kernel_history() if kernel.get("cache_hit") is False]
         if number:
             assert not compiled
     assert renderer.render.n_recordings == 1
@@ -120,9 +120,13 @@ def test_shapes_keep_their_names_beside_bounded_media(variant):
     assert {"bar", "floor"} <= set(names)
     assert not {"red", "green", "blue"} & set(names)
     frames = animate(scene, Animation(("objects", "medium"), objects=("bar",)), 4)
-    base = [float(body.medium.sigma_t[0][0]) for body in scene.medium.bodies]
+    base = [float(bounded_medium.medium.sigma_t[0][0]) for bounded_medium in scene.medium.bounded_media]
     moved = [
-        (step.positions["bar"], [float(body.medium.sigma_t[0][0]) for body in step.medium.bodies]) for step in frames
+        (
+            step.positions["bar"],
+            [float(bounded_medium.medium.sigma_t[0][0]) for bounded_medium in step.medium.bounded_media],
+        )
+        for step in frames
     ]
     assert np.abs(moved[1][0] - moved[0][0]).max() > 1
     np.testing.assert_allclose(moved[1][1], 1.5 * np.array(base), rtol=1e-6)

@@ -146,7 +146,7 @@ def test_map_of_the_tangle_has_edges_all_over(variant):
     # A ray that falls at an angle e to a floor 4.2 m below has the inverse distance sin(e) / 4.2 m, so from texel to
     # texel, 2 tan(26.3 degrees) / 256 apart at most, it changes by 1e-3 [1/m]. A row meets the floor's border twice.
     jumps = np.count_nonzero(np.abs(np.diff(1 / face, axis=1)) > 0.01, axis=1)
-    assert np.median(jumps) > 12  # 20; one ball before the floor has 4 at most
+    assert np.median(jumps) > 12  # 20; one sphere before the floor has 4 at most
 
 
 def frame_of(name, method, *, kernel=None, **parameters):

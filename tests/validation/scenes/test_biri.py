@@ -175,9 +175,9 @@ def test_winding_number_tells_inside_from_outside():
 
 
 def test_media_are_convex_and_apart(variant):
-    found = {name: mesh for name, mesh in meshes("three-media").items() if name in MEDIA}
+    media = {name: mesh for name, mesh in meshes("three-media").items() if name in MEDIA}
     normals = {}
-    for name, (vertices, faces) in found.items():
+    for name, (vertices, faces) in media.items():
         a, b, c = (vertices[faces[:, k]] for k in range(3))
         normal = np.cross(b - a, c - a)
         normal /= np.linalg.norm(normal, axis=1)[:, None]
@@ -185,14 +185,14 @@ def test_media_are_convex_and_apart(variant):
         height = normal @ vertices.T - np.sum(normal * a, axis=1)[:, None]
         # Positions of 2 m are rounded to 1e-7 in float32; the box's sides have two coplanar triangles each.
         assert height.max() < 1e-6, name
-    for one in MEDIA:
-        for other in MEDIA - {one}:
+    for medium in MEDIA:
+        for other in MEDIA - {medium}:
             # Convex bodies are apart where a plane lies between them; here one of the faces' planes, or one across the
             # line of centres, does.
-            line = found[other][0].mean(axis=0) - found[one][0].mean(axis=0)
-            axes = np.concatenate([normals[one], -normals[other], [line / np.linalg.norm(line)]])
-            gap = (axes @ found[other][0].T).min(axis=1) - (axes @ found[one][0].T).max(axis=1)
-            assert gap.max() > 0.05, (one, other)
+            line = media[other][0].mean(axis=0) - media[medium][0].mean(axis=0)
+            axes = np.concatenate([normals[medium], -normals[other], [line / np.linalg.norm(line)]])
+            gap = (axes @ media[other][0].T).min(axis=1) - (axes @ media[medium][0].T).max(axis=1)
+            assert gap.max() > 0.05, (medium, other)
 
 
 def test_media_differ_and_belong_to_their_boundaries_only(variant):
@@ -212,25 +212,25 @@ def test_media_differ_and_belong_to_their_boundaries_only(variant):
 
 def test_casters_lie_within_across_and_outside_media(variant):
     """The bar pierces all three, one ring and star lie wholly within, and others have no point in any medium."""
-    found = meshes("three-media")
+    shapes = meshes("three-media")
 
     def share(caster, medium):
-        return np.mean([winding_number(point, *found[medium]) > 0.5 for point in found[caster][0][::7]])
+        return np.mean([winding_number(point, *shapes[medium]) > 0.5 for point in shapes[caster][0][::7]])
 
-    bar, _ = found["bar"]
+    bar, _ = shapes["bar"]
     for medium in MEDIA:
         along = np.linspace(bar[[0, 2, 4, 6]].mean(axis=0), bar[[1, 3, 5, 7]].mean(axis=0), 199)
-        inside = [winding_number(point, *found[medium]) > 0.5 for point in along]
+        inside = [winding_number(point, *shapes[medium]) > 0.5 for point in along]
         assert 10 < sum(inside) < 190, medium
     assert share("ring-within", "red") == 1
     assert share("star", "green") == 1
     assert 0 < share("star-across", "blue") < 1
-    for caster in ("ring-above", "ball", "slats", "tetrahedron", "vase"):
+    for caster in ("ring-above", "sphere", "slats", "tetrahedron", "vase"):
         assert all(share(caster, medium) == 0 for medium in MEDIA), caster
 
 
 def test_things_stand_on_the_table_and_sink_in_a_little(variant):
-    """A gap would let light pass below; a ball or ring that rests on it dips in by its facets less."""
+    """A gap would let light pass below; a sphere or ring that rests on it dips in by its facets less."""
     for shape, (vertices, _) in meshes("clutter").items():
         if shape not in OPEN["clutter"]:
             assert -0.03 < vertices[:, 2].min() < 0, shape
@@ -252,10 +252,10 @@ def test_methods_and_truth_can_read_the_scenes_in_unbounded_fog(variant, name):
     from reference.scene.read import read_truth
 
     scene = mi.load_dict(built(name))
-    one, other = read_scene(scene), read_truth(scene)
-    assert len(one.lights) == len(other.lights) == 1
+    rendered, truth = read_scene(scene), read_truth(scene)
+    assert len(rendered.lights) == len(truth.lights) == 1
     # Mitsuba holds it in float32: 6e-8.
-    np.testing.assert_allclose(np.array(one.medium.albedo).reshape(-1), other.medium.albedo, rtol=3e-7)
+    np.testing.assert_allclose(np.array(rendered.medium.albedo).reshape(-1), truth.medium.albedo, rtol=3e-7)
 
 
 @pytest.mark.claim("scenes-of-arbitrary-numbers")

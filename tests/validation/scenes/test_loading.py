@@ -125,10 +125,10 @@ def test_resized_scene_has_the_rays_of_one_built_at_that_size(variant, small_fil
     expected = mi.load_string(text)
     resized = load_scene(str(small_file), size).scene
     np.testing.assert_array_equal(read_truth(resized).direction, read_truth(expected).direction)
-    one, two = read_scene(resized).camera, read_scene(expected).camera
-    assert (one.width, one.height) == size
+    resized_camera, expected_camera = read_scene(resized).camera, read_scene(expected).camera
+    assert (resized_camera.width, resized_camera.height) == size
     for name in ("origin", "forward", "left", "up", "forward_low", "left_low", "up_low"):
-        np.testing.assert_array_equal(np.array(getattr(one, name)), np.array(getattr(two, name)))
+        np.testing.assert_array_equal(np.array(getattr(resized_camera, name)), np.array(getattr(expected_camera, name)))
     for place in [(0.13, 0.29), (0.71, 0.93)]:
         rays = [
             s.sensors()[0].sample_ray(0.0, 0.5, mi.Point2f(*place), mi.Point2f(0.5))[0] for s in (resized, expected)
@@ -142,9 +142,9 @@ def test_resizing_moves_the_corner_rays(variant, small_file):
     """The test of the test above: another size is another bundle of rays."""
     from reference.scene.read import read_truth
 
-    one, two = (read_truth(load_scene(str(small_file), size).scene) for size in [(16, 12), (32, 24)])
-    assert len(two.direction) == 4 * len(one.direction)
-    assert np.abs(one.direction[0] - two.direction[0]).max() > 1e-3
+    small, large = (read_truth(load_scene(str(small_file), size).scene) for size in [(16, 12), (32, 24)])
+    assert len(large.direction) == 4 * len(small.direction)
+    assert np.abs(small.direction[0] - large.direction[0]).max() > 1e-3
 
 
 def test_nearest_says_nothing_rather_than_nonsense():

@@ -117,11 +117,11 @@ def test_methods_and_truth_can_read_every_scene_alike(variant, name):
     (light,) = scene.lights
     (other,) = truth.lights + truth.directional
     if light.kind == "directional":
-        one, two = light.axis, other.direction
+        of_methods, of_truth = light.axis, other.direction
         np.testing.assert_allclose(np.array(light.intensity).reshape(-1), other.irradiance, rtol=3e-7)
     else:
-        one, two = light.position, other.position
-    np.testing.assert_allclose(np.array(one).reshape(-1), two, rtol=3e-7)
+        of_methods, of_truth = light.position, other.position
+    np.testing.assert_allclose(np.array(of_methods).reshape(-1), of_truth, rtol=3e-7)
 
 
 @pytest.mark.claim("scenes-of-arbitrary-numbers")
@@ -170,11 +170,11 @@ def test_rotation_turns_by_the_right_hand():
 
 
 def test_joined_meshes_keep_their_faces_apart():
-    one = lathe([0.3, 0.2], [0.0, 1.0], 5)
-    two = placed(one, (3.0, 0.0, 0.0), rotation((0, 0, 1), 17))
-    vertices, faces = joined([one, two])
-    assert len(vertices) == 2 * len(one[0])
-    assert volume(vertices, faces) == pytest.approx(2 * volume(*one))
-    half = len(one[1])
-    assert faces[half:].min() == len(one[0])
-    np.testing.assert_allclose(vertices[faces[half:]], two[0][two[1]])
+    original = lathe([0.3, 0.2], [0.0, 1.0], 5)
+    copy = placed(original, (3.0, 0.0, 0.0), rotation((0, 0, 1), 17))
+    vertices, faces = joined([original, copy])
+    assert len(vertices) == 2 * len(original[0])
+    assert volume(vertices, faces) == pytest.approx(2 * volume(*original))
+    half = len(original[1])
+    assert faces[half:].min() == len(original[0])
+    np.testing.assert_allclose(vertices[faces[half:]], copy[0][copy[1]])

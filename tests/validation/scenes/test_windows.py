@@ -61,11 +61,11 @@ def test_sun_comes_in_by_the_windows_alone(variant):
     truth = read_truth(loaded((40, 30)))
     span = scattering_range(camera_segments(truth, surface_hits(truth).distance))
     rays = parallel_rays(truth.origin, truth.direction, truth.directional[0], span)
-    found = directional_intervals(truth, rays)
-    assert found.transitions > 500
-    assert found.random_checks.left == 0
-    x = rays.distance(found.ray, 0.5 * (found.low + found.high))
-    point = truth.origin + x[:, None] * truth.direction[found.ray]
+    intervals = directional_intervals(truth, rays)
+    assert intervals.transitions > 500
+    assert intervals.random_checks.left == 0
+    x = rays.distance(intervals.ray, 0.5 * (intervals.low + intervals.high))
+    point = truth.origin + x[:, None] * truth.direction[intervals.ray]
     towards = -truth.directional[0].direction
     at_wall = point + ((_LEFT - point[:, 0]) / towards[0])[:, None] * towards
     along, up = np.searchsorted(_PANES_ALONG, at_wall[:, 1] - _FRONT), np.searchsorted(_PANES_UP, at_wall[:, 2])
@@ -81,7 +81,7 @@ def test_estimators_agree(variant, estimator, margin):
     """
     from validation.estimates.agreement import agreement
 
-    for layer, one in agreement(loaded((24, 18)), estimator=estimator, margin=margin, samples=64).items():
-        assert one.statistics.equivalent is True, layer
-        assert one.masked == 0
-        assert one.statistics.rejected == 0
+    for layer, verdict in agreement(loaded((24, 18)), estimator=estimator, margin=margin, samples=64).items():
+        assert verdict.statistics.equivalent is True, layer
+        assert verdict.masked == 0
+        assert verdict.statistics.rejected == 0

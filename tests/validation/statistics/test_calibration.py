@@ -50,15 +50,15 @@ def test_injected_biases_are_found_with_the_printed_power(bias):
 
 def test_the_unit_of_radiance_changes_nothing():
     few = Experiment(runs=20)
-    for one, two in (
+    for plain, rescaled in (
         (calibrate(few), calibrate(replace(few, unit=2.0**-100))),
         (check_power(0.005, few), check_power(0.005, replace(few, unit=2.0**100))),
     ):
-        assert one == two  # powers of two change no digit
+        assert plain == rescaled  # powers of two change no digit
     for unit in (1e-30, 1e30):
-        found = asdict(check_power(0.005, replace(few, unit=unit)))
+        power_check = asdict(check_power(0.005, replace(few, unit=unit)))
         # Rounding of the factor, magnified by the difference of two images that agree to some per mille.
-        assert found == pytest.approx(asdict(check_power(0.005, few)), rel=1e-9)
+        assert power_check == pytest.approx(asdict(check_power(0.005, few)), rel=1e-9)
 
 
 def test_laws_have_mean_zero_and_deviation_one():
@@ -109,19 +109,19 @@ def test_no_power_without_a_bias(bias):
 @pytest.mark.statistical
 @pytest.mark.parametrize(("batches", "noisy_reference"), [(4, False), (16, False), (16, True)])
 def test_many_null_comparisons(batches, noisy_reference):
-    found = calibrate(Experiment(runs=1000, batches=batches, noisy_reference=noisy_reference, seed=30 + batches))
-    assert found.problems() == (), found
+    calibration = calibrate(Experiment(runs=1000, batches=batches, noisy_reference=noisy_reference, seed=30 + batches))
+    assert calibration.problems() == (), calibration
 
 
 @pytest.mark.statistical
 def test_two_images_of_few_batches_are_judged_too_mildly():
     """Welch's degrees of freedom are estimates too: with 4 batches on either side 0.7 % exceed instead of 1 %."""
-    found = calibrate(Experiment(runs=400, batches=4, noisy_reference=True, seed=34))
-    assert 0.005 < found.exceeding < 0.008
-    assert found.pixel_alarms <= share_interval(0.01, found.runs, 1e-4)[1]
-    low, high = share_interval(0.95, found.runs, 1e-4)
-    assert low <= found.coverage <= high
-    assert low <= found.coverage_batches <= high
+    calibration = calibrate(Experiment(runs=400, batches=4, noisy_reference=True, seed=34))
+    assert 0.005 < calibration.exceeding < 0.008
+    assert calibration.pixel_alarms <= share_interval(0.01, calibration.runs, 1e-4)[1]
+    low, high = share_interval(0.95, calibration.runs, 1e-4)
+    assert low <= calibration.coverage <= high
+    assert low <= calibration.coverage_batches <= high
 
 
 @pytest.mark.statistical
@@ -146,10 +146,10 @@ def test_skewed_noise_breaks_the_count_of_pixels_first_and_the_interval_last():
     )
     assert 0.15 < mild.pixel_alarms < 0.45
     assert skewed.pixel_alarms > 0.9
-    for found in (mild, skewed):
-        low, high = share_interval(0.95, found.runs, 1e-4)
-        assert low <= found.coverage <= high
-        assert low <= found.coverage_batches <= high
+    for calibration in (mild, skewed):
+        low, high = share_interval(0.95, calibration.runs, 1e-4)
+        assert low <= calibration.coverage <= high
+        assert low <= calibration.coverage_batches <= high
     assert mild.block_alarms <= share_interval(0.01, mild.runs, 1e-4)[1]
     assert heavy.coverage < 0.92
     # It is noticed where the interval is still right, and always where it is not.
@@ -159,7 +159,9 @@ def test_skewed_noise_breaks_the_count_of_pixels_first_and_the_interval_last():
 
 @pytest.mark.statistical
 def test_skewness_of_one_law_on_both_sides_cancels():
-    found = calibrate(Experiment(log_normal(0.5), runs=400, noisy_reference=True, seed=41), spread=relative_spread(0.5))
-    low, high = share_interval(0.95, found.runs, 1e-4)
-    assert low <= found.coverage <= high
-    assert found.exceeding < 0.011  # symmetric errors with heavy tails: too few exceed if anything
+    calibration = calibrate(
+        Experiment(log_normal(0.5), runs=400, noisy_reference=True, seed=41), spread=relative_spread(0.5)
+    )
+    low, high = share_interval(0.95, calibration.runs, 1e-4)
+    assert low <= calibration.coverage <= high
+    assert calibration.exceeding < 0.011  # symmetric errors with heavy tails: too few exceed if anything

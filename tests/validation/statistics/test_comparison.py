@@ -34,13 +34,13 @@ def test_hand_computed_values():
 
 def test_students_law_and_welchs_degrees_of_freedom():
     # z = 3.2 with 3 degrees of freedom: p = 0.0493; normal: p = 0.0014. Equal variances of 4 batches each give 6.
-    one = Estimate(np.ones((1, 1)))
+    unit = Estimate(np.ones((1, 1)))
     z = 3.2
     level = 0.01
     random = Estimate(np.full((1, 1), 1 + 0.1 * z), np.full((1, 1), 0.1), 4)
     exact = dataclasses.replace(random, batches=None)
-    assert compare_statistics(one, random, plain_level=level).exceeding == 0
-    assert compare_statistics(one, exact, plain_level=level).exceeding == 1
+    assert compare_statistics(unit, random, plain_level=level).exceeding == 0
+    assert compare_statistics(unit, exact, plain_level=level).exceeding == 1
     both = Estimate(np.ones((1, 1)), np.full((1, 1), 0.1), 4)
     p = 2 * stats.t.sf(0.1 * z / np.hypot(0.1, 0.1), 6)
     for factor, exceeding in ((0.999, 0), (1.001, 1)):
@@ -87,9 +87,9 @@ def test_light_where_the_reference_has_none_shows_in_absolute_terms():
     reference[0] = 0.0  # mean 1.5
     test = reference.copy()
     test[0, 1:3] = [0.03, -0.06]
-    found = compare_statistics(Estimate(reference), Estimate(test, np.full((4, 4), 0.1)))
-    assert (found.zero_reference, found.tested) == (4, 16)
-    assert found.zero_reference_error == pytest.approx(0.04, rel=1e-12)
+    statistics = compare_statistics(Estimate(reference), Estimate(test, np.full((4, 4), 0.1)))
+    assert (statistics.zero_reference, statistics.tested) == (4, 16)
+    assert statistics.zero_reference_error == pytest.approx(0.04, rel=1e-12)
     black = compare_statistics(Estimate(np.zeros((4, 4))), Estimate(test, np.full((4, 4), 0.1)))
     assert black.zero_reference == 16
     assert np.isnan(black.zero_reference_error)
@@ -97,23 +97,23 @@ def test_light_where_the_reference_has_none_shows_in_absolute_terms():
 
 def test_the_variance_of_both_sides_counts_and_is_told_apart():
     # Variances of 0.09 and of 0.16 a pixel at equal means: the reference has 9/25 of the sum.
-    found = compare_statistics(
+    statistics = compare_statistics(
         Estimate(np.ones((3, 4)), np.full((3, 4), 0.3)), Estimate(np.ones((3, 4)), np.full((3, 4), 0.4))
     )
-    assert found.reference_variance_share == pytest.approx(9 / 25, rel=1e-12)
-    assert found.relative_bias_se == pytest.approx(0.5 / np.sqrt(12), rel=1e-12)
-    assert (found.relative_bias_p, found.relative_bias_freedom) == (1, np.inf)
-    one = compare_statistics(Estimate(np.ones((3, 4))), Estimate(np.ones((3, 4)), np.full((3, 4), 0.4), 5))
-    assert one.reference_variance_share == 0
-    assert one.relative_bias_freedom == pytest.approx(12 * 4, rel=1e-12)
+    assert statistics.reference_variance_share == pytest.approx(9 / 25, rel=1e-12)
+    assert statistics.relative_bias_se == pytest.approx(0.5 / np.sqrt(12), rel=1e-12)
+    assert (statistics.relative_bias_p, statistics.relative_bias_freedom) == (1, np.inf)
+    exact_reference = compare_statistics(Estimate(np.ones((3, 4))), Estimate(np.ones((3, 4)), np.full((3, 4), 0.4), 5))
+    assert exact_reference.reference_variance_share == 0
+    assert exact_reference.relative_bias_freedom == pytest.approx(12 * 4, rel=1e-12)
 
 
 def test_the_p_value_of_the_bias_is_below_five_percent_where_the_interval_leaves_zero_out():
     for shift, inside in ((1.95, True), (1.97, False)):
         test = Estimate(np.full((4, 4), 1 + shift * 0.01), np.full((4, 4), 0.04))
-        found = compare_statistics(Estimate(np.ones((4, 4))), test)
-        assert (found.relative_bias_p > 0.05) is inside
-        assert (found.relative_bias_ci[0] < 0) is inside
+        statistics = compare_statistics(Estimate(np.ones((4, 4))), test)
+        assert (statistics.relative_bias_p > 0.05) is inside
+        assert (statistics.relative_bias_ci[0] < 0) is inside
 
 
 def test_no_floor_under_the_variance():
@@ -151,8 +151,8 @@ def test_mask_and_nonfinite_pixels_leave_no_trace():
     mask = np.arange(16) < 8
     alone = compare_statistics(Estimate(np.ones((8, 8, 3))), dataclasses.replace(estimate, batch_means=None))
     masked = Estimate(wide, error, BATCHES)
-    found = compare_statistics(Estimate(np.ones((8, 16, 3))), masked, mask=np.tile(mask, (8, 1)))
-    assert found == dataclasses.replace(alone, masked=64)  # no trace but their number
+    statistics = compare_statistics(Estimate(np.ones((8, 16, 3))), masked, mask=np.tile(mask, (8, 1)))
+    assert statistics == dataclasses.replace(alone, masked=64)  # no trace but their number
     # Without the mask the same pixels fall away because they are not finite, and batch means with them.
     with_means = dataclasses.replace(masked, batch_means=estimate.batch_means)
     assert compare_statistics(Estimate(np.ones((8, 16, 3))), with_means) == alone
@@ -162,15 +162,15 @@ def test_mask_and_nonfinite_pixels_leave_no_trace():
 def test_numbers_have_no_unit(factor):
     rng = np.random.default_rng(4)
     profile = rng.gamma(0.5, 2.0, (16, 16, 3))
-    one, two = (monte_carlo(profile * normal(rng, (BATCHES, 16, 16, 3))) for _ in range(2))
+    first, second = (monte_carlo(profile * normal(rng, (BATCHES, 16, 16, 3))) for _ in range(2))
 
     def scaled(estimate):
         values = (factor * np.asarray(v) for v in (estimate.mean, estimate.standard_error, estimate.batch_means))
         mean, error, batch_means = values
         return Estimate(mean, error, BATCHES, batch_means)
 
-    before = compare_statistics(one, two, margin=0.01).to_json()
-    after = compare_statistics(scaled(one), scaled(two), margin=0.01).to_json()
+    before = compare_statistics(first, second, margin=0.01).to_json()
+    after = compare_statistics(scaled(first), scaled(second), margin=0.01).to_json()
     for name, value in before.items():
         # 1e-9: the rounding of a factor that is no power of two, magnified by differences of the two images.
         assert after[name] == pytest.approx(value, rel=1e-9), name
@@ -180,9 +180,9 @@ def test_dependent_channels_do_not_narrow_the_interval():
     rng = np.random.default_rng(5)
     grey = monte_carlo(normal(rng, (BATCHES, *SIZE)))
     colour = Estimate(*(np.repeat(np.asarray(v)[..., None], 3, axis=-1) for v in (grey.mean, grey.standard_error)), 16)
-    one = compare_statistics(Estimate(np.ones(SIZE)), grey)
-    three = compare_statistics(Estimate(np.ones((*SIZE, 3))), colour)
-    assert three.relative_bias_ci == pytest.approx(one.relative_bias_ci, rel=1e-12)
+    of_grey = compare_statistics(Estimate(np.ones(SIZE)), grey)
+    of_colour = compare_statistics(Estimate(np.ones((*SIZE, 3))), colour)
+    assert of_colour.relative_bias_ci == pytest.approx(of_grey.relative_bias_ci, rel=1e-12)
 
 
 @pytest.mark.claim("detectable-bias")

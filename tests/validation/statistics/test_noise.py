@@ -43,11 +43,11 @@ def test_floors_let_rounding_pass_and_no_more():
 
 
 def test_spread_is_the_geometric_mean_of_the_quartiles():
-    one = {"median_ms": 1.0, "low_ms": 1.0, "high_ms": 4.0, "repetitions": 9}
+    wide = {"median_ms": 1.0, "low_ms": 1.0, "high_ms": 4.0, "repetitions": 9}
     quiet = {"median_ms": 1.0, "low_ms": 1.0, "high_ms": 1.0, "repetitions": 9}
-    assert spread([{"frame": one, "airlight": quiet}]) == pytest.approx(2.0)
+    assert spread([{"frame": wide, "airlight": quiet}]) == pytest.approx(2.0)
     # A single repetition, and what is shorter than a launch, say nothing of the machine.
-    assert spread([{"frame": one | {"repetitions": 1}, "surface": one | {"median_ms": 0.002}}]) == 1.0
+    assert spread([{"frame": wide | {"repetitions": 1}, "surface": wide | {"median_ms": 0.002}}]) == 1.0
     assert spread([]) == 1.0
 
 
@@ -110,7 +110,8 @@ def test_a_machine_that_is_slower_excuses_as_much():
 
 def test_quiet_and_busy_machines_are_told_apart():
     quiet, busy = (
-        [one["times"] for scene in report(3, busy=share)["scenes"] for one in scene["methods"]] for share in (0.0, 0.2)
+        [configuration["times"] for scene in report(3, busy=share)["scenes"] for configuration in scene["methods"]]
+        for share in (0.0, 0.2)
     )
     assert spread(quiet) < 1.05
     assert spread(busy) > 1.2

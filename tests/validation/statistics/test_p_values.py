@@ -25,9 +25,9 @@ def test_power_of_the_detectable_effect_is_ninety_percent():
 def test_power_is_the_share_of_simulated_tests_that_find_the_effect():
     rng = np.random.default_rng(1)
     values = rng.normal(0.8, 1.0, (40000, 8))
-    found = stats.ttest_1samp(values, 0.0, axis=1).pvalue < 0.05
+    significant = stats.ttest_1samp(values, 0.0, axis=1).pvalue < 0.05
     # Standard error of a share of 40000 at most 0.0025; four of them.
-    assert power(0.8 * np.sqrt(8), 7.0) == pytest.approx(found.mean(), abs=0.01)
+    assert power(0.8 * np.sqrt(8), 7.0) == pytest.approx(significant.mean(), abs=0.01)
 
 
 def test_sidak_and_the_binomial_law_by_hand():

@@ -97,8 +97,8 @@ def test_two_random_images_need_both_variances():
     rng = np.random.default_rng(8)
     runs = []
     for _ in range(300):
-        one, two = (monte_carlo(rng.normal(1, sigma, (n, *SIZE))) for sigma, n in ((0.3, 16), (0.5, 24)))
-        runs.append(compare_statistics(one, two))
+        reference, test = (monte_carlo(rng.normal(1, sigma, (n, *SIZE))) for sigma, n in ((0.3, 16), (0.5, 24)))
+        runs.append(compare_statistics(reference, test))
     assert_rate((s.relative_bias_ci[0] <= 0 <= s.relative_bias_ci[1] for s in runs), 0.95)
     assert_rate((s.relative_bias_ci_batches[0] <= 0 <= s.relative_bias_ci_batches[1] for s in runs), 0.95)
     assert_rate((s.rejected > 0 for s in runs), 0.01)

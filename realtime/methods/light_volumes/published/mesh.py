@@ -84,6 +84,11 @@ def tessellation_stages(
 
     The passes are those of the paper's Table 1, ``laplacian``, ``edge map`` and ``tessellate``, and ``vertices``, which
     a graphics card does while it draws.
+
+    Raises
+    ------
+    InputError
+        If `threshold` is not a positive number.
     """
     passed: list[Any] = [_heights(shadow_map)]
     times = {}
@@ -113,16 +118,16 @@ def _static_mesh(shadow_map: ShadowMap, light: Light, height) -> VolumeMesh:
     faces, size = shadow_map.faces, shadow_map.size
     number, kept = _numbering(faces, size, np.ones(height.size, bool))
     cells = 2 * faces * size * size
-    found = np.empty((cells + (4 * size if faces == 1 else 0), 3), np.int32)
+    corner_numbers = np.empty((cells + (4 * size if faces == 1 else 0), 3), np.int32)
     if faces == 1:
-        found[cells:] = _sides(size, number, apex=len(kept))
-    grid, number = found[:cells].reshape(faces, size, size, 2, 3), number.reshape(height.shape)
+        corner_numbers[cells:] = _sides(size, number, apex=len(kept))
+    grid, number = corner_numbers[:cells].reshape(faces, size, size, 2, 3), number.reshape(height.shape)
     steps = ((0, 0), (0, 1), (1, 1)), ((0, 0), (1, 1), (1, 0))  # (row, column)
     for face in range(faces):
         for which, three in enumerate(steps):
             for k, (row, column) in enumerate(three[::-1] if face % 2 else three):
                 grid[face, ..., which, k] = number[face, row : row + size, column : column + size]
-    return VolumeMesh(_vertices(shadow_map, light, height, kept), found)
+    return VolumeMesh(_vertices(shadow_map, light, height, kept), corner_numbers)
 
 
 def _adaptive_mesh(shadow_map: ShadowMap, light: Light, height, corners) -> VolumeMesh:
@@ -131,13 +136,13 @@ def _adaptive_mesh(shadow_map: ShadowMap, light: Light, height, corners) -> Volu
     used = np.zeros(height.size, bool)
     used[corners] = True
     number, kept = _numbering(faces, size, used)
-    found = number[corners]
+    corner_numbers = number[corners]
     if faces == 1:
-        found = np.concatenate([found, _sides(size, number, apex=len(kept))])
+        corner_numbers = np.concatenate([corner_numbers, _sides(size, number, apex=len(kept))])
     else:
         mirrored = corners[:, 0] // (size + 1) ** 2 % 2 == 1
-        found[mirrored] = found[mirrored, ::-1]
-    return VolumeMesh(_vertices(shadow_map, light, height, kept), found)
+        corner_numbers[mirrored] = corner_numbers[mirrored, ::-1]
+    return VolumeMesh(_vertices(shadow_map, light, height, kept), corner_numbers)
 
 
 def _numbering(faces: int, size: int, used):
@@ -175,8 +180,8 @@ def _vertices(shadow_map: ShadowMap, light: Light, height, kept):
             row, column = np.divmod(numbers, side)
             u, v = column * (2 / shadow_map.size) - 1, row * (2 / shadow_map.size) - 1
             s = height[face].ravel()[numbers].astype(float)
-            for one, k in enumerate(_directions(shadow_map.projection.basis, face, u, v)):
-                result[some, one] = place[one] * s + k
+            for axis, k in enumerate(_directions(shadow_map.projection.basis, face, u, v)):
+                result[some, axis] = place[axis] * s + k
             result[some, 3] = s
     return result
 
@@ -184,10 +189,10 @@ def _vertices(shadow_map: ShadowMap, light: Light, height, kept):
 def _directions(basis, face: int, u, v) -> list[Any]:
     """Return the coordinates of axis + u across + v up of a face."""
     if basis:
-        across, up, axis = (np.array(one, dtype=float).ravel() for one in basis)
-        return [axis[one] + u * across[one] + v * up[one] for one in range(3)]
+        across, up, axis = (np.array(vector, dtype=float).ravel() for vector in basis)
+        return [axis[k] + u * across[k] + v * up[k] for k in range(3)]
     cyclic = [1.0 - 2 * (face & 1), u, v]  # from the coordinate of the axis onwards
-    return [cyclic[(one - (face >> 1)) % 3] for one in range(3)]
+    return [cyclic[(k - (face >> 1)) % 3] for k in range(3)]
 
 
 def _border(size: int):

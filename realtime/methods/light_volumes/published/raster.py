@@ -107,7 +107,7 @@ def _camera_basis(camera: Camera):
 
 def _opaque(values):
     """Return a vector of which no kernel knows the value, so that none is compiled anew when it changes."""
-    return mi.Vector3d(*(dr.opaque(mi.Float64, float(one)) for one in values))
+    return mi.Vector3d(*(dr.opaque(mi.Float64, float(component)) for component in values))
 
 
 def _project(vertices, camera: Camera):
@@ -129,7 +129,7 @@ def _project(vertices, camera: Camera):
 def _corners(screen, corners, triangle):
     """Return the corners (a, b, z, w) of triangles."""
     number = [dr.gather(mi.UInt32, corners, 3 * triangle + k) for k in range(3)]
-    return [dr.gather(mi.Vector4d, screen, one) for one in number]
+    return [dr.gather(mi.Vector4d, screen, corner) for corner in number]
 
 
 def _rows(screen, corners, camera: Camera):
@@ -155,12 +155,12 @@ def _pixel_range(values, depth, size: int):
         at = value / z
         low, high = dr.select(z > 0, dr.minimum(low, at), low), dr.select(z > 0, dr.maximum(high, at), high)
     for k, m in ((0, 1), (1, 2), (2, 0)):
-        # Where an edge passes z = 0 it leaves the image on the side of its value there; in doubt, on both.
+        # Where an edge passes z = 0 it leaves the image on the side of its value there, or on both if that is unclear.
         cut = (depth[k] > 0) ^ (depth[m] > 0)
-        one, other = values[k] * dr.abs(depth[m]), values[m] * dr.abs(depth[k])
-        doubt = 1e-12 * (dr.abs(one) + dr.abs(other))
-        low = dr.select(cut & (one + other <= doubt), -dr.inf, low)
-        high = dr.select(cut & (one + other >= -doubt), dr.inf, high)
+        from_k, from_m = values[k] * dr.abs(depth[m]), values[m] * dr.abs(depth[k])
+        doubt = 1e-12 * (dr.abs(from_k) + dr.abs(from_m))
+        low = dr.select(cut & (from_k + from_m <= doubt), -dr.inf, low)
+        high = dr.select(cut & (from_k + from_m >= -doubt), dr.inf, high)
     begin, end = (dr.clip(dr.ceil(edge), 0, size) for edge in (low - 1e-6, high + 1e-6))
     return mi.UInt32(begin), dr.maximum(mi.UInt32(end), mi.UInt32(begin))
 
@@ -173,7 +173,7 @@ def _expand(count, limit: int):
     ends = np.cumsum(np.array(dr.gather(mi.UInt32, count, used)), dtype=np.int64)
     begin = before = 0
     while begin < len(ends):
-        # One that is larger than the limit comes alone; it is the width or the height of an image at most.
+        # A count above the limit comes alone; it is the width or the height of an image at most.
         end = max(begin + 1, int(np.searchsorted(ends, before + limit, side="right")))
         starts = np.concatenate(([before], ends[begin : end - 1])) - before
         start = mi.UInt32(starts.astype(np.uint32))
@@ -185,12 +185,12 @@ def _expand(count, limit: int):
         begin, before = end, int(ends[end - 1])
 
 
-def _spans(screen, corners, camera: Camera, found, owner, rank) -> _Spans:
+def _spans(screen, corners, camera: Camera, row_ranges, owner, rank) -> _Spans:
     """Return the pixels that triangles cover in rows, by the rule of the module."""
-    triangle, first = (dr.gather(mi.UInt32, values, owner) for values in found)
+    triangle, first = (dr.gather(mi.UInt32, values, owner) for values in row_ranges)
     row = first + rank
     down, up = _row_segment(_corners(screen, corners, triangle), mi.Float64(row))
-    columns = [_first_right_of(one, other, camera.width) for one, other in ((down, up), (up, down))]
+    columns = [_first_right_of(leading, trailing, camera.width) for leading, trailing in ((down, up), (up, down))]
     begin, end = dr.minimum(*columns), dr.maximum(*columns)
     count = dr.select((down.z > 0) | (up.z > 0), end - begin, 0)
     up_is_left = columns[1] < columns[0]
@@ -218,15 +218,15 @@ def _row_segment(vertices, row):
 
     vertex, after, before = ([*vertices[k:], *vertices[:k]] for k in range(3))
     f, f_after, f_before = ([*side[k:], *side[:k]] for k in range(3))
-    one = pick(vertex), pick(f)
+    single = pick(vertex), pick(f)
     other = pick(after), pick(f_after)
     third = pick(before), pick(f_before)
-    is_below = one[1] > 0
+    is_below = single[1] > 0
     crossed = (below[0] != below[1]) | (below[1] != below[2])
 
     def cross(end):
-        above, under = (dr.select(is_below, x, y) for x, y in ((end[0], one[0]), (one[0], end[0])))
-        weight, other_weight = dr.select(is_below, one[1], end[1]), -dr.select(is_below, end[1], one[1])
+        above, under = (dr.select(is_below, x, y) for x, y in ((end[0], single[0]), (single[0], end[0])))
+        weight, other_weight = dr.select(is_below, single[1], end[1]), -dr.select(is_below, end[1], single[1])
         return dr.select(crossed, dr.fma(above, weight, under * other_weight), mi.Vector4d(0))
 
     leaving, arriving = cross(other), cross(third)
@@ -254,7 +254,7 @@ def _inverse_depth(left, right, column):
 def _crossings(spans: _Spans, camera: Camera, span, step) -> Crossings:
     """Return the crossings of pixels: the span of each, and how many pixels come before it there."""
     pixel = dr.gather(mi.UInt32, spans.pixel, span) + step
-    first, change, sign = (dr.gather(mi.Float64, one, span) for one in (spans.inverse, spans.step, spans.sign))
+    first, change, sign = (dr.gather(mi.Float64, column, span) for column in (spans.inverse, spans.step, spans.sign))
     inverse = dr.maximum(dr.fma(mi.Float64(step), change, first), 0)
     row = pixel // camera.width
     across = 0.5 * (camera.width - 1) - mi.Float64(pixel - row * camera.width)

@@ -64,16 +64,16 @@ def crossing_sum(
     beyond = dr.zeros(mi.Float64, dr.width(distance))
 
     def add(index, x0, x1, sign):
-        dr.eval(index, x0, x1, sign)  # so that all calls are one kernel: compiling it is what takes time
+        dr.eval(index, x0, x1, sign)  # All calls then share one kernel; compiling it takes longer than running it.
         columns = (getattr(geometry, field.name) for field in fields(RayGeometry))
-        rays = RayGeometry(*(None if one is None else dr.gather(Float, one, index) for one in columns))
+        rays = RayGeometry(*(None if column is None else dr.gather(Float, column, index) for column in columns))
         term = airlight_integral(kernel, rays, x0, x1, medium=medium, light=light)
         dr.scatter_add(total, type(total)(term) * sign, index)
         dr.eval(total)
 
-    for found in batches:
-        index = found.pixel if lane is None else dr.gather(mi.UInt32, lane, found.pixel)
-        x, sign = Float(found.distance), found.sign
+    for crossings in batches:
+        index = crossings.pixel if lane is None else dr.gather(mi.UInt32, lane, crossings.pixel)
+        x, sign = Float(crossings.distance), crossings.sign
         in_front = x < dr.gather(Float, distance, index)
         is_beyond = ~in_front | (x >= dr.gather(Float, geometry.foot, index))
         dr.scatter_add(beyond, sign, index, is_beyond)
@@ -81,7 +81,7 @@ def crossing_sum(
         some = dr.compress(in_front)
         if dr.width(some) == 0:
             continue
-        index, x, sign = (dr.gather(type(one), one, some) for one in (index, x, sign))
+        index, x, sign = (dr.gather(type(values), values, some) for values in (index, x, sign))
         near = x < dr.gather(Float, geometry.foot, index)
         end = dr.select(near, x, dr.gather(Float, distance, index))
         add(index, dr.select(near, 0, x), end, dr.select(near, sign, -sign))

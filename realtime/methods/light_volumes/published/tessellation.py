@@ -64,9 +64,9 @@ def edges(height, threshold: float) -> list[Any]:
     Parameters
     ----------
     height
-        Array (faces, N + 1, N + 1), N a power of two, of inverse depths, none negative.
+        Array (faces, N + 1, N + 1), N a power of two, of inverse depths [1/m], none negative.
     threshold
-        Largest departure that is no edge, relative to the height.
+        Largest departure that is no edge, relative to the height [1].
 
     Raises
     ------
@@ -76,12 +76,13 @@ def edges(height, threshold: float) -> list[Any]:
     if not 0 < threshold < np.inf:
         raise InputError(f"threshold: got {threshold!r}, wanted a positive number, for instance 0.001")
     size = height.shape[1] - 1
-    found = []
+    marks_by_level = []
     for level in range(size.bit_length() - 1):
         half = size >> (level + 1)
-        marks = [_marks(one[::half, ::half], threshold) for one in height]  # face by face, to save memory
-        found.append(np.stack(marks))
-    return found
+        # Face by face, to save memory.
+        marks = [_marks(face_height[::half, ::half], threshold) for face_height in height]
+        marks_by_level.append(np.stack(marks))
+    return marks_by_level
 
 
 def _marks(s, threshold: float):
@@ -148,7 +149,8 @@ def quads(divided: list[Any]):
 def triangles(divided: list[Any]):
     """Return the triangles of the quads, (m, 3) numbers of corners face by face and row by row.
 
-    They are counter-clockwise in (column, row). No corner lies inside a side of a triangle.
+    `divided` is that of `divide`. Triangles are counter-clockwise in (column, row), and no corner lies inside a side
+    of one.
     """
     size = 2 ** len(divided)
     parts = []
@@ -157,7 +159,9 @@ def triangles(divided: list[Any]):
             chosen = numbers[sides == sides_now] if len(numbers) else numbers
             if len(chosen):
                 first, step = _first_corner(chosen, level, size)
-                fan = np.array([[_ring_offset(k, step, size) for k in one] for one in configuration(sides_now)])
+                fan = np.array(
+                    [[_ring_offset(k, step, size) for k in triangle] for triangle in configuration(sides_now)]
+                )
                 parts.append((first[:, None, None] + fan.astype(np.int32)).reshape(-1, 3))
     return np.concatenate(parts)
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from realtime.errors import InputError
-from tests.helpers.scenes import body, clear_scene, spot, tiny_scene
+from tests.helpers.scenes import bounded_medium, clear_scene, spot, tiny_scene
 
 SIZE = (48, 36)
 MAP = 256
@@ -67,8 +67,8 @@ def render(scene, method, precision="single", **parameters):
     return render_frame(frame_renderer(read_scene(scene, precision), chosen, kernel=kernel, **parameters)).airlight
 
 
-def relative_rmse(found, expected):
-    return np.sqrt(np.mean((found - expected) ** 2)) / expected.mean()
+def relative_rmse(image, expected):
+    return np.sqrt(np.mean((image - expected) ** 2)) / expected.mean()
 
 
 def marched(scene, steps=600):
@@ -80,13 +80,13 @@ def marched(scene, steps=600):
 def test_every_pixel_is_that_of_the_marcher(variant, change):
     scene = scene_with(change)
     expected = marched(scene)
-    found = relative_rmse(render(scene, "min-max", map=MAP, sampling="pixels", slices=200), expected)
+    error = relative_rmse(render(scene, "min-max", map=MAP, sampling="pixels", slices=200), expected)
     # The marcher takes the nearest texel, the trees are linear between them: half a texel of a 256 map at shadow edges,
     # and half a slice of 200.
-    assert found < 8e-3
+    assert error < 8e-3
     bare = relative_rmse(render(scene, "unshadowed"), expected)
     if bare > 1e-4:  # else no shadow is seen; the marcher itself is 1e-5 off
-        assert found < 0.2 * bare
+        assert error < 0.2 * bare
 
 
 @pytest.mark.claim("slices-converge", tolerance="relative RMSE 2e-3")
@@ -125,7 +125,7 @@ def test_bounded_media(variant, sampling):
     import mitsuba as mi
 
     occluders = {name: tiny_scene()[name] for name in ("ball", "floor")}
-    smoke = body({"type": "sphere", "center": [-0.2, 0.3, 0.9], "radius": 1.3}, 0.7, (0.9, 0.8, 0.7))
+    smoke = bounded_medium({"type": "sphere", "center": [-0.2, 0.3, 0.9], "radius": 1.3}, 0.7, (0.9, 0.8, 0.7))
     scene = mi.load_dict(clear_scene(size=SIZE, smoke=smoke, **occluders))
     expected = marched(scene)
     settings = {"sampling": sampling, "slices": 200, "samples": 128, "step": 4}
@@ -142,22 +142,22 @@ def test_without_casters_it_is_the_unshadowed_frame(variant, sampling):
 
 @pytest.mark.parametrize("sampling", ["slices", "pixels"])
 def test_where_no_shadow_is_seen_it_is_unshadowed(variant, sampling):
-    """A ball behind the light: there is a map, and nothing in view is dark."""
-    ball = {"type": "sphere", "center": [4.9, 5.7, 2.9], "radius": 0.41}
-    scene = scene_with(ball=ball, floor=None)
-    found = render(scene, "min-max", sampling=sampling, step=1, samples=128, slices=200)
+    """A sphere behind the light: there is a map, and nothing in view is dark."""
+    sphere = {"type": "sphere", "center": [4.9, 5.7, 2.9], "radius": 0.41}
+    scene = scene_with(ball=sphere, floor=None)
+    image = render(scene, "min-max", sampling=sampling, step=1, samples=128, slices=200)
     expected = render(scene, "unshadowed")
     # Every pixel by itself: rounding. Between samples: what is interpolated is smooth, but not linear.
-    assert relative_rmse(found, expected) < (1e-6 if sampling == "pixels" else 2e-3)
+    assert relative_rmse(image, expected) < (1e-6 if sampling == "pixels" else 2e-3)
 
 
 @pytest.mark.parametrize("sampling", ["slices", "pixels"])
 def test_camera_at_the_light(variant, sampling):
     """All that it sees is lit; the airlight there is infinite, as every method says."""
     scene = scene_with(sensor=sensor((0.9, 0.7, 1.9), (0, 0, 0.9)))
-    found = render(scene, "min-max", map=32, sampling=sampling)
-    assert not np.any(np.isnan(found))
-    assert np.array_equal(found, render(scene, "unshadowed"))
+    image = render(scene, "min-max", map=32, sampling=sampling)
+    assert not np.any(np.isnan(image))
+    assert np.array_equal(image, render(scene, "unshadowed"))
 
 
 @pytest.mark.parametrize("change", ["light in view", "spot in view"])
@@ -171,19 +171,19 @@ def test_rays_through_the_light(variant, change):
     scene = mi.load_dict(tiny_scene(**changes))
     expected = render(scene, "unshadowed")
     for sampling in ("slices", "pixels"):
-        found = render(scene, "min-max", map=64, sampling=sampling)
-        assert not np.any(np.isnan(found))
-        assert np.all(found >= 0)
+        image = render(scene, "min-max", map=64, sampling=sampling)
+        assert not np.any(np.isnan(image))
+        assert np.all(image >= 0)
     # The light is seen, so its pixel holds all but the part of the ray that lies behind something.
-    assert found[12, 16, 0] == pytest.approx(expected[12, 16, 0], rel=0.01)
+    assert image[12, 16, 0] == pytest.approx(expected[12, 16, 0], rel=0.01)
 
 
 def test_both_precisions_agree(variant):
     scene = scene_with("light in view")
-    one, other = (render(scene, "min-max", precision, map=64) for precision in ("single", "double"))
+    single, double = (render(scene, "min-max", precision, map=64) for precision in ("single", "double"))
     # Both read a map of float32 distances; a few rays pass an edge on the other side.
-    assert relative_rmse(one, other) < 1e-3
-    assert np.median(np.abs(one - other) / other) < 1e-5
+    assert relative_rmse(single, double) < 1e-3
+    assert np.median(np.abs(single - double) / double) < 1e-5
 
 
 @pytest.mark.parametrize("size", [(1, 1), (16, 1), (3, 50)])
@@ -195,10 +195,10 @@ def test_images_of_any_size(variant, size):
     scene = mi.load_dict(tiny_scene(**changes))
     expected = render(scene, "unshadowed")
     for settings in ({}, {"sampling": "pixels"}, {"slices": 1}):
-        found = render(scene, "min-max", map=32, **settings)
-        assert np.all(np.isfinite(found))
+        image = render(scene, "min-max", map=32, **settings)
+        assert np.all(np.isfinite(image))
         # Little of this view is in shadow; that of one pixel is as exact as its kernel.
-        assert relative_rmse(found, expected) < (1e-5 if size == (1, 1) else 0.3)
+        assert relative_rmse(image, expected) < (1e-5 if size == (1, 1) else 0.3)
 
 
 def test_a_frame_follows_its_light(variant):
@@ -216,9 +216,9 @@ def test_a_frame_follows_its_light(variant):
     for scene in (here, here, here):
         run_stages(renderer, renderer.prepare(scene))
     moved = replace(renderer, scene=replace(here, lights=there.lights))
-    found = image_frame(moved, run_stages(moved, renderer.prepare(moved.scene))).airlight
+    replayed = image_frame(moved, run_stages(moved, renderer.prepare(moved.scene))).airlight
     expected = render(scene_with("light in view", lamp=lamp((2.9, -1.7, 1.4))), "min-max", map=64)
-    assert found == pytest.approx(expected, rel=1e-5)
+    assert replayed == pytest.approx(expected, rel=1e-5)
 
 
 @pytest.mark.parametrize(
@@ -241,8 +241,8 @@ def test_samples_in_a_medium_bounded_by_a_mesh(variant):
     scene = read_scene(load_scene("three-media", (32, 24)).scene)
     settings = {"map": 64, "samples": 1024, "slices": 400, "step": 4}
     images = [
-        render_frame(frame_renderer(scene, METHODS["min-max"], kernel=exact, sampling=one, **settings)).airlight
-        for one in ("slices", "pixels")
+        render_frame(frame_renderer(scene, METHODS["min-max"], kernel=exact, sampling=sampling, **settings)).airlight
+        for sampling in ("slices", "pixels")
     ]
     assert all(np.all(np.isfinite(image)) for image in images)
     assert np.mean(images[1]) > 0

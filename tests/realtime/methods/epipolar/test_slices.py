@@ -30,9 +30,9 @@ def read(position, *, kind="point", **changes):
     if kind == "spot":
         aim = mi.ScalarTransform4f().look_at(list(position), [0.1, 2.4, -0.9], [1, 0, 0])
         lamp = {"type": "spot", "to_world": aim, "cutoff_angle": 37.0, "beam_width": 37.0, "intensity": 1.0}
-    ball = {"type": "sphere", "center": [0.3, 1.6, 0.6], "radius": 0.41}
+    sphere = {"type": "sphere", "center": [0.3, 1.6, 0.6], "radius": 0.41}
     floor = {"type": "rectangle", "to_world": mi.ScalarTransform4f().translate([0, 0, -1]).scale(6.3)}
-    scene = tiny_scene(size=SIZE, **({"lamp": lamp, "ball": ball, "floor": floor} | changes))
+    scene = tiny_scene(size=SIZE, **({"lamp": lamp, "ball": sphere, "floor": floor} | changes))
     scene["sensor"] = scene["sensor"] | {"to_world": look}
     return read_scene(mi.load_dict(scene))
 
@@ -75,9 +75,9 @@ def test_a_point_of_a_slice_is_found_there(variant, place):
 
     slices = slices_of(read(PLACES[place]))
     for share in (0.3, 0.8):
-        found = np.array(slice_coordinate(slices, *points_on(slices, share)), dtype=float)
+        coordinate = np.array(slice_coordinate(slices, *points_on(slices, share)), dtype=float)
         # Lines that run along the border are found less sharply.
-        assert found == pytest.approx(np.arange(slices.count), abs=2e-3)
+        assert coordinate == pytest.approx(np.arange(slices.count), abs=2e-3)
 
 
 @pytest.mark.claim("slices-by-the-border", tolerance="1e-4 relative")
@@ -145,7 +145,7 @@ def test_a_plane_is_where_it_is(variant, kind):
     scene = read((0.4, 1.9, 0.9), kind=kind, ball=None, floor=floor)
     heights = height_maps(scene, size=8)
     values = samples_of(heights)
-    number, q = (one.ravel() for one in np.mgrid[: values.shape[0], : values.shape[1]])
+    number, q = (index.ravel() for index in np.mgrid[: values.shape[0], : values.shape[1]])
     kx, ky = line_point(heights, mi.UInt32(number), mi.Float(q))
     slices = heights.slices
     k = np.outer(np.array(kx), vectors(slices.towards)) + np.array(ky)[:, None] * vectors(slices.across)[number]
@@ -201,7 +201,7 @@ def test_lit_pieces_are_those_of_many_points(variant, kind):
         begin, edges = x1 * 0, np.array([[[1.0, 0.0], [0.0, 1.0]], [[0.0, 1.0], [-1.0, 0.0]]])
         edges = np.broadcast_to(edges, (count, 2, 2, 2))
     else:
-        chord = np.stack([np.array(one, dtype=float) for one in heights.chord], axis=1)[number]
+        chord = np.stack([np.array(coordinate, dtype=float) for coordinate in heights.chord], axis=1)[number]
         edges, begin = chord.reshape(count, 1, 2, 2), x1 * 0
     total, inside_all = np.zeros(count), np.zeros(count)
     for edge in range(heights.edges):
@@ -226,10 +226,10 @@ def test_lit_pieces_are_those_of_many_points(variant, kind):
     geometry = RayGeometry(mi.Float(-distance * np.cos(angle)), mi.Float(distance * np.sin(angle)), None, None)
     zero = mi.Float(np.zeros(count))
     segment = mi.Float(begin), mi.Float(x1)
-    found = np.array(sum_lit_intervals(heights, mi.UInt32(number), geometry, segment, lambda a, b: b - a, zero))
+    length = np.array(sum_lit_intervals(heights, mi.UInt32(number), geometry, segment, lambda a, b: b - a, zero))
     assert np.mean((total > 0) & (total < inside_all - 1e-2)) > 0.1  # some rays are lit in part
     # The points are 9e-4 m apart at most; few rays have more than two pieces, of two ends each.
-    assert found == pytest.approx(total, abs=4e-3)
+    assert length == pytest.approx(total, abs=4e-3)
 
 
 def test_marked_are_the_first_of_each_step_and_both_sides_of_breaks(variant):
@@ -252,8 +252,8 @@ def test_marked_are_the_first_of_each_step_and_both_sides_of_breaks(variant):
     changes = seen[:, 1:] != seen[:, :-1]
     expected[:, 1:] |= changes
     expected[:, :-1] |= changes
-    found = np.array(marked)[: int(count[0])]
-    assert sorted(found) == sorted(every[expected.ravel()])
+    listed = np.array(marked)[: int(count[0])]
+    assert sorted(listed) == sorted(every[expected.ravel()])
     assert changes.sum() > 5
 
 
@@ -270,13 +270,13 @@ def test_what_is_linear_along_slices_is_interpolated_exactly(variant):
     values = 50 + 0.5 * i - 0.25 * j
     pixel = np.arange(SIZE[0] * SIZE[1])
     point = SIZE[0] / 2 - 0.5 - pixel % SIZE[0], SIZE[1] / 2 - 0.5 - pixel // SIZE[0]
-    value, found = between_samples(samples, values, tuple(mi.Float(one) for one in point), depth)
-    assert np.all(np.array(found))
+    value, fits = between_samples(samples, values, tuple(mi.Float(coordinate) for coordinate in point), depth)
+    assert np.all(np.array(fits))
     # Slices are at most a quarter of a pixel apart, and pixels beyond the last one take its value.
     assert np.array(value) == pytest.approx(50 + 0.5 * point[0] - 0.25 * point[1], abs=0.1)
     # A pixel that is as near as none of its samples is not found.
-    _, found = between_samples(samples, values, tuple(mi.Float(one) for one in point), depth * 0.5)
-    assert not np.any(np.array(found))
+    _, fits = between_samples(samples, values, tuple(mi.Float(coordinate) for coordinate in point), depth * 0.5)
+    assert not np.any(np.array(fits))
 
 
 @pytest.mark.parametrize("width", [1, 16, 1000, 1024, 70000])

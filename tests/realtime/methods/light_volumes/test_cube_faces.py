@@ -79,13 +79,13 @@ def test_few_faces_are_found_that_no_ray_passes(variant):
     """A ray can pass a pyramid by without being on the outer side of one of its planes: one face in six."""
     random = np.random.default_rng(5)
     x = np.concatenate([[0.0], 10.0 ** np.linspace(-3, 4, 4000)])
-    found = passed = 0
+    listed = passed = 0
     for _ in range(100):
         ray, away = random.normal(size=3), random.normal(size=3)
         ray /= np.linalg.norm(ray)
-        found += len(found_for(np.repeat(ray[None], 4, axis=0), np.inf, away))
+        listed += len(found_for(np.repeat(ray[None], 4, axis=0), np.inf, away))
         passed += len(set(faces_of(away + x[:, None] * ray).tolist()))
-    assert passed <= found <= 1.2 * passed
+    assert passed <= listed <= 1.2 * passed
 
 
 @given(
@@ -95,8 +95,8 @@ def test_every_face_that_is_passed_comes_once_and_in_order(variant, passed, begi
     import mitsuba as mi
 
     order = int(faces_in_order(mi.UInt32(passed), [mi.Float(begin) for begin in begins])[0])
-    found = []
+    faces = []
     while order != NO_FACE:
-        found.append(order & NO_FACE)
+        faces.append(order & NO_FACE)
         order >>= FACE_BITS
-    assert found == sorted((face for face in range(6) if passed >> face & 1), key=lambda face: (begins[face], face))
+    assert faces == sorted((face for face in range(6) if passed >> face & 1), key=lambda face: (begins[face], face))

@@ -8,7 +8,19 @@ import numpy as np
 import pytest
 
 from tests.helpers.scenes import clear_scene, tiny_scene
-from tests.helpers.sunlit import ALONG, ball, box_part, cube, read, relative_rmse, render, shaded, summed, sun, unit
+from tests.helpers.sunlit import (
+    ALONG,
+    box_part,
+    cube,
+    fog_sphere,
+    read,
+    relative_rmse,
+    render,
+    shaded,
+    summed,
+    sun,
+    unit,
+)
 from validation.scenes.parts import rotation
 
 
@@ -30,22 +42,22 @@ def test_depths_are_measured_along_the_light(variant):
     shadow_map = cast(scene, 16)
     position, across, up, axis = face_of(shadow_map, scene.lights[0])
     assert axis == pytest.approx(unit(ALONG), abs=1e-7)
-    for one, other in ((across, up), (across, axis), (up, axis)):
-        assert abs(one @ other) < 1e-6
+    for first, second in ((across, up), (across, axis), (up, axis)):
+        assert abs(first @ second) < 1e-6
     u = np.linspace(-1, 1, 17)
     start = position + u[None, :, None] * across + u[:, None, None] * up - float(shadow_map.projection.depth[0]) * axis
-    found = np.array(shadow_map.distance, dtype=float).reshape(17, 17)
+    depth = np.array(shadow_map.distance, dtype=float).reshape(17, 17)
     # Rays are float32, of lengths of about 10 m.
-    assert found == pytest.approx(-start[..., 2] / axis[2], rel=1e-6)
+    assert depth == pytest.approx(-start[..., 2] / axis[2], rel=1e-6)
 
 
 @pytest.mark.claim("directional-light-volumes")
 def test_the_face_just_covers_the_media(variant):
-    """The corners of the box and the ball fill the rectangle from side to side, and nothing is before or behind it."""
+    """The corners of the box and the sphere fill the rectangle from side to side; nothing is before or behind it."""
     from realtime.scene.directional_extent import media_spheres
 
-    scene = read(clear_scene(lamp=sun(), cube=cube(), ball=ball()))
-    spheres = media_spheres(scene.medium.bodies)
+    scene = read(clear_scene(lamp=sun(), cube=cube(), ball=fog_sphere()))
+    spheres = media_spheres(scene.medium.bounded_media)
     assert len(spheres) == 8 + 1
     shadow_map = cast(scene, 4)
     position, across, up, axis = face_of(shadow_map, scene.lights[0])
@@ -72,7 +84,7 @@ def height_field(scene, size):
     def lit(point):
         away = point - position
         x, y = (0.5 * size * (away @ side / (side @ side) + 1) for side in (across, up))
-        i, j = (np.clip(np.floor(one).astype(int), 0, size - 1) for one in (x, y))
+        i, j = (np.clip(np.floor(coordinate).astype(int), 0, size - 1) for coordinate in (x, y))
         a, b = x - i, y - j
         s00, s10, s01, s11 = height[j, i], height[j, i + 1], height[j + 1, i], height[j + 1, i + 1]
         below = s00 + a * (s10 - s00) + b * (s11 - s10)
@@ -88,12 +100,12 @@ def test_the_walk_against_steps_through_the_height_field(variant, size):
     """The same map, met by a sum over 10 000 steps of every ray in NumPy."""
     scene = read(shaded(size=(12, 8)))
     frame = render(scene, "light-volumes", map=size, walls="slanted")
-    found, distance = frame.airlight, frame.distance
+    walked, distance = frame.airlight, frame.distance
     expected = summed(scene, [box_part()], distance=distance, lit=height_field(scene, size))
     without = render(scene).airlight
     assert relative_rmse(without, expected) > 0.05  # there is a shadow
     # A step of 1e-4 of a chord at each edge.
-    assert relative_rmse(found, expected) < 2e-4
+    assert relative_rmse(walked, expected) < 2e-4
 
 
 def test_the_error_falls_as_the_map_grows(variant):
@@ -110,8 +122,8 @@ def test_the_error_falls_as_the_map_grows(variant):
         return relative_rmse(render(loaded, "light-volumes", map=size, walls=walls).airlight, truth)
 
     errors = [error(size, "slanted") for size in (32, 128, 512, 2048)]
-    # As 1/size where shadow edges are crossed, as its root for the few rays that graze the shadow of the ball.
-    assert all(other < 0.65 * one for one, other in pairwise(errors))
+    # As 1/size where shadow edges are crossed, as its root for the few rays that graze the shadow of the sphere.
+    assert all(fine < 0.65 * coarse for coarse, fine in pairwise(errors))
     assert errors[-1] < 5e-3
     # Walls that stand upright where rays found them are worth a map of eight times the size.
     assert error(128, "upright") < 1.5 * errors[2]
@@ -127,7 +139,7 @@ def test_marching_with_the_map_comes_to_the_same(variant):
     assert relative_rmse(marched, walked) < 5e-3
 
 
-def test_a_map_of_rays_that_miss_all_bodies(variant):
+def test_a_map_of_rays_that_miss_all_media(variant):
     """A camera that looks away from the media: points at infinity have no place in a map."""
     scene = shaded(size=(8, 8), floor=None)
     import mitsuba as mi
@@ -141,8 +153,8 @@ def test_a_map_of_rays_that_miss_all_bodies(variant):
 def test_single_precision_against_double(variant):
     """The map is the same in both: what differs is rounding along the rays."""
     scene = shaded(size=(32, 24))
-    one, other = (render(scene, "light-volumes", map=256, precision=name).airlight for name in ("single", "double"))
-    assert np.abs(one - other).max() < 1e-5 * other.max()
+    single, double = (render(scene, "light-volumes", map=256, precision=name).airlight for name in ("single", "double"))
+    assert np.abs(single - double).max() < 1e-5 * double.max()
     maps = [np.array(cast(read(scene, name), 64).distance, dtype=float) for name in ("single", "double")]
     assert np.array_equal(*maps)
 
@@ -150,10 +162,10 @@ def test_single_precision_against_double(variant):
 @pytest.mark.slow
 def test_several_lights_have_a_volume_each(variant):
     lamp = tiny_scene()["lamp"] | {"position": [1.9, -0.7, 2.9]}
-    one, other = render(shaded(), "light-volumes", map=128), render(shaded(lamp=lamp), "light-volumes", map=128)
+    of_sun, of_lamp = render(shaded(), "light-volumes", map=128), render(shaded(lamp=lamp), "light-volumes", map=128)
     both = render(shaded(other=lamp), "light-volumes", map=128)
-    assert np.abs(both.airlight - one.airlight - other.airlight).max() < 1e-12 * both.airlight.max()
-    assert np.abs(both.surface - one.surface - other.surface).max() < 1e-12 * both.surface.max()
+    assert np.abs(both.airlight - of_sun.airlight - of_lamp.airlight).max() < 1e-12 * both.airlight.max()
+    assert np.abs(both.surface - of_sun.surface - of_lamp.surface).max() < 1e-12 * both.surface.max()
 
 
 def test_a_light_that_turns_is_the_light_of_a_turned_scene(variant):

@@ -6,7 +6,7 @@ import pytest
 
 from realtime.errors import InputError
 from tests.helpers.light_frames import EVALUATIONS, differ, loaded_scene, render, renderer_of
-from tests.helpers.scenes import body, clear_scene
+from tests.helpers.scenes import bounded_medium, clear_scene
 
 
 @pytest.mark.parametrize(
@@ -45,8 +45,8 @@ def test_other_methods_check_their_parameters_without_casters(variant, method, p
 def test_a_mesh_is_for_media_without_bounds(variant):
     import mitsuba as mi
 
-    ball = body({"type": "sphere", "center": [0.1, 0.2, 0.9], "radius": 0.4}, 0.7, (0.9, 0.8, 0.7))
-    loaded = mi.load_dict(clear_scene(cloud=ball))
+    smoke = bounded_medium({"type": "sphere", "center": [0.1, 0.2, 0.9], "radius": 0.4}, 0.7, (0.9, 0.8, 0.7))
+    loaded = mi.load_dict(clear_scene(cloud=smoke))
     with pytest.raises(InputError, match=r"evaluation=mesh: the scene has a medium with bounds.*evaluation=walk"):
         renderer_of(loaded, evaluation="mesh")
     assert np.max(render(loaded, map=16).airlight) > 0

@@ -23,9 +23,12 @@ def walled(loaded, size, precision="single"):
 
     scene = read_scene(loaded, precision)
     heights = inverse_depth_field(cast_shadow_map(scene.geometry, scene.lights[0], size))
-    found = with_walls(heights, scene.geometry, scene.lights[0])
-    number = np.array(found.walls).reshape(heights.faces, size, size, 1) >> np.arange(0, 32, 8, dtype=np.uint32) & 0xFF
-    return found, np.where(number > 0, (number - 0.5) / PLACES, np.nan)
+    walled_field = with_walls(heights, scene.geometry, scene.lights[0])
+    number = (
+        np.array(walled_field.walls).reshape(heights.faces, size, size, 1) >> np.arange(0, 32, 8, dtype=np.uint32)
+        & 0xFF
+    )
+    return walled_field, np.where(number > 0, (number - 0.5) / PLACES, np.nan)
 
 
 def plate(x, y, z=1.1, half=0.6):
@@ -55,9 +58,9 @@ def test_walls_stand_where_the_edges_of_a_plate_are(variant, size, precision):
             line = below[:, column, 0] if across == 0 else below[column, :, 2]
             other = (y, x)[across]
             first, last = (int(0.5 * size * (end / depth + 1)) for end in (other, other + 2 * half))
-            found = line[first + 2 : last - 1]
-            assert len(found) >= size // 8
-            assert np.all(np.abs(found - (texel - column)) <= 0.5 / PLACES + 1e-6)
+            walls = line[first + 2 : last - 1]
+            assert len(walls) >= size // 8
+            assert np.all(np.abs(walls - (texel - column)) <= 0.5 / PLACES + 1e-6)
 
 
 def test_both_texels_of_a_side_see_the_same_wall(variant):
@@ -104,8 +107,8 @@ def test_a_shadow_of_straight_edges_is_known_to_a_fraction_of_a_texel(variant, s
     loaded = mi.load_dict(description)
 
     def error(walls):
-        found = render(loaded, map=size, walls=walls).airlight
-        return np.sqrt(np.mean((found - truth) ** 2)) / np.mean(truth)
+        airlight = render(loaded, map=size, walls=walls).airlight
+        return np.sqrt(np.mean((airlight - truth) ** 2)) / np.mean(truth)
 
     assert error("upright") < 0.15 * error("slanted")
 
@@ -152,12 +155,12 @@ def test_parts_of_a_texel_with_a_corner_cut_off(variant, corner):
     rng = np.random.default_rng(4)
     x, y = rng.random((2, 1000))
     parts = parts_of(mi.Vector4f(*four), mi.UInt32(walls), mi.Float)
-    found = np.array(height_in(parts, mi.Float(x), mi.Float(y)))
+    heights = np.array(height_in(parts, mi.Float(x), mi.Float(y)))
     place_x, place_y = (along + 0.5) / PLACES, (up + 0.5) / PLACES
     cut = np.abs(x - right) / np.abs(place_x - right) + np.abs(y - above) / np.abs(place_y - above) < 1
     assert 0.01 < np.mean(cut) < 0.5
     expected = np.where(cut, 1.7, 0.2 + 0.01 * x + 0.03 * y)
-    assert found == pytest.approx(expected, rel=1e-6)
+    assert heights == pytest.approx(expected, rel=1e-6)
 
 
 def test_a_moved_light_finds_its_walls_anew(variant):
@@ -171,6 +174,6 @@ def test_a_moved_light_finds_its_walls_anew(variant):
     light = replace(renderer.scene.lights[0], position=mi.Vector3f(0.7, 0.9, 2.3))
     dr.make_opaque(light.position)
     moved = replace(renderer, scene=replace(renderer.scene, lights=(light,)))
-    found = image_frame(moved, run_stages(moved, moved.prepare(moved.scene))).airlight
+    airlight = image_frame(moved, run_stages(moved, moved.prepare(moved.scene))).airlight
     wanted = render(loaded_scene(lamp=lamp(0.7, 0.9, 2.3)), map=64).airlight
-    assert np.max(np.abs(found - wanted)) < 1e-6 * np.max(wanted)
+    assert np.max(np.abs(airlight - wanted)) < 1e-6 * np.max(wanted)

@@ -80,7 +80,7 @@ def test_rays_cross_the_fence_more_often_than_a_queue_holds(variant):
 
     scene = read_scene(loaded_scene("fence"))
     mesh = volume_mesh(cast_shadow_map(scene.geometry, scene.lights[0], SCENES["fence"][1]), scene.lights[0])
-    pixels = np.concatenate([np.array(found.pixel) for found in signed_crossings(mesh, scene.camera)])
+    pixels = np.concatenate([np.array(batch.pixel) for batch in signed_crossings(mesh, scene.camera)])
     assert np.max(np.bincount(pixels)) > 2 * PLACES
 
 
@@ -112,7 +112,9 @@ def test_lists_that_overflow_change_nothing(variant, monkeypatch, rooms):
 @pytest.mark.parametrize("evaluation", EVALUATIONS)
 def test_rays_on_the_border_of_two_faces_are_lit_once(variant, axis, evaluation):
     """The plane of the border holds the camera, and a column, a row or a diagonal of its pixels."""
-    origin, target, up, light = (np.roll(one, axis) for one in ((1, -4, 1.5), (1, 4, 1.5), (0, 0, 1), (0, 0, 2.5)))
+    origin, target, up, light = (
+        np.roll(vector, axis) for vector in ((1, -4, 1.5), (1, 4, 1.5), (0, 0, 1), (0, 0, 2.5))
+    )
     speck = {"type": "sphere", "center": [0.3, 0.2, -90.0], "radius": 1e-3}  # falls between the rays of the map
     changes = camera(origin, target, size=GRID, up=up) | {"lamp": lamp(*light), "ball": speck, "floor": None}
     loaded = loaded_scene(**changes)
@@ -133,7 +135,10 @@ def renderers(kind, view):
 
     changes = camera(*VIEWS[view], size=(13, 9)) | ({"lamp": spot(cutoff=50.0, beam=50.0)} if kind == "spot" else {})
     loaded = loaded_scene(**changes)
-    both = [renderer_of(loaded, precision="double", map=SMALL, evaluation=one, walls="slanted") for one in EVALUATIONS]
+    both = [
+        renderer_of(loaded, precision="double", map=SMALL, evaluation=evaluation, walls="slanted")
+        for evaluation in EVALUATIONS
+    ]
     scene = both[0].scene
     return loaded, both, cast_shadow_map(scene.geometry, scene.lights[0], SMALL)
 
@@ -144,8 +149,8 @@ def vertices_of(shadow_map):
     face, row, column = np.indices((shadow_map.faces, size + 1, size + 1)).reshape(3, -1)
     place = np.stack([np.where(face % 2, -size, size), 2 * column - size, 2 * row - size])
     lattice = np.empty_like(place)
-    for one in range(3):
-        lattice[(face // 2 + one) % 3, np.arange(len(face))] = place[one]
+    for axis in range(3):
+        lattice[(face // 2 + axis) % 3, np.arange(len(face))] = place[axis]
     return np.unique(lattice, axis=1, return_inverse=True)[1].ravel()
 
 
@@ -176,10 +181,10 @@ def test_any_map(variant, kind, data):
     vertex = vertices_of(shadow_map)
     count = int(np.max(vertex)) + 1
     heights = data.draw(st.lists(st.sampled_from(HEIGHTS), min_size=count, max_size=count))
-    found = with_heights(shadow_map, np.array(heights)[vertex])
-    walked = image_frame(walk, run_stages(walk, (inverse_depth_field(found),)))
-    drawn = image_frame(mesh, run_stages(mesh, (volume_mesh(found, walk.scene.lights[0]),)))
-    wanted = oracle_airlight(read_truth(loaded), [found], distance=walked.distance)
+    drawn_map = with_heights(shadow_map, np.array(heights)[vertex])
+    walked = image_frame(walk, run_stages(walk, (inverse_depth_field(drawn_map),)))
+    drawn = image_frame(mesh, run_stages(mesh, (volume_mesh(drawn_map, walk.scene.lights[0]),)))
+    wanted = oracle_airlight(read_truth(loaded), [drawn_map], distance=walked.distance)
     # As in the frames above; what is lit may be next to nothing, so the scale is the light's.
     scale = np.max(np.array(walk.scene.lights[0].intensity))
     assert np.max(np.abs(walked.airlight - drawn.airlight)) < 1e-13 * scale
@@ -216,11 +221,11 @@ def test_any_walls_in_any_map(variant, kind, data):
     rng = np.random.default_rng(data.draw(st.integers(0, 2**32)))
     # Heights of no two corners are the same, so that no ray lies in the height field over a length.
     heights = (rng.choice(HEIGHTS[1:], vertex.max() + 1) * rng.uniform(0.9, 1.1, vertex.max() + 1))[vertex]
-    found = with_heights(shadow_map, heights)
-    walls = any_walls(rng, found.faces, data.draw(st.sampled_from([0.0, 0.2, 0.5, 1.0])))
-    field = walled_heights(inverse_depth_field(found), mi.UInt32(walls), mi.UInt32(np.flatnonzero(walls)))
+    drawn_map = with_heights(shadow_map, heights)
+    walls = any_walls(rng, drawn_map.faces, data.draw(st.sampled_from([0.0, 0.2, 0.5, 1.0])))
+    field = walled_heights(inverse_depth_field(drawn_map), mi.UInt32(walls), mi.UInt32(np.flatnonzero(walls)))
     walked = image_frame(walk, run_stages(walk, (field,)))
-    wanted = oracle_airlight(read_truth(loaded), [found], distance=walked.distance, walls=[walls])
+    wanted = oracle_airlight(read_truth(loaded), [drawn_map], distance=walked.distance, walls=[walls])
     scale = np.max(np.array(walk.scene.lights[0].intensity))
     assert np.max(np.abs(walked.airlight - wanted)) < 1e-7 * scale
 
@@ -232,15 +237,18 @@ def test_a_light_that_moves_between_frames(variant):
 
     from realtime.frame.renderer import image_frame, run_stages
 
-    renderer = {one: renderer_of(loaded_scene(), map=64, evaluation=one, walls="slanted") for one in EVALUATIONS}
+    renderer = {
+        evaluation: renderer_of(loaded_scene(), map=64, evaluation=evaluation, walls="slanted")
+        for evaluation in EVALUATIONS
+    }
     scene = renderer["walk"].scene
     frames = []
     for height in (1.9, 2.3, 2.9):
         light = replace(scene.lights[0], position=mi.Vector3f(0.9, 0.7, height))
         dr.make_opaque(light.position)
         there = replace(scene, lights=(light,))
-        for one in EVALUATIONS:
-            moved = replace(renderer[one], scene=there)
+        for evaluation in EVALUATIONS:
+            moved = replace(renderer[evaluation], scene=there)
             frames.append(image_frame(moved, run_stages(moved, moved.prepare(there))).airlight)
         assert differ(frames[-1], frames[-2]) < 1e-5
     assert renderer["walk"].render.n_recordings == 1
@@ -255,8 +263,8 @@ def test_adaptive_meshes_come_closer_with_the_threshold(variant):
     thresholds = (1e-1, 1e-2, 1e-3)
     errors = []
     for threshold in thresholds:
-        found = render(loaded, map=128, evaluation="mesh", tessellation="adaptive", threshold=threshold).airlight
-        errors.append(np.sqrt(np.mean((found - exact) ** 2)) / np.mean(exact))
+        airlight = render(loaded, map=128, evaluation="mesh", tessellation="adaptive", threshold=threshold).airlight
+        errors.append(np.sqrt(np.mean((airlight - exact) ** 2)) / np.mean(exact))
     # The airlight up to the dome is wrong by less than the depth of the dome is: all of it lies before.
     assert np.all(np.array(errors) < thresholds)
     assert errors == sorted(errors, reverse=True)

@@ -67,15 +67,15 @@ def test_planes_are_the_limit_of_a_light_far_away(variant, name):
     casters = casters_of(name)
     toward = np.array([0.37, -0.61, 0.7]) / np.linalg.norm([0.37, -0.61, 0.7])
     far = 1e7
-    one = index_of(casters, np.append(toward, 0.0), precision="double")
-    other = index_of(casters, CAMERA + far * toward, precision="double")
-    assert float(np.array(one.layers)[0]) == float(np.array(other.layers)[0])
-    spans, distant = (np.array(index.spans).reshape(-1, 4) for index in (one, other))
+    directional = index_of(casters, np.append(toward, 0.0), precision="double")
+    faraway = index_of(casters, CAMERA + far * toward, precision="double")
+    assert float(np.array(directional.layers)[0]) == float(np.array(faraway.layers)[0])
+    spans, distant = (np.array(index.spans).reshape(-1, 4) for index in (directional, faraway))
     count = int(np.max(np.flatnonzero(np.any(spans != 0, axis=1)))) + 1
     assert count > 10
     assert np.array_equal(spans[:count, 2], distant[:count, 2])  # layers gained
     np.testing.assert_allclose(spans[:count, :2], distant[:count, :2], atol=1e-5)
-    lines, distant = (np.array(index.lines).reshape(-1, 4)[:count] for index in (one, other))
+    lines, distant = (np.array(index.lines).reshape(-1, 4)[:count] for index in (directional, faraway))
     # 1/x = P x + Q y is the limit of (A x + B y - z)/D, and A - D P that of A.
     scale = np.abs(lines[:, :2]).max(axis=1, keepdims=True)
     assert np.max(np.abs(distant[:, :2] / far - lines[:, :2]) / scale) < 1e-5
@@ -103,8 +103,8 @@ def unit(vector):
     return vector / np.linalg.norm(vector)
 
 
-def test_no_body_is_dropped_whose_parallel_shadow_is_seen(variant):
-    from realtime.methods.shadow_planes.view_culling import bodies_in_view
+def test_no_component_is_dropped_whose_parallel_shadow_is_seen(variant):
+    from realtime.methods.shadow_planes.view_culling import components_in_view
 
     rng = np.random.default_rng(12)
     dropped = 0
@@ -112,12 +112,12 @@ def test_no_body_is_dropped_whose_parallel_shadow_is_seen(variant):
         casters = boxes(rng, 8)
         along, origin, target = rng.normal(size=(3, 3)) * 3
         camera = camera_at(origin, target)
-        used = bodies_in_view(casters, camera, np.append(-unit(along), 0.0))
-        for body, (low, high) in enumerate(casters.boxes):
+        used = components_in_view(casters, camera, np.append(-unit(along), 0.0))
+        for component, (low, high) in enumerate(casters.boxes):
             points = rng.uniform(low, high, (4000, 3))
             beyond = rng.exponential(10, (len(points), 1)) * (rng.random((len(points), 1)) < 0.9)
             if sees(camera, points + beyond * unit(along)).any():
-                assert used[body]
+                assert used[component]
         dropped += int(np.sum(~used))
     assert dropped > 20
 
@@ -128,8 +128,8 @@ def test_published_variants_take_it(variant, parameters):
     scene = shaded(solid=solid((0.5, 0.4, 0.3), (0.33, 0.27, 1.75)), floor=None)
     exact = render(scene, "shadow-planes").airlight
     white = {"white": 2 * float(exact.max())} if "buffer" in parameters else {}
-    found = render(scene, "shadow-planes", **parameters, **white).airlight
-    assert np.max(np.abs(found - exact)) < (0.05 if white else 1e-9) * exact.max()
+    published = render(scene, "shadow-planes", **parameters, **white).airlight
+    assert np.max(np.abs(published - exact)) < (0.05 if white else 1e-9) * exact.max()
 
 
 def test_adaptive_sampling_and_one_record_for_a_light_that_turns(variant):

@@ -184,7 +184,7 @@ def test_orders_agree_without_shadow_in_shadow(variant, name, order):
 
 @pytest.mark.claim("orders-of-the-planes")
 def test_order_none_shows_the_artefact(variant):
-    """Fig. 4: a ball within a ball takes its share of the light twice."""
+    """Fig. 4: a sphere within a sphere takes its share of the light twice."""
     scene = scene_with(SOUND["nested spheres"]())
     image = truth(scene)
     error = planes(scene, order="none").airlight - image.airlight

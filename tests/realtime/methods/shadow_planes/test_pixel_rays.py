@@ -58,7 +58,7 @@ def geometries(place, spot=None):
     aim = aim_at(read_camera(camera), axes, read_spot(light), single)
     pixel = mi.UInt32(np.arange(SIZE[0] * SIZE[1], dtype=np.uint32))
     seen = seen_rays(aim, camera, pixel, single.scalar(distance), light)
-    way = np.stack([np.array(one, dtype=float) for one in (seen.x, seen.y, seen.z)], axis=1)
+    way = np.stack([np.array(component, dtype=float) for component in (seen.x, seen.y, seen.z)], axis=1)
     assert np.max(np.abs(way - ways @ axes.T)) < 4 * SINGLE
     truth = ray_geometry(
         double.vector(*(float(x) for x in ORIGIN)), double.vector(ways.T.copy()), light_at(double, place, spot)
@@ -95,12 +95,12 @@ PLACES = {
 @pytest.mark.parametrize("name", PLACES)
 def test_foot_and_height(variant, name):
     place = np.asarray(PLACES[name](), dtype=np.float32).astype(float)
-    found, truth = geometries(place)
+    seen, truth = geometries(place)
     distance = np.linalg.norm(place - ORIGIN)
-    assert np.max(np.abs(numbers(found.foot) - numbers(truth.foot))) < 3 * SINGLE * distance
+    assert np.max(np.abs(numbers(seen.foot) - numbers(truth.foot))) < 3 * SINGLE * distance
     height = numbers(truth.height)
     # The place of the light is rounded before both; a light at a pixel is beside it by that.
-    error = np.abs(numbers(found.height) - height) / height
+    error = np.abs(numbers(seen.height) - height) / height
     assert error[height > 1e-6 * distance].max() < 4 * SINGLE
     assert error.max() < 1e-3
 
@@ -122,12 +122,12 @@ def test_where_rays_are_in_the_cone(variant, name, spot):
     that nearly touch the cone are roots of what is left of the discriminant, 1e-10 of the height's square.
     """
     place = np.asarray(PLACES[name](), dtype=np.float32).astype(float)
-    found, truth = geometries(place, SPOTS[spot])
+    seen, truth = geometries(place, SPOTS[spot])
     foot, height = numbers(truth.foot), numbers(truth.height)
     cos_square = np.cos(np.deg2rad(SPOTS[spot][1])) ** 2
     ends = [("enter", "leave")] + [("beam_enter", "beam_leave")] * (spot == "soft")
     for pair in ends:
-        mine, wanted = (np.array([numbers(getattr(one, field)) for field in pair]) for one in (found, truth))
+        mine, wanted = (np.array([numbers(getattr(geometry, field)) for field in pair]) for geometry in (seen, truth))
         missed, misses = np.isneginf(mine[1]), np.isneginf(wanted[1])
         assert np.sum(missed != misses) <= 1
         hit = ~missed & ~misses & (height > 1e-6 * np.linalg.norm(place - ORIGIN))

@@ -16,7 +16,7 @@ def read(name):
 
 def test_the_sphere_has_32_edges_and_the_floor_4(variant):
     plan = caster_plan(read("sphere-spot"))
-    assert (plan.shapes, plan.bodies, plan.closed, plan.triangles) == (2, 2, 1, 2 * 32 * 17 + 2)
+    assert (plan.shapes, plan.components, plan.closed, plan.triangles) == (2, 2, 1, 2 * 32 * 17 + 2)
     assert plan.lights[0].edges == 36
     assert len(plan.warnings) == 1
     assert "'floor' is open" in plan.warnings[0]
@@ -36,8 +36,8 @@ def test_what_is_left_out_is_said(variant):
     away = replace(scene.camera, forward=-scene.camera.forward, origin=type(scene.camera.origin)(0.4, -90.0, 1.3))
     moved = replace(scene, camera=away)
     plan = caster_plan(moved)
-    assert seen.bodies == 4
-    assert plan.lights[0].bodies < seen.bodies
+    assert seen.components == 4
+    assert plan.lights[0].components < seen.components
     assert plan.lights[0].edges == seen.edges
     assert plan.lights[0].planes < seen.planes
     assert "left out" in describe_casters(plan)["planes"]
@@ -45,5 +45,5 @@ def test_what_is_left_out_is_said(variant):
 
 def test_no_casters_no_planes(variant):
     plan = caster_plan(read("open-fog"))
-    assert plan.triangles == plan.bodies == 0
+    assert plan.triangles == plan.components == 0
     assert describe_casters(plan)["casters"].startswith("none")

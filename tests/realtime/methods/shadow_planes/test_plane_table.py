@@ -29,7 +29,7 @@ def planes_of(casters, light=LIGHT, camera=CAMERA):
 
 
 def count_between(casters, light, camera):
-    """Layers between two points, triangle by triangle: a closed body by its facing or its averted ones."""
+    """Layers between two points, triangle by triangle: a closed component by its facing or its averted ones."""
     corner = casters.vertices[casters.triangles]
     edge, other = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
     way = camera - light
@@ -43,8 +43,8 @@ def count_between(casters, light, camera):
         t = np.sum(other * turned, axis=1) / scale
         hit = (u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0) & (t < 1)
     total = 0
-    for body, closed in enumerate(casters.closed):
-        mine = hit & (casters.body == body)
+    for component, closed in enumerate(casters.closed):
+        mine = hit & (casters.component == component)
         facing = int(np.sum(mine & (scale > 0)))
         total += max(facing, int(mine.sum()) - facing) if closed else int(mine.sum())
     return total
@@ -93,8 +93,8 @@ def test_bins_hold_what_a_ray_of_their_azimuth_crosses(name):
         wanted = np.flatnonzero((planes.first <= azimuth) & (azimuth < planes.last))
         for turn in (0, BINS):
             place = int(azimuth * BINS / 4) + turn
-            found = entries[start[place] : start[place + 1]] & NUMBER
-            assert set(wanted.tolist()) <= set(found.tolist())
+            listed = entries[start[place] : start[place + 1]] & NUMBER
+            assert set(wanted.tolist()) <= set(listed.tolist())
     gains = (entries >> GAIN_SHIFT & 63).astype(int) - GAIN_ZERO
     assert np.array_equal(gains, planes.gain[entries & NUMBER])
     firsts, count = entries[: len(entries) // 2] & FIRST, len(planes.gain)
@@ -113,12 +113,12 @@ def test_every_azimuth_gains_as_much_as_it_loses_but_for_the_layers_on_the_axis(
 
 
 @settings(max_examples=60, deadline=None)
-@given(seed=st.integers(0, 10**6), bodies=st.integers(1, 4))
-def test_layers_between_light_and_camera(seed, bodies):
+@given(seed=st.integers(0, 10**6), components=st.integers(1, 4))
+def test_layers_between_light_and_camera(seed, components):
     rng = np.random.default_rng(seed)
     faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
     meshes = [
-        ("closed", rng.normal(size=(4, 3)), faces if rng.random() < 0.5 else faces[:, ::-1]) for _ in range(bodies)
+        ("closed", rng.normal(size=(4, 3)), faces if rng.random() < 0.5 else faces[:, ::-1]) for _ in range(components)
     ]
     meshes.append(("open", rng.normal(size=(9, 3)), np.arange(9).reshape(3, 3)))
     casters = make_casters(meshes)

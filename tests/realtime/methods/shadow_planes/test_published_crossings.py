@@ -38,8 +38,8 @@ def test_orders_agree_where_no_shadow_lies_in_another(variant, order, camera):
     ways = bundles(1920, spread=0.01, camera=place)
     end = np.full(len(ways), 4.7)
     expected, lit = lit_lengths(index, ways, end, weight=weight)
-    found, found_lit = added_up(index, ways, end, order=order)
-    assert most((np.abs(found - expected) > 1e-4) | (found_lit != lit))
+    total, total_lit = added_up(index, ways, end, order=order)
+    assert most((np.abs(total - expected) > 1e-4) | (total_lit != lit))
     assert np.any(lit)
     assert not np.all(lit)
 
@@ -50,9 +50,9 @@ def test_exact_order_is_right_where_shadows_overlap(variant):
     ways = bundles(1920, spread=0.003)
     end = np.full(len(ways), 4.7)
     expected, lit = lit_lengths(index, ways, end, weight=weight)
-    found, found_lit = added_up(index, ways, end, order="exact")
+    total, total_lit = added_up(index, ways, end, order="exact")
     # Two crossings can come in the wrong order within a tile: that is counted, not mended.
-    wrong = (np.abs(found - expected) > 1e-4) | (found_lit != lit)
+    wrong = (np.abs(total - expected) > 1e-4) | (total_lit != lit)
     assert wrong.mean() < 0.03
 
 
@@ -67,8 +67,8 @@ def test_without_an_order_every_plane_counts(variant):
     crossed = x < end[:, None]
     of_planes = np.sum(np.where(crossed, gain * weight(np.where(crossed, x, 0)), 0), axis=1)
     expected = np.where(lit, weight(end), 0) + of_planes
-    found, _ = added_up(index, ways, end, order="none")
-    assert most(np.abs(found - expected) > 1e-4)
+    total, _ = added_up(index, ways, end, order="none")
+    assert most(np.abs(total - expected) > 1e-4)
     assert np.max(np.abs(expected - lit_lengths(index, ways, end, weight=weight)[0])) > 0.1
 
 
@@ -80,7 +80,7 @@ def test_order_of_the_paper_is_by_the_stencil_rule(variant):
     end = np.full(len(ways), 4.7)
     x, gain = crossings(index, ways)
     cosine = np.array(index.spans).reshape(-1, 4)[: len(gain), 3]
-    found, lit = added_up(index, ways, end, order="paper")
+    total, lit = added_up(index, ways, end, order="paper")
     expected = np.zeros(len(ways))
     for ray in range(len(ways)):
         order = np.argsort(cosine, kind="stable")
@@ -94,7 +94,7 @@ def test_order_of_the_paper_is_by_the_stencil_rule(variant):
                 expected[ray] -= weight(x[ray][plane]) if stencil == 0 else 0
             stencil -= gain[plane]
     # Planes of one cosine come in either order.
-    assert most(np.abs(found - expected) > 1e-9)
+    assert most(np.abs(total - expected) > 1e-9)
     assert np.any(lit)
 
 
@@ -142,10 +142,10 @@ def test_tiles_without_room_add_up_in_the_same_order(variant, monkeypatch, order
     monkeypatch.setattr(module, "ROOM", room)
     monkeypatch.setattr(module, "LEAST", 0)
     assert np.array(drawn_lists(index, ways, end, order=order)[0].sorted).mean() < 0.9
-    found, found_lit = added_up(index, ways, end, order=order)
-    found_stepped, _ = added_up(index, ways, end, order=order, buffer=Buffer(0.9))
+    total, total_lit = added_up(index, ways, end, order=order)
+    total_stepped, _ = added_up(index, ways, end, order=order, buffer=Buffer(0.9))
     # With room, crossings are in the order of the tile's middle ray; without, in that of the ray itself: one ray in a
     # hundred differs. The paper's order is that of the planes, the same for all rays.
     differing = 0.0 if order == "paper" else 0.01
-    assert np.mean((np.abs(found - wanted) > 1e-9) | (found_lit != lit)) <= differing
-    assert np.mean(np.abs(found_stepped - stepped) > 1e-9) <= differing
+    assert np.mean((np.abs(total - wanted) > 1e-9) | (total_lit != lit)) <= differing
+    assert np.mean(np.abs(total_stepped - stepped) > 1e-9) <= differing

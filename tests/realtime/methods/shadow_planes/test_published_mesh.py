@@ -28,11 +28,11 @@ def empty_view():
     return {"origin": mi.Vector3d(CAMERA.tolist()), "direction": mi.Vector3d(0), "distance": mi.Float64(0)}
 
 
-def crossed_planes(ball):
-    """The planes of a ball, where rays cross them (plane, ray, x) and those points [m]."""
+def crossed_planes(sphere):
+    """The planes of a sphere, where rays cross them (plane, ray, x) and those points [m]."""
     import mitsuba as mi
 
-    index = index_of(make_casters([("ball", *ball)]), precision="double")
+    index = index_of(make_casters([("ball", *sphere)]), precision="double")
     ways = bundles(1920, spread=0.01)
     x, _ = crossings(index, ways)
     number, plane = np.nonzero((x > 0.2) & (x < 12))
@@ -44,7 +44,7 @@ def crossed_planes(ball):
 
 
 def interpolated(module, rows, ratio, monkeypatch):
-    """Gamma on the planes of a finely divided ball, interpolated, and as it is."""
+    """Gamma on the planes of a finely divided sphere, interpolated, and as it is."""
     import mitsuba as mi
 
     from realtime.kernels.registry import KERNELS
@@ -81,7 +81,7 @@ def test_gamma_keeps_its_value_beyond_the_last_row(variant, monkeypatch):
 
     near, exact = interpolated(module, 2, 1.5, monkeypatch)
     assert np.all(np.isfinite(near))
-    # Lower bound of what is cut off: Gamma still grows beyond 1.5 times the distance of the ball.
+    # Lower bound of what is cut off: Gamma still grows beyond 1.5 times the distance of the sphere.
     assert np.max(np.abs(near - exact)) > 0.05 * exact.mean()
 
 
@@ -103,5 +103,5 @@ def test_interpolation_is_exact_on_vertices_and_linear_between(variant, monkeypa
     view: Any = SimpleNamespace(**empty_view())
     light: Any = SimpleNamespace(position=mi.Vector3d(LIGHT.tolist()))
     at = module.mesh_gamma(view, index, light, kernel=None, rows=16)
-    found = np.array(at(*crossed))[0]
-    assert found == pytest.approx(points @ slope + 1, rel=1e-9)
+    gamma = np.array(at(*crossed))[0]
+    assert gamma == pytest.approx(points @ slope + 1, rel=1e-9)

@@ -26,20 +26,20 @@ def determinant(a, b, c):
 
 
 def layers_over(casters, light, way):
-    """How many layers lie over a direction, triangle by triangle: those of a closed body that face the light."""
+    """How many layers lie over a direction, triangle by triangle: those of a closed component that face the light."""
     a, b, c = (casters.vertices[casters.triangles[:, k]] - light for k in range(3))
     towards = -determinant(a, b, c)  # the normal is turned to the light if the corners run clockwise from outside
     sides = np.stack([determinant(p, q, way) for p, q in ((a, b), (b, c), (c, a))])
     hit = np.all(sides > 0, axis=0) | np.all(sides < 0, axis=0)
     # All corners lie on the far side of the light, or the three sides agree behind it.
     hit &= np.sign(determinant(a, b, c)) * sides[0] > 0
-    counts = hit & ((towards > 0) | (~casters.closed[casters.body] & (towards != 0)))
+    counts = hit & ((towards > 0) | (~casters.closed[casters.component] & (towards != 0)))
     return int(counts.sum())
 
 
-def layers_gained(casters, found, light, start, end):
+def layers_gained(casters, contour, light, start, end):
     """What the silhouette says is gained on the way from one direction to another, along the shorter arc."""
-    a, b = casters.vertices[found.edges[:, 0]] - light, casters.vertices[found.edges[:, 1]] - light
+    a, b = casters.vertices[contour.edges[:, 0]] - light, casters.vertices[contour.edges[:, 1]] - light
     across = np.sign(determinant(a, b, start)) - np.sign(determinant(a, b, end))
     within = determinant(start, end, a) * determinant(start, end, b) < 0
     # Two great circles meet twice: the arcs do if a crossing lies on the near side of both.
@@ -48,7 +48,7 @@ def layers_gained(casters, found, light, start, end):
         middle = a / np.linalg.norm(a, axis=1)[:, None] + b / np.linalg.norm(b, axis=1)[:, None]
     near = np.sum(crossing * middle, axis=-1) * np.sum(crossing * (start + end), axis=-1) > 0
     # As the light sees it, w is to the left of the way from a to b where det(a, b, w) < 0.
-    return int(np.sum(found.coefficient * across * (within & near)) / 2)
+    return int(np.sum(contour.coefficient * across * (within & near)) / 2)
 
 
 def random_directions(seed, count):
@@ -58,31 +58,31 @@ def random_directions(seed, count):
 
 def assert_counts_layers(casters, light, *, seed=3, count=12):
     light = np.asarray(light, dtype=float)
-    found = silhouette(casters, light)
+    contour = silhouette(casters, light)
     ways = random_directions(seed, count)
     for start, end in pairwise(ways):
         change = layers_over(casters, light, end) - layers_over(casters, light, start)
-        assert layers_gained(casters, found, light, start, end) == change
+        assert layers_gained(casters, contour, light, start, end) == change
 
 
-def assert_is_cycle(found):
+def assert_is_cycle(contour):
     balance: Counter = Counter()
-    for (a, b), c in zip(found.edges.tolist(), found.coefficient.tolist()):
+    for (a, b), c in zip(contour.edges.tolist(), contour.coefficient.tolist()):
         balance[a] += c
         balance[b] -= c
     assert not any(balance.values())
 
 
-def link_loops(found):
+def link_loops(contour):
     """Link directed silhouette edges into closed loops of vertices, the last of which is joined to the first.
 
     An edge with the coefficient c is passed |c| times, in its direction for c > 0 and against it for c < 0. Where loops
     touch, they are parted at the vertex.
     """
-    count = np.abs(found.coefficient)
-    along = found.coefficient > 0
-    tail = np.repeat(np.where(along, found.edges[:, 0], found.edges[:, 1]), count)
-    head = np.repeat(np.where(along, found.edges[:, 1], found.edges[:, 0]), count)
+    count = np.abs(contour.coefficient)
+    along = contour.coefficient > 0
+    tail = np.repeat(np.where(along, contour.edges[:, 0], contour.edges[:, 1]), count)
+    head = np.repeat(np.where(along, contour.edges[:, 1], contour.edges[:, 0]), count)
     leaving: dict[int, list[int]] = {}
     for edge, vertex in enumerate(tail.tolist()):
         leaving.setdefault(vertex, []).append(edge)
@@ -143,7 +143,7 @@ def test_any_triangles_and_any_light(vertices, faces, light, seed):
     flips=st.lists(st.booleans(), min_size=2, max_size=2),
 )
 def test_tetrahedra_either_way_round(corners, light, flips):
-    """Closed bodies, one or both of which may be inside out, flat, or about the light."""
+    """Closed components, one or both of which may be inside out, flat, or about the light."""
     faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
     parts = [faces[:, ::-1] if flip else faces for flip in flips]
     casters = casters_of((np.array(corners, dtype=float), np.concatenate([parts[0], parts[1] + 4])))
@@ -153,16 +153,16 @@ def test_tetrahedra_either_way_round(corners, light, flips):
 
 
 @pytest.mark.parametrize("turned", [False, True])
-def test_closed_body_has_the_silhouette_of_the_paper(turned):
+def test_closed_component_has_the_silhouette_of_the_paper(turned):
     """The edges between a facing and an averted triangle, whichever side is out."""
     vertices, faces = closed_sphere()
     casters = casters_of((vertices, faces[:, ::-1] if turned else faces))
     light = np.array(LIGHTS["aside"])
-    found = silhouette(casters, light)
+    contour = silhouette(casters, light)
     faces_light = np.einsum("ij,ij->i", casters.normals, light - casters.vertices[casters.triangles[:, 0]]) > 0
     expected = casters.edges[faces_light[casters.left] != faces_light[casters.right]]
-    assert np.array_equal(found.edges, expected)
-    assert set(np.abs(found.coefficient).tolist()) == {1}
+    assert np.array_equal(contour.edges, expected)
+    assert set(np.abs(contour.coefficient).tolist()) == {1}
 
 
 @pytest.mark.claim("silhouettes-count-layers")
@@ -177,7 +177,7 @@ def test_light_inside_a_convex_caster_has_no_silhouette():
     assert len(silhouette(casters_of(closed_box()), np.array([-0.1, 0.15, 0.1])).edges) == 0
 
 
-def test_only_bodies_in_use_are_looked_at():
+def test_only_components_in_use_are_looked_at():
     both = casters_of(SOUND["nested spheres"]())
     light = np.array(LIGHTS["aside"])
     parts = [silhouette(both, light, used=np.array(used)) for used in ((True, False), (False, True))]
@@ -190,19 +190,19 @@ def test_only_bodies_in_use_are_looked_at():
 @pytest.mark.parametrize("name", ALL)
 def test_loops_use_every_edge_once(name):
     casters = casters_of(ALL[name]())
-    found = silhouette(casters, np.array(LIGHTS["aside"]))
-    loops = link_loops(found)
+    contour = silhouette(casters, np.array(LIGHTS["aside"]))
+    loops = link_loops(contour)
     used: Counter = Counter()
     for loop in loops:
         assert len(set(loop.tolist())) == len(loop) >= 2
         used.update(zip(loop.tolist(), np.roll(loop, -1).tolist()))
     wanted: Counter = Counter()
-    for (a, b), c in zip(found.edges.tolist(), found.coefficient.tolist()):
+    for (a, b), c in zip(contour.edges.tolist(), contour.coefficient.tolist()):
         wanted[(a, b) if c > 0 else (b, a)] += abs(c)
     assert used == wanted
 
 
-def test_ball_has_one_loop_and_two_balls_two():
+def test_sphere_has_one_loop_and_two_spheres_two():
     light = np.array(LIGHTS["aside"])
     assert len(link_loops(silhouette(casters_of(closed_sphere()), light))) == 1
     assert len(link_loops(silhouette(casters_of(SOUND["nested spheres"]()), light))) == 2

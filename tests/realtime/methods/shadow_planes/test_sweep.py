@@ -29,9 +29,9 @@ def weight(x):
     return -np.exp(-x)
 
 
-def assert_same(found, expected, *, tolerance):
+def assert_same(sums, expected, *, tolerance):
     """All but one ray in a thousand: one that passes a vertex or an edge within rounding may miss it or not."""
-    wrong = (np.abs(found[0] - expected[0]) > tolerance) | (found[1] != expected[1])
+    wrong = (np.abs(sums[0] - expected[0]) > tolerance) | (sums[1] != expected[1])
     assert wrong.sum() <= len(wrong) // 1000
 
 
@@ -108,8 +108,8 @@ def test_segments_begin_where_they_are_told_to(variant):
     lists, _ = drawn_lists(index, ways, end)
     until_end, lit = lit_lengths(index, ways, end, weight=weight)
     until_begin, _ = lit_lengths(index, ways, np.full(len(ways), begin), weight=weight)
-    found = walked(index, lists, ways, end, begin=begin)
-    assert_same(found, (until_end - until_begin, lit), tolerance=1e-4)
+    sums = walked(index, lists, ways, end, begin=begin)
+    assert_same(sums, (until_end - until_begin, lit), tolerance=1e-4)
 
 
 def test_empty_segments_are_nothing(variant):

@@ -29,9 +29,9 @@ def test_lists_hold_every_plane_that_a_ray_crosses(variant, name, camera):
         ways, ends = bundles(960, spread=spread, camera=CAMERAS[camera]), np.full(960, end)
         x, _ = crossings(index, ways)
         lists, _ = drawn_lists(index, ways, ends)
-        found = listed_planes(lists)
+        planes_by_tile = listed_planes(lists)
         crossed = x < ends[:, None]
-        for tile, (numbers, _) in enumerate(found):
+        for tile, (numbers, _) in enumerate(planes_by_tile):
             wanted = np.flatnonzero(crossed[16 * tile : 16 * tile + 16].any(axis=0))
             assert set(wanted.tolist()) <= set(numbers.tolist())
             assert len(set(numbers.tolist())) == len(numbers)

@@ -2,7 +2,7 @@
 import numpy as np
 import pytest
 
-from realtime.methods.shadow_planes.view_culling import bodies_in_view, view_planes
+from realtime.methods.shadow_planes.view_culling import components_in_view, view_planes
 from realtime.scene.mesh_adjacency import make_casters
 from tests.helpers.scenes import tiny_scene
 
@@ -30,7 +30,7 @@ def sees(camera, points):
 
 
 def boxes(rng, count):
-    """Boxes of triangles, one a body."""
+    """Boxes of triangles, one a component."""
     corners = np.array([[i >> k & 1 for k in range(3)] for i in range(8)], dtype=float)
     faces = np.array([[0, 1, 3], [0, 3, 2], [4, 5, 7], [4, 7, 6], [0, 1, 5], [0, 5, 4]])
     meshes = []
@@ -41,19 +41,19 @@ def boxes(rng, count):
 
 
 @pytest.mark.claim("culled-casters")
-def test_no_body_is_dropped_whose_shadow_is_seen(variant):
+def test_no_component_is_dropped_whose_shadow_is_seen(variant):
     rng = np.random.default_rng(11)
     dropped = 0
     for _ in range(40):
         casters = boxes(rng, 8)
         light, origin, target = rng.normal(size=(3, 3)) * 3
         camera = camera_at(origin, target)
-        used = bodies_in_view(casters, camera, light)
-        for body, (low, high) in enumerate(casters.boxes):
+        used = components_in_view(casters, camera, light)
+        for component, (low, high) in enumerate(casters.boxes):
             points = rng.uniform(low, high, (4000, 3))
             beyond = rng.exponential(3, (len(points), 1)) * (rng.random((len(points), 1)) < 0.9)
             if sees(camera, points + beyond * (points - light)).any():
-                assert used[body]
+                assert used[component]
         dropped += int(np.sum(~used))
     # A third at least has its shadow elsewhere: the test is worth its time only if there is something to drop.
     assert dropped > 100
@@ -75,9 +75,9 @@ def test_culling_by_hand(variant, place):
     centre = {"behind the camera": (0, -1, 0), "between": (0, 2, 0), "far aside": (30, 1, 0)}[place]
     corners = np.array([[-0.1, -0.1, -0.1], [0.1, -0.1, -0.1], [0, 0.1, -0.1], [0, 0, 0.1]]) + centre
     casters = make_casters([("caster", corners, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])])
-    assert bodies_in_view(casters, camera, np.array([0.0, -5.0, 0.0]))[0] == (place != "far aside")
+    assert components_in_view(casters, camera, np.array([0.0, -5.0, 0.0]))[0] == (place != "far aside")
 
 
 def test_no_casters_are_nothing_to_cull(variant):
-    found = bodies_in_view(make_casters([]), camera_at((0, 0, 0), (0, 1, 0)), np.zeros(3))
-    assert found.shape == (0,)
+    in_view = components_in_view(make_casters([]), camera_at((0, 0, 0), (0, 1, 0)), np.zeros(3))
+    assert in_view.shape == (0,)

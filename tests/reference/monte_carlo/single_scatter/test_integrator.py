@@ -63,7 +63,7 @@ def _assert_agrees(mean, error, expected, *, batches, largest_error):
 FOG = {"type": "homogeneous", "id": "fog", "sigma_t": 0.31, "albedo": 0.8}
 COLOURED = {"sigma_t": {"type": "rgb", "value": [0.1, 0.3, 0.7]}, "has_spectral_extinction": True}
 CASES = {
-    "ball and floor": {},
+    "sphere and floor": {},
     "no surface": {"ball": None, "floor": None},
     "spot": {"lamp": "hard spot"},
     "soft spot": {"lamp": "soft spot"},
@@ -81,7 +81,7 @@ def _case(name):
     return {key: spots[value] if isinstance(value, str) else value for key, value in CASES[name].items()}
 
 
-_FAST = ("ball and floor", "soft spot", "coloured")
+_FAST = ("sphere and floor", "soft spot", "coloured")
 
 
 @pytest.mark.claim("single-scatter-agrees", tolerance="family level 1e-4; bias within four errors below 0.1 %")
@@ -143,8 +143,8 @@ def test_agrees_with_the_certified_integral_on_random_rays(variant):
     _assert_agrees(mean, error, expected, batches=24, largest_error=2e-3)
 
 
-def _box_and_ball(lamp):
-    """Return a scene of two bounded media, coloured fog in a box and grey fog in a ball, over a wall, with a lamp."""
+def _box_and_sphere(lamp):
+    """Return a scene of two bounded media, coloured fog in a box and grey fog in a sphere, over a wall, with a lamp."""
     import mitsuba as mi
 
     transform = mi.ScalarTransform4f()
@@ -168,7 +168,7 @@ def _box_and_ball(lamp):
                 "center": list(_CENTRE),
                 "radius": _RADIUS,
                 "bsdf": {"type": "null"},
-                "interior": {"type": "homogeneous", "sigma_t": _BALL_SIGMA, "albedo": 0.6},
+                "interior": {"type": "homogeneous", "sigma_t": _SPHERE_SIGMA, "albedo": 0.6},
             },
             "wall": {
                 "type": "rectangle",
@@ -181,20 +181,20 @@ def _box_and_ball(lamp):
 
 
 _HALF, _BOX_SIGMA = np.array([1.1, 0.9, 0.8]), np.array([0.9, 0.4, 0.2])
-_CENTRE, _RADIUS, _BALL_SIGMA = np.array([2.6, 0.2, 0.0]), 0.7, 0.5
+_CENTRE, _RADIUS, _SPHERE_SIGMA = np.array([2.6, 0.2, 0.0]), 0.7, 0.5
 _LAMPS = {"in clear air": np.array([1.7, 0.4, 1.5]), "in the box": np.array([0.31, 0.23, 0.11])}
 
 
 def _box_crossing(start, step):
     """Return at which shares of a leg the box begins and ends."""
     with np.errstate(divide="ignore"):
-        one, two = (-_HALF - start) / step, (_HALF - start) / step
-    begin = np.clip(np.minimum(one, two).max(axis=-1), 0, 1)
-    return begin, np.maximum(np.clip(np.maximum(one, two).min(axis=-1), 0, 1), begin)
+        low_sides, high_sides = (-_HALF - start) / step, (_HALF - start) / step
+    begin = np.clip(np.minimum(low_sides, high_sides).max(axis=-1), 0, 1)
+    return begin, np.maximum(np.clip(np.maximum(low_sides, high_sides).min(axis=-1), 0, 1), begin)
 
 
-def _ball_crossing(start, step):
-    """Return at which shares of a leg the ball begins and ends."""
+def _sphere_crossing(start, step):
+    """Return at which shares of a leg the sphere begins and ends."""
     length2 = np.sum(step * step, axis=-1)
     middle = -np.sum((start - _CENTRE) * step, axis=-1) / length2
     off = np.sum((start - _CENTRE) ** 2, axis=-1) - length2 * middle**2
@@ -205,15 +205,15 @@ def _ball_crossing(start, step):
 def _optical_depth(start, end):
     step = end - start
     length = np.linalg.norm(step, axis=-1)
-    box, ball = _box_crossing(start, step), _ball_crossing(start, step)
-    in_box, in_ball = length * (box[1] - box[0]), length * (ball[1] - ball[0])
-    return in_box[..., None] * _BOX_SIGMA + in_ball[..., None] * _BALL_SIGMA
+    box, sphere = _box_crossing(start, step), _sphere_crossing(start, step)
+    in_box, in_sphere = length * (box[1] - box[0]), length * (sphere[1] - sphere[0])
+    return in_box[..., None] * _BOX_SIGMA + in_sphere[..., None] * _SPHERE_SIGMA
 
 
 def _brute_force(lamp, origin, direction, steps=4000):
     """Sum the airlight of one ray by the midpoint rule in either medium."""
     total, reach = np.zeros(3), 12.0
-    media = ((_box_crossing, _BOX_SIGMA * 0.8, 0.5), (_ball_crossing, np.full(3, _BALL_SIGMA * 0.6), 0.0))
+    media = ((_box_crossing, _BOX_SIGMA * 0.8, 0.5), (_sphere_crossing, np.full(3, _SPHERE_SIGMA * 0.6), 0.0))
     for crossing, sigma_s, g in media:
         begin, end = (float(share) * reach for share in crossing(origin, direction * reach))
         x = begin + (end - begin) * (np.arange(steps) + 0.5) / steps
@@ -233,16 +233,16 @@ def _brute_force(lamp, origin, direction, steps=4000):
 def test_bounded_media_against_a_plain_sum(variant, place):
     """Rationale: boundaries are walked on both legs; slabs and spheres have crossings in closed form.
 
-    Setup: coloured fog in a box, grey in a ball, camera in clear air, a wall behind; 40 rays, 4000 midpoints
+    Setup: coloured fog in a box, grey in a sphere, camera in clear air, a wall behind; 40 rays, 4000 midpoints
     each, whose own error is below 1e-6.
     """
     lamp = _LAMPS[place]
-    scene = _box_and_ball(lamp)
+    scene = _box_and_sphere(lamp)
     rng = np.random.default_rng(0)
     origin = np.array([-4.0, -1.0, 0.6])
     direction = rng.uniform([-1, -0.8, -0.7], [3, 0.8, 0.7], (40, 3)) - origin
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    expected = np.array([_brute_force(lamp, origin, one) for one in direction])
+    expected = np.array([_brute_force(lamp, origin, towards) for towards in direction])
     mean, error = _mean_and_error(scene, origin, direction, batches=16, samples=128)
     assert np.count_nonzero(expected[:, 0]) > 30
     _assert_agrees(mean, error, expected, batches=16, largest_error=1e-3)
@@ -273,7 +273,7 @@ def test_rays_that_graze_a_boundary(variant):
     direction = np.broadcast_to(slope / np.linalg.norm(slope), begin.shape)
     origin = begin - 1.3 * direction
     expected = np.array([_brute_force(lamp, *ray) for ray in zip(origin, direction)])
-    mean, error = _mean_and_error(_box_and_ball(lamp), origin, direction, samples=128)
+    mean, error = _mean_and_error(_box_and_sphere(lamp), origin, direction, samples=128)
     assert np.all(np.abs(mean - expected) < 4.5 * error + 1e-3 * expected)
     assert np.median(error / expected) < 1e-3
 
@@ -347,8 +347,8 @@ def test_seeds_decide(variant):
     from reference.scene.read import read_truth
 
     truth = read_truth(_load())
-    one, again = single_scatter_batch(truth, 7, 8), single_scatter_batch(truth, 7, 8)
-    assert np.array_equal(one.mean, again.mean)
+    first, again = single_scatter_batch(truth, 7, 8), single_scatter_batch(truth, 7, 8)
+    assert np.array_equal(first.mean, again.mean)
     centre = _run(_load(), first_seed=50).mean[0]
     signs = [np.sign(single_scatter_batch(truth, seed, 8).mean[0] - centre)[:, 0] for seed in range(20)]
     correlation = np.corrcoef(signs)[np.triu_indices(20, 1)]

@@ -33,9 +33,9 @@ def test_same_batch_twice_is_refused(truth):
     from reference.monte_carlo.batches import merged
     from reference.monte_carlo.volpath.integrator import volpath_batch
 
-    one = volpath_batch(truth, 3, 4)
+    batch = volpath_batch(truth, 3, 4)
     with pytest.raises(ValueError, match="different seeds"):
-        merged(one, one)
+        merged(batch, batch)
 
 
 def test_materials_come_back(truth):
@@ -70,7 +70,7 @@ def _distance(truth):
 def test_agrees_with_the_quadrature(variant, colour):
     """Rationale: two routes that share no code lead to the same radiance, airlight and surface.
 
-    Setup: ball and floor, 16 x 12 pixels, 32 batches of 256 samples, shadow-ray epsilon corrected.
+    Setup: sphere and floor, 16 x 12 pixels, 32 batches of 256 samples, shadow-ray epsilon corrected.
     Expected: pooled relative bias within four standard errors (a false alarm in 16 000 runs), which are below 2 %.
     """
     import mitsuba as mi

@@ -19,9 +19,9 @@ def browser():
         pytest.skip("no Chromium on this machine; Debian's package is chromium")
     with playwright.sync_playwright() as running:
         # As root, as in a container, Chromium's own sandbox cannot work.
-        found = running.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
-        yield found
-        found.close()
+        chromium_running = running.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        yield chromium_running
+        chromium_running.close()
 
 
 @pytest.fixture(scope="module")

@@ -27,13 +27,13 @@ def test_axe_finds_nothing(browser, path, scheme, width):
     opened.goto(path.as_uri())
     opened.wait_for_selector("html[data-drawn]")
     opened.keyboard.press("f")  # one picture
-    found = axe.Axe().run(opened)
+    plain = axe.Axe().run(opened)
     opened.keyboard.press("?")
     helped = axe.Axe().run(opened)
     opened.close()
-    for one in (found, helped):
-        assert one.violations_count == 0, one.generate_report()
-    assert [one for one in told if not one.startswith("request file:")] == []
+    for violations in (plain, helped):
+        assert violations.violations_count == 0, violations.generate_report()
+    assert [message for message in told if not message.startswith("request file:")] == []
 
 
 def test_nothing_is_wider_than_a_telephone(browser, path):

@@ -20,7 +20,7 @@ def map_of(kind: str, size: int, **changes):
 
 
 def assert_closed(mesh):
-    """Every edge has two triangles of opposite direction, and the surface is one ball: no vertex twice."""
+    """Every edge has two triangles of opposite direction, and the surface is one sphere: no vertex twice."""
     ends = np.concatenate([mesh.triangles[:, [k, (k + 1) % 3]] for k in range(3)]).astype(np.int64)
     count = len(mesh.vertices)
     keys = ends[:, 0] * count + ends[:, 1]
@@ -60,7 +60,7 @@ def heights_above(shadow_map, light, points):
     distance = np.array(shadow_map.distance, dtype=float).reshape(shadow_map.faces, size + 1, size + 1)
     d = points - np.array(light.position, dtype=float).ravel()
     if shadow_map.projection.basis:
-        across, up, axis = (np.array(one, dtype=float).ravel() for one in shadow_map.projection.basis)
+        across, up, axis = (np.array(vector, dtype=float).ravel() for vector in shadow_map.projection.basis)
         a, b, depth = np.linalg.solve(np.stack([across, up, axis], axis=1), d.T)
         face = np.zeros(len(d), int)
         tangent = float(np.linalg.norm(across))
@@ -72,8 +72,8 @@ def heights_above(shadow_map, light, points):
         tangent = 1.0
     u, v = a / depth, b / depth
     inside = (depth > 0) & (abs(u) <= 1) & (abs(v) <= 1)
-    x, y = (np.where(inside, (one + 1) * size / 2, 0) for one in (u, v))
-    column, row = (np.minimum(one.astype(int), size - 1) for one in (x, y))
+    x, y = (np.where(inside, (coordinate + 1) * size / 2, 0) for coordinate in (u, v))
+    column, row = (np.minimum(coordinate.astype(int), size - 1) for coordinate in (x, y))
     grid = np.linspace(-1, 1, size + 1)
     length = np.sqrt(1 + tangent**2 * (grid[None, :] ** 2 + grid[:, None] ** 2))
     s00, s10, s01, s11 = (
@@ -126,8 +126,8 @@ def test_parity_tells_lit_from_unlit(variant, kind, tessellation, floor):
     inner = 2e-4 * np.array([0.31, 0.23, -0.83])  # towards the floor, inside the cone of the spot
     if kind == "spot":
         inner += 1e-3 * np.array(light.axis, dtype=float).ravel()
-    found = signed_crossings(mesh, place + inner, points[clear])
-    assert np.array_equal(found, np.where(lit[clear], 0, 1))
+    layers = signed_crossings(mesh, place + inner, points[clear])
+    assert np.array_equal(layers, np.where(lit[clear], 0, 1))
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -138,9 +138,9 @@ def test_a_fine_threshold_gives_the_same_surface(variant, kind):
 
     shadow_map, _ = map_of(kind, 64)
     height = _heights(shadow_map)
-    found = tessellated_heights(height, divide(edges(height, 1e-6)))
+    tessellated = tessellated_heights(height, divide(edges(height, 1e-6)))
     # Errors of the levels add up, and the heights carry the rounding errors of float32 distances.
-    assert found == pytest.approx(height.astype(float), rel=1e-5)
+    assert tessellated == pytest.approx(height.astype(float), rel=1e-5)
 
 
 @pytest.mark.parametrize(("kind", "triangles"), [("point", 12), ("spot", 2 + 4)])

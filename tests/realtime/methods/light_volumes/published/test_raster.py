@@ -37,7 +37,7 @@ def found_crossings(mesh, camera, **settings):
     if not batches:
         return np.zeros(0, dtype=int), np.zeros(0), np.zeros(0)
     pixel, distance, sign = (
-        np.concatenate([np.array(getattr(found, name)) for found in batches]) for name in ("pixel", "distance", "sign")
+        np.concatenate([np.array(getattr(batch, name)) for batch in batches]) for name in ("pixel", "distance", "sign")
     )
     order = np.lexsort((distance, pixel))
     return pixel[order].astype(int), distance[order], sign[order]
@@ -147,8 +147,8 @@ def test_batches_change_nothing(variant):
     mesh = light_pyramid(np.random.default_rng(4).choice((0.0, 0.2, 0.7), (9, 9)))
     camera = make_camera((2.4, 0.3, 0.2), (0.1, 0.5, -1.0))
     whole_run, pieces = found_crossings(mesh, camera), found_crossings(mesh, camera, batch=7)
-    for one, other in zip(whole_run, pieces):
-        assert np.array_equal(one, other)
+    for whole, joined in zip(whole_run, pieces):
+        assert np.array_equal(whole, joined)
     assert len(whole_run[0]) > 100
 
 

@@ -50,9 +50,9 @@ def test_sum_over_a_convex_volume_is_one_integral(variant, kind, order):
     wanted = airlight_integral(exact, geometry, mi.Float64(begin), mi.Float64(np.maximum(begin, end)), **settings)
     batches = signed_crossings(tetrahedron(corners), camera)
     distance = mi.Float64(np.full(len(rays), 3.1))
-    found = crossing_sum(batches, kernel=exact, geometry=geometry, distance=distance, lane=lane, **settings)
+    total = crossing_sum(batches, kernel=exact, geometry=geometry, distance=distance, lane=lane, **settings)
     # The nodes of J(0, x) and J(begin, end) differ; the kernel promises 1e-6 of each.
-    assert np.array(found) == pytest.approx(np.array(wanted), abs=2e-6 * np.max(np.array(wanted)))
+    assert np.array(total) == pytest.approx(np.array(wanted), abs=2e-6 * np.max(np.array(wanted)))
     assert np.max(np.array(wanted)) > 0.05
 
 
@@ -94,12 +94,12 @@ def test_a_frame_is_that_of_the_height_field(variant, kind, precision):
     shadow_map = cast_shadow_map(scene.geometry, light, 32)
     view = view_of(scene)
     lanes = mesh_airlight(view, light, volume_mesh(shadow_map, light), kernel=exact)
-    found, distance = np.empty((40 * 28, 3)), np.empty(40 * 28)
-    found[np.array(view.pixel)], distance[np.array(view.pixel)] = np.array(lanes).T, np.array(view.distance)
+    airlight, distance = np.empty((40 * 28, 3)), np.empty(40 * 28)
+    airlight[np.array(view.pixel)], distance[np.array(view.pixel)] = np.array(lanes).T, np.array(view.distance)
     wanted = oracle_airlight(read_truth(loaded), [shadow_map], distance=distance.reshape(28, 40)).reshape(-1, 3)
     # The scene holds its numbers in float32, 6e-8 each; float32 adds the kernel's 5e-6 and the rounding of the cone.
     tolerance = 3e-7 if precision == "double" else 1e-5
-    assert np.max(np.abs(found - wanted)) < tolerance * np.max(wanted)
+    assert np.max(np.abs(airlight - wanted)) < tolerance * np.max(wanted)
 
 
 def test_light_that_the_rays_pass_closely_leaves_nothing_where_it_is_hidden(variant):
@@ -114,7 +114,7 @@ def test_light_that_the_rays_pass_closely_leaves_nothing_where_it_is_hidden(vari
     from realtime.scene.medium import Medium
     from realtime.scene.phase import named_phase
 
-    found = {}
+    totals = {}
     for Float, Vector, Color in ((mi.Float, mi.Vector3f, mi.Color3f), (mi.Float64, mi.Vector3d, mi.Color3d)):
         medium = Medium((Float(0.4),), Color(1), named_phase("isotropic"))
         light = Light(Vector(0), Color(1))
@@ -123,10 +123,10 @@ def test_light_that_the_rays_pass_closely_leaves_nothing_where_it_is_hidden(vari
         sign = mi.Float64([-1, 1, -1, 1, -1, 1])
         crossings = Crossings(mi.UInt32([0] * 6), x, sign)
         settings: dict[str, Any] = {"medium": medium, "light": light, "geometry": geometry}
-        found[Float] = crossing_sum([crossings], kernel=exact, distance=Float([5.0]), **settings)[0]
+        totals[Float] = crossing_sum([crossings], kernel=exact, distance=Float([5.0]), **settings)[0]
         parts = [exact(geometry, Float(a), Float(b), medium, light)[0] for a, b in ((0.5, 1.5), (2.5, 3.5))]
-        assert found[Float] == pytest.approx(sum(parts), rel=1e-5 if Float is mi.Float else 1e-9)
-    assert 0.1 < found[mi.Float64] < 10
+        assert totals[Float] == pytest.approx(sum(parts), rel=1e-5 if Float is mi.Float else 1e-9)
+    assert 0.1 < totals[mi.Float64] < 10
 
 
 def test_no_crossings_no_light(variant):

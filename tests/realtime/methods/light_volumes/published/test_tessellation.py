@@ -9,13 +9,15 @@ from realtime.methods.light_volumes.published.tessellation import RING, configur
 from tests.helpers.tessellated_heights import tessellated_heights
 
 
-def directed_edges(found):
-    return Counter((int(a), int(b)) for one in found for a, b in zip(one, np.roll(one, -1), strict=True))
+def directed_edges(corners):
+    return Counter(
+        (int(a), int(b)) for triangle in corners for a, b in zip(triangle, np.roll(triangle, -1), strict=True)
+    )
 
 
-def areas(points, found):
+def areas(points, corners):
     """Twice the signed areas."""
-    a, b, c = (points[found[:, k]] for k in range(3))
+    a, b, c = (points[corners[:, k]] for k in range(3))
     (p, q), (r, s) = (b - a).T, (c - a).T
     return p * s - q * r
 
@@ -31,14 +33,14 @@ def random_edges(rng, *, faces: int, levels: int, share: float):
 @pytest.mark.claim("no-t-junctions")
 @pytest.mark.parametrize("sides", range(16))
 def test_configuration_covers_its_quad_once(sides):
-    found = np.array(configuration(sides))
-    assert len(found) == 2 + bin(sides).count("1") <= 6
+    corners = np.array(configuration(sides))
+    assert len(corners) == 2 + bin(sides).count("1") <= 6
     points = np.array(RING)
-    area = areas(points, found)
+    area = areas(points, corners)
     assert np.all(area > 0)
     assert area.sum() == 8  # twice the square of two halves a side
     # Each edge twice, in opposite directions, but for those of the quad: these once, with the middles that there are.
-    seen = directed_edges(found)
+    seen = directed_edges(corners)
     assert set(seen.values()) == {1}
     border = {edge for edge in seen if edge[::-1] not in seen}
     ring = [k for k in range(8) if k % 2 == 0 or sides >> (k // 2) & 1]
@@ -47,7 +49,7 @@ def test_configuration_covers_its_quad_once(sides):
     rng = np.random.default_rng(sides)
     p = rng.uniform(0, 2, (500, 2))
     inside = np.zeros(len(p), int)
-    for a, b, c in points[found]:
+    for a, b, c in points[corners]:
         signs = [(q - o)[0] * (p - o)[:, 1] - (q - o)[1] * (p - o)[:, 0] for o, q in ((a, b), (b, c), (c, a))]
         inside += np.all(np.array(signs) > 0, axis=0)
     assert np.all(inside == 1)
@@ -62,12 +64,12 @@ def test_meshes_of_random_divisions_have_no_gaps():
         divided = divide(random_edges(rng, faces=1, levels=5, share=share))
         for _, _, sides in quads(divided):
             configurations |= set(sides.tolist())
-        found = triangles(divided)
+        corners = triangles(divided)
         points = grid_points(np.arange((size + 1) ** 2), size)
-        area = areas(points, found)
+        area = areas(points, corners)
         assert np.all(area > 0)
         assert area.sum() == 2 * size**2
-        seen = directed_edges(found)
+        seen = directed_edges(corners)
         assert set(seen.values()) == {1}
         for a, b in seen:
             on_border = np.any((points[a] == points[b]) & ((points[a] == 0) | (points[a] == size)))
@@ -113,10 +115,10 @@ def test_planes_have_no_edges():
 def test_saddles_have_edges(saddle):
     """The sum of the second differences vanishes there, the error of the mesh does not."""
     height = height_of(saddle, 64)
-    found = edges(height, 1e-3)
-    assert found[0].all()
-    assert not found[-1].any()
-    error = abs(tessellated_heights(height, divide(found)) / height - 1).max()
+    marks = edges(height, 1e-3)
+    assert marks[0].all()
+    assert not marks[-1].any()
+    error = abs(tessellated_heights(height, divide(marks)) / height - 1).max()
     assert 1e-4 < error < 2e-3
 
 
@@ -157,7 +159,7 @@ def test_tessellated_heights_are_those_of_the_triangles():
     size = 16
     height = rng.uniform(1, 2, (2, size + 1, size + 1))
     divided = divide(random_edges(rng, faces=2, levels=4, share=0.08))
-    found = tessellated_heights(height, divided)
+    tessellated = tessellated_heights(height, divided)
     flat = height.ravel()
     corner = grid_points(np.arange((size + 1) ** 2), size)
     seen = np.zeros((2, len(corner)), bool)
@@ -170,7 +172,7 @@ def test_tessellated_heights_are_those_of_the_triangles():
         for p, q in ((a, b), (b, c), (c, a)):
             inside &= (q - p)[0] * (corner - p)[:, 1] - (q - p)[1] * (corner - p)[:, 0] >= 0
         expected = flat[three[0]] + (corner[inside] - a) @ slope
-        assert found[face].ravel()[inside] == pytest.approx(expected, rel=1e-12)
+        assert tessellated[face].ravel()[inside] == pytest.approx(expected, rel=1e-12)
         seen[face] |= inside
     assert seen.all()
 
