@@ -12,7 +12,12 @@ from reports.tables.table import Table
 
 def print_json(data: Any) -> None:
     """Print data as JSON; not-a-number must be None by now."""
-    print(json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False))
+    text = json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False)
+    try:
+        text.encode(sys.stdout.encoding or "utf-8")
+    except UnicodeEncodeError:
+        text = json.dumps(data, indent=2, allow_nan=False)
+    print(text)
 
 
 def print_table(table: Table, *, as_markdown: bool = False) -> None:

@@ -28,6 +28,7 @@ from reference.storage.cache import cache_folder, drop_arrays, is_kept, load_arr
 from reference.storage.cache_size import make_room
 from reference.storage.files import NO_SPACE
 from reference.storage.scene_digest import cache_key
+from reference.storage.stopping import hint_when_stopped
 
 Progress = Callable[[int, int, str], None]
 Trace = Callable[[int], Batches]  # from the seed
@@ -122,15 +123,16 @@ def monte_carlo_batches(
         return batch
 
     try:
-        done = None
-        for seeds in _blocks(first_seed, batches):
-            block, whole = _block(folder, seeds, samples, tally=tally, batch_of=kept_or_traced)
-            if block is not None:
-                done = block if done is None else merged(done, block)
-            if not whole or (enough is not None and 2 <= tally["done"] < batches and enough(_all(done))):
-                break
+        with hint_when_stopped(lambda: _go_on(tally)):
+            done = None
+            for seeds in _blocks(first_seed, batches):
+                block, whole = _block(folder, seeds, samples, tally=tally, batch_of=kept_or_traced)
+                if block is not None:
+                    done = block if done is None else merged(done, block)
+                if not whole or (enough is not None and 2 <= tally["done"] < batches and enough(_all(done))):
+                    break
     except KeyboardInterrupt:
-        raise KeyboardInterrupt(f"{_kept(tally)}; run again to go on") from None
+        raise KeyboardInterrupt(_go_on(tally)) from None
     except OSError as error:
         if error.errno not in NO_SPACE:
             raise
@@ -208,3 +210,7 @@ def _load(folder: str, seeds: range, samples: int, tally: Counter[str]) -> Batch
 
 def _kept(tally: Counter[str]) -> str:
     return f"{tally['done']} finished batches are kept" if tally["done"] else "nothing was finished yet"
+
+
+def _go_on(tally: Counter[str]) -> str:
+    return f"{_kept(tally)}; run again to go on"

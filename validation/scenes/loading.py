@@ -54,6 +54,7 @@ def load_scene(name_or_path: str, size: tuple[int, int] | None = None) -> Loaded
         loaded = LoadedScene(path.stem, _parse(path), f"The user's own scene, {path.name}.", "", path)
     if size is not None:
         resize(loaded.scene, size)
+    _check_films(loaded)
     return loaded
 
 
@@ -86,6 +87,23 @@ def _existing(name_or_path: str) -> Path:
         f"scene: got {name_or_path!r}, wanted one of {', '.join(SCENES)} or the path of a Mitsuba XML file"
         + nearest(name_or_path, SCENES)
     )
+
+
+def _check_films(loaded: LoadedScene) -> None:
+    """Refuse films without pixels, with more than any image has, and cropped ones, of which a part would be shown."""
+    for sensor in loaded.scene.sensors():
+        size, crop = (tuple(int(n) for n in pair) for pair in (sensor.film().size(), sensor.film().crop_size()))
+        where = f"scene {loaded.path or loaded.name}"
+        if not all(1 <= n <= _LARGEST for n in size):
+            raise InputError(
+                f"{where}: the camera's film has {size[0]} x {size[1]} pixels, wanted at least 1 x 1 and at most "
+                f"{_LARGEST} on a side; change its width and height, or give --size"
+            )
+        if crop != size:
+            raise InputError(
+                f"{where}: the camera's film is cropped to {crop[0]} x {crop[1]} of {size[0]} x {size[1]} pixels; "
+                "remove crop_width, crop_height and crop_offset from the film, or give --size"
+            )
 
 
 def _parse(path: Path):
