@@ -13,17 +13,18 @@ import pytest
 from reports.commands.main import run
 
 EXAMPLES = Path(__file__).parents[3] / "docs" / "examples"
-MODULES = {"cycles": "bpy", "luxcore": "pyluxcore"}
+#: By renderer: its module, and the variable that names a Python that has it.
+MODULES = {"cycles": ("bpy", "AIRLIGHT_CYCLES_PYTHON"), "luxcore": ("pyluxcore", "AIRLIGHT_LUXCORE_PYTHON")}
 
 
 def interpreter(renderer):
     """Return the Python that an environment variable names, or this one if it has the module."""
-    module = MODULES[renderer]
-    named = os.environ.get(f"AIRLIGHT_{renderer.upper()}_PYTHON")
+    module, variable = MODULES[renderer]
+    named = os.environ.get(variable)
     if named:
         return named
     if importlib.util.find_spec(module) is None:
-        pytest.skip(f"no {module} here; AIRLIGHT_{renderer.upper()}_PYTHON can name a Python that has it")
+        pytest.skip(f"no {module} here; {variable} can name a Python that has it")
     return sys.executable
 
 
