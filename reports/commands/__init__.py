@@ -5,6 +5,8 @@ Read in this order:
 
 - `main.py`: the command line: the commands, and how mistakes are reported
 - `printing.py`: how commands print the tables of one run
+- `options.py`: options that several commands have
+- `own_methods.py`: methods of the user's own
 - `baselines.py`: `airlight baselines`
 - `bench.py`: `airlight bench`
 - `cache.py`: `airlight cache`

@@ -118,6 +118,10 @@ def run(arguments: Sequence[str]) -> int:
     """
     command = typer.main.get_command(app)
     try:
+        os.getcwd()
+    except OSError:  # Dr.Jit ends the process over it
+        return _fail("the current folder was deleted: change into another folder, then run this again", WRONG_INPUT)
+    try:
         status = command.main(list(arguments), prog_name="airlight", standalone_mode=False)
         sys.stdout.flush()
     except BrokenPipeError:  # the reader of the pipe has left

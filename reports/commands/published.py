@@ -6,6 +6,8 @@ from typing import Annotated, Any
 
 import typer
 
+from reports.commands.options import Force
+
 PAPERS = ("biri", "billeter")
 
 
@@ -27,6 +29,7 @@ def published(
     zero_cost: Annotated[
         bool, typer.Option(help="biri: also measure that casters which are not there or not seen cost nothing.")
     ] = True,
+    force: Force = False,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
     markdown: Annotated[bool, typer.Option("--markdown", help="Print tables for a README, dated.")] = False,
 ) -> None:
@@ -44,6 +47,7 @@ def published(
     from reports.machine.progress import progress_bar
     from reports.tables.terminal import print_json
     from validation.configurations.kernel_names import find_kernel
+    from validation.frames.expected_work import check_work, frame_work, truth_work
 
     if paper is not None and paper not in PAPERS:
         raise InputError(f"--paper: got {paper!r}, wanted one of {', '.join(PAPERS)}")
@@ -59,6 +63,10 @@ def published(
     sizes = parse_map_sizes("--maps", maps)
     activate()
     data: dict[str, Any] = {}
+    pixels = round(800 * scale), round(600 * scale)
+    count = len(wanted) * (len(names) + len(sizes))
+    works = [truth_work(pixels, images=2 * len(wanted)), frame_work(pixels, frames=20 * count)]
+    check_work(f"published, --scale {scale:g}", works, force=force)
     with progress_bar("published") as progress:
         if "biri" in papers:
             data |= _biri(wanted, names, scale=scale, zero_cost=zero_cost, progress=progress)

@@ -11,8 +11,8 @@ Read in this order:
 - `kept.py`: what the results of every report have in common
 - `measure.py`: all of these, report.json and the page
 
-May import: `analytic`, `realtime.errors`, `realtime.frame`, `reference.storage`, `reports.data`, `reports.machine`,
-`reports.page`, `reports.papers`, `reports.plotting`, `validation.comparison`, `validation.configurations`,
-`validation.estimates`, `validation.fidelity`, `validation.frames`, `validation.kernels`, `validation.metrics`,
-`validation.mutations`, `validation.papers`, `validation.scenes`.
+May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.methods`, `reference.storage`, `reports.data`,
+`reports.machine`, `reports.page`, `reports.papers`, `reports.plotting`, `validation.comparison`,
+`validation.configurations`, `validation.estimates`, `validation.fidelity`, `validation.frames`, `validation.kernels`,
+`validation.metrics`, `validation.mutations`, `validation.papers`, `validation.scenes`.
 """
