@@ -49,7 +49,7 @@ def fidelity_parts(
 
 def _part(name: str, experiment: Experiment, cache: ResultCache) -> OtherPart:
     def compute(progress: Progress) -> Computed:
-        progress(0.0, name)
+        progress(0.0, "claims of papers")
         return {"experiment": name, "data": experiment.compute()}, {}
 
     entry = cache_entry(cache, "fidelity", identity={"experiment": name})
@@ -97,6 +97,6 @@ def measure_fidelity(
     }
     results: dict[str, list[CachedResult]] = {}
     for part, share in zip(parts, shares(seconds).values()):
-        step = part_of(progress, *share)
+        step = part_of(progress, *share, before=f"{part.title}, ")
         results.setdefault(part.kind, []).append(cached_result(part.entry, partial(part.compute, step)))
     return fidelity_rows(results, rows=rows)

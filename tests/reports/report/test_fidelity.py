@@ -78,6 +78,6 @@ def test_an_experiment_runs_once_for_all_its_rows_and_is_kept(cache, monkeypatch
         found = measure_fidelity(rows, cache, quick=True, progress=lambda share, what: told.append(what))
         assert len(found) == len(rows) > 3
     assert runs == [1]
-    assert told == ["nothing"]
+    assert told == ["nothing, claims of papers"]
     assert len(measure_fidelity(rows, replace(cache, fresh=True), quick=True)) == len(rows)
     assert len(runs) == 2
