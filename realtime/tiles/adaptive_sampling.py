@@ -13,7 +13,15 @@ where
     |Delta| <= tolerance f
 
 at all four corners, in both directions and all channels, and errs by about the tolerance at most. A jump of f, at an
-edge of surfaces, has a Delta of its own size.
+edge of surfaces, has a Delta of its own size. The corners at the ends of a row have one neighbour and take the Delta of
+the corner beside them: there the error of a kink is up to one Delta instead of a half.
+
+A smooth curvature of the opposite sign, whose own Delta is c, hides a kink that is not larger. With both within the
+tolerance, s h w <= tolerance f + c, at the ends of a row
+
+    s h w (1 - w) - c/8 <= tolerance f + 7 c/8,
+
+which is the most by which a kink and a curvature together can err.
 
 What no corner sees is missed: beams and shadows thinner than a tile. Surfaces are not, since the pixels of an
 interpolated tile and its corners have to be about equally far away, and the light reaches the surface at all four

@@ -55,8 +55,8 @@ def report(
     Examples
     --------
     >>> import airlight
-    >>> found = airlight.report("my-report", scenes=["open-fog"], methods=["unshadowed"])  # doctest: +SKIP
-    >>> found.claims[0]  # doctest: +SKIP
+    >>> report = airlight.report("my-report", scenes=["open-fog"], methods=["unshadowed"])  # doctest: +SKIP
+    >>> report.claims[0]  # doctest: +SKIP
     'The truth is confirmed by our own Mitsuba integrator in 1 of 1 comparisons: ...'
     """
     from reference.storage.files import ensure_folder

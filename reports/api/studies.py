@@ -58,10 +58,10 @@ def integrate(
     --------
     >>> import airlight, numpy as np
     >>> rays = {"phase": "isotropic", "foot": np.linspace(-2, 2, 5), "height": 0.3, "x0": 0, "x1": np.inf}
-    >>> found = airlight.integrate(rays | {"sigma_t": 0.2}, "exact", certify=True)
-    >>> found.J.shape
+    >>> integrals = airlight.integrate(rays | {"sigma_t": 0.2}, "exact", certify=True)
+    >>> integrals.J.shape
     (5,)
-    >>> bool(abs(found.error).max() < 1e-5)
+    >>> bool(abs(integrals.error).max() < 1e-5)
     True
     """
     from analytic.cases import integrate_cases as certified

@@ -63,6 +63,7 @@ def figures(
     """
     from analytic.errors import InputError, nearest
     from reference.storage.files import ensure_folder
+    from reports.figures.files import plot
     from reports.machine.progress import part_of, progress_bar
     from reports.plotting.style import WIDTHS
 
@@ -88,7 +89,7 @@ def figures(
             progress(number / len(chosen), name)
             step = part_of(progress, number / len(chosen), (number + 1) / len(chosen), before=f"{name}: ")
             _compute(name, folder, given | {"progress": step})
-            _module(name).plot(folder, **drawing)
+            plot(_module(name), folder, **drawing)
             _print_files(name, folder)
 
 
@@ -145,12 +146,13 @@ def _compute(name: str, folder: Path, given: dict[str, Any]) -> None:
 def _redraw(names: list[str] | None, source: Path, target: Path, drawing: dict[str, Any]) -> None:
     """Draw the named figures, or all, from data in a folder."""
     from analytic.errors import InputError
+    from reports.figures.files import plot
 
     chosen = names or [name for name in FIGURES if (source / f"{name}.csv").is_file()]
     if not chosen:
         raise InputError(f"--from: {source} holds no data of a figure; write some with `airlight figures -o {source}`")
     for name in chosen:
-        _module(name).plot(source, output=target, **drawing)
+        plot(_module(name), source, output=target, **drawing)
         _print_files(name, target)
 
 

@@ -80,6 +80,7 @@ def image_data(measured: ImageMeasurement) -> dict[str, Any]:
         "label": measured.shown.label,
         "kind": "image",
         "layer": measured.layer,
+        "pixel": measured.pixel,
         "method": "image",
         "kernel": None,
         "parameters": {},

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Figures and tables for papers: `compute` writes data, `plot` only reads them.
+"""Figures and tables for papers: `compute` writes data, `draw` and `tabular` only read them.
 
 Read in this order:
 

@@ -8,13 +8,11 @@ without a bias it falls with the order 1/2. For volpath the image is that of the
 (`validation.estimates.agreement`).
 """
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from reference.storage.files import ensure_folder
-from reports.figures.files import draw_figure, name_sizes, new_figure, read_data, values, write_data
-from reports.machine.progress import counted, part_of
+from reports.figures.files import name_sizes, new_figure, read_data, values, write_data
+from reports.machine.progress import Progress, counted, part_of
 from reports.plotting.style import COLOURS, WIDTHS, kernel_style
 
 NAME = "convergence"
@@ -35,25 +33,15 @@ _ESTIMATOR_STYLES = {
 }
 
 
-def compute(
-    folder: Path | str,
-    *,
-    quick: bool = False,
-    scene: str = SCENE,
-    progress: Callable[[float, str], None] | None = None,
-) -> None:
+def compute(folder: Path | str, *, quick: bool = False, scene: str = SCENE, progress: Progress | None = None) -> None:
     """Write `convergence.csv` into a folder: errors by kernel and size, by estimator and samples, with the slopes.
 
     Parameters
     ----------
-    folder
-        Where the data go.
     quick
         A smaller image and fewer samples.
     scene
         Of the estimators: a built-in scene or the path of a Mitsuba XML file.
-    progress
-        Called with the share done and what comes next.
     """
     from validation.kernels.convergence import convergence, declared
 
@@ -96,12 +84,8 @@ def _estimator_rows(scene: str, image: tuple[int, int], estimator: str, batches:
     return [("estimator", estimator, size, error, *law) for size, error in zip(samples, errors)]
 
 
-def plot(folder: Path | str, **options: Any) -> None:
-    """Draw `convergence.pdf` and `.png` from the data; options: see `reports.figures.files.draw_figure`."""
-    draw_figure(NAME, folder, _draw, **options)
-
-
-def _draw(folder: Path, column: str):
+def draw(folder: Path, column: str):
+    """Return the figure, see `reports.figures.files.plot`."""
     rows = read_data(folder, NAME)
     width = WIDTHS[column]
     double = column == "double"

@@ -1,17 +1,28 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The files of a figure: its data as CSV, where they come from as JSON, the drawing as PDF and PNG.
 
-A figure is a module `reports/figures/*.py` with `NAME`, `SUMMARY` and two functions. `compute` measures, or reads a
-report, and writes `NAME.csv` and `NAME.json`; `plot` reads nothing but these and draws `NAME.pdf` and `NAME.png`. What
-varies from run to run, the date above all, is in the JSON alone: the same data give the same bytes.
+A figure is a module `reports/figures/*.py` with `NAME`, `SUMMARY` and these functions:
+
+    compute(folder, *, report, quick, progress, ...)
+        writes `NAME.csv` and `NAME.json` into a folder. It takes those of the arguments that it needs: `report`, the
+        folder of a report from which the data come; `quick`, to measure less where it measures; `progress`, called
+        with the share done and what comes next; and its own.
+    draw(folder, column)
+        returns the figure from nothing but these data, for a column of `reports.plotting.style.WIDTHS`.
+    tabular(rows)
+        returns a LaTeX table from the rows of the data.
+
+`draw` and `tabular` may each be missing; `plot` writes what they return. What varies from run to run, the date above
+all, is in the JSON alone: the same data give the same bytes.
 """
 
 import csv
 import io
 import json
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from analytic.errors import InputError
@@ -25,43 +36,42 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Row = Mapping[str, str]
-Draw = Callable[[Path, str], "Figure"]  # from the folder of the data and the column
 
 #: Metadata without anything that differs from one run to the next.
 _METADATA: Mapping[str, dict[str, Any]] = {".pdf": {"CreationDate": None}, ".png": {"Software": None}}
 
 
-def draw_figure(
-    name: str,
+def plot(
+    figure: ModuleType,
     folder: Path | str,
-    draw: Draw,
     *,
     column: str = "double",
     extra: Sequence[str] = (),
     output: Path | str | None = None,
 ) -> None:
-    """Draw a figure from its data and write it as PDF and PNG.
+    """Draw a figure from its data as PDF and PNG, and write its table as LaTeX.
 
     Parameters
     ----------
-    name
-        Of the files.
+    figure
+        Its module, see above.
     folder
         Where the data are.
-    draw
-        Returns the figure from the folder and the column; runs under the style sheets.
     column, extra
-        See `reports.plotting.style.figure_style`.
+        See `reports.plotting.style.figure_style`; a table does not depend on them.
     output
         Where the drawings go; the folder of the data by default.
     """
     source, target = Path(folder), Path(output or folder)
-    with figure_style(column, extra):
-        figure = draw(source, column)
-        for suffix, metadata in _METADATA.items():
-            buffer = io.BytesIO()
-            figure.savefig(buffer, format=suffix[1:], metadata=metadata)
-            write_bytes(target / f"{name}{suffix}", buffer.getvalue())
+    if hasattr(figure, "draw"):
+        with figure_style(column, extra):
+            drawn = figure.draw(source, column)
+            for suffix, metadata in _METADATA.items():
+                buffer = io.BytesIO()
+                drawn.savefig(buffer, format=suffix[1:], metadata=metadata)
+                write_bytes(target / f"{figure.NAME}{suffix}", buffer.getvalue())
+    if hasattr(figure, "tabular"):
+        write_text(target / f"{figure.NAME}.tex", figure.tabular(read_data(source, figure.NAME)))
 
 
 def new_figure(width: float, height: float) -> "Figure":
@@ -79,21 +89,6 @@ def name_sizes(panel: "Axes", sizes: Iterable[float]) -> None:
     panel.xaxis.set_major_locator(FixedLocator(shown))
     panel.xaxis.set_minor_locator(NullLocator())
     panel.set_xticklabels([f"{size:g}" for size in shown])
-
-
-def write_table(
-    name: str, folder: Path | str, tabular: Callable[[list[dict[str, str]]], str], output: Path | str | None = None
-) -> None:
-    """Write a table from the data of a figure as LaTeX.
-
-    Parameters
-    ----------
-    name, folder, output
-        See `draw_figure`.
-    tabular
-        Returns the table from the rows of the data.
-    """
-    write_text(Path(output or folder) / f"{name}.tex", tabular(read_data(folder, name)))
 
 
 def write_data(folder: Path, name: str, header: Sequence[str], rows: Iterable[Sequence[Any]], **made_by: Any) -> None:

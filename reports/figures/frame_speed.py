@@ -6,7 +6,7 @@ from typing import Any
 
 from reference.storage.files import ensure_folder
 from reports.data.reader import read_report
-from reports.figures.files import draw_figure, new_figure, read_csv, read_data, value, write_csv, write_data
+from reports.figures.files import new_figure, read_csv, read_data, value, write_csv, write_data
 from reports.figures.report import measured, report_origin
 from reports.plotting.style import WIDTHS, report_styles
 
@@ -33,13 +33,6 @@ def compute(folder: Path | str, *, report: Path | str) -> None:
     """Write `frame-speed.csv` into a folder: times [ms] and errors of every method in every scene of a report.
 
     `frame-speed-labels.csv` names all methods of the report in its order.
-
-    Parameters
-    ----------
-    folder
-        Where the data go.
-    report
-        The folder of the report.
     """
     target, data = ensure_folder(folder), read_report(report)
     rows = []
@@ -57,12 +50,8 @@ def compute(folder: Path | str, *, report: Path | str) -> None:
     write_data(target, NAME, _HEADER, rows, **report_origin(report, data), timed=data["settings"].get("timed"))
 
 
-def plot(folder: Path | str, **options: Any) -> None:
-    """Draw `frame-speed.pdf` and `.png` from the data; options: see `reports.figures.files.draw_figure`."""
-    draw_figure(NAME, folder, _draw, **options)
-
-
-def _draw(folder: Path, column: str):
+def draw(folder: Path, column: str):
+    """Return the figure, see `reports.figures.files.plot`."""
     rows = read_data(folder, NAME)
     scenes = list(dict.fromkeys(row["scene"] for row in rows))
     by_scene = {scene: [row for row in rows if row["scene"] == scene] for scene in scenes}

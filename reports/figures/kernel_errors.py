@@ -6,12 +6,11 @@ the ray and the direction to the light. Its segment goes from the camera to 2 d,
 small. Kernels run in float32 with their default sizes; isotropic fog. The truth is `analytic`'s, to about 1e-12.
 """
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from reference.storage.files import ensure_folder
-from reports.figures.files import draw_figure, new_figure, read_data, write_data
+from reports.figures.files import new_figure, read_data, write_data
+from reports.machine.progress import Progress
 from reports.plotting.style import WIDTHS
 
 NAME = "kernel-errors"
@@ -23,17 +22,13 @@ _REACH = 2.0  # length of the segment over the distance to the light
 _FLOOR, _CEILING = 1e-7, 1.0  # ends of the colour scale: the rounding of float32, and no correct digit
 
 
-def compute(folder: Path | str, *, quick: bool = False, progress: Callable[[float, str], None] | None = None) -> None:
+def compute(folder: Path | str, *, quick: bool = False, progress: Progress | None = None) -> None:
     """Write `kernel-errors.csv` into a folder: kernel, optical depth, angle, relative error.
 
     Parameters
     ----------
-    folder
-        Where the data go.
     quick
         Fewer rays.
-    progress
-        Called with the share done and what comes next.
     """
     import numpy as np
 
@@ -76,12 +71,8 @@ def _rays(columns: int, lines: int):
     return with_truth(cases), depth, angle
 
 
-def plot(folder: Path | str, **options: Any) -> None:
-    """Draw `kernel-errors.pdf` and `.png` from the data; options: see `reports.figures.files.draw_figure`."""
-    draw_figure(NAME, folder, _draw, **options)
-
-
-def _draw(folder: Path, column: str):
+def draw(folder: Path, column: str):
+    """Return the figure, see `reports.figures.files.plot`."""
     import numpy as np
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import LogNorm

@@ -1,13 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The figure of the kernels' speed: nanoseconds a ray against the error, a line for each kernel over its sizes."""
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from reference.storage.files import ensure_folder
-from reports.figures.files import draw_figure, new_figure, read_data, value, write_data
-from reports.machine.progress import counted
+from reports.figures.files import new_figure, read_data, value, write_data
+from reports.machine.progress import Progress, counted
 from reports.plotting.style import WIDTHS, kernel_style
 
 NAME = "kernel-speed"
@@ -23,20 +21,16 @@ def compute(
     *,
     quick: bool = False,
     names: list[str] | None = None,
-    progress: Callable[[float, str], None] | None = None,
+    progress: Progress | None = None,
 ) -> None:
     """Write `kernel-speed.csv` into a folder: time and errors of every kernel and size, isotropic, in float32.
 
     Parameters
     ----------
-    folder
-        Where the data go.
     quick
         Fewer rays and shorter timings.
     names
         Kernels; all of them by default.
-    progress
-        Called with the share done and what comes next.
     """
     from validation.kernels.benchmark import PHASES, RAYS, bench_kernels
 
@@ -55,12 +49,8 @@ def compute(
     write_data(target, NAME, _HEADER, rows, **made_by)
 
 
-def plot(folder: Path | str, **options: Any) -> None:
-    """Draw `kernel-speed.pdf` and `.png` from the data; options: see `reports.figures.files.draw_figure`."""
-    draw_figure(NAME, folder, _draw, **options)
-
-
-def _draw(folder: Path, column: str):
+def draw(folder: Path, column: str):
+    """Return the figure, see `reports.figures.files.plot`."""
     rows = read_data(folder, NAME)
     width = WIDTHS[column]
     double = column == "double"

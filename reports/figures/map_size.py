@@ -5,13 +5,13 @@ The lines are `validation.frames.map_size.fitted_slope`: error ~ size^-order; it
 or a little less.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from reference.storage.files import ensure_folder
-from reports.figures.files import draw_figure, name_sizes, new_figure, read_data, values, write_data
-from reports.machine.progress import counted, part_of
+from reports.figures.files import name_sizes, new_figure, read_data, values, write_data
+from reports.machine.progress import Progress, counted, part_of
 from reports.plotting.style import WIDTHS, method_style
 
 NAME = "map-size"
@@ -34,22 +34,18 @@ def compute(
     quick: bool = False,
     scene: str = SCENE,
     sizes: Sequence[int] | None = None,
-    progress: Callable[[float, str], None] | None = None,
+    progress: Progress | None = None,
 ) -> None:
     """Write `map-size.csv` into a folder: the errors of each method for every size of the map, and its order.
 
     Parameters
     ----------
-    folder
-        Where the data go.
     quick
         A smaller image and fewer sizes.
     scene
         A built-in scene or the path of a Mitsuba XML file.
     sizes
         Of the shadow map [texels].
-    progress
-        Called with the share done and what comes next.
     """
     from validation.frames.map_size import map_errors
     from validation.scenes.loading import load_scene
@@ -70,12 +66,8 @@ def compute(
     write_data(target, NAME, _HEADER, rows, scene=scene, image=image, sizes=chosen)
 
 
-def plot(folder: Path | str, **options: Any) -> None:
-    """Draw `map-size.pdf` and `.png` from the data; options: see `reports.figures.files.draw_figure`."""
-    draw_figure(NAME, folder, _draw, **options)
-
-
-def _draw(folder: Path, column: str):
+def draw(folder: Path, column: str):
+    """Return the figure, see `reports.figures.files.plot`."""
     import numpy as np
 
     rows = read_data(folder, NAME)

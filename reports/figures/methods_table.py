@@ -2,11 +2,10 @@
 """The table of the methods: time of a frame with its quartiles and errors of the airlight, by scene of a report."""
 
 from pathlib import Path
-from typing import Any
 
 from reference.storage.files import ensure_folder
 from reports.data.reader import read_report
-from reports.figures.files import pixels, value, write_data, write_table
+from reports.figures.files import pixels, value, write_data
 from reports.figures.report import report_origin
 from reports.tables.drawing import latex
 from reports.tables.methods import methods_table
@@ -26,15 +25,7 @@ _HEADER = (
 
 
 def compute(folder: Path | str, *, report: Path | str) -> None:
-    """Write `methods-table.csv` into a folder: times [ms] and errors of every method in every scene of a report.
-
-    Parameters
-    ----------
-    folder
-        Where the data go.
-    report
-        The folder of the report.
-    """
+    """Write `methods-table.csv` into a folder: times [ms] and errors of every method in every scene of a report."""
     target, data = ensure_folder(folder), read_report(report)
     rows = []
     for scene in data["scenes"]:
@@ -50,12 +41,8 @@ def compute(folder: Path | str, *, report: Path | str) -> None:
     write_data(target, NAME, _HEADER, rows, **report_origin(report, data), settings=settings)
 
 
-def plot(folder: Path | str, *, output: Path | str | None = None, **options: Any) -> None:
-    """Write `methods-table.tex` from the data in a folder; a table has no use for the options of drawings."""
-    write_table(NAME, folder, _tabular, output)
-
-
-def _tabular(rows: list[dict[str, str]]) -> str:
+def tabular(rows: list[dict[str, str]]) -> str:
+    """Return the LaTeX table, see `reports.figures.files.plot`."""
     scenes = dict.fromkeys(row["scene"] for row in rows)
     comment = (
         "Times: medians with the distances to the quartiles, kernels compiled before.",

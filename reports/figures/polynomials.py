@@ -11,10 +11,9 @@ three kernels integrate to within 1 % and 10 % (`validation.kernels.biri_misprin
 """
 
 from pathlib import Path
-from typing import Any
 
 from reference.storage.files import ensure_folder
-from reports.figures.files import draw_figure, new_figure, read_data, values, write_csv, write_data
+from reports.figures.files import new_figure, read_data, values, write_csv, write_data
 from reports.plotting.style import WIDTHS, kernel_style, truth_style
 
 NAME = "polynomials"
@@ -29,8 +28,6 @@ def compute(folder: Path | str, *, rays: int = 100_000) -> None:
 
     Parameters
     ----------
-    folder
-        Where the files go.
     rays
         Quasi-random rays of which the shares are counted.
     """
@@ -71,12 +68,8 @@ def _curves(phase: str, a: float, theta):
     return {"exact": exact, **polynomials}
 
 
-def plot(folder: Path | str, **options: Any) -> None:
-    """Draw `polynomials.pdf` and `.png` from the data in a folder; options: see `reports.figures.files.draw_figure`."""
-    draw_figure(NAME, folder, _draw, **options)
-
-
-def _draw(folder: Path, column: str):
+def draw(folder: Path, column: str):
+    """Return the figure, see `reports.figures.files.plot`."""
     import numpy as np
 
     rows = read_data(folder, NAME)

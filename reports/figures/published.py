@@ -6,14 +6,14 @@ rebuilt after the light moved, as published. The machines are not the same: what
 paper, and what the error of each is.
 """
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from reference.storage.files import ensure_folder
-from reports.figures.files import draw_figure, new_figure, pixels, read_data, value, write_data, write_table
+from reports.figures.files import new_figure, pixels, read_data, value, write_data
 from reports.figures.published_rows import HEADER, billeter_entries, biri_entries, measured_papers
 from reports.figures.report import reported_papers
+from reports.machine.progress import Progress
 from reports.plotting.style import WIDTHS, method_style
 from reports.tables.drawing import latex
 from reports.tables.table import Column, Measured, Table, Value, table
@@ -27,21 +27,17 @@ def compute(
     *,
     report: Path | str | None = None,
     quick: bool = False,
-    progress: Callable[[float, str], None] | None = None,
+    progress: Progress | None = None,
 ) -> None:
     """Write `published.csv` into a folder: a row for each published figure and everything that was measured for it.
 
     Parameters
     ----------
-    folder
-        Where the data go.
     report
         The folder of a report: the papers that it holds are taken from it; if it holds none, all are measured, which
         takes minutes.
     quick
         Measure at a quarter of the published size, Billeter's Table 1 for its smallest map.
-    progress
-        Called with the share done and what comes next.
     """
     target = ensure_folder(folder)
     papers, origin = reported_papers(report)
@@ -51,13 +47,8 @@ def compute(
     write_data(target, NAME, HEADER, rows, **origin)
 
 
-def plot(folder: Path | str, *, output: Path | str | None = None, **options: Any) -> None:
-    """Draw `published.pdf` and `.png` and write `published.tex`; options: see `reports.figures.files.draw_figure`."""
-    draw_figure(NAME, folder, _draw, output=output, **options)
-    write_table(NAME, folder, _tabular, output)
-
-
-def _draw(folder: Path, column: str):
+def draw(folder: Path, column: str):
+    """Return the figure, see `reports.figures.files.plot`."""
     rows = read_data(folder, NAME)
     names = dict.fromkeys(row["table"] for row in rows)
     tables = {name: [row for row in rows if row["table"] == name] for name in names}
@@ -113,7 +104,8 @@ def _measured(panel, row: dict[str, str], height: float, style: dict[str, Any]) 
         panel.errorbar([middle], [height], xerr=[[middle - low], [high - middle]], **style)
 
 
-def _tabular(rows: list[dict[str, str]]) -> str:
+def tabular(rows: list[dict[str, str]]) -> str:
+    """Return the LaTeX table, see `reports.figures.files.plot`."""
     comment = (
         "Frames a second after the light moved, everything rebuilt, medians with the distances to the quartiles; the",
         "error of the airlight is against the quadrature truth.",

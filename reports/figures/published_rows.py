@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Rows of the figure of the published results, from what `airlight published` measures or a report holds."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
-from reports.machine.progress import part_of
+from reports.machine.progress import Progress, part_of
 from reports.papers.billeter import SIZE, billeter_data
 from reports.papers.biri import biri_data, biri_variant
 
@@ -28,7 +28,7 @@ HEADER = (
 _LIMIT = 10.0  # a frame that takes longer is left out [s]
 
 
-def measured_papers(quick: bool, progress: Callable[[float, str], None] | None) -> dict[str, Any]:
+def measured_papers(quick: bool, progress: Progress | None) -> dict[str, Any]:
     """Measure the tables of both papers, as `published` in report.json.
 
     Parameters

@@ -5,13 +5,13 @@ The shares are of the sum of the stages of a frame after the light moved. How th
 `validation.papers.biri`.
 """
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from reference.storage.files import ensure_folder
-from reports.figures.files import draw_figure, new_figure, pixels, read_data, value, values, write_data, write_table
+from reports.figures.files import new_figure, pixels, read_data, value, values, write_data
 from reports.figures.report import reported_papers
+from reports.machine.progress import Progress
 from reports.papers.biri import biri_variant
 from reports.plotting.style import COLOURS, WIDTHS
 from reports.tables.drawing import latex
@@ -31,20 +31,16 @@ def compute(
     *,
     report: Path | str | None = None,
     quick: bool = False,
-    progress: Callable[[float, str], None] | None = None,
+    progress: Progress | None = None,
 ) -> None:
     """Write `stages.csv` into a folder: the share of every stage in every row of the table.
 
     Parameters
     ----------
-    folder
-        Where the data go.
     report
         The folder of a report: if it holds Biri's tables they are taken from it, else they are measured.
     quick
         Measure at a quarter of the published size.
-    progress
-        Called with the share done and what comes next.
     """
     target = ensure_folder(folder)
     papers, origin = reported_papers(report)
@@ -68,17 +64,11 @@ def compute(
     write_data(target, NAME, _HEADER, rows, **origin)
 
 
-def _measured(scale: float, progress: Callable[[float, str], None] | None) -> dict[str, Any]:
+def _measured(scale: float, progress: Progress | None) -> dict[str, Any]:
     from reports.papers.biri import biri_data
     from validation.papers.biri import PUBLISHED, biri_rows
 
     return biri_data(biri_rows([row for row in PUBLISHED if row.shares], scale=scale, progress=progress), [])
-
-
-def plot(folder: Path | str, *, output: Path | str | None = None, **options: Any) -> None:
-    """Draw `stages.pdf` and `.png` and write `stages.tex`; options: see `reports.figures.files.draw_figure`."""
-    draw_figure(NAME, folder, _draw, output=output, **options)
-    write_table(NAME, folder, _tabular, output)
 
 
 def _groups(rows: list[dict[str, str]]) -> dict[tuple[str, str], list[dict[str, str]]]:
@@ -89,7 +79,8 @@ def _groups(rows: list[dict[str, str]]) -> dict[tuple[str, str], list[dict[str, 
     return groups
 
 
-def _draw(folder: Path, column: str):
+def draw(folder: Path, column: str):
+    """Return the figure, see `reports.figures.files.plot`."""
     import numpy as np
 
     rows = read_data(folder, NAME)
@@ -122,7 +113,8 @@ def _words(scene: str, row: str, group: list[dict[str, str]]) -> str:
     return f"{row}, {pixels(group[0])}, {value(group[0], 'frame_ms'):.3g} ms"
 
 
-def _tabular(rows: list[dict[str, str]]) -> str:
+def tabular(rows: list[dict[str, str]]) -> str:
+    """Return the LaTeX table, see `reports.figures.files.plot`."""
     scenes: dict[str, list[list[dict[str, str]]]] = {}
     for (scene, _), group in _groups(rows).items():
         scenes.setdefault(scene, []).append(group)

@@ -12,7 +12,7 @@ from typing import Any
 from analytic.errors import InputError, nearest
 from reference.storage.files import ensure_folder
 from reports.data.reader import read_report
-from reports.figures.files import draw_figure, new_figure, read_data, value, write_data
+from reports.figures.files import new_figure, read_data, value, write_data
 from reports.figures.report import measured, report_origin
 from reports.plotting.style import COLOURS, WIDTHS
 
@@ -37,10 +37,6 @@ def compute(
 
     Parameters
     ----------
-    folder
-        Where the data go.
-    report
-        The folder of the report.
     scene
         Its name in the report; the first with shadows by default.
     methods
@@ -152,12 +148,8 @@ def _worst_squares(images, side: int) -> tuple[tuple[int, int], ...]:
     return tuple(corners)
 
 
-def plot(folder: Path | str, **options: Any) -> None:
-    """Draw `strip.pdf` and `.png` from the data in a folder; options: see `reports.figures.files.draw_figure`."""
-    draw_figure(NAME, folder, _draw, **options)
-
-
-def _draw(folder: Path, column: str):
+def draw(folder: Path, column: str):
+    """Return the figure, see `reports.figures.files.plot`."""
     import numpy as np
 
     from reports.plotting.pictures import error_map, tone_mapped

@@ -6,13 +6,11 @@ comes from K batch means, so without a bias z follows Student's law with K - 1 d
 law. Channels of one pixel share their paths; one channel is shown, the first that is lit.
 """
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from reference.storage.files import ensure_folder
-from reports.figures.files import draw_figure, new_figure, read_data, values, write_data
-from reports.machine.progress import counted, part_of
+from reports.figures.files import new_figure, read_data, values, write_data
+from reports.machine.progress import Progress, counted, part_of
 from reports.plotting.style import COLOURS, WIDTHS, truth_style
 
 NAME = "z-distribution"
@@ -26,25 +24,15 @@ _EDGE, _BINS = 5.0, 50  # of the histogram; values beyond are counted in the out
 _HEADER = ("estimator", "low", "high", "count", "expected", "normal", "tested", "batches", "z_mean", "z_std")
 
 
-def compute(
-    folder: Path | str,
-    *,
-    quick: bool = False,
-    scene: str = SCENE,
-    progress: Callable[[float, str], None] | None = None,
-) -> None:
+def compute(folder: Path | str, *, quick: bool = False, scene: str = SCENE, progress: Progress | None = None) -> None:
     """Write `z-distribution.csv` into a folder: how many values of z fall into each bin, and how many should.
 
     Parameters
     ----------
-    folder
-        Where the data go.
     quick
         A smaller image.
     scene
         A built-in scene or the path of a Mitsuba XML file.
-    progress
-        Called with the share done and what comes next.
     """
     import numpy as np
     from scipy.stats import norm, t
@@ -86,12 +74,8 @@ def _z(scene, estimator: str, samples: int, progress):
     return ((mean - expected)[:, channel] / np.where(tested, error[:, channel], 1.0))[tested]
 
 
-def plot(folder: Path | str, **options: Any) -> None:
-    """Draw `z-distribution.pdf` and `.png` from the data; options: see `reports.figures.files.draw_figure`."""
-    draw_figure(NAME, folder, _draw, **options)
-
-
-def _draw(folder: Path, column: str):
+def draw(folder: Path, column: str):
+    """Return the figure, see `reports.figures.files.plot`."""
     import numpy as np
 
     rows = read_data(folder, NAME)

@@ -19,8 +19,7 @@ reference in the denominator and against the exact one in the difference, so tha
 
 A plane of codes is then predicted (from nothing, from the left, from the gradient left + up - left-up), the second and
 third channel also from the first; what remains, zigzag coded (0, -1, 1, -2, ...), goes byte by byte, low bytes first,
-into zlib. All arithmetic is modulo 2^bits, so decoding is exact. `templates/codec.js` is the decoder of the page,
-`decode_planes` does the same.
+into zlib. All arithmetic is modulo 2^bits, so decoding is exact. `templates/codec.js` is the decoder of the page.
 """
 
 import zlib
@@ -105,13 +104,6 @@ def difference_codes(difference: Array, precision: Precision) -> tuple[Codes, fl
     return np.where(np.isnan(difference), NAN, codes).astype(np.int32), k
 
 
-def difference_values(codes: Codes, k: float, s: float) -> Array:
-    """Return the relative differences that the codes of `difference_codes` stand for, in the same shape."""
-    values = s * np.sinh(codes / k)
-    values = np.where(codes == INFINITE, np.inf, np.where(codes == -INFINITE, -np.inf, values))
-    return np.where(codes == NAN, np.nan, values)
-
-
 def pack_planes(codes: Codes, bits: int) -> Packed:
     """Compress planes of codes.
 
@@ -138,38 +130,6 @@ def pack_planes(codes: Codes, bits: int) -> Packed:
         residual = _residual(choices[relative][1], predictor, bits)
         parts += [(residual >> shift).astype(np.uint8).tobytes() for shift in range(0, bits, 8)]
     return Packed(zlib.compress(b"".join(parts), 6), tuple(planes))
-
-
-def decode_planes(packed: Packed, size: tuple[int, int], bits: int) -> Codes:
-    """Return the codes, (height, width, planes); those of 16 bits with their sign.
-
-    `templates/codec.js` does the same on the page.
-
-    Parameters
-    ----------
-    packed
-        From `pack_planes`.
-    size
-        Width and height.
-    bits
-        As given to `pack_planes`.
-    """
-    width, height = size
-    raw = np.frombuffer(zlib.decompress(packed.data), np.uint8).astype(np.int64)
-    decoded: list[NDArray[np.int64]] = []
-    for part, (relative, predictor) in zip(np.split(raw, len(packed.planes)), packed.planes):
-        zigzag = sum(byte << 8 * place for place, byte in enumerate(np.split(part, bits // 8)))
-        residual = np.where(zigzag & 1, -(zigzag + 1) // 2, zigzag // 2).reshape(height, width)
-        if predictor == LEFT:
-            residual = np.cumsum(residual, axis=1)
-        elif predictor == GRADIENT:
-            residual = np.cumsum(np.cumsum(residual, axis=1), axis=0)
-        codes = residual + decoded[0] if relative else residual
-        decoded.append(np.asarray(codes % (1 << bits), dtype=np.int64))
-    planes = np.stack(decoded, axis=-1)
-    if bits == DIFFERENCE_BITS:
-        planes = np.where(planes >> (bits - 1), planes - (1 << bits), planes)
-    return planes.astype(np.int32)
 
 
 def _residual(plane: Codes, predictor: int, bits: int) -> Codes:

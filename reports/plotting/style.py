@@ -4,8 +4,7 @@
 The colours are six of Okabe and Ito 2008, *Color Universal Design*, and two darker ones. Under normal sight and for
 whoever lacks one kind of cones (Machado, Oliveira, Fernandes 2009, severity 1) any two differ by more than
 `LEAST_DIFFERENCE` in CIEDE2000; no chart leaves a distinction to the colour alone, each has its marker too. Variants of
-one method (its kernel, its parameters) keep colour and marker and differ by the filling of the marker and the dashes of
-the line.
+one method (its kernel, its parameters) keep colour and marker and differ by the filling of the marker.
 
 Nothing heavy is imported at the top, and nothing is set: `figure_style` changes matplotlib's settings for a block.
 """
@@ -59,7 +58,6 @@ _KERNELS = {
 }
 _OTHER_KERNEL = ("navy", "h")
 _FILLS = ("full", "none", "left", "right", "top", "bottom")
-_DASHES = ("-", "--", ":", "-.")
 
 _SHEETS = Path(__file__).parent / "styles"
 
@@ -94,11 +92,6 @@ def kernel_style(kernel: str, variant: int = 0) -> dict[str, Any]:
 def truth_style() -> dict[str, Any]:
     """Return matplotlib's properties of the line of what is known: black, without markers."""
     return {"color": "black", "linestyle": "-", "linewidth": 1.3}
-
-
-def dashes(variant: int) -> str:
-    """Return the line style of a variant."""
-    return _DASHES[variant % len(_DASHES)]
 
 
 def report_styles(scenes: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:

@@ -20,6 +20,7 @@ from reports.machine.progress import Progress, part_of
 from reports.plotting.pictures import error_map, exposure, png_bytes, tone_mapped
 from reports.report.expected import SceneEntries, scene_seconds, shares
 from validation.comparison.engine_images import EngineImage, ImageMeasurement, image_flip, measure_image
+from validation.comparison.engine_layers import truth_layer
 from validation.configurations.methods import Configuration
 from validation.estimates.images import layered_frame, layered_truth
 from validation.frames.benchmark import Apart, Measurement, configurations_for
@@ -243,11 +244,10 @@ def _measured(study: SceneStudy, measured: Measurement, factor: float) -> Comput
 
 
 def _judged(study: SceneStudy, shown: EngineImage, factor: float) -> Computed:
-    truth = study.truth
-    measured = measure_image(shown, truth, surfaces=study.scene.features.surfaces)
+    measured = measure_image(shown, study.truth_of, surfaces=study.scene.features.surfaces)
     if study.effort.flip != "none":
-        measured = replace(measured, flip=image_flip(measured, truth))
-    expected = truth.airlight if measured.layer == "airlight" else truth.airlight + truth.surface
+        measured = replace(measured, flip=image_flip(measured, measured.truth))
+    expected = truth_layer(measured.truth, measured.layer)
     test = np.asarray(measured.image.layers[measured.layer], dtype=np.float64)
     files = {
         "exr": _exr_bytes(_with_flip(_named(study, measured), measured.flip)),

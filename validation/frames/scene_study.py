@@ -148,8 +148,12 @@ class SceneStudy:
 
     @cached_property
     def truth(self) -> TruthImage:
-        """The quadrature truth."""
+        """The quadrature truth at pixel centres."""
         return truth_image(self.loaded.scene)
+
+    def truth_of(self, pixel: str) -> TruthImage:
+        """Return the quadrature truth at pixel centres, or its means over their areas: 'centre' or 'area'."""
+        return self.truth if pixel == "centre" else truth_image(self.loaded.scene, pixel=pixel)
 
     @property
     def name(self) -> str:

@@ -212,6 +212,8 @@ def test_images_and_ones_own_method_in_one_report(variant, mine, images, capsys)
     truth = truth_image(load_scene("open-fog", (32, 24)).scene)
     for name, factor in (("a", 1.0), ("b", 0.9)):
         write_exr(images / f"open-fog.{name}.exr", Image({"airlight": factor * truth.airlight}))
+    area = truth_image(load_scene("open-fog", (32, 24)).scene, pixel="area")
+    write_exr(images / "open-fog.means.exr", Image({"total": area.airlight}))
     options = ["--scenes", "open-fog", "--methods", "unshadowed", "--method", "fog_of_mine:half", "-o", "out"]
     assert run(["report", "--quick", "--images", str(images), *options]) == 0
     (scene,) = json.loads((mine / "out" / "report.json").read_text())["scenes"]
@@ -224,4 +226,8 @@ def test_images_and_ones_own_method_in_one_report(variant, mine, images, capsys)
     # float32 in the file
     assert entries["a"]["error"]["relative_rmse"] == pytest.approx(0, abs=1e-7)
     assert entries["b"]["error"]["relative_bias"] == pytest.approx(-0.1, abs=1e-6)
+    assert entries["a"]["pixel"] == "centre"
+    assert (entries["means"]["pixel"], entries["means"]["layer"]) == ("area", "total")
+    assert entries["means"]["error"]["relative_rmse"] == pytest.approx(0, abs=1e-7)
+    assert "means over the areas of pixels" in entries["means"]["note"]
     assert "The image b of open-fog, judged by its airlight" in capsys.readouterr().out

@@ -9,14 +9,16 @@ import pytest
 from analytic.errors import InputError
 from reports.commands import figures as command_figures
 from reports.commands.figures import FIGURES, figures
-from reports.figures.polynomials import THICKNESSES, compute, plot
+from reports.figures import polynomials
+from reports.figures.files import plot
+from reports.figures.polynomials import THICKNESSES, compute
 
 
 @pytest.fixture(scope="module")
 def folder(variant, tmp_path_factory):
     folder = tmp_path_factory.mktemp("figures")
     compute(folder, rays=256)
-    plot(folder, column="single")
+    plot(polynomials, folder, column="single")
     return folder
 
 
@@ -77,7 +79,8 @@ def test_every_figure_has_a_module_with_its_name_and_summary():
         assert name == module.NAME
         assert module.SUMMARY
         assert callable(module.compute)
-        assert callable(module.plot)
+        drawn = [getattr(module, part, None) for part in ("draw", "tabular")]
+        assert any(map(callable, drawn))
 
 
 def test_the_page_of_the_figures_names_each():

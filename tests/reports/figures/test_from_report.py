@@ -14,6 +14,7 @@ from reports.figures import methods_table as figure_methods_table
 from reports.figures import published as figure_published
 from reports.figures import stages as figure_stages
 from reports.figures import strip as figure_strip
+from reports.figures.files import plot
 from tests.helpers.reports import (
     checked,
     engine,
@@ -125,7 +126,7 @@ def drawn(module, folder):
     """Draw in one column, coarsely; return the bytes of PDF and PNG."""
     coarse = folder / "coarse.mplstyle"
     coarse.write_text("savefig.dpi: 50\n")
-    module.plot(folder, column="single", extra=(str(coarse),))
+    plot(module, folder, column="single", extra=(str(coarse),))
     return [(folder / f"{module.NAME}{suffix}").read_bytes() for suffix in (".pdf", ".png")]
 
 
@@ -143,7 +144,7 @@ def test_frame_speed_keeps_medians_quartiles_and_errors(report, tmp_path):
 
 def test_methods_table_has_units_quartiles_and_what_was_refused(report, tmp_path):
     figure_methods_table.compute(tmp_path, report=report)
-    figure_methods_table.plot(tmp_path)
+    plot(figure_methods_table, tmp_path)
     text = (tmp_path / "methods-table.tex").read_text(encoding="utf-8")
     assert r"\textit{a\_scene}, 32 $\times$ 24, truth known to \num{4.0e-11}" in text
     times = " & ".join(rf"$\num{{{m}}}_{{-\num{{{a}}}}}^{{+\num{{{b}}}}}$" for m, a, b in SPREADS)

@@ -11,6 +11,7 @@ from reports.figures import kernel_errors as figure_kernel_errors
 from reports.figures import kernel_speed as figure_kernel_speed
 from reports.figures import map_size as figure_map_size
 from reports.figures import z_distribution as figure_z_distribution
+from reports.figures.files import plot
 
 
 def rows_of(path):
@@ -21,7 +22,7 @@ def rows_of(path):
 def drawn(module, folder):
     coarse = folder / "coarse.mplstyle"
     coarse.write_text("savefig.dpi: 50\n")
-    module.plot(folder, extra=(str(coarse),))
+    plot(module, folder, extra=(str(coarse),))
     return [(folder / f"{module.NAME}{suffix}").read_bytes() for suffix in (".pdf", ".png")]
 
 

@@ -12,13 +12,12 @@ from reports.page.image_codec import (
     GRADIENT,
     PRECISIONS,
     REFERENCE_BITS,
-    decode_planes,
     difference_codes,
-    difference_values,
     pack_planes,
     reference_codes,
     reference_values,
 )
+from tests.helpers.decoding import decode_planes, difference_values
 
 
 @pytest.mark.parametrize("bits", [REFERENCE_BITS, DIFFERENCE_BITS, FLIP_BITS])

@@ -7,9 +7,10 @@ import pytest
 from analytic.errors import InputError
 from reference.storage.exr import Image, read_exr, write_exr
 from reports.page.image_cache import page_images
-from reports.page.image_codec import DIFFERENCE_BITS, REFERENCE_BITS, Packed, decode_planes, difference_values
+from reports.page.image_codec import DIFFERENCE_BITS, REFERENCE_BITS, Packed
 from reports.page.image_codec import reference_values as values_of
 from reports.page.image_index import DARK, LADDER, relative_difference
+from tests.helpers.decoding import decode_planes, difference_values
 from tests.helpers.page import HEIGHT, WIDTH, engine_image, images, report_data, write_files
 
 

@@ -190,3 +190,15 @@ def test_messages_name_the_file(pair, tmp_path):
         compare_files(tmp_path / "a.exr", tmp_path / "b.exr")
     with pytest.raises(InputError, match=r"cannot read .*c\.exr"):
         compare_files(tmp_path / "a.exr", tmp_path / "c.exr")
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0])
+def test_a_reference_without_light_has_no_relative_errors_and_says_so(value):
+    """They were printed as nan, with exit status 0."""
+    images = (Image({"airlight": np.full(SHAPE, number)}) for number in (value, 1.0))
+    summary = compare_images(*images, all_metrics=True).summary()
+    assert "relative undefined" in summary
+    assert "the mean of the reference is not above zero" in summary
+    assert "nan" not in summary
+    same = Image({"airlight": np.ones(SHAPE)})
+    assert "psnr unlimited dB" in compare_images(same, same, all_metrics=True).summary()
