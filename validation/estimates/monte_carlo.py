@@ -97,6 +97,10 @@ def monte_carlo_batches(
     """
     if batches < 2:
         raise ValueError(f"batches: got {batches}, wanted at least 2 for a standard error")
+    if batches > LARGEST_SEED:
+        raise InputError(
+            f"samples: got {samples * batches} a pixel, {batches} batches; wanted at most {samples * LARGEST_SEED}"
+        )
     if not 0 <= first_seed <= LARGEST_SEED - batches:
         raise InputError(
             f"seed: got {first_seed} for {batches} batches, which count up; wanted 0 to {LARGEST_SEED - batches}"

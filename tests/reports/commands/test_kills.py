@@ -39,7 +39,7 @@ COMMANDS = {
         "--scenes",
         "open-fog",
         "--method",
-        f"{ROOT}/tests/helpers/veil.py:VEIL",
+        "realtime.methods.unshadowed:unshadowed",
         "-o",
         "r",
     ],
