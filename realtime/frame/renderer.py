@@ -18,6 +18,7 @@ import numpy as np
 from realtime.errors import InputError
 from realtime.frame.frame_view import frame_view
 from realtime.frame.layers import adaptive_layers, composed, image_passes
+from realtime.frame.light_on_ray import check_radiance
 from realtime.frame.recorded import Frozen
 from realtime.frame.surface import Cast
 from realtime.frame.surface_stages import no_surface, surface_stages
@@ -175,13 +176,15 @@ def image_frame(renderer: FrameRenderer, stages) -> Frame:
     distance, surface, airlight = stages
     height, width = renderer.scene.camera.height, renderer.scene.camera.width
     light = _image(renderer, airlight, (height, width, 3))
-    if renderer.method.check is not None:
-        renderer.method.check(light)
-    return Frame(
+    frame = Frame(
         light,
         _image(renderer, surface, (height, width, 3)),
         _image(renderer, distance, (height, width)),
     )
+    if renderer.method.check is not None:
+        renderer.method.check(light)
+    check_radiance(renderer.scene, renderer.method.name, frame.airlight, frame.surface, frame.distance)
+    return frame
 
 
 def run_stages(renderer: FrameRenderer, state):

@@ -100,7 +100,7 @@ def layer_names(image: Image) -> str:
     return "no layer of colours at all" + (f" ({note}); write it in half or float" if _INTEGERS in note else "")
 
 
-def write_exr(path: str | os.PathLike[str], image: Image) -> None:
+def write_exr(path: str | os.PathLike[str], image: Image, *, finite: bool = True) -> None:
     """Write an image as a single-part float32 EXR, whole or not at all.
 
     If there is an airlight, `R`, `G`, `B` hold the total: the airlight plus the surface, or the airlight alone. The
@@ -110,11 +110,14 @@ def write_exr(path: str | os.PathLike[str], image: Image) -> None:
     ------
     InputError
         If there are no layers, or they have two sizes, another shape than (height, width, 3), or values too large for
-        float32; if a `total` is given that is not the sum; if an attribute has a name of the format's own.
+        float32; if a `total` is given that is not the sum; if an attribute has a name of the format's own; for values
+        that are not finite, unless `finite` is False, as for an image of another program that is to be judged.
     OSError
         If the disk is full; the file is as it was.
     """
     channels = _channels(image)
+    if finite:
+        _check_finite(image)
     header: dict[str, Any] = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     for key, value in image.attributes.items():
         header[key] = _attribute(key, value)
@@ -229,6 +232,19 @@ def _float32(values: NDArray[Any], name: str) -> NDArray[np.float32]:
     if lost:
         raise InputError(f"{lost} values of '{name}' exceed what float32 holds (3.4e38); scale the radiance down")
     return rounded
+
+
+def _check_finite(image: Image) -> None:
+    """Refuse layers with NaN or infinity; of depths only NaN, where there is nothing they are infinite."""
+    depth = {} if image.depth is None else {"depth": np.where(np.isinf(image.depth), 0, image.depth)[..., None]}
+    for name, values in (dict(image.layers) | depth).items():
+        wrong = ~np.isfinite(values).all(axis=2)
+        if wrong.any():
+            row, column = np.argwhere(wrong)[0]
+            raise InputError(
+                f"layer '{name}': {int(wrong.sum())} of {wrong.size} pixels are not finite, first in column "
+                f"{column} of row {row}; an image is written whole, or with finite=False as it is"
+            )
 
 
 def _attribute(key: str, value: Any) -> Attribute:

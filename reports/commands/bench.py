@@ -52,6 +52,7 @@ def bench(
     from realtime.methods.registry import METHODS
     from realtime.scene.read_scene import read_scene
     from reports.commands.own_methods import checked_configuration
+    from reports.commands.printing import print_notes
     from reports.data.own_faults import own_faults
     from reports.machine.environment import activate
     from reports.machine.own_process import in_own_process
@@ -74,6 +75,7 @@ def bench(
     works = []
     for name in names:  # refuses unusable input before an hour of work, not after
         scene = read_scene(load_scene(name, pixels).scene)
+        print_notes(scene.features.notes)
         at, lights = (scene.camera.width, scene.camera.height), len(scene.lights)
         works.append(truth_work(at, lights=lights))
         works += [frame_work(at, lights=lights, steps=_steps(each)) for each in chosen]

@@ -70,8 +70,10 @@ def reference(
 
     Exit status 1 if the target error was not reached.
     """
+    from realtime.scene.features import camera_notes
     from reference.storage.exr import write_exr
     from reference.storage.files import ensure_writable
+    from reports.commands.printing import print_notes
     from reports.interchange.frames import check_ending
     from reports.machine.environment import activate, stamped
     from reports.machine.progress import progress_bar
@@ -88,6 +90,7 @@ def reference(
     ensure_writable(output)
     activate()
     loaded = load_scene(scene, parse_size(size) if size else None)
+    print_notes(camera_notes(loaded.scene))
     pixels = loaded.scene.sensors()[0].film().size() if loaded.scene.sensors() else (1, 1)
     if budget is None:
         area = 16 if pixel is Pixel.area else 1  # rays in a pixel

@@ -128,6 +128,7 @@ def _measured(
     from analytic.errors import InputError
     from realtime.scene.read_scene import read_scene
     from reference.storage.files import ensure_folder
+    from reports.commands.printing import print_notes
     from reports.machine.environment import activate
     from reports.machine.progress import progress_bar
     from reports.report.measure import write_report
@@ -154,7 +155,7 @@ def _measured(
     ensure_folder(target)
     activate()
     for name in names:
-        read_scene(load_scene(name, (8, 6)).scene)
+        print_notes(read_scene(load_scene(name, (8, 6)).scene).features.notes)
     # The sizes of an effort are known to be right; those of images are the user's.
     sizes = [images_size(tuple(several)) for several in shown.values()]
     works = [truth_work(size) for size in sizes]

@@ -60,6 +60,8 @@ def write_frames(
     Interrupted
         At Ctrl-C, with the frames that are finished.
     """
+    from dataclasses import replace
+
     import numpy as np
 
     from realtime.frame.renderer import image_frame
@@ -78,7 +80,7 @@ def write_frames(
                 moved = 1e3 * (time.perf_counter() - start)
                 stages, kept, render_ms = timed_frame(renderer, scene, kept, **moved_parts(animation))
                 cost.append((moved, render_ms))
-                frame = image_frame(renderer, stages)
+                frame = image_frame(replace(renderer, scene=scene), stages)
                 numbers = {kind: path and numbered(path, number, frames) for kind, path in outputs.items()}
                 factor = write_frame(name, chosen, frame, outputs=numbers, factor=factor)
                 done = number

@@ -273,7 +273,7 @@ def _exr_bytes(image: Image) -> bytes:
     """Return the file of an image: OpenEXR writes to a path alone."""
     with temporary_folder() as folder:
         path = folder / "image.exr"
-        write_exr(path, stamped(image))
+        write_exr(path, stamped(image), finite=False)  # somebody's, which the report judges
         return path.read_bytes()
 
 

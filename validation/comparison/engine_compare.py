@@ -228,14 +228,13 @@ def scene_of_size(scene: str, size: tuple[int, int], path: str | os.PathLike[str
 
 def _other_light(judged: JudgedLayer, fitting: list[TruthImage]) -> tuple[str, ...]:
     """Say so where an image is the airlight or the surface alone, or all light, and not what it was taken for."""
-    if not (fitting[0].airlight.any() and fitting[0].surface.any()):
-        return ()  # there is one kind of light: what is dim is dim
     errors, powers = {}, {}
     for name in KINDS:
         layers = [truth_layer(truth, name) for truth in fitting]
         errors[name] = min(_mean_square(judged.values - values) for values in layers)
         powers[name] = _mean_square(layers[0])
     nearest = min(errors, key=errors.__getitem__)
+    # A dim image is near to a layer without light, but not nearer than a tenth of that layer's own.
     if nearest == judged.holds or not GAIN**2 * errors[nearest] < min(errors[judged.holds], powers[nearest]):
         return ()
     if nearest == TOTAL:

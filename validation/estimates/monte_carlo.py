@@ -23,12 +23,14 @@ from analytic.errors import InputError
 from reference.monte_carlo.batches import LARGEST_SEED, Batches, merged
 from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
 from reference.monte_carlo.volpath.integrator import volpath_batch
+from reference.quadrature.surface import surface_hits
 from reference.scene.read import read_truth
 from reference.storage.cache import cache_folder, drop_arrays, is_kept, load_arrays, store_arrays, sweep
 from reference.storage.cache_size import make_room
 from reference.storage.files import NO_SPACE
 from reference.storage.scene_digest import cache_key
 from reference.storage.stopping import hint_when_stopped
+from validation.estimates.light_on_ray import check_camera, check_rays
 
 Progress = Callable[[int, int, str], None]
 Trace = Callable[[int], Batches]  # from the seed
@@ -89,7 +91,7 @@ def monte_carlo_batches(
     Raises
     ------
     InputError
-        If a seed would be out of range.
+        If a seed would be out of range, if a ray meets a light, and for samples that are not finite.
     KeyboardInterrupt
         With a word on how many batches are kept.
     OSError
@@ -99,7 +101,8 @@ def monte_carlo_batches(
         raise ValueError(f"batches: got {batches}, wanted at least 2 for a standard error")
     if batches > LARGEST_SEED:
         raise InputError(
-            f"samples: got {samples * batches} a pixel, {batches} batches; wanted at most {samples * LARGEST_SEED}"
+            f"samples: got {batches * samples} a pixel, in {batches} batches of {samples}; wanted at most "
+            f"{LARGEST_SEED * samples}: each batch has a seed of its own"
         )
     if not 0 <= first_seed <= LARGEST_SEED - batches:
         raise InputError(
@@ -153,6 +156,8 @@ def _all(done: Batches | None) -> Batches:
 
 def _tracer(scene, estimator: str, samples: int, max_depth: int, counts: NDArray[np.integer] | None) -> Trace:
     truth = read_truth(scene)
+    check_camera(truth)
+    check_rays(truth, surface_hits(truth).distance)
     if estimator == "volpath":
         return lambda seed: volpath_batch(truth, seed, samples, max_depth=max_depth, counts=counts)
     if estimator == "single-scatter" and max_depth == 2 and counts is None:
@@ -206,6 +211,9 @@ def _load(folder: str, seeds: range, samples: int, tally: Counter[str]) -> Batch
     stored = load_arrays(name)
     if stored is None:
         tally["damaged"] += is_kept(name)
+        return None
+    if not np.isfinite(stored["mean"]).all():  # kept by a version that did not look
+        tally["damaged"] += 1
         return None
     tally["cached"] += len(seeds)
     squares = stored["squares"] if len(seeds) > 1 else np.zeros_like(stored["mean"])

@@ -3,17 +3,21 @@
 
 import os
 import re
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+from xml.parsers import expat
 
 import mitsuba as mi
 
 from analytic.errors import InputError, nearest
+from validation.scenes.numbers import check_numbers
 from validation.scenes.record import Animation
 from validation.scenes.registry import SCENES
 
 _LARGEST = 16384
+_DEEPEST = 200  # elements in one another; a scene has about ten
 
 
 @dataclass(frozen=True)
@@ -107,6 +111,7 @@ def _check_films(loaded: LoadedScene) -> None:
 
 
 def _parse(path: Path):
+    _check_depth(path)
     try:
         scene = mi.load_file(str(path))
     except Exception as error:  # Mitsuba raises RuntimeError for all bad input; Python plugins raise anything
@@ -114,7 +119,39 @@ def _parse(path: Path):
         raise InputError(f"scene {path}: Mitsuba cannot read it: {reason}") from error
     if not isinstance(scene, mi.Scene):
         raise InputError(f"scene {path}: the file holds a single {type(scene).__name__}; wanted a whole <scene>")
+    name_shapes(scene)
+    check_numbers(scene)
     return scene
+
+
+def name_shapes(scene) -> None:
+    """Name the shapes of a Mitsuba scene that have no id, such as 'sphere-2': messages and copies need names."""
+    taken = {shape.id() for shape in scene.shapes()}
+    for number, shape in enumerate(scene.shapes(), 1):
+        if not shape.id():
+            name = f"{shape.class_name().lower()}-{number}"
+            shape.set_id(name if name not in taken else f"{name}-{len(taken)}")
+
+
+def _check_depth(path: Path) -> None:
+    """Refuse a file that Mitsuba's reader, which calls itself for every element, would end the process at."""
+    depth = deepest = 0
+
+    def opens(name: str, attributes: dict[str, str]) -> None:
+        nonlocal depth, deepest
+        depth += 1
+        deepest = max(deepest, depth)
+
+    def closes(name: str) -> None:
+        nonlocal depth
+        depth -= 1
+
+    parser = expat.ParserCreate()
+    parser.StartElementHandler, parser.EndElementHandler = opens, closes
+    with suppress(expat.ExpatError), path.open("rb") as file:  # what is malformed Mitsuba says best
+        parser.ParseFile(file)
+    if deepest > _DEEPEST:
+        raise InputError(f"scene {path}: its elements are nested {deepest} deep; wanted at most {_DEEPEST}")
 
 
 def resize(scene, size: tuple[int, int]) -> None:

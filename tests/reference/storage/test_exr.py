@@ -72,8 +72,21 @@ def test_strided_arrays_are_written_as_they_are(tmp_path):
 def test_nonfinite_and_negative_values_survive(tmp_path):
     values = np.zeros((2, 2, 3), np.float32)
     values[0, 0], values[0, 1], values[1, 0] = np.nan, np.inf, -1.5
-    write_exr(tmp_path / "a.exr", Image({"airlight": values}))
+    write_exr(tmp_path / "a.exr", Image({"airlight": values}), finite=False)
     np.testing.assert_array_equal(read_exr(tmp_path / "a.exr").layers["airlight"], values)
+
+
+@pytest.mark.parametrize(("odd", "layer"), [(np.nan, "surface"), (np.inf, "airlight"), (-np.inf, "airlight")])
+def test_what_is_not_finite_is_not_written(tmp_path, odd, layer):
+    layers = {name: np.ones((2, 3, 3)) for name in ("airlight", "surface")}
+    layers[layer][1, 2, 0] = odd
+    with pytest.raises(InputError, match=f"layer '{layer}': 1 of 6 pixels are not finite, first in column 2 of row 1"):
+        write_exr(tmp_path / "a.exr", Image(layers))
+    depth = np.array([[np.nan, np.inf], [1.0, 2.0]])
+    with pytest.raises(InputError, match="layer 'depth': 1 of 4 pixels"):
+        write_exr(tmp_path / "a.exr", Image({"airlight": np.ones((2, 2, 3))}, depth))
+    assert list(tmp_path.iterdir()) == []
+    write_exr(tmp_path / "a.exr", Image({"airlight": np.ones((1, 1, 3))}, np.array([[np.inf]])))  # nothing was hit
 
 
 def test_attributes_keep_their_value(tmp_path):

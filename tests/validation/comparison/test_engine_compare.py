@@ -46,7 +46,7 @@ def write(tmp_path):
 
     def written(**layers):
         path = tmp_path / "engine.exr"
-        write_exr(path, Image({name.replace("__", "."): values for name, values in layers.items()}))
+        write_exr(path, Image({name.replace("__", "."): values for name, values in layers.items()}), finite=False)
         return path
 
     return written

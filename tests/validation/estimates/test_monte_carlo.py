@@ -324,10 +324,3 @@ def test_damaged_batches_are_traced_again(scene, own_cache):
 def test_one_batch_is_refused(scene):
     with pytest.raises(ValueError, match="at least 2"):
         volpath(scene, batches=1)
-
-
-def test_more_samples_than_there_are_seeds_are_refused(variant):
-    with pytest.raises(
-        InputError, match=r"^samples: got 100000000000 a pixel, 1562500000 batches; wanted at most \d+$"
-    ):
-        monte_carlo_batches(None, "volpath", batches=1_562_500_000, samples=64)
