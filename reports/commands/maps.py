@@ -56,12 +56,12 @@ def maps(
     largest = configuration(method, kernel, parameters | {"map": texels[-1]})
     activate()
     loaded = [load_scene(name, pixels) for name in scenes or SCENES]
-    for opened in loaded:  # refuse unusable scenes, and maps that exceed the memory, before any work
-        prepared(read_scene(opened.scene), largest)
     images = 1 + (frames if flicker else 0)
     works = [truth_work(pixels, lights=len(opened.scene.emitters()), images=images) for opened in loaded]
     works += [frame_work(pixels, frames=images * len(texels)) for _ in loaded]
     check_work(f"maps, {pixels[0]} x {pixels[1]}", works, force=force)
+    for opened in loaded:  # refuse unusable scenes, and maps that exceed the memory, before any work
+        prepared(read_scene(opened.scene), largest)
     studied = []
     with progress_bar("maps") as progress:
         for number, opened in enumerate(loaded):

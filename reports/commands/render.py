@@ -134,10 +134,12 @@ def _check_work(name: str, scene, chosen, frames: int | None = None, *, force: b
 
 
 def _prepared(scene, chosen):
-    """Return the frame renderer, the warnings of its casters printed."""
+    """Return the frame renderer; print the notes on the scene, and the warnings of its casters."""
     from realtime.methods.shadow_planes.method import PlanePreparation
+    from reports.commands.printing import print_notes
     from validation.configurations.methods import prepared
 
+    print_notes(scene.features.notes)
     renderer = prepared(scene, chosen)
     if isinstance(renderer.prepare, PlanePreparation):
         _warn(renderer.prepare.casters.warnings)
@@ -157,14 +159,12 @@ def _render(
 
     from realtime.frame.renderer import render_frame
     from realtime.scene.read_scene import read_scene
-    from reports.commands.printing import print_notes
     from reports.interchange.frames import write_frame
     from validation.configurations.timing import time_frame
     from validation.scenes.loading import load_scene
 
     loaded = load_scene(name_or_path, pixels)
     scene = read_scene(loaded.scene, precision)
-    print_notes(scene.features.notes)
     _check_work(loaded.name, scene, chosen, force=force)
     renderer = _prepared(scene, chosen)
     write_frame(loaded.name, chosen, render_frame(renderer), outputs=outputs)
@@ -201,7 +201,6 @@ def _render_frames(
     from dataclasses import replace
 
     from realtime.scene.read_scene import read_scene
-    from reports.commands.printing import print_notes
     from reports.interchange.frames import write_frames
     from reports.machine.progress import progress_bar
     from validation.scenes.animation import parse_moves
@@ -212,7 +211,6 @@ def _render_frames(
     animation = loaded.animation
     if animate is not None:
         animation = replace(animation, moves=parse_moves(animate))
-    print_notes(scene.features.notes)
     _check_work(loaded.name, scene, chosen, frames, force=force)
     renderer = _prepared(scene, chosen)
     with progress_bar(f"{loaded.name}: {frames} frames") as progress:

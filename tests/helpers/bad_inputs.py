@@ -264,7 +264,7 @@ def _fault(order: list[str]) -> tuple[str, str]:
         if written is not None and not _finite_file(written):
             return "0", f"{written.name} is not finite"
     elif status == 2 and not any(
-        word in said for word in ("wanted", "move", "give", "use ", "cannot", "finite", "mend")
+        word in said for word in ("wanted", "move", "give", "use ", "reference ", "cannot", "finite", "mend")
     ):
         return "2", f"says nothing of what is wanted: {said}"
     elif status not in (1, 2):

@@ -108,7 +108,7 @@ FAULTS = {
 
 
 @pytest.mark.slow
-@pytest.mark.claim("own-method-faults")
+@pytest.mark.claim("own-method-process")
 def test_a_report_goes_on_without_methods_that_are_at_fault(variant, mine, capfd, own_cache):
     import json
 
@@ -132,7 +132,7 @@ def test_a_report_goes_on_without_methods_that_are_at_fault(variant, mine, capfd
     assert (again["exits"]["kept"], again["half"]["kept"]) == (False, True)
 
 
-@pytest.mark.claim("own-method-faults")
+@pytest.mark.claim("own-method-process")
 def test_a_frame_by_a_method_that_ends_its_process_is_no_success(variant, mine, capfd):
     command = ["render", "open-fog", "--size", "8x6", "--json", "-o", "fog.exr", "--method"]
     for name in ("crashes", "exits"):

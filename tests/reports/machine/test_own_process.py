@@ -19,6 +19,7 @@ def run(function, *arguments, limit=60.0):
     return in_own_process(function, *arguments, name="fog.py:f", limit=limit)
 
 
+@pytest.mark.claim("own-method-process")
 def test_what_is_returned_comes_back_and_what_is_printed_goes_to_the_error_stream(variant, capfd):
     assert run(divmod, 17, 5) == (3, 2)
     assert run(print, "from within") is None

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from tests.helpers.scenes import body, spot, tiny_scene
+from tests.helpers.scenes import bounded_medium, spot, tiny_scene
 
 
 def scene_with(position, *, size=(9, 9), **changes):
@@ -74,7 +74,9 @@ def test_beside_a_bounded_medium_the_airlight_of_a_light_on_a_ray_is_finite(vari
 
     def bounded(x):
         ball = {"type": "sphere", "center": [x, 2.0, 1.0], "radius": 0.7}
-        scene = scene_with([0.0, 0.0, 1.0], cloud=body(ball, 0.7, (0.9, 0.8, 0.7)), fog=None, sensor=_bare_sensor())
+        scene = scene_with(
+            [0.0, 0.0, 1.0], cloud=bounded_medium(ball, 0.7, (0.9, 0.8, 0.7)), fog=None, sensor=_bare_sensor()
+        )
         return truth_image(scene).airlight
 
     assert np.isfinite(bounded(0.0)).all()
