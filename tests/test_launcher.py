@@ -96,11 +96,11 @@ def _left_over(machine: Path) -> set[str]:
 def test_first_start_installs_and_later_starts_do_not(machine):
     first = _start(machine, "report", "--scenes", "a b,c", "*")
     script = machine / "a project" / "airlight.py"
-    assert (first.returncode, first.stdout) == (0, f"ran <{script}> <report> <--scenes> <a b,c> <*>\n")
+    assert (first.returncode, first.stdout) == (0, f"ran <-S> <{script}> <report> <--scenes> <a b,c> <*>\n")
     assert _log(machine) == ["venv", "pip", "pip"]
     assert first.stderr.count("\n") == 1
     second = _start(machine, "--version")
-    assert (second.returncode, second.stdout, second.stderr) == (0, f"ran <{script}> <--version>\n", "")
+    assert (second.returncode, second.stdout, second.stderr) == (0, f"ran <-S> <{script}> <--version>\n", "")
     assert _log(machine) == []
     assert not _left_over(machine)
 
@@ -120,7 +120,7 @@ def test_runs_through_symbolic_links_and_from_any_folder(machine):
     ]
     for launcher, cwd in cases:
         ran = _start(machine, "x", launcher=launcher, cwd=cwd)
-        assert (ran.stdout, ran.stderr) == (f"ran <{script}> <x>\n", ""), launcher
+        assert (ran.stdout, ran.stderr) == (f"ran <-S> <{script}> <x>\n", ""), launcher
     assert _log(machine).count("venv") == 1
 
 

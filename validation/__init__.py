@@ -15,6 +15,7 @@ Read in this order:
 - `oracles/`: slow programs that compute the airlight of a light volume in float64;
 - `frames/`: errors and cost of whole frames, scene by scene, and the comparison with `baselines/`;
 - `papers/`: the results of papers measured again;
+- `fidelity/`: a verdict for every claim of these papers;
 - `comparison/`: images from files and engines against the truth.
 
 `baselines/` holds the known errors of every configuration as JSON files.

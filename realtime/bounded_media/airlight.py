@@ -33,8 +33,11 @@ x - x_n + R with x = t + h tan theta gives
 
     L = k_t exp(-k_t (t + R - x_n)) Omega/(4 pi h) int I exp(-k_t h tan theta) p dtheta.
 
-That is ``media=paper``. The paper has each medium alone: the light reaches a medium through clear air, however many
-media are before it. What is before the medium on the camera's side is one factor for a ray, and is kept.
+That is ``media=paper``. ``media=printed`` is the first equation with t for the r before the integral, which alone can
+be meant, and the exponent within it as it stands. A kernel may have a polynomial for either
+(`realtime.kernels.bounded`); without one they are summed over nodes. The paper has each medium alone: the light reaches
+a body through clear air, however many bodies are before it. What is before the body on the camera's side is one factor
+for a ray, and is kept.
 
 References
 ----------
@@ -58,7 +61,7 @@ from realtime.rays.ray_light import distance_to_light, falloff, ray_geometry, sm
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium, least_extinction
 
-FORMS = ("exact", "paper")
+FORMS = ("exact", "paper", "printed")
 _NODES, _NODES_PAPER = 24, 6
 _OPTICAL_REACH = 18.0  # e^-18 = 1.5e-8 of the light is left
 
@@ -82,6 +85,21 @@ class PlacedRay(MediaRay):
         panels = smooth_subsegments(self.geometry, self.light, *self.geometry.lit_segment(x0, x1))
         zero = dr.zeros(type(self.medium.albedo), dr.width(self.geometry.height, x0, x1))
         return sum_over_pieces(self.pieces, panels, lambda *segment: _piece_integral(self, *segment), zero)
+
+    def gamma(self, x, *, from_camera: bool = False):
+        """Return the integral up to the distance x in the one piece and beyond, RGB [1/m^2].
+
+        It begins where the ray enters, or for a polynomial at the camera, as section 4.2 has it: then its value where
+        the ray enters is to be taken off. Nodes never begin there, since the exponent grows without end before A.
+        """
+        (piece,) = self.pieces
+        zero = dr.zeros(type(self.medium.albedo), dr.width(self.geometry.height, x))
+        if self.polynomial is None:
+            return self.airlight(type(x)(0), x)
+        begin = type(x)(0) if from_camera else piece.begin
+        segment = self.geometry.lit_segment(begin, dr.maximum(x, begin))
+        panels = smooth_subsegments(self.geometry, self.light, *segment)
+        return sum((published_integral(self, piece, begin, end) for begin, end in panels), zero)
 
     def source(self, x):
         """Return albedo sigma exp(-tau) p at the distance x of the rays, RGB [1/m], 0 where nothing scatters."""
@@ -111,6 +129,7 @@ def lit_ray(
     pieces: tuple[Piece, ...],
     form: str = "exact",
     views: tuple[Any, ...] | None = None,
+    polynomial: Any = None,
 ) -> LitRay:
     """Return camera rays in bounded media with one light.
 
@@ -126,6 +145,9 @@ def lit_ray(
         One of `FORMS`.
     views
         The media as the light sees them, from `realtime.bounded_media.views.light_views`, if they are known.
+    polynomial
+        For the published forms, what takes the place of nodes: a function (geometry, x0, x1, light, phase, (sigma_t,
+        depth, R, printed)) -> J, see `realtime.kernels.bounded`.
 
     Raises
     ------
@@ -141,7 +163,8 @@ def lit_ray(
     known = () if form != "exact" else views or light_views(medium, light)
     seen, entries = tuple(view.seen for view in known), tuple(view.entering for view in known)
     exits = tuple(view.leaving for view in known) if len(known) > 1 else ()
-    return PlacedRay(medium, light, geometry, origin - light.position, direction, pieces, seen, entries, exits, form)
+    place = geometry, origin - light.position, direction, pieces
+    return PlacedRay(medium, light, *place, seen, entries, exits, form, polynomial)
 
 
 def ambient_radiance(ray_pieces: tuple[Piece, ...], distance, ambient: float):
@@ -168,8 +191,8 @@ def check_form(medium: Medium, form: str) -> None:
     """
     if form not in FORMS:
         raise InputError(f"media: got {form!r}, wanted one of {', '.join(FORMS)}")
-    if form == "paper" and medium.bounded_media and not medium.clear:
-        raise InputError("media=paper: wanted clear air around the bounded media; use media=exact")
+    if form != "exact" and medium.bounded_media and not medium.clear:
+        raise InputError(f"media={form}: wanted clear air around the bounded media; use media=exact")
 
 
 def _piece_integral(ray: MediaRay, piece: Piece, x0, x1):
@@ -201,6 +224,8 @@ def _piece_integral(ray: MediaRay, piece: Piece, x0, x1):
 
 def _integral(ray: MediaRay, piece: Piece, x0, x1):
     """Integrate one segment in one piece."""
+    if ray.polynomial is not None:
+        return published_integral(ray, piece, x0, x1)
     Float = type(ray.geometry.height)
     x1 = dr.minimum(x1, x0 + _OPTICAL_REACH / least_extinction(piece.medium))
     # A ray passes through the light itself: its integral is infinite, and so nearly is this value.
@@ -225,7 +250,7 @@ def _integral(ray: MediaRay, piece: Piece, x0, x1):
 def _node_count(ray: MediaRay, piece: Piece, *, single: bool) -> int:
     if ray.form == "paper":
         return _NODES_PAPER
-    return _NODES if single else 2 * _NODES
+    return _NODES if single or ray.form == "printed" else 2 * _NODES
 
 
 def _scattered(ray: MediaRay, piece: Piece, transmittance: list[Any], x, r):
@@ -260,4 +285,31 @@ def _paper_attenuation(ray: MediaRay, piece: Piece, xs) -> list[list[Any]]:
     assert piece.number is not None
     distance = ray.medium.bounded_media[piece.number].mean_distance
     constants = [before + s * (distance - piece.begin) for before, s in zip(piece.before, piece.medium.sigma_t)]
+    if ray.form == "printed":
+        return [[dr.exp(-depth) for depth in _printed_depths(ray, piece, x, distance, constants)] for x in xs]
     return [[exp_bounded(-(constant + s * x)) for constant, s in zip(constants, piece.medium.sigma_t)] for x in xs]
+
+
+def _printed_depths(ray: MediaRay, piece: Piece, x, distance, constants):
+    """Return t + R - x_n and R (sin theta + 1)/cos theta in optical depths, by channel."""
+    geometry = ray.geometry
+    s, h = x - geometry.foot, dr.maximum(geometry.height, 1e-15)
+    r = dr.sqrt(dr.fma(s, s, h * h))
+    ratio = dr.select(s > 0, (r + s) / h, h / (r - s))  # neither cancels
+    return [c + sigma * (geometry.foot + distance * ratio) for c, sigma in zip(constants, piece.medium.sigma_t)]
+
+
+def published_integral(ray: MediaRay, piece: Piece, x0, x1):
+    """Return albedo sigma J over a segment with the constant R, by the polynomial of a kernel, a colour [1/m^2].
+
+    The segment may lie before the medium: there the exponent is continued, as section 4.2 does that begins all
+    integrals at the camera.
+    """
+    assert piece.number is not None
+    distance = ray.medium.bounded_media[piece.number].mean_distance
+    channels = []
+    for before, sigma in zip(piece.before, piece.medium.sigma_t):
+        depth = dr.fma(sigma, distance - piece.begin, before)
+        leg = sigma, depth, distance, ray.form == "printed"
+        channels.append(sigma * ray.polynomial(ray.geometry, x0, x1, ray.light, piece.medium.phase, leg))
+    return piece.medium.albedo * type(ray.medium.albedo)(*channels)

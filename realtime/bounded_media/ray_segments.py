@@ -43,6 +43,7 @@ class MediaRay:
     entries: tuple[EntryPlanes | None, ...]  #: by medium, the planes where legs to points within it enter
     exits: tuple[EntryPlanes | None, ...]  #: by medium, the planes where legs leave it; only where there are several
     form: str  #: of `realtime.bounded_media.airlight.FORMS`
+    polynomial: Any = None  #: of a kernel, for the published forms; None: nodes
 
 
 def sum_over_pieces(pieces: tuple[Piece, ...], segments, integral, zero):

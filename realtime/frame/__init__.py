@@ -3,6 +3,7 @@
 
 Read in this order:
 
+- `light_on_ray.py`: what no frame may hold: radiance that is not finite.
 - `renderer.py`: the stages of a frame and how they follow one another.
 - `surface.py`: camera rays, and the light that surfaces send back through the medium.
 - `surface_stages.py`: these as two recorded functions, one that casts and one that shades what was cast before.

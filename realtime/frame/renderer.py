@@ -8,7 +8,7 @@ frame serves the next one too: `realtime.frame.incremental`.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import drjit as dr
@@ -18,6 +18,7 @@ import numpy as np
 from realtime.errors import InputError
 from realtime.frame.frame_view import frame_view
 from realtime.frame.layers import adaptive_layers, composed, image_passes
+from realtime.frame.light_on_ray import check_radiance
 from realtime.frame.recorded import Frozen
 from realtime.frame.surface import Cast
 from realtime.frame.surface_stages import no_surface, surface_stages
@@ -83,7 +84,7 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
     method
         A real-time method.
     kernel
-        An airlight kernel function; needed where `method.uses_kernel`.
+        An airlight kernel function; needed where `method.uses_kernel` says so.
     parameters
         Values of the method's parameters; the others have its defaults.
 
@@ -94,7 +95,7 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
         what the kernel of a method that is not frozen refuses comes with the first frame.
     """
     chosen = read_parameters(method.name, method.parameters, parameters)
-    if method.uses_kernel and kernel is None:
+    if method.uses_kernel(chosen) and kernel is None:
         raise InputError(f"method {method.name}: got no kernel, wanted one of realtime.kernels.registry.KERNELS")
     by_rays = method.by_rays is not None and method.by_rays(chosen)
     tolerance = chosen.tolerance if method.by_rays else 0.0
@@ -103,7 +104,7 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
     pixel = mi.UInt32(tiled_pixels(camera.width, camera.height))
     corners = tile_corners(pixel, camera, tolerance, by_rays=by_rays, lights=len(scene.lights))
     surface, shade, shade_casts_rays = surface_stages(scene, provides_visibility=provides_visibility)
-    tables = prepare_kernel(kernel, type(camera.origin.x)) if method.uses_kernel else None
+    tables = prepare_kernel(kernel, type(camera.origin.x)) if method.uses_kernel(chosen) else None
 
     def sort(pixel, camera, medium, lights, state, distance):
         assert method.cull is not None
@@ -113,6 +114,8 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
     def run(geometry, pixel, camera, medium, lights, state, lists, distance, by_light, tables, corners=None):
         shown = {"features": features, "geometry": geometry, "medium": medium, "lights": lights}
         view = frame_view(camera, pixel, distance, **shown)
+        if provides_visibility:
+            view = replace(view, surfaces=by_light)
 
         def layers_of(view):
             return method.render(view, state, lists, kernel=with_tables(kernel, tables), parameters=chosen)
@@ -175,13 +178,15 @@ def image_frame(renderer: FrameRenderer, stages) -> Frame:
     distance, surface, airlight = stages
     height, width = renderer.scene.camera.height, renderer.scene.camera.width
     light = _image(renderer, airlight, (height, width, 3))
-    if renderer.method.check is not None:
-        renderer.method.check(light)
-    return Frame(
+    frame = Frame(
         light,
         _image(renderer, surface, (height, width, 3)),
         _image(renderer, distance, (height, width)),
     )
+    if renderer.method.check is not None:
+        renderer.method.check(light)
+    check_radiance(renderer.scene, renderer.method.name, frame.airlight, frame.surface, frame.distance)
+    return frame
 
 
 def run_stages(renderer: FrameRenderer, state):

@@ -119,7 +119,8 @@ def panel_count(phase: Phase, width, depth, *, soft: bool = False):
     if soft:
         widest = dr.minimum(widest, _SOFT)
     count = dr.maximum(width / widest, depth * (1 / _DEPTH))
-    return dr.select(width > 0, mi.UInt32(dr.ceil(dr.minimum(count, _MOST))), 0)
+    # As whole numbers: a minimum of floats lets through what is no number, as 2^32 - 1 panels.
+    return dr.select(width > 0, dr.minimum(mi.UInt32(dr.ceil(count)), _MOST), 0)
 
 
 def _offset(u):

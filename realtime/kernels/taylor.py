@@ -27,6 +27,7 @@ import drjit as dr
 import numpy as np
 
 from realtime.errors import InputError
+from realtime.kernels.bounded import ConstantLeg, bounded_by, tangent_series
 from realtime.numerics.array_types import largest
 from realtime.rays.ray_light import RayGeometry, falloff
 from realtime.scene.lights import Light
@@ -34,6 +35,34 @@ from realtime.scene.medium import Medium, per_extinction
 from realtime.scene.phase import PHASES, Phase, series_product
 
 
+def taylor_bounded(geometry: RayGeometry, x0, x1, light: Light, phase: Phase, leg: ConstantLeg, *, degree: int = 4):
+    """Return the airlight integral of a bounded medium by the polynomial, see `realtime.kernels.bounded` [1/m].
+
+    Valid near theta = 0, as `taylor`, and as far as a constant stands for the light's way in the medium.
+    """
+    _check_degree(degree)
+    argument = leg.sigma_t * (leg.distance if leg.printed else geometry.height)
+    series = _extinction_series(argument, degree) if leg.printed else tangent_series(argument, degree)
+    coefficients = series_product(series, phase_series(phase, degree, "taylor"), degree)
+    return bounded_integral(geometry, x0, x1, light, leg, coefficients)
+
+
+def bounded_integral(geometry: RayGeometry, x0, x1, light: Light, leg: ConstantLeg, coefficients):
+    """Return the integral of a polynomial in theta over a segment in a bounded medium [1/m]."""
+    h = geometry.height
+    s0, s1 = x0 - geometry.foot, dr.minimum(x1 - geometry.foot, largest(type(h)))
+    theta0, theta1 = dr.atan2(s0, h), dr.atan2(s1, h)
+    if light.soft:
+        total = _weighted(geometry, light, (theta0, theta1), coefficients)
+    else:
+        total = _integrated(geometry, (s0, s1), (theta0, theta1), coefficients)
+    depth = dr.fma(leg.sigma_t, geometry.foot, leg.depth)
+    if leg.printed:
+        depth = dr.fma(leg.sigma_t, leg.distance, depth)  # e^-b, which the coefficients leave out
+    return total * dr.exp(-depth) / h
+
+
+@bounded_by(taylor_bounded)
 def taylor(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, degree: int = 4):
     """Return the airlight integral J by the Taylor polynomial about the foot [1/m].
 
@@ -54,8 +83,7 @@ def taylor(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, degre
     Valid near theta = 0 only: the error is large where the segment ends more than about 1 rad from the foot or where
     sigma_t h is large; far behind the camera exp(-sigma_t foot) overflows. That is the published method's own limit.
     """
-    if degree < 0:
-        raise InputError(f"degree: got {degree}, wanted 0 or more")
+    _check_degree(degree)
     foot, h = geometry.foot, geometry.height
     s0, s1 = x0 - foot, dr.minimum(x1 - foot, largest(type(h)))
     theta0, theta1 = dr.atan2(s0, h), dr.atan2(s1, h)
@@ -71,6 +99,11 @@ def taylor(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, degre
         return total * dr.exp(-sigma_t * foot - a) / h
 
     return per_extinction(medium, integral)
+
+
+def _check_degree(degree: int) -> None:
+    if degree < 0:
+        raise InputError(f"degree: got {degree}, wanted 0 or more")
 
 
 def _integrated(geometry: RayGeometry, ends, angles, coefficients):

@@ -26,17 +26,36 @@ Three choices let the kernel be compared with others:
 import drjit as dr
 
 from realtime.errors import InputError
-from realtime.kernels.taylor import _extinction_series, _integrated, _weighted, phase_series
+from realtime.kernels.bounded import ConstantLeg, bounded_by
+from realtime.kernels.taylor import _extinction_series, _integrated, _weighted, bounded_integral, phase_series
 from realtime.numerics.array_types import largest
 from realtime.rays.ray_light import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium, per_extinction
-from realtime.scene.phase import series_product
+from realtime.scene.phase import Phase, series_product
 
 PRINTED_PHASES = ("isotropic", "rayleigh", "hazy", "murky")
 HIGHEST_DEGREE = 4
 
 
+def printed_bounded(geometry: RayGeometry, x0, x1, light: Light, phase: Phase, leg: ConstantLeg, *, degree: int = 4):
+    """Return the airlight integral of a bounded medium with the annex's c_n(sigma_t, R), all as printed [1/m].
+
+    Raises
+    ------
+    InputError
+        As `taylor_printed`, and for the derived exponent, for which the paper prints no coefficients.
+    """
+    if not leg.printed:
+        raise InputError(
+            "kernel taylor-printed: the paper prints no coefficients for the exponent that section 4.2 must mean; use "
+            "media=printed, or the kernel 'taylor'"
+        )
+    coefficients = _coefficients(leg.sigma_t * leg.distance, phase, degree)
+    return bounded_integral(geometry, x0, x1, light, leg, coefficients)
+
+
+@bounded_by(printed_bounded)
 def taylor_printed(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, degree: int = 4):
     """Return the airlight integral J by the polynomial of the paper's annex, misprints included [1/m].
 
@@ -61,25 +80,13 @@ def taylor_printed(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, 
     ----------
     Biri, Arques, Michelin 2006, *Real time rendering of atmospheric scattering and volumetric shadows*, annex.
     """
-    name = medium.phase.name
-    if name not in PRINTED_PHASES:
-        raise InputError(
-            f"kernel taylor-printed: the paper prints no coefficients for the phase function {name!r}; use the kernel "
-            f"'taylor' or 'quadrature', or one of {', '.join(PRINTED_PHASES)}"
-        )
-    if not 0 <= degree <= HIGHEST_DEGREE:
-        raise InputError(f"degree: got {degree}, wanted 0 to {HIGHEST_DEGREE}; for more use the kernel 'taylor'")
     foot, h = geometry.foot, geometry.height
     s0, s1 = x0 - foot, dr.minimum(x1 - foot, largest(type(h)))
     theta0, theta1 = dr.atan2(s0, h), dr.atan2(s1, h)
-    derived = phase_series(medium.phase, degree, "taylor-printed")
 
     def integral(sigma_t):
         a = sigma_t * h
-        printed = printed_coefficients(a, name)
-        if degree >= len(printed):
-            printed = printed + series_product(_extinction_series(a, degree), derived, degree)[len(printed) :]
-        coefficients = printed[: degree + 1]
+        coefficients = _coefficients(a, medium.phase, degree)
         if light.soft:
             total = _weighted(geometry, light, (theta0, theta1), coefficients)
         else:
@@ -87,6 +94,23 @@ def taylor_printed(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, 
         return total * dr.exp(-sigma_t * foot - a) / h
 
     return per_extinction(medium, integral)
+
+
+def _coefficients(a, phase: Phase, degree: int) -> list:
+    """Return the coefficients of all powers up to a degree, those that the annex does not print derived."""
+    name = phase.name
+    if name not in PRINTED_PHASES:
+        raise InputError(
+            f"kernel taylor-printed: the paper prints no coefficients for the phase function {name!r}; use the kernel "
+            f"'taylor' or 'quadrature', or one of {', '.join(PRINTED_PHASES)}"
+        )
+    if not 0 <= degree <= HIGHEST_DEGREE:
+        raise InputError(f"degree: got {degree}, wanted 0 to {HIGHEST_DEGREE}; for more use the kernel 'taylor'")
+    derived = phase_series(phase, degree, "taylor-printed")
+    printed = printed_coefficients(a, name)
+    if degree >= len(printed):
+        printed = printed + series_product(_extinction_series(a, degree), derived, degree)[len(printed) :]
+    return printed[: degree + 1]
 
 
 def printed_coefficients(a, name: str) -> list:

@@ -10,6 +10,18 @@ Two spacings of the same number of steps:
 
 The order of convergence in the number of steps is 2 on a ray without shadows and 1 where shadow edges fall between
 steps.
+
+``sum=transitions`` is the marcher with which Billeter, Sintorn and Assarsson 2010 compare (their section 6): N samples
+of the visibility alone, and the airlight "only calculated when a transition between a lit and an unlit region is
+detected", as the integral up to there (their eq. 3). The paper does not say where between two samples the transition
+is. With the cells [u_k, u_k+1] about the samples, u the variable of the spacing and V_k the visibility in the middle of
+a cell, it is here at their border:
+
+    J = sum_k V_k J(x_k, x_k+1) = sum over the runs of lit cells of J(x_i, x_j),     x_k = x(u_k),
+
+for neighbouring cells that are lit add up to one integral, by the kernel. Nothing is left of the error of the
+integrand, so on a ray without shadows the sum is that of the kernel with any N. A shadow edge is wrong by half a cell
+at most: the order is 1. The paper starts at the farthest sample; the sum is the same from either end.
 """
 
 from collections.abc import Callable
@@ -20,8 +32,10 @@ import mitsuba as mi
 
 from realtime.bounded_media.airlight import LitRay
 from realtime.errors import InputError
+from realtime.intervals.lit_intervals import add_waiting, close_interval, no_intervals, sum_at_end
 from realtime.memory import check_memory
 from realtime.methods.interface.layers import Layers
+from realtime.methods.interface.light_airlight import RayAirlight, integral_type, ray_airlight
 from realtime.methods.interface.view import View, bounded_radiance, radiance, rays_in_media
 from realtime.parameters import Parameters, parameter
 from realtime.rays.ray_light import RayGeometry, distance_to_light, falloff, ray_geometry
@@ -32,6 +46,7 @@ from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, lit_in_m
 from realtime.tiles.adaptive_sampling import tolerance
 
 _OPTICAL_REACH = 20.0
+_DUE = 3  # in the last bits of a step's number: there an interval that has ended is integrated
 
 
 @dataclass(frozen=True)
@@ -44,6 +59,11 @@ class RayMarchParameters(Parameters):
     )
     shadow: str = parameter(
         "ray", "a shadow ray a step, a look-up in a shadow map, or no shadows", choices=("ray", "map", "none")
+    )
+    sum: str = parameter(
+        "steps",
+        "the integrand at every step, or an integral by the kernel for each run of lit steps, as Billeter 2010 marches",
+        choices=("steps", "transitions"),
     )
     map: int = map_size(512, "texels on a side of a face of the map, with `shadow=map`")
     tolerance: float = tolerance()
@@ -58,8 +78,10 @@ def ray_march(view: View, state, lists, *, kernel, parameters: RayMarchParameter
         The frame.
     state
         From `prepare_maps`.
-    lists, kernel
-        Not used: each step evaluates the integrand itself.
+    lists
+        Not used.
+    kernel
+        An airlight kernel for `sum=transitions`, see `realtime.kernels`; otherwise each step evaluates the integrand.
     parameters
         Values of the parameters.
 
@@ -70,17 +92,23 @@ def ray_march(view: View, state, lists, *, kernel, parameters: RayMarchParameter
 
     References
     ----------
-    Billeter, Sintorn, Assarsson 2010, section 2 (the marcher that they compare with). Kulla, Fajardo 2012, *Importance
+    Billeter, Sintorn, Assarsson 2010, section 6 (the marcher that they compare with). Kulla, Fajardo 2012, *Importance
     sampling techniques for path tracing in participating media*, section 4 (the equi-angular variable).
     """
     steps, spacing = parameters.steps, parameters.spacing
     if spacing == "uniform" and view.features.vacuum and not view.medium.clear:
         raise InputError("spacing=uniform: an endless ray through a vacuum has no step length; use spacing=equiangular")
     total = type(view.medium.albedo)(0)
-    in_media = rays_in_media(view) if view.features.bounded else ()
+    asked = kernel if parameters.sum == "transitions" else None
+    in_media = rays_in_media(view, kernel=asked) if view.features.bounded else ()
     for number, light in enumerate(view.lights):
         x0, x1 = type(view.distance)(0), view.distance
         media = in_media[number] if in_media else None
+        if parameters.sum == "transitions":
+            airlight = ray_airlight(view, light, kernel, media)
+            lit = _visibility(view, state, number, parameters.shadow)
+            total += airlight.radiance(_lit_runs(airlight, steps=steps, spacing=spacing, lit=lit))
+            continue
         if media and not light.w:
             lit = _visibility(view, state, number, parameters.shadow)
             integral = _march_parallel(view, media, _within(media, x0, x1), steps=steps, lit=lit)
@@ -131,6 +159,45 @@ def _within(media: LitRay, x0, x1):
         first = dr.minimum(first, piece.begin)
         last = dr.maximum(last, dr.select(dr.isfinite(piece.begin), piece.end, x0))
     return dr.maximum(first, x0), dr.minimum(last, x1)
+
+
+def _lit_runs(airlight: RayAirlight, *, steps: int, spacing: str, lit):
+    """Integrate the runs of cells whose middles are lit."""
+    view, light, geometry, media = airlight.view, airlight.light, airlight.geometry, airlight.media
+    Float, lanes = type(view.distance), dr.width(view.distance)
+    x0, x1 = airlight.segment
+    if media and view.medium.clear:
+        x0, x1 = _within(media, x0, x1)
+    elif spacing == "uniform":
+        x1 = dr.minimum(x1, x0 + _OPTICAL_REACH / least_extinction(view.medium))
+    uniform = spacing == "uniform" or not light.w
+    theta1 = dr.select(dr.isfinite(x1), dr.atan2(x1 - geometry.foot, geometry.height), 0.5 * dr.pi)
+    begin = x0 if uniform else dr.atan2(x0 - geometry.foot, geometry.height)
+    meets = x1 > x0  # rays that miss all bodies march on the spot, where a map can be asked
+    begin = dr.select(meets, begin, 0)
+    width = dr.select(meets, ((x1 if uniform else theta1) - begin) / steps, 0)
+
+    def place(u):
+        return u if uniform else dr.fma(geometry.height, dr.tan(u), geometry.foot)
+
+    def step(index, was_lit, opened, intervals):
+        border = dr.maximum(place(dr.fma(Float(index), width, begin)), x0)
+        x = place(dr.fma(Float(index) + 0.5, width, begin))
+        now = meets & lit(view.origin + view.direction * x)
+        closes = was_lit & ~now
+        intervals = add_waiting(intervals, airlight.integral, closes | ((index & _DUE) == _DUE))
+        intervals = close_interval(intervals, border, closes, begin=opened)
+        return index + 1, now, dr.select(now & ~was_lit, border, opened), intervals
+
+    start = x0 + dr.zeros(Float, lanes)
+    intervals = no_intervals(dr.zeros(integral_type(view), lanes), start)
+    _, was_lit, opened, intervals = dr.while_loop(
+        state=(mi.UInt32(0), dr.full(mi.Bool, False, lanes), +start, intervals),
+        cond=lambda index, was_lit, opened, intervals: index < steps,
+        body=step,
+        labels=("index", "was_lit", "opened", "intervals"),
+    )
+    return sum_at_end(intervals, airlight.integral, x1, opened=opened, lit=was_lit, active=meets)
 
 
 def _march(

@@ -39,7 +39,7 @@ METHODS: dict[str, Method] = {
         ray_march,
         "midpoint steps with one visibility test each: the baseline to beat",
         "Billeter, Sintorn, Assarsson 2010, section 2; Kulla and Fajardo 2012 (equi-angular steps)",
-        uses_kernel=False,
+        uses_kernel=lambda parameters: parameters.sum == "transitions",
         prepare=prepare_maps,
         prepared_from=frozenset({"geometry", "light"}),
         casts_rays=lambda parameters: parameters.shadow == "ray",

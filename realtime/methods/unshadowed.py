@@ -21,7 +21,7 @@ def unshadowed(view: View, *, kernel):
     Notes
     -----
     Valid for any scene without occluders between a light and a visible part of the medium; elsewhere it shows how much
-    light the volumetric shadows take away. Bounded media have nodes of their own, the kernel is not asked.
+    light the volumetric shadows take away. Bounded media have nodes of their own, but for a polynomial kernel.
 
     References
     ----------
@@ -30,7 +30,7 @@ def unshadowed(view: View, *, kernel):
     total = type(view.medium.albedo)(0)
     start = type(view.distance)(0)
     if view.features.bounded:
-        rays = rays_in_media(view)
+        rays = rays_in_media(view, kernel=kernel)
         return sum(bounded_radiance(ray.light, ray.airlight(start, view.distance)) for ray in rays)
     for light in view.lights:
         geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)

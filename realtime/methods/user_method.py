@@ -9,6 +9,7 @@ out ends the process (Dr.Jit 1.5). Tracing `unshadowed` anew for every frame cos
 """
 
 import importlib
+import importlib.machinery
 import importlib.util
 import inspect
 import os
@@ -67,7 +68,7 @@ def own_method(name: str) -> Method:
         _guarded(named_object, name, takes_kernel=takes_kernel, takes=parameters),
         _summary(named_object),
         _file(named_object) or "one's own",
-        uses_kernel=takes_kernel,
+        uses_kernel=always if takes_kernel else never,
         prepare=_guarded_prepare(getattr(named_object, "prepare", None), name),
         casts_rays=always,
         frozen=always if getattr(named_object, "frozen", False) else never,
@@ -78,14 +79,34 @@ def own_method(name: str) -> Method:
     )
 
 
+def method_file(name: str) -> Path | None:
+    """Return the file of a user's own method without running it; None if it has none, or cannot be found."""
+    module_name = name.rpartition(":")[0]
+    if _is_file(module_name):
+        return Path(module_name)
+    known = getattr(sys.modules.get(module_name), "__file__", None)
+    if known is not None:
+        return Path(known)
+    places: list[str] | None = [os.getcwd(), *sys.path]
+    spec = None
+    for number, part in enumerate(module_name.split(".")):
+        whole = ".".join(module_name.split(".")[: number + 1])
+        spec = importlib.machinery.PathFinder.find_spec(whole, places) if part and places is not None else None
+        places = None if spec is None else spec.submodule_search_locations
+    return Path(spec.origin) if spec is not None and spec.origin else None
+
+
+def _is_file(module_name: str) -> bool:
+    return module_name.endswith(".py") or os.sep in module_name
+
+
 def _find(name: str) -> Any:
     """Import the module or the file, and return the object in it."""
     module_name, _, path = name.rpartition(":")
     if not module_name or not all(part.isidentifier() for part in path.split(".")):
         raise InputError(f"method: got {name!r}, {_WANTED}")
-    is_file = module_name.endswith(".py") or os.sep in module_name
     with _own_errors(f"method {name}"):
-        module = _from_file(Path(module_name), name) if is_file else _from_path(module_name, name)
+        module = _from_file(Path(module_name), name) if _is_file(module_name) else _from_path(module_name, name)
     named_object: Any = module
     for part in path.split("."):
         if not hasattr(named_object, part):
@@ -234,7 +255,8 @@ def _own_errors(what: str, file: str | None = None) -> Iterator[None]:
         yield
     except InputError:  # what it refuses by name
         raise
-    except Exception as error:  # the user's code may raise anything, and that is his to mend: never a failure of ours
+    # The user's code may raise anything, and end the program: that is his to mend, never a failure of ours.
+    except (Exception, SystemExit) as error:
         root: BaseException = error
         while root.__cause__ is not None:  # Dr.Jit wraps what is raised in the body of a loop
             root = root.__cause__

@@ -22,6 +22,12 @@ class SceneFeatures:
     notes: tuple[str, ...] = ()  #: what the user should know of this scene
 
 
+def camera_notes(scene) -> list[str]:
+    """Return what the user should know of the cameras of a Mitsuba scene: a line where there are several."""
+    cameras = len(scene.sensors())
+    return [f"the scene has {cameras} cameras: the first is used, the others are left out"] if cameras > 1 else []
+
+
 def describe(features: SceneFeatures) -> dict[str, str]:
     """Return the features in words, one entry for each decision."""
     counts = (

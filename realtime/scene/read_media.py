@@ -59,8 +59,10 @@ def opaque_scene(scene, opaque):
     """Return the scene itself where all shapes are opaque, else a scene of those that are, under their names."""
     if len(opaque) == len(scene.shapes()):
         return scene
-    # A key of Mitsuba's dictionaries becomes the shape's name, and holds no dots.
-    return mi.load_dict({"type": "scene"} | {shape.id().replace(".", "-"): shape for shape in opaque})
+    # A key of Mitsuba's dictionaries becomes the shape's name, and holds no dots. Shapes without a name get one: under
+    # the same key the last would be left alone.
+    names = [shape.id().replace(".", "-") or f"{shape.class_name()}-{number}" for number, shape in enumerate(opaque, 1)]
+    return mi.load_dict({"type": "scene"} | dict(zip(names, opaque, strict=True)))
 
 
 def read_medium(sensor, boundaries, types: ArrayTypes) -> Medium:

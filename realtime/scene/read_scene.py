@@ -17,7 +17,7 @@ from realtime.errors import InputError
 from realtime.numerics.array_types import ArrayTypes, array_types, is_single
 from realtime.scene.camera import Camera
 from realtime.scene.directional_extent import directional_fields, distance_before, media_spheres
-from realtime.scene.features import SceneFeatures
+from realtime.scene.features import SceneFeatures, camera_notes
 from realtime.scene.lights import Light, spot_fields
 from realtime.scene.medium import Medium
 from realtime.scene.read_media import opaque_scene, read_medium, sort_shapes
@@ -66,7 +66,12 @@ def read_scene(scene, precision: str = "single") -> Scene:
     )
     geometry = opaque_scene(scene, opaque)
     return Scene(
-        geometry, camera, medium, lights, _scene_features(opaque, medium, lights), read_facets(geometry, types)
+        geometry,
+        camera,
+        medium,
+        lights,
+        _scene_features(scene, opaque, medium, lights),
+        read_facets(geometry, types),
     )
 
 
@@ -157,8 +162,8 @@ def _read_angles(parameters) -> tuple[float, float]:
     return cutoff, beam
 
 
-def _scene_features(opaque, medium: Medium, lights: tuple[Light, ...]) -> SceneFeatures:
-    notes = []
+def _scene_features(scene, opaque, medium: Medium, lights: tuple[Light, ...]) -> SceneFeatures:
+    notes = camera_notes(scene)
     for shape in opaque:
         flags = shape.bsdf().flags()
         if flags & ~int(mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide) & 0x3FF:

@@ -151,9 +151,17 @@ def lit_in_map(shadow_map: ShadowMap, light: Light, point):
         a, b, _, c = projection.homogeneous(face, d, 1)
         u, v = (a / c, b / c) if projection.w else (a, b)
     size = shadow_map.size
-    column = mi.UInt32(dr.clip(dr.fma(u, 0.5 * size, 0.5 * (size + 1)), 0, size))
-    row = mi.UInt32(dr.clip(dr.fma(v, 0.5 * size, 0.5 * (size + 1)), 0, size))
+    column, row = (_nearest(dr.fma(place, 0.5 * size, 0.5 * (size + 1)), size) for place in (u, v))
     stored = dr.gather(Float, shadow_map.distance, (face * (size + 1) + row) * (size + 1) + column)
     if projection.w:
         return dr.squared_norm(d) <= dr.square(stored)
     return projection.products(face, d)[2] <= stored - projection.depth
+
+
+def _nearest(place, last: int):
+    """Return the whole number below a place, from 0 to `last`, whatever the place is.
+
+    At the light itself, where a ray passes through it, (u, v) is no number. `dr.clip` lets that through, and as a whole
+    number it is 2^32 - 1: a load from there ends the process. So the upper bound is one of whole numbers.
+    """
+    return dr.minimum(mi.UInt32(dr.maximum(place, 0)), last)

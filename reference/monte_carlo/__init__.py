@@ -8,5 +8,5 @@ Read in this order:
 - `single_scatter`: an integrator of our own for Mitsuba;
 - `volpath`: Mitsuba's volumetric path tracer.
 
-May import: nothing of ours.
+May import: `analytic.errors`.
 """

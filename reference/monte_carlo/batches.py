@@ -11,6 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from analytic.errors import InputError
+
 Array = NDArray[np.float64]
 
 LAYERS = ("airlight", "surface")
@@ -58,7 +60,19 @@ def single_batch(seed: int, samples: int, mean: Array) -> Batches:
         Samples a pixel in it.
     mean
         Its radiance of every pixel, (layers, pixels, 3) [W/(m^2 sr)].
+
+    Raises
+    ------
+    InputError
+        For radiance that is not finite: no mean and no standard error would follow from it.
     """
+    wrong = ~np.isfinite(mean).all(axis=(0, 2))
+    if wrong.any():
+        raise InputError(
+            f"the samples of {int(wrong.sum())} of {wrong.size} pixels are not finite, first of pixel "
+            f"{int(np.argmax(wrong))}, row by row; a light may lie on its ray, or a number of the scene be too large "
+            "for float32: move the light, or use other units"
+        )
     return Batches((seed,), samples, mean, np.zeros_like(mean), mean.mean(axis=1)[None])
 
 

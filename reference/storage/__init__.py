@@ -3,6 +3,7 @@
 
 Read in this order:
 
+- `stopping.py`: what a process that a signal ends removes and says;
 - `files.py`: writes a file whole or not at all;
 - `exr.py`: reads and writes layered OpenEXR images;
 - `scene_digest.py`: a digest of everything that decides the numbers of a reference;

@@ -5,7 +5,8 @@ A file is one part of scan lines in float32 with ZIP compression, which every vi
 `name.R`, `name.G`, `name.B`; the total, `airlight + surface`, is in plain `R`, `G`, `B`, so that viewers show it.
 
 The binding of OpenEXR 3.5 writes an array with strides as if it were contiguous, drops the upper half of an integer
-attribute, changes the header dictionary that it is given and refuses NumPy's scalars: hence the conversions below.
+attribute, changes the header dictionary that it is given, refuses NumPy's scalars, and leaves out parts that it cannot
+read: hence the conversions and checks below.
 """
 
 import contextlib
@@ -38,9 +39,12 @@ _STANDARD = frozenset((
     "tiles", "type", "version", "view",
 ))
 # fmt: on
+_INTEGERS = "colours in unsigned integers"
 _COLOURS = {"r": "R", "g": "G", "b": "B", "red": "R", "green": "G", "blue": "B"}  # as other programs name channels
+_WHOLE = frozenset((*_COLOURS, "y"))
 _MAGIC = 20000630
-_KINDS = {0x200: "tiled", 0x800: "deep", 0x1000: "multi-part"}  # bits of the second word of a file
+_KINDS = {0x200: "tiled", 0x800: "deep"}  # bits of the second word of a file
+_PLAIN = frozenset(("", "rgb", "rgba"))  # names of a part whose channels are the image itself
 
 
 @dataclass(frozen=True)
@@ -83,14 +87,20 @@ def layer(image: Image, name: str, path: str | os.PathLike[str] = "the image") -
     name = name or TOTAL
     if name in image.layers:
         return image.layers[name]
-    there = sorted(image.layers)
-    near = difflib.get_close_matches(name, there, n=1, cutoff=0.4)
+    near = difflib.get_close_matches(name, sorted(image.layers), n=1, cutoff=0.4)
     hint = f"did you mean '{near[0]}'?" if near else "ask for one of them"
-    listed = ", ".join(there) if there else "no layer of colours at all"
-    raise InputError(f"{path} has no layer '{name}'; it has {listed}; {hint}")
+    raise InputError(f"{path} has no layer '{name}'; it has {layer_names(image)}; {hint}")
 
 
-def write_exr(path: str | os.PathLike[str], image: Image) -> None:
+def layer_names(image: Image) -> str:
+    """Return the layers that an image has for a message, or why it has none."""
+    if image.layers:
+        return ", ".join(sorted(image.layers))
+    note = str(image.attributes.get(NOTE, ""))
+    return "no layer of colours at all" + (f" ({note}); write it in half or float" if _INTEGERS in note else "")
+
+
+def write_exr(path: str | os.PathLike[str], image: Image, *, finite: bool = True) -> None:
     """Write an image as a single-part float32 EXR, whole or not at all.
 
     If there is an airlight, `R`, `G`, `B` hold the total: the airlight plus the surface, or the airlight alone. The
@@ -100,11 +110,14 @@ def write_exr(path: str | os.PathLike[str], image: Image) -> None:
     ------
     InputError
         If there are no layers, or they have two sizes, another shape than (height, width, 3), or values too large for
-        float32; if a `total` is given that is not the sum; if an attribute has a name of the format's own.
+        float32; if a `total` is given that is not the sum; if an attribute has a name of the format's own; for values
+        that are not finite, unless `finite` is False, as for an image of another program that is to be judged.
     OSError
         If the disk is full; the file is as it was.
     """
     channels = _channels(image)
+    if finite:
+        _check_finite(image)
     header: dict[str, Any] = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     for key, value in image.attributes.items():
         header[key] = _attribute(key, value)
@@ -117,30 +130,67 @@ def read_exr(path: str | os.PathLike[str]) -> Image:
 
     Plain `R`, `G`, `B` (or `r`, `Red` and so on) become the layer `total`, half floats float32, a lone `Y` three equal
     channels; the attribute `airlight:read` says so, and names the channels left out (alpha, integers, incomplete
-    layers).
+    layers). Of a file with several parts, all are read: a channel that names no layer is of the layer that its part is
+    named by.
 
     Raises
     ------
     InputError
-        If the file is missing, broken, not an EXR file, multi-part, tiled, deep or subsampled, or shows a part of its
-        frame.
+        If the file is missing, broken, not an EXR file, tiled, deep or subsampled, shows a part of its frame, or has a
+        channel twice.
     """
     _check_kind(path)
     try:
+        with _quiet(), OpenEXR.File(str(path), header_only=True) as file:
+            declared = len(file.parts)
         with _quiet(), OpenEXR.File(str(path), separate_channels=True) as file:
-            header = dict(file.header())  # the binding empties its own when the file is closed
-            channels = {key: (c.pixels, c.xSampling * c.ySampling) for key, c in file.channels().items()}
+            # The binding empties its own headers when the file is closed.
+            parts = [_Part(part.name(), dict(part.header), _planes(part.channels)) for part in file.parts]
     except (RuntimeError, ValueError, MemoryError, TypeError) as error:
         raise InputError(f"{path} is a broken EXR file: its pixels cannot be read; write or copy it again") from error
-    if not all(np.array_equal(a, b) for a, b in zip(header["dataWindow"], header["displayWindow"])):
+    if len(parts) != declared:  # the binding leaves out a part that it cannot read
         raise InputError(
-            f"{path} holds another window of pixels than its frame (dataWindow is not displayWindow); "
-            "crop or pad it to the frame first"
+            f"{path} is a broken EXR file: of its {declared} parts {len(parts)} can be read; copy it again"
         )
-    subsampled = sorted(key for key, (_, sampling) in channels.items() if sampling != 1)
-    if subsampled or any(key.rpartition(".")[2] in ("RY", "BY") for key in channels):
-        raise InputError(f"{path} is stored as luminance and subsampled chroma; convert it to R, G, B channels")
-    return _image({key: pixels for key, (pixels, _) in channels.items()}, header)
+    if not any(part.planes for part in parts):
+        raise InputError(f"{path} is a broken EXR file: it has no channels; write or copy it again")
+    return _image(_channels_of(parts, path), parts[0].header)
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A part of a file; of each channel the pixels, and whether a pixel has a value of its own."""
+
+    name: str
+    header: dict[str, Any]
+    planes: dict[str, tuple[NDArray[Any], bool]]
+
+
+def _planes(channels: Mapping[str, Any]) -> dict[str, tuple[NDArray[Any], bool]]:
+    return {key: (channel.pixels, channel.xSampling * channel.ySampling == 1) for key, channel in channels.items()}
+
+
+def _channels_of(parts: list[_Part], path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
+    """Return the channels of all parts by name."""
+    channels: dict[str, NDArray[Any]] = {}
+    for part in parts:
+        if part.header.get("type") not in (None, OpenEXR.scanlineimage):
+            raise InputError(f"{path} has a part '{part.name}' that is tiled or deep; save it as flat scan lines")
+        if not all(np.array_equal(a, b) for a, b in zip(part.header["dataWindow"], part.header["displayWindow"])):
+            raise InputError(
+                f"{path} holds another window of pixels than its frame (dataWindow is not displayWindow); "
+                "crop or pad it to the frame first"
+            )
+        whole = all(complete for _, complete in part.planes.values())
+        if not whole or any(key.rpartition(".")[2] in ("RY", "BY") for key in part.planes):
+            raise InputError(f"{path} is stored as luminance and subsampled chroma; convert it to R, G, B channels")
+        prefix = "" if len(parts) == 1 or part.name.lower() in _PLAIN else f"{part.name}."
+        for key, (pixels, _) in part.planes.items():
+            name = key if "." in key else prefix + key
+            if name in channels:
+                raise InputError(f"{path} has the channel '{name}' in two parts; save each layer once")
+            channels[name] = pixels
+    return channels
 
 
 def _channels(image: Image) -> dict[str, NDArray[np.float32]]:
@@ -182,6 +232,19 @@ def _float32(values: NDArray[Any], name: str) -> NDArray[np.float32]:
     if lost:
         raise InputError(f"{lost} values of '{name}' exceed what float32 holds (3.4e38); scale the radiance down")
     return rounded
+
+
+def _check_finite(image: Image) -> None:
+    """Refuse layers with NaN or infinity; of depths only NaN, where there is nothing they are infinite."""
+    depth = {} if image.depth is None else {"depth": np.where(np.isinf(image.depth), 0, image.depth)[..., None]}
+    for name, values in (dict(image.layers) | depth).items():
+        wrong = ~np.isfinite(values).all(axis=2)
+        if wrong.any():
+            row, column = np.argwhere(wrong)[0]
+            raise InputError(
+                f"layer '{name}': {int(wrong.sum())} of {wrong.size} pixels are not finite, first in column "
+                f"{column} of row {row}; an image is written whole, or with finite=False as it is"
+            )
 
 
 def _attribute(key: str, value: Any) -> Attribute:
@@ -267,7 +330,10 @@ def _image(channels: dict[str, NDArray[Any]], header: dict[str, Any]) -> Image:
         notes.append(f"grey, Y repeated as R, G, B: {', '.join(sorted(grey))}")
     if any(channels[key].dtype == np.float16 for key in used):
         notes.append("half floats (relative rounding 5e-4)")
-    if left := sorted(channels.keys() - used):
+    integers = {k for k, v in channels.items() if v.dtype.kind in "ui" and k.rpartition(".")[2].lower() in _WHOLE}
+    if integers:
+        notes.append(f"{_INTEGERS} left out: {', '.join(sorted(integers))}")
+    if left := sorted(channels.keys() - used - integers):
         notes.append(f"channels left out: {', '.join(left)}")
     kept = {k: v for k, v in header.items() if isinstance(v, str | int | float) and k not in _STANDARD and k != NOTE}
     return Image(layers, floats.get(depth_key or ""), {**kept, NOTE: "; ".join(notes)} if notes else kept)

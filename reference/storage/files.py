@@ -8,6 +8,7 @@ was.
 
 import errno
 import os
+import shutil
 import stat
 import tempfile
 import uuid
@@ -16,6 +17,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from analytic.errors import InputError
+from reference.storage.stopping import cleaned_up
 
 #: What the system says when a disk is full, a quota used up, or a file larger than allowed.
 NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -116,9 +118,10 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     # Not tempfile's: its files are readable by their owner alone and would stay so.
     temporary = target.with_name(f".{target.stem[:100]}-{uuid.uuid4().hex}{target.suffix}")
     try:
-        yield temporary
-        _flush(temporary)
-        os.replace(temporary, target)
+        with cleaned_up(lambda: temporary.unlink(missing_ok=True)):
+            yield temporary
+            _flush(temporary)
+            os.replace(temporary, target)
     except BaseException as error:
         with suppress(OSError):
             temporary.unlink()
@@ -126,6 +129,14 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
             # A failed write names no file of its own, and a failed flush the temporary one.
             raise OSError(error.errno, error.strerror, str(path)) from error
         raise
+
+
+@contextmanager
+def temporary_folder() -> Iterator[Path]:
+    """Give a folder that is removed when the block ends, or a signal the process."""
+    folder = tempfile.TemporaryDirectory(prefix="airlight-")
+    with folder as name, cleaned_up(lambda: shutil.rmtree(name, ignore_errors=True)):
+        yield Path(name)
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:

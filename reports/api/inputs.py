@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeAlias, TypeVar
 
 from analytic.errors import InputError
 from realtime.errors import InputError as RealtimeInputError
-from validation.scenes.loading import LoadedScene, load_scene, parse_size, resize
+from validation.scenes.loading import LoadedScene, load_scene, name_shapes, parse_size, resize
+from validation.scenes.numbers import check_numbers
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -220,6 +221,8 @@ def _from_mitsuba(scene: Any) -> OpenScene:
         )
     if not scene.sensors():
         raise InputError("scene: it has no sensor; add one of the type 'perspective'")
+    name_shapes(scene)
+    check_numbers(scene)
     return OpenScene("scene", scene, "The user's own scene.", "")
 
 

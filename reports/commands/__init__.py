@@ -5,6 +5,8 @@ Read in this order:
 
 - `main.py`: the command line: the commands, and how mistakes are reported
 - `printing.py`: how commands print the tables of one run
+- `options.py`: options that several commands have
+- `own_methods.py`: methods of the user's own
 - `baselines.py`: `airlight baselines`
 - `bench.py`: `airlight bench`
 - `cache.py`: `airlight cache`
@@ -14,6 +16,7 @@ Read in this order:
 - `diff.py`: `airlight diff`
 - `docs.py`: `airlight docs`
 - `doctor.py`: `airlight doctor`
+- `fidelity.py`: `airlight fidelity`
 - `figures.py`: `airlight figures`
 - `integrate.py`: `airlight integrate`
 - `lists.py`: `airlight scenes`, `methods`, `kernels`
@@ -31,6 +34,6 @@ May import: `analytic`, `realtime.frame`, `realtime.kernels`, `realtime.methods`
 `realtime.scene`, `realtime.shadow_maps`, `reference.storage`, `reports.data`, `reports.diff`, `reports.docs`,
 `reports.figures`, `reports.interchange`, `reports.machine`, `reports.papers`, `reports.plotting`, `reports.report`,
 `reports.tables`, `validation.certified`, `validation.comparison`, `validation.configurations`, `validation.estimates`,
-`validation.frames`, `validation.kernels`, `validation.metrics`, `validation.mutations`, `validation.papers`,
-`validation.scenes`.
+`validation.fidelity`, `validation.frames`, `validation.kernels`, `validation.metrics`, `validation.mutations`,
+`validation.papers`, `validation.scenes`.
 """

@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`airlight bench [SCENE...]`: speed against error."""
 
+import sys
+from functools import partial
 from typing import Annotated
 
 import typer
+
+from reports.commands.options import USUAL_LIMIT, Force, MethodLimit
 
 _BATCHES = 4096  # at most: a comparison ends earlier if its interval is narrow enough
 
@@ -19,11 +23,13 @@ def bench(
     methods: Annotated[
         str | None, typer.Option(help="Comma-separated methods, also your own MODULE:FUNCTION; all by default.")
     ] = None,
+    method_limit: MethodLimit = USUAL_LIMIT,
     size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels; the scene's own by default.")] = None,
     truth: Annotated[bool, typer.Option(help="Also compare the truth with single-scatter and volpath.")] = True,
     margin: Annotated[
         float, typer.Option(help="Relative bias of volpath that counts as agreement; the time grows like 1/margin^2.")
     ] = 0.01,
+    force: Force = False,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
     markdown: Annotated[bool, typer.Option("--markdown", help="Print tables for a README, dated.")] = False,
 ) -> None:
@@ -31,7 +37,7 @@ def bench(
 
     `airlight` is the airlight alone (the kernel with its ray set-up), `frame` a frame with static geometry and light,
     `light moved` a frame after the light moved. Exit status 1 if single-scatter does not confirm the truth within
-    +-0.05 %, or volpath within +- the margin.
+    +-0.05 %, or volpath within +- the margin, or if a method of your own is at fault.
     """
     if not 0 < margin < 1:
         from analytic.errors import InputError
@@ -41,39 +47,64 @@ def bench(
         _bench_kernels(scenes, json=json, markdown=markdown)
         return
     if estimators:
-        _bench_estimators(scenes, size=size, json=json)
+        _bench_estimators(scenes, size=size, force=force, json=json)
         return
     from realtime.methods.registry import METHODS
     from realtime.scene.read_scene import read_scene
+    from reports.commands.own_methods import checked_configuration
+    from reports.commands.printing import print_notes
+    from reports.data.own_faults import own_faults
     from reports.machine.environment import activate
+    from reports.machine.own_process import in_own_process
     from reports.machine.progress import part_of, progress_bar
     from reports.tables.terminal import print_json
-    from validation.configurations.methods import chosen_configurations
+    from validation.configurations.methods import Configuration, chosen_configurations
+    from validation.frames.expected_work import check_work, frame_work, truth_work
     from validation.scenes.loading import load_scene, parse_size
     from validation.scenes.registry import SCENES
 
-    names = methods.split(",") if methods else list(METHODS)
-    if any(":" in name for name in names):
-        activate()  # a user's module may create arrays when it is imported
-    chosen = chosen_configurations([name.strip() for name in names])
+    chosen: list[Configuration] = []
+    for name in methods.split(",") if methods else METHODS:
+        name = name.strip()
+        own = ":" in name
+        chosen += [checked_configuration(name, limit=method_limit)] if own else chosen_configurations([name])
+    apart = partial(in_own_process, limit=method_limit)
     pixels = parse_size(size) if size else None
     activate()
     names = scenes or list(SCENES)
+    works = []
     for name in names:  # refuses unusable input before an hour of work, not after
-        read_scene(load_scene(name, pixels).scene)
+        scene = read_scene(load_scene(name, pixels).scene)
+        print_notes(scene.features.notes)
+        at, lights = (scene.camera.width, scene.camera.height), len(scene.lights)
+        works.append(truth_work(at, lights=lights))
+        works += [frame_work(at, lights=lights, steps=_steps(each)) for each in chosen]
+    check_work("bench", works, force=force)
     benched = []
     with progress_bar("bench") as progress:
         for number, name in enumerate(names):
             step = part_of(progress, number / len(names), (number + 1) / len(names))
-            benched.append(_bench_scene(name, pixels, chosen, margin=margin if truth else None, progress=step))
+            asked = margin if truth else None
+            benched.append(_bench_scene(name, pixels, chosen, margin=asked, apart=apart, progress=step))
     if json:
         from reports.machine.environment import describe_environment
 
         print_json({"environment": describe_environment(), "scenes": benched})
     else:
         _print_bench(benched, markdown=markdown)
-    if any(not agreement["statistics"]["equivalent"] for scene in benched for agreement in scene["agreement"].values()):
+    faults = own_faults({"scenes": benched})
+    for fault in faults:
+        print(f"airlight: error: {fault}", file=sys.stderr)
+    agreed = [agreement["statistics"] for scene in benched for agreement in scene["agreement"].values()]
+    if faults or not all(statistics["equivalent"] for statistics in agreed):
         raise typer.Exit(1)
+
+
+def _steps(chosen) -> float:
+    """Return how many steps a configuration marches."""
+    from validation.frames.expected_work import steps_of
+
+    return steps_of(chosen.parameters) if chosen.method == "ray-march" else 0
 
 
 def _print_bench(scenes: list[dict], *, markdown: bool) -> None:
@@ -92,7 +123,7 @@ def _print_bench(scenes: list[dict], *, markdown: bool) -> None:
     print_tables(tables, as_markdown=markdown)
 
 
-def _bench_scene(name: str, pixels, chosen, *, margin: float | None, progress) -> dict:
+def _bench_scene(name: str, pixels, chosen, *, margin: float | None, apart, progress) -> dict:
     from reports.data.serialize import measurement_data
     from reports.machine.progress import counted, part_of
     from validation.estimates.agreement import agreements
@@ -105,7 +136,7 @@ def _bench_scene(name: str, pixels, chosen, *, margin: float | None, progress) -
     share = 1.0 if margin is None else 0.6
     rows, camera = [], None
     progress(0.0, f"{loaded.name}: the truth")
-    for scene, measured in run(loaded, chosen, progress=counted(part_of(progress, 0.0, share))):
+    for scene, measured in run(loaded, chosen, apart=apart, progress=counted(part_of(progress, 0.0, share))):
         rows.append(measurement_data(measured))
         camera = scene.camera
     agreed = {}
@@ -152,11 +183,12 @@ def _bench_kernels(names: list[str] | None, *, json: bool, markdown: bool) -> No
         print_tables([order_table(orders)], as_markdown=markdown)
 
 
-def _bench_estimators(scenes: list[str] | None, *, size: str | None, json: bool) -> None:
+def _bench_estimators(scenes: list[str] | None, *, size: str | None, force: bool, json: bool) -> None:
     from reports.machine.environment import activate, describe_environment
     from reports.machine.progress import progress_bar
     from reports.tables.terminal import print_json
     from validation.estimates.efficiency import efficiency_lines, scene_efficiency, thin_fog
+    from validation.frames.expected_work import check_work, sampled_work
     from validation.scenes.loading import load_scene, parse_size
     from validation.scenes.registry import SCENES
 
@@ -166,6 +198,7 @@ def _bench_estimators(scenes: list[str] | None, *, size: str | None, json: bool)
     loaded = {name: load_scene(name, pixels).scene for name in names}  # refuses unusable input before any work
     if not scenes:
         loaded = {"open-fog, optical depth 0.2": thin_fog(pixels)} | loaded
+    check_work("bench --estimators", [sampled_work(pixels, 1024) for _ in loaded], force=force)
     efficiencies = {}
     with progress_bar("bench") as progress:
         for number, (name, scene) in enumerate(loaded.items()):

@@ -30,9 +30,22 @@ def compare(
             show_default=False,
         ),
     ] = None,
+    holds: Annotated[
+        str | None,
+        typer.Option(
+            "--as",
+            help="With --scene: what the layer holds, 'airlight', 'surface' or 'total'; what its name says by default.",
+            show_default=False,
+        ),
+    ] = None,
     pixel: Annotated[
-        str, typer.Option(help="With --scene: the truth at the 'centre' of each pixel, or its mean over the 'area'.")
-    ] = "centre",
+        str | None,
+        typer.Option(
+            help="With --scene: the truth at the 'centre' of each pixel, or its mean over the 'area'. By default both "
+            "are computed and kept and what fits is used; the means take several times as long as the centres.",
+            show_default=False,
+        ),
+    ] = None,
     margin: Annotated[
         float | None, typer.Option(help="Largest relative bias that counts as agreement, such as 0.005.")
     ] = None,
@@ -49,8 +62,9 @@ def compare(
     """Compare two EXR images, or one with the truth of a scene, as `airlight describe SCENE` wants it.
 
     Prints bias and error quantiles, statistics if there are standard errors, and with --scene also the best-fitting
-    factor and what may be wrong with the image as a whole. Exit status 1 if the test image has values that are negative
-    or not finite, or if the bias is not shown to be within the margin.
+    factor, what may be wrong with the image as a whole, where most of the error lies, and whether the image is right.
+    Exit status 1 if the test image has values that are negative or not finite, or if the bias is not shown to be within
+    the margin.
     """
     from analytic.errors import InputError
     from reports.tables.terminal import print_json
@@ -62,10 +76,14 @@ def compare(
         raise InputError(f"compare: got {len(files)} file{'s' * (len(files) != 1)}, wanted {usage}{hint}")
     if metrics not in ("basic", "all"):
         raise InputError(f"--metrics {metrics}; wanted 'basic' or 'all'")
-    if pixel not in ("centre", "area"):
-        raise InputError(f"--pixel {pixel}; wanted 'centre' or 'area'")
-    if scene is None and pixel != "centre":
-        raise InputError("--pixel: the pixels of a file are what they are; this option goes with --scene")
+    for option, value, known in (
+        ("--pixel", pixel, ("centre", "area")),
+        ("--as", holds, ("airlight", "surface", "total")),
+    ):
+        if value is not None and value not in known:
+            raise InputError(f"{option} {value}; wanted {', '.join(map(repr, known[:-1]))} or {known[-1]!r}")
+        if value is not None and scene is None:
+            raise InputError(f"{option}: the pixels of a file are what they are; this option goes with --scene")
     options: dict[str, Any] = {
         "mask": mask,
         "margin": margin,
@@ -76,7 +94,7 @@ def compare(
     if scene is None:
         comparison: Any = _two_files(files, "airlight" if layer is None else layer, **options)
     else:
-        comparison = _with_scene(scene, files[0], layer=layer, pixel=pixel, **options)
+        comparison = _with_scene(scene, files[0], layer=layer, holds=holds, pixel=pixel, **options)
     print_json(comparison.to_json()) if json else print(comparison.summary())
     if comparison.failures:
         raise typer.Exit(1)

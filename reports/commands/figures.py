@@ -21,6 +21,7 @@ FIGURES: dict[str, tuple[str, tuple[str, ...]]] = {
     "map-size": ("map_size", ("quick", "progress")),
     "stages": ("stages", ("quick", "progress", "published")),
     "published": ("published", ("quick", "progress", "published")),
+    "paper-images": ("paper_images", ("quick",)),
     "frame-speed": ("frame_speed", ("report",)),
     "strip": ("strip", ("report", "scene", "methods")),
     "methods-table": ("methods_table", ("report",)),

@@ -18,18 +18,22 @@ def integrate(
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print a summary as JSON.")] = False,
 ) -> None:
-    """Evaluate J for each row of a CSV file; rows that have a value are compared with it."""
+    """Evaluate J for each row of a CSV file; rows that have a value are compared with it.
+
+    Results that are not finite are refused, with the first row.
+    """
     from analytic.cases import read_cases
     from reference.storage.files import ensure_writable
     from reports.machine.environment import activate
     from reports.tables.terminal import print_json
-    from validation.kernels.cases import integrate_cases, summary, write_results
+    from validation.kernels.cases import check_results, integrate_cases, summary, write_results
 
     read = read_cases(cases)
     if output is not None:
         ensure_writable(output)
     activate()
     results = integrate_cases(read, kernel, precision)
+    check_results(read, results, kernel)
     if output is not None:
         write_results(read, results, output)
     report = summary(read, results)

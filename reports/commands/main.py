@@ -25,6 +25,7 @@ from reports.commands.describe import describe
 from reports.commands.diff import diff
 from reports.commands.docs import docs
 from reports.commands.doctor import doctor
+from reports.commands.fidelity import fidelity
 from reports.commands.figures import figures
 from reports.commands.integrate import integrate
 from reports.commands.lists import kernels, methods, scenes
@@ -60,6 +61,7 @@ _COMMANDS = (
     bench,
     maps,
     published,
+    fidelity,
     stability,
     mutations,
     certify,
@@ -115,6 +117,10 @@ def run(arguments: Sequence[str]) -> int:
     is a fault of the program and keeps its traceback.
     """
     command = typer.main.get_command(app)
+    try:
+        os.getcwd()
+    except OSError:  # Dr.Jit ends the process over it
+        return _fail("the current folder was deleted: change into another folder, then run this again", WRONG_INPUT)
     try:
         status = command.main(list(arguments), prog_name="airlight", standalone_mode=False)
         sys.stdout.flush()

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from reports.commands.options import Force
+
 if TYPE_CHECKING:
     from validation.frames.map_size import MapErrors, MapFlicker
 
@@ -24,6 +26,7 @@ def maps(
     ] = False,
     frames: Annotated[int, typer.Option(min=2, help="Frames of the moving light.")] = 9,
     step: Annotated[float, typer.Option(help="By how much the light turns from frame to frame [rad].")] = 1e-3,
+    force: Force = False,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
     markdown: Annotated[bool, typer.Option("--markdown", help="Print tables for a README, dated.")] = False,
 ) -> None:
@@ -39,6 +42,7 @@ def maps(
     from reports.machine.progress import counted, part_of, progress_bar
     from reports.tables.terminal import print_json
     from validation.configurations.methods import configuration, parse_settings, prepared
+    from validation.frames.expected_work import check_work, frame_work, truth_work
     from validation.frames.map_size import map_errors, map_flicker
     from validation.metrics.errors import plain
     from validation.scenes.loading import load_scene, parse_size
@@ -52,6 +56,10 @@ def maps(
     largest = configuration(method, kernel, parameters | {"map": texels[-1]})
     activate()
     loaded = [load_scene(name, pixels) for name in scenes or SCENES]
+    images = 1 + (frames if flicker else 0)
+    works = [truth_work(pixels, lights=len(opened.scene.emitters()), images=images) for opened in loaded]
+    works += [frame_work(pixels, frames=images * len(texels)) for _ in loaded]
+    check_work(f"maps, {pixels[0]} x {pixels[1]}", works, force=force)
     for opened in loaded:  # refuse unusable scenes, and maps that exceed the memory, before any work
         prepared(read_scene(opened.scene), largest)
     studied = []

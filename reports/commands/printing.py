@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How commands print the tables of one run."""
 
+import sys
 import time
 from collections.abc import Iterable
 
@@ -19,3 +20,9 @@ def print_heading() -> None:
     from reports.machine.environment import describe_environment, machine_in_words
 
     print(f"{time.strftime('%Y-%m-%d')}, {machine_in_words(describe_environment())}.")
+
+
+def print_notes(notes: Iterable[str]) -> None:
+    """Print what a user should know of a scene on the error stream, a line for each note."""
+    for note in notes:
+        print(f"airlight: note: {note}", file=sys.stderr)

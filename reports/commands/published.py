@@ -6,6 +6,8 @@ from typing import Annotated, Any
 
 import typer
 
+from reports.commands.options import Force
+
 PAPERS = ("biri", "billeter")
 
 
@@ -27,12 +29,14 @@ def published(
     zero_cost: Annotated[
         bool, typer.Option(help="biri: also measure that casters which are not there or not seen cost nothing.")
     ] = True,
+    force: Force = False,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
     markdown: Annotated[bool, typer.Option("--markdown", help="Print tables for a README, dated.")] = False,
 ) -> None:
     """Measure the results of Biri, Arques, Michelin 2006 and of Billeter, Sintorn, Assarsson 2010 again.
 
-    biri: Tables 1 and 2 with `shadow-planes`: share of time by stage, frames a second. billeter: Figures 6 and 7 and
+    biri: Tables 1 and 2 with `shadow-planes`: share of time by stage, frames a second; with `three-media`, the error of
+    the constant R of section 4.2 by size and depth. billeter: Figures 6 and 7 and
     Table 1 with `light-volumes` and its peers: frames a second, static against adaptive tessellation, the passes, and
     which of the paper's conclusions hold here. Each at the published sizes, after the light moved, everything rebuilt
     or camera rays kept, beside the published figures, with the error of the airlight.
@@ -43,6 +47,7 @@ def published(
     from reports.machine.progress import progress_bar
     from reports.tables.terminal import print_json
     from validation.configurations.kernel_names import find_kernel
+    from validation.frames.expected_work import check_work, frame_work, truth_work
 
     if paper is not None and paper not in PAPERS:
         raise InputError(f"--paper: got {paper!r}, wanted one of {', '.join(PAPERS)}")
@@ -58,6 +63,10 @@ def published(
     sizes = parse_map_sizes("--maps", maps)
     activate()
     data: dict[str, Any] = {}
+    pixels = round(800 * scale), round(600 * scale)
+    count = len(wanted) * (len(names) + len(sizes))
+    works = [truth_work(pixels, images=2 * len(wanted)), frame_work(pixels, frames=20 * count)]
+    check_work(f"published, --scale {scale:g}", works, force=force)
     with progress_bar("published") as progress:
         if "biri" in papers:
             data |= _biri(wanted, names, scale=scale, zero_cost=zero_cost, progress=progress)
@@ -122,7 +131,11 @@ def _biri(
     if zero_cost:
         progress(0.99, "what is not needed")
     costs = zero_costs(size=(round(800 * scale), round(600 * scale))) if zero_cost else []
-    return biri_data(rows, costs)
+    from validation.papers.constant_distance import constant_distance_study
+
+    progress(0.99, "the constant R")
+    study = constant_distance_study() if any(one.scene == "three-media" for one in chosen) else ()
+    return biri_data(rows, costs, study)
 
 
 def _billeter(

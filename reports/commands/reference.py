@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from reports.commands.options import Force
+
 if TYPE_CHECKING:
     from reports.machine.progress import Progress
     from validation.estimates.budget import Budget
@@ -59,6 +61,7 @@ def reference(
     pixel: Annotated[Pixel, typer.Option(help="quadrature: the radiance at the centre, or the mean.")] = Pixel.centre,
     seed: Annotated[int, typer.Option(min=0, help="Monte Carlo: seed of the first batch; the others count up.")] = 0,
     size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels; the scene's own by default.")] = None,
+    force: Force = False,
     json: Annotated[bool, typer.Option("--json", help="Print a summary as JSON.")] = False,
 ) -> None:
     """Compute the ground truth of a scene and write it as layered EXR, with its error.
@@ -67,13 +70,16 @@ def reference(
 
     Exit status 1 if the target error was not reached.
     """
+    from realtime.scene.features import camera_notes
     from reference.storage.exr import write_exr
     from reference.storage.files import ensure_writable
+    from reports.commands.printing import print_notes
     from reports.interchange.frames import check_ending
     from reports.machine.environment import activate, stamped
     from reports.machine.progress import progress_bar
     from validation.estimates.budget import Budget
     from validation.estimates.images import quadrature_reference
+    from validation.frames.expected_work import check_work, sampled_work, truth_work
     from validation.scenes.loading import load_scene, parse_size
 
     sampled = estimator is not Estimator.quadrature
@@ -84,6 +90,14 @@ def reference(
     ensure_writable(output)
     activate()
     loaded = load_scene(scene, parse_size(size) if size else None)
+    print_notes(camera_notes(loaded.scene))
+    pixels = loaded.scene.sensors()[0].film().size() if loaded.scene.sensors() else (1, 1)
+    if budget is None:
+        area = 16 if pixel is Pixel.area else 1  # rays in a pixel
+        work = truth_work(tuple(pixels), lights=len(loaded.scene.emitters()), images=area)
+    else:
+        work = sampled_work(tuple(pixels), usual or 64)
+    check_work(f"reference {loaded.name}, {pixels[0]} x {pixels[1]}, {estimator}", [work], force=force)
     estimate = None
     with progress_bar(f"{loaded.name}: {estimator}") as progress:
         if budget is None:

@@ -2,10 +2,13 @@
 """`airlight render SCENE`: a frame or an animation by a real-time method, with what it costs."""
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+
+from reports.commands.options import USUAL_LIMIT, Force, MethodLimit
 
 Scene = Annotated[str, typer.Argument(help="A built-in scene or a Mitsuba XML file.", show_default=False)]
 Size = Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels; the scene's own by default.")]
@@ -31,6 +34,8 @@ def render(
             help="What moves: light, objects, medium, colour, or several with commas; the scene's by default."
         ),
     ] = None,
+    force: Force = False,
+    method_limit: MethodLimit = USUAL_LIMIT,
     plan: Annotated[bool, typer.Option("--plan", help="Print what the scene needs of a method, and stop.")] = False,
     json: Annotated[bool, typer.Option("--json", help="Print times as JSON.")] = False,
 ) -> None:
@@ -39,26 +44,31 @@ def render(
     An animation is one turn: lights circle, objects turn, the medium's density swings, colours go round. Each frame
     recomputes only what depends on the motion. Ctrl-C keeps the finished frames.
     """
-    from realtime.scene.read_scene import read_scene
-    from reports.machine.environment import activate
-    from validation.configurations.methods import configuration, parse_settings
-    from validation.scenes.loading import load_scene, parse_size
+    from functools import partial
 
-    if ":" in method:
-        activate()  # a user's module may create arrays when it is imported
-    chosen = configuration(method, kernel, parse_settings(set_ or []))
+    from reports.commands.own_methods import checked_configuration
+    from reports.machine.environment import activate
+    from reports.machine.own_process import in_own_process
+    from validation.configurations.methods import parse_settings
+    from validation.scenes.loading import parse_size
+
+    chosen = checked_configuration(method, kernel, parse_settings(set_ or []), limit=method_limit)
     outputs = {"exr": output, "png": preview}
     _check_outputs(outputs, frames, animate)
+    pixels = parse_size(size) if size else None
     variant = activate()
-    loaded = load_scene(scene, parse_size(size) if size else None)
-    read = read_scene(loaded.scene, precision)
+    call = partial(in_own_process, name=method, limit=method_limit) if chosen.own else _call
     if plan:
-        _print_plan(read, chosen, json=json)
+        _print_plan(call(_plan, scene, pixels, precision, chosen), json=json)
     elif frames is None:
-        _print_times(_render(loaded.name, read, chosen, outputs=outputs), variant, json=json)
+        _print_times(call(_render, scene, pixels, precision, chosen, outputs, force) | {"device": variant}, json=json)
     else:
-        rendered = _render_frames(loaded, read, chosen, frames=frames, animate=animate, outputs=outputs)
-        _print_frames(rendered, variant, json=json)
+        rendered = call(_render_frames, scene, pixels, precision, chosen, outputs, frames, animate, force)
+        _print_frames(rendered | {"device": variant}, json=json)
+
+
+def _call(function: Callable[..., dict[str, Any]], *arguments: Any) -> dict[str, Any]:
+    return function(*arguments)
 
 
 def _check_outputs(outputs: dict[str, Path | None], frames: int | None, animate: str | None) -> None:
@@ -80,22 +90,31 @@ def _check_outputs(outputs: dict[str, Path | None], frames: int | None, animate:
             ensure_writable(path if frames is None else numbered(path, 1, frames))
 
 
-def _print_plan(scene, chosen, *, json: bool) -> None:
+def _plan(name_or_path: str, pixels: tuple[int, int] | None, precision: str, chosen) -> dict[str, Any]:
+    """Return what a scene needs of a method."""
     from realtime.methods.registry import find_method
     from realtime.methods.shadow_planes.method import prepare_shadow_planes
     from realtime.methods.shadow_planes.plane_counts import caster_plan, describe_casters
     from realtime.scene.features import describe
-    from reports.tables.terminal import print_json
+    from realtime.scene.read_scene import read_scene
+    from validation.scenes.loading import load_scene
 
+    scene = read_scene(load_scene(name_or_path, pixels).scene, precision)
     words, notes = describe(scene.features), list(scene.features.notes)
     if find_method(chosen.method).prepare is prepare_shadow_planes:
         casters = caster_plan(scene)
         words |= describe_casters(casters)
         _warn(casters.warnings)
+    return {"plan": words, "notes": notes}
+
+
+def _print_plan(plan: dict[str, Any], *, json: bool) -> None:
+    from reports.tables.terminal import print_json
+
     if json:
-        print_json({"plan": words, "notes": notes})
+        print_json(plan)
     else:
-        print("\n".join([f"{name}: {value}" for name, value in words.items()] + notes))
+        print("\n".join([f"{name}: {value}" for name, value in plan["plan"].items()] + plan["notes"]))
 
 
 def _warn(warnings) -> None:
@@ -104,29 +123,54 @@ def _warn(warnings) -> None:
         print(f"airlight: warning: {warning}", file=sys.stderr)
 
 
+def _check_work(name: str, scene, chosen, frames: int | None = None, *, force: bool) -> None:
+    from validation.frames.expected_work import TIMED, check_work, frame_work, steps_of
+
+    size = scene.camera.width, scene.camera.height
+    marches = chosen.method == "ray-march" or "steps" in dict(chosen.parameters)
+    steps = steps_of(chosen.parameters) if marches else 0
+    work = frame_work(size, lights=len(scene.lights), steps=steps, frames=TIMED if frames is None else frames)
+    check_work(f"render {name}, {size[0]} x {size[1]}, {chosen.label}", [work], force=force)
+
+
 def _prepared(scene, chosen):
-    """Return the frame renderer, the warnings of its casters printed."""
+    """Return the frame renderer; print the notes on the scene, and the warnings of its casters."""
     from realtime.methods.shadow_planes.method import PlanePreparation
+    from reports.commands.printing import print_notes
     from validation.configurations.methods import prepared
 
+    print_notes(scene.features.notes)
     renderer = prepared(scene, chosen)
     if isinstance(renderer.prepare, PlanePreparation):
         _warn(renderer.prepare.casters.warnings)
     return renderer
 
 
-def _render(name: str, scene, chosen, *, outputs: dict[str, Path | None]) -> dict[str, Any]:
+def _render(
+    name_or_path: str,
+    pixels: tuple[int, int] | None,
+    precision: str,
+    chosen,
+    outputs: dict[str, Path | None],
+    force: bool,
+) -> dict[str, Any]:
+    """Render a frame, write it and return what it costs."""
     import drjit as dr
 
     from realtime.frame.renderer import render_frame
+    from realtime.scene.read_scene import read_scene
     from reports.interchange.frames import write_frame
     from validation.configurations.timing import time_frame
+    from validation.scenes.loading import load_scene
 
+    loaded = load_scene(name_or_path, pixels)
+    scene = read_scene(loaded.scene, precision)
+    _check_work(loaded.name, scene, chosen, force=force)
     renderer = _prepared(scene, chosen)
-    write_frame(name, chosen, render_frame(renderer), outputs=outputs)
+    write_frame(loaded.name, chosen, render_frame(renderer), outputs=outputs)
     times = time_frame(renderer)
     return {
-        "scene": name,
+        "scene": loaded.name,
         "method": chosen.label,
         "size": [scene.camera.width, scene.camera.height],
         "frame_ms": times.frame.median_ms,
@@ -143,16 +187,31 @@ def _render(name: str, scene, chosen, *, outputs: dict[str, Path | None]) -> dic
     }
 
 
-def _render_frames(loaded, scene, chosen, *, frames: int, animate: str | None, outputs) -> dict[str, Any]:
+def _render_frames(
+    name_or_path: str,
+    pixels: tuple[int, int] | None,
+    precision: str,
+    chosen,
+    outputs: dict[str, Path | None],
+    frames: int,
+    animate: str | None,
+    force: bool,
+) -> dict[str, Any]:
+    """Render the frames of an animation, write them and return what they cost."""
     from dataclasses import replace
 
+    from realtime.scene.read_scene import read_scene
     from reports.interchange.frames import write_frames
     from reports.machine.progress import progress_bar
     from validation.scenes.animation import parse_moves
+    from validation.scenes.loading import load_scene
 
+    loaded = load_scene(name_or_path, pixels)
+    scene = read_scene(loaded.scene, precision)
     animation = loaded.animation
     if animate is not None:
         animation = replace(animation, moves=parse_moves(animate))
+    _check_work(loaded.name, scene, chosen, frames, force=force)
     renderer = _prepared(scene, chosen)
     with progress_bar(f"{loaded.name}: {frames} frames") as progress:
         written = write_frames(
@@ -162,12 +221,12 @@ def _render_frames(loaded, scene, chosen, *, frames: int, animate: str | None, o
     return {"scene": loaded.name, "method": chosen.label, "size": size} | written
 
 
-def _print_times(times: dict[str, Any], variant: str, *, json: bool) -> None:
+def _print_times(times: dict[str, Any], *, json: bool) -> None:
     from reports.tables.methods import rate_words
     from reports.tables.terminal import print_json
 
     if json:
-        print_json(times | {"device": variant})
+        print_json(times)
         return
     stages = ", ".join(f"{stage['name']} {stage['ms']:.3g} ms" for stage in times["stages"])
     print(f"{times['scene']}, {times['method']}: {times['frame_ms']:.3g} ms a frame ({rate_words(times['frame_ms'])})")
@@ -179,20 +238,20 @@ def _print_times(times: dict[str, Any], variant: str, *, json: bool) -> None:
         f"  camera rays kept: {times['light_moved_camera_kept_ms']:.3g} ms after the light moved, "
         f"{times['colours_changed_ms']:.3g} ms after only medium or colours changed"
     )
-    print(f"  {variant}, {times['threads']} threads")
+    print(f"  {times['device']}, {times['threads']} threads")
 
 
-def _print_frames(written: dict[str, Any], variant: str, *, json: bool) -> None:
+def _print_frames(written: dict[str, Any], *, json: bool) -> None:
     from reports.tables.methods import rate_words
     from reports.tables.terminal import print_json
 
     if json:
-        print_json(written | {"device": variant})
+        print_json(written)
         return
     move, rendered, moves = written["move_ms"], written["render_ms"], " and ".join(written["moves"])
     print(f"{written['scene']}, {written['method']}: {written['frames']} frames, {moves} moving")
     print(f"  {written['files'][0]} to {written['files'][-1]}")
     print(
         f"  {written['frame_ms']:.3g} ms a frame ({rate_words(written['frame_ms'])}): {move:.3g} ms to move, "
-        f"{rendered:.3g} ms to render, keeping what stood still; {variant}"
+        f"{rendered:.3g} ms to render, keeping what stood still; {written['device']}"
     )

@@ -8,6 +8,8 @@ from typing import Annotated, Any
 
 import typer
 
+from reports.commands.options import USUAL_LIMIT, Force, MethodLimit
+
 
 def report(
     quick: Annotated[
@@ -29,6 +31,8 @@ def report(
         Path | None,
         typer.Option(help="Folder with your engine's images, SCENE.exr or SCENE.NAME.exr, judged against the truth."),
     ] = None,
+    method_limit: MethodLimit = USUAL_LIMIT,
+    force: Force = False,
     fresh: Annotated[bool, typer.Option("--fresh", help="Measure again what is kept from earlier runs.")] = False,
     redraw: Annotated[
         Path | None, typer.Option("--from", help="Draw the page of this report.json again, without measuring.")
@@ -41,10 +45,12 @@ def report(
     """Measure every method in every scene and write the report: one HTML page, report.json, EXR and PNG files.
 
     Results that this machine measured before, with the same code and scenes, come from the cache. Exit status 1 if
-    single-scatter or volpath does not confirm the truth within the margin.
+    single-scatter or volpath does not confirm the truth within the margin, or a method of your own is at fault: the
+    report says what became of it.
     """
     from analytic.errors import InputError
     from reports.data.claims import confirmed
+    from reports.data.own_faults import own_faults
     from reports.tables.drawing import sentence_in_text
     from reports.tables.methods import fastest_table
     from reports.tables.terminal import print_json, print_table
@@ -69,7 +75,17 @@ def report(
             raise InputError("report: got both --quick and --full; give one of them, or neither for the default")
         target = output or Path("airlight-report")
         effort = "quick" if quick else "full" if full else "default"
-        data = _measured(target, effort, scenes=scenes, methods=methods, own=method or [], images=images, fresh=fresh)
+        data = _measured(
+            target,
+            effort,
+            scenes=scenes,
+            methods=methods,
+            own=method or [],
+            images=images,
+            fresh=fresh,
+            method_limit=method_limit,
+            force=force,
+        )
         done = _kept_words(data)
     if json:
         print_json(data)
@@ -79,7 +95,10 @@ def report(
             print_table(fastest_table(data["scenes"]))
         count = len(data["scenes"])
         print(f"{target / 'report.html'}: {count} scene{'' if count == 1 else 's'}, {done}")
-    if not confirmed(data["scenes"]):
+    faults = own_faults(data)
+    for fault in faults:
+        print(f"airlight: error: {fault}", file=sys.stderr)
+    if faults or not confirmed(data["scenes"]):
         raise typer.Exit(1)
 
 
@@ -102,15 +121,19 @@ def _measured(
     own: list[str],
     images: Path | None,
     fresh: bool,
+    method_limit: float,
+    force: bool,
 ) -> dict[str, Any]:
     """Measure and write a report; unusable input is refused before the work begins."""
     from analytic.errors import InputError
     from realtime.scene.read_scene import read_scene
     from reference.storage.files import ensure_folder
+    from reports.commands.printing import print_notes
     from reports.machine.environment import activate
     from reports.machine.progress import progress_bar
     from reports.report.measure import write_report
-    from validation.comparison.engine_images import find_images
+    from validation.comparison.engine_images import find_images, images_size
+    from validation.frames.expected_work import check_work, frame_work, truth_work
     from validation.frames.scene_study import EFFORTS
     from validation.scenes.loading import load_scene
     from validation.scenes.registry import SCENES
@@ -128,11 +151,16 @@ def _measured(
                 f"--images: {images} has no image of {', '.join(sorted(wanted))}, only of {', '.join(shown)}"
             )
         shown = {name: several for name, several in shown.items() if name in wanted}
-    chosen = _configurations(effort_name, methods, own)
+    chosen = _configurations(effort_name, methods, own, method_limit)
     ensure_folder(target)
     activate()
     for name in names:
-        read_scene(load_scene(name, (8, 6)).scene)
+        print_notes(read_scene(load_scene(name, (8, 6)).scene).features.notes)
+    # The sizes of an effort are known to be right; those of images are the user's.
+    sizes = [images_size(tuple(several)) for several in shown.values()]
+    works = [truth_work(size) for size in sizes]
+    works += [frame_work(size, steps=100, frames=8 * len(chosen)) for size in sizes]
+    check_work("report --images", works, force=force)
     with progress_bar("report") as progress:
         return write_report(
             target,
@@ -142,20 +170,24 @@ def _measured(
             images=shown,
             command=shlex.join(["airlight", *sys.argv[1:]]),
             fresh=fresh,
+            method_limit=method_limit,
             progress=progress,
         )
 
 
-def _configurations(effort_name: str, methods: str | None, own: list[str]) -> list[Any]:
+def _configurations(effort_name: str, methods: str | None, own: list[str], limit: float) -> list[Any]:
     """Return what to measure: the methods that were named, or the usual ones, and the user's own."""
     from realtime.methods.registry import METHODS
-    from validation.configurations.methods import QUICK, chosen_configurations, configuration
+    from reports.commands.own_methods import check_limit, checked_configuration
+    from validation.configurations.methods import QUICK, chosen_configurations
+
+    check_limit(limit)
 
     if effort_name == "quick" and not methods:
         chosen = list(QUICK)
     else:
         chosen = list(chosen_configurations([name.strip() for name in (methods.split(",") if methods else METHODS)]))
-    return chosen + [configuration(name) for name in own]
+    return chosen + [checked_configuration(name, limit=limit) for name in own]
 
 
 def _kept_words(data: dict[str, Any]) -> str:

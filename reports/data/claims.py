@@ -116,7 +116,7 @@ def _images(scenes: Scenes) -> Iterator[Claim]:
         error = entry["error"]
         if not error or error["relative_rmse"] is None:
             continue
-        what = "airlight" if entry["layer"] == "airlight" else "total of airlight and surface"
+        what = "total of airlight and surface" if entry["layer"] == "total" else entry["layer"]
         text = (
             f"The image {entry['label']} of {scene}, judged by its {what}: relative RMSE "
             f"{100 * error['relative_rmse']:.3g} %, relative bias {100 * error['relative_bias']:+.3g} %."

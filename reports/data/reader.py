@@ -2,7 +2,6 @@
 """report.json read back, checked, and its page drawn again: without Mitsuba, and without measuring anything."""
 
 import json
-import shutil
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -33,9 +32,11 @@ def read_report(path: Path | str) -> dict[str, Any]:
     if given != SCHEMA:
         got = f"the schema {given!r}" if given is not None else "no schema"
         raise InputError(f"{file} has {got}, wanted {SCHEMA!r}; make the report again with this version of airlight")
-    missing = [key for key in _schema()["required"] if key not in data]
-    if missing:
-        raise InputError(f"{file} does not keep to {SCHEMA}: {missing[0]!r} is missing; make the report again")
+    schema = json.loads(SCHEMA_FILE.read_text(encoding="utf-8"))
+    missing = [key for key in schema["required"] if key not in data]
+    fault = f"{missing[0]!r} is missing" if missing else _fault(data, schema)
+    if fault:
+        raise InputError(f"{file} does not keep to {SCHEMA}: {fault}; make the report again")
     return data
 
 
@@ -58,9 +59,6 @@ def load_report(path: Path | str) -> tuple[dict[str, Any], Path]:
         If there is no such file, it does not keep to the schema, or a file that it names is missing.
     """
     data, file = read_report(path), _report_file(path)
-    fault = _fault(data, _schema())
-    if fault:
-        raise InputError(f"{file} does not keep to {SCHEMA}: {fault}; make the report again")
     for name in named_files(data):
         if Path(name).is_absolute() or ".." in Path(name).parts:
             raise InputError(f"{file} names {name}, which is not in its folder; make the report again")
@@ -71,11 +69,8 @@ def load_report(path: Path | str) -> tuple[dict[str, Any], Path]:
 
 def _report_file(path: Path | str) -> Path:
     file = Path(path)
-    return file / "report.json" if file.is_dir() or file.suffix != ".json" else file
-
-
-def _schema() -> dict[str, Any]:
-    return json.loads(SCHEMA_FILE.read_text(encoding="utf-8"))
+    named = file.is_file() or (file.suffix and not file.is_dir())
+    return file if named else file / "report.json"
 
 
 def _fault(data: Any, schema: Mapping[str, Any]) -> str | None:
@@ -91,6 +86,11 @@ def _fault(data: Any, schema: Mapping[str, Any]) -> str | None:
     return f"{error.json_path.replace('$', 'report', 1)}: {words if len(words) < 200 else f'.. {words[-160:]}'}"
 
 
+def report_text(data: Mapping[str, Any]) -> str:
+    """Return the content of report.json."""
+    return json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
 def redraw_report(data: Mapping[str, Any], folder: Path, target: Path) -> None:
     """Draw the page of a report again, into its own folder or as a whole report into another.
 
@@ -101,16 +101,15 @@ def redraw_report(data: Mapping[str, Any], folder: Path, target: Path) -> None:
     target
         Where to write.
     """
-    from reference.storage.files import ensure_folder, write_text
+    from reference.storage.files import ensure_folder, write_bytes, write_text
     from reports.page.render import render_page
 
     ensure_folder(target)
     page = render_page(dict(data), folder)
     if not target.samefile(folder):
         for name in named_files(data):
-            (target / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(folder / name, target / name)
-        shutil.copyfile(folder / "report.json", target / "report.json")
+            write_bytes(target / name, (folder / name).read_bytes())
+        write_text(target / "report.json", report_text(data))
     write_text(target / "report.html", page)
 
 

@@ -54,14 +54,15 @@ def truth_data(truth: TruthImage) -> dict[str, Any]:
 
 def measurement_data(measured: Measurement) -> dict[str, Any]:
     """Return times and errors of one configuration."""
+    chosen = measured.configuration
     return {
-        "label": measured.configuration.label,
-        "kind": "function" if measured.configuration.own else "built-in",
+        "label": chosen.label,
+        "kind": "function" if chosen.own else "built-in",
         "layer": "airlight",
-        "method": measured.configuration.method,
-        "kernel": measured.configuration.kernel,
-        "parameters": dict(measured.configuration.parameters),
-        "knows_shadows": knows_shadows(measured.configuration),
+        "method": chosen.method,
+        "kernel": chosen.kernel,
+        "parameters": dict(chosen.parameters),
+        "knows_shadows": knows_shadows(chosen) if measured.knows_shadows is None else measured.knows_shadows,
         "refused": measured.refused,
         "left_out": measured.left_out,
         "note": measured.note,
@@ -79,6 +80,7 @@ def image_data(measured: ImageMeasurement) -> dict[str, Any]:
         "label": measured.shown.label,
         "kind": "image",
         "layer": measured.layer,
+        "pixel": measured.pixel,
         "method": "image",
         "kernel": None,
         "parameters": {},

@@ -7,6 +7,7 @@ Read in this order:
 - `errors.py`: errors, scene by scene and method by method
 - `times.py`: times, by the rules of `validation.statistics.noise`
 - `truth_and_claims.py`: truth, claims, broken kernels, missed faults, the fastest methods
+- `papers.py`: verdicts on the claims of papers
 - `compare.py`: all of these together, and how a report is read
 - `table.py`: what `airlight diff` prints
 

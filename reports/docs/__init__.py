@@ -5,9 +5,10 @@ Read in this order:
 
 - `build.py`: runs Sphinx
 - `data.py`: numbers and pictures of a report, and whether they are stale
+- `fidelity.py`: the page of verdicts on papers
 - `full_run.py`: the last full run of all tests
 - `verification.py`: the page of claims and of the tests that protect them
 
-May import: `analytic`, `reference.storage`, `reports.data`, `reports.machine`, `validation.configurations`,
-`validation.frames`, `validation.scenes`.
+May import: `analytic`, `reference.storage`, `reports.data`, `reports.machine`, `reports.papers`, `reports.tables`,
+`validation.configurations`, `validation.fidelity`, `validation.frames`, `validation.scenes`.
 """

@@ -5,7 +5,6 @@ import importlib.util
 import re
 import subprocess
 import sys
-import tempfile
 from pathlib import Path
 
 from reports.machine.environment import MissingError
@@ -50,7 +49,7 @@ def build_docs(source: Path, output: Path) -> str:
     analytic.errors.InputError
         If the folder cannot be written.
     """
-    from reference.storage.files import ensure_folder
+    from reference.storage.files import ensure_folder, temporary_folder
 
     missing = [package for module, package in _NEEDED.items() if importlib.util.find_spec(module) is None]
     if missing:
@@ -59,10 +58,10 @@ def build_docs(source: Path, output: Path) -> str:
             f"`{sys.executable} -m pip install 'airlight[docs]'`, in a checkout `pip install -r requirements.lock`"
         )
     ensure_folder(output)
-    with tempfile.TemporaryDirectory() as kept, progress_bar("docs") as progress:
-        complaints = Path(kept) / "complaints.txt"
+    with temporary_folder() as kept, progress_bar("docs") as progress:
+        complaints = kept / "complaints.txt"
         command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "--no-color", "-b", "html"]
-        command += ["-d", str(Path(kept) / "doctrees"), str(source), str(output)]
+        command += ["-d", str(kept / "doctrees"), str(source), str(output)]
         with (
             complaints.open("w", encoding="utf-8") as stream,
             subprocess.Popen(

@@ -12,6 +12,7 @@ Read in this order:
 - `kernel_speed.py`: time of kernels against error
 - `map_size.py`: error over the size of the shadow map
 - `methods_table.py`: times and errors of methods
+- `paper_images.py`: the pictures of the papers in our scenes
 - `polynomials.py`: Biri's polynomials
 - `published.py`: frames a second beside the papers
 - `stages.py`: shares of the stages of a frame
@@ -20,5 +21,5 @@ Read in this order:
 
 May import: `analytic`, `realtime.kernels`, `reference.storage`, `reports.data`, `reports.machine`, `reports.papers`,
 `reports.plotting`, `reports.tables`, `validation.configurations`, `validation.estimates`, `validation.frames`,
-`validation.kernels`, `validation.papers`, `validation.scenes`.
+`validation.fidelity`, `validation.kernels`, `validation.papers`, `validation.scenes`.
 """

@@ -86,7 +86,8 @@ def draw(folder: Path, column: str):
     rows = read_data(folder, NAME)
     groups = _groups(rows)
     stages = list(dict.fromkeys(row["stage"] for row in rows))
-    shares = np.array([values(group, "share_percent") for group in groups.values()])
+    # A stage that cannot be told apart has no bar.
+    shares = np.nan_to_num([values(group, "share_percent") for group in groups.values()])
     width = WIDTHS[column]
     double = column == "double"
     figure = new_figure(width, 0.24 * len(groups) + (0.9 if double else 1.25))
@@ -129,6 +130,6 @@ def _table(scene: str, groups: list[list[dict[str, str]]]) -> Table:
     for group in groups:
         name, printed = group[0]["row"], group[0]["row"] == _PAPER
         cells: dict[str, Value] = {"name": name if printed else f"{name}, {pixels(group[0])}"}
-        cells |= dict(zip(stages, values(group, "share_percent")))
+        cells |= {row["stage"]: value(row, "share_percent") for row in group}
         table_rows.append(Row(cells | {"frame": value(group[0], "frame_ms")}, published=printed))
     return table(scene, [*columns, Column("frame", "frame", "ms")], table_rows, explanation=groups[0][0]["where"])

@@ -4,6 +4,7 @@
 Read in this order:
 
 - `scene.py`: a scene in numbers
+- `recipes.py`: these numbers in the words of two renderers
 - `meshes.py`: its shapes as triangles
 - `gltf.py`: the scene as glTF
 - `frames.py`: frames of an animation as files

@@ -60,9 +60,12 @@ def write_frames(
     Interrupted
         At Ctrl-C, with the frames that are finished.
     """
+    from dataclasses import replace
+
     import numpy as np
 
     from realtime.frame.renderer import image_frame
+    from reference.storage.stopping import hint_when_stopped
     from validation.configurations.timing import timed_frame
     from validation.scenes.animation import animate, moved_parts
 
@@ -71,17 +74,18 @@ def write_frames(
     factor: float | None = None  # all frames share the exposure of the first, so that a lamp that fades looks it
     done = 0
     try:
-        start = time.perf_counter()
-        for number, scene in enumerate(animate(renderer.scene, animation, frames), 1):
-            moved = 1e3 * (time.perf_counter() - start)
-            stages, kept, render_ms = timed_frame(renderer, scene, kept, **moved_parts(animation))
-            cost.append((moved, render_ms))
-            frame = image_frame(renderer, stages)
-            numbers = {kind: path and numbered(path, number, frames) for kind, path in outputs.items()}
-            factor = write_frame(name, chosen, frame, outputs=numbers, factor=factor)
-            done = number
-            progress(number / frames, f"frame {number} of {frames}")
+        with hint_when_stopped(lambda: _kept(outputs, done, frames)):
             start = time.perf_counter()
+            for number, scene in enumerate(animate(renderer.scene, animation, frames), 1):
+                moved = 1e3 * (time.perf_counter() - start)
+                stages, kept, render_ms = timed_frame(renderer, scene, kept, **moved_parts(animation))
+                cost.append((moved, render_ms))
+                frame = image_frame(replace(renderer, scene=scene), stages)
+                numbers = {kind: path and numbered(path, number, frames) for kind, path in outputs.items()}
+                factor = write_frame(name, chosen, frame, outputs=numbers, factor=factor)
+                done = number
+                progress(number / frames, f"frame {number} of {frames}")
+                start = time.perf_counter()
     except KeyboardInterrupt:
         raise Interrupted(_kept(outputs, done, frames)) from None
     later = np.array(cost[1:] or cost)

@@ -3,12 +3,14 @@
 
 Read in this order:
 
+- `streams.py`: standard streams that can be written
 - `progress.py`: progress bars with the time left
 - `llvm.py`: finds a libLLVM that works
 - `gpu.py`: whether CUDA and OptiX work, and why not
 - `environment.py`: chooses the variant; versions and processor
 - `probe.py`: one kernel in a process of its own
+- `own_process.py`: the user's own code in a process of its own
 - `doctor.py`: examines all of these
 
-May import: `analytic`, `reference.scene`, `reference.storage`, `reports.tables`.
+May import: `analytic`, `realtime.errors`, `reference.scene`, `reference.storage`, `reports.tables`.
 """

@@ -8,6 +8,7 @@ from typing import Any
 from reports.page.filters import words
 from reports.papers.billeter import billeter_tables
 from reports.papers.biri import biri_notes, biri_tables
+from reports.papers.fidelity import fidelity_tables
 from reports.tables.agreement import agreement_table
 from reports.tables.checks import left_out_table, mutation_table
 from reports.tables.drawing import html
@@ -102,4 +103,5 @@ TABLES: dict[str, Callable[..., Any]] = {
     "biri_tables": _drawn(biri_tables),
     "biri_notes": biri_notes,
     "billeter_tables": _drawn(billeter_tables),
+    "fidelity_tables": _drawn(fidelity_tables),
 }

@@ -8,6 +8,7 @@ Read in this order:
 - `rates.py`: frames a second of a row beside the published ones
 - `biri.py`: Tables 1 and 2 of Biri, Arques, Michelin 2006
 - `billeter.py`: Figures 6 and 7 and Table 1 of Billeter, Sintorn, Assarsson 2010
+- `fidelity.py`: a verdict for every claim of the papers
 
-May import: `reports.tables`, `validation.metrics`, `validation.papers`.
+May import: `reports.tables`, `validation.fidelity`, `validation.metrics`, `validation.papers`.
 """

@@ -39,6 +39,7 @@ def billeter_data(figures: Sequence[Any], views: Sequence[Any]) -> dict[str, Any
                     "what": row.published.what,
                     "fps": row.published_fps,
                     "passes": plain(row.published.passes.get((row.map, row.evaluation), {})),
+                    "as_read": list(row.published.as_read.get((row.map, row.evaluation), ())),
                 },
                 "scene": row.published.scene,
             }
@@ -107,6 +108,8 @@ def _pass_table(rows: Sequence[Data]) -> Table:
         published = row["published"]["passes"]
         if published:
             name = f"{row['scene']}, map {row['map']}, {row['evaluation']}: published"
+            if row["published"].get("as_read"):
+                name += f" ({', '.join(row['published']['as_read'])} as read)"
             table_rows.append(Row({"name": name} | {step: published.get(step) for step in PASSES}, published=True))
         if row["passes"]:
             table_rows.append(Row({"name": _view(row)} | {step: row["passes"].get(step) for step in PASSES}))

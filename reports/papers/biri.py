@@ -14,7 +14,7 @@ from reports.tables.table import Interval, Row, Table, measured, numbers, table,
 Data = Mapping[str, Any]
 
 
-def biri_data(rows: Sequence[Any], costs: Sequence[Any]) -> dict[str, Any]:
+def biri_data(rows: Sequence[Any], costs: Sequence[Any], study: Sequence[Any] = ()) -> dict[str, Any]:
     """Return what was measured as JSON-ready data.
 
     Parameters
@@ -23,21 +23,27 @@ def biri_data(rows: Sequence[Any], costs: Sequence[Any]) -> dict[str, Any]:
         From `validation.papers.biri.biri_rows`.
     costs
         From `validation.frames.zero_cost.zero_costs`, or none.
+    study
+        From `validation.papers.constant_distance.constant_distance_study`, or none.
     """
     from validation.metrics.errors import plain
     from validation.papers.biri import STAGES
 
     return {
         "stages": list(STAGES),
-        "rows": [plain(row) | {"shares": [float(share) for share in row.shares]} for row in rows],
+        "rows": [
+            plain(row) | {"shares": [None if share is None else float(share) for share in row.shares]} for row in rows
+        ],
         "zero_cost": plain(costs),
+        "constant_distance": plain(study),
     }
 
 
 def biri_tables(data: Data) -> list[Table]:
     """Return the tables: shares of the stages, frames a second, and what is not needed if that was measured."""
     costs = [_cost_table(data["zero_cost"])] if data["zero_cost"] else []
-    return [_share_table(data), _rate_table(data["rows"]), *costs]
+    study = data.get("constant_distance") or []
+    return [_share_table(data), _rate_table(data["rows"]), *([_study_table(study)] if study else []), *costs]
 
 
 def biri_notes(data: Data) -> list[str]:
@@ -47,7 +53,9 @@ def biri_notes(data: Data) -> list[str]:
 
 
 def biri_variant(row: Data) -> str:
-    """Return the kernel of a row, and the parameters that differ from their defaults."""
+    """Return the kernel of a row, and the parameters that differ from their defaults, or that it is as published."""
+    if row.get("white"):
+        return f"{row['kernel']}, as published"
     return ", ".join([row["kernel"], *(f"{name}={row[name]}" for name in ("cone", "tolerance") if row.get(name))])
 
 
@@ -66,9 +74,11 @@ def _share_table(data: Data) -> Table:
             name = f"{published['scene']}: Table 1, {published['where']}"
             shares = {key: share / 100 for key, share in zip(stages, published["shares"])}
             rows.append(Row({"name": name, **shares}, published=True))
-        shares = {key: share / 100 for key, share in zip(stages, row["shares"])}
-        rows.append(Row({"name": _name(row), **shares, "sum": sum(row["stages_ms"])}))
-    return table("Table 1 of Biri 2006 again: share of each stage in their sum, after the light moved", columns, rows)
+        known = {key: None if share is None else share / 100 for key, share in zip(stages, row["shares"])}
+        rows.append(Row({"name": _name(row), **known, "sum": sum(row["stages_ms"])}))
+    title = "Table 1 of Biri 2006 again: share of each stage in their sum, after the light moved"
+    explanation = "One kernel does stages 3 and 5; without a share the spread of the timings hides which does what."
+    return table(title, columns, rows, explanation=explanation)
 
 
 def _with_published(rows: Sequence[Data]) -> Iterator[tuple[Data, Data | None]]:
@@ -88,6 +98,7 @@ def _rate_table(rows: Sequence[Data]) -> Table:
         *COLUMNS,
         *numbers(rays="camera rays alone", how={"whole": True}),
         *numbers(relative_rmse="rel. RMSE", relative_bias="rel. bias", p99="", how={"digits": 2, "share": True}),
+        *numbers(frame_rmse="rel. RMSE of the frame", how={"digits": 2, "share": True}),
     )
     table_rows = []
     for row in rows:
@@ -95,7 +106,21 @@ def _rate_table(rows: Sequence[Data]) -> Table:
         beside = rates(row, published["fps"], comparable=list(row["size"]) == list(published["size"]))
         alone = per_second(measured(row.get("rays")))
         table_rows.append({**row["error"], **beside, "name": _name(row), "triangles": row["triangles"], "rays": alone})
+        table_rows[-1]["frame_rmse"] = (row.get("frame_error") or {}).get("relative_rmse")
     return table("Table 2 of Biri 2006 again: frames a second, and the error of the airlight", columns, table_rows)
+
+
+def _study_table(rows: Sequence[Data]) -> Table:
+    columns = (
+        *numbers(size="radius over the lamp's distance", optical_depth="optical depth", how={"digits": 2}),
+        *numbers(relative_rmse="rel. RMSE", relative_bias="rel. bias", how={"digits": 2, "share": True}),
+        *numbers(scale="best factor", how={"digits": 3}),
+        *numbers(shape="rel. RMSE left by it", how={"digits": 2, "share": True}),
+        *numbers(polynomial="rel. RMSE of the polynomial", printed="as printed", how={"digits": 2, "share": True}),
+    )
+    explanation = "A sphere of fog in clear air, lit from above; against the true depth of both legs."
+    title = "The constant R of Biri 2006, section 4.2: error by size and optical depth of the medium"
+    return table(title, columns, rows, explanation=explanation)
 
 
 def _cost_table(costs: Sequence[Data]) -> Table:

@@ -7,10 +7,12 @@ Read in this order:
 - `expected.py`: how long the parts will take
 - `scene.py`: one scene: truth, its checks, every method
 - `papers.py`: what belongs to no scene: papers, stability, mutations
+- `fidelity.py`: the experiments behind the claims of papers
+- `kept.py`: what the results of every report have in common
 - `measure.py`: all of these, report.json and the page
 
-May import: `analytic`, `realtime.errors`, `realtime.frame`, `reference.storage`, `reports.data`, `reports.machine`,
-`reports.page`, `reports.papers`, `reports.plotting`, `validation.comparison`, `validation.configurations`,
-`validation.estimates`, `validation.frames`, `validation.kernels`, `validation.metrics`, `validation.mutations`,
-`validation.papers`, `validation.scenes`.
+May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.methods`, `reference.storage`, `reports.data`,
+`reports.machine`, `reports.page`, `reports.papers`, `reports.plotting`, `validation.comparison`,
+`validation.configurations`, `validation.estimates`, `validation.fidelity`, `validation.frames`, `validation.kernels`,
+`validation.metrics`, `validation.mutations`, `validation.papers`, `validation.scenes`.
 """

@@ -6,7 +6,7 @@ interrupted goes on where it stopped and one in which nothing changed measures n
 when it is whole.
 """
 
-import json
+import sys
 import time
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -18,33 +18,30 @@ from pathlib import Path
 from typing import Any
 
 from analytic.errors import InputError
+from realtime.errors import InputError as MethodError
+from realtime.frame.renderer import render_frame
 from reference.storage.files import ensure_folder
+from reference.storage.stopping import hint_when_stopped
 from reports.data.claims import claims, unstudied
-from reports.data.reader import SCHEMA
+from reports.data.own_faults import own_fault
+from reports.data.reader import SCHEMA, report_text
 from reports.machine.environment import describe_environment
+from reports.machine.own_process import EndedError, in_own_process
 from reports.machine.progress import Interrupted, Progress, part_of
 from reports.page.render import render_page
 from reports.report.expected import PAGE_SECONDS, SceneEntries, other_seconds, scene_seconds, shares
+from reports.report.fidelity import fidelity_parts, fidelity_rows
+from reports.report.kept import report_cache
 from reports.report.papers import OtherPart, other_parts, published_data
-from reports.report.scene import raise_own_error, scene_report
+from reports.report.scene import OwnMethods, scene_report
 from reports.report.staging import staged
 from validation.comparison.engine_images import EngineImage, images_size
-from validation.configurations.methods import STANDARD, Configuration
-from validation.frames.result_cache import CachedResult, ResultCache, cached_result, now, result_cache, sweep_results
-from validation.frames.scene_study import Effort, open_study
+from validation.configurations.methods import STANDARD, Configuration, prepared
+from validation.frames.benchmark import Apart, render_by_name
+from validation.frames.result_cache import CachedResult, ResultCache, cached_result, now, sweep_results
+from validation.frames.scene_study import Effort, SceneStudy, open_study
 from validation.metrics.errors import plain
 from validation.scenes.registry import SCENES
-
-#: Modules on which kept results depend, besides the four packages below `reports`.
-_MAKERS = (
-    "data/serialize.py",
-    "plotting/pictures.py",
-    "plotting/colour_maps.py",
-    "papers/biri.py",
-    "papers/billeter.py",
-    "report/scene.py",
-    "report/papers.py",
-)
 
 
 def write_report(
@@ -56,6 +53,7 @@ def write_report(
     images: Mapping[str, Sequence[EngineImage]] | None = None,
     command: str = "airlight report",
     fresh: bool = False,
+    method_limit: float | None = None,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Study scenes and write the report.
@@ -76,6 +74,9 @@ def write_report(
         The command line that the page names under "how to reproduce".
     fresh
         Measure again what was kept from earlier runs.
+    method_limit
+        Methods of the user's own run in processes of their own, so long at most in each scene [s], and what is at fault
+        there stands in their rows (`own_faults`). None: they run in this process, and a fault ends the report.
     progress
         Called with (share done, what) now and then.
 
@@ -87,8 +88,8 @@ def write_report(
     Raises
     ------
     InputError
-        If the folder cannot be written, a scene or an image cannot be used, or a method of one's own is at fault;
-        nothing that was there before is damaged.
+        If the folder cannot be written, a scene or an image cannot be used, or a method of one's own that runs in
+        this process is at fault; nothing that was there before is damaged.
     Interrupted
         At Ctrl-C, with what is kept.
     """
@@ -100,21 +101,21 @@ def write_report(
     sweep_results()
     results: list[CachedResult] = []
     start = time.monotonic()
-    here = Path(__file__).parent.parent
-    machine = {name: str(environment.get(name)) for name in ("processor", "threads", "variant", "llvm", "device")}
-    cache = result_cache(machine, more=[here / name for name in _MAKERS], fresh=fresh)
+    cache = report_cache(environment, fresh=fresh)
     efforts = {name: effort.at(sizes.get(Path(name).stem)) for name in scenes}
-    others = other_parts(effort, scenes, cache)
+    others = [*other_parts(effort, scenes, cache), *fidelity_parts(effort, scenes, cache)]
     steps = _steps(progress, cache, efforts, configurations, others)
-    seconds = dict.fromkeys(("scenes", "stability", "mutations", "published"), 0.0)
+    apart = None if method_limit is None else partial(in_own_process, limit=method_limit)
+    ended: dict[Configuration, str] = {}
+    seconds = dict.fromkeys(("scenes", "stability", "mutations", "published", "fidelity"), 0.0)
     try:
-        with staged(target) as hidden:
+        with hint_when_stopped(lambda: _kept_words(results, "")), staged(target) as hidden:
             studied = []
             with _timed(seconds, "scenes"):
                 for number, (name, sized_effort) in enumerate(efforts.items()):
                     study = open_study(name, sized_effort)
                     if number == 0:
-                        _try_own(study, configurations)
+                        ended = _try_own(study, configurations, apart)
                     studied.append(
                         scene_report(
                             study,
@@ -123,6 +124,7 @@ def write_report(
                             cache=cache,
                             folder=hidden,
                             results=results,
+                            own=OwnMethods(apart, ended),
                             progress=steps[name],
                         )
                     )
@@ -147,6 +149,7 @@ def write_report(
                 "stability": stability[-1].data["kernels"] if stability else [],
                 "mutations": mutations[-1].data if mutations else None,
                 "published": published_data(by_kind),
+                "fidelity": fidelity_rows(by_kind),
             }
             steps["page"](0.0, "the page")
             write_page(data, images=hidden, folder=hidden)
@@ -158,8 +161,7 @@ def write_report(
 
 def write_page(data: Mapping[str, Any], *, images: Path, folder: Path) -> None:
     """Write report.json and the page that is made from it and from the files it names, which lie in `images`."""
-    text = json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-    (folder / "report.json").write_text(text, encoding="utf-8", newline="\n")
+    (folder / "report.json").write_text(report_text(data), encoding="utf-8", newline="\n")
     (folder / "report.html").write_text(render_page(dict(data), images), encoding="utf-8", newline="\n")
 
 
@@ -203,18 +205,33 @@ def _kept_words(results: Sequence[CachedResult], more: str) -> str:
     return f"{words}{f' ({more})' if more else ''}; nothing was written; run the same command again to go on"
 
 
-def _try_own(study, configurations: Sequence[Configuration]) -> None:
-    """Render a small frame with every method of the user's own: what is at fault there is said before the work."""
-    from realtime.errors import InputError as MethodError
-    from realtime.frame.renderer import render_frame
-    from validation.configurations.methods import prepared
+def _try_own(
+    study: SceneStudy, configurations: Sequence[Configuration], apart: Apart | None
+) -> dict[Configuration, str]:
+    """Render a small frame with every method of the user's own: what is at fault there is said before the work.
 
+    Returns those that ended their process, with how: they are not called again.
+    """
+    ended = {}
     for configuration in configurations:
-        if configuration.own:
-            try:
+        if not configuration.own:
+            continue
+        try:
+            if apart is None:
                 render_frame(prepared(study.probe, configuration))
-            except MethodError as error:
-                raise_own_error(configuration, str(error))
+            else:
+                name = str(study.loaded.path or study.loaded.name)
+                size = study.probe.camera.width, study.probe.camera.height
+                apart(render_by_name, name, size, configuration, name=configuration.method)
+        except (InputError, MethodError) as error:
+            fault = own_fault(configuration.method, str(error))
+            if fault and apart is None:
+                raise InputError(fault) from error
+            if fault:
+                print(f"airlight: warning: {fault}; the report goes on", file=sys.stderr)
+            if isinstance(error, EndedError):
+                ended[configuration] = str(error)
+    return ended
 
 
 def _refuse_twins(scenes: Sequence[str]) -> None:

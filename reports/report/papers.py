@@ -9,6 +9,7 @@ from reports.data.serialize import mutations_data
 from reports.machine.progress import Progress, counted, part_of
 from reports.papers.billeter import billeter_data
 from reports.papers.biri import biri_data
+from validation.fidelity.catalogue import ROWS, published_figures
 from validation.frames.result_cache import CachedResult, CacheEntry, Computed, ResultCache, cache_entry
 from validation.frames.scene_study import Effort
 from validation.metrics.errors import plain
@@ -18,7 +19,7 @@ from validation.metrics.errors import plain
 class OtherPart:
     """A part of a report that belongs to no scene."""
 
-    kind: str  #: 'stability', 'mutations', 'biri', 'zero_cost' or 'billeter'
+    kind: str  #: 'stability', 'mutations', 'biri', 'zero_cost', 'billeter' or 'fidelity'
     title: str  #: shown as the progress
     entry: CacheEntry
     compute: Callable[[Progress], Computed]
@@ -49,8 +50,10 @@ def published_data(results: Mapping[str, Sequence[CachedResult]]) -> dict[str, A
     if biri:
         zero_cost = [cost for result in results.get("zero_cost", ()) for cost in result.data["costs"]]
         rows = [row for result in biri for row in result.data["rows"]]
-        tables = {"stages": biri[-1].data["stages"], "rows": rows, "zero_cost": zero_cost}
-    return {"biri": tables, "billeter": billeter[-1].data if billeter else None}
+        study = [row for result in biri for row in result.data["constant_distance"]]
+        tables = {"stages": biri[-1].data["stages"], "rows": rows, "zero_cost": zero_cost, "constant_distance": study}
+    figures = published_figures(ROWS)
+    return {"biri": tables, "billeter": billeter[-1].data if billeter else None, "figures": figures}
 
 
 def _stability(rays: int, progress: Progress) -> Computed:
@@ -69,8 +72,13 @@ def _biri(effort: Effort, scenes: Sequence[str], cache: ResultCache) -> list[Oth
     """Return Tables 1 and 2 of Biri 2006, each entry a part."""
     from validation.frames.zero_cost import zero_costs
     from validation.papers.biri import PUBLISHED, Published, biri_rows
+    from validation.papers.constant_distance import constant_distance_study
 
     kernels, seconds = effort.paper_kernels, effort.seconds
+
+    def measured(published: Published, progress: Progress) -> dict[str, Any]:
+        study = constant_distance_study() if published.scene == "three-media" else ()
+        return biri_data(biri_rows([published], kernels, seconds=seconds, progress=progress), [], study)
 
     def part(published: Published) -> OtherPart:
         identity = {"scene": published.scene, "size": published.size, "kernels": kernels, "seconds": seconds}
@@ -78,7 +86,7 @@ def _biri(effort: Effort, scenes: Sequence[str], cache: ResultCache) -> list[Oth
             "biri",
             "Biri 2006",
             cache_entry(cache, "biri", identity=identity),
-            lambda progress: (biri_data(biri_rows([published], kernels, seconds=seconds, progress=progress), []), {}),
+            lambda progress: (measured(published, progress), {}),
         )
 
     parts = [part(published) for published in PUBLISHED if published.scene in scenes]

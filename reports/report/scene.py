@@ -1,34 +1,36 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What a report says of one scene: every part kept on disk, or computed and then kept."""
 
-import os
-import sys
-import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from analytic.errors import InputError
+from realtime.methods.user_method import method_file
 from reference.storage.exr import Image, write_exr
+from reference.storage.files import temporary_folder
+from reports.data.own_faults import own_fault
 from reports.data.serialize import image_data, measurement_data, scene_facts, truth_data
 from reports.machine.environment import stamped, threads
 from reports.machine.progress import Progress, part_of
 from reports.plotting.pictures import error_map, exposure, png_bytes, tone_mapped
 from reports.report.expected import SceneEntries, scene_seconds, shares
 from validation.comparison.engine_images import EngineImage, ImageMeasurement, image_flip, measure_image
+from validation.comparison.engine_layers import truth_layer
 from validation.configurations.methods import Configuration
 from validation.estimates.images import layered_frame, layered_truth
-from validation.frames.benchmark import Measurement, configurations_for
+from validation.frames.benchmark import Apart, Measurement, configurations_for
 from validation.frames.result_cache import (
     CachedResult,
     Computed,
     ResultCache,
     cached_result,
     load_result,
+    now,
     source_digest,
     store_result,
 )
@@ -41,6 +43,30 @@ SUFFIXES = {"exr": ".exr", "picture": ".png", "airlight": "-airlight.png", "erro
 _REFERENCE = "reference"  # the stem of the truth's files
 
 
+@dataclass(frozen=True)
+class OwnMethods:
+    """How methods of the user's own are run."""
+
+    apart: Apart | None = None  #: calls a function in a process of its own; None: in this one, where a fault is raised
+    ended: Mapping[Configuration, str] = field(default_factory=dict)  #: those that ended such a process, with how
+
+    def measured(self, study: SceneStudy, chosen: Configuration) -> Measurement:
+        """Measure a configuration, also one that is not the user's own.
+
+        Raises
+        ------
+        InputError
+            If the user's method is at fault and runs in this process.
+        """
+        if chosen in self.ended:
+            return Measurement(chosen, None, None, None, None, refused=self.ended[chosen], knows_shadows=True)
+        measurement = study_configuration(study, chosen, apart=self.apart)
+        fault = own_fault(chosen.method, measurement.refused)
+        if fault and self.apart is None:
+            raise InputError(fault)
+        return measurement
+
+
 def scene_report(
     study: SceneStudy,
     *,
@@ -49,6 +75,7 @@ def scene_report(
     cache: ResultCache,
     folder: Path,
     results: list[CachedResult],
+    own: OwnMethods,
     progress: Progress,
 ) -> dict[str, Any]:
     """Return what the report says of a scene, and write its files.
@@ -67,6 +94,8 @@ def scene_report(
         Of the report; the files go into a folder in it that has the scene's name.
     results
         Every part is added to it as soon as it is there.
+    own
+        How methods of the user's own are run.
     progress
         Called with (share done, what).
     """
@@ -83,7 +112,7 @@ def scene_report(
     steps["multiple"](0.0, "multiple scattering")
     multiple = parts.result("multiple", lambda: (plain(study_multiple(study)), {}))
     stems = file_stems([*(configuration.label for configuration in chosen), *(image.label for image in images)])
-    methods = parts.methods(chosen, stems, factor, steps)
+    methods = parts.methods(chosen, stems, factor, own=own, steps=steps)
     judged = [parts.image(image, stem, factor) for image, stem in zip(images, stems[len(chosen) :])]
     seconds = {"truth": truth.seconds, "agreement": checks.seconds, "multiple": multiple.seconds}
     seconds |= {"methods": round(sum(entry["seconds"] for entry in methods), 3)}
@@ -128,7 +157,13 @@ class _Parts:
         return result.data | {"files": self.names(stem, result.files)} | about
 
     def methods(
-        self, chosen: Sequence[Configuration], stems: Sequence[str], factor: float, steps: Mapping[str, Progress]
+        self,
+        chosen: Sequence[Configuration],
+        stems: Sequence[str],
+        factor: float,
+        *,
+        own: OwnMethods,
+        steps: Mapping[str, Progress],
     ) -> list[dict[str, Any]]:
         """Return what the report says of all configurations."""
         entries = [self._entries.method(each, self._made_from | _own_source(each)) for each in chosen]
@@ -143,15 +178,17 @@ class _Parts:
             for number in missing:
                 steps[chosen[number].label](0.0, chosen[number].label)
                 start = time.monotonic()
-                measured.append(study_configuration(self._study, chosen[number]))
-                raise_own_error(chosen[number], measured[-1].refused)
+                measured.append(own.measured(self._study, chosen[number]))
                 seconds.append(time.monotonic() - start)
             start = time.monotonic()
             measured = with_flips(self._study, measured, workers=workers)
             flip = (time.monotonic() - start) / max(1, len(missing))
             for number, measurement, took in zip(missing, measured, seconds):
                 computed = _measured(self._study, measurement, factor)
-                results[number] = store_result(entries[number], computed, took + flip)
+                if own_fault(measurement.configuration.method, measurement.refused):  # it may have gone by the next run
+                    results[number] = CachedResult(*computed, seconds=took, measured=now(), cached=False)
+                else:
+                    results[number] = store_result(entries[number], computed, took + flip)
             methods += [self.written(result, stems[number]) for number, result in results.items() if result is not None]
         return methods
 
@@ -178,18 +215,6 @@ def file_stems(labels: Sequence[str]) -> list[str]:
         taken |= files(stem)
         stems.append(stem)
     return stems
-
-
-def raise_own_error(chosen: Configuration, refused: str | None) -> None:
-    """Raise what a method of the user's own did wrong: what it refuses by name is a result, its faults are not.
-
-    Raises
-    ------
-    InputError
-        With the words of `realtime.methods.user_method`, which begin with the name of the method.
-    """
-    if chosen.own and refused and refused.startswith(f"method {chosen.method}:"):
-        raise InputError(refused)
 
 
 def _truth(study: SceneStudy) -> Computed:
@@ -219,11 +244,10 @@ def _measured(study: SceneStudy, measured: Measurement, factor: float) -> Comput
 
 
 def _judged(study: SceneStudy, shown: EngineImage, factor: float) -> Computed:
-    truth = study.truth
-    measured = measure_image(shown, truth, surfaces=study.scene.features.surfaces)
+    measured = measure_image(shown, study.truth_of, surfaces=study.scene.features.surfaces)
     if study.effort.flip != "none":
-        measured = replace(measured, flip=image_flip(measured, truth))
-    expected = truth.airlight if measured.layer == "airlight" else truth.airlight + truth.surface
+        measured = replace(measured, flip=image_flip(measured, measured.truth))
+    expected = truth_layer(measured.truth, measured.layer)
     test = np.asarray(measured.image.layers[measured.layer], dtype=np.float64)
     files = {
         "exr": _exr_bytes(_with_flip(_named(study, measured), measured.flip)),
@@ -247,9 +271,9 @@ def _with_flip(image: Image, flip: Flip | None) -> Image:
 
 def _exr_bytes(image: Image) -> bytes:
     """Return the file of an image: OpenEXR writes to a path alone."""
-    with tempfile.TemporaryDirectory(prefix="airlight-exr-") as folder:
-        path = Path(folder, "image.exr")
-        write_exr(path, stamped(image))
+    with temporary_folder() as folder:
+        path = folder / "image.exr"
+        write_exr(path, stamped(image), finite=False)  # somebody's, which the report judges
         return path.read_bytes()
 
 
@@ -257,10 +281,9 @@ def _own_source(chosen: Configuration) -> dict[str, Any]:
     """Return what else the numbers of a method depend on: its source where it is the user's own, HDR-FLIP."""
     if not chosen.own:
         return _flip_version()
-    module = chosen.method.rpartition(":")[0]
-    file = module if module.endswith(".py") or os.sep in module else getattr(sys.modules.get(module), "__file__", None)
+    file = method_file(chosen.method)
     # A function typed into a notebook has no file, so its results cannot be kept.
-    source = Path(file).read_bytes().hex() if file else f"no file, {time.time_ns()}"
+    source = file.read_bytes().hex() if file else f"no file, {time.time_ns()}"
     return _flip_version() | {"own": source}
 
 

@@ -18,5 +18,6 @@ Read in this order:
 - `lists.py`: scenes, methods, kernels
 - `scene.py`: the description of a scene for another renderer
 
-May import: `realtime.kernels`, `realtime.methods`, `validation.frames`, `validation.metrics`, `validation.scenes`.
+May import: `analytic.errors`, `realtime.kernels`, `realtime.methods`, `validation.frames`, `validation.metrics`,
+`validation.scenes`.
 """

@@ -18,7 +18,14 @@ def method_list() -> Table:
     from realtime.methods.registry import METHODS
 
     rows = [
-        (method.name, method.summary, method.uses_kernel, method.shadows, _defaults(method.defaults), method.source)
+        (
+            method.name,
+            method.summary,
+            method.uses_kernel(method.parameters()),
+            method.shadows,
+            _defaults(method.defaults),
+            method.source,
+        )
         for method in METHODS.values()
     ]
     return table("", words("name", "what", "kernel", "shadows", "parameters", "source", how=_LONG), rows)

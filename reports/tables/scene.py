@@ -46,6 +46,9 @@ def _rows(described: dict[str, Any]) -> Iterator[Cells]:
     yield "radiance", "", described["radiance"]
     file = described["file"]
     yield "file to write", "", f"{file['name']}: {file['format']}; {'; '.join(file['layers'].values())}"
+    for renderer, lines in described["recipes"].items():
+        for number, line in enumerate(lines):
+            yield "" if number else f"in {renderer}", "", line
 
 
 def _camera(camera: dict[str, Any]) -> Iterator[Cells]:
@@ -87,10 +90,14 @@ def _light(light: dict[str, Any]) -> Iterator[Cells]:
         yield "light", "", f"{light['kind']}, at {_vector(light['position'])}"
         on_axis = " on the axis" if "axis" in light else ""
         yield "", "intensity", f"{_colour(light['intensity'])} W/sr{on_axis}"
+        whole = f"4 pi I = {_colour(light['power_all_round'])} W"
         if "axis" in light:
+            yield "", "power", f"{_colour(light['power'])} W; {whole} where a spot counts as a lamp all round (Blender)"
             yield "", "axis", _vector(light["axis"])
             angles = f"beam {light['beam_angle']:.7g}, cut-off {light['cutoff_angle']:.7g} degrees from the axis"
-            yield "", "half angles", angles
+            yield "", "half angles, degrees", angles
+        else:
+            yield "", "power", whole
     yield "", "falloff", light["falloff"]
 
 

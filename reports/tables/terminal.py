@@ -11,8 +11,24 @@ from reports.tables.table import Table
 
 
 def print_json(data: Any) -> None:
-    """Print data as JSON; not-a-number must be None by now."""
-    print(json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False))
+    """Print data as JSON.
+
+    Raises
+    ------
+    InputError
+        For a number that is not finite: what has none is None.
+    """
+    try:
+        text = json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False)
+    except ValueError:
+        from analytic.errors import InputError
+
+        raise InputError("a result is not finite, and is not printed; a number of the input may be too large") from None
+    try:
+        text.encode(sys.stdout.encoding or "utf-8")
+    except UnicodeEncodeError:
+        text = json.dumps(data, indent=2, allow_nan=False)
+    print(text)
 
 
 def print_table(table: Table, *, as_markdown: bool = False) -> None:

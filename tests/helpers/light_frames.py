@@ -89,7 +89,7 @@ def renderer_of(loaded, method="light-volumes", precision="single", **parameters
     from realtime.methods.registry import METHODS
     from realtime.scene.read_scene import read_scene
 
-    kernel = KERNELS["exact"].function if METHODS[method].uses_kernel else None
+    kernel = KERNELS["exact"].function
     return frame_renderer(read_scene(loaded, precision), METHODS[method], kernel=kernel, **parameters)
 
 

@@ -155,7 +155,7 @@ def write_files(folder: Path) -> Path:
     """Write the EXR files that `DATA` names, and one of an engine's image."""
     (folder / "s").mkdir(parents=True, exist_ok=True)
     for name, layers in images().items():
-        write_exr(folder / "s" / f"{name}.exr", Image(layers))
+        write_exr(folder / "s" / f"{name}.exr", Image(layers), finite=False)
     return folder
 
 
@@ -183,7 +183,7 @@ def write_large_report(folder: Path, *, scenes: int, methods: int, size: tuple[i
         return np.exp(-3 * np.hypot(x - 0.5, y - 0.2))[..., None] * shafts[..., None] ** np.array([1.0, 1.2, 1.5])
 
     def write(name, **layers):
-        write_exr(folder / "s" / f"{name}.exr", Image(layers))
+        write_exr(folder / "s" / f"{name}.exr", Image(layers), finite=False)
         return {"exr": f"s/{name}.exr", "picture": f"s/{name}.png", "error": f"s/{name}-error.png"}
 
     airlight = light(0.0)

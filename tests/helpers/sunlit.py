@@ -74,7 +74,7 @@ def render(scene, method="unshadowed", *, precision="double", **parameters):
     from realtime.methods.registry import METHODS
 
     chosen = METHODS[method]
-    kernel = KERNELS["exact"].function if chosen.uses_kernel else None
+    kernel = KERNELS["exact"].function
     scene = read(scene, precision) if isinstance(scene, dict) else scene
     return render_frame(frame_renderer(scene, chosen, kernel=kernel, **parameters))
 

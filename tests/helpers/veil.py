@@ -7,7 +7,7 @@ import drjit as dr
 import mitsuba as mi
 
 from realtime.methods.interface.layers import Layers
-from realtime.methods.interface.method import Method, always
+from realtime.methods.interface.method import Method, always, never
 from realtime.parameters import Parameters, parameter
 from realtime.tiles.layout import TILE
 
@@ -45,5 +45,5 @@ def soften(layers, g_buffer, history, *, camera, parameters):
     return replace(layers, in_scattered=value)
 
 
-VISIBLE = {"provides_visibility": always, "uses_kernel": False}
+VISIBLE = {"provides_visibility": always, "uses_kernel": never}
 VEIL = Method("veil", render, "a veil", "tests", VeilParameters, prepare, cull=cull, passes=(soften,), **VISIBLE)

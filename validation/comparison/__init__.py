@@ -4,11 +4,14 @@
 Read in this order:
 
 - `images.py`: compares two image files;
-- `engine_images.py`: images of another renderer, found by scene;
+- `engine_layers.py`: which layer of it is judged, and what light it holds;
 - `engine_hints.py`: what may be wrong with an image as a whole;
+- `engine_pixels.py`: whether its pixels are centres or means;
+- `engine_verdict.py`: whether it is right, and where it is not;
 - `engine_compare.py`: one such image against the truth of its scene;
+- `engine_images.py`: a folder of them, found by scene, for the report;
 - `compare_text.py`: what `airlight compare` prints.
 
-May import: `analytic.errors`, `reference.quadrature`, `reference.storage`, `validation.estimates`,
+May import: `analytic.errors`, `reference.quadrature`, `reference.scene`, `reference.storage`, `validation.estimates`,
 `validation.metrics`, `validation.scenes`, `validation.statistics`.
 """

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What `airlight compare` prints, a line for each group of numbers."""
 
+import math
+
 from validation.metrics.colour import ColourDifference
 from validation.metrics.flip import Flip
 from validation.metrics.other_tools import PublishedErrors
@@ -24,34 +26,34 @@ def statistics_lines(s: Statistics) -> list[str]:
         f"variance         {percent(s.reference_variance_share)} of it the reference's; one pixel has up to "
         f"{percent(s.largest_share)}",
         f"zero reference   {s.zero_reference} values, the test image there up to "
-        f"{s.zero_reference_error:.3g} of the mean",
-        f"z                mean {s.z_mean:.3f}, standard deviation {s.z_std:.3f}, {s.tested} values; "
-        f"{s.zero_variance} without variance differ by up to {s.zero_variance_error:.3g} of the mean",
+        f"{shown(s.zero_reference_error, 3)} of the mean",
+        f"z                mean {_fixed(s.z_mean)}, standard deviation {_fixed(s.z_std)}, {s.tested} values; "
+        f"{s.zero_variance} without variance differ by up to {shown(s.zero_variance_error, 3)} of the mean",
         f"rejected         {s.rejected} pixels, {s.expected_rejections:.2g} expected (Sidak level {s.family_level:g}); "
         f"{s.rejected_blocks} of {s.blocks} blocks",
         f"exceeding        {s.exceeding} values, {s.expected_exceeding:.0f} expected (level {s.plain_level:g}), "
-        f"p = {s.exceeding_p:.3g}; p-values uniform: p = {s.uniformity_p:.3g}",
+        f"p = {shown(s.exceeding_p, 3)}; p-values uniform: p = {shown(s.uniformity_p, 3)}",
     ]
 
 
 def errors_lines(e: PublishedErrors) -> list[str]:
     """Return the errors of other tools as text."""
     return [
-        f"unit {e.unit:<12.4g}mse {e.mse:.4g}, mae {e.mae:.4g}, psnr {e.psnr:.4g} dB, smape {e.smape:.4g}, "
-        f"mape {e.mape:.4g}",
-        f"  by tool        rse_tev {e.rse_tev:.4g}, rae_tev {e.rae_tev:.4g}, mrse_pbrt {e.mrse_pbrt:.4g}, "
-        f"relmse {e.relmse:.4g} (trimmed {e.relmse_trim:.4g}), mrse_jeri {e.mrse_jeri:.4g}",
-        f"  without floor  relative {e.relative:.4g}, largest {e.relative_max:.4g}; {e.dark} dark values wrong "
-        f"by up to {e.dark_max:.3g} of the mean",
+        f"unit {e.unit:<12.4g}mse {shown(e.mse)}, mae {shown(e.mae)}, psnr {shown(e.psnr)} dB, smape {shown(e.smape)}, "
+        f"mape {shown(e.mape)}",
+        f"  by tool        rse_tev {shown(e.rse_tev)}, rae_tev {shown(e.rae_tev)}, mrse_pbrt {shown(e.mrse_pbrt)}, "
+        f"relmse {shown(e.relmse)} (trimmed {shown(e.relmse_trim)}), mrse_jeri {shown(e.mrse_jeri)}",
+        f"  without floor  relative {shown(e.relative)}, largest {shown(e.relative_max)}; {e.dark} dark values wrong "
+        f"by up to {shown(e.dark_max, 3)} of the mean",
     ]
 
 
 def colour_lines(c: ColourDifference) -> list[str]:
     """Return the colour differences as text."""
     return [
-        f"CIEDE2000        mean {c.ciede2000_mean:.4g}, p99 {c.ciede2000_p99:.4g}, max {c.ciede2000_max:.4g} at "
-        f"{c.exposure:+.2f} stops; {c.clipped} pixels clipped",
-        f"Delta E ITP      mean {c.itp_mean:.4g}, p99 {c.itp_p99:.4g}, max {c.itp_max:.4g}, white "
+        f"CIEDE2000        mean {shown(c.ciede2000_mean)}, p99 {shown(c.ciede2000_p99)}, max "
+        f"{shown(c.ciede2000_max)} at {c.exposure:+.2f} stops; {c.clipped} pixels clipped",
+        f"Delta E ITP      mean {shown(c.itp_mean)}, p99 {shown(c.itp_p99)}, max {shown(c.itp_max)}, white "
         f"{c.white_luminance:g}, peak {c.peak_luminance:g} cd/m^2; {c.clipped_itp} pixels clipped",
     ]
 
@@ -68,4 +70,15 @@ def flip_line(f: Flip) -> str:
 
 def percent(value: float) -> str:
     """Return a share, `value` [1], as text in percent: '0.12 %' for 0.0012."""
-    return f"{100 * value:.4g} %"
+    return f"{shown(100 * value)} %" if math.isfinite(value) else shown(value)
+
+
+def shown(value: float, digits: int = 4) -> str:
+    """Return a number, or a word for what is none."""
+    if math.isnan(value):
+        return "undefined"
+    return "unlimited" if math.isinf(value) else f"{value:.{digits}g}"
+
+
+def _fixed(value: float) -> str:
+    return f"{value:.3f}" if math.isfinite(value) else shown(value)

@@ -1,9 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""An image that another renderer made of a scene, against the truth of that scene at the image's size."""
+"""An image that another renderer made of a scene, against the truth of that scene at the image's size.
 
+The errors of the whole image are those against the truth that fits, at pixel centres or over their areas.
+"""
+
+import math
 import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -11,9 +16,14 @@ from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from reference.quadrature.ray_values import TruthImage
-from reference.storage.exr import NOTE, TOTAL, Image, layer, read_exr
-from validation.comparison.engine_hints import Hints, find_hints
+from reference.scene.read import read_truth
+from reference.storage.exr import NOTE, TOTAL, Image, read_exr
+from validation.comparison.engine_hints import GAIN, Hints
+from validation.comparison.engine_layers import KINDS, JudgedLayer, judged_layer, truth_layer
+from validation.comparison.engine_pixels import PIXELS, PixelFit, fit_pixel
+from validation.comparison.engine_verdict import ErrorPlace, Verdict, error_place, judge
 from validation.comparison.images import Comparison, compare_images, read_mask
+from validation.estimates.agreement import pixel_angle
 from validation.estimates.quadrature import truth_image
 from validation.metrics.errors import plain
 from validation.scenes.loading import LoadedScene, load_scene
@@ -28,13 +38,24 @@ class EngineComparison:
     scene: str
     path: str
     size: tuple[int, int]  #: width and height [pixels]
-    pixel: str  #: 'centre' or 'area': what a pixel of the truth is
+    fit: PixelFit  #: what a pixel of the truth is, and what is wrong with the image as a whole
     expected: str  #: what the layer was compared with: 'airlight', 'surface', or 'total' for both
     truth_error: float  #: bound of the error of the truth's airlight, relative to its mean
     comparison: Comparison
-    hints: Hints
+    place: ErrorPlace | None  #: where most of the error lies; None where there is none
+    verdict: Verdict
     note: str  #: what the reader of the file changed or left out
     margin: float | None  #: largest relative bias that counts as agreement
+
+    @property
+    def pixel(self) -> str:
+        """What a pixel of the truth is: its 'centre' or its 'area'."""
+        return self.fit.pixel
+
+    @property
+    def hints(self) -> Hints:
+        """What may be wrong with the image as a whole."""
+        return self.fit.hints
 
     @property
     def failures(self) -> tuple[str, ...]:
@@ -58,6 +79,9 @@ class EngineComparison:
             "factor": plain(self.hints.factor),
             "factor_rmse": plain(self.hints.factor_rmse),
             "hints": list(self.hints.words),
+            "pixel_errors": {"centre": plain(self.fit.centre_error), "area": plain(self.fit.area_error)},
+            "where": None if self.place is None else self.place.to_json(),
+            "verdict": self.verdict.to_json(),
             "note": self.note,
             "failures": list(self.failures),
         }
@@ -69,14 +93,18 @@ class EngineComparison:
         lines = [
             f"scene            {self.scene}, {self.size[0]} x {self.size[1]}; truth: {of}, {pixel}, airlight known to "
             f"{self.truth_error:.2g} of its mean",
+            f"pixels           {self.fit.words}",
             self.comparison.summary(),
-            f"best factor      {self.hints.factor:.6g} times the image leaves a relative rmse of "
-            f"{100 * self.hints.factor_rmse:.4g} %",
         ]
+        found = self.hints
+        fitted = f"{found.factor:.6g} times the image leaves a relative rmse of {100 * found.factor_rmse:.4g} %"
+        lines.append(f"best factor      {f'none: {found.reason}' if found.reason else fitted}")
+        lines += [] if self.place is None else [f"where            {self.place.words}"]
         lines += [f"suspect          {words}" for words in self.hints.words]
         lines += [f"file             {self.note}"] if self.note else []
         own = self.failures[len(self.comparison.failures) :]
-        return "\n".join(lines + [f"failed           {reason}" for reason in own])
+        lines += [f"failed           {reason}" for reason in own]
+        return "\n".join([*lines, f"verdict          {self.verdict.words}"])
 
 
 def compare_scene(
@@ -84,7 +112,8 @@ def compare_scene(
     path: str | os.PathLike[str],
     *,
     layer: str | None = None,
-    pixel: str = "centre",
+    holds: str | None = None,
+    pixel: str | None = None,
     mask: str | os.PathLike[str] | None = None,
     margin: float | None = None,
     all_metrics: bool = False,
@@ -100,17 +129,16 @@ def compare_scene(
         A built-in scene or a Mitsuba XML file.
     path
         The EXR file.
-    layer
-        The layer to judge: by default 'airlight' where the file has it, else the plain channels, else its only layer.
-        'airlight' and 'surface' are compared with those layers of the truth, any other with their sum.
+    layer, holds
+        The layer to judge and what it holds, see `validation.comparison.engine_layers.judged_layer`.
     pixel
-        'centre' or 'area', see `reference.quadrature.image.quadrature_image`.
+        'centre' or 'area', see `reference.quadrature.image.quadrature_image`; by default what fits.
     mask, all_metrics, flip, exposure
         See `validation.comparison.images.compare_files`.
     margin
         Largest relative bias [1] that counts as agreement; with standard errors, what they can show counts.
     progress
-        Called with (share done, what) while the truth is computed.
+        Called with (share done, what) while a truth is computed.
 
     Raises
     ------
@@ -118,49 +146,66 @@ def compare_scene(
         For a scene or a file that cannot be read, a layer that is not there, and a size of another aspect than the
         scene's.
     """
-    if margin is not None and not margin > 0:
+    if margin is not None and not 0 < margin < math.inf:
         raise InputError(f"margin: got {margin}, wanted a relative bias above 0, such as 0.005")
+    if pixel is not None and pixel not in PIXELS:
+        raise InputError(f"--pixel {pixel}; wanted 'centre' or 'area'")
     image = read_exr(path)
-    chosen = _chosen_layer(image, layer, path)
-    loaded = scene_of_size(scene, _size(image, chosen, path), path)
-    truth = truth_image(
-        loaded.scene,
-        pixel=pixel,
-        progress=None if progress is None else lambda done, total, what: progress(done / total, what),
-    )
-    expected = chosen if chosen in ("airlight", "surface") else TOTAL
-    layers = {name: values for name, values in image.layers.items() if name in (chosen, f"{chosen}_se")}
-    with_errors = f"{chosen}_se" in layers
+    judged = judged_layer(image, path, name=layer, holds=holds)
+    chosen = None if mask is None else read_mask(mask)
+    loaded = scene_of_size(scene, judged.size, path)
+    truth_of = truths(loaded, progress)
+    fit = fit_pixel(judged, truth_of, pixel)
+    # Light of another kind says nothing of the pixels: either truth may fit it.
+    other = _other_light(judged, [truth_of(each) for each in ((fit.pixel,) if pixel else ("centre", fit.pixel))])
+    fit = replace(fit, hints=replace(fit.hints, words=(*fit.hints.words, *other)))
+    name, with_errors = judged.name, f"{judged.name}_se" in image.layers
+    layers = {name: judged.values} | ({f"{name}_se": image.layers[f"{name}_se"]} if with_errors else {})
+    wanted = truth_layer(fit.truth, judged.holds)
     comparison = compare_images(
-        Image({chosen: truth_layer(truth, expected)}),
+        Image({name: wanted}),
         Image(layers, attributes=image.attributes),
-        layer=chosen,
-        mask=None if mask is None else read_mask(mask),
+        layer=name,
+        mask=chosen,
         margin=margin if with_errors else None,
         all_metrics=all_metrics,
         flip=flip,
         exposure=exposure,
     )
-    hints = find_hints(truth_layer(truth, expected), layers[chosen])
-    if expected == TOTAL:
-        hints = replace(hints, words=(*hints.words, *_without_surface(truth, layers[chosen])))
+    compared = wanted if chosen is None else np.where(chosen[:, :, None], wanted, np.nan)
+    test = judged.values.astype(np.float64)
     return EngineComparison(
         scene=loaded.name,
         path=str(path),
-        size=(int(layers[chosen].shape[1]), int(layers[chosen].shape[0])),
-        pixel=pixel,
-        expected=expected,
-        truth_error=float(truth.airlight_bound.mean() / truth.airlight.mean()) if truth.airlight.any() else 0.0,
+        size=judged.size,
+        fit=fit,
+        expected=judged.holds,
+        truth_error=relative_bound(fit.truth),
         comparison=comparison,
-        hints=hints,
+        place=error_place(compared, test, lamp_distance(loaded, fit.truth)),
+        verdict=judge(compared, test, fit.hints, comparison.failures),
         note=str(image.attributes.get(NOTE, "")),
         margin=margin,
     )
 
 
-def truth_layer(truth: TruthImage, name: str) -> NDArray[np.float64]:
-    """Return 'airlight', 'surface' or their sum, 'total', (height, width, 3) [W/(m^2 sr)]."""
-    return truth.airlight + truth.surface if name == TOTAL else getattr(truth, name)
+def truths(loaded: LoadedScene, progress: Progress | None = None) -> Callable[[str], TruthImage]:
+    """Return a function that computes the truth at pixel centres or over their areas, or takes it from the cache."""
+    tell = None if progress is None else lambda done, total, what: progress(done / total, what)
+    return cache(lambda pixel: truth_image(loaded.scene, pixel=pixel, progress=tell))
+
+
+def relative_bound(truth: TruthImage) -> float:
+    """Return the bound of the error of the airlight relative to its mean, where both are finite."""
+    finite = np.isfinite(truth.airlight) & np.isfinite(truth.airlight_bound)
+    mean = float(truth.airlight[finite].mean()) if finite.any() else 0.0
+    return float(truth.airlight_bound[finite].mean()) / mean if mean > 0 else 0.0
+
+
+def lamp_distance(loaded: LoadedScene, truth: TruthImage) -> NDArray[np.float64]:
+    """Return how far the nearest lamp is from each pixel, (height, width) [pixels in the middle of the image]."""
+    angle = pixel_angle(read_truth(loaded.scene))  # zero in an image of one column
+    return truth.light_angle / angle if angle > 0 else np.full(truth.light_angle.shape, math.inf)
 
 
 def scene_of_size(scene: str, size: tuple[int, int], path: str | os.PathLike[str]) -> LoadedScene:
@@ -181,33 +226,23 @@ def scene_of_size(scene: str, size: tuple[int, int], path: str | os.PathLike[str
     return load_scene(scene, size)
 
 
-def _chosen_layer(image: Image, name: str | None, path: str | os.PathLike[str]) -> str:
-    """Return the layer to judge, checked."""
-    if name is not None:
-        layer(image, name, path)
-        return name or TOTAL
-    colours = [each for each in image.layers if not each.endswith("_se")]
-    for usual in ("airlight", TOTAL):
-        if usual in colours:
-            return usual
-    if len(colours) != 1:
-        raise InputError(
-            f"{path} has no channels R, G, B and no layer 'airlight'; it has "
-            f"{', '.join(sorted(colours)) or 'no layer of colours at all'}; name one by --layer"
-        )
-    return colours[0]
+def _other_light(judged: JudgedLayer, fitting: list[TruthImage]) -> tuple[str, ...]:
+    """Say so where an image is the airlight or the surface alone, or all light, and not what it was taken for."""
+    errors, powers = {}, {}
+    for name in KINDS:
+        layers = [truth_layer(truth, name) for truth in fitting]
+        errors[name] = min(_mean_square(judged.values - values) for values in layers)
+        powers[name] = _mean_square(layers[0])
+    nearest = min(errors, key=errors.__getitem__)
+    # A dim image is near to a layer without light, but not nearer than a tenth of that layer's own.
+    if nearest == judged.holds or not GAIN**2 * errors[nearest] < min(errors[judged.holds], powers[nearest]):
+        return ()
+    if nearest == TOTAL:
+        return ("the image is all light: say --as total",)
+    channels = ", ".join(f"{nearest}.{channel}" for channel in "RGB")
+    return (f"the image is the {nearest} alone: name its channels {channels}, or say --as {nearest}",)
 
 
-def _size(image: Image, name: str, path: str | os.PathLike[str]) -> tuple[int, int]:
-    height, width, _ = layer(image, name, path).shape
-    return width, height
-
-
-def _without_surface(truth: TruthImage, image: NDArray[np.floating]) -> tuple[str, ...]:
-    """Say so where an image of all light is the airlight alone, or the surface alone."""
-    wholes = {"": truth_layer(truth, TOTAL), "airlight": truth.airlight, "surface": truth.surface}
-    errors = {name: float(np.nanmean((image - values) ** 2)) for name, values in wholes.items()}
-    for name in ("airlight", "surface"):
-        if 100 * errors[name] < errors[""]:  # a tenth, before the root
-            return (f"the image is the {name} alone: name its channels {name}.R, {name}.G, {name}.B",)
-    return ()
+def _mean_square(values: NDArray[np.floating]) -> float:
+    finite = values[np.isfinite(values)]
+    return float(np.mean(finite**2)) if finite.size else math.inf

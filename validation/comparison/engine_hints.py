@@ -2,22 +2,31 @@
 """What may be wrong with an image as a whole: a constant factor, another way up, a gamma, values that stop at one.
 
 Such a fault of set-up hides everything else. For each combination of suspects this module takes the faults back,
-computes the root mean square error again, and names those that make it ten times smaller, the fewest first. The factor
-that fits best, in the sense of that same error, is k = sum(t r)/sum(t^2), with t the test image and r the reference.
+computes the root mean square error again, and names those that make it ten times smaller, the fewest first.
+
+The radiance grows without bound towards a lamp, so that one pixel beside it can have most of the error, whatever the
+others are like. Therefore the error that decides leaves out a hundredth of the values that are lit, the worst; and the
+factor that fits best is k = exp(median(log(r/t))) over the values that both images light, with t the test image and r
+the reference.
 """
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import product
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from validation.metrics.errors import FLOOR
+
 Array = NDArray[np.float64]
 
 GAIN = 10.0  #: how many times smaller the error must become for a suspect to be named
-LEAST = 0.01  #: relative rmse below which nothing is suspected
+LEAST = 0.01  #: relative error below which nothing is suspected
+OUTLIERS = 0.01  #: share of the lit values that may be as wrong as they like
+
+_LARGEST = 700.0  # the logarithm of a number that a float can hold
 
 _TURNS: dict[str, Callable[[Array], Array]] = {
     "": lambda image: image,
@@ -47,9 +56,11 @@ _NAMED = {
 class Hints:
     """What may be wrong with an image as a whole."""
 
-    factor: float  #: times which the image fits the reference best; NaN if it is black or not finite
+    factor: float  #: times which the image fits the reference best; NaN if there is none
     factor_rmse: float  #: the relative rmse that is left then
     words: tuple[str, ...]  #: a sentence for each suspect
+    corrected: Array = field(repr=False, compare=False)  #: the image without what was suspected
+    reason: str = ""  #: why there is no factor
 
 
 def find_hints(reference: ArrayLike, test: ArrayLike) -> Hints:
@@ -62,49 +73,80 @@ def find_hints(reference: ArrayLike, test: ArrayLike) -> Hints:
 
     Notes
     -----
-    Pixels that are not finite in either are left out.
+    Values that are not finite in either are left out.
     """
     ref, tst = (np.asarray(values, dtype=np.float64) for values in (reference, test))
-    mean = float(np.mean(ref[np.isfinite(ref)])) if np.isfinite(ref).any() else 0.0
-    if mean <= 0 or not np.isfinite(tst).any():
-        return Hints(math.nan, math.nan, ())
-    factor, error = _fitted(ref, tst)
-    return Hints(factor, error / mean, (*_suspects(ref, tst, mean), *_clipped(ref, tst)))
+    ref = np.where(np.isfinite(ref), ref, np.nan)
+    tst = np.where(np.isfinite(tst), tst, np.nan)
+    if np.isnan(tst).all():
+        return Hints(math.nan, math.nan, (), tst, "the image has no finite value")
+    mean = float(np.nanmean(ref)) if not np.isnan(ref).all() else 0.0
+    if mean <= 0:
+        return Hints(math.nan, math.nan, (), tst, "the truth is black")
+    factor = _fitted(ref, tst)
+    if math.isnan(factor):
+        dark = "wherever the truth is lit" if np.any(np.nan_to_num(tst)) else "everywhere"
+        return Hints(math.nan, math.nan, (), tst, f"the image is black {dark}")
+    corrected, words = _suspects(ref, tst, mean)
+    return Hints(factor, _rmse(ref, factor * tst) / mean, (*words, *_clipped(ref, tst)), corrected)
 
 
-def _suspects(ref: Array, tst: Array, mean: float) -> tuple[str, ...]:
-    """Name the faults without which the error is ten times smaller."""
-    first = smallest = _rmse(ref, tst)
+def _suspects(ref: Array, tst: Array, mean: float) -> tuple[Array, tuple[str, ...]]:
+    """Return the image without the faults that make the error ten times smaller, and their names."""
+    first = smallest = _usual_error(ref, tst)
     hints: tuple[str, ...] = ()
+    corrected, left = tst, math.nan
     if first < LEAST * mean:
-        return hints
+        return corrected, ()
     combinations = sorted(product(_TURNS, _ORDERS, _CURVES, (False, True)), key=lambda changes: sum(map(bool, changes)))
     for turn, order, curve, scaled in combinations:
         changed = _TURNS[turn](_ORDERS[order](_CURVES[curve](tst)))
-        factor, error = _fitted(ref, changed) if scaled else (1.0, _rmse(ref, changed))
-        if not error * GAIN < smallest:  # NaN where the image is black
+        factor = _fitted(ref, changed) if scaled else 1.0
+        error = _usual_error(ref, factor * changed)
+        if not error * GAIN < smallest:  # NaN where no factor fits
             continue
-        smallest = error
+        smallest, corrected, left = error, factor * changed, _rmse(ref, factor * changed)
         words = [f"the image is {fault}" for fault in (turn, order, curve) if fault]
         hints = (*words, f"the image is {_brightness(factor)}") if scaled else tuple(words)
-    fall = f"; without {'it' if len(hints) == 1 else 'all that'} the relative rmse is {smallest / mean:.3g} instead of "
-    return (*hints[:-1], hints[-1] + fall + f"{first / mean:.3g}") if hints else ()
+    if not hints:
+        return corrected, ()
+    fall = f"; without {'it' if len(hints) == 1 else 'all that'} the relative rmse is {left / mean:.3g} instead of "
+    return corrected, (*hints[:-1], hints[-1] + fall + f"{_rmse(ref, tst) / mean:.3g}")
 
 
-def _fitted(ref: Array, tst: Array) -> tuple[float, float]:
-    """Return the factor that fits best, and the rmse that it leaves."""
-    good = np.isfinite(ref) & np.isfinite(tst)
-    power = float(np.sum(tst[good] ** 2))
-    if power == 0 or not math.isfinite(power):
-        return math.nan, math.nan
-    factor = float(np.sum(tst[good] * ref[good])) / power
-    return factor, _rmse(ref, factor * tst)
+def _fitted(ref: Array, tst: Array) -> float:
+    """Return the factor that fits best; NaN if no value is lit in both."""
+    lit = (ref > FLOOR * np.nanmean(ref)) & (np.abs(tst) > 0)
+    if not lit.any():
+        return math.nan
+    sign = float(np.sign(np.median(tst[lit])))
+    # A difference of logarithms: the ratio may be out of range.
+    return sign * _exp(float(np.median(np.log(ref[lit]) - np.log(np.abs(tst[lit])))))
+
+
+def _exp(value: float) -> float:
+    return math.exp(value) if value < _LARGEST else math.nan
+
+
+def _usual_error(ref: Array, tst: Array) -> float:
+    """Return the rmse without the worst hundredth of the values that are lit in either image."""
+    squared = _squared_errors(ref, tst)
+    floor = FLOOR * float(np.nanmean(ref))
+    lit = int(np.count_nonzero((ref > floor) | (tst > floor)))
+    kept = max(len(squared) - int(OUTLIERS * lit), 1)
+    return math.sqrt(float(np.mean(np.partition(squared, kept - 1)[:kept]))) if len(squared) else math.nan
 
 
 def _rmse(ref: Array, tst: Array) -> float:
+    squared = _squared_errors(ref, tst)
+    return math.sqrt(float(np.mean(squared))) if len(squared) else math.nan
+
+
+def _squared_errors(ref: Array, tst: Array) -> Array:
+    """Return the squared errors of the values that are finite in both images, (n,)."""
     difference = tst - ref
-    good = np.isfinite(difference)
-    return float(np.sqrt(np.mean(difference[good] ** 2))) if good.any() else math.nan
+    with np.errstate(over="ignore"):
+        return difference[np.isfinite(difference)] ** 2
 
 
 def _brightness(factor: float) -> str:
@@ -126,7 +168,7 @@ def _clipped(ref: Array, tst: Array) -> tuple[str, ...]:
     if count < 8 or top <= 0 or not (ref[stopped] > 1.02 * top).mean() > 0.5:
         return ()
     return (
-        f"{count} values stop at {top:.4g} where the truth goes up to {ref[stopped].max():.4g}: write floats, "
+        f"{count} values stop at {top:.4g} where the truth goes up to {np.nanmax(ref[stopped]):.4g}: write floats, "
         "without a tone curve",
     )
 

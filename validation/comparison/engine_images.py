@@ -3,7 +3,7 @@
 
 A folder holds SCENE.exr, or SCENE.NAME.exr where several images of a scene are to be told apart. An image with a layer
 `airlight` is judged by that; else its plain channels are judged against airlight plus surface. It is judged at its own
-size: all images of a scene must have the same one.
+size, which all images of a scene must share, and by the truth that fits, at pixel centres or over their areas.
 """
 
 import difflib
@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from reference.quadrature.ray_values import TruthImage
-from reference.storage.exr import NOTE, TOTAL, Image, layer, read_exr
+from reference.storage.exr import NOTE, Image, read_exr
+from validation.comparison.engine_layers import AIRLIGHT, SURFACE, judged_layer, truth_layer
+from validation.comparison.engine_pixels import TruthOf, fit_pixel
 from validation.metrics.errors import Metrics, error_metrics
 from validation.metrics.flip import Flip, flip_hdr
-
-AIRLIGHT = "airlight"
 
 
 @dataclass(frozen=True)
@@ -37,8 +37,10 @@ class ImageMeasurement:
     """How wrong an image from elsewhere is."""
 
     shown: EngineImage
-    image: Image  #: only the layers that were judged
-    layer: str  #: what `error` is of: 'airlight', or 'total' for airlight and surface together
+    image: Image  #: only the layers that were judged, named by what they hold
+    layer: str  #: what `error` is of: 'airlight', 'surface', or 'total' for both together
+    truth: TruthImage  #: what it was compared with
+    pixel: str  #: 'centre' or 'area': what a pixel of that truth is
     error: Metrics
     surface_error: Metrics | None  #: where the image has both layers
     note: str | None  #: what the reader of the file changed or left out
@@ -87,7 +89,7 @@ def images_size(images: tuple[EngineImage, ...]) -> tuple[int, int]:
     InputError
         If two sizes differ, or a file cannot be read.
     """
-    sizes = {image.path: _size(read_exr(image.path)) for image in images}
+    sizes = {image.path: judged_layer(read_exr(image.path), image.path).size for image in images}
     first = images[0]
     for path, size in sizes.items():
         if size != sizes[first.path]:
@@ -98,15 +100,15 @@ def images_size(images: tuple[EngineImage, ...]) -> tuple[int, int]:
     return sizes[first.path]
 
 
-def measure_image(shown: EngineImage, truth: TruthImage, *, surfaces: bool) -> ImageMeasurement:
+def measure_image(shown: EngineImage, truth_of: TruthOf, *, surfaces: bool) -> ImageMeasurement:
     """Compare an image from elsewhere with the truth of its scene at its size.
 
     Parameters
     ----------
     shown
         The image.
-    truth
-        The quadrature truth.
+    truth_of
+        Computes the quadrature truth for 'centre' or 'area'.
     surfaces
         Whether the scene has surfaces at all.
 
@@ -116,16 +118,22 @@ def measure_image(shown: EngineImage, truth: TruthImage, *, surfaces: bool) -> I
         If the file cannot be read, has none of the layers, or has another size than the truth.
     """
     image = read_exr(shown.path)
-    note = str(image.attributes[NOTE]) if NOTE in image.attributes else None
-    if AIRLIGHT in image.layers:
-        layers = {name: image.layers[name] for name in (AIRLIGHT, "surface") if name in image.layers}
-        of, expected = AIRLIGHT, truth.airlight
-    else:
-        layers = {TOTAL: layer(image, TOTAL, shown.path)}
-        of, expected = TOTAL, truth.airlight + truth.surface
-    error = error_metrics(expected, layers[of])
-    surface = error_metrics(truth.surface, layers["surface"]) if surfaces and "surface" in layers else None
-    return ImageMeasurement(shown, Image(layers), of, error, surface, note)
+    judged = judged_layer(image, shown.path)
+    layers = {judged.holds: judged.values}
+    if judged.name == AIRLIGHT and SURFACE in image.layers:
+        layers[SURFACE] = image.layers[SURFACE]
+    fit = fit_pixel(judged, truth_of)
+    error = error_metrics(truth_layer(fit.truth, judged.holds), judged.values)
+    surface = (
+        error_metrics(fit.truth.surface, layers[SURFACE])
+        if surfaces and AIRLIGHT in layers and SURFACE in layers
+        else None
+    )
+    notes = [str(image.attributes[NOTE])] if NOTE in image.attributes else []
+    notes += ["judged by the means over the areas of pixels, which fit"] if fit.pixel == "area" else []
+    return ImageMeasurement(
+        shown, Image(layers), judged.holds, fit.truth, fit.pixel, error, surface, "; ".join(notes) or None
+    )
 
 
 def image_flip(measured: ImageMeasurement, truth: TruthImage) -> Flip | None:
@@ -138,11 +146,6 @@ def image_flip(measured: ImageMeasurement, truth: TruthImage) -> Flip | None:
 
 def _light(image: Image) -> NDArray[np.float64]:
     return np.sum([np.asarray(values, dtype=np.float64) for values in image.layers.values()], axis=0)
-
-
-def _size(image: Image) -> tuple[int, int]:
-    height, width, _ = next(iter(image.layers.values())).shape
-    return width, height
 
 
 def _scene_of(path: Path, scenes: Mapping[str, str]) -> str:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Comparison of two image files: how large the error is, and whether it is more than noise."""
 
+import math
 import os
 from dataclasses import dataclass
 from typing import Any
@@ -11,13 +12,14 @@ from numpy.typing import ArrayLike, NDArray
 from analytic.errors import InputError
 from reference.storage.exr import TOTAL, Image, read_exr
 from reference.storage.exr import layer as image_layer
-from validation.comparison.compare_text import colour_lines, errors_lines, flip_line, percent, statistics_lines
+from validation.comparison.compare_text import colour_lines, errors_lines, flip_line, percent, shown, statistics_lines
 from validation.metrics.colour import ColourDifference, colour_difference
 from validation.metrics.errors import Metrics, error_metrics
 from validation.metrics.flip import Flip, flip_hdr
 from validation.metrics.other_tools import PublishedErrors, published_errors
 from validation.statistics.comparison import Estimate, Statistics, compare_statistics
 
+STOPS = 200.0  #: the largest exposure, more than float32 images can need
 BATCHES = "airlight:batches"  #: header attribute: how many batch means gave the standard errors
 
 
@@ -67,10 +69,12 @@ class Comparison:
         lines = [
             f"layer            {self.layer}, {m.pixels} pixels, {self.masked} masked, {m.nonfinite} not finite, "
             f"{m.negative} negative",
-            f"bias             {m.bias:.4g} W/(m^2 sr), relative {percent(m.relative_bias)}",
-            f"rmse             {m.rmse:.4g} W/(m^2 sr), relative {percent(m.relative_rmse)}",
-            f"relative error   p50 {m.p50:.3g}, p99 {m.p99:.3g}, max {m.max:.3g}",
+            f"bias             {shown(m.bias)} W/(m^2 sr), relative {percent(m.relative_bias)}",
+            f"rmse             {shown(m.rmse)} W/(m^2 sr), relative {percent(m.relative_rmse)}",
+            f"relative error   p50 {shown(m.p50, 3)}, p99 {shown(m.p99, 3)}, max {shown(m.max, 3)}",
         ]
+        if math.isfinite(m.bias) and not math.isfinite(m.relative_bias):
+            lines.append("  undefined      the mean of the reference is not above zero: nothing is relative to it")
         if self.statistics is not None:
             lines += statistics_lines(self.statistics)
         for errors in (self.errors, self.errors_normalised):
@@ -180,6 +184,8 @@ def _compare(
     """Compare a layer of two images that have names."""
     if extras.exposure is not None and not (extras.all_metrics or extras.flip):
         raise InputError("an exposure is for the colour differences and FLIP; ask for all metrics or for FLIP too")
+    if extras.exposure is not None and not abs(extras.exposure) <= STOPS:
+        raise InputError(f"exposure: got {extras.exposure:g} stops, wanted -{STOPS:g} to {STOPS:g}")
     reference, test = (_estimate(path, image, name) for path, image in (reference_image, test_image))
     metrics = error_metrics(reference.mean, test.mean, mask=mask)
     statistics = None

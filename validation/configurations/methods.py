@@ -98,15 +98,16 @@ def configuration(
         record = find_method(method)
     except MethodError as error:
         raise InputError(str(error)) from error
-    if not record.uses_kernel and kernel is not None:
-        raise InputError(f"method {method}: got the kernel {kernel!r}, but this method calls no kernel: leave it out")
-    if record.uses_kernel:
-        kernel = kernel or "exact"
-        find_kernel(kernel)
     try:
         chosen = read_parameters(method, record.parameters, parameters or {})
     except MethodError as error:
         raise InputError(str(error)) from error
+    uses_kernel = record.uses_kernel(chosen)
+    if not uses_kernel and kernel is not None:
+        raise InputError(f"method {method}: got the kernel {kernel!r}, but this method calls no kernel: leave it out")
+    if uses_kernel:
+        kernel = kernel or "exact"
+        find_kernel(kernel)
     return Configuration(method, kernel, tuple((name, getattr(chosen, name)) for name in parameters or {}))
 
 

@@ -3,6 +3,7 @@
 
 Read in this order:
 
+- `light_on_ray.py`: refuses radiance that is infinite;
 - `quadrature.py`: the quadrature image of a scene;
 - `monte_carlo.py`: batches of a Monte Carlo estimator;
 - `budget.py`: when a Monte Carlo run ends;

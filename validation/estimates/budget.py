@@ -80,7 +80,7 @@ def _power_of_two(number: int) -> int:
 
 @dataclass(frozen=True)
 class RelativeErrors:
-    """Relative standard errors of an image [1], see the module; 0 where nothing is lit."""
+    """Relative standard errors of an image [1], see the module; 0 in the dark, infinite for what is not finite."""
 
     pooled: float  #: of the sum of all pixels' errors, the largest of all layers and channels
     worst: float  #: of a single pixel
@@ -93,6 +93,8 @@ def relative_errors(batches: Batches, near: NDArray[np.bool_]) -> RelativeErrors
         keep = ~near if layer == "airlight" else np.ones_like(near)
         mean, error = batches.mean[number][keep], batches.standard_error[number][keep]
         total = mean.sum(axis=0)
+        if not (np.isfinite(total).all() and np.isfinite(error).all()):
+            return RelativeErrors(np.inf, np.inf)  # no target is met by what is no number
         lit = total > 0
         if not lit.any():
             continue

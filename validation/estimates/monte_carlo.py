@@ -23,11 +23,14 @@ from analytic.errors import InputError
 from reference.monte_carlo.batches import LARGEST_SEED, Batches, merged
 from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
 from reference.monte_carlo.volpath.integrator import volpath_batch
+from reference.quadrature.surface import surface_hits
 from reference.scene.read import read_truth
 from reference.storage.cache import cache_folder, drop_arrays, is_kept, load_arrays, store_arrays, sweep
 from reference.storage.cache_size import make_room
 from reference.storage.files import NO_SPACE
 from reference.storage.scene_digest import cache_key
+from reference.storage.stopping import hint_when_stopped
+from validation.estimates.light_on_ray import check_camera, check_rays
 
 Progress = Callable[[int, int, str], None]
 Trace = Callable[[int], Batches]  # from the seed
@@ -88,7 +91,7 @@ def monte_carlo_batches(
     Raises
     ------
     InputError
-        If a seed would be out of range.
+        If a seed would be out of range, if a ray meets a light, and for samples that are not finite.
     KeyboardInterrupt
         With a word on how many batches are kept.
     OSError
@@ -96,6 +99,11 @@ def monte_carlo_batches(
     """
     if batches < 2:
         raise ValueError(f"batches: got {batches}, wanted at least 2 for a standard error")
+    if batches > LARGEST_SEED:
+        raise InputError(
+            f"samples: got {batches * samples} a pixel, in {batches} batches of {samples}; wanted at most "
+            f"{LARGEST_SEED * samples}: each batch has a seed of its own"
+        )
     if not 0 <= first_seed <= LARGEST_SEED - batches:
         raise InputError(
             f"seed: got {first_seed} for {batches} batches, which count up; wanted 0 to {LARGEST_SEED - batches}"
@@ -122,15 +130,16 @@ def monte_carlo_batches(
         return batch
 
     try:
-        done = None
-        for seeds in _blocks(first_seed, batches):
-            block, whole = _block(folder, seeds, samples, tally=tally, batch_of=kept_or_traced)
-            if block is not None:
-                done = block if done is None else merged(done, block)
-            if not whole or (enough is not None and 2 <= tally["done"] < batches and enough(_all(done))):
-                break
+        with hint_when_stopped(lambda: _go_on(tally)):
+            done = None
+            for seeds in _blocks(first_seed, batches):
+                block, whole = _block(folder, seeds, samples, tally=tally, batch_of=kept_or_traced)
+                if block is not None:
+                    done = block if done is None else merged(done, block)
+                if not whole or (enough is not None and 2 <= tally["done"] < batches and enough(_all(done))):
+                    break
     except KeyboardInterrupt:
-        raise KeyboardInterrupt(f"{_kept(tally)}; run again to go on") from None
+        raise KeyboardInterrupt(_go_on(tally)) from None
     except OSError as error:
         if error.errno not in NO_SPACE:
             raise
@@ -147,6 +156,8 @@ def _all(done: Batches | None) -> Batches:
 
 def _tracer(scene, estimator: str, samples: int, max_depth: int, counts: NDArray[np.integer] | None) -> Trace:
     truth = read_truth(scene)
+    check_camera(truth)
+    check_rays(truth, surface_hits(truth).distance)
     if estimator == "volpath":
         return lambda seed: volpath_batch(truth, seed, samples, max_depth=max_depth, counts=counts)
     if estimator == "single-scatter" and max_depth == 2 and counts is None:
@@ -201,6 +212,9 @@ def _load(folder: str, seeds: range, samples: int, tally: Counter[str]) -> Batch
     if stored is None:
         tally["damaged"] += is_kept(name)
         return None
+    if not np.isfinite(stored["mean"]).all():  # kept by a version that did not look
+        tally["damaged"] += 1
+        return None
     tally["cached"] += len(seeds)
     squares = stored["squares"] if len(seeds) > 1 else np.zeros_like(stored["mean"])
     return Batches(tuple(seeds), samples, stored["mean"], squares, stored["totals"])
@@ -208,3 +222,7 @@ def _load(folder: str, seeds: range, samples: int, tally: Counter[str]) -> Batch
 
 def _kept(tally: Counter[str]) -> str:
     return f"{tally['done']} finished batches are kept" if tally["done"] else "nothing was finished yet"
+
+
+def _go_on(tally: Counter[str]) -> str:
+    return f"{_kept(tally)}; run again to go on"

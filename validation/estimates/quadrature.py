@@ -7,10 +7,12 @@ from typing import Any
 
 from reference.quadrature.image import quadrature_image
 from reference.quadrature.ray_values import TruthImage
+from reference.quadrature.surface import surface_hits
 from reference.scene.read import read_truth
 from reference.storage.cache import load_arrays, store_arrays
 from reference.storage.cache_size import make_room
 from reference.storage.scene_digest import cache_key
+from validation.estimates.light_on_ray import check_camera, check_rays, check_values
 
 Progress = Callable[[int, int, str], None]
 
@@ -31,6 +33,11 @@ def truth_image(
         The `mi.Scene`.
     samples, shadow_scale, pixel, progress
         See `reference.quadrature.image.quadrature_image`.
+
+    Raises
+    ------
+    InputError
+        For a scene that cannot be read, and for radiance that is not finite, see `validation.estimates.light_on_ray`.
     """
     # The key names only what differs from the usual, so that images that were kept before are found.
     settings: dict[str, Any] = {"samples": samples, "shadow_scale": shadow_scale}
@@ -42,7 +49,12 @@ def truth_image(
     if stored is not None and set(stored) == {field.name for field in fields(TruthImage)}:
         return TruthImage(**{field.name: _as_kept(field, stored[field.name]) for field in fields(TruthImage)})
     make_room()
-    image = quadrature_image(read_truth(scene), **settings, progress=progress)
+    truth = read_truth(scene)
+    check_camera(truth)
+    if pixel == "centre":
+        check_rays(truth, surface_hits(truth).distance)
+    image = quadrature_image(truth, **settings, progress=progress)
+    check_values(truth, image)
     store_arrays(key, {field.name: getattr(image, field.name) for field in fields(TruthImage)})
     return image
 

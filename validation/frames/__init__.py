@@ -4,6 +4,7 @@
 Read in this order:
 
 - `benchmark.py`: the time and the error of one configuration in one scene;
+- `expected_work.py`: what a command will take, and the question before it starts;
 - `scene_study.py`: all that a report asks of one scene, by effort;
 - `result_cache.py`: results on disk, so that a report computes only what changed;
 - `baseline_runs.py`: measures the errors that baselines keep;
@@ -12,7 +13,7 @@ Read in this order:
 - `plane_stability.py`: hard cases for sums over shadow planes;
 - `zero_cost.py`: checks that what a scene does not need costs nothing.
 
-May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.kernels`, `realtime.methods`, `realtime.scene`,
-`reference.quadrature`, `reference.scene`, `reference.storage`, `validation.configurations`, `validation.estimates`,
-`validation.metrics`, `validation.scenes`, `validation.statistics`.
+May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.kernels`, `realtime.memory`, `realtime.methods`,
+`realtime.scene`, `reference.quadrature`, `reference.scene`, `reference.storage`, `validation.configurations`,
+`validation.estimates`, `validation.metrics`, `validation.scenes`, `validation.statistics`.
 """

@@ -4,7 +4,10 @@
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
+from analytic.errors import InputError as TruthError
 from realtime.errors import InputError
 from realtime.frame.recorded import Frozen
 from realtime.frame.renderer import Frame, render_frame
@@ -17,12 +20,26 @@ from validation.configurations.timing import FrameTimes, time_frame
 from validation.estimates.quadrature import truth_image
 from validation.metrics.errors import Metrics, error_metrics
 from validation.metrics.flip import Flip, flip_hdr
-from validation.scenes.loading import LoadedScene
+from validation.scenes.loading import LoadedScene, load_scene
 
 Progress = Callable[[int, int, str], None]
+#: Calls a function with arguments in another process: ``apart(function, *arguments, name=the method's)``.
+Apart = Callable[..., Any]
 
 _DOUBTFUL = 0.3  # after a longer preparation, a small frame is rendered before the large one [s]
 _LONG = 25.0  # after a longer first frame, compilation included, no larger frame is timed [s]
+
+
+@dataclass(frozen=True)
+class Rendering:
+    """A frame by one configuration and its cost, not yet compared with anything."""
+
+    frame: Frame | None  #: None if the method refused the scene
+    times: FrameTimes | None
+    knows_shadows: bool  #: whether it renders volumetric shadows
+    refused: str | None = None  #: why there is no frame
+    left_out: bool = False  #: whether only the time speaks against this configuration, which could render the scene
+    note: str | None = None  #: how its times differ from those of other configurations
 
 
 @dataclass(frozen=True)
@@ -38,6 +55,7 @@ class Measurement:
     refused: str | None = None  #: why there is no frame
     left_out: bool = False  #: whether only the time speaks against this configuration, which could render the scene
     note: str | None = None  #: how its times differ from those of other configurations
+    knows_shadows: bool | None = None  #: whether it renders volumetric shadows; None: the method's record says it
 
 
 def configurations_for(
@@ -64,6 +82,7 @@ def measure(
     slow: float | None = None,
     limit: float | None = None,
     probe: Callable[[], Scene] | None = None,
+    render: Callable[[], Rendering] | None = None,
 ) -> Measurement:
     """Render, compare and time one configuration.
 
@@ -75,18 +94,73 @@ def measure(
         The configuration.
     truth
         The quadrature truth of the same scene.
-    timed
-        The scene at the size of the timed frames; None if that is the size of the truth.
-    seconds
-        Time to spend on each timing.
+    timed, seconds, slow, limit, probe
+        See `render_and_time`.
     with_flip
         Whether to compute HDR-FLIP; if the package is missing, the result holds a note.
+    render
+        Renders and times instead of `render_and_time`, in another process.
+    """
+    if render is None:
+        rendered = render_and_time(scene, chosen, timed=timed, seconds=seconds, slow=slow, limit=limit, probe=probe)
+    else:
+        try:
+            rendered = render()
+        except (InputError, TruthError) as error:
+            rendered = Rendering(None, None, True, refused=str(error))
+    frame = rendered.frame
+    if frame is None:
+        return Measurement(
+            chosen,
+            None,
+            None,
+            None,
+            None,
+            refused=rendered.refused,
+            left_out=rendered.left_out,
+            knows_shadows=rendered.knows_shadows,
+        )
+    return Measurement(
+        chosen,
+        frame,
+        rendered.times,
+        error_metrics(truth.airlight, frame.airlight),
+        error_metrics(truth.surface, frame.surface) if scene.features.surfaces else None,
+        flip_hdr(truth.airlight + truth.surface, frame.airlight + frame.surface) if with_flip else None,
+        note=rendered.note,
+        knows_shadows=rendered.knows_shadows,
+    )
+
+
+def render_and_time(
+    scene: Scene,
+    chosen: Configuration,
+    *,
+    timed: Scene | None = None,
+    seconds: float = 0.6,
+    slow: float | None = None,
+    limit: float | None = None,
+    probe: Callable[[], Scene] | None = None,
+) -> Rendering:
+    """Render and time one configuration.
+
+    Parameters
+    ----------
+    scene
+        From `realtime.scene.read_scene.read_scene`.
+    chosen
+        The configuration.
+    timed
+        The scene at the size of the timed frames; None if that is the size of the scene.
+    seconds
+        Time to spend on each timing.
     slow
         See `validation.configurations.timing.time_frame` [s].
     limit, probe
         A configuration is left out if a frame of it would take longer than `limit` [s]. The estimate comes from a frame
         of the small scene that `probe` returns. It is made only after a long preparation and for a user's own method.
     """
+    shadows = knows_shadows(chosen)
     try:
         begin = time.perf_counter()
         renderer = prepared(scene, chosen)
@@ -94,12 +168,12 @@ def measure(
         if limit is not None and probe is not None and doubtful:
             reason = _too_long(probe(), chosen, scene, limit)
             if reason:
-                return Measurement(chosen, None, None, None, None, refused=reason, left_out=True)
+                return Rendering(None, None, shadows, refused=reason, left_out=True)
         begin = time.perf_counter()
         frame = render_frame(renderer)
         took = time.perf_counter() - begin
     except InputError as error:
-        return Measurement(chosen, None, None, None, None, refused=str(error))
+        return Rendering(None, None, shadows, refused=str(error))
     notes = []
     if timed is not None and took > _LONG:
         timed = None
@@ -107,15 +181,39 @@ def measure(
     if chosen.own and not isinstance(renderer.render, Frozen):
         notes.append("not frozen: its Python runs again for every frame")
     times = time_frame(renderer if timed is None else prepared(timed, chosen), seconds=seconds, slow=slow)
-    return Measurement(
+    return Rendering(frame, times, shadows, note="; ".join(notes) or None)
+
+
+def render_and_time_by_name(
+    name_or_path: str,
+    size: tuple[int, int],
+    chosen: Configuration,
+    *,
+    timed: tuple[int, int] | None = None,
+    probe: tuple[int, int] | None = None,
+    seconds: float = 0.6,
+    slow: float | None = None,
+    limit: float | None = None,
+) -> Rendering:
+    """Do what `render_and_time` does in a process that has loaded nothing: scenes are named, with their sizes."""
+
+    def at(size: tuple[int, int]) -> Scene:
+        return read_scene(load_scene(name_or_path, size).scene)
+
+    return render_and_time(
+        at(size),
         chosen,
-        frame,
-        times,
-        error_metrics(truth.airlight, frame.airlight),
-        error_metrics(truth.surface, frame.surface) if scene.features.surfaces else None,
-        flip_hdr(truth.airlight + truth.surface, frame.airlight + frame.surface) if with_flip else None,
-        note="; ".join(notes) or None,
+        timed=None if timed is None or timed == size else at(timed),
+        seconds=seconds,
+        slow=slow,
+        limit=limit,
+        probe=None if probe is None else lambda: at(probe),
     )
+
+
+def render_by_name(name_or_path: str, size: tuple[int, int], chosen: Configuration) -> Frame:
+    """Render a frame in a process that has loaded nothing."""
+    return render_frame(prepared(read_scene(load_scene(name_or_path, size).scene), chosen))
 
 
 def _too_long(probe: Scene, chosen: Configuration, scene: Scene, limit: float) -> str | None:
@@ -136,14 +234,32 @@ def _too_long(probe: Scene, chosen: Configuration, scene: Scene, limit: float) -
 
 
 def bench(
-    loaded: LoadedScene, configurations: Sequence[Configuration] = STANDARD, *, progress: Progress | None = None
+    loaded: LoadedScene,
+    configurations: Sequence[Configuration] = STANDARD,
+    *,
+    apart: Apart | None = None,
+    progress: Progress | None = None,
 ) -> Iterator[tuple[Scene, Measurement]]:
-    """Yield the measurements of a scene's configurations at its own size, one after the other."""
+    """Yield the measurements of a scene's configurations at its own size, one after the other.
+
+    Methods of the user's own are called by `apart`, if given.
+    """
     scene = read_scene(loaded.scene)
     chosen = configurations_for(scene.features, configurations)
     truth = truth_image(loaded.scene)
     for number, configuration in enumerate(chosen):
-        yield scene, measure(scene, configuration, truth=truth)
+        render = None
+        if configuration.own and apart is not None:
+            size = scene.camera.width, scene.camera.height
+            render = partial(
+                apart,
+                render_and_time_by_name,
+                str(loaded.path or loaded.name),
+                size,
+                configuration,
+                name=configuration.method,
+            )
+        yield scene, measure(scene, configuration, truth=truth, render=render)
         if progress is not None:
             progress(number + 1, len(chosen), loaded.name)
 

@@ -7,7 +7,7 @@ Each part is a function of its own, so that a report can reuse earlier results a
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 from realtime.scene.read_scene import Scene, read_scene
@@ -17,7 +17,7 @@ from validation.configurations.methods import QUICK, Configuration
 from validation.estimates.agreement import Agreement, agreements
 from validation.estimates.multiple_scattering import MultipleScattering, multiple_scattering_share
 from validation.estimates.quadrature import truth_image
-from validation.frames.benchmark import Measurement, measure
+from validation.frames.benchmark import Apart, Measurement, measure, render_and_time_by_name
 from validation.metrics.flip import flip_hdr
 from validation.scenes.loading import LoadedScene, load_scene
 from validation.scenes.registry import SCENES
@@ -50,6 +50,7 @@ class Effort:
     rays: int = 0  #: number of generated rays for the stability of kernels; 0 leaves it out
     papers: tuple[str, ...] = ()  #: papers whose tables are measured again: 'biri', 'billeter'
     paper_kernels: tuple[str, ...] = ("exact",)  #: kernels of these tables
+    fidelity: bool = False  #: whether to measure the claims of papers that need images
 
     def at(self, size: tuple[int, int] | None) -> "Effort":
         """Return the effort with images and timed frames of another size [pixels]; itself for None."""
@@ -94,6 +95,7 @@ EFFORTS: dict[str, Effort] = {
             flip="kinds",
             rays=10_000,
             papers=("biri",),
+            fidelity=True,
         ),
         Effort(
             "full",
@@ -114,6 +116,7 @@ EFFORTS: dict[str, Effort] = {
             rays=100_000,
             papers=("biri", "billeter"),
             paper_kernels=("exact", "taylor"),
+            fidelity=True,
         ),
     )
 }
@@ -148,8 +151,12 @@ class SceneStudy:
 
     @cached_property
     def truth(self) -> TruthImage:
-        """The quadrature truth."""
+        """The quadrature truth at pixel centres."""
         return truth_image(self.loaded.scene)
+
+    def truth_of(self, pixel: str) -> TruthImage:
+        """Return the quadrature truth at pixel centres, or its means over their areas: 'centre' or 'area'."""
+        return self.truth if pixel == "centre" else truth_image(self.loaded.scene, pixel=pixel)
 
     @property
     def name(self) -> str:
@@ -185,9 +192,24 @@ def study_multiple(study: SceneStudy) -> MultipleScattering:
     return multiple_scattering_share(study.at(_MULTIPLE).scene, batches=batches, samples=samples)
 
 
-def study_configuration(study: SceneStudy, chosen: Configuration) -> Measurement:
-    """Measure a configuration against the truth, without HDR-FLIP, which `with_flips` adds."""
+def study_configuration(study: SceneStudy, chosen: Configuration, *, apart: Apart | None = None) -> Measurement:
+    """Measure a configuration against the truth, without HDR-FLIP, which `with_flips` adds.
+
+    A method of the user's own is called by `apart`, if given.
+    """
     effort = study.effort
+    render = None
+    if chosen.own and apart is not None:
+        name = str(study.loaded.path or study.loaded.name)
+        function = partial(
+            render_and_time_by_name,
+            timed=effort.timed,
+            probe=_PROBE,
+            seconds=effort.seconds,
+            slow=effort.slow,
+            limit=effort.limit,
+        )
+        render = partial(apart, function, name, effort.image, chosen, name=chosen.method)
     return measure(
         study.scene,
         chosen,
@@ -197,6 +219,7 @@ def study_configuration(study: SceneStudy, chosen: Configuration) -> Measurement
         slow=effort.slow,
         limit=effort.limit,
         probe=lambda: study.probe,
+        render=render,
     )
 
 

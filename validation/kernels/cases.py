@@ -10,12 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.cases import Cases
+from analytic.errors import InputError
 from reference.storage.files import write_text
 from validation.configurations.kernel_names import find_kernel
 from validation.kernels.values import evaluate_rows
 
 Array = NDArray[np.float64]
 
+#: Largest number of a case in a precision: its square must be one too [m, 1/m].
+LARGEST = {"single": 1e18, "double": 1e150}
 _TINY = 1e-37  # below this float32 has no normal numbers: such values are compared in absolute terms
 
 
@@ -30,13 +33,60 @@ def integrate_cases(cases: Cases, kernel: str, precision: str) -> Array:
         See `validation.configurations.kernel_names.find_kernel`.
     precision
         'single' or 'double'.
+
+    Raises
+    ------
+    InputError
+        For a number that the precision cannot square, and for an unknown kernel.
     """
     function = find_kernel(kernel)
+    for name in ("foot", "height", "x0", "x1", "sigma_t"):
+        values = getattr(cases, name)
+        large = (np.abs(values) > LARGEST.get(precision, np.inf)) & np.isfinite(values)
+        if large.any():
+            row = int(np.argmax(large))
+            raise InputError(
+                f"{_place(cases, row)}: {name} is {values[row]:g}; wanted at most {LARGEST[precision]:g} in "
+                f"{precision} precision: use other units"
+            )
     results = np.empty(len(cases.x0))
     for name in dict.fromkeys(cases.phase):
         rows = np.flatnonzero(np.asarray(cases.phase) == name)
         results[rows] = evaluate_rows(cases, rows, function, precision)
     return results
+
+
+def check_results(cases: Cases, results: Array, kernel: str) -> None:
+    """Refuse results that are not finite, by the first row.
+
+    Parameters
+    ----------
+    cases
+        The cases.
+    results
+        J of every case [1/m], (n,).
+    kernel
+        The name of what gave them.
+
+    Raises
+    ------
+    InputError
+        If a result is not finite.
+    """
+    wrong = ~np.isfinite(results)
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        hint = f"{kernel} is not valid there: use another kernel"
+        if cases.height[row] < 1e-30 and cases.x0[row] <= cases.foot[row] <= cases.x1[row]:
+            hint = "the light lies on the segment, and J, which grows like 1/height, is infinite: give a larger height"
+        raise InputError(
+            f"{_place(cases, row)}: the result is {results[row]:g}, and {int(wrong.sum())} of {len(results)} rows are "
+            f"not finite; {hint}"
+        )
+
+
+def _place(cases: Cases, row: int) -> str:
+    return f"line {row + 2}" if cases.rows else f"row {row}"
 
 
 def summary(cases: Cases, results: Array) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from analytic.cases import Cases
 from validation.kernels.rays import case_row
+from validation.kernels.underflow import underflow_allowance
 from validation.kernels.values import Values
 
 Array = NDArray[np.float64]
@@ -46,8 +47,8 @@ def groups(cases: Cases) -> dict[str, Rows]:
     return groups | {f"phase {name}": phases == name for name in sorted(set(cases.phase))}
 
 
-def relative_error(results: Array, expected: Array, precision: str) -> Array:
-    """Return |results - expected| / |expected| [1], NaN where either is not finite.
+def relative_error(results: Array, expected: Array, precision: str, allowance: Array | float = 0.0) -> Array:
+    """Return |results - expected| / |expected| [1] beyond an allowance, NaN where either is not finite.
 
     Parameters
     ----------
@@ -55,9 +56,11 @@ def relative_error(results: Array, expected: Array, precision: str) -> Array:
         J [1/m], (n,) each.
     precision
         'single' or 'double', of the results.
+    allowance
+        What each may be off without an error, `validation.kernels.underflow.underflow_allowance`, (n,) [1/m].
     """
     with np.errstate(invalid="ignore", over="ignore"):
-        error = np.abs(results - expected) / np.maximum(np.abs(expected), TINY[precision])
+        error = np.maximum(np.abs(results - expected) - allowance, 0.0) / np.maximum(np.abs(expected), TINY[precision])
     return np.where(np.isfinite(results) & np.isfinite(expected), error, np.nan)
 
 
@@ -87,7 +90,7 @@ def errors_by_group(
     expected = cases.value if expected is None else expected
     if expected is None:
         raise ValueError("cases: got cases without `value`, wanted the true J of each")
-    error = relative_error(values.J, expected, precision)
+    error = relative_error(values.J, expected, precision, underflow_allowance(cases, precision))
     return {name: _errors(cases, values, error, np.isfinite(expected), group) for name, group in rows.items()}
 
 

@@ -70,7 +70,8 @@ class Bar:
     """What an exact kernel keeps: the maxima on every set of rays, the quantiles on the certified ones.
 
     Tables are left out, whose kinks no rule of fixed cost resolves, but not where values are NaN, infinite or negative.
-    The quantiles describe the certified cases; how many generated rays are hard is a matter of taste.
+    The quantiles describe the certified cases; how many generated rays are hard is a matter of taste. What a processor
+    flushes to zero on the way is no error: `validation.kernels.underflow` derives how much that can be.
     """
 
     single_max: float = 3e-5  #: in float32, for |g| <= 0.9

@@ -8,5 +8,5 @@ Read in this order:
 - `colour.py`: CIEDE2000 and Delta E ITP;
 - `flip.py`: HDR-FLIP, by its authors' code in a process of its own.
 
-May import: `analytic.errors`.
+May import: `analytic.errors`, `reference.storage`.
 """

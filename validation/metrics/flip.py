@@ -24,15 +24,14 @@ The number depends a little on the operating system (the project's note on preci
 
 import subprocess
 import sys
-import tempfile
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analytic.errors import InputError
+from reference.storage.files import temporary_folder
 from validation.metrics.errors import colours, compared, plain
 
 PIXELS_PER_DEGREE = 67.0  #: of visual angle: a screen of 3840 pixels, 0.7 m wide, seen from 0.7 m
@@ -188,8 +187,8 @@ def _unanswerable(ref: NDArray[np.float64], tst: NDArray[np.float64]) -> str:
 
 def _in_child(inputs: dict[str, Any], timeout: float) -> NDArray[np.float32] | str:
     """Run FLIP in a process of its own; return its map, or what went wrong."""
-    with tempfile.TemporaryDirectory(prefix="airlight-flip-") as folder:
-        input_file, map_file = Path(folder, "inputs.npz"), Path(folder, "map.npy")
+    with temporary_folder() as folder:
+        input_file, map_file = folder / "inputs.npz", folder / "map.npy"
         np.savez(input_file, **inputs)
         try:
             # -P: a file of that name in the current folder is not the package.

@@ -4,6 +4,7 @@
 Read in this order:
 
 - `biri.py`: Tables 1 and 2 of Biri, Arques, Michelin 2006;
+- `constant_distance.py`: how wrong the constant R of their section 4.2 is, by size and depth;
 - `billeter_images.py`: Figures 6 and 7 of Billeter, Sintorn, Assarsson 2010;
 - `billeter_tessellation.py`: their Table 1;
 - `billeter_conclusions.py`: which of their conclusions hold here.

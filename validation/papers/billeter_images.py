@@ -9,7 +9,9 @@ all directions, so its map has six faces.
 Every frame is compared at one pixel in `stride` along both axes, with two images: with the truth, and with the volume
 that its own shadow map bounds, the height field met by the same rays in float64 (`validation.oracles.light_volume`).
 The second error of a marcher comes from its steps and from the steps of the map, which it looks up without
-interpolation.
+interpolation. The paper's marcher samples the visibility and evaluates the airlight where that changes
+(`realtime.methods.ray_march`, ``sum=transitions``). The usual one, which sums the integrand, stands beside it as a
+peer.
 """
 
 import time
@@ -60,7 +62,18 @@ class FigureEntry:
     def configuration(self, kernel: str) -> Configuration:
         """Return the configuration to measure with a kernel."""
         values = dict(self.parameters) | {"map": self.map}
-        return configuration(self.method, None if self.method == "ray-march" else kernel, values)
+        sums_integrand = self.method == "ray-march" and "sum" not in values
+        return configuration(self.method, None if sums_integrand else kernel, values)
+
+    @property
+    def volume(self) -> str | None:
+        """Of a light volume, which form of it, by a name of `VOLUMES`; None for other methods."""
+        if self.method != "light-volumes":
+            return None
+        values = dict(self.parameters)
+        if values.get("evaluation") == "mesh":
+            return "mesh"
+        return "upright walk" if self.upright else "walk"
 
     @property
     def upright(self) -> bool:
@@ -68,6 +81,8 @@ class FigureEntry:
         return dict(self.parameters).get("walls") == "upright"
 
 
+#: The forms of the light volume: as published, its height field walked, and that with upright walls.
+VOLUMES = ("mesh", "walk", "upright walk")
 TILES = "tiles"  #: `where` of rows whose airlight is interpolated between the corners of tiles
 _TOLERANCE = ("tolerance", TOLERANCE)
 _MESH: tuple[tuple[str, float | str], ...] = (("evaluation", "mesh"),)
@@ -79,15 +94,21 @@ def _march(steps: int) -> tuple[tuple[str, float | str], ...]:
     return (("steps", steps), ("spacing", "uniform"), ("shadow", "map"))
 
 
+#: The marcher of the paper evaluates the airlight where the visibility changes.
+_TRANSITIONS: tuple[tuple[str, float | str], ...] = (("sum", "transitions"),)
+
+
 FIGURES: tuple[FigureEntry, ...] = (
     *(
         FigureEntry(where, "omni-box", size, "light-volumes", how, fps)
         for where, size, fps in (("Fig. 6a", 32, 230), ("Fig. 6b", 128, 165), ("Fig. 6c", 512, 25))
         for how in (_MESH, _WALK, _UPRIGHT)
     ),
-    FigureEntry("Fig. 7a", "colonnade", 512, "ray-march", _march(150), 25),
-    FigureEntry("Fig. 7b", "colonnade", 512, "ray-march", _march(400), 10),
+    FigureEntry("Fig. 7a", "colonnade", 512, "ray-march", (*_march(150), *_TRANSITIONS), 25),
+    FigureEntry("Fig. 7b", "colonnade", 512, "ray-march", (*_march(400), *_TRANSITIONS), 10),
     *(FigureEntry("Fig. 7c", "colonnade", 512, "light-volumes", how, 96) for how in (_MESH, _WALK, _UPRIGHT)),
+    FigureEntry("peer", "colonnade", 512, "ray-march", _march(150)),
+    FigureEntry("peer", "colonnade", 512, "ray-march", _march(400)),
     FigureEntry("peer", "colonnade", 512, "min-max"),
     # Interpolation between the corners of tiles, which the paper does not have.
     FigureEntry(TILES, "colonnade", 512, "light-volumes", (*_WALK, _TOLERANCE)),

@@ -14,6 +14,12 @@ never
 4. Sorting: the planes with their bins, that is the rest of the preparation on the host, and the tile lists.
 5. Shadow planes: the airlight after the tile lists, less stage 3.
 
+Rows *as published* have everything that the paper has at once (`as_published`): its polynomial, its order of the
+planes, Gamma at vertices, a frame buffer of 8 bits, the cone of 32 planes about a spot. "A reasonable intensity for the
+light source" leaves nothing to clamp: the buffer is full at the radiance that all but one in a thousand pixels of the
+true frame stay below. Their error is that of the airlight as the buffer shows it, and beside it that of the whole
+frame.
+
 A frame takes less time than the sum of the stages, since the host finds planes while the device casts rays and shades.
 """
 
@@ -23,6 +29,7 @@ from typing import Any
 
 import drjit as dr
 import numpy as np
+from numpy.typing import NDArray
 
 from realtime.frame.incremental import FrameCache
 from realtime.frame.renderer import (
@@ -40,7 +47,7 @@ from realtime.methods.shadow_planes.view_culling import components_in_view
 from realtime.scene.camera import read_camera
 from realtime.scene.read_scene import Scene, read_scene
 from realtime.tiles.layout import SIDE
-from validation.configurations.methods import TOLERANCE, Configuration, prepared
+from validation.configurations.methods import TOLERANCE, Configuration, configuration, prepared
 from validation.configurations.timing import (
     Timing,
     camera_rays,
@@ -56,6 +63,7 @@ from validation.scenes.loading import load_scene
 
 STAGES = ("silhouettes", "scene", "airlight of the scene", "sorting", "shadow planes")
 KERNELS = ("exact", "taylor")
+POLYNOMIALS = ("taylor", "taylor-printed")  #: kernels of rows as published
 
 
 @dataclass(frozen=True)
@@ -95,6 +103,7 @@ class TableRow:
     published: Published
     kernel: str
     cone: int  #: edges of the pyramid that bounds the spot; 0: the cone itself
+    white: float  #: radiance that fills the 8-bit buffer of a row as published; 0 for others [W/(m^2 sr)]
     tolerance: float  #: for interpolation between the corners of tiles; 0: no interpolation
     size: tuple[int, int]  #: of the frame that was timed [pixels]
     triangles: int
@@ -105,13 +114,25 @@ class TableRow:
     colours_changed: Timing  #: a frame after only medium or colours changed: planes, tile lists, camera rays are kept
     rays: Timing  #: the camera rays alone
     error: Metrics  #: of the airlight at pixel centres, at `error_size`
+    frame_error: Metrics  #: of airlight and surfaces together
     error_size: tuple[int, int]
+    told_apart: bool = True  #: whether stages 3 and 5 differ by more than the spread of their timings
 
     @property
-    def shares(self) -> tuple[float, ...]:
-        """Share of each stage in the sum of all stages, for a frame after the light moved [%]."""
+    def published_variant(self) -> bool:
+        """Whether the row is as published."""
+        return self.white > 0
+
+    @property
+    def shares(self) -> tuple[float | None, ...]:
+        """Share of each stage in the sum of all stages, for a frame after the light moved [%].
+
+        One kernel does stages 3 and 5. Stage 3 is timed as an unshadowed frame, stage 5 is what is left: where the
+        spread of both timings hides that, neither has a share.
+        """
         total = sum(self.stages_ms)
-        return tuple(100 * stage / total for stage in self.stages_ms)
+        shares = tuple(100 * stage / total for stage in self.stages_ms)
+        return shares if self.told_apart else (*shares[:2], None, shares[3], None)
 
 
 def biri_row(
@@ -120,6 +141,7 @@ def biri_row(
     *,
     cone: int = 0,
     tolerance: float = 0.0,
+    published_variant: bool = False,
     size: tuple[int, int],
     error_size: tuple[int, int],
     seconds: float = 0.6,
@@ -134,6 +156,8 @@ def biri_row(
         Name of the airlight kernel.
     cone, tolerance
         Parameters of the method, see `realtime.methods.shadow_planes.method` and `realtime.tiles.adaptive_sampling`.
+    published_variant
+        Whether to do everything as published (`as_published`).
     size
         Width and height of the frame that is timed [pixels].
     error_size
@@ -144,8 +168,14 @@ def biri_row(
     changed = {"cone": cone, "tolerance": tolerance}
     chosen = Configuration("shadow-planes", kernel, tuple((name, value) for name, value in changed.items() if value))
     small = load_scene(published.scene, error_size).scene
-    airlight = render_frame(prepared(read_scene(small), chosen)).airlight
-    error = error_metrics(truth_image(small).airlight, airlight)
+    truth = truth_image(small)
+    white = 0.0
+    if published_variant:
+        white = buffer_white(truth.airlight + truth.surface)
+        chosen = as_published(kernel, white=white, cone=cone)
+    frame = render_frame(prepared(read_scene(small), chosen))
+    error = error_metrics(truth.airlight, frame.airlight)
+    frame_error = error_metrics(truth.airlight + truth.surface, frame.airlight + frame.surface)
     loaded = load_scene(published.scene, size).scene
     scene = read_scene(loaded)
     renderer = prepared(scene, chosen)
@@ -165,6 +195,7 @@ def biri_row(
         published,
         kernel,
         cone,
+        white,
         tolerance,
         size,
         sum(shape.face_count() for shape in loaded.shapes()),
@@ -175,8 +206,32 @@ def biri_row(
         colours_changed,
         rays,
         error,
+        frame_error,
         error_size,
+        told_apart=told_apart(stages[2], stages[5]),
     )
+
+
+def as_published(kernel: str, *, white: float, cone: int = 0) -> Configuration:
+    """Return shadow planes with all that the paper has.
+
+    Parameters
+    ----------
+    kernel
+        The polynomial.
+    white
+        The radiance that fills the buffer [W/(m^2 sr)].
+    cone
+        Edges of the cone over a spot; 0 for other lights.
+    """
+    media = "printed" if kernel == "taylor-printed" else "kernel"
+    values = {"order": "paper", "evaluation": "vertex", "buffer": "8bit", "white": white, "media": media, "cone": cone}
+    return configuration("shadow-planes", kernel, {name: value for name, value in values.items() if value != "kernel"})
+
+
+def buffer_white(frame: NDArray[np.float64]) -> float:
+    """Return the radiance below which all but one in a thousand pixels of a frame stay in all channels."""
+    return float(np.quantile(frame.max(axis=-1), 0.999))
 
 
 def biri_rows(
@@ -193,7 +248,8 @@ def biri_rows(
     ----------
     published, kernels
         What to measure: every entry with every kernel, a spot both with its cone and with the pyramid of the paper,
-        and the kernel `exact` also with the tolerance `validation.configurations.methods.TOLERANCE`.
+        the kernel `exact` also with the tolerance `validation.configurations.methods.TOLERANCE`, and the polynomials
+        of the paper also with all that it has (`as_published`).
     scale
         Factor on the width and height of all images; 1 for the published sizes.
     seconds
@@ -206,6 +262,8 @@ def biri_rows(
         for kernel in kernels:
             wanted += [(entry, kernel, {"cone": cone}) for cone in dict.fromkeys((0, entry.cone))]
             wanted += [(entry, kernel, {"tolerance": TOLERANCE})] if kernel == "exact" else []
+            if kernel in POLYNOMIALS:
+                wanted += [(entry, kernel, {"cone": entry.cone, "published_variant": True})]
     rows: list[TableRow] = []
     for entry, kernel, changed in wanted:
         size = _whole_tiles(scale * entry.size[0]), _whole_tiles(scale * entry.size[1])
@@ -221,6 +279,11 @@ def biri_rows(
 def _whole_tiles(length: float) -> int:
     """Return the side of an image of at least three whole tiles, so that tiles can be interpolated [pixels]."""
     return SIDE * max(3, round(length / SIDE))
+
+
+def told_apart(unshadowed: Timing, airlight: Timing) -> bool:
+    """Return whether the airlight of a frame takes longer than without shadows, by more than the quartiles of both."""
+    return airlight.low_ms > unshadowed.high_ms
 
 
 def _shared(measured: Sequence[float]) -> tuple[float, ...]:

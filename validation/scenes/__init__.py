@@ -21,6 +21,7 @@ Read in this order:
 - `tangle.py`: uneven tubes before a spot light;
 - `windows.py`: a directional light through the windows of a room;
 - `probes.py`: small scenes for what the built-in ones lack, used by checks of the checks;
+- `numbers.py`: refuses numbers of which no finite image can come;
 - `loading.py`: a scene by its name or from a Mitsuba XML file;
 - `animation.py`: the scenes of the frames of an animation.
 

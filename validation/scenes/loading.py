@@ -3,17 +3,21 @@
 
 import os
 import re
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+from xml.parsers import expat
 
 import mitsuba as mi
 
 from analytic.errors import InputError, nearest
+from validation.scenes.numbers import check_numbers
 from validation.scenes.record import Animation
 from validation.scenes.registry import SCENES
 
 _LARGEST = 16384
+_DEEPEST = 200  # elements in one another; a scene has about ten
 
 
 @dataclass(frozen=True)
@@ -54,6 +58,7 @@ def load_scene(name_or_path: str, size: tuple[int, int] | None = None) -> Loaded
         loaded = LoadedScene(path.stem, _parse(path), f"The user's own scene, {path.name}.", "", path)
     if size is not None:
         resize(loaded.scene, size)
+    _check_films(loaded)
     return loaded
 
 
@@ -88,7 +93,25 @@ def _existing(name_or_path: str) -> Path:
     )
 
 
+def _check_films(loaded: LoadedScene) -> None:
+    """Refuse films without pixels, with more than any image has, and cropped ones, of which a part would be shown."""
+    for sensor in loaded.scene.sensors():
+        size, crop = (tuple(int(n) for n in pair) for pair in (sensor.film().size(), sensor.film().crop_size()))
+        where = f"scene {loaded.path or loaded.name}"
+        if not all(1 <= n <= _LARGEST for n in size):
+            raise InputError(
+                f"{where}: the camera's film has {size[0]} x {size[1]} pixels, wanted at least 1 x 1 and at most "
+                f"{_LARGEST} on a side; change its width and height, or give --size"
+            )
+        if crop != size:
+            raise InputError(
+                f"{where}: the camera's film is cropped to {crop[0]} x {crop[1]} of {size[0]} x {size[1]} pixels; "
+                "remove crop_width, crop_height and crop_offset from the film, or give --size"
+            )
+
+
 def _parse(path: Path):
+    _check_depth(path)
     try:
         scene = mi.load_file(str(path))
     except Exception as error:  # Mitsuba raises RuntimeError for all bad input; Python plugins raise anything
@@ -96,7 +119,39 @@ def _parse(path: Path):
         raise InputError(f"scene {path}: Mitsuba cannot read it: {reason}") from error
     if not isinstance(scene, mi.Scene):
         raise InputError(f"scene {path}: the file holds a single {type(scene).__name__}; wanted a whole <scene>")
+    name_shapes(scene)
+    check_numbers(scene)
     return scene
+
+
+def name_shapes(scene) -> None:
+    """Name the shapes of a Mitsuba scene that have no id, such as 'sphere-2': messages and copies need names."""
+    taken = {shape.id() for shape in scene.shapes()}
+    for number, shape in enumerate(scene.shapes(), 1):
+        if not shape.id():
+            name = f"{shape.class_name().lower()}-{number}"
+            shape.set_id(name if name not in taken else f"{name}-{len(taken)}")
+
+
+def _check_depth(path: Path) -> None:
+    """Refuse a file that Mitsuba's reader, which calls itself for every element, would end the process at."""
+    depth = deepest = 0
+
+    def opens(name: str, attributes: dict[str, str]) -> None:
+        nonlocal depth, deepest
+        depth += 1
+        deepest = max(deepest, depth)
+
+    def closes(name: str) -> None:
+        nonlocal depth
+        depth -= 1
+
+    parser = expat.ParserCreate()
+    parser.StartElementHandler, parser.EndElementHandler = opens, closes
+    with suppress(expat.ExpatError), path.open("rb") as file:  # what is malformed Mitsuba says best
+        parser.ParseFile(file)
+    if deepest > _DEEPEST:
+        raise InputError(f"scene {path}: its elements are nested {deepest} deep; wanted at most {_DEEPEST}")
 
 
 def resize(scene, size: tuple[int, int]) -> None:

@@ -191,7 +191,7 @@ def _epipolar_map(scene: Scene, light: Light, size: int) -> EpipolarMap:
 def _ray_airlight(view: View, number: int, kernel) -> RayAirlight:
     """Return the airlight of one light along the rays of a view."""
     light = view.lights[number]
-    media = rays_in_media(replace(view, lights=(light,)))[0] if view.features.bounded else None
+    media = rays_in_media(replace(view, lights=(light,)), kernel=kernel)[0] if view.features.bounded else None
     return ray_airlight(view, light, kernel, media)
 
 

@@ -51,7 +51,7 @@ class Method:
     #: ``f(layers, g_buffer, history, *, camera, parameters)`` -> layers: functions over the whole image, run in turn
     #: on what `render` returned. All arrays have an entry per pixel, row by row; `history` is None in the first frame.
     passes: tuple[Callable[..., Layers], ...] = ()
-    uses_kernel: bool = True  #: whether `render` is given an airlight kernel
+    uses_kernel: Callable[[Any], bool] = always  #: parameters -> whether `render` calls an airlight kernel
     shadows: bool = True  #: whether it knows shadows; one that does not is wrong where there are occluders
     provides_visibility: Callable[[Any], bool] = never  #: parameters -> whether its layers have a visibility
     casts_rays: Callable[[Any], bool] = never  #: parameters -> whether it casts rays

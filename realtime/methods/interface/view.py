@@ -7,9 +7,11 @@ from typing import Any
 
 import drjit as dr
 
-from realtime.bounded_media.airlight import LitRay, lit_ray
+from realtime.bounded_media.airlight import LitRay, PlacedRay, check_form, lit_ray
 from realtime.bounded_media.ray_segments import camera_pieces
 from realtime.bounded_media.views import MediaViews
+from realtime.errors import InputError
+from realtime.kernels.bounded import ConstantLeg, bounded_form
 from realtime.numerics.array_types import Metres, PerRay
 from realtime.scene.camera import Camera
 from realtime.scene.features import SceneFeatures
@@ -42,6 +44,9 @@ class View:
     visible_triangle: Callable[[], tuple[Any, Any, Any]]  #: -> corners [m], barycentric weights, whether there is one
     part: Callable[[], Callable[..., "View"]]  #: -> (pixel, distance, tile, layout) -> the view of some of the rays
     media_views: MediaViews | None = None  #: of bounded media, where they are known before the rays
+    surfaces: tuple[PerRay, ...] | None = (
+        None  #: by light, what the visible surface sends back unshadowed, for a method that provides visibility
+    )
     prepared: Any = ()  #: for a user's plain function: what its `prepare` made
 
 
@@ -51,19 +56,66 @@ def radiance(medium: Medium, light: Light, integral):
     return medium.albedo * light.intensity * (sigma_t * (integral * (0.25 * dr.inv_pi)))
 
 
-def rays_in_media(view: View, form: str = "exact") -> tuple[LitRay, ...]:
-    """Return the rays of a view in bounded media, by light; `form` is one of
-    `realtime.bounded_media.airlight.FORMS`.
+def rays_in_media(view: View, form: str = "kernel", *, kernel: Any = None) -> tuple[LitRay, ...]:
+    """Return the rays of a view in bounded media, by light.
+
+    Parameters
+    ----------
+    view
+        The frame.
+    form
+        One of `realtime.bounded_media.airlight.FORMS`, or 'kernel': 'paper' for a light that has a place and a kernel
+        that has a form for bounded media, otherwise 'exact'.
+    kernel
+        An airlight kernel, or None. `exact` does not ask it.
+
+    Raises
+    ------
+    InputError
+        For what a published form refuses.
     """
+    polynomial = media_polynomial(kernel)
     pieces = camera_pieces(
         view.medium, view.origin, view.direction, view.media_views.camera if view.media_views else None
     )
     place = {"origin": view.origin, "direction": view.direction, "low": view.direction_low}
     light_views = view.media_views.lights if view.media_views else [None] * len(view.lights)
     return tuple(
-        lit_ray(view.medium, light, **place, pieces=pieces, form=form, views=views)
+        _ray_in_media(view.medium, light, place, pieces=pieces, form=form, views=views, polynomial=polynomial)
         for light, views in zip(view.lights, light_views, strict=True)
     )
+
+
+def media_polynomial(kernel: Any) -> Any:
+    """Return the form of a kernel for bounded media, for `realtime.bounded_media.airlight.lit_ray`, or None."""
+    bounded = bounded_form(kernel)
+    if bounded is None:
+        return None
+    return lambda geometry, x0, x1, light, phase, leg: bounded(geometry, x0, x1, light, phase, ConstantLeg(*leg))
+
+
+def _ray_in_media(
+    medium: Medium, light: Light, place: dict[str, Any], *, form: str, polynomial: Any, **known
+) -> LitRay:
+    if form == "kernel":
+        form = "exact" if polynomial is None or not light.w else "paper"
+        if form != "exact" and not medium.clear:
+            raise InputError(
+                "kernel: got a polynomial, which has each medium in clear air; wanted clear air around the bounded "
+                "media, or another kernel"
+            )
+    else:
+        check_form(medium, form)
+    if form == "exact":
+        return lit_ray(medium, light, **place, form=form, **known)
+    ray = lit_ray(medium, light, **place, form=form, polynomial=polynomial, **known)
+    if polynomial is not None and isinstance(ray, PlacedRay):
+        # What it refuses must be raised here, not in a branch. Nothing is computed that nobody reads.
+        zero = type(ray.geometry.height)(0)
+        for bounded in medium.bounded_media:
+            leg = bounded.medium.sigma_t[0], zero, bounded.mean_distance, form == "printed"
+            polynomial(ray.geometry, zero, zero, light, bounded.medium.phase, leg)
+    return ray
 
 
 def bounded_radiance(light: Light, scattered):

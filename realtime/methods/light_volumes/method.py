@@ -112,7 +112,7 @@ def light_volumes(
     and its shadows on surfaces always come from rays. Exact with respect to the shadow map:
     what it misses of the scene falls as the size of a texel (`validation.frames.map_size`). A map that sees nothing
     lights everything; a light inside a closed occluder lights nothing outside it. Bounded media are for
-    evaluation=walk; they have nodes of their own, the kernel is not asked.
+    evaluation=walk; they have nodes of their own, but for a polynomial kernel.
 
     References
     ----------
@@ -121,7 +121,7 @@ def light_volumes(
     """
     total = type(view.medium.albedo)(0)
     lit = []
-    in_media = rays_in_media(view) if view.features.bounded else ()
+    in_media = rays_in_media(view, kernel=kernel) if view.features.bounded else ()
     for number, light in enumerate(view.lights):
         if parameters.evaluation == "mesh" and view.features.shadows:
             total += mesh_airlight(view, light, state[number], kernel=kernel)

@@ -17,6 +17,7 @@ Read in this order:
 - `sweep.py`: the lit intervals of a ray, along the planes of its tile.
 - `published_crossings.py`: the sum of the paper, plane by plane with a stencil.
 - `published_mesh.py`: its Gamma at the vertices of meshes.
+- `published_media.py`: its Gamma in bounded media, medium by medium.
 - `plane_counts.py`: how many casters, edges and planes there are, for `--plan`.
 
 May import: `realtime.bounded_media`, `realtime.errors`, `realtime.intervals`, `realtime.kernels`,

@@ -22,21 +22,22 @@ difference of the two Gammas instead, as the paper does.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from realtime.bounded_media.airlight import FORMS, LitRay, ambient_radiance, check_form
+from realtime.bounded_media.airlight import FORMS, LitRay, PlacedRay, ambient_radiance
 from realtime.errors import InputError
 from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.light_airlight import RayAirlight, integral_type, ray_airlight
 from realtime.methods.interface.view import View, rays_in_media
 from realtime.methods.shadow_planes.pixel_rays import aim_at, read_spot, seen_rays, seen_ways
 from realtime.methods.shadow_planes.plane_table import PlaneIndex, index_planes
-from realtime.methods.shadow_planes.published_crossings import Buffer, sum_crossings
+from realtime.methods.shadow_planes.published_crossings import Buffer, reaches, sum_crossings
+from realtime.methods.shadow_planes.published_media import check_vertices, sum_in_media
 from realtime.methods.shadow_planes.published_mesh import mesh_gamma, surface_gamma
 from realtime.methods.shadow_planes.spot_pyramid import cone_ring
 from realtime.methods.shadow_planes.sweep import RayPlanes, ray_planes, sum_lit_intervals
@@ -73,7 +74,8 @@ class ShadowPlaneParameters(Parameters):
     )
     buffer: str = parameter(
         "float",
-        "the paper's frame buffer: 255 steps up to `white`, clamped after every plane",
+        "the paper's frame buffer: 255 steps up to `white` for surfaces and all lights, rounded and clamped after each "
+        "pass",
         choices=("float", "8bit"),
     )
     white: float = parameter(
@@ -93,7 +95,16 @@ class ShadowPlaneParameters(Parameters):
         unit="W/(m^2 sr)",
     )
     media: str = parameter(
-        "exact", "bounded media: the true depth on both legs, or the constant R of section 4.2", choices=FORMS
+        "kernel",
+        "bounded media: the true depth on both legs, or the constant R of section 4.2 as it is meant or as printed; "
+        "`kernel` is `paper` with a polynomial kernel and otherwise `exact`, which asks no kernel",
+        choices=("kernel", *FORMS),
+    )
+    gamma: str = parameter(
+        "medium",
+        "evaluation=vertex in bounded media: Gamma from where a ray enters the medium, or from the camera as in "
+        "section 4.2, for polynomial kernels",
+        choices=("medium", "camera"),
     )
     cone: int = parameter(
         0,
@@ -107,10 +118,8 @@ class ShadowPlaneParameters(Parameters):
     tolerance: float = tolerance()
 
     def _check_together(self) -> None:
-        if self.cone and self.evaluation == "vertex":
-            raise InputError(
-                "cone: wanted evaluation=pixel; the planes of a cone begin too close to the light to be meshed"
-            )
+        if self.buffer == "8bit" and self.tolerance:
+            raise InputError("buffer=8bit: wanted tolerance=0; the buffer holds whole frames, pixel by pixel")
         if self.sum == "gamma" and not self.segments:
             raise InputError(
                 "sum=gamma: wanted order=exact, evaluation=pixel and buffer=float; the others add Gammas anyway"
@@ -204,13 +213,13 @@ def shadow_planes(
     Raises
     ------
     InputError
-        For an evaluation that does not know bounded media.
+        For bounded media that an evaluation does not know.
 
     Notes
     -----
     Valid for all lights and casters that are triangle meshes, closed or not. Shadows are those of the
-    triangles, exact to rounding, with order=exact. Bounded media have nodes of their own, the kernel is not asked;
-    they are for evaluation=pixel.
+    triangles, exact to rounding, with order=exact. Bounded media have nodes of their own, but for a polynomial kernel.
+    With buffer=8bit the in-scattered radiance is what the buffer holds less the lit surfaces.
 
     References
     ----------
@@ -221,42 +230,109 @@ def shadow_planes(
     lit = []
     in_media: tuple[LitRay, ...] = ()
     if view.features.bounded:
-        check_form(view.medium, parameters.media)
-        _check_bounded(parameters.evaluation)
-        in_media = rays_in_media(view, parameters.media)
+        if parameters.evaluation == "vertex":
+            check_vertices(view)
+        in_media = rays_in_media(view, parameters.media, kernel=kernel)
+    buffer = Buffer(parameters.white) if parameters.buffer == "8bit" else None
+    surfaces = type(view.medium.albedo)(0)  # what of them the buffer shows
     for number, light in enumerate(view.lights):
-        if parameters.cone and light.cone is not None and not light.soft and view.features.shadows:
+        cone = bool(parameters.cone and light.cone is not None and not light.soft and view.features.shadows)
+        if cone:
             light = light.without_cone()  # planes bound it
+        media = in_media[number] if in_media else None
         if not view.features.shadows:
-            airlight = ray_airlight(view, light, kernel, in_media[number] if in_media else None)
-            total += airlight.radiance(airlight.integral(type(view.distance)(0), view.distance))
+            airlight = ray_airlight(view, light, kernel, media)
+            value = airlight.radiance(airlight.integral(type(view.distance)(0), view.distance))
+            if buffer:
+                surface = _surface(view, number, True)
+                surfaces += surface
+                total = _with_surface(view, buffer, total, surface, _fog_of(number, parameters), in_media)
+                total = buffer.stored(total + value)
+            else:
+                total += value
             lit.append(True)
             continue
         index = state[number]
         seen = seen_rays(index.aim, view.camera, view.pixel, index.distance, light)
         rays = ray_planes(lists[number], seen.x, seen.y, seen.z, tile=view.tile)
-        airlight = ray_airlight(view, light, kernel, in_media[number] if in_media else None, geometry=seen.geometry)
+        airlight = ray_airlight(view, light, kernel, media, geometry=seen.geometry)
         if parameters.segments:
             differences = parameters.sum == "gamma"
             value, reached = _segments(index, lists[number], rays, airlight, differences=differences)
+            total += value
+        elif buffer:
+            reached = reaches(index, lists[number], rays, view.distance) if light.w else mi.Bool(True)
+            surface = _surface(view, number, reached)
+            surfaces += surface
+            total = _with_surface(view, buffer, total, surface, _fog_of(number, parameters), in_media)
+            planes = index, lists[number], rays
+            total, _ = _drawn(planes, airlight, parameters, cone=cone, buffer=buffer, start=total)
         else:
-            at_plane, at_surface = _gammas(index, airlight, evaluation=parameters.evaluation, rows=parameters.rows)
-            levels = Buffer(parameters.white) if parameters.buffer == "8bit" else None
-            gammas = at_plane, at_surface
-            value, reached = sum_crossings(
-                index, lists[number], rays, view.distance, gammas, order=parameters.order, buffer=levels
-            )
-        total += value
+            planes = index, lists[number], rays
+            value, reached = _drawn(planes, airlight, parameters, cone=cone, buffer=None, start=None)
+            total += value
         # Frames cast rays for the shadows of a light at infinity on surfaces.
         lit.append(reached if light.w else True)
-    ambient = parameters.ambient
-    if ambient and in_media:
-        total += ambient_radiance(in_media[0].pieces, view.distance, ambient)
-    elif ambient:
-        distance = dr.minimum(view.distance, 1e30)
-        for_channel = [1 - dr.exp(-sigma_t * distance) for sigma_t in view.medium.sigma_t]
-        total += view.medium.albedo * ambient * type(total)(*for_channel)
+    if buffer:
+        total -= surfaces
+    elif parameters.ambient:
+        total += _ambient_fog(view, parameters.ambient, in_media)
     return Layers(total, tuple(lit))
+
+
+def _drawn(
+    planes: tuple[PlaneIndex, Lists, RayPlanes],
+    airlight: RayAirlight,
+    parameters: ShadowPlaneParameters,
+    *,
+    cone: bool,
+    buffer: Buffer | None,
+    start,
+):
+    """Add up the Gammas of one light, in a buffer or not, and say whether it reaches the surface."""
+    view, media = airlight.view, airlight.media
+    if not isinstance(media, PlacedRay) or parameters.evaluation == "pixel":
+        gammas = _gammas(planes[0], airlight, parameters=parameters, cone=cone)
+        return sum_crossings(*planes, view.distance, gammas, order=parameters.order, buffer=buffer, start=start)
+    media = replace(media, light=airlight.light, geometry=airlight.geometry)
+    start = type(view.medium.albedo)(0) if start is None else start
+    value = sum_in_media(
+        view,
+        media,
+        *planes,
+        rows=parameters.rows,
+        cone=cone,
+        from_camera=parameters.gamma == "camera",
+        order=parameters.order,
+        buffer=buffer,
+        start=start,
+    )
+    return value, reaches(*planes, view.distance)
+
+
+def _surface(view: View, number: int, reached):
+    """Return what the visible surface sends back of a light, 0 where nobody knows."""
+    return type(view.medium.albedo)(0) if view.surfaces is None else dr.select(reached, view.surfaces[number], 0)
+
+
+def _fog_of(number: int, parameters: ShadowPlaneParameters) -> float:
+    """Return the ambient light in stage 2 of a light: that of the first is that of all."""
+    return parameters.ambient if number == 0 else 0.0
+
+
+def _with_surface(view: View, buffer: Buffer, total, surface, ambient: float, in_media: tuple[LitRay, ...]):
+    """Return the buffer after stage 2 of a light."""
+    total = buffer.stored(total + surface)
+    return buffer.stored(total + _ambient_fog(view, ambient, in_media)) if ambient else total
+
+
+def _ambient_fog(view: View, ambient: float, in_media: tuple[LitRay, ...]):
+    """Return the radiance of a constant light field in the media [W/(m^2 sr)]."""
+    if in_media:
+        return ambient_radiance(in_media[0].pieces, view.distance, ambient)
+    distance = dr.minimum(view.distance, 1e30)
+    for_channel = [1 - dr.exp(-sigma_t * distance) for sigma_t in view.medium.sigma_t]
+    return view.medium.albedo * ambient * type(view.medium.albedo)(*for_channel)
 
 
 def cull_shadow_planes(
@@ -288,24 +364,16 @@ def _segments(index: PlaneIndex, lists: Lists, rays: RayPlanes, airlight: RayAir
     return airlight.radiance(value), reached
 
 
-def _gammas(index: PlaneIndex, airlight: RayAirlight, *, evaluation: str, rows: int):
+def _gammas(index: PlaneIndex, airlight: RayAirlight, *, parameters: ShadowPlaneParameters, cone: bool):
     """Return the functions that give the radiance of Gamma at a crossing, and at the surface."""
     view, light, kernel = airlight.view, airlight.light, airlight.kernel
 
     def at(x):
         return airlight.radiance(airlight.gamma(x))
 
-    if evaluation == "pixel":
+    if parameters.evaluation == "pixel":
         return lambda number, rays, x: at(x), at
     return (
-        mesh_gamma(view, index, light, kernel=kernel, rows=rows),
+        mesh_gamma(view, index, light, kernel=kernel, rows=parameters.rows, cone=cone),
         lambda x: surface_gamma(view, light, kernel=kernel, otherwise=at(x)),
     )
-
-
-def _check_bounded(evaluation: str) -> None:
-    if evaluation == "vertex":
-        raise InputError(
-            "evaluation=vertex: Gamma has kinks where planes cross the bounds of a medium, between any vertices; use "
-            "evaluation=pixel in scenes with bounded media"
-        )

@@ -7,6 +7,15 @@ faces away subtracts its Gamma if the stencil is zero and puts its layers on (Bi
 on (order=exact) the same rule reads: a plane that brings the count from zero up adds, one that brings it back to zero
 subtracts. Without an order every plane counts.
 
+**Bounded media** (5.2). A ray is drawn in each medium by itself: its end is the exit from the medium or the surface
+before that, whose Gamma is added if it is lit, and the entry, a back facing triangle of the bounds in the paper, is
+drawn in the order of the planes. It subtracts its Gamma if the stencil is zero, and sets the stencil to 255: of what is
+closer to the camera nothing passes. So for order=paper an entry counts by the cosine of the angle at the light between
+the camera and itself, planes of a larger cosine are left out, and it comes last. The paper asks for small triangles,
+since their middles stand for them in the order: here they are points. Otherwise the planes behind the entry count.
+
+**The frame buffer** holds the frame, not one sum: what is there already is `start`.
+
 The list of a tile is in order, but for a tile that found no room for a list of its own and reads the longer one that it
 would have drawn on. Its rays look for each next crossing in the whole of that list.
 """
@@ -34,6 +43,14 @@ class Buffer:
         return dr.round(dr.clip(value, 0, self.white) * (255 / self.white)) * (self.white / 255)
 
 
+@dataclass(frozen=True)
+class Entry:
+    """Where rays enter a bounded medium."""
+
+    distance: Any  #: from the camera; 0 for one within [m]
+    gamma: Any  #: the radiance of Gamma there
+
+
 @dataclass
 class _Draw:
     """What has been drawn of a ray's planes."""
@@ -48,7 +65,16 @@ class _Draw:
 
 
 def sum_crossings(
-    index: PlaneIndex, lists: Lists, ray: RayPlanes, distance, gammas, *, order: str, buffer: Buffer | None
+    index: PlaneIndex,
+    lists: Lists,
+    ray: RayPlanes,
+    distance,
+    gammas,
+    *,
+    order: str,
+    buffer: Buffer | None,
+    start=None,
+    entry: Entry | None = None,
 ):
     """Add up Gamma over the crossings of every ray.
 
@@ -57,20 +83,24 @@ def sum_crossings(
     index, lists, ray
         The planes and the rays.
     distance
-        To the visible surface [m].
+        To the visible surface, or to the end in a bounded medium [m].
     gammas
         Functions (plane, ray, x) and (x) that give the radiance of Gamma at a crossing and at the surface.
     order
         'exact', 'paper' or 'none'.
     buffer
         What keeps the sum; None for float.
+    start
+        What is in the buffer before, or None.
+    entry
+        Where rays enter a bounded medium, or None.
 
     Returns
     -------
     total
         The radiance.
     lit
-        Whether the light reaches the visible surface.
+        Whether the light reaches the end.
     """
     at_plane, at_surface = gammas
     ray_end = index.distance / distance
@@ -79,7 +109,9 @@ def sum_crossings(
     over_surface = _layers_at_end(index, lists, ray, ray_end)
     lit = over_surface <= 0
     keep = buffer.stored if buffer else lambda value: value
-    total = keep(dr.select(lit, at_surface(distance), 0))
+    at_end = dr.select(lit, at_surface(distance), 0)
+    total = keep(at_end if start is None else start + at_end)
+    key = None if entry is None else _entry_key(index, ray, entry, order)
     begin = Float(index.layers) + dr.zeros(Float, width) if order == "exact" else over_surface
     draw = _Draw(
         dr.zeros(mi.UInt32, width),
@@ -95,7 +127,7 @@ def sum_crossings(
         (draw,) = dr.while_loop(
             state=(draw,),
             cond=lambda draw: (draw.factor == 0) & (draw.place < ray.source.count),
-            body=lambda draw: (_next(index, lists, ray, ray_end, draw, order),),
+            body=lambda draw: (_next(index, lists, ray, ray_end, draw, order, key),),
             labels=("draw",),
         )
         x = dr.minimum(index.distance / dr.select(draw.factor == 0, index.distance, draw.quotient), distance)
@@ -105,15 +137,44 @@ def sum_crossings(
         return (draw,)
 
     (draw,) = dr.while_loop(state=(draw,), cond=lambda draw: draw.place < ray.source.count, body=body, labels=("draw",))
-    return draw.total, lit
+    if entry is None:
+        return draw.total, lit
+    enters: Any = mi.Bool(True)
+    if order == "paper":
+        enters = draw.stencil == 0
+    elif order == "exact":
+        enters = _layers_at_end(index, lists, ray, index.distance / entry.distance) <= 0
+    return keep(draw.total - dr.select(enters, entry.gamma, 0)), lit
 
 
-def _next(index: PlaneIndex, lists: Lists, ray: RayPlanes, ray_end, draw: _Draw, order: str) -> _Draw:
+def reaches(index: PlaneIndex, lists: Lists, ray: RayPlanes, distance):
+    """Return whether the light reaches the points of rays at a distance [m]."""
+    return _layers_at_end(index, lists, ray, index.distance / distance) <= 0
+
+
+def _entry_key(index: PlaneIndex, ray: RayPlanes, entry: Entry, order: str):
+    """Return what is larger of the planes that count: -cos in the paper's order, else a limit of D/x that is not."""
+    if order != "paper":
+        return index.distance / entry.distance
+    # The entry is x w from the camera, which is at D on the z axis.
+    x, z = entry.distance, ray.z
+    along = dr.fma(x, z, index.distance)
+    beside = x * dr.sqrt(dr.maximum(dr.fma(-z, z, 1), 0))
+    return -along * dr.rsqrt(dr.fma(along, along, beside * beside))
+
+
+def _next(index: PlaneIndex, lists: Lists, ray: RayPlanes, ray_end, draw: _Draw, order: str, entry_key) -> _Draw:
     """Read one plane: the next of the list, or the next crossing of a list without order."""
     place, key = _sought(index, lists, ray, ray_end, draw, order)
     place = dr.select(ray.sorted, draw.place, place)
     quotient, crossed, gain, number = read_plane(index, lists, ray, place, place < ray.source.count)
     crossed &= quotient > ray_end
+    counts = crossed
+    if entry_key is not None and order == "paper":
+        crossed &= -dr.gather(type(ray.x), index.spans, number * 4 + 3, crossed) > entry_key
+        counts = crossed
+    elif entry_key is not None:
+        counts = crossed & (quotient < entry_key)
     if order == "none":
         factor, stencil = gain, draw.stencil
     elif order == "paper":
@@ -130,7 +191,7 @@ def _next(index: PlaneIndex, lists: Lists, ray: RayPlanes, ray_end, draw: _Draw,
         dr.select(crossed, stencil, draw.stencil),
         quotient,
         number,
-        dr.select(crossed, type(gain)(factor), 0),
+        dr.select(counts, type(gain)(factor), 0),
         draw.total,
     )
 

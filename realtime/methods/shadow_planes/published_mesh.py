@@ -8,11 +8,19 @@ quadrilateral that a graphics card draws as two triangles; in the coordinates p 
 
     (r_k, 0), (0, r_k), (r_k+1, 0)      and      (r_k+1, 0), (0, r_k), (0, r_k+1).
 
+Near the light Gamma falls as 1/u. Interpolated linearly between u and ratio u it is too large by up to (ratio + 1)^2/(4
+ratio) - 1, 4 % for 1.5, at whatever distance: this is why rows at equal ratios are wise. The planes of a cone begin
+NEARNESS of the camera's distance from the light (`realtime.methods.shadow_planes.spot_pyramid`); by the same ratio they
+need log(1/NEARNESS)/log(ratio) rows, 35, to come as far as the camera, and have so many more than the planes of
+casters.
+
 Beyond the last row Gamma keeps its value there. Surfaces interpolate Gamma between the vertices of their triangles
 (5.1.3).
 """
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -20,10 +28,14 @@ import mitsuba as mi
 from realtime.kernels.registry import gamma
 from realtime.methods.interface.view import View, radiance
 from realtime.methods.shadow_planes.plane_table import PlaneIndex
+from realtime.methods.shadow_planes.spot_pyramid import NEARNESS
 from realtime.rays.ray_light import ray_geometry
 from realtime.scene.lights import Light
 
 RATIO = 1.5
+
+#: Radiance of Gamma from the camera to points, as a function of them.
+Gamma = Callable[[Any], Any]
 
 
 def gamma_at(view: View, light: Light, point, *, kernel):
@@ -34,15 +46,40 @@ def gamma_at(view: View, light: Light, point, *, kernel):
     return radiance(view.medium, light, gamma(kernel, geometry, distance, medium=view.medium, light=light))
 
 
-def mesh_gamma(view: View, index: PlaneIndex, light: Light, *, kernel, rows: int):
-    """Return the function (plane, ray, x) that interpolates Gamma on the meshes of the planes."""
+def mesh_gamma(
+    view: View,
+    index: PlaneIndex,
+    light: Light,
+    *,
+    kernel,
+    rows: int,
+    cone: bool = False,
+    gamma_of: Gamma | None = None,
+):
+    """Return the function (plane, ray, x) that interpolates Gamma on the meshes of the planes.
+
+    Parameters
+    ----------
+    view, index, light, kernel
+        The frame, the planes of a light, and what evaluates Gamma.
+    rows
+        Of the planes of casters.
+    cone
+        Whether planes of a cone are among them.
+    gamma_of
+        In place of the kernel, Gamma at points.
+    """
+    further = math.ceil(-math.log(NEARNESS) / math.log(RATIO)) if cone else 0
+    casters_rows, rows = rows, rows + further
     Float, Vector = type(view.distance), type(view.direction)
     planes = dr.width(index.ends) // 6
     lane = dr.arange(mi.UInt32, planes * 2 * rows)
     row, end = lane % rows, lane // rows
+    if further:
+        row = dr.minimum(row, _last_row(index, end // 2, casters_rows, rows))
     corner = Vector(*(dr.gather(Float, index.ends, end * 3 + k) for k in range(3))) * RATIO ** Float(row)
     point = light.position + index.x_axis * corner.x + index.y_axis * corner.y + index.z_axis * corner.z
-    values = gamma_at(view, light, point, kernel=kernel)
+    values = gamma_of(point) if gamma_of else gamma_at(view, light, point, kernel=kernel)
     dr.eval(values)
     Color = type(values)
 
@@ -54,6 +91,8 @@ def mesh_gamma(view: View, index: PlaneIndex, light: Light, *, kernel, rows: int
         q = x * dr.fma(a[0], ray.y, -a[1] * ray.x) / cross
         p, q = dr.maximum(p, 0), dr.maximum(q, 0)
         u = dr.clip(p + q, 1, RATIO ** (rows - 1))
+        if further:
+            u = dr.minimum(u, RATIO ** Float(_last_row(index, number, casters_rows, rows)))
         t = dr.clip(q / dr.maximum(p + q, 1e-30), 0, 1)
         cell = dr.minimum(mi.UInt32(dr.log(u) * (1 / math.log(RATIO))), rows - 2)
         near = RATIO ** Float(cell)
@@ -72,7 +111,15 @@ def mesh_gamma(view: View, index: PlaneIndex, light: Light, *, kernel, rows: int
     return at
 
 
-def surface_gamma(view: View, light: Light, *, kernel, otherwise):
+def _last_row(index: PlaneIndex, plane, rows: int, rows_of_cone: int):
+    """Return the last row of planes: those of a cone begin where no caster is."""
+    Float = type(index.distance)
+    first = [dr.gather(Float, index.ends, plane * 6 + k) for k in range(3)]
+    of_cone = sum(dr.square(part) for part in first) < dr.square(10 * NEARNESS * index.distance)
+    return dr.select(of_cone, mi.UInt32(rows_of_cone - 1), mi.UInt32(rows - 1))
+
+
+def surface_gamma(view: View, light: Light, *, kernel, otherwise, gamma_of: Gamma | None = None, triangle=None):
     """Return Gamma at the visible surface, interpolated between the vertices of its triangle.
 
     Parameters
@@ -81,10 +128,14 @@ def surface_gamma(view: View, light: Light, *, kernel, otherwise):
         The frame, a light, a kernel.
     otherwise
         Gamma where no triangle is seen.
+    gamma_of
+        In place of the kernel, Gamma at points.
+    triangle
+        What `view.visible_triangle` returns, if that was asked before.
     """
-    corners, weights, seen = view.visible_triangle()
+    corners, weights, seen = triangle or view.visible_triangle()
     total = sum(
-        dr.select(seen, weight, 0) * gamma_at(view, light, corner, kernel=kernel)
+        dr.select(seen, weight, 0) * (gamma_of(corner) if gamma_of else gamma_at(view, light, corner, kernel=kernel))
         for corner, weight in zip(corners, weights)
     )
     return dr.select(seen, total, otherwise)

@@ -73,8 +73,10 @@ def bin_source(index: PlaneIndex, box: Box) -> Source:
     everything = box.azimuth_half > TURN / 2
     low, high = box.azimuth - box.azimuth_half, box.azimuth + box.azimuth_half
     turned = dr.select(low < 0, TURN, 0)
-    begin = dr.select(everything, 0, mi.UInt32(dr.clip((low + turned) * (BINS / TURN), 0, BINS - 1)))
-    end = dr.select(everything, BINS - 1, mi.UInt32(dr.clip((high + turned) * (BINS / TURN), 0, 2 * BINS - 1)))
+    # The upper bound is one of whole numbers: what is no number would pass `dr.clip` and become 2^32 - 1.
+    first, last = (mi.UInt32(dr.maximum((azimuth + turned) * (BINS / TURN), 0)) for azimuth in (low, high))
+    begin = dr.select(everything, 0, dr.minimum(first, BINS - 1))
+    end = dr.select(everything, BINS - 1, dr.minimum(last, 2 * BINS - 1))
 
     def start(number):
         return dr.gather(mi.UInt32, index.start, number)

@@ -11,6 +11,7 @@ from realtime.frame.incremental import next_frame
 from realtime.frame.renderer import FrameRenderer, frame_renderer, image_frame, run_stages
 from realtime.kernels.registry import KERNELS
 from realtime.methods.interface.layers import Layers
+from realtime.methods.interface.method import never
 from realtime.methods.registry import METHODS
 from realtime.scene.animate import coloured_light, read_objects, thicker_medium, turned_light, turned_objects
 from realtime.scene.read_scene import Scene, read_scene
@@ -24,7 +25,7 @@ STEPS = ("light", "medium", "colour", "camera", "light", "objects", "colour", "l
 
 
 def made(scene: Scene, method: str, **parameters) -> FrameRenderer:
-    kernel = KERNELS["taylor"].function if METHODS[method].uses_kernel else None
+    kernel = KERNELS["taylor"].function
     return frame_renderer(scene, METHODS[method], kernel=kernel, **parameters)
 
 
@@ -174,7 +175,7 @@ def test_what_a_method_of_ones_own_prepares_is_made_anew_unless_it_says_otherwis
     def render(view, state, lists, *, kernel, parameters):
         return Layers(type(view.medium.albedo)(state[0] + 0 * view.direction.x))
 
-    own = replace(METHODS["unshadowed"], render=render, prepare=of_medium, uses_kernel=False)
+    own = replace(METHODS["unshadowed"], render=render, prepare=of_medium, uses_kernel=never)
     renderer = frame_renderer(sphere_scene(), own)
     _, kept = next_frame(renderer, renderer.scene, None, **STILL)
     thick = replace(renderer.scene, medium=thicker_medium(renderer.scene.medium, 2.0))

@@ -55,3 +55,16 @@ def test_a_collector_that_was_off_stays_off(variant):
         assert not gc.isenabled()
     finally:
         gc.enable()
+
+
+def test_many_recordings_print_nothing(variant, collecting, capfd):
+    """Of a scene with bounded media whose objects move Dr.Jit records every frame, and said so each time."""
+    import mitsuba as mi
+
+    from realtime.frame.recorded import Frozen
+
+    function = Frozen(lambda x, number: x + number)
+    for number in range(14):
+        function(mi.Float([1.0, 2.0]), number)
+    assert function.n_recordings == 14
+    assert "recorded" not in "".join(capfd.readouterr())

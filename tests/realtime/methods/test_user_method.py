@@ -17,7 +17,7 @@ import mitsuba as mi
 import numpy as np
 from realtime.errors import InputError
 from realtime.methods.interface.layers import Layers
-from realtime.methods.interface.method import Method, always
+from realtime.methods.interface.method import Method, always, never
 from realtime.methods.registry import METHODS
 
 NUMBER = 3
@@ -64,9 +64,9 @@ def wrong_ready(view): return 1
 wrong_ready.prepare = 5
 def full(view, state, lists, *, kernel, parameters): return Layers(2)
 def bare(view, state, lists, *, kernel, parameters): return 2
-record = Method("theirs", full, "", "", uses_kernel=False)
-unlayered = Method("unlayered", bare, "", "", uses_kernel=False)
-lights = Method("lights", full, "", "", uses_kernel=False, provides_visibility=always)
+record = Method("theirs", full, "", "", uses_kernel=never)
+unlayered = Method("unlayered", bare, "", "", uses_kernel=never)
+lights = Method("lights", full, "", "", uses_kernel=never, provides_visibility=always)
 """
 
 
@@ -106,11 +106,11 @@ def test_a_built_in_name_gives_the_record_itself():
 @pytest.mark.claim("own-method-parameters")
 def test_the_signature_decides(own):
     method = find_method(f"{own}:calls")
-    assert method.uses_kernel
+    assert method.uses_kernel(None)
     assert method.defaults == {"steps": 7, "share": 0.5, "word": "a", "on": True}
     assert (method.shadows, method.frozen({}), method.casts_rays({})) == (False, True, True)
     method = find_method(f"{own}:divides")
-    assert not method.uses_kernel
+    assert not method.uses_kernel(None)
     assert (method.defaults, method.shadows, method.frozen({})) == ({}, True, False)
     assert (method.summary, method.source) == ("Divide by zero.", own)
 

@@ -87,3 +87,10 @@ def test_glossy_surfaces_are_noted(variant):
     assert len(notes) == 1
     assert "not purely diffuse" in notes[0]
     assert read().features.notes == ()
+
+
+@pytest.mark.claim("first-camera-noted")
+def test_a_second_camera_is_noted(variant):
+    """The first is used, and whoever meant the other is told."""
+    (note,) = read(other={"type": "perspective", "medium": {"type": "ref", "id": "fog"}}).features.notes
+    assert "2 cameras: the first is used" in note

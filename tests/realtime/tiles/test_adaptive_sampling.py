@@ -157,7 +157,7 @@ def frame(method, parameters, size=(96, 72)):
     chosen = METHODS[method]
     turned = mi.ScalarTransform4f().translate([0.1, 0.1, 0.7]).rotate([1, 2, 3], 40).scale(0.33)
     scene = read_scene(mi.load_dict(tiny_scene(size=size, ball={"type": "cube", "to_world": turned})))
-    kernel = KERNELS["exact"].function if chosen.uses_kernel else None
+    kernel = KERNELS["exact"].function
     return render_frame(frame_renderer(scene, chosen, kernel=kernel, **parameters))
 
 
@@ -248,7 +248,7 @@ def test_every_layer_is_interpolated(variant):
     two = tiny_scene(size=(48, 36)) | {"second": tiny_scene()["lamp"] | {"position": [-1.1, -0.9, 2.3]}}
     scene = read_scene(mi.load_dict(two))
     method = Method(
-        "layered", smooth, "", "", LayeredParameters, uses_kernel=False, provides_visibility=always, by_rays=always
+        "layered", smooth, "", "", LayeredParameters, uses_kernel=never, provides_visibility=always, by_rays=always
     )
     whole, parted = (render_frame(frame_renderer(scene, method, tolerance=tolerance)) for tolerance in (0.0, 0.02))
     for layer in ("airlight", "surface"):

@@ -72,8 +72,21 @@ def test_strided_arrays_are_written_as_they_are(tmp_path):
 def test_nonfinite_and_negative_values_survive(tmp_path):
     values = np.zeros((2, 2, 3), np.float32)
     values[0, 0], values[0, 1], values[1, 0] = np.nan, np.inf, -1.5
-    write_exr(tmp_path / "a.exr", Image({"airlight": values}))
+    write_exr(tmp_path / "a.exr", Image({"airlight": values}), finite=False)
     np.testing.assert_array_equal(read_exr(tmp_path / "a.exr").layers["airlight"], values)
+
+
+@pytest.mark.parametrize(("odd", "layer"), [(np.nan, "surface"), (np.inf, "airlight"), (-np.inf, "airlight")])
+def test_what_is_not_finite_is_not_written(tmp_path, odd, layer):
+    layers = {name: np.ones((2, 3, 3)) for name in ("airlight", "surface")}
+    layers[layer][1, 2, 0] = odd
+    with pytest.raises(InputError, match=f"layer '{layer}': 1 of 6 pixels are not finite, first in column 2 of row 1"):
+        write_exr(tmp_path / "a.exr", Image(layers))
+    depth = np.array([[np.nan, np.inf], [1.0, 2.0]])
+    with pytest.raises(InputError, match="layer 'depth': 1 of 4 pixels"):
+        write_exr(tmp_path / "a.exr", Image({"airlight": np.ones((2, 2, 3))}, depth))
+    assert list(tmp_path.iterdir()) == []
+    write_exr(tmp_path / "a.exr", Image({"airlight": np.ones((1, 1, 3))}, np.array([[np.inf]])))  # nothing was hit
 
 
 def test_attributes_keep_their_value(tmp_path):
@@ -206,23 +219,89 @@ def test_broken_files_give_one_line_and_nothing_on_the_terminal(tmp_path, capfd)
     assert capfd.readouterr() == ("", "")
 
 
-def test_refuses_tiled_deep_and_multi_part_files(tmp_path):
+def test_refuses_tiled_and_deep_files(tmp_path):
     import OpenEXR
 
     plane = np.ones((3, 4), np.float32)
     write_raw(tmp_path / "tiled.exr", {"R": plane}, {"type": OpenEXR.tiledimage, "tiles": OpenEXR.TileDescription()})
-    OpenEXR.File([OpenEXR.Part({}, {"R": plane}, name) for name in ("left", "right")]).write(
-        str(tmp_path / "multi.exr")
-    )
     deep = np.empty((3, 4), object)
     for index in np.ndindex(deep.shape):
         deep[index] = np.zeros(2, np.float32)
     write_raw(
         tmp_path / "deep.exr", {"Z": deep}, {"type": OpenEXR.deepscanline, "compression": OpenEXR.ZIPS_COMPRESSION}
     )
-    for name, kind in (("tiled", "tiled"), ("multi", "multi-part"), ("deep", "deep")):
-        with pytest.raises(InputError, match=rf"{name}\.exr is a {kind} EXR file; save it as a single part"):
+    for kind in ("tiled", "deep"):
+        with pytest.raises(InputError, match=rf"{kind}\.exr is a {kind} EXR file; save it as a single part"):
+            read_exr(tmp_path / f"{kind}.exr")
+
+
+def write_parts(path, parts):
+    import OpenEXR
+
+    OpenEXR.File([OpenEXR.Part(header, channels, name) for name, header, channels in parts]).write(str(path))
+
+
+@pytest.mark.claim("image-parts", tolerance="none: equal")
+def test_reads_the_parts_of_a_file(tmp_path):
+    """Blender names the layer in the channel, others in the part alone; a part named rgba is the image itself."""
+    value = iter(np.arange(1, 20, dtype=np.float32))
+    plane = {key: np.full((3, 4), next(value)) for key in ("C.R", "C.G", "C.B", "C.A", "V.R", "V.G", "V.B", "R", "Z")}
+    blender = [
+        ("View.C", {}, {f"View.{key}": plane[key] for key in ("C.R", "C.G", "C.B", "C.A")}),
+        ("View.V", {}, {f"View.{key}": plane[key] for key in ("V.R", "V.G", "V.B")}),
+    ]
+    write_parts(tmp_path / "a.exr", blender)
+    image = read_exr(tmp_path / "a.exr")
+    assert sorted(image.layers) == ["View.C", "View.V"]
+    np.testing.assert_array_equal(image.layers["View.V"][2, 3], [5, 6, 7])
+    assert image.attributes["airlight:read"] == "channels left out: View.C.A"
+    colours = {key: plane["R"] for key in "RGB"}
+    write_parts(
+        tmp_path / "b.exr", [("rgba", {"owner": "me"}, colours), ("fog", {}, colours), ("depth", {}, {"Z": plane["Z"]})]
+    )
+    image = read_exr(tmp_path / "b.exr")
+    assert sorted(image.layers) == ["fog", "total"]
+    np.testing.assert_array_equal(image.depth, plane["Z"])
+    assert image.attributes == {"owner": "me"}
+
+
+def test_a_part_that_is_cut_off_is_not_left_out_in_silence(tmp_path, capfd):
+    """The binding returns the other parts, with a word on the terminal."""
+    noise = np.random.default_rng(1).random((3, 64, 64)).astype(np.float32)
+    parts = [(name, {}, dict(zip("RGB", noise))) for name in ("rgba", "fog")]
+    write_parts(tmp_path / "good.exr", parts)
+    good = (tmp_path / "good.exr").read_bytes()
+    for cut in (1, len(good) // 4, len(good) * 3 // 4):
+        (tmp_path / "bad.exr").write_bytes(good[:-cut])
+        with pytest.raises(InputError, match=r"bad\.exr is a broken EXR file"):
+            read_exr(tmp_path / "bad.exr")
+    assert capfd.readouterr() == ("", "")
+
+
+def test_refuses_parts_that_do_not_fit(tmp_path):
+    import OpenEXR
+
+    plane = np.ones((3, 4), np.float32)
+    frame = {"displayWindow": (np.array([0, 0], np.int32), np.array([3, 2], np.int32))}
+    window = frame | {"dataWindow": (np.array([0, 0], np.int32), np.array([3, 1], np.int32))}
+    write_parts(tmp_path / "a.exr", [("one", frame, {"R": plane}), ("two", window, {"R": plane[:2]})])
+    tiles = {"type": OpenEXR.tiledimage, "tiles": OpenEXR.TileDescription()}
+    write_parts(tmp_path / "b.exr", [("one", {}, {"R": plane}), ("two", tiles, {"R": plane})])
+    write_parts(tmp_path / "c.exr", [("one", {}, {"x.R": plane}), ("two", {}, {"x.R": plane})])
+    for name, words in (("a", "another window of pixels"), ("b", "part 'two' that is tiled"), ("c", "'x.R' in two")):
+        with pytest.raises(InputError, match=words):
             read_exr(tmp_path / f"{name}.exr")
+
+
+def test_colours_in_integers_are_named(tmp_path):
+    plane = np.ones((3, 4), np.uint32)
+    write_raw(tmp_path / "a.exr", dict.fromkeys("RGB", plane))
+    image = read_exr(tmp_path / "a.exr")
+    assert image.attributes["airlight:read"] == "colours in unsigned integers left out: B, G, R"
+    with pytest.raises(
+        InputError, match=r"no layer of colours at all \(colours in unsigned.*write it in half or float"
+    ):
+        layer(image, "total")
 
 
 def test_refuses_a_window_of_a_larger_frame(tmp_path):

@@ -326,3 +326,32 @@ def test_tolerances_that_are_none_are_refused(files, capsys):
 def test_reports_are_read_by_their_folder(files):
     folder, file = files(report(), report())
     assert read_report(folder) == read_report(file)
+
+
+def claimed(verdict, measured, *, unit="", published=None, item="eq. 1"):
+    """Return a report with one verdict on a paper."""
+    row = {"paper": "biri", "item": item, "claim": "words", "verdict": verdict, "published": published}
+    return report() | {"fidelity": [row | {"measured": measured, "unit": unit, "command": "airlight", "why": "so"}]}
+
+
+def test_verdicts_on_papers_are_compared():
+    good, bad = claimed("reproduced", 1.0), claimed("refuted", 2.0)
+    assert words(compare_reports(good, bad)) == ["biri, eq. 1: refuted, was reproduced"]
+    assert words(compare_reports(bad, good), "better") == ["biri, eq. 1: reproduced, was refuted"]
+    assert words(compare_reports(good, good)) == []
+    assert words(compare_reports(bad, claimed("impossible", None)), "note") == ["biri, eq. 1: impossible, was refuted"]
+    slow = compare_reports(claimed("reproduced", 30.0, unit="frames/s"), claimed("differs", 20.0, unit="frames/s"))
+    assert (words(slow), words(slow, "note")) == ([], ["biri, eq. 1: differs, was reproduced"])
+
+
+def test_a_row_that_is_gone_and_a_published_figure_that_changed_are_worse():
+    old, new = claimed("reproduced", 1.0), claimed("reproduced", 1.0, item="eq. 2")
+    assert words(compare_reports(old, new)) == ["biri, eq. 1: the row is gone"]
+    assert words(compare_reports(old, new, common=True)) == []
+    other = claimed("reproduced", 1.0, published=4.0)
+    assert words(compare_reports(old, other)) == ["biri, eq. 1: the published figure"]
+    assert words(compare_reports(old, report())) == []  # a report of few scenes measures no claims
+
+
+def test_reports_with_verdicts_keep_to_the_schema():
+    checked(claimed("differs", 2.0, published=3))

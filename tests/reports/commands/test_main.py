@@ -177,3 +177,13 @@ def test_every_public_name_can_be_imported(variant):
     assert set(airlight.__all__) <= set(dir(airlight))
     with pytest.raises(AttributeError, match="no_such_name"):
         airlight.no_such_name  # noqa: B018 - to look it up is the test
+
+
+def test_a_deleted_working_folder_is_one_line(tmp_path):
+    """Dr.Jit ends the process over it."""
+    (tmp_path / "gone").mkdir()
+    program = f"cd {tmp_path}/gone && rmdir {tmp_path}/gone && {sys.executable} {ROOT / 'airlight.py'} scenes"
+    ran = subprocess.run(["sh", "-c", program], capture_output=True, text=True, timeout=60)
+    assert (ran.returncode, ran.stdout) == (2, "")
+    assert ran.stderr.startswith("airlight: error: the current folder was deleted: change into another")
+    assert ran.stderr.count("\n") == 1

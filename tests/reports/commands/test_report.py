@@ -8,6 +8,9 @@ from reference.storage.exr import Image, write_exr
 from reports.commands.main import run
 
 METHOD = """
+print("at import")
+
+
 def half(view, *, kernel=None):
     from realtime.methods.unshadowed import unshadowed
     return 0.5 * unshadowed(view, kernel=kernel)
@@ -20,6 +23,27 @@ def broken(view):
 def flat(view):
     import numpy as np
     return np.zeros((3, 7))
+
+
+def hangs(view):
+    while True:
+        pass
+
+
+def crashes(view):
+    import os
+    os.abort()
+
+
+def exits(view):
+    print("farewell")
+    raise SystemExit(0)
+
+
+def darkens(view):
+    if len(view.pixel) > 64 * 48:
+        raise RuntimeError("too large")
+    return 1.0
 """
 
 
@@ -61,18 +85,63 @@ def refused(capsys, *arguments):
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("fog_of_mine:broken", "fog_of_mine.py, line 8: KeyError: 'nothing'"),
-        ("fog_of_mine:flat", "returned an array of shape (3, 7) for"),
-        ("fog_of_mine:missing", "has no 'missing'; it has half, broken, flat"),
+        ("fog_of_mine:missing", "has no 'missing'; it has half, broken, flat, hangs, crashes, exits, darkens"),
         ("nowhere:half", "there is no module 'nowhere'"),
     ],
 )
-def test_faults_of_ones_own_method_are_one_line_before_any_work(variant, mine, capsys, own_cache, name, words):
+def test_what_is_no_method_is_one_line_before_any_work(variant, mine, capsys, own_cache, name, words):
     printed = refused(capsys, "--quick", "--scenes", "open-fog", "--methods", "unshadowed", "--method", name)
     assert f"method {name}" in printed
     assert words in printed
     assert not any(mine.rglob("report.*"))
     assert not any(own_cache.rglob("*.npz"))  # not even the truth
+
+
+FAULTS = {
+    "broken": "fog_of_mine.py, line 11: KeyError: 'nothing'",
+    "flat": "returned an array of shape (3, 7) for",
+    "hangs": "did not end within 20 s and was stopped; --method-limit allows more",
+    "crashes": "ended its process, killed by SIGABRT",
+    "exits": "SystemExit: 0",
+    "darkens": "RuntimeError: too large",
+}
+
+
+@pytest.mark.slow
+@pytest.mark.claim("own-method-process")
+def test_a_report_goes_on_without_methods_that_are_at_fault(variant, mine, capfd, own_cache):
+    import json
+
+    own = [word for name in (*FAULTS, "half") for word in ("--method", f"fog_of_mine:{name}")]
+    options = ["--quick", "--scenes", "open-fog", "--methods", "unshadowed", "-o", "out", "--method-limit", "20"]
+    assert run(["report", *options, *own, "--json"]) == 1
+    printed = capfd.readouterr()
+    data = json.loads(printed.out)
+    rows = {row["method"].partition(":")[2]: row for row in data["scenes"][0]["methods"]}
+    assert rows["half"]["error"]["relative_bias"] == pytest.approx(-0.5, abs=1e-5)
+    page = (mine / "out" / "report.html").read_text(encoding="utf-8")
+    for name, words in FAULTS.items():
+        assert words in rows[name]["refused"]
+        assert f"airlight: error: method fog_of_mine:{name}: " in printed.err
+        assert f"method fog_of_mine:{name}: " in page
+    # Those that are at fault in a small frame are told before the work, and nothing of a fault is kept.
+    assert printed.err.index("warning: method fog_of_mine:crashes") < printed.err.index("error: method")
+    assert "warning: method fog_of_mine:darkens" not in printed.err
+    assert run(["report", *options, "--method", "fog_of_mine:exits", "--method", "fog_of_mine:half", "--json"]) == 1
+    again = {row["method"].partition(":")[2]: row for row in json.loads(capfd.readouterr().out)["scenes"][0]["methods"]}
+    assert (again["exits"]["kept"], again["half"]["kept"]) == (False, True)
+
+
+@pytest.mark.claim("own-method-process")
+def test_a_frame_by_a_method_that_ends_its_process_is_no_success(variant, mine, capfd):
+    command = ["render", "open-fog", "--size", "8x6", "--json", "-o", "fog.exr", "--method"]
+    for name in ("crashes", "exits"):
+        assert run([*command, f"fog_of_mine:{name}"]) == 2
+        printed = capfd.readouterr()
+        assert printed.out == ""
+        assert f"airlight: error: method fog_of_mine:{name}: " in printed.err
+        assert FAULTS[name] in printed.err
+        assert not (mine / "fog.exr").exists()
 
 
 def test_ones_own_methods_come_after_the_others(variant, mine, handed_on, capsys):
@@ -143,6 +212,8 @@ def test_images_and_ones_own_method_in_one_report(variant, mine, images, capsys)
     truth = truth_image(load_scene("open-fog", (32, 24)).scene)
     for name, factor in (("a", 1.0), ("b", 0.9)):
         write_exr(images / f"open-fog.{name}.exr", Image({"airlight": factor * truth.airlight}))
+    area = truth_image(load_scene("open-fog", (32, 24)).scene, pixel="area")
+    write_exr(images / "open-fog.means.exr", Image({"total": area.airlight}))
     options = ["--scenes", "open-fog", "--methods", "unshadowed", "--method", "fog_of_mine:half", "-o", "out"]
     assert run(["report", "--quick", "--images", str(images), *options]) == 0
     (scene,) = json.loads((mine / "out" / "report.json").read_text())["scenes"]
@@ -155,4 +226,8 @@ def test_images_and_ones_own_method_in_one_report(variant, mine, images, capsys)
     # float32 in the file
     assert entries["a"]["error"]["relative_rmse"] == pytest.approx(0, abs=1e-7)
     assert entries["b"]["error"]["relative_bias"] == pytest.approx(-0.1, abs=1e-6)
+    assert entries["a"]["pixel"] == "centre"
+    assert (entries["means"]["pixel"], entries["means"]["layer"]) == ("area", "total")
+    assert entries["means"]["error"]["relative_rmse"] == pytest.approx(0, abs=1e-7)
+    assert "means over the areas of pixels" in entries["means"]["note"]
     assert "The image b of open-fog, judged by its airlight" in capsys.readouterr().out

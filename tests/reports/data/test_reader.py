@@ -67,6 +67,13 @@ def test_the_page_is_drawn_again_in_place_and_as_a_whole_elsewhere(folder, tmp_p
     redraw_report(data, where, new)
     assert without_ids((new / "report.html").read_text(encoding="utf-8")) == without_ids(page)
     assert load_report(new)[0] == data
+    # Under another name, too; and a name of a file is never taken for that of a folder.
+    (new / "report.json").rename(new / "my.json")
+    redraw_report(*load_report(new / "my.json"), tmp_path / "newer")
+    assert load_report(tmp_path / "newer")[0] == data
+    (new / "my.json").rename(new / "mine")
+    assert load_report(new / "mine")[0] == data
+    (new / "mine").rename(new / "report.json")
     # A report in itself: its own page can be drawn again, too.
     redraw_report(*load_report(new), new)
 
@@ -148,3 +155,26 @@ def test_the_command_refuses_in_one_line(folder, capsys, arguments, message):
     printed = capsys.readouterr().err
     assert message in printed
     assert printed.count("\n") == 1
+
+
+def test_a_full_disk_names_what_was_to_be_written(folder, tmp_path, monkeypatch):
+    import errno
+
+    from reference.storage import files
+
+    data, where = load_report(folder)
+
+    def full(path):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(files, "_flush", full)
+    with pytest.raises(OSError, match="No space left") as caught:
+        redraw_report(data, where, tmp_path / "new")
+    assert str(tmp_path / "new") in caught.value.filename
+    assert not [path for path in (tmp_path / "new").rglob("*") if path.is_file()]
+
+
+def test_json_too_deep_to_read_is_refused(folder):
+    (folder / "report.json").write_text("[" * 200_000)
+    with pytest.raises(InputError, match="is not valid JSON"):
+        load_report(folder)

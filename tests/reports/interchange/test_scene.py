@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from reports.commands.main import run
-from reports.interchange.scene import describe_scene, up_axis
+from reports.interchange.scene import describe_scene, spot_power_angle, up_axis
 from reports.tables.scene import description_text
 from tests.helpers.scenes import bounded_medium, spot, tiny_scene
 from validation.scenes.loading import LoadedScene, load_scene
@@ -114,6 +114,48 @@ def test_surfaces_have_their_reflectance(variant):
     }
     assert (floor["kind"], floor["triangles"], floor["textured"], floor["two_sided"]) == ("Rectangle", 2, True, True)
     np.testing.assert_allclose(floor["reflectance"], 0.4, atol=0.05)  # the mean of 64 places
+
+
+@pytest.mark.claim("described-power", tolerance="1e-9 relative: the quadrature's; 1e-7: float32 angles")
+@pytest.mark.parametrize(
+    ("beam", "cutoff"), [(25.0, 40.0), (33.0, 33.0), (0.0, 90.0), (24.3, 24.3000001), (0.01, 0.02)]
+)
+def test_power_of_a_spot_is_the_integral_of_its_falloff(beam, cutoff):
+    from scipy.integrate import quad
+
+    b, c = np.deg2rad([beam, cutoff])
+    inside = quad(np.sin, 0, b, epsabs=0)[0]
+    edge = quad(lambda t: (c - t) / (c - b) * np.sin(t), b, c, epsabs=0)[0] if c > b else 0.0
+    tolerance = 1e-9 if cutoff > 1 else 1e-8  # 1 - cos of a hundredth of a degree has lost eight digits
+    np.testing.assert_allclose(spot_power_angle(b, c), 2 * np.pi * (inside + edge), rtol=tolerance)
+
+
+@pytest.mark.claim("described-power")
+def test_lights_have_their_power(variant):
+    lamp, soft = described(soft=spot(cutoff=40.0, beam=25.0))["lights"]
+    np.testing.assert_allclose(lamp["power"], 4 * np.pi * np.array(lamp["intensity"]), rtol=1e-12)
+    assert lamp["power"] == lamp["power_all_round"]
+    angle = spot_power_angle(*np.deg2rad([25.0, 40.0]))
+    np.testing.assert_allclose(soft["power"], angle * np.array(soft["intensity"]), rtol=1e-6)
+    np.testing.assert_allclose(soft["power_all_round"], 4 * np.pi * np.array(soft["intensity"]), rtol=1e-12)
+
+
+def test_recipes_name_what_another_renderer_cannot_do(variant):
+    fog = tiny_scene()["fog"]
+    plain = described(ball=None, floor=None)["recipes"]
+    assert plain["Cycles"][0] == "light: Point, power 62.83185 W, colour (1, 0.8, 0.6), radius 0, no soft falloff"
+    assert plain["LuxCore"][0].startswith("light: `point`, colour 4 pi I = (62.83185, 50.26548, 37.69911)")
+    found = described(soft=spot(cutoff=40.0, beam=25.0), hard=spot(), fog=fog | {"phase": {"type": "hg", "g": 0.37}})
+    cycles, luxcore = (found["recipes"][name] for name in ("Cycles", "LuxCore"))
+    assert "spot size 80 degrees, which is the whole angle" in cycles[1]
+    assert "this edge cannot be made" in cycles[1]
+    assert "spot size 66 degrees" in cycles[2]
+    assert cycles[2].endswith("blend 0")
+    assert "Henyey-Greenstein" in cycles[3]
+    assert "this light cannot be made" in luxcore[1]
+    assert "Schlick's: no hg" in luxcore[3]
+    (sun, *_) = describe_scene(load_scene("windows", (8, 6)))["recipes"]["Cycles"]
+    assert sun == "light: Sun of strength 33.1, colour (1, 0.8670695, 0.673716), angle 0"
 
 
 @pytest.mark.parametrize(("up", "axis"), [((0, 0.1, 1), "z"), ((0.1, -1, 0), "-y"), ((1, 0, 0), "x")])

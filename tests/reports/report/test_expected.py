@@ -8,6 +8,7 @@ import pytest
 
 from reports.machine.progress import part_of, seconds_left
 from reports.report.expected import PAGE_SECONDS, SceneEntries, other_seconds, scene_seconds, shares
+from reports.report.fidelity import fidelity_parts
 from reports.report.measure import _steps
 from reports.report.papers import other_parts
 from validation.configurations.methods import STANDARD, Configuration
@@ -105,7 +106,8 @@ def test_every_scene_and_part_has_its_usual_time():
     from reports.report.expected import _OTHERS, _TYPICAL
 
     assert set(_TYPICAL) == set(SCENES)
-    full = {part.kind for part in other_parts(EFFORTS["full"], list(SCENES), result_cache(MACHINE))}
+    asked = EFFORTS["full"], list(SCENES), result_cache(MACHINE)
+    full = {part.kind for part in (*other_parts(*asked), *fidelity_parts(*asked))}
     assert full == set(_OTHERS)
     assert PAGE_SECONDS > 0
 

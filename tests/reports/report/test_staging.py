@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
+import errno
 import os
 import time
 
@@ -50,3 +51,14 @@ def test_what_a_killed_run_left_is_removed_after_a_day(tmp_path):
         pass
     assert fresh.exists()
     assert not stale.exists()
+
+
+def test_a_full_disk_names_the_folder_of_the_report(tmp_path):
+    def work():
+        with staged(tmp_path):
+            raise OSError(errno.ENOSPC, "No space left on device", "/somewhere/else")
+
+    with pytest.raises(OSError, match="No space left") as caught:
+        work()
+    assert caught.value.filename == str(tmp_path)
+    assert list(tmp_path.iterdir()) == []

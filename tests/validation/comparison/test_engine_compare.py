@@ -6,7 +6,8 @@ import pytest
 
 from analytic.errors import InputError
 from reference.storage.exr import Image, write_exr
-from validation.comparison.engine_compare import compare_scene, scene_of_size, truth_layer
+from validation.comparison.engine_compare import compare_scene, scene_of_size
+from validation.comparison.engine_layers import truth_layer
 from validation.estimates.quadrature import truth_image
 from validation.scenes.loading import load_scene
 
@@ -45,7 +46,7 @@ def write(tmp_path):
 
     def written(**layers):
         path = tmp_path / "engine.exr"
-        write_exr(path, Image({name.replace("__", "."): values for name, values in layers.items()}))
+        write_exr(path, Image({name.replace("__", "."): values for name, values in layers.items()}), finite=False)
         return path
 
     return written
@@ -105,11 +106,15 @@ def test_standard_errors_of_the_file_are_used(scene, truth, write):
 
 
 def test_pixels_can_be_means(scene, truth, write):
-    """The mean over a pixel differs from its centre most where the lamp is; both have the same scale."""
+    """The mean over a pixel differs from its centre most where the lamp is; what fits is found."""
     area = truth_image(load_scene(scene, (16, 12)).scene, pixel="area")
     file = write(airlight=area.airlight)
     assert compare_scene(scene, file, pixel="area").comparison.metrics.relative_rmse < 1e-6
-    assert compare_scene(scene, file).comparison.metrics.relative_rmse > 1e-3
+    assert compare_scene(scene, file, pixel="centre").comparison.metrics.relative_rmse > 1e-3
+    found = compare_scene(scene, file)
+    assert (found.pixel, found.fit.area_error < 1e-6, found.fit.centre_error > 0.01) == ("area", True, True)
+    assert found.comparison.metrics.relative_rmse < 1e-6
+    assert "means over the area fit" in found.summary()
 
 
 def test_json_has_every_number_once(scene, truth, write):
@@ -145,3 +150,34 @@ def test_layers_that_are_not_there_are_refused(scene, truth, write):
     with refused("it has A.Combined, B.Combined; name one by --layer"):
         compare_scene(scene, file)
     assert compare_scene(scene, file, layer="B.Combined").comparison.metrics.relative_rmse < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("margin", "exposure"), [(float("inf"), None), (float("nan"), None), (None, 1e30), (None, float("nan"))]
+)
+def test_numbers_out_of_range_are_refused(scene, truth, write, margin, exposure):
+    with refused("margin: got" if margin else "exposure: got"):
+        compare_scene(scene, write(airlight=truth.airlight), margin=margin, exposure=exposure, all_metrics=True)
+
+
+def test_what_a_layer_holds_can_be_said(scene, truth, write):
+    file = write(Beauty=truth.airlight)
+    found = compare_scene(scene, file, holds="airlight")
+    assert (found.expected, found.verdict.right) == ("airlight", True)
+    (words,) = compare_scene(scene, write(airlight=truth.airlight + truth.surface)).hints.words
+    assert words == "the image is all light: say --as total"
+    with refused("--as fog; wanted one of airlight, surface, total"):
+        compare_scene(scene, file, holds="fog")
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 3), (3, 1), (4, 3)])
+@pytest.mark.parametrize("value", [0.0, 1.0, -1.0, np.nan, np.inf, 3e38, 1e-45])
+def test_odd_images_get_a_verdict_and_no_number_that_is_none(tmp_path, variant, size, value):
+    """All warnings are errors in the tests; the text of an image without failures has no nan and no inf."""
+    path = tmp_path / "own.xml"
+    path.write_text(SCENE.replace('"32"', f'"{size[0]}"').replace('"24"', f'"{size[1]}"'))
+    write_exr(tmp_path / "odd.exr", Image({"total": np.full((size[1], size[0], 3), value, dtype=np.float32)}))
+    found = compare_scene(str(path), tmp_path / "odd.exr", all_metrics=True)
+    assert not found.verdict.right
+    assert "nan" not in found.summary()
+    assert not re.search(r"\binf\b", found.summary())

@@ -16,6 +16,12 @@ AIRLIGHT, SURFACE = RANDOM.uniform(0.5, 2, SHAPE), RANDOM.uniform(0, 3, SHAPE)
 TRUTH = SimpleNamespace(airlight=AIRLIGHT, surface=SURFACE)
 
 
+def truth_of(pixel):
+    """The means over pixels are a tenth brighter here, where a pixel is bright."""
+    brighter = 1 + 0.1 * (pixel == "area") * (AIRLIGHT > 1)
+    return SimpleNamespace(airlight=brighter * AIRLIGHT, surface=brighter * SURFACE)
+
+
 def write(folder, name, **layers):
     path = folder / name
     write_exr(path, Image(layers or {"total": np.ones(SHAPE, dtype=np.float32)}))
@@ -65,18 +71,18 @@ def shown(path):
 
 def test_a_layer_of_airlight_is_judged_as_such(tmp_path):
     path = write(tmp_path, "hall.exr", airlight=1.1 * AIRLIGHT, surface=SURFACE)
-    judged = measure_image(shown(path), TRUTH, surfaces=True)
+    judged = measure_image(shown(path), truth_of, surfaces=True)
     assert judged.layer == "airlight"
     # The file holds float32: 6e-8.
     assert judged.error.relative_bias == pytest.approx(0.1, abs=1e-7)
     assert judged.surface_error.relative_rmse == pytest.approx(0, abs=1e-7)
     np.testing.assert_allclose(judged.light, 1.1 * AIRLIGHT + SURFACE, rtol=1e-6)
-    assert measure_image(shown(path), TRUTH, surfaces=False).surface_error is None
+    assert measure_image(shown(path), truth_of, surfaces=False).surface_error is None
 
 
 def test_plain_channels_are_judged_against_all_light(tmp_path):
     path = write(tmp_path, "hall.exr", total=0.9 * (AIRLIGHT + SURFACE))
-    judged = measure_image(shown(path), TRUTH, surfaces=True)
+    judged = measure_image(shown(path), truth_of, surfaces=True)
     assert (judged.layer, judged.surface_error) == ("total", None)
     assert judged.error.relative_bias == pytest.approx(-0.1, abs=1e-7)
 
@@ -87,20 +93,53 @@ def test_what_the_reader_left_out_is_noted(tmp_path):
     channels = {name: np.ones((4, 6), dtype=np.float16) for name in ("R", "G", "B", "A")}
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     OpenEXR.File(header, channels).write(str(tmp_path / "hall.exr"))
-    note = measure_image(shown(tmp_path / "hall.exr"), TRUTH, surfaces=True).note
+    note = measure_image(shown(tmp_path / "hall.exr"), truth_of, surfaces=True).note
     assert "half floats" in note
     assert "A" in note
 
 
 def test_a_file_without_any_light_is_refused(tmp_path):
-    path = write(tmp_path, "hall.exr", beauty=np.ones(SHAPE))
-    with pytest.raises(InputError, match="has no layer 'total'"):
-        measure_image(shown(path), TRUTH, surfaces=True)
+    path = write(tmp_path, "hall.exr", beauty=np.ones(SHAPE), matte=np.ones(SHAPE))
+    for refused in (lambda: measure_image(shown(path), truth_of, surfaces=True), lambda: images_size((shown(path),))):
+        with pytest.raises(InputError, match="has no channels R, G, B and no layer 'airlight'; it has beauty, matte"):
+            refused()
+
+
+def test_colours_in_integers_are_refused_by_name(tmp_path):
+    """They once ended `report --images` with a StopIteration."""
+    import OpenEXR
+
+    path = tmp_path / "hall.exr"
+    OpenEXR.File({}, {name: np.ones((4, 6), dtype=np.uint32) for name in "RGB"}).write(str(path))
+    with pytest.raises(InputError, match="colours in unsigned integers left out: B, G, R"):
+        images_size((shown(path),))
+
+
+@pytest.mark.claim("engine-pixels")
+def test_the_truth_that_fits_is_taken(tmp_path):
+    for pixel in ("centre", "area"):
+        truth = truth_of(pixel)
+        path = write(tmp_path, f"{pixel}.exr", total=0.999 * (truth.airlight + truth.surface))
+        judged = measure_image(shown(path), truth_of, surfaces=True)
+        assert (judged.pixel, "means over the areas" in (judged.note or "")) == (pixel, pixel == "area")
+        assert judged.error.relative_bias == pytest.approx(-0.001, abs=1e-6)
+        np.testing.assert_array_equal(judged.truth.airlight, truth.airlight)
+
+
+def test_layers_of_blender_are_judged_by_their_names(tmp_path):
+    """Combined among others is all light, Volume Direct alone the airlight."""
+    layers = {"View.Combined": AIRLIGHT + SURFACE, "View.Diffuse": SURFACE}
+    judged = measure_image(shown(write(tmp_path, "hall.exr", **layers)), truth_of, surfaces=True)
+    assert (judged.layer, judged.error.relative_rmse < 1e-6) == ("total", True)
+    judged = measure_image(
+        shown(write(tmp_path, "hall.exr", **{"View.Volume Direct": AIRLIGHT})), truth_of, surfaces=True
+    )
+    assert (judged.layer, judged.error.relative_rmse < 1e-6) == ("airlight", True)
 
 
 def test_there_is_no_flip_where_the_surface_is_missing(tmp_path):
     path = write(tmp_path, "hall.exr", airlight=AIRLIGHT)
-    judged = measure_image(shown(path), TRUTH, surfaces=True)
+    judged = measure_image(shown(path), truth_of, surfaces=True)
     assert image_flip(judged, TRUTH) is None
     dark = SimpleNamespace(airlight=AIRLIGHT, surface=np.zeros(SHAPE))
     assert image_flip(replace(judged, surface_error=None), dark) is not None

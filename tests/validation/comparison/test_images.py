@@ -136,7 +136,7 @@ def test_a_mask_from_a_file(pair, tmp_path):
     comparison = compare_files(tmp_path / "a.exr", tmp_path / "b.exr", mask=tmp_path / "m.exr")
     assert (comparison.metrics.pixels, comparison.masked) == (24, 84)
     mask[0, 0, 0] = np.nan
-    write_exr(tmp_path / "m.exr", Image({"total": mask}))
+    write_exr(tmp_path / "m.exr", Image({"total": mask}), finite=False)
     with pytest.raises(InputError, match=r"m\.exr as a mask has values that are not finite"):
         compare_files(tmp_path / "a.exr", tmp_path / "b.exr", mask=tmp_path / "m.exr")
 
@@ -190,3 +190,15 @@ def test_messages_name_the_file(pair, tmp_path):
         compare_files(tmp_path / "a.exr", tmp_path / "b.exr")
     with pytest.raises(InputError, match=r"cannot read .*c\.exr"):
         compare_files(tmp_path / "a.exr", tmp_path / "c.exr")
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0])
+def test_a_reference_without_light_has_no_relative_errors_and_says_so(value):
+    """They were printed as nan, with exit status 0."""
+    images = (Image({"airlight": np.full(SHAPE, number)}) for number in (value, 1.0))
+    summary = compare_images(*images, all_metrics=True).summary()
+    assert "relative undefined" in summary
+    assert "the mean of the reference is not above zero" in summary
+    assert "nan" not in summary
+    same = Image({"airlight": np.ones(SHAPE)})
+    assert "psnr unlimited dB" in compare_images(same, same, all_metrics=True).summary()

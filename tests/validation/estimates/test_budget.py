@@ -112,3 +112,14 @@ def test_pixels_beside_a_light_are_those_that_the_truth_names(variant):
     expected = truth_image(scene, samples=16).light_angle <= MASK_PIXELS * pixel_angle(truth)
     assert 0 < expected.sum() < 40
     np.testing.assert_array_equal(near_light(truth, surface_hits(truth).distance), expected.ravel())
+
+
+@pytest.mark.parametrize("odd", [np.nan, np.inf])
+@pytest.mark.parametrize("layer", [0, 1])
+def test_no_target_is_met_by_what_is_no_number(odd, layer):
+    """A mean of NaN with a standard error of 0 ended a run at once."""
+    mean = np.ones((2, 4, 3))
+    mean[layer, 2] = odd
+    batches = Batches(tuple(range(32)), 1, mean, np.zeros_like(mean), np.ones((32, 2, 3)))
+    found = relative_errors(batches, np.zeros(4, dtype=bool))
+    assert (found.pooled, found.worst) == (np.inf, np.inf)

@@ -150,3 +150,22 @@ def test_resizing_moves_the_corner_rays(variant, small_file):
 def test_nearest_says_nothing_rather_than_nonsense():
     assert nearest("quadratur", ["taylor", "quadrature"]) == "; did you mean 'quadrature'?"
     assert nearest("zzz", ["taylor", "quadrature"]) == ""
+
+
+@pytest.mark.parametrize("side", ["width", "height"])
+@pytest.mark.parametrize("length", [0, 16385, 100_000_000])
+def test_a_film_that_no_image_has_is_refused_by_its_file(variant, small_file, side, length):
+    text, count = re.subn(rf'name="{side}" value="\d+"', f'name="{side}" value="{length}"', SMALL)
+    assert count == 1
+    small_file.write_text(text)
+    with refused(f"scene {small_file}: the camera's film has "):
+        load_scene(str(small_file))
+    assert load_scene(str(small_file), (8, 6)).scene.sensors()[0].film().size()[0] == 8
+
+
+def test_a_cropped_film_is_refused_also_for_the_truth(variant, small_file):
+    crop = '<integer name="crop_width" value="3"/><integer name="crop_height" value="2"/></film>'
+    small_file.write_text(SMALL.replace("</film>", crop))
+    with refused("the camera's film is cropped to 3 x 2 of "):
+        load_scene(str(small_file))
+    load_scene(str(small_file), (8, 6))

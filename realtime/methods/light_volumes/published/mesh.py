@@ -65,7 +65,7 @@ def volume_mesh(
     height = _heights(shadow_map)
     if tessellation == "static":
         return _static_mesh(shadow_map, light, height)
-    return _adaptive_mesh(shadow_map, light, height, triangles(divide(edges(height, threshold))))
+    return adaptive_mesh(shadow_map, light, height, triangles(divide(edges(height, threshold))))
 
 
 def memory_needed(faces: int, size: int) -> int:
@@ -96,7 +96,7 @@ def tessellation_stages(
         "laplacian": lambda height: edges(height, threshold),
         "edge map": divide,
         "tessellate": triangles,
-        "vertices": lambda corners: _adaptive_mesh(shadow_map, light, passed[0], corners),
+        "vertices": lambda corners: adaptive_mesh(shadow_map, light, passed[0], corners),
     }
     for name, stage in stages.items():
         start = perf_counter()
@@ -130,7 +130,7 @@ def _static_mesh(shadow_map: ShadowMap, light: Light, height) -> VolumeMesh:
     return VolumeMesh(_vertices(shadow_map, light, height, kept), corner_numbers)
 
 
-def _adaptive_mesh(shadow_map: ShadowMap, light: Light, height, corners) -> VolumeMesh:
+def adaptive_mesh(shadow_map: ShadowMap, light: Light, height, corners) -> VolumeMesh:
     """Return the mesh of triangles between corners of texels: those that are used become its vertices."""
     faces, size = shadow_map.faces, shadow_map.size
     used = np.zeros(height.size, bool)

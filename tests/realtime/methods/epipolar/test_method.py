@@ -63,7 +63,7 @@ def render(scene, method, precision="single", **parameters):
     from realtime.scene.read_scene import read_scene
 
     chosen = METHODS[method]
-    kernel = KERNELS["exact"].function if chosen.uses_kernel else None
+    kernel = KERNELS["exact"].function
     return render_frame(frame_renderer(read_scene(scene, precision), chosen, kernel=kernel, **parameters)).airlight
 
 

@@ -112,3 +112,18 @@ def test_a_small_image_of_many_planes_has_room(variant):
     _, lists = endless("torus", "open cylinder", "sphere", spread=0.5)
     assert np.max(np.array(lists.source.count)) > 32
     assert np.all(np.array(lists.sorted))
+
+
+def test_bins_stay_in_the_index_whatever_the_azimuth(variant):
+    """The azimuth about a light that is at the camera is no number: a load from bin 2^32 - 1 ended the process."""
+    import mitsuba as mi
+
+    from realtime.methods.shadow_planes.tile_boxes import Box
+    from realtime.methods.shadow_planes.tile_lists import bin_source
+
+    index = index_of(casters_of("torus"))
+    azimuths = mi.Float([np.nan, np.inf, -np.inf, 1e30, -1e30, 0.5])
+    rest = dict.fromkeys(("x", "y", "z", "x_half", "y_half", "z_half", "ray_end"), mi.Float(0))
+    for half in (0.1, np.nan):
+        source = bin_source(index, Box(azimuth=azimuths, azimuth_half=mi.Float([half] * 6), **rest))
+        assert np.all(np.array(source.first) <= len(index.entries))

@@ -10,7 +10,8 @@ truth; on request it compares with the truth itself.
 R, the mean distance between a point of the boundary and a point of the medium, is 1.2 radii in a sphere. A leg from far
 away has a mean length of 0.75 radii within the sphere (the mean of half a chord over the volume): R is 60 % too long,
 and the airlight too dark by about exp(-0.45 sigma_t radius). `scale` is the factor that brings the paper's image
-closest to the exact one. `shape` is the error that remains after this scaling: no choice of R could remove it.
+closest to the exact one. `shape` is the error that remains after this scaling: no choice of R could remove it. Beside
+them stand the errors of the polynomial for this form, of degree 4 as in the paper, and of the equation as printed.
 """
 
 from collections.abc import Callable, Sequence
@@ -44,6 +45,8 @@ class ConstantDistance:
     relative_bias: float
     scale: float  #: factor that brings the image closest to the exact one
     shape: float  #: relative RMSE that remains after scaling by this factor
+    polynomial: float  #: relative RMSE of the same by the kernel 'taylor'
+    printed: float  #: relative RMSE of the equation as printed, summed over nodes
 
 
 def constant_distance_study(
@@ -130,8 +133,10 @@ def _judged(size: float, depth: float, image: tuple[int, int], against: str) -> 
         relative_bias=error.relative_bias,
         scale=scale,
         shape=error_metrics(exact, scale * paper, mask=in_medium).relative_rmse,
+        polynomial=error_metrics(exact, _airlight(scene, "paper", "taylor"), mask=in_medium).relative_rmse,
+        printed=error_metrics(exact, _airlight(scene, "printed"), mask=in_medium).relative_rmse,
     )
 
 
-def _airlight(scene, media: str):
-    return render_frame(prepared(scene, configuration("shadow-planes", "exact", {"media": media}))).airlight
+def _airlight(scene, media: str, kernel: str = "exact"):
+    return render_frame(prepared(scene, configuration("shadow-planes", kernel, {"media": media}))).airlight

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from tests.helpers.bounded_study import constant_distance_study
+from validation.papers.constant_distance import constant_distance_study
 
 
 def test_a_thin_medium_does_not_care_for_r(variant):
@@ -28,6 +28,9 @@ def test_error_grows_with_optical_depth_and_no_factor_mends_it(variant):
     assert np.all(np.diff([row.shape for row in rows]) > 0)
     assert all(row.shape < row.relative_rmse for row in rows)
     assert rows[-1].scale > 2  # far too dark
+    # The lamp is above: chords lie within 40 degrees of their feet, where the series serves a thin medium.
+    assert rows[0].polynomial == pytest.approx(rows[0].relative_rmse, rel=0.02)
+    assert all(row.printed > row.relative_rmse for row in rows)  # it counts R twice
 
 
 @pytest.mark.slow

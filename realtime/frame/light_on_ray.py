@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""What no frame may hold: radiance that is not finite, and that of a ray which meets a point light.
+
+With h the distance from the light to the ray, t that to its foot, and theta the angle at the light,
+
+    J = exp(-sigma_t t)/h  int exp(-sigma_t h tan(theta/2 + pi/4)) p(-sin theta) dtheta.
+
+As h goes to 0 the exponential under the integral goes to 1 at every angle below pi/2, so that
+
+    h J -> exp(-sigma_t t) int_{-pi/2}^{pi/2} p(-sin theta) dtheta,            pi exp(-sigma_t t) for p = 1:
+
+J grows like 1/h, and the pixel of a ray that meets the light is infinite; a ray that ends at the light has half of the
+integral or more, and is so too. With the light at the camera this is so of every pixel. A mean over a pixel is finite,
+since 1/h is integrable over a plane, but a frame holds the radiance of the centres.
+
+Positions are float32 numbers: of a light at the distance |l - o| nobody knows better than to 2^-24 of the largest
+coordinate where it is. Below that height, h is noise, and so is 1/h. Such a pixel is refused, by the distance.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realtime.errors import InputError
+from realtime.scene.camera import HostCamera, read_camera
+from realtime.scene.read_scene import Scene
+
+Array = NDArray[np.float64]
+
+_ROUNDING = 2.0**-24
+
+
+def check_radiance(scene: Scene, name: str, airlight: Any, surface: Any, distance: Any) -> None:
+    """Refuse the frame of a method that is not finite everywhere, or whose airlight is not.
+
+    Parameters
+    ----------
+    scene
+        As it was rendered.
+    name
+        The method's.
+    airlight, surface
+        Radiances, (height, width, 3) [W/(m^2 sr)].
+    distance
+        To the visible surface, (height, width) [m].
+
+    Raises
+    ------
+    InputError
+        With the first pixel that is wrong, and why.
+    """
+    for number, light in enumerate(scene.lights, 1):
+        # A medium with bounds may end before the light, and a cone look away: there the number says more than the ray.
+        if light.kind == "point" and not scene.medium.clear:
+            _check_light(
+                read_camera(scene.camera), number, np.array(light.position, dtype=np.float64).ravel(), distance
+            )
+    for what, values in (("airlight", airlight), ("surface radiance", surface)):
+        wrong = ~np.isfinite(values).all(axis=2)
+        if wrong.any():
+            row, column = np.argwhere(wrong)[0]
+            raise InputError(
+                f"method {name}: the {what} of {int(wrong.sum())} of {wrong.size} pixels is not finite, first in "
+                f"column {column} of row {row}: {', '.join(f'{value:g}' for value in values[row, column])}; a light "
+                "may lie on its ray, or a number of the scene be too large for float32: move the light, or use other "
+                "units"
+            )
+
+
+def _check_light(camera: HostCamera, number: int, position: Array, distance: Any) -> None:
+    away = position - camera.origin
+    reach = float(np.linalg.norm(away))
+    known = _ROUNDING * max(np.abs(position).max(), np.abs(camera.origin).max())
+    if not reach > known:
+        raise InputError(
+            f"light {number} is {reach:.3g} m from the camera: the airlight, which grows like 1/distance, is infinite "
+            "in every pixel; move the light or the camera"
+        )
+    # In the plane at distance 1 a pixel has the sides `left` and `up`.
+    basis = np.stack([camera.left, camera.up, camera.forward], axis=1)
+    a, b, c = np.linalg.solve(basis, away)
+    if c <= 0:
+        return
+    column, row = 0.5 * (camera.width - 1) - a / c, 0.5 * (camera.height - 1) - b / c
+    nearest = np.clip(np.round([column, row]), 0, [camera.width - 1, camera.height - 1]).astype(int)
+    across, upward = 0.5 * (camera.width - 1) - nearest[0], 0.5 * (camera.height - 1) - nearest[1]
+    ray = basis @ (across, upward, 1.0)
+    height = float(np.linalg.norm(np.cross(away, ray)) / np.linalg.norm(ray))
+    ends = float(distance[nearest[1], nearest[0]])
+    if height <= max(known, _ROUNDING * reach) and reach <= ends * (1 + 4 * _ROUNDING):
+        raise InputError(
+            f"light {number} is {height:.3g} m from the ray through the centre of the pixel in column {nearest[0]} of "
+            f"row {nearest[1]}: the airlight there, which grows like 1/distance, is infinite; move the light or the "
+            "camera, or take another size"
+        )

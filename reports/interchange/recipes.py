@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What to set in renderers that were tried, in their own words and with the numbers of a scene.
+
+docs/examples has a script for each that does the same.
+"""
+
+import math
+from typing import Any
+
+_CYCLES = (
+    "Cycles, all `Max Bounces` 0 but Transparent 1024, `Clamp` 0, light threshold 0, no denoiser, no adaptive sampling",
+    "Pixel filter Box; write 32-bit EXR, or multi-layer with the pass Volume Direct, which is the airlight",
+)
+_LUXCORE = (
+    "`path.pathdepth.total` 1, `path.clamping.variance.maxvalue` 0, `film.filter.type` BOX of width 0.5, output RGB",
+    "its images are a pixel too low: move `scene.camera.screenwindow` up by one",
+)
+
+
+def recipes(described: dict[str, Any]) -> dict[str, list[str]]:
+    """Return what to set by the name of the renderer.
+
+    Parameters
+    ----------
+    described
+        What `reports.interchange.scene.describe_scene` found, `lights`, `medium`, `bounded_media` and `camera`.
+    """
+    bodies = [one for one in (described["medium"], *described["bounded_media"]) if one is not None]
+    phases = {one["phase"]["name"] for one in bodies}
+    lights = described["lights"]
+    cycles = [_cycles_light(light, _name(number, lights)) for number, light in enumerate(lights)]
+    cycles += [_cycles_media(phases)] if bodies else []
+    luxcore = [_luxcore_light(light, _name(number, lights)) for number, light in enumerate(lights)]
+    luxcore += [_luxcore_media(phases)] if bodies else []
+    longer = (
+        "horizontal" if described["camera"]["fov_horizontal"] >= described["camera"]["fov_vertical"] else "vertical"
+    )
+    angle = f"the field of view is the {longer} one, {described['camera'][f'fov_{longer}']:.7g} degrees"
+    return {"Cycles": [*cycles, angle, *_CYCLES], "LuxCore": [*luxcore, angle, *_LUXCORE]}
+
+
+def _name(number: int, lights: list[Any]) -> str:
+    return "light" if len(lights) == 1 else f"light {number + 1}"
+
+
+def _cycles_light(light: dict[str, Any], name: str) -> str:
+    if light["kind"] == "directional":
+        brightest = max(light["irradiance"])
+        return f"{name}: Sun of strength {brightest:.7g}, colour {_colour(light['irradiance'], brightest)}, angle 0"
+    brightest = max(light["intensity"])
+    colour = f"power {4 * math.pi * brightest:.7g} W, colour {_colour(light['intensity'], brightest)}, radius 0"
+    if light["kind"] == "point":
+        return f"{name}: Point, {colour}, no soft falloff"
+    size = f"spot size {2 * light['cutoff_angle']:.7g} degrees, which is the whole angle"
+    soft = light["beam_angle"] < light["cutoff_angle"]
+    blend = "its blend is another function of the angle: this edge cannot be made" if soft else "blend 0"
+    return f"{name}: Spot, {colour}, no soft falloff, {size}, {blend}"
+
+
+def _cycles_media(phases: set[str]) -> str:
+    line = "media: Volume Coefficients with sigma_s and sigma_a as Scatter and Absorption, on the world or the body"
+    kinds = {"hg": "Henyey-Greenstein", "isotropic": "Henyey-Greenstein of anisotropy 0", "rayleigh": "Rayleigh"}
+    named = [kinds[name] for name in sorted(phases) if name in kinds]
+    line += f"; phase {', '.join(named)}" if named else ""
+    return line + ("; it has no tabulated phase function" if "tabulated" in phases else "")
+
+
+def _luxcore_light(light: dict[str, Any], name: str) -> str:
+    if light["kind"] == "directional":
+        return f"{name}: `sharpdistant`, colour {_plain(light['irradiance'])} (not tried)"
+    colour = f"colour 4 pi I = {_plain([4 * math.pi * value for value in light['intensity']])}, no power or efficiency"
+    if light["kind"] == "point":
+        return f"{name}: `point`, {colour}"
+    return f"{name}: its `spot` is 1/cos(angle) brighter off the axis: this light cannot be made"
+
+
+def _luxcore_media(phases: set[str]) -> str:
+    line = "media: `homogeneous`, `scattering` sigma_s, `absorption` sigma_a"
+    other = sorted(phases - {"isotropic"})
+    return line + (f"; its phase function is Schlick's: no {', '.join(other)}" if other else ", `asymmetry` 0")
+
+
+def _colour(values: list[float], brightest: float) -> str:
+    return _plain([value / brightest for value in values] if brightest > 0 else [1.0, 1.0, 1.0])
+
+
+def _plain(values: list[float]) -> str:
+    return f"({', '.join(f'{value:.7g}' for value in values)})"

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Protects the claim that no frame holds what is not finite, and that a light on a ray is refused by its distance."""
+
+import numpy as np
+import pytest
+
+from realtime.errors import InputError
+from realtime.kernels.exact import exact
+from realtime.methods.registry import METHODS
+from tests.helpers.scenes import spot, tiny_scene
+
+
+def render(method, *, position, size=(9, 9), **changes):
+    """Render a scene whose camera looks along +y, its middle pixel along the axis."""
+    import mitsuba as mi
+
+    from realtime.frame.renderer import frame_renderer, render_frame
+    from realtime.scene.read_scene import read_scene
+
+    scene = tiny_scene(size=size, floor=None)
+    scene["sensor"]["to_world"] = mi.ScalarTransform4f().look_at([0, -5, 1], [0, 0, 1], [0, 0, 1])
+    scene["lamp"]["position"] = position
+    scene |= {"ball": {"type": "cube", "to_world": mi.ScalarTransform4f().translate([2, 3, 0]).scale(0.3)}} | changes
+    chosen = METHODS[method]
+    kernel = exact if chosen.uses_kernel else None
+    return render_frame(frame_renderer(read_scene(mi.load_dict(scene)), chosen, kernel=kernel))
+
+
+@pytest.mark.claim("light-on-a-ray-refused")
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("position", [[0.0, -5.0, 1.0], [0.0, 0.0, 1.0], [1e-8, 0.0, 1.0]])
+def test_a_light_at_the_camera_or_on_a_ray_is_refused_by_its_distance(variant, method, position):
+    with pytest.raises(InputError, match=r"light 1 is [\d.e-]+ m from the (camera|ray .* column 4 of row 4)"):
+        render(method, position=position)
+
+
+@pytest.mark.parametrize("position", [[0.0, -9.0, 1.0], [0.0, 9.0, 1.0], [1e-4, 0.0, 1.0], [0.0, -4.999, 1.03]])
+def test_a_light_on_the_line_of_a_ray_but_not_on_it_is_rendered(variant, position):
+    """Behind the camera, behind a wall, a little aside."""
+    import mitsuba as mi
+
+    wall = {"type": "cube", "to_world": mi.ScalarTransform4f().translate([0, 4, 1]).scale(0.5)}
+    frame = render("unshadowed", position=position, wall=wall)
+    assert np.isfinite(frame.airlight).all()
+    assert frame.airlight[4, 4].min() > 0
+
+
+def test_an_even_size_has_no_ray_through_the_middle(variant):
+    assert np.isfinite(render("unshadowed", position=[0.0, 0.0, 1.0], size=(8, 8)).airlight).all()
+
+
+def test_a_spot_that_looks_aside_is_no_reason(variant):
+    """On a ray it lights neither before nor behind itself, the airlight is 0 or finite."""
+    frame = render("ray-march", position=[3.0, 3.0, 3.0], spot=spot())
+    assert np.isfinite(frame.airlight).all()
+
+
+def test_what_is_not_finite_is_refused_whatever_the_reason():
+    from types import SimpleNamespace
+
+    from realtime.frame.light_on_ray import check_radiance
+
+    values = np.ones((2, 3, 3))
+    values[1, 2, 0] = np.nan
+    scene = SimpleNamespace(lights=(), camera=None)
+    for layers in ((values, np.ones_like(values)), (np.ones_like(values), values)):
+        with pytest.raises(InputError, match="1 of 6 pixels is not finite, first in column 2 of row 1: nan, 1, 1"):
+            check_radiance(scene, "unshadowed", *layers, np.full((2, 3), np.inf))

@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The polynomial in bounded media, against numerical integrals of what section 4.2 of Biri 2006 means and prints.
+
+Protects the claim that both forms of the equation are runnable by the polynomial and by nodes.
+"""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.special import factorial
+
+from realtime.errors import InputError
+from realtime.kernels.bounded import tangent_series
+from tests.helpers.scenes import bounded_medium, clear_scene, spot
+
+CENTRE, RADIUS, SIGMA, MEAN = np.array([-0.2, 0.4, 0.7]), 0.6, 0.7, 1.2 * 0.6
+
+
+def render(scene, kernel, **parameters):
+    import mitsuba as mi
+
+    from realtime.frame.renderer import render_frame
+    from realtime.scene.read_scene import read_scene
+    from validation.configurations.methods import configuration, prepared
+
+    read = read_scene(mi.load_dict(scene), "double")
+    return render_frame(prepared(read, configuration("shadow-planes", kernel, parameters))).airlight
+
+
+def ball(**phase):
+    shape = {"type": "sphere", "center": CENTRE.tolist(), "radius": RADIUS}
+    return bounded_medium(shape, SIGMA, (0.9, 0.4, 0.3), **phase)
+
+
+def by_hand(scene, exponent, p):
+    """Integrate exp(-exponent(x, r, foot, height, enter)) p/r^2 over every chord by adaptive quadrature."""
+    import mitsuba as mi
+
+    from reference.scene.read import read_truth
+
+    truth = read_truth(mi.load_dict(scene))
+    light = truth.lights[0]
+    image = np.zeros(len(truth.direction))
+    for pixel, direction in enumerate(truth.direction):
+        toward = CENTRE - truth.origin
+        middle = toward @ direction
+        half = RADIUS**2 - (toward @ toward - middle**2)
+        if half <= 0:
+            continue
+        enter, leave = middle - np.sqrt(half), middle + np.sqrt(half)
+        away = light.position - truth.origin
+        foot = away @ direction
+        height = np.sqrt(away @ away - foot**2)
+
+        def integrand(x, foot=foot, height=height, enter=enter):
+            r = np.hypot(x - foot, height)
+            return np.exp(-exponent(x, r, foot, height, enter)) * p((foot - x) / r) / r**2
+
+        image[pixel] = quad(integrand, enter, leave, epsabs=0, epsrel=1e-11)[0]
+    scale = np.array([0.9, 0.4, 0.3]) * SIGMA * light.intensity / (4 * np.pi)
+    return image.reshape(truth.height, truth.width, 1) * scale
+
+
+def meant(x, r, foot, height, enter):
+    return SIGMA * (x - enter + MEAN)
+
+
+def printed(x, r, foot, height, enter):
+    # (sin theta + 1)/cos theta with theta the angle at the light from the foot.
+    return SIGMA * (foot + MEAN - enter + MEAN * (r + x - foot) / height)
+
+
+def relative_rmse(one, two):
+    return np.sqrt(np.mean((one - two) ** 2)) / np.mean(two)
+
+
+def test_series_of_the_tangent_is_that_of_its_derivatives():
+    """exp(-a tan theta) by differences of high order about 0."""
+    a = 0.73
+    nodes = 0.3 * np.cos(np.pi * (np.arange(24) + 0.5) / 24)
+    fit = np.polynomial.polynomial.polyfit(nodes, np.exp(-a * np.tan(nodes)), 15)
+    assert np.array(tangent_series(a, 5)) == pytest.approx(fit[:6], rel=1e-6)
+    assert tangent_series(a, 4) == pytest.approx([1, -a, a * a / 2, -(a**3) / 6 - a / 3, a**4 / 24 + a * a / 3])
+    assert factorial(3) * tangent_series(a, 3)[3] == pytest.approx(-(a**3) - 2 * a)
+
+
+@pytest.mark.claim("polynomial-of-bounded-media", tolerance="relative RMSE 1e-4 of nodes and of degree 25")
+@pytest.mark.parametrize(("form", "exponent"), [("paper", meant), ("printed", printed)])
+@pytest.mark.parametrize("phase", ["isotropic", "rayleigh"])
+def test_both_forms_are_their_integrals_by_nodes_and_by_a_polynomial(variant, form, exponent, phase):
+    # The chords pass their feet within 45 degrees at the light, where the series converge fast.
+    lamp = clear_scene()["lamp"] | {"position": [-0.1, 0.5, 2.7]}
+    scene = clear_scene(lamp=lamp, ball=ball(phase={"type": phase}))
+    p = {"isotropic": lambda c: 1.0, "rayleigh": lambda c: 0.75 * (1 + c * c)}[phase]
+    expected = by_hand(scene, exponent, p)
+    assert (expected > 0).sum() > 30
+    assert relative_rmse(render(scene, "exact", media=form), expected) < 1e-4
+    assert relative_rmse(render(scene, "taylor-25", media=form), expected) < 1e-4
+    few = relative_rmse(render(scene, "taylor-1", media=form), expected)
+    more = relative_rmse(render(scene, "taylor", media=form), expected)
+    assert 1e-7 < more < 0.2 * few
+
+
+@pytest.mark.claim("polynomial-of-bounded-media")
+def test_a_polynomial_kernel_is_asked_in_bounded_media_and_no_other(variant):
+    scene = clear_scene(ball=ball())
+    exact, asked = render(scene, "exact"), render(scene, "taylor")
+    assert np.array_equal(asked, render(scene, "taylor", media="paper"))
+    assert relative_rmse(asked, exact) > 0.05
+    assert np.array_equal(exact, render(scene, "taylor", media="exact"))
+    assert np.array_equal(exact, render(scene, "quadrature"))
+    wrong = render(scene, "taylor-printed", media="printed")
+    # c_2 of the isotropic function is misprinted: a^2 - a for half of it.
+    assert relative_rmse(wrong, render(scene, "taylor", media="printed")) > 1e-3
+
+
+@pytest.mark.claim("polynomial-of-bounded-media", tolerance="relative RMSE 1e-3")
+def test_a_soft_spot_weighs_the_polynomial(variant):
+    scene = clear_scene(lamp=spot(cutoff=41.0, beam=23.0), ball=ball())
+    nodes, series = render(scene, "exact", media="paper"), render(scene, "taylor-25", media="paper")
+    assert relative_rmse(series, nodes) < 1e-3
+
+
+def test_what_has_no_polynomial_is_refused(variant):
+    with pytest.raises(InputError, match="no coefficients for the exponent"):
+        render(clear_scene(ball=ball()), "taylor-printed", media="paper")
+    hg = ball(phase={"type": "hg", "g": 0.3})
+    with pytest.raises(InputError, match="phase function 'hg'"):
+        render(clear_scene(ball=hg), "taylor-printed", media="printed")

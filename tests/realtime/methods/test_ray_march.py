@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The marcher of Billeter 2010: samples of the visibility, and one integral for each run of lit cells.
+
+Protects the claim that `sum=transitions` is that baseline: no error without shadows, order 1 with them.
+"""
+
+import numpy as np
+import pytest
+
+from tests.helpers.scenes import bounded_medium, clear_scene, spot, tiny_scene
+
+
+def render(method, *, scene, kernel="exact", precision="double", **parameters):
+    import mitsuba as mi
+
+    from realtime.frame.renderer import frame_renderer, render_frame
+    from realtime.kernels.registry import KERNELS
+    from realtime.methods.registry import METHODS
+    from realtime.scene.read_scene import read_scene
+
+    read = read_scene(mi.load_dict(scene), precision)
+    return render_frame(frame_renderer(read, METHODS[method], kernel=KERNELS[kernel].function, **parameters)).airlight
+
+
+def relative_rmse(one, two):
+    return np.sqrt(np.mean((one - two) ** 2)) / np.mean(two)
+
+
+def lit_by_hand(points, light, centre, radius):
+    """Return whether no ball lies between points and the light, by the distance of its centre from the segment."""
+    way = light - points
+    share = np.clip(np.sum((centre - points) * way, axis=-1) / np.sum(way * way, axis=-1), 0, 1)
+    return np.linalg.norm(points + share[..., None] * way - centre, axis=-1) > radius
+
+
+def runs_by_hand(scene, distance, steps, spacing):
+    """Add up, cell by cell, twelve Gauss nodes of the integrand where the middle of the cell is lit."""
+    import mitsuba as mi
+
+    from reference.scene.read import read_truth
+
+    truth = read_truth(mi.load_dict(scene))
+    light, centre, radius = truth.lights[0], np.array(scene["ball"]["center"]), scene["ball"]["radius"]
+    sigma, albedo = truth.medium.sigma_t, truth.medium.albedo
+    nodes, weights = np.polynomial.legendre.leggauss(12)
+    image = np.zeros((len(truth.direction), 3))
+    for pixel, (direction, end) in enumerate(zip(truth.direction, distance.ravel(), strict=True)):
+        foot = (light.position - truth.origin) @ direction
+        height = np.linalg.norm(light.position - truth.origin - foot * direction)
+        angles = np.arctan2(np.array([0.0, end]) - foot, height)
+        ends = np.array([0.0, end]) if spacing == "uniform" else angles
+        edges = ends[0] + np.arange(2 * steps + 1) / (2 * steps) * (ends[1] - ends[0])
+        x = edges if spacing == "uniform" else foot + height * np.tan(edges)
+        lit = lit_by_hand(truth.origin + x[1::2, None] * direction, light.position, centre, radius)
+        for number in np.flatnonzero(lit):
+            begin, close = x[2 * number], x[2 * number + 2]
+            at = 0.5 * (begin + close) + 0.5 * (close - begin) * nodes
+            r = np.hypot(at - foot, height)
+            value = np.exp(-sigma[:, None] * (at + r)) / r**2
+            image[pixel] += value @ weights * 0.5 * (close - begin)
+    scale = albedo * sigma * light.intensity / (4 * np.pi)
+    return (scale * image).reshape(truth.height, truth.width, 3)
+
+
+@pytest.mark.claim("billeter-marcher", tolerance="relative RMSE 1e-5 of twelve nodes in every lit cell")
+@pytest.mark.parametrize("spacing", ["uniform", "equiangular"])
+def test_transitions_are_integrals_over_the_cells_whose_middles_are_lit(variant, spacing):
+    from realtime.frame.renderer import frame_renderer, render_frame
+    from realtime.methods.registry import METHODS
+    from realtime.scene.read_scene import read_scene
+
+    scene = tiny_scene(size=(10, 8))
+    import mitsuba as mi
+
+    distance = render_frame(
+        frame_renderer(read_scene(mi.load_dict(scene), "double"), METHODS["ray-march"], steps=1)
+    ).distance
+    seen = np.isfinite(distance)
+    found = render("ray-march", scene=scene, steps=17, spacing=spacing, sum="transitions")
+    expected = runs_by_hand(scene, np.where(seen, distance, 1.0), 17, spacing)
+    # Mitsuba's distances and shadow rays are float32; no sample lies that close to an edge of the shadow.
+    assert relative_rmse(found[seen], expected[seen]) < 1e-5
+    assert relative_rmse(render("unshadowed", scene=scene)[seen], expected[seen]) > 0.01
+
+
+@pytest.mark.claim("billeter-marcher", tolerance="1e-12 relative")
+@pytest.mark.parametrize("spacing", ["uniform", "equiangular"])
+@pytest.mark.parametrize("name", ["point", "soft spot", "bounded", "directional"])
+def test_without_shadows_the_kernel_is_all(variant, name, spacing):
+    from tests.helpers.suns import sun
+
+    def fog():
+        return bounded_medium({"type": "sphere", "center": [0.1, 0.2, 0.7], "radius": 0.6}, 0.9, (0.9, 0.4, 0.3))
+
+    scenes = {
+        "point": lambda: tiny_scene(ball=None),
+        "soft spot": lambda: tiny_scene(ball=None, lamp=spot(beam=11.0)),
+        "bounded": lambda: clear_scene(ball=fog()),
+        "directional": lambda: clear_scene(lamp=sun(), ball=fog()),
+    }
+    scene = scenes[name]()
+    whole = render("unshadowed", scene=scene)
+    runs = render("ray-march", scene=scene, steps=3, spacing=spacing, sum="transitions", shadow="none")
+    np.testing.assert_allclose(runs, whole, rtol=1e-9, atol=1e-12 * whole.max())
+
+
+@pytest.mark.claim("billeter-marcher", tolerance="0.25 of the order 1")
+def test_with_shadows_the_order_is_one_and_the_integrand_costs_nothing(variant):
+    scene = tiny_scene(size=(48, 36))
+    truth = render("ray-march", scene=scene, steps=6000, sum="transitions")
+    steps = np.array([12, 48, 192])
+    errors = [
+        relative_rmse(render("ray-march", scene=scene, steps=int(n), spacing="uniform", sum="transitions"), truth)
+        for n in steps
+    ]
+    order = -np.polyfit(np.log(steps), np.log(errors), 1)[0]
+    assert order == pytest.approx(1, abs=0.25)
+    # At twelve uniform steps the integrand near the light is most of the marcher's error.
+    summed = relative_rmse(render("ray-march", scene=scene, steps=12, spacing="uniform"), truth)
+    assert errors[0] < 0.5 * summed
+
+
+def test_a_map_says_what_is_lit(variant):
+    scene = tiny_scene(size=(24, 18))
+    rays = render("ray-march", scene=scene, steps=100, sum="transitions")
+    mapped = render("ray-march", scene=scene, steps=100, sum="transitions", shadow="map", map=512)
+    assert 0 < relative_rmse(mapped, rays) < 0.02
+
+
+def test_the_kernel_is_asked_for_transitions_alone(variant):
+    from analytic.errors import InputError
+    from validation.configurations.methods import configuration
+
+    assert configuration("ray-march").kernel is None
+    assert configuration("ray-march", None, {"sum": "transitions"}).kernel == "exact"
+    assert configuration("ray-march", "taylor", {"sum": "transitions"}).label == "ray-march (taylor, sum=transitions)"
+    with pytest.raises(InputError, match="calls no kernel"):
+        configuration("ray-march", "taylor")

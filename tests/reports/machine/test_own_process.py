@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the user's code does in a process of its own: nothing of it ends the command or gets into its output."""
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from analytic.errors import InputError
+from reports.machine.own_process import EndedError, in_own_process
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+def run(function, *arguments, limit=60.0):
+    return in_own_process(function, *arguments, name="fog.py:f", limit=limit)
+
+
+@pytest.mark.claim("own-method-process")
+def test_what_is_returned_comes_back_and_what_is_printed_goes_to_the_error_stream(variant, capfd):
+    assert run(divmod, 17, 5) == (3, 2)
+    assert run(print, "from within") is None
+    assert capfd.readouterr() == ("", "from within\n")
+
+
+@pytest.mark.parametrize(
+    ("function", "arguments", "words"),
+    [
+        (os.abort, (), "killed by SIGABRT"),
+        (os.kill, (0, 11), "killed by SIGSEGV"),
+        (os._exit, (0,), "exit status 0"),
+        (sys.exit, (0,), "exit status 0"),
+        (sys.exit, (7,), "exit status 7"),
+    ],
+    ids=lambda value: getattr(value, "__name__", None),
+)
+def test_a_process_that_ends_says_how(variant, function, arguments, words):
+    with pytest.raises(EndedError, match=rf"^method fog\.py:f: ended its process, {words}; wanted"):
+        run(function, *arguments)
+
+
+def test_a_hang_is_ended_in_time(variant):
+    start = time.monotonic()
+    with pytest.raises(EndedError, match=r"did not end within 0\.5 s and was stopped; --method-limit allows more"):
+        run(time.sleep, 600, limit=0.5)
+    assert time.monotonic() - start < 60
+
+
+def refuse(words):
+    raise InputError(words)
+
+
+def test_a_refusal_comes_back_as_it_is(variant):
+    with pytest.raises(InputError, match=r"^wanted fog$") as caught:
+        run(refuse, "wanted fog")
+    assert type(caught.value) is InputError
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sign", [2, 15, 9])
+def test_the_process_ends_with_the_one_that_started_it(variant, tmp_path, sign):
+    """Also with all that the user's code started itself."""
+    method = tmp_path / "hangs.py"
+    method.write_text(
+        "import os, subprocess\nfrom pathlib import Path\n\n\ndef f(view):\n"
+        "    child = subprocess.Popen(['sleep', '600'])\n"
+        f"    Path({str(tmp_path / 'pids')!r}).write_text(f'{{os.getpid()}} {{child.pid}}')\n"
+        "    while True:\n        pass\n"
+    )
+    command = [sys.executable, "airlight.py", "render", "open-fog", "--size", "8x6", "--method", f"{method}:f"]
+    process = subprocess.Popen(command, cwd=ROOT, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    for _ in range(1200):
+        if (tmp_path / "pids").exists() and len((tmp_path / "pids").read_text().split()) == 2:
+            break
+        time.sleep(0.05)
+    process.send_signal(sign)
+    out, err = process.communicate(timeout=30)
+    assert process.returncode == {2: 130, 15: 143, 9: -9}[sign]
+    assert (out, err.count("\n")) == ("", 0 if sign == 9 else 1)
+    pids = [int(word) for word in (tmp_path / "pids").read_text().split()]
+    for _ in range(100):
+        if not any(alive(pid) for pid in pids):
+            break
+        time.sleep(0.05)
+    assert not any(alive(pid) for pid in pids)
+
+
+def alive(pid):
+    """Whether a process runs; one that nobody waits for stays as a zombie."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except OSError:
+        return False

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Output that is closed, full or in ASCII: no traceback, and JSON stays JSON."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+def run(line, **environment):
+    """Run a line of the shell in which $AIRLIGHT is the command."""
+    environment = os.environ | {"AIRLIGHT": f"{sys.executable} {ROOT / 'airlight.py'}"} | environment
+    return subprocess.run(["sh", "-c", line], capture_output=True, env=environment, timeout=120)
+
+
+@pytest.mark.parametrize(
+    ("line", "status"),
+    [
+        ("$AIRLIGHT scenes >&-", 0),
+        ("$AIRLIGHT scenes --json >&-", 0),
+        ("$AIRLIGHT --help >&-", 0),
+        ("$AIRLIGHT --version >&-", 0),
+        ("$AIRLIGHT scenes <&-", 0),
+        ("$AIRLIGHT render nowhere 2>&-", 2),
+        ("$AIRLIGHT render nowhere <&- >&- 2>&-", 2),
+        ("($AIRLIGHT scenes; echo $? >&2) | head -c 1 >/dev/null", 0),
+    ],
+)
+def test_closed_streams_are_no_fault(line, status):
+    ran = run(line)
+    assert ran.returncode == status
+    assert b"Traceback" not in ran.stderr
+
+
+def test_a_file_does_not_take_the_place_of_a_closed_output(tmp_path):
+    code = "from reports.machine.streams import usable_streams; usable_streams()\n"
+    code += f"file = open({str(tmp_path / 'a')!r}, 'w'); print('printed'); import os; os.write(1, b'said')"
+    assert run(f'cd {ROOT}; {sys.executable} -c "{code}" >&-').returncode == 0
+    assert (tmp_path / "a").read_bytes() == b""
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
+def test_an_output_without_unicode_gets_the_nearest(encoding):
+    ran = run("$AIRLIGHT scenes", PYTHONIOENCODING=encoding)
+    assert (ran.returncode, ran.stderr) == (0, b"")
+    assert b"-----" in ran.stdout
+    assert b"?" not in ran.stdout
+
+
+def test_json_in_ascii_loses_nothing():
+    line = "$AIRLIGHT published --json --scenes X --paper biri"
+    assert run(line, PYTHONIOENCODING="ascii").returncode == 2
+    code = "from reports.machine.streams import usable_streams; usable_streams()\n"
+    code += "from reports.tables.terminal import print_json; print_json({'name': '\\u2500 \\udcff'})"
+    ran = run(f'cd {ROOT}; {sys.executable} -c "{code}"', PYTHONIOENCODING="ascii")
+    assert json.loads(ran.stdout) == {"name": "\u2500 \udcff"}

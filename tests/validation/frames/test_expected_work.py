@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Work of an hour, or for more memory than there is, is asked about before it starts; usual work is not."""
+
+import pytest
+
+from analytic.errors import InputError
+from reports.commands.main import run
+from validation.frames import expected_work
+from validation.frames.expected_work import Work, check_work
+
+
+def test_an_hour_and_the_memory_are_the_bounds(variant, monkeypatch):
+    monkeypatch.setattr(expected_work.dr, "thread_count", lambda: 2)
+    monkeypatch.setattr(expected_work, "machine_memory", lambda: 10**9)
+    monkeypatch.setattr(expected_work.mi, "variant", lambda: "llvm_ad_rgb")
+    check_work("x", [Work(3600, 1e9), Work(3600, 1e9)], force=False)
+    with pytest.raises(InputError, match=r"^x: would take about 1 hours; ask for less, or add --force to start it"):
+        check_work("x", [Work(3700), Work(3600)], force=False)
+    with pytest.raises(InputError, match=r"^x: needs about 2 GB of memory, of which this machine has 1 GB; ask"):
+        check_work("x", [Work(1, 2e9)], force=False)
+    with pytest.raises(InputError, match=r"about 6\.[0-9]* years and needs"):
+        check_work("x", [Work(4e8, 2e9)], force=False)
+    check_work("x", [Work(1e9, 2e9)], force=True)
+    check_work("x", [], force=False)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["render", "open-fog", "--size", "16384x16384"],
+        ["render", "open-fog", "--size", "8x6", "--set", "steps=9999999999999"],
+        ["render", "open-fog", "--size", "8x6", "--frames", "9999999999999", "-o", "a.exr"],
+        ["reference", "open-fog", "--size", "16384x16384"],
+        ["reference", "open-fog", "--estimator", "volpath", "--spp", "100000000000"],
+        ["bench", "open-fog", "--size", "16384x16384"],
+        ["bench", "open-fog", "--estimators", "--size", "16384x16384"],
+        ["maps", "sphere-spot", "--size", "16384x16384", "--sizes", "32"],
+        ["published", "--scale", "4"],
+    ],
+    ids=" ".join,
+)
+def test_every_command_that_renders_asks(variant, tmp_path, monkeypatch, capfd, command):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(expected_work.dr, "thread_count", lambda: 2)
+    monkeypatch.setattr(expected_work, "machine_memory", lambda: 16 * 10**9)
+    assert run(command) == 2
+    err = capfd.readouterr().err
+    assert err.count("\n") == 1
+    assert "add --force to start it nevertheless" in err
+    assert not list(tmp_path.iterdir())
+
+
+def test_usual_work_is_not_asked_about(variant, monkeypatch):
+    """The largest documented commands, on one thread of a small machine."""
+    from validation.scenes.registry import SCENES
+
+    monkeypatch.setattr(expected_work.dr, "thread_count", lambda: 1)
+    monkeypatch.setattr(expected_work, "machine_memory", lambda: 8 * 10**9)
+    size = (800, 600)
+    works = [expected_work.truth_work(size) for _ in SCENES]
+    works += [expected_work.frame_work(size, steps=100) for _ in SCENES for _ in range(17)]
+    check_work("bench", works, force=False)
+    check_work("render", [expected_work.frame_work((3840, 2160), steps=400)], force=False)
+    check_work("reference", [expected_work.sampled_work(size, 2048)], force=False)

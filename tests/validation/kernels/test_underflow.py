@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Protects the claim that a value which underflows breaks no bar, on any processor, and nothing else is let off."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from validation.kernels.errors import errors_by_group
+from validation.kernels.rays import table
+from validation.kernels.stability import GENERATED, Bar, _broken
+from validation.kernels.underflow import underflow_allowance
+from validation.kernels.values import Values
+
+# Rays of which single terms are below 2^-126 though their sums are far above, with the J of each. A processor that
+# flushes lost all of the first and the third, a nearly isotropic lobe, and 2.4 % of the second.
+FLUSHED = (
+    ("hazy", 132789.140625, 232308.1875, 0.0, 32985.58984375, 0.00022316776448860765, 1.2482876161892056e-33),
+    ("rayleigh", 689046.9375, 1363.2552490234375, 0.0, 372320.25, 8.510394400218502e-05, 8.723572803710459e-32),
+    ("isotropic", -438344.6875, 1188.7958984375, 0.0, 10104.048828125, 0.00013516764738596976, 3.828543456423609e-34),
+)
+
+
+def rays(*given):
+    phase, foot, height, x0, x1, sigma_t, value = zip(*given)
+    columns = {"foot": foot, "height": height, "x0": x0, "x1": x1, "sigma_t": sigma_t}
+    arrays = {name: np.array(column, dtype=np.float64) for name, column in columns.items()}
+    return replace(table(phase, np.zeros(len(phase)), tags=["thick"] * len(phase), **arrays), value=np.array(value))
+
+
+def faults(cases, J, precision="single"):
+    """Return what values break of the bar, if the other precision is right."""
+    values = {one: Values(cases.value, {}, np.ones(len(J), dtype=bool)) for one in ("single", "double")}
+    values[precision] = replace(values[precision], J=np.asarray(J, dtype=np.float64))
+    return _broken(Bar(), GENERATED, cases, values)
+
+
+@pytest.mark.claim("underflow-breaks-no-bar")
+@pytest.mark.parametrize("kept", [0.0, 0.5, 1.0])
+def test_what_a_processor_flushes_on_the_way_breaks_no_bar(kept):
+    cases = rays(*FLUSHED[::2])
+    assert faults(cases, kept * cases.value) == []
+
+
+@pytest.mark.claim("underflow-breaks-no-bar")
+def test_what_remains_after_flushing_some_terms_breaks_no_bar():
+    cases = rays(FLUSHED[1])
+    assert faults(cases, [8.516171514327399e-32]) == []
+
+
+def test_more_than_can_be_flushed_breaks_it():
+    cases = rays(*FLUSHED)
+    assert any("float32 maximum" in words for words in faults(cases, 10 * cases.value))
+
+
+def test_nothing_is_let_off_in_float64():
+    cases = rays(*FLUSHED)
+    assert any("float64 maximum" in words for words in faults(cases, 0 * cases.value, "double"))
+
+
+@pytest.mark.parametrize("value", [1e-20, 1e-27])
+def test_a_dim_value_that_does_not_underflow_is_held_to_the_bar(value):
+    """A short segment near the light in thick fog: its terms are far above the smallest numbers."""
+    cases = rays(("isotropic", 5.0, 1.0, 0.0, 1.0, 10.0, value))
+    assert faults(cases, [0.0])
+    assert faults(cases, [1.001 * value])
+
+
+def test_the_allowance_follows_from_length_and_vacuum_value():
+    t = 2.0**-126
+    near = rays(("isotropic", 0.0, 1e-6, 0.0, 1e-6, 0.1, 1.0))
+    assert underflow_allowance(near, "single") == pytest.approx(t * (8e-6 + 1e6 + 1), rel=1e-12)
+    long = rays(("rayleigh", 1e4, 1e5, 0.0, np.inf, 1e-3, 1.0))
+    assert underflow_allowance(long, "single") == pytest.approx(t * (8 * (1e4 + 87e3) + 1 + 1.5 * 9.7e-6), rel=1e-9)
+    vacuum = rays(("isotropic", 0.0, 1.0, 0.0, np.inf, 0.0, np.pi / 2), ("isotropic", 0.0, 0.0, 0.0, 0.0, 1.0, 0.0))
+    allowed = underflow_allowance(vacuum, "single")
+    assert np.isfinite(allowed).all()
+    assert (allowed < 1e-18).all()
+
+
+def test_units_of_a_certified_value_do_not_matter():
+    """The third ray in a larger and a smaller unit: what is flushed hangs on it, and so does the allowance."""
+    for scale in (1e-3, 1e3):
+        name, foot, height, x0, x1, sigma_t, value = FLUSHED[2]
+        scaled = (name, foot * scale, height * scale, x0 * scale, x1 * scale, sigma_t / scale, value / scale)
+        allowed = underflow_allowance(rays(scaled), "single")[0]
+        # In numbers a thousand times as large 1/r^2 is a millionth of what it was: more is flushed.
+        assert (allowed > value / scale) == (scale > 1)
+
+
+def test_errors_leave_the_allowance_out():
+    cases = rays(FLUSHED[0])
+    values = Values(np.zeros(1), {}, np.ones(1, dtype=bool))
+    found = errors_by_group(cases, values, "single", {"all": np.ones(1, dtype=bool)})["all"]
+    assert found.max == 0.0
+    twice = errors_by_group(cases, replace(values, J=8 * cases.value), "single", {"all": np.ones(1, dtype=bool)})["all"]
+    assert 3 < twice.max < 7

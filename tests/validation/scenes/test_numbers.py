@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Protects that a number of which no finite image can come is refused by name, in every place of a scene."""
+
+import numpy as np
+import pytest
+
+from analytic.errors import InputError
+from tests.helpers.bad_inputs import cloud, mesh, scene
+from validation.scenes.loading import load_scene
+
+BROKEN = {
+    "position": ("nan, 0, 1", "light 'lamp': position has nan"),
+    "intensity": ("1e30, 1, 1", "light 'lamp': intensity.value has 1e[+]30 in 1 of 3 places; wanted .* to 1e[+]18"),
+    "origin": ("1e30, 0, 1", "camera 1: to_world has (1e[+]30|nan)"),
+    "g": ("nan", "phase_function.g has nan"),
+    "fov": ("nan", "camera 1: x_fov has nan"),
+    "radius": ("nan", "shape 'ball': to_world has nan"),
+    "scale": ("1e30", "medium 'fog': scale has 1e[+]30"),
+    "albedo": ("nan, 0, 0", "medium 'fog': albedo.value.value has nan"),
+    "sigma_t": ("nan, 0, 0", "medium 'fog': sigma_t.value.value has nan"),
+    "center": ("1e30, 0, 0", "shape 'ball': to_world has 1e[+]30"),
+}
+
+
+def load(tmp_path, text):
+    path = tmp_path / "scene.xml"
+    path.write_text(text)
+    return load_scene(str(path)).scene
+
+
+@pytest.mark.parametrize("place", BROKEN)
+def test_an_odd_number_is_refused_by_its_name(variant, tmp_path, place):
+    value, words = BROKEN[place]
+    with pytest.raises(InputError, match=words):
+        load(tmp_path, scene(**{place: value}))
+
+
+@pytest.mark.parametrize("intensity", ["-1, 1, 1", "1, 1, -1e-9"])
+def test_a_negative_intensity_is_refused(variant, tmp_path, intensity):
+    with pytest.raises(InputError, match="wanted finite numbers from 0"):
+        load(tmp_path, scene(intensity=intensity))
+
+
+def test_a_sphere_of_no_size_is_refused(variant, tmp_path):
+    with pytest.raises(InputError, match="shape 'ball': to_world scales an axis by 0"):
+        load(tmp_path, scene(radius="0"))
+
+
+@pytest.mark.parametrize(
+    ("corner", "words"), [("nan 1 0", "invalid vertex position data"), ("1e30 1 0", "shape 'mesh': .*1e[+]30")]
+)
+def test_a_vertex_is_refused_by_the_name_of_its_mesh(variant, tmp_path, corner, words):
+    with pytest.raises(InputError, match=words):
+        load(tmp_path, scene(extra=mesh(f"0 0 0\n1 0 0\n{corner}", "3 0 1 2", tmp_path)))
+
+
+def test_a_cloud_is_refused_by_its_name(variant, tmp_path):
+    with pytest.raises(InputError, match=r"sigma_t\.value.value has nan"):
+        load(tmp_path, scene(extra=cloud("nan, 1, 1")))
+
+
+def test_usual_numbers_pass(variant, tmp_path):
+    loaded = load(tmp_path, scene(extra=cloud()))
+    assert len(loaded.shapes()) == 2
+
+
+def test_the_python_interface_checks_scenes_that_are_built(variant):
+    import mitsuba as mi
+
+    import airlight
+
+    built = mi.load_string(scene(position="0, nan, 0"))
+    with pytest.raises(InputError, match="light 'lamp': position has nan"):
+        airlight.load_scene(built)
+
+
+def test_shapes_without_an_id_get_a_name_each(variant, tmp_path):
+    loaded = load(tmp_path, scene(extra='<shape type="rectangle"/><shape type="cube"/>'))
+    names = {shape.id() for shape in loaded.shapes()}
+    assert "" not in names
+    assert len(names) == 3
+
+
+def test_overlapping_media_are_named(variant, tmp_path):
+    """Without an id they were called ''."""
+    from realtime.errors import InputError as RealtimeInputError
+    from realtime.scene.read_scene import read_scene
+    from reference.scene.read import read_truth
+
+    loaded = load(tmp_path, scene(extra=cloud(name="") + cloud(name="")))
+    for read in (read_scene, read_truth):
+        with pytest.raises((InputError, RealtimeInputError), match=r"shapes 'sphere-\d' and 'sphere-\d'"):
+            read(loaded)
+
+
+def test_deep_elements_are_refused(variant, tmp_path):
+    """Mitsuba's reader calls itself for each and ended the process."""
+    deep = "<scene version='3.0.0'>" + "<shape>" * 20000 + "</shape>" * 20000 + "</scene>"
+    with pytest.raises(InputError, match="nested 20001 deep; wanted at most 200"):
+        load(tmp_path, deep)
+
+
+def test_no_opaque_shape_without_a_name_is_lost_beside_bounded_media(variant):
+    """A dictionary with one key for all of them kept the last alone."""
+    import mitsuba as mi
+
+    from realtime.scene.read_scene import read_scene
+
+    text = scene(extra='<shape type="rectangle"/><shape type="cube"/>' + cloud())
+    read = read_scene(mi.load_string(text))
+    assert len(read.geometry.shapes()) == 3
+    assert np.isfinite(np.array(read.geometry.bbox().max)).all()

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The rows of the other papers of the documentation: misprints, kernels and a peer that are built here."""
+
+from validation.fidelity.figures import at, ratio
+from validation.fidelity.row import AtMost, Bound, Equal, Row
+
+_FORMULA = Equal(1e-9, "the printed formula over what it stands for, by quadrature")
+
+ROWS: tuple[Row, ...] = (
+    Row(
+        "bouthors",
+        "eq. 1",
+        "single scattering of a segment, for l linear on it: printed over derived",
+        Bound(1),
+        "",
+        "printed",
+        at("clouds", "scattering"),
+        _FORMULA,
+    ),
+    Row(
+        "bouthors",
+        "eq. 2",
+        "opacity of a segment: printed over derived",
+        Bound(1),
+        "",
+        "printed",
+        at("clouds", "opacity"),
+        _FORMULA,
+    ),
+    Row(
+        "bouthors",
+        "eq. 4",
+        "kappa = rho N0 pi r_e^2 with r_e = (gamma + 2) r_n: printed over the mean square radius, gamma = 2",
+        Bound(1),
+        "",
+        "printed",
+        at("clouds", "radius"),
+        _FORMULA,
+    ),
+    Row(
+        "bouthors",
+        "eq. 5",
+        "radiative transfer: the change of an isotropic field without absorption, in units of the field",
+        Bound(0),
+        "",
+        "printed",
+        at("clouds", "conservation"),
+        Equal(0, "in a medium of albedo 1 what is scattered out comes back"),
+    ),
+    Row(
+        "sun",
+        "3, dimensionless",
+        "the airlight integral depends on dimensionless parameters only: times h, relative difference",
+        Bound(1e-12),
+        "",
+        "equations",
+        at("scaling"),
+        AtMost("an identity: what is left is rounding in double precision"),
+    ),
+    Row(
+        "pegoraro",
+        "closed form",
+        "an analytical solution in homogeneous media: median relative error on moderate rays, double precision",
+        Bound(1e-10),
+        "",
+        "polynomials",
+        at("moderate", "closed-form", "median"),
+        AtMost("an analytical solution is exact but for rounding"),
+        "airlight stability --kernels closed-form",
+    ),
+    Row(
+        "chen",
+        "min/max trees",
+        "the tree finds the lit segments of the map: error of a walk for every pixel over that of the light volume",
+        Bound(1.5),
+        "times",
+        "slices",
+        ratio(at("pixel", "relative_rmse"), at("volume", "relative_rmse")),
+        AtMost(
+            "both read the same map, the tree a second time along its slices; half as much again is allowed for that"
+        ),
+    ),
+    Row(
+        "chen",
+        "epipolar sampling",
+        "few samples along epipolar lines are enough: error of interpolated samples over that of every pixel",
+        Bound(2),
+        "times",
+        "slices",
+        ratio(at("samples", "relative_rmse"), at("pixel", "relative_rmse")),
+        AtMost("enough is read as twice the error at most, in `colonnade`"),
+    ),
+)

@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The numbers of a scene: each is refused by name where no float32 arithmetic can give a finite image with it.
+
+Mitsuba takes NaN, infinity and 1e30 nearly everywhere. The methods square lengths, and the area of a triangle and the
+planes of a silhouette need the fourth power of a coordinate: of 1e9 m that is 1e36, below the largest float32 number,
+3.4e38. An intensity is divided by a square and multiplied by coefficients, so its limit is lower than the type's.
+"""
+
+from collections.abc import Iterator
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from analytic.errors import InputError
+
+LARGEST_LENGTH = 1e9  #: of a coordinate or a radius [m], also of an extinction [1/m]
+LARGEST_LIGHT = 1e18  #: of an intensity [W/sr] or an irradiance [W/m^2]
+
+_LIGHT = ("intensity", "irradiance", "radiance")
+_NOT_NEGATIVE = (*_LIGHT, "sigma_t", "albedo", "scale")
+_CLIP = ("near_clip", "far_clip")  # no method takes them
+_NO_MATTER = ("vertex_texcoords",)
+_LEAST_SCALE = 1e-15  # of an axis of a transform [m]
+_FLATTEST = 1e-9  # of one axis beside another
+
+
+def check_numbers(scene: Any) -> None:
+    """Refuse a scene with a number that no image can be computed from.
+
+    Parameters
+    ----------
+    scene
+        The `mi.Scene`.
+
+    Raises
+    ------
+    InputError
+        With the name of the part, what it has and what is wanted.
+    """
+    for name, plugin in _plugins(scene):
+        parameters = mi.traverse(plugin)
+        for key in parameters.keys():  # noqa: SIM118 - SceneParameters iterates over items
+            values = _numbers(parameters[key])
+            if values is not None:
+                _check(name, key, values)
+        if "faces" in parameters:
+            _check_faces(name, parameters)
+
+
+def _plugins(scene: Any) -> Iterator[tuple[str, Any]]:
+    """Yield the parts of a scene under names that a user knows; media first, which are parts of others too."""
+    media = [sensor.get_medium() for sensor in scene.sensors()]
+    for shape in scene.shapes():
+        media += [shape.interior_medium(), shape.exterior_medium()]
+    parts = (("medium", media), ("camera", scene.sensors()), ("light", scene.emitters()), ("shape", scene.shapes()))
+    for kind, plugins in parts:
+        for number, plugin in enumerate(plugins, 1):
+            if plugin is not None:
+                yield _name(kind, plugin, number), plugin
+
+
+def _name(kind: str, plugin: Any, number: int) -> str:
+    return f"{kind} '{plugin.id()}'" if plugin.id() else f"{kind} {number}"
+
+
+def _numbers(value: Any) -> NDArray[np.float64] | None:
+    """Return the numbers of a parameter, None where it has none."""
+    # By the name of the type: a colour has a `matrix` too, a swizzle that holds its first channel six times.
+    matrix = value.matrix if "Transform" in type(value).__name__ else value
+    try:
+        return np.array(matrix, dtype=np.float64)
+    except (TypeError, ValueError):
+        return None
+
+
+def _check(name: str, key: str, values: NDArray[np.float64]) -> None:
+    words = key.split(".")
+    if words[-1] in _NO_MATTER:
+        return
+    light = any(word in _LIGHT for word in words)
+    largest = np.inf if words[-1] in _CLIP else LARGEST_LIGHT if light else LARGEST_LENGTH
+    least = 0.0 if any(word in _NOT_NEGATIVE for word in words) else -largest
+    wrong = ~((values >= least) & (values <= largest))
+    if wrong.any():
+        given = f"{values[wrong].ravel()[0]:g}"
+        given += f" in {int(wrong.sum())} of {values.size} places" if values.size > 1 else ""
+        wanted = f"finite numbers {'from 0 to' if least == 0 else 'of at most'} {largest:g}"
+        raise InputError(f"{name}: {key} has {given}; wanted {wanted}: use other units, or the right sign")
+    if words[-1] == "to_world":
+        _check_transform(name, key, values.reshape(4, 4))
+
+
+def _check_transform(name: str, key: str, matrix: NDArray[np.float64]) -> None:
+    scale = np.linalg.svd(matrix[:3, :3], compute_uv=False)
+    if scale[-1] < _LEAST_SCALE or scale[-1] < _FLATTEST * scale[0]:
+        raise InputError(
+            f"{name}: {key} scales an axis by {scale[-1]:.3g} and another by {scale[0]:.3g}; wanted at least "
+            f"{_LEAST_SCALE:g} m, and {_FLATTEST:g} of the other: give it a size"
+        )
+
+
+def _check_faces(name: str, parameters: Any) -> None:
+    """Refuse triangles of vertices that are not there."""
+    faces = np.array(parameters["faces"], dtype=np.int64)
+    count = len(np.array(parameters["vertex_positions"])) // 3
+    if faces.size and faces.max() >= count:
+        raise InputError(f"{name}: a face has vertex {faces.max()} of {count}, counted from 0; mend the mesh")
