@@ -17,8 +17,7 @@ class Frozen:
     """A function frozen by `drjit.freeze`, during whose calls nothing is collected."""
 
     def __init__(self, function: Callable[..., Any], **options):
-        # Dr.Jit warns of many recordings in words that help no user; `n_recordings` says it to tests.
-        self._recorded = dr.freeze(function, warn_after=1 << 30, **options)
+        self._recorded = dr.freeze(function, **options)
 
     def __call__(self, *args):
         """Call the function: the first time it is recorded, then replayed."""

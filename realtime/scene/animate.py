@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realtime.errors import InputError
+from realtime.numerics.aligned import aligned_array
 from realtime.numerics.array_types import types_of
 from realtime.scene.directional_extent import directional_fields, extent_spheres
 from realtime.scene.lights import DirectionalExtent, Light
@@ -113,17 +114,13 @@ def read_objects(scene: Scene, names: Sequence[str]) -> Objects:
 def replace_positions(parameters, positions: Mapping[str, Array]) -> Mapping[str, Array]:
     """Move the vertices of shapes in Mitsuba's scene; return them as it holds them, rounded to float32.
 
-    Dr.Jit reads NumPy's memory where it lies, and a frozen function is recorded anew where the alignment of an array
-    is another: what it is given are arrays of Dr.Jit's own.
+    The arrays are aligned, so that a frozen function that reads them is not recorded anew.
     """
     rounded = {}
     for name, vertices in positions.items():
         key = f"{name}.vertex_positions"
         narrow = vertices.astype(np.float32)
-        borrowed = mi.Float(narrow.ravel())
-        own = dr.gather(mi.Float, borrowed, dr.arange(mi.UInt32, dr.width(borrowed)))
-        dr.eval(own)
-        parameters[key] = own
+        parameters[key] = aligned_array(mi.Float, narrow.ravel())
         rounded[name] = narrow.astype(np.float64)
     parameters.update()
     return rounded

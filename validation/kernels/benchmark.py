@@ -20,6 +20,7 @@ from realtime.errors import InputError as RealtimeInputError
 from realtime.frame.recorded import Frozen
 from realtime.kernels.preparation import prepare_kernel, with_tables
 from realtime.kernels.registry import KERNELS
+from realtime.numerics.aligned import aligned_array
 from realtime.rays.ray_light import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium
@@ -28,7 +29,7 @@ from validation.configurations.kernel_names import find_kernel, sized, split_nam
 from validation.configurations.timing import Timing, time_repeated
 from validation.kernels.errors import relative_error
 from validation.kernels.rays import wide_rays
-from validation.kernels.values import TABLE, Kernel, aligned_array
+from validation.kernels.values import TABLE, Kernel
 
 Progress = Callable[[int, int, str], None]
 

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from analytic.cases import Cases
 from analytic.errors import InputError
 from realtime.errors import InputError as RealtimeInputError
+from realtime.numerics.aligned import aligned_array
 from realtime.numerics.array_types import array_types
 from realtime.rays.ray_light import RayGeometry, ray_geometry
 from realtime.scene.lights import Light
@@ -24,8 +25,6 @@ Kernel = Callable[..., Any]
 
 #: The phase function of cases called 'tabulated': float32 numbers whose mean over the sphere is exactly 1.
 TABLE = (0.5, 0.25, 0.25, 0.5, 0.5, 0.75, 1.0, 2.0, 5.0)
-
-_ALIGNMENT = 64  # bytes, of memory that Dr.Jit allocates
 
 
 @dataclass(frozen=True)
@@ -109,21 +108,6 @@ def evaluate_rows(
         geometry = ray_geometry(types.vector(cases.origin[rows].T), direction, light, low=low)
     x0, x1 = column(cases.x0[rows]), column(cases.x1[rows])
     return np.array(function(geometry, x0, x1, medium, light), dtype=np.float64)
-
-
-def aligned_array(scalar: Any, numbers: NDArray[Any]) -> Any:
-    """Return numbers as a Dr.Jit array in memory that is aligned as Dr.Jit's own is.
-
-    A Dr.Jit array of NumPy's memory uses it as it stands, and a kernel is compiled for the alignment of each of its
-    arrays: where NumPy puts them by chance, the same kernel is compiled again and again.
-    """
-    floats: dict[Any, np.dtype[Any]] = {dr.VarType.Float32: np.dtype("f4"), dr.VarType.Float64: np.dtype("f8")}
-    dtype = floats.get(dr.type_v(scalar), numbers.dtype)  # truth values and whole numbers come in their own type
-    memory = np.empty(numbers.size * dtype.itemsize + _ALIGNMENT, dtype=np.uint8)
-    begin = -memory.ctypes.data % _ALIGNMENT
-    aligned = memory[begin : begin + numbers.size * dtype.itemsize].view(dtype)
-    aligned[:] = numbers
-    return scalar(aligned)
 
 
 def take(cases: Cases, rows: NDArray[Any]) -> Cases:

@@ -4,8 +4,8 @@
 import numpy as np
 import pytest
 
+from realtime.numerics.aligned import aligned_array
 from realtime.scene.convex_bounds import mesh_bounds
-from validation.kernels.values import aligned_array
 from validation.scenes.parts import placed, rotation, scaled
 from validation.scenes.solids import box, gem, icosphere, prism
 

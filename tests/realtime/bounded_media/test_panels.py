@@ -4,8 +4,8 @@
 import numpy as np
 import pytest
 
+from realtime.numerics.aligned import aligned_array
 from tests.realtime.bounded_media.test_facet_walk import CENTRE, lines_in, seen_medium
-from validation.kernels.values import aligned_array
 
 PHASES = [
     ("isotropic", 0.0),

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import gc
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 
@@ -57,14 +59,26 @@ def test_a_collector_that_was_off_stays_off(variant):
         gc.enable()
 
 
-def test_many_recordings_print_nothing(variant, collecting, capfd):
-    """Of a scene with bounded media whose objects move Dr.Jit records every frame, and said so each time."""
-    import mitsuba as mi
+def test_a_frame_whose_objects_move_is_recorded_at_most_twice(variant):
+    """Dr.Jit records anew where the memory of an array is aligned in another way, and NumPy's is by chance.
 
-    from realtime.frame.recorded import Frozen
+    The second recording is for vertices that are aligned, after Mitsuba's own, which need not be.
+    """
+    import drjit as dr
 
-    function = Frozen(lambda x, number: x + number)
-    for number in range(14):
-        function(mi.Float([1.0, 2.0]), number)
-    assert function.n_recordings == 14
-    assert "recorded" not in "".join(capfd.readouterr())
+    from realtime.frame.renderer import frame_renderer, run_stages
+    from realtime.kernels.registry import KERNELS
+    from realtime.methods.registry import METHODS
+    from realtime.scene.animate import read_objects, turned_objects
+    from realtime.scene.read_scene import read_scene
+    from validation.scenes.loading import load_scene
+
+    scene = read_scene(load_scene("three-media", (16, 12)).scene)
+    renderer = frame_renderer(scene, METHODS["unshadowed"], kernel=KERNELS["exact"])
+    names = ("bar", "star", "slats", "vase", "tetrahedron", "floor")
+    objects = read_objects(scene, names)
+    for _ in range(8):
+        moved = replace(renderer, scene=turned_objects(scene, objects, np.eye(3)))
+        dr.eval(run_stages(moved, ()))
+    assert 1 <= renderer.surface.n_recordings <= 2
+    assert 1 <= renderer.render.n_recordings <= 2

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from validation.kernels.values import aligned_array
+from realtime.numerics.aligned import aligned_array
 
 RAYS, STEPS = 24, 7
 GAINS = arrays(np.int64, (RAYS, STEPS), elements=st.integers(-2, 2))

@@ -7,7 +7,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from validation.kernels.values import aligned_array
+from realtime.numerics.aligned import aligned_array
 
 RAYS, COUNT, PLACES = 16, 9, 4
 # Few values, so that many are equal; 0 and infinity stand for no crossing.

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from validation.kernels.values import aligned_array
+from realtime.numerics.aligned import aligned_array
 
 #: Rounding left aside, the rule leaves 5e-7, 8e-7 of cos^64; it was tuned on other rays.
 LEFT = 1e-6

@@ -8,8 +8,8 @@ from analytic.panels import airlight_segments
 from analytic.phase import PhaseFunction
 from realtime.errors import InputError
 from realtime.kernels.polynomial import _nodes, polynomial
+from realtime.numerics.aligned import aligned_array
 from tests.helpers.ray_polynomial import _antiderivative, evaluate, evaluate_segment, polynomial_coefficients
-from validation.kernels.values import aligned_array
 
 PHASES = ("isotropic", "rayleigh", "hazy", "murky", "hg")
 RAY = {"foot": 1.3, "height": 0.7, "x0": 0.0, "x1": 2.9, "sigma_t": 0.43}

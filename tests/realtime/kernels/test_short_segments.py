@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from validation.kernels.values import aligned_array
+from realtime.numerics.aligned import aligned_array
 
 PHASES = [
     ("isotropic", 0.0),
