@@ -114,9 +114,10 @@ def image_point(camera: Camera, direction):
 
 def pixel_number(slices: Slices, i, j):
     """Return the number, row times width plus column, of the pixel that holds a point (i, j), or of the nearest."""
-    column = dr.clip(0.5 * slices.width - i, 0, slices.width - 1)
-    row = dr.clip(0.5 * slices.height - j, 0, slices.height - 1)
-    return mi.UInt32(row) * slices.width + mi.UInt32(column)
+    # The upper bounds are those of whole numbers: NaN becomes the largest of them.
+    column = dr.minimum(mi.UInt32(dr.maximum(0.5 * slices.width - i, 0)), slices.width - 1)
+    row = dr.minimum(mi.UInt32(dr.maximum(0.5 * slices.height - j, 0)), slices.height - 1)
+    return row * slices.width + column
 
 
 def slice_coordinate(slices: Slices, i, j):
@@ -144,7 +145,7 @@ def neighbour(slices: Slices, number):
     """Return the slice of a whole number that may lie beyond the first or the last."""
     last = slices.count - 1
     round_ = dr.select(number < 0, number + slices.count, dr.select(number > last, number - slices.count, number))
-    return mi.UInt32(dr.clip(dr.select(slices.closed, round_, number), 0, last))
+    return dr.minimum(mi.UInt32(dr.maximum(dr.select(slices.closed, round_, number), 0)), last)
 
 
 def _towards_epipole(epipole, i, j):

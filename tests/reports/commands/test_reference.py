@@ -195,9 +195,7 @@ def test_merged_files_of_two_machines(variant, tmp_path, monkeypatch, capfd):
 def start(output, *arguments, before=""):
     """Run the command in a process of its own; `before` is Python to run in it first."""
     command = ["reference", *SCENE, "--estimator", "volpath", "-o", str(output), *arguments]
-    # What a shell starts in the background ignores Ctrl-C, and so would its children; a command at a terminal does not.
-    heeded = "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)"
-    code = f"import sys\n{heeded}\n{before}\nfrom reports.commands.main import run\nsys.exit(run({command!r}))"
+    code = f"import sys\n{before}\nfrom reports.commands.main import run\nsys.exit(run({command!r}))"
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     return subprocess.Popen([sys.executable, "-c", code], env=environment, cwd=ROOT, text=True, **pipes)

@@ -153,17 +153,19 @@ def test_where_no_shadow_is_seen_it_is_unshadowed(variant, sampling):
 
 @pytest.mark.parametrize("sampling", ["slices", "pixels"])
 def test_camera_at_the_light(variant, sampling):
-    """All that it sees is lit; the airlight there is infinite, as every method says."""
-    scene = scene_with(sensor=sensor((0.9, 0.7, 1.9), (0, 0, 0.9)))
-    image = render(scene, "min-max", map=32, sampling=sampling)
-    assert not np.any(np.isnan(image))
-    assert np.array_equal(image, render(scene, "unshadowed"))
+    """All that it sees is lit, and the airlight there is infinite; so near it is large and finite."""
+    there, near = (scene_with(sensor=sensor((0.9, 0.7 + away, 1.9), (0, 0, 0.9))) for away in (0, 1e-5))
+    for method, settings in (("min-max", {"map": 32, "sampling": sampling}), ("unshadowed", {})):
+        with pytest.raises(InputError, match=r"light 1 is .* m from the camera"):
+            render(there, method, **settings)
+    image = render(near, "min-max", map=32, sampling=sampling)
+    assert relative_rmse(image, render(near, "unshadowed")) < 1e-6
 
 
 @pytest.mark.parametrize("change", ["light in view", "spot in view"])
 def test_rays_through_the_light(variant, change):
-    """An odd number of pixels, the light in the middle of one: its ray passes through it."""
-    at = (0.9, 0.7, 1.9) if change == "light in view" else (0.7, -0.3, 2.6)
+    """An odd number of pixels, the light in the middle of one: its ray passes by at some hundredth of a millimetre."""
+    at = (0.90001, 0.7, 1.9) if change == "light in view" else (0.70001, -0.3, 2.6)
     changes = CHANGES[change]() | {"sensor": sensor((-2.5, -2.2, 0.3), at)}
     changes["sensor"]["film"] = changes["sensor"]["film"] | {"width": 33, "height": 25}
     import mitsuba as mi
@@ -190,7 +192,8 @@ def test_both_precisions_agree(variant):
 def test_images_of_any_size(variant, size):
     import mitsuba as mi
 
-    changes = CHANGES["light in view"]()
+    # The ray of an only pixel passes the light at a micrometre, where what lies in shadow behind it is one in a million.
+    changes = {"sensor": sensor((-2.5, -2.2, 0.3), (0.900001, 0.7, 1.9))}
     changes["sensor"]["film"] = changes["sensor"]["film"] | {"width": size[0], "height": size[1]}
     scene = mi.load_dict(tiny_scene(**changes))
     expected = render(scene, "unshadowed")
