@@ -192,7 +192,7 @@ def test_both_precisions_agree(variant):
 def test_images_of_any_size(variant, size):
     import mitsuba as mi
 
-    # The ray of an only pixel passes the light at a micrometre, where what lies in shadow behind it is one in a million.
+    # The ray of an only pixel passes the light at a micrometre, where what is in shadow behind it is one part in 1e6.
     changes = {"sensor": sensor((-2.5, -2.2, 0.3), (0.900001, 0.7, 1.9))}
     changes["sensor"]["film"] = changes["sensor"]["film"] | {"width": size[0], "height": size[1]}
     scene = mi.load_dict(tiny_scene(**changes))
