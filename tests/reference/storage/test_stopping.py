@@ -16,12 +16,22 @@ STATUS = {signal.SIGINT: 130, signal.SIGTERM: 143}
 HEAD = "import time\nfrom pathlib import Path\nfrom reference.storage.stopping import *\nstop_on_signals()\n"
 
 
-def start(code, *, head=HEAD):
-    """Start a program and wait for its first line."""
-    program = [sys.executable, "-c", f"{head}{code}"]
-    process = subprocess.Popen(program, cwd=ROOT, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-    assert process.stdout.readline() == "ready\n"
-    return process
+@pytest.fixture
+def start():
+    """A function that starts a program and waits for its first line; none outlives its test."""
+    started = []
+
+    def begin(code, *, head=HEAD):
+        program = [sys.executable, "-c", f"{head}{code}"]
+        process = subprocess.Popen(program, cwd=ROOT, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        started.append(process)
+        assert process.stdout.readline() == "ready\n"
+        return process
+
+    yield begin
+    for process in started:
+        process.kill()
+        process.communicate()
 
 
 @pytest.mark.parametrize("sign", STATUS)
@@ -36,7 +46,7 @@ def start(code, *, head=HEAD):
         "try:\n    time.sleep(60)\nexcept BaseException:\n    time.sleep(60)",
     ],
 )
-def test_a_signal_is_a_status_and_one_line(sign, busy):
+def test_a_signal_is_a_status_and_one_line(start, sign, busy):
     process = start(f"print('ready', flush=True)\n{busy}")
     time.sleep(0.05)
     process.send_signal(sign)
@@ -46,7 +56,7 @@ def test_a_signal_is_a_status_and_one_line(sign, busy):
     assert err.endswith("no file is left half-written; run the same command again\n")
 
 
-def test_what_is_unfinished_is_removed_and_the_outermost_hint_said(tmp_path):
+def test_what_is_unfinished_is_removed_and_the_outermost_hint_said(start, tmp_path):
     code = f"""
 folder = Path({str(tmp_path)!r})
 with hint_when_stopped(lambda: "three are kept"), hint_when_stopped(lambda: "two are kept"):
@@ -64,7 +74,7 @@ with hint_when_stopped(lambda: "three are kept"), hint_when_stopped(lambda: "two
     assert [path.name for path in tmp_path.iterdir()] == ["done"]
 
 
-def test_a_second_signal_does_not_wait():
+def test_a_second_signal_does_not_wait(start):
     code = "with cleaned_up(lambda: time.sleep(60)):\n    print('ready', flush=True)\n    time.sleep(60)"
     process = start(code)
     process.send_signal(signal.SIGINT)
@@ -75,7 +85,7 @@ def test_a_second_signal_does_not_wait():
     process.communicate()
 
 
-def test_what_the_parent_ignores_stays_ignored():
+def test_what_the_parent_ignores_stays_ignored(start):
     code = "print('ready', flush=True)\ntime.sleep(0.5)\nprint('done')"
     process = start(code, head="import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\n" + HEAD)
     process.send_signal(signal.SIGINT)
