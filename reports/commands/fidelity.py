@@ -37,16 +37,16 @@ def fidelity(
     activate()
     environment = describe_environment()
     with progress_bar("fidelity") as progress:
-        found = measure_fidelity(rows, report_cache(environment, fresh=fresh), quick=quick, progress=progress)
+        judged = measure_fidelity(rows, report_cache(environment, fresh=fresh), quick=quick, progress=progress)
     if json:
         print_json(
-            {"measured": now(), "environment": environment, "fidelity": found, "left_out": len(rows) - len(found)}
+            {"measured": now(), "environment": environment, "fidelity": judged, "left_out": len(rows) - len(judged)}
         )
         return
     if markdown:
         print_heading()
     shown = ("item", "claim", "verdict", "published", "measured", "unit", "why")
-    print_tables((table.only(*shown) for table in fidelity_tables(found)), as_markdown=markdown)
-    print(f"\n{count_words(found)}.")
-    if len(found) < len(rows):
-        print(f"{len(rows) - len(found)} more rows need images: leave out --quick.")
+    print_tables((table.only(*shown) for table in fidelity_tables(judged)), as_markdown=markdown)
+    print(f"\n{count_words(judged)}.")
+    if len(judged) < len(rows):
+        print(f"{len(rows) - len(judged)} more rows need images: leave out --quick.")

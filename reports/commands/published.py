@@ -134,7 +134,7 @@ def _biri(
     from validation.papers.constant_distance import constant_distance_study
 
     progress(0.99, "the constant R")
-    study = constant_distance_study() if any(one.scene == "three-media" for one in chosen) else ()
+    study = constant_distance_study() if any(row_set.scene == "three-media" for row_set in chosen) else ()
     return biri_data(rows, costs, study)
 
 

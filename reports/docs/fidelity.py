@@ -57,7 +57,7 @@ def stale_rows(record: Mapping[str, Any]) -> list[str]:
     """Return in what the rows of a run differ from those that are measured now, a line each."""
     from validation.fidelity.catalogue import ROWS, published_figures
 
-    figures = {(one["paper"], one["item"]): one["value"] for one in published_figures(ROWS)}
+    figures = {(figure["paper"], figure["item"]): figure["value"] for figure in published_figures(ROWS)}
     now = {(row.paper, row.item): (row.claim, row.unit, figures.get((row.paper, row.item))) for row in ROWS}
     then = {(row["paper"], row["item"]): (row["claim"], row["unit"], row["published"]) for row in record["fidelity"]}
     stale = [f"{paper}, {item}: not in the run" for paper, item in now if (paper, item) not in then]

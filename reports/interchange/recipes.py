@@ -25,13 +25,13 @@ def recipes(described: dict[str, Any]) -> dict[str, list[str]]:
     described
         What `reports.interchange.scene.describe_scene` found, `lights`, `medium`, `bounded_media` and `camera`.
     """
-    bodies = [one for one in (described["medium"], *described["bounded_media"]) if one is not None]
-    phases = {one["phase"]["name"] for one in bodies}
+    media = [medium for medium in (described["medium"], *described["bounded_media"]) if medium is not None]
+    phases = {medium["phase"]["name"] for medium in media}
     lights = described["lights"]
     cycles = [_cycles_light(light, _name(number, lights)) for number, light in enumerate(lights)]
-    cycles += [_cycles_media(phases)] if bodies else []
+    cycles += [_cycles_media(phases)] if media else []
     luxcore = [_luxcore_light(light, _name(number, lights)) for number, light in enumerate(lights)]
-    luxcore += [_luxcore_media(phases)] if bodies else []
+    luxcore += [_luxcore_media(phases)] if media else []
     longer = (
         "horizontal" if described["camera"]["fov_horizontal"] >= described["camera"]["fov_vertical"] else "vertical"
     )

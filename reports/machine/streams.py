@@ -35,7 +35,7 @@ def _nearest(error: UnicodeError) -> tuple[str, int]:
     """Replace what an encoding does not have by the nearest ASCII."""
     assert isinstance(error, UnicodeEncodeError)
     characters = error.object[error.start : error.end]
-    return "".join(_PLAIN.get(one) or _decomposed(one) for one in characters), error.end
+    return "".join(_PLAIN.get(character) or _decomposed(character) for character in characters), error.end
 
 
 def _decomposed(character: str) -> str:

@@ -41,9 +41,9 @@ def fidelity_parts(
         return []
     chosen = {name: EXPERIMENTS[name] for name in experiments_of(rows)}
     return [
-        _part(name, one, cache)
-        for name, one in chosen.items()
-        if (one.report or not reported) and (effort.fidelity or not one.images)
+        _part(name, experiment, cache)
+        for name, experiment in chosen.items()
+        if (experiment.report or not reported) and (effort.fidelity or not experiment.images)
     ]
 
 

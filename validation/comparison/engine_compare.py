@@ -96,9 +96,9 @@ class EngineComparison:
             f"pixels           {self.fit.words}",
             self.comparison.summary(),
         ]
-        found = self.hints
-        fitted = f"{found.factor:.6g} times the image leaves a relative rmse of {100 * found.factor_rmse:.4g} %"
-        lines.append(f"best factor      {f'none: {found.reason}' if found.reason else fitted}")
+        hints = self.hints
+        fitted = f"{hints.factor:.6g} times the image leaves a relative rmse of {100 * hints.factor_rmse:.4g} %"
+        lines.append(f"best factor      {f'none: {hints.reason}' if hints.reason else fitted}")
         lines += [] if self.place is None else [f"where            {self.place.words}"]
         lines += [f"suspect          {words}" for words in self.hints.words]
         lines += [f"file             {self.note}"] if self.note else []

@@ -54,12 +54,12 @@ class ErrorPlace:
         if not self.few:
             return f"spread: {100 * self.share:.3g} % of the squared error in {self.pixels} pixels"
         kinds = {"lamp": "beside a lamp", "edge": "at edges of light and shadow"}
-        one = self.pixels == 1
+        single = self.pixels == 1
         place = f"{kinds[self.kind]}, " if self.kind else ""
-        at = "" if one else "the worst "
+        at = "" if single else "the worst "
         return (
-            f"{100 * self.share:.3g} % of the squared error in {self.pixels} pixel{'s' * (not one)} ({place}{at}in "
-            f"column {self.worst[0]}, row {self.worst[1]}); without {'it' if one else 'them'} the relative rmse is "
+            f"{100 * self.share:.3g} % of the squared error in {self.pixels} pixel{'s' * (not single)} ({place}{at}in "
+            f"column {self.worst[0]}, row {self.worst[1]}); without {'it' if single else 'them'} the relative rmse is "
             f"{100 * self.relative_rmse_without:.3g} %"
         )
 

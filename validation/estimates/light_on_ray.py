@@ -106,7 +106,7 @@ def check_values(truth: TruthScene, image: TruthImage) -> None:
 
 
 def _name(number: int, light: TruthLight) -> str:
-    return f"light {number} at ({', '.join(f'{one:g}' for one in light.position)})"
+    return f"light {number} at ({', '.join(f'{coordinate:g}' for coordinate in light.position)})"
 
 
 def _uncertainty(truth: TruthScene, light: TruthLight) -> float:

@@ -295,7 +295,7 @@ _MESHES = (
         "a bias would work in many simple cases: relative RMSE to the clamped sum, at the best of five",
         Bound(0.01),
         "tessellation",
-        lambda evidence: min(one["error"] for one in evidence["biased"]),
+        lambda evidence: min(error["error"] for error in evidence["biased"]),
         AtMost("works is read as 1 %; `omni-box` is a simple case"),
     ),
     _row(

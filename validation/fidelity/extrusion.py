@@ -58,15 +58,15 @@ def _closed_silhouette(casters: Casters, light: Array) -> NDArray[np.int64]:
 def _bounding(truth: TruthScene, ends: Array, way: Array) -> float:
     """Return the share of points along `way` that have shadow on the caster's side and light on the other."""
     middle = ends.mean(axis=0)
-    found = []
+    bounding = []
     for reach in (0.2, 0.5, 0.8):
         points = ends + reach * way
         inward = middle - ends
         inward -= np.sum(inward * way, axis=1, keepdims=True) * way
         inward /= np.linalg.norm(inward, axis=1, keepdims=True)
         dark, lit = (~_lit(truth, points + side * _ASIDE * inward) for side in (1, -1))
-        found.append(dark & ~lit)
-    return float(np.mean(found))
+        bounding.append(dark & ~lit)
+    return float(np.mean(bounding))
 
 
 def _lit(truth: TruthScene, points: Array) -> NDArray[np.bool_]:

@@ -57,7 +57,7 @@ def tessellations(size: int) -> dict[str, Array]:
     heights = np.array(inverse_depth(shadow_map)).reshape(6, size + 1, size + 1)
     ours = divide(edges(heights, THRESHOLD))
     plain = divide(plain_edges(heights, len(triangles(ours))))
-    return {name: size / 2.0 ** quad_levels(one)[_FACE] for name, one in (("ours", ours), ("plain", plain))}
+    return {name: size / 2.0 ** quad_levels(divided)[_FACE] for name, divided in (("ours", ours), ("plain", plain))}
 
 
 def _all_light(scene: Scene, method: str, **values: int) -> Array:

@@ -57,18 +57,18 @@ def shortcuts() -> dict[str, Any]:
         (white is 4 times as much; `relative_rmse` to the truth cut off at white); `taylor` and `exact` (in `hall`).
     """
     planes: dict[str, dict[str, Any]] = {"pixel": {}, "vertex": {"evaluation": "vertex"}}
-    found = {name: _error("two-pens", "shadow-planes", "exact", values) for name, values in planes.items()}
-    found |= {kernel: _error("hall", "shadow-planes", kernel, {}) for kernel in ("taylor", "exact")}
+    errors = {name: _error("two-pens", "shadow-planes", "exact", values) for name, values in planes.items()}
+    errors |= {kernel: _error("hall", "shadow-planes", kernel, {}) for kernel in ("taylor", "exact")}
     true = _truth("clutter").airlight
     brightest = float(np.percentile(true.max(axis=2), 99))
     for name, white in (("bright", brightest / 4), ("dim", 4 * brightest)):
         image = _rendered("clutter", "shadow-planes", "exact", {"buffer": "8bit", "white": white})
         below = true < white
-        found[name] = {
+        errors[name] = {
             "bias": float((image - true)[below].sum() / true[below].sum()),
             "relative_rmse": error_metrics(np.minimum(true, white), image).relative_rmse,
         }
-    return found
+    return errors
 
 
 def levels() -> dict[str, Any]:
@@ -83,7 +83,7 @@ def levels() -> dict[str, Any]:
     dict
         `near`, `far`: `noticeable` [1], `relative_rmse`.
     """
-    white, found = None, {}
+    white, distances = None, {}
     for name, depth in _DISTANCES.items():
         scene = mi.load_dict(_lamp_in_fog(depth))
         resize(scene, SIZE)
@@ -95,11 +95,11 @@ def levels() -> dict[str, Any]:
         white = white or float(np.percentile(true, 99))
         at = _close_to_lamp(scene) if name == "near" else np.ones(true.shape[:2], dtype=bool)
         on_screen = [255 * np.clip(image[at] / white, 0, 1) for image in (true, shown)]
-        found[name] = {
+        distances[name] = {
             "noticeable": float(np.mean(np.abs(on_screen[1] - on_screen[0]).max(axis=1) > 1)),
             "relative_rmse": error_metrics(true, shown, mask=at).relative_rmse,
         }
-    return found
+    return distances
 
 
 def _lamp_in_fog(depth: float) -> dict[str, Any]:
@@ -149,19 +149,19 @@ def slices() -> dict[str, Any]:
         `pixel` (a walk for every pixel), `samples` (interpolated), and `volume` (a light volume of the same map).
     """
     how = {"pixel": {"sampling": "pixels"}, "samples": {}}
-    found = {name: _error("colonnade", "min-max", "exact", {**values, "map": 512}) for name, values in how.items()}
-    return found | {"volume": _error("colonnade", "light-volumes", "exact", _walk(512))}
+    errors = {name: _error("colonnade", "min-max", "exact", {**values, "map": 512}) for name, values in how.items()}
+    return errors | {"volume": _error("colonnade", "light-volumes", "exact", _walk(512))}
 
 
 def two_lights() -> dict[str, Any]:
     """Return the errors of light volumes in a hall with two lamps, each with a map of 1024 texels."""
     scene = two_lamps()
     read, true = read_scene(scene), truth_image(scene).airlight
-    found = {}
+    errors = {}
     for name, values in (("mesh", {"evaluation": "mesh", "map": 1024}), ("upright", {"map": 1024})):
         image = render_frame(prepared(read, configuration("light-volumes", "exact", values))).airlight
-        found[name] = error_metrics(true, image).relative_rmse
-    return found
+        errors[name] = error_metrics(true, image).relative_rmse
+    return errors
 
 
 def two_lamps(size: tuple[int, int] = SIZE) -> Any:

@@ -15,12 +15,12 @@ def polynomials() -> dict[str, Any]:
 
     The rays and regions are those of `validation.kernels.biri_misprints`.
     """
-    found: dict[str, Any] = {}
+    accuracies: dict[str, Any] = {}
     for accuracy in printed_against_derived(_COUNT, kernels={**COMPARED, "closed-form": closed_form}):
         if accuracy.phase == "isotropic":
-            found.setdefault(accuracy.region, {})[accuracy.kernel] = {
+            accuracies.setdefault(accuracy.region, {})[accuracy.kernel] = {
                 "within_1_percent": accuracy.within_1_percent,
                 "within_10_percent": accuracy.within_10_percent,
                 "median": accuracy.quantiles[_MEDIAN],
             }
-    return found
+    return accuracies

@@ -91,7 +91,7 @@ def _static_triangles(size: int) -> int:
 
 def _grid(divided: list[Any], heights: Array) -> dict[str, Any]:
     """Return what holds of the quads of an adaptive mesh."""
-    used = {int(one) for _, _, sides in quads(divided) for one in np.unique(sides)}
+    used = {int(level) for _, _, sides in quads(divided) for level in np.unique(sides)}
     level = quad_levels(divided)
     jump = _jumps(heights)
     side = 2 ** len(divided) / 2.0**level
@@ -148,18 +148,18 @@ def _filters(renderer: FrameRenderer, shadow_map: ShadowMap, heights: Array, our
         return image_frame(renderer, evaluated(cast, by_light, run_method(renderer, (mesh,), cast, by_light))).airlight
 
     static = airlight(volume_mesh(shadow_map, light))
-    found = {}
+    meshes = {}
     for name, divided in (("ours", ours), ("plain", divide(plain_edges(heights, len(triangles(ours)))))):
         corners = triangles(divided)
         error = error_metrics(static, airlight(corner_mesh(shadow_map, light, corners)))
         departure = departures(heights, divided)
-        found[name] = {
+        meshes[name] = {
             "triangles": len(corners),
             "error": error.relative_rmse,
             "rms_departure": float(np.sqrt(np.mean(departure**2))),
             "largest_departure": float(departure.max()),
         }
-    return found
+    return meshes
 
 
 def biased() -> list[dict[str, float]]:
