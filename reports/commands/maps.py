@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from reports.commands.options import Force
+from reports.commands.options import USUAL_LIMIT, Force, MethodLimit
 
 if TYPE_CHECKING:
     from validation.frames.map_size import MapErrors, MapFlicker
@@ -26,6 +26,7 @@ def maps(
     ] = False,
     frames: Annotated[int, typer.Option(min=2, help="Frames of the moving light.")] = 9,
     step: Annotated[float, typer.Option(help="By how much the light turns from frame to frame [rad].")] = 1e-3,
+    method_limit: MethodLimit = USUAL_LIMIT,
     force: Force = False,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
     markdown: Annotated[bool, typer.Option("--markdown", help="Print tables for a README, dated.")] = False,
@@ -36,16 +37,14 @@ def maps(
     the change of the image from frame to frame is measured, less that of the truth.
     """
     from analytic.errors import InputError
-    from realtime.scene.read_scene import read_scene
+    from reports.commands.own_methods import checked_configuration
     from reports.commands.printing import print_heading
     from reports.machine.environment import activate, describe_environment
-    from reports.machine.progress import counted, part_of, progress_bar
+    from reports.machine.own_process import in_own_process
     from reports.tables.terminal import print_json
-    from validation.configurations.methods import configuration, parse_settings, prepared
-    from validation.frames.expected_work import check_work, frame_work, truth_work
-    from validation.frames.map_size import map_errors, map_flicker
+    from validation.configurations.methods import parse_settings
     from validation.metrics.errors import plain
-    from validation.scenes.loading import load_scene, parse_size
+    from validation.scenes.loading import parse_size
     from validation.scenes.registry import SCENES
 
     pixels = parse_size(size)
@@ -53,27 +52,11 @@ def maps(
     parameters = parse_settings(settings or [])
     if "map" in parameters:
         raise InputError(f"--set: got map={parameters['map']}, wanted it in --sizes: the map's size is what varies")
-    largest = configuration(method, kernel, parameters | {"map": texels[-1]})
+    largest = checked_configuration(method, kernel, parameters | {"map": texels[-1]}, limit=method_limit)
     activate()
-    loaded = [load_scene(name, pixels) for name in scenes or SCENES]
-    images = 1 + (frames if flicker else 0)
-    works = [truth_work(pixels, lights=len(opened.scene.emitters()), images=images) for opened in loaded]
-    works += [frame_work(pixels, frames=images * len(texels)) for _ in loaded]
-    check_work(f"maps, {pixels[0]} x {pixels[1]}", works, force=force)
-    for opened in loaded:  # refuse unusable scenes, and maps that exceed the memory, before any work
-        prepared(read_scene(opened.scene), largest)
-    studied = []
-    with progress_bar("maps") as progress:
-        for number, opened in enumerate(loaded):
-            studies: list[Any] = [partial(map_errors, opened.scene, method)]
-            if flicker:
-                moves: dict[str, Any] = {"frames": frames, "step": step, "about": opened.animation.about}
-                studies.append(partial(map_flicker, opened.scene, method, **moves))
-            results = []
-            for study in studies:
-                part = part_of(progress, number / len(loaded), (number + 1) / len(loaded), before=f"{opened.name}, ")
-                results.append(study(kernel=kernel, parameters=parameters, sizes=texels, progress=counted(part)))
-            studied.append((opened.name, results[0], results[1] if flicker else None))
+    call: Any = partial(in_own_process, _studied, name=method, limit=method_limit) if largest.own else _studied
+    moves = {"frames": frames, "step": step} if flicker else None
+    studied = call(scenes or list(SCENES), pixels, texels, method, kernel, parameters, moves, force)
     if json:
         scenes_data = [
             {"name": name, "method": errors.configuration.label, "errors": plain(errors), "flicker": plain(moving)}
@@ -86,6 +69,46 @@ def maps(
     for name, errors, moving in studied:
         title = f"{name}, {pixels[0]} x {pixels[1]}, {errors.configuration.label}"
         _print_scene(title, errors, moving, markdown=markdown)
+
+
+def _studied(
+    names: list[str],
+    pixels: tuple[int, int],
+    texels: list[int],
+    method: str,
+    kernel: str | None,
+    parameters: dict[str, Any],
+    moves: dict[str, Any] | None,
+    force: bool,
+) -> list[tuple[str, "MapErrors", "MapFlicker | None"]]:
+    """Return of every scene its name, the errors, and the flicker where the light moves."""
+    from realtime.scene.read_scene import read_scene
+    from reports.machine.progress import counted, part_of, progress_bar
+    from validation.configurations.methods import configuration, prepared
+    from validation.frames.expected_work import check_work, frame_work, truth_work
+    from validation.frames.map_size import map_errors, map_flicker
+    from validation.scenes.loading import load_scene
+
+    loaded = [load_scene(name, pixels) for name in names]
+    images = 1 + (moves["frames"] if moves else 0)
+    works = [truth_work(pixels, lights=len(opened.scene.emitters()), images=images) for opened in loaded]
+    works += [frame_work(pixels, frames=images * len(texels)) for _ in loaded]
+    check_work(f"maps, {pixels[0]} x {pixels[1]}", works, force=force)
+    largest = configuration(method, kernel, parameters | {"map": texels[-1]})
+    for opened in loaded:  # refuse unusable scenes, and maps that exceed the memory, before any work
+        prepared(read_scene(opened.scene), largest)
+    studied = []
+    with progress_bar("maps") as progress:
+        for number, opened in enumerate(loaded):
+            studies: list[Any] = [partial(map_errors, opened.scene, method)]
+            if moves:
+                studies.append(partial(map_flicker, opened.scene, method, about=opened.animation.about, **moves))
+            results = []
+            for study in studies:
+                part = part_of(progress, number / len(loaded), (number + 1) / len(loaded), before=f"{opened.name}, ")
+                results.append(study(kernel=kernel, parameters=parameters, sizes=texels, progress=counted(part)))
+            studied.append((opened.name, results[0], results[1] if moves else None))
+    return studied
 
 
 def _print_scene(title: str, errors: "MapErrors", flicker: "MapFlicker | None", *, markdown: bool) -> None:

@@ -58,3 +58,18 @@ def test_sizes_are_read_in_ascending_order():
 def test_wrong_options_are_refused(variant, arguments, words, capfd):
     assert cli.run(["maps", "omni-box", "--size", "8x8", *arguments]) == cli.WRONG_INPUT
     assert words in capfd.readouterr().err
+
+
+@pytest.mark.claim("own-method-process")
+def test_a_method_of_ones_own_that_ends_its_process_is_one_line(variant, capfd, tmp_path, monkeypatch):
+    (tmp_path / "ending.py").write_text(
+        "import os\nfrom dataclasses import replace\nfrom realtime.methods.registry import METHODS\n"
+        "def render(view, state, lists, *, kernel, parameters):\n    os.abort()\n"
+        "OWN = replace(METHODS['light-volumes'], name='ending', render=render)\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    arguments = ["maps", "sphere-spot", "--size", "16x12", "--sizes", "16", "--method", "ending:OWN", "--json"]
+    assert cli.run(arguments) == 2
+    out, err = capfd.readouterr()
+    assert out == ""
+    assert "method ending:OWN: ended its process, killed by SIGABRT" in err
