@@ -4,10 +4,11 @@
 The paper's method is the mesh; what we made of it, the walk, is asked for only where a row says `ours`.
 """
 
+from functools import partial
 from typing import Any
 
 from validation.fidelity.figures import Data, Take, at, impossible, milliseconds, rate, ratio
-from validation.fidelity.row import DIFFERS, AtLeast, AtMost, Bound, Equal, Evidence, Figure, NotMeasured, Row, Rule
+from validation.fidelity.row import DIFFERS, AtLeast, AtMost, Bound, Equal, Evidence, Figure, NotMeasured, Row
 from validation.papers.billeter_tessellation import TABLE
 
 PAPER = "billeter"
@@ -23,18 +24,7 @@ _EQUAL = 1.03  # ratios of rates below this count as equal
 VIEWS = {"colonnade": "Sponza", "tangle": "Yeah Right"}
 
 
-def _row(
-    item: str,
-    claim: str,
-    published: float | Bound | None,
-    experiment: str,
-    figure: Take,
-    rule: Rule | None,
-    *,
-    unit: str = "",
-    command: str = "",
-) -> Row:
-    return Row(PAPER, item, claim, published, unit, experiment, figure, rule, command)
+_row = partial(Row, PAPER)
 
 
 def image(evidence: Evidence, where: str, **wanted: Any) -> Data | None:

@@ -6,10 +6,11 @@ machine the figures differ, so what is asked of a rate is that it is reached.
 """
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from statistics import median
 
 from validation.fidelity.figures import Data, Take, at, impossible, largest, rate, ratio, smallest
-from validation.fidelity.row import DIFFERS, AtLeast, AtMost, Bound, Equal, Evidence, Figure, NotMeasured, Row, Rule
+from validation.fidelity.row import DIFFERS, AtLeast, AtMost, Bound, Equal, Evidence, Figure, NotMeasured, Row
 
 PAPER = "biri"
 TABLES = "airlight published --paper biri"
@@ -35,18 +36,7 @@ RATES = (
 _PHASES = {"isotropic": 5, "rayleigh": 3, "hazy": 3, "murky": 3}
 
 
-def _row(
-    item: str,
-    claim: str,
-    published: float | Bound | None,
-    experiment: str,
-    figure: Take,
-    rule: Rule | None,
-    *,
-    unit: str = "",
-    command: str = "",
-) -> Row:
-    return Row(PAPER, item, claim, published, unit, experiment, figure, rule, command)
+_row = partial(Row, PAPER)
 
 
 def table_row(evidence: Evidence, scene: str, size: Sequence[int] = (800, 600), *, ours: bool = False) -> Data | None:

@@ -111,10 +111,10 @@ class Row:
     item: str  #: where it stands: an equation, a figure, a table, a section
     claim: str  #: the paper's words, short
     published: float | Bound | None  #: the paper's figure, or the number that its words were taken to mean
-    unit: str  #: of both figures; empty for a plain number
     experiment: str  #: that measures it
     figure: Callable[[Evidence], Figure]  #: takes the measured figure from what the experiment gave
     rule: Rule | None  #: None where nothing can be measured: `figure` then says why
+    unit: str = ""  #: of both figures; empty for a plain number
     command: str = ""  #: that prints the measured figure; empty for `airlight fidelity --paper PAPER`
 
 

@@ -9,7 +9,7 @@ from validation.fidelity.row import VERDICTS, AtLeast, AtMost, Bound, Equal, Not
 
 
 def row(figure, rule, published=10.0):
-    return Row("biri", "eq. 1", "words", published, "m", "nothing", lambda evidence: figure, rule)
+    return Row("biri", "eq. 1", "words", published, "nothing", lambda evidence: figure, rule, unit="m")
 
 
 @pytest.mark.claim("verdicts-are-computed", tolerance="by hand")
