@@ -8,7 +8,7 @@ compares both sides.
 Read in this order:
 
 - `errors.py`: the exception for mistakes of the user;
-- `memory.py`: refuses work that needs more memory than the machine has;
+- `memory.py`: refuses work that needs more memory than the machine, its container or the GPU has;
 - `parameters.py`: typed parameters of methods, with defaults, ranges and help;
 - `numerics/`: array types, error-free arithmetic, fast functions, Gauss-Legendre nodes;
 - `scene/`: camera, lights, media, phase functions and meshes, read from Mitsuba; the features of a scene; what moves;
