@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from reports.commands.options import USUAL_LIMIT, Force, MethodLimit
+from reports.commands.options import USUAL_LIMIT, Force, MethodLimit, listed
 
 _BATCHES = 4096  # at most: a comparison ends earlier if its interval is narrow enough
 
@@ -64,8 +64,7 @@ def bench(
     from validation.scenes.registry import SCENES
 
     chosen: list[Configuration] = []
-    for name in methods.split(",") if methods else METHODS:
-        name = name.strip()
+    for name in METHODS if methods is None else listed("--methods", methods):
         own = ":" in name
         chosen += [checked_configuration(name, limit=method_limit)] if own else chosen_configurations([name])
     apart = partial(in_own_process, limit=method_limit)
