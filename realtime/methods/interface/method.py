@@ -59,7 +59,6 @@ class Method:
     #: Parameters -> whether it computes each ray by itself, on any layout: then a frame may interpolate. It has the
     #: parameter `tolerance`, `realtime.tiles.adaptive_sampling.tolerance`. None: it has not.
     by_rays: Callable[[Any], bool] | None = None
-    check: Callable[[Any], None] | None = None  #: airlight (height, width, 3) -> raises what is wrong with it
 
     @property
     def defaults(self) -> dict[str, Any]:
