@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from statistics import median
 
-from validation.fidelity.figures import Data, Figure, Take, at, impossible, largest, rate, ratio, smallest
+from validation.fidelity.figures import Data, Take, at, impossible, largest, rate, ratio, smallest
 from validation.fidelity.row import DIFFERS, AtLeast, AtMost, Bound, Equal, Evidence, Figure, NotMeasured, Row
 
 PAPER = "biri"
