@@ -41,7 +41,7 @@ def test_a_row_that_changed_is_stale(record):
     gone = changed["fidelity"].pop()
     changed["fidelity"].append(gone | {"item": "eq. 99"})
     words = stale_rows(changed)
-    assert any("is not what it was" in one for one in words)
+    assert any("is not what it was" in sentence for sentence in words)
     assert f"{gone['paper']}, {gone['item']}: not in the run" in words
     assert f"{gone['paper']}, eq. 99: no such row any more" in words
 
@@ -69,7 +69,7 @@ def test_the_page_shows_rows_by_paper():
 def test_runs_of_one_paper_each_are_joined():
     first, second = run(row(), row(paper="sun")), run(row(measured=9.0), measured="2026-11-22 21:00:00 +0000")
     both = joined([first, second])
-    assert [(one["paper"], one["measured"]) for one in both["fidelity"]] == [("biri", 9.0), ("sun", 2.5)]
+    assert [(row["paper"], row["measured"]) for row in both["fidelity"]] == [("biri", 9.0), ("sun", 2.5)]
     assert both["measured"] == first["measured"]
     with pytest.raises(InputError, match="different machines"):
         joined([first, run(row(), processor="slide rule")])
