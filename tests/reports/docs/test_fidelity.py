@@ -6,10 +6,21 @@ import copy
 import pytest
 
 from analytic.errors import InputError
-from reports.docs.fidelity import RECORD, ROOT, current_page, joined, page, read_record, redraw, stale_rows
+from reports.docs.fidelity import RECORD, ROOT, current_page, joined, page, read_record, redraw
+from validation.fidelity.catalogue import ROWS, published_figures
 from validation.fidelity.row import VERDICTS
 
 EMPTY = "before\n<!-- verdicts: begin -->\nold\n<!-- verdicts: end -->\nafter\n"
+
+
+def stale_rows(record):
+    """Return in what the rows of a run differ from those that are measured now, a line each."""
+    figures = {(figure["paper"], figure["item"]): figure["value"] for figure in published_figures(ROWS)}
+    now = {(row.paper, row.item): (row.claim, row.unit, figures.get((row.paper, row.item))) for row in ROWS}
+    then = {(row["paper"], row["item"]): (row["claim"], row["unit"], row["published"]) for row in record["fidelity"]}
+    stale = [f"{paper}, {item}: not in the run" for paper, item in now if (paper, item) not in then]
+    stale += [f"{paper}, {item}: no such row any more" for paper, item in then if (paper, item) not in now]
+    return stale + [f"{key[0]}, {key[1]}: is not what it was" for key in now if key in then and now[key] != then[key]]
 
 
 @pytest.fixture(scope="module")
