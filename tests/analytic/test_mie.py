@@ -44,9 +44,9 @@ def test_another_program_says_the_same():
         assert ours == pytest.approx(theirs, rel=1e-7, abs=3e-8)
     a, b = coefficients(68.5, 1.333)
     ours = intensities(a, b, *angular_functions(cos_scatter, len(a)))[0]
-    one, two = miepython.S1_S2(1.333 - 0j, 68.5, cos_scatter, norm="bohren")
-    theirs = np.abs(one) ** 2 + np.abs(two) ** 2
-    assert ours == pytest.approx(theirs, rel=1e-7, abs=1e-7 * theirs.max())
+    scattered = 68.5**2 * efficiencies(68.5, 1.333).scattering[0]
+    theirs = 4 * np.pi * miepython.i_unpolarized(1.333 - 0j, 68.5, cos_scatter, norm="one")
+    assert 2 * ours / scattered == pytest.approx(theirs, rel=1e-6)
 
 
 def test_a_sphere_without_absorption_scatters_all_that_it_takes():
