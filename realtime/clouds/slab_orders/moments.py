@@ -138,9 +138,14 @@ class SlabOrders:
 
     def following(self, fields: "_Fields") -> tuple["_Fields", Edges]:
         """Return the next order, and its moments at the edges."""
-        zero, one = self.scatter
-        sources = _Fields(fields.b0 @ zero, fields.b1 @ one, fields.a0 @ zero, fields.a1 @ one, fields.c0 @ zero)
-        return self._carried(sources)
+        b0, a0, c0 = self._scattered(0, fields.b0, fields.a0, fields.c0)
+        b1, a1 = self._scattered(1, fields.b1, fields.a1)
+        return self._carried(_Fields(b0, b1, a0, a1, c0))
+
+    def _scattered(self, m: int, *fields: Array) -> Array:
+        """Return the sources of some fields of one mode: in one product, which is faster than one for each."""
+        depths = fields[0].shape[0]
+        return (np.concatenate(fields) @ self.scatter[m]).reshape(len(fields), depths, -1)
 
     def _carried(self, sources: "_Fields") -> tuple["_Fields", Edges]:
         """Return the light of scattered sources, with the displacement it gains on the way."""

@@ -5,13 +5,18 @@ Moments are chi_l = (1/2) int_{-1}^{1} P(c) P_l(c) dc, chi_0 = 1, chi_1 the mean
 P_l(c). Henyey and Greenstein's function has chi_l = g^l.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.polynomial.legendre import leggauss, legval
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
+
+_PANEL, _PANEL_NODES = np.deg2rad(0.5), 8  #: of the quadrature over angles: P_l of l = 300 has 1.2 waves in a panel
 
 
 class SlabPhase:
@@ -74,8 +79,56 @@ class SeriesPhase(SlabPhase):
 
 
 @dataclass(frozen=True, eq=False)
-class TabulatedPhase(SlabPhase):
-    """A phase function linear in the angle between values, divided by its mean.
+class AnglePhase(SlabPhase):
+    """A function of the scattering angle, divided by its mean.
+
+    Parameters
+    ----------
+    heights
+        Takes angles [rad], (A,), and returns values that are not negative, in any unit.
+    breaks
+        Angles in [0, pi] where the function has a jump or a kink [rad], the ends among them.
+    """
+
+    heights: Callable[[Array], Array]
+    breaks: Array
+
+    @cached_property
+    def _nodes(self) -> tuple[Array, Array]:
+        """Cosines of angles by Gauss nodes between the breaks, and weights of the mean of P over the sphere."""
+        nodes, weights = leggauss(_PANEL_NODES)
+        parts = [
+            np.linspace(low, high, max(2, int(np.ceil((high - low) / _PANEL)) + 1))[:-1]
+            for low, high in pairwise(self.breaks)
+        ]
+        edges = np.append(np.concatenate(parts), self.breaks[-1])
+        width = np.diff(edges)[:, None]
+        angles = (edges[:-1, None] + width * (nodes + 1) / 2).reshape(-1)
+        shares = np.sin(angles) * (width / 4 * weights).reshape(-1) * self.heights(angles)
+        return np.cos(angles), shares
+
+    @property
+    def _mean(self) -> float:
+        return float(self._nodes[1].sum())
+
+    def moments(self, count: int) -> Array:
+        """Return the moments by quadrature."""
+        cosines, shares = self._nodes
+        moments = np.empty(count)
+        before, now = np.zeros_like(cosines), np.ones_like(cosines)
+        for degree in range(count):
+            moments[degree] = shares @ now
+            before, now = now, ((2 * degree + 1) * cosines * now - degree * before) / (degree + 1)
+        return moments / self._mean
+
+    def values(self, cosines: ArrayLike) -> Array:
+        """Return the values."""
+        angles = np.arccos(np.clip(np.asarray(cosines, dtype=np.float64), -1.0, 1.0))
+        return self.heights(np.atleast_1d(angles)).reshape(angles.shape) / self._mean
+
+
+def tabulated_phase(angles: Array, heights: Array) -> AnglePhase:
+    """Return the phase function that is linear in the angle between values.
 
     Parameters
     ----------
@@ -84,40 +137,4 @@ class TabulatedPhase(SlabPhase):
     heights
         (A,), not negative, in any unit.
     """
-
-    angles: Array
-    heights: Array
-
-    def _nodes(self) -> tuple[Array, Array, Array]:
-        """Return angles, weights of (1/2) sin theta d theta and values, by six Gauss nodes in each interval."""
-        nodes, weights = leggauss(6)
-        width = np.diff(self.angles)[:, None]
-        angles = (self.angles[:-1, None] + width * (nodes + 1) / 2).reshape(-1)
-        return (
-            angles,
-            np.sin(angles) / 2 * (width / 2 * weights).reshape(-1),
-            np.interp(angles, self.angles, self.heights),
-        )
-
-    def mean(self) -> float:
-        """Return the mean of the heights over the sphere."""
-        _, weights, heights = self._nodes()
-        return float(weights @ heights)
-
-    def moments(self, count: int) -> Array:
-        """Return the moments by quadrature between the values."""
-        angles, weights, heights = self._nodes()
-        cosines = np.cos(angles)
-        # Where an interval is wider than the wave of P_l, six nodes are not enough: the caller gives a fine table.
-        measure = weights * heights / (weights @ heights)
-        moments = np.empty(count)
-        before, now = np.zeros_like(cosines), np.ones_like(cosines)
-        for degree in range(count):
-            moments[degree] = measure @ now
-            before, now = now, ((2 * degree + 1) * cosines * now - degree * before) / (degree + 1)
-        return moments
-
-    def values(self, cosines: ArrayLike) -> Array:
-        """Return the values, linear in the angle."""
-        angles = np.arccos(np.clip(np.asarray(cosines, dtype=np.float64), -1.0, 1.0))
-        return np.interp(angles, self.angles, self.heights) / self.mean()
+    return AnglePhase(lambda angle: np.interp(angle, angles, heights), angles)

@@ -15,6 +15,7 @@ Array = NDArray[np.float64]
 
 #: Photons of a batch: their arrays fit into the cache of a core.
 BATCH = 25_000
+_FEWEST = 5
 
 
 @dataclass(frozen=True)
@@ -157,12 +158,17 @@ def _standard_error(residuals: Array, share: Array) -> float | None:
 
 
 def _exit(batches: Array, share: Array) -> ExitEstimate:
-    """Return amount, mean and rms of (batches, 3) moments; ratios by the delta method."""
+    """Return amount, mean and rms of (batches, 3) moments; ratios by the delta method.
+
+    The errors of ratios need light in several batches: below `_FEWEST` there is none to tell.
+    """
     amount, first, second = share @ batches
     if amount <= 0.0:
         return ExitEstimate(_amount(batches[:, 0], share), Estimate(None, None), Estimate(None, None))
     mean, square = first / amount, second / amount
     rms = math.sqrt(square)
+    if np.count_nonzero(batches[:, 0]) < _FEWEST:
+        return ExitEstimate(_amount(batches[:, 0], share), Estimate(float(mean), None), Estimate(rms, None))
     mean_error = _standard_error((batches[:, 1] - mean * batches[:, 0]) / amount, share)
     square_error = _standard_error((batches[:, 2] - square * batches[:, 0]) / amount, share)
     return ExitEstimate(
