@@ -16,5 +16,5 @@ Read in this order:
 - `read_scene.py`: reads a Mitsuba scene;
 - `animate.py`: the scene after lights, the medium or objects moved.
 
-May import: `realtime.errors`, `realtime.numerics`.
+May import: `realtime.droplets`, `realtime.errors`, `realtime.numerics`.
 """

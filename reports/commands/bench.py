@@ -17,6 +17,9 @@ def bench(
         list[str] | None, typer.Argument(help="Scenes, or with --kernels kernels; all built-in ones by default.")
     ] = None,
     kernels: Annotated[bool, typer.Option("--kernels", help="Time the kernels alone, on 480 000 rays.")] = False,
+    phase: Annotated[
+        str | None, typer.Option(help="With --kernels: the only phase function, such as hg-draine:12 or mie:6.")
+    ] = None,
     estimators: Annotated[
         bool, typer.Option("--estimators", help="Time single-scatter and volpath at equal error.")
     ] = False,
@@ -44,8 +47,12 @@ def bench(
 
         raise InputError(f"--margin: got {margin:g}, wanted a share between 0 and 1, such as 0.002 for 0.2 %")
     if kernels:
-        _bench_kernels(scenes, json=json, markdown=markdown)
+        _bench_kernels(scenes, phase=phase, json=json, markdown=markdown)
         return
+    if phase is not None:
+        from analytic.errors import InputError
+
+        raise InputError("--phase: it is for kernels; add --kernels, a scene has its own phase function")
     if estimators:
         _bench_estimators(scenes, size=size, force=force, json=json)
         return
@@ -154,7 +161,8 @@ def _bench_scene(name: str, pixels, chosen, *, margin: float | None, apart, prog
     return {"name": loaded.name, "size": size, "methods": rows, "agreement": agreed}
 
 
-def _bench_kernels(names: list[str] | None, *, json: bool, markdown: bool) -> None:
+def _bench_kernels(names: list[str] | None, *, phase: str | None, json: bool, markdown: bool) -> None:
+    from analytic.phase import phase_from_words
     from realtime.kernels.registry import KERNELS
     from reports.commands.printing import print_heading, print_tables
     from reports.machine.environment import activate, describe_environment
@@ -162,14 +170,15 @@ def _bench_kernels(names: list[str] | None, *, json: bool, markdown: bool) -> No
     from reports.tables.kernels import convergence_data, kernel_tables, order_table
     from reports.tables.terminal import print_json
     from validation.configurations.kernel_names import split_name
-    from validation.kernels.benchmark import bench_kernels
+    from validation.kernels.benchmark import PHASES, bench_kernels
     from validation.kernels.convergence import convergence, declared
     from validation.metrics.errors import plain
 
     wanted = [split_name(name)[0].name for name in names] if names else list(KERNELS)
+    phases = PHASES if phase is None else ((phase, phase_from_words(phase).g),)
     activate()
     with progress_bar("bench") as progress:
-        costs = bench_kernels(names, progress=counted(progress))
+        costs = bench_kernels(names, phases=phases, progress=counted(progress))
         rates = [convergence(name) for name in declared() if name in wanted]
     measured, orders = plain(costs), [convergence_data(rate) for rate in rates]
     if json:
