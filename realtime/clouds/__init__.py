@@ -5,5 +5,5 @@ Read in this order:
 
 - `slab_orders/`: the light of a slab by order of scattering, in float64, from which tables are made.
 
-May import: nothing of ours.
+May import: `realtime.droplets`.
 """

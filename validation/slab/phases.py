@@ -13,7 +13,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from analytic.droplets import Droplets, Modified, optics
 from analytic.errors import InputError, nearest
+from realtime.clouds.slab_orders.droplets import droplet_phase
 from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase, SlabPhase, tabulated_phase
 from reference.monte_carlo.slab_walk.scattering import HenyeyGreenstein, Tabulated
 from reference.monte_carlo.slab_walk.walk import Scattering
@@ -23,6 +25,8 @@ Array = NDArray[np.float64]
 NAMES = ("isotropic", "hg:G", "mie", "mie-modified", "FILE.csv")
 #: |g| up to which the streams resolve Henyey and Greenstein's lobe
 LARGEST_G = 0.98
+_DROPLETS = (6.0, 2.0, 0.55)  #: r_e [um], gamma and wavelength [um] of Bouthors 2008
+_TABLE = 20_000  #: rows of the table of droplets
 
 
 @dataclass(frozen=True)
@@ -66,7 +70,32 @@ def phase_pair(name: str) -> PhasePair:
     if name.lower().endswith(".csv"):
         angles, heights = read_phase_file(Path(name))
         return PhasePair(name, tabulated_phase(angles, heights), lambda: Tabulated(angles, heights))
+    kind, *words = name.split(":")
+    if kind in ("mie", "mie-modified"):
+        return _droplets(name, words, modified=kind == "mie-modified")
     raise InputError(f"phase: got {name!r}, wanted one of {', '.join(NAMES)}{nearest(name, NAMES)}")
+
+
+def _droplets(name: str, words: list[str], *, modified: bool) -> PhasePair:
+    """Return droplets: words are r_e [um], gamma and the wavelength [um], as far as they are given."""
+    if len(words) > len(_DROPLETS) or not all(map(_is_number, words)):
+        raise InputError(
+            f"phase: got {name!r}, wanted mie or mie-modified, and if wanted by colons r_e [um], gamma and the "
+            "wavelength [um], for example mie:6:2:0.55"
+        )
+    radius, gamma, wavelength = [*map(float, words), *_DROPLETS[len(words) :]]
+    deterministic = droplet_phase(radius, gamma, wavelength, modified=modified)
+
+    def sampled() -> Scattering:
+        full = optics(Droplets(radius, gamma), wavelength)
+        angles = np.linspace(0.0, np.pi, _TABLE + 1)
+        if not modified:
+            return Tabulated(angles, full(np.cos(angles)))
+        peak = np.deg2rad(Modified(full).angle)
+        angles = np.unique(np.concatenate([angles, [peak * (1 - 1e-12), peak]]))
+        return Tabulated(angles, np.where(angles < peak, 0.0, full(np.cos(angles))))
+
+    return PhasePair(name, deterministic, sampled)
 
 
 def _mean_cosine(name: str) -> float:

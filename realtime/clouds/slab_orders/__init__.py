@@ -8,6 +8,7 @@ and runs nowhere in a frame. The truth that checks it is a walk of photons, on t
 Read in this order:
 
 - `phases.py`: phase functions by values and Legendre moments;
+- `droplets.py`: water droplets among them;
 - `streams.py`: directions, and scattering between them by mode of the azimuth;
 - `depth_panels.py`: light along straight lines through the slab;
 - `discrete_ordinates.py`: all orders of one mode at once;
@@ -15,5 +16,5 @@ Read in this order:
 - `radiance.py`: the radiance of all orders in any direction;
 - `slab.py`: what leaves a slab and what is inside, with the error of every number.
 
-May import: nothing of ours.
+May import: `realtime.droplets`.
 """
