@@ -139,10 +139,8 @@ def test_no_number_of_a_scene_is_round(variant, name):
     for key in parameters.keys():  # noqa: SIM118 - SceneParameters iterates over items
         if key == "lamp.bsdf.reflectance.value":
             continue  # a light with extent is black
-        if key.endswith(
-            ("albedo.value.value", "intensity.value", "irradiance.value", "radiance.value")
-            + ("position", "x_fov", "reflectance.value")
-        ):
+        light = ("intensity.value", "irradiance.value", "radiance.value", "position")
+        if key.endswith(("albedo.value.value", "x_fov", "reflectance.value", *light)):
             for value in np.array(parameters[key], dtype=np.float64).reshape(-1):
                 assert value % 0.5 != 0 or value > 10, (key, value)
 
