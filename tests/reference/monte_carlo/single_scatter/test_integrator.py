@@ -32,8 +32,9 @@ def _along(scene, origin, direction, *, samples, seed, medium=None):
     import drjit as dr
     import mitsuba as mi
 
-    from reference.monte_carlo.single_scatter.estimator import double_ray, ray_light
+    from reference.monte_carlo.single_scatter.estimator import ray_light
     from reference.monte_carlo.single_scatter.scene_data import read_task
+    from reference.monte_carlo.single_scatter.stretches import double_ray
 
     sampler = mi.load_dict({"type": "independent"})
     sampler.seed(seed, len(direction))
@@ -385,6 +386,7 @@ def test_one_sample_is_unbiased(variant):
 def test_unsupported_scenes_are_refused_by_name(variant, changes, words):
     from analytic.errors import InputError
     from reference.monte_carlo.single_scatter.scene_data import read_task
+    from reference.monte_carlo.single_scatter.stretches import double_ray
 
     with pytest.raises(InputError, match=words):
         read_task(_load(**changes), None, 1)
