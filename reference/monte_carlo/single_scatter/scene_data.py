@@ -108,7 +108,8 @@ def _read_light(emitter) -> Light:
     name = emitter.class_name()
     if name not in ("PointLight", "SpotLight"):
         raise InputError(
-            f"single-scatter: the scene has an emitter of class {name}; wanted 'point', 'spot', 'directional' or 'area' only"
+            f"single-scatter: the scene has an emitter of class {name}; wanted 'point', 'spot', 'directional' or "
+            "'area' only"
         )
     sample, _ = emitter.sample_direction(dr.zeros(mi.Interaction3f), mi.Point2f(0.5))
     position = mi.Point3d(sample.p)
