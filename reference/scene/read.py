@@ -26,18 +26,19 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class TruthLight:
-    """A point or spot light."""
+    """A point or spot light, or a point of a light with extent."""
 
     position: Array  #: [m]
     intensity: Array  #: radiant intensity on the axis [W/sr], RGB
-    axis: Array | None = None  #: spot: unit vector
+    axis: Array | None = None  #: spot: unit vector; of a point of a light with extent the normal
     cutoff: float = np.pi  #: spot: half angle of the cone [rad]
     beam: float = np.pi  #: spot: half angle of full intensity [rad]
+    cosine: bool = False  #: whether the intensity falls off as the cosine of the angle to the axis
 
     @property
     def is_soft(self) -> bool:
-        """Whether the intensity falls off between beam and cut-off."""
-        return self.axis is not None and self.beam < self.cutoff
+        """Whether the intensity falls off within the cone."""
+        return self.cosine or (self.axis is not None and self.beam < self.cutoff)
 
 
 @dataclass(frozen=True)
