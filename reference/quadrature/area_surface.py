@@ -172,9 +172,7 @@ def _draws(plan: PointPlan, light: int, count: int) -> tuple[Array, Array]:
     return turn, generator.random((count, REPLICATES))
 
 
-def _lines(
-    draws: tuple[Array, Array], points: Index, numbers: tuple[int, int]
-) -> tuple[Index, Array, Array, Index]:
+def _lines(draws: tuple[Array, Array], points: Index, numbers: tuple[int, int]) -> tuple[Index, Array, Array, Index]:
     """Return points, directions, places and replicates of the lines of these numbers, sorted by point."""
     low, high = numbers
     lattice = np.array([_van_der_corput(number) for number in range(low, high)])

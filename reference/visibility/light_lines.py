@@ -98,9 +98,7 @@ def facing(light: TruthAreaLight, points: Points) -> Facing:
         first = np.cross(axis, helper)
         first /= np.linalg.norm(first, axis=1, keepdims=True)
         frame = np.stack([first, np.cross(axis, first), axis], axis=1)
-        return Facing(
-            seen, depth[:, None] * axis, frame, depth, np.stack([radius, radius], axis=1), np.pi * radius**2
-        )
+        return Facing(seen, depth[:, None] * axis, frame, depth, np.stack([radius, radius], axis=1), np.pi * radius**2)
     depth = -(away @ light.normal)
     seen = depth > _HORIZON * max(1.0, float(np.abs(light.centre).max()))
     frame = np.stack([light.frame[0], light.frame[1], -light.normal])
@@ -399,9 +397,7 @@ def _angles(row: Index, a: tuple[Array, Array], b: tuple[Array, Array]) -> Shado
     row, y0, z0, y1, z1 = row[keep], y0[keep], z0[keep], y1[keep], z1[keep]
     with np.errstate(divide="ignore", invalid="ignore"):
         on_axis = z0 - y0 * (z1 - z0) / (y1 - y0)
-    low, high = (
-        np.arctan2(np.where(y > 0, z, on_axis), np.where(y > 0, y, 0.0)) for y, z in ((y0, z0), (y1, z1))
-    )
+    low, high = (np.arctan2(np.where(y > 0, z, on_axis), np.where(y > 0, y, 0.0)) for y, z in ((y0, z0), (y1, z1)))
     return row, np.minimum(low, high), np.maximum(low, high)
 
 

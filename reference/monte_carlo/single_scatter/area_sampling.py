@@ -106,13 +106,15 @@ def read_area(emitter) -> AreaLight:
     there = np.array(shape.sample_position(0.0, mi.Point2f(0.5)).n, dtype=np.float64).reshape(3)
     if kind != "Sphere" and normal @ there < 0:
         normal = -normal
-    reach = (lengths[0], lengths[0] if kind == "Sphere" else lengths[1])
+    vectors = [mi.Vector3d(*(float(c) for c in vector)) for vector in (across, up, normal)]
     return AreaLight(
         kind,
         mi.Point3d(*(float(c) for c in matrix[:3, 3])),
-        *(mi.Vector3d(*(float(c) for c in vector)) for vector in (across, up, normal)),
-        (float(reach[0]), float(reach[1])),
-        mi.Color3f(*(float(c) for c in np.broadcast_to(radiance, 3))),
+        across=vectors[0],
+        up=vectors[1],
+        normal=vectors[2],
+        reach=(float(lengths[0]), float(lengths[0 if kind == "Sphere" else 1])),
+        radiance=mi.Color3f(*(float(c) for c in np.broadcast_to(radiance, 3))),
     )
 
 
