@@ -51,6 +51,7 @@ class FrameRenderer:
     lane: PerRay | None  #: the entry of every pixel row by row, for passes
     shade_casts_rays: bool  #: whether shading asks Mitsuba for shapes or shadows
     casts_rays: bool  #: whether the method casts rays of its own
+    carries: bool  #: whether the method hands arrays on to the next frame
 
     # A frozen function reads all shapes of a scene that it is given anew at every call.
 
@@ -111,9 +112,13 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
         shown = {"features": features, "geometry": None, "medium": medium, "lights": lights}
         return method.cull(frame_view(camera, pixel, distance, **shown), state, chosen)
 
-    def run(geometry, pixel, camera, medium, lights, state, lists, distance, by_light, tables, corners=None):
+    carries = method.carries(chosen)
+
+    def run(geometry, pixel, camera, medium, lights, state, lists, distance, by_light, tables, corners=None, last=None):
         shown = {"features": features, "geometry": geometry, "medium": medium, "lights": lights}
         view = frame_view(camera, pixel, distance, **shown)
+        if carries:
+            view = replace(view, carried=last)
         if provides_visibility:
             view = replace(view, surfaces=by_light)
 
@@ -121,7 +126,10 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
             return method.render(view, state, lists, kernel=with_tables(kernel, tables), parameters=chosen)
 
         layers = layers_of(view) if corners is None else adaptive_layers(layers_of, view, corners, tolerance)
-        return layers if method.passes else composed(layers, by_light)
+        if not carries:
+            return layers if method.passes else composed(layers, by_light)
+        carried, layers = layers.carried, replace(layers, carried=None)
+        return (layers if method.passes else composed(layers, by_light)), carried
 
     # Every scene runs it: it checks the parameters also where nothing casts a shadow.
     prepare = method.prepare(scene, chosen) if method.prepare else _no_state
@@ -165,6 +173,7 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
         lane=lane,
         shade_casts_rays=shade_casts_rays,
         casts_rays=casts_rays,
+        carries=carries,
     )
 
 
@@ -226,8 +235,14 @@ def run_cull(renderer: FrameRenderer, state, distance: Metres):
 
 
 def run_method(
-    renderer: FrameRenderer, state, cast: Cast, by_light, lists=None, history: History | None = None
-) -> tuple[PerRay, PerRay | None, History | None]:
+    renderer: FrameRenderer,
+    state,
+    cast: Cast,
+    by_light,
+    lists=None,
+    history: History | None = None,
+    carried: Any = None,
+) -> tuple[PerRay, PerRay | None, History | None, Any]:
     """Run the stages of the method, and return what they do, not evaluated.
 
     Parameters
@@ -240,6 +255,8 @@ def run_method(
         From `run_cull`; None to run that too.
     history
         What the last frame returned, for passes; None for the first.
+    carried
+        What the method handed on from the last frame; None for the first.
 
     Returns
     -------
@@ -249,19 +266,24 @@ def run_method(
         What is seen through it [W/(m^2 sr)]; None where that is the shaded surface as it is.
     history
         For the next frame; None where the method has no passes.
+    carried
+        For the next frame; None where the method hands nothing on.
     """
     scene, pixel = renderer.scene, renderer.pixel
     if lists is None:
         lists = run_cull(renderer, state, cast.distance)
     shown = pixel, scene.camera, scene.medium, scene.lights
     inputs = state, lists, cast.distance, by_light, renderer.tables, renderer.corners
-    layers = renderer.render(renderer.geometry, *shown, *inputs)
+    if renderer.carries:
+        layers, carried = renderer.render(renderer.geometry, *shown, *inputs, carried)
+    else:
+        layers = renderer.render(renderer.geometry, *shown, *inputs)
     if renderer.passes is None:
-        return *layers, None
+        return *layers, None, carried
     geometry = scene.geometry if scene.facets is None else None
     place = geometry, scene.facets, pixel, renderer.lane, scene.camera, scene.medium
     airlight, surface, layers, g_buffer = renderer.passes(*place, cast, by_light, layers, history)
-    return airlight, surface, History(layers, g_buffer, scene.camera)
+    return airlight, surface, History(layers, g_buffer, scene.camera), carried
 
 
 def _no_state(scene: Scene) -> tuple[()]:

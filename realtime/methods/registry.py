@@ -7,7 +7,8 @@ every command and report knows it. `find_method` also finds a user's own, which 
 
 from realtime.errors import InputError
 from realtime.methods.epipolar.method import MinMaxParameters, min_max, prepare_min_max
-from realtime.methods.interface.method import Method, always
+from realtime.methods.froxel_fog.method import FroxelFogParameters, froxel_fog, hands_on, prepare_froxel_fog
+from realtime.methods.interface.method import Method, always, never
 from realtime.methods.light_volumes.method import (
     LightVolumeParameters,
     cull_light_volumes,
@@ -80,6 +81,18 @@ METHODS: dict[str, Method] = {
         prepare=prepare_min_max,
         prepared_from=frozenset({"geometry", "light"}),
         parameters=MinMaxParameters,
+    ),
+    "froxel-fog": Method(
+        "froxel-fog",
+        froxel_fog,
+        "scattered light in a grid along the view, summed front to back: what engines ship",
+        "Wronski 2014; Hillaire 2015",
+        uses_kernel=never,
+        prepare=prepare_froxel_fog,
+        prepared_from=frozenset({"geometry", "light"}),
+        casts_rays=lambda parameters: parameters.shadow == "ray",
+        carries=hands_on,
+        parameters=FroxelFogParameters,
     ),
 }
 
