@@ -25,6 +25,7 @@ from realtime.methods.froxel_fog.history import averaged, frame_shift
 from realtime.methods.froxel_fog.injection import Visibility, scattered_light
 from realtime.methods.froxel_fog.media import column_pieces
 from realtime.methods.interface.layers import Layers
+from realtime.methods.interface.method import ErrorCause
 from realtime.methods.interface.view import View
 from realtime.numerics.array_types import bytes_of
 from realtime.parameters import Parameters, parameter
@@ -139,6 +140,14 @@ def froxel_fog(view: View, state, lists, *, kernel, parameters: FroxelFogParamet
 def hands_on(parameters: FroxelFogParameters) -> bool:
     """Return whether frames hand anything on: what they held, or their number."""
     return parameters.history > 0 or parameters.jitter != "none"
+
+
+def froxel_errors(parameters: FroxelFogParameters, size: tuple[int, int]) -> tuple[ErrorCause, ...]:
+    """Return the causes of its errors, as `realtime.methods.interface.method.Method.error_causes` has them.
+
+    With a column a pixel nothing is left of the columns' error; then what is left is that of the slices.
+    """
+    return ("map", {"shadow": "ray"}), ("resolution", {"width": size[0], "height": size[1]}), ("steps", None)
 
 
 def _visibility(view: View, maps: tuple[ShadowMap, ...], shadow: str) -> Visibility:

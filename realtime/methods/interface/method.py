@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The record of a method: its stages, and what a user and a frame must know of it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,6 +25,15 @@ def never(parameters: Any) -> bool:
 def always(parameters: Any) -> bool:
     """Return True, whatever the parameters."""
     return True
+
+
+#: A cause of errors, and the values of parameters with which it is gone; None: all that the method has left.
+ErrorCause = tuple[str, Mapping[str, Any] | None]
+
+
+def no_causes(parameters: Any, size: tuple[int, int]) -> tuple[ErrorCause, ...]:
+    """Return no cause of errors, whatever the parameters and the size of the image."""
+    return ()
 
 
 @dataclass(frozen=True)
@@ -61,6 +70,9 @@ class Method:
     #: Parameters -> whether it computes each ray by itself, on any layout: then a frame may interpolate. It has the
     #: parameter `tolerance`, `realtime.tiles.adaptive_sampling.tolerance`. None: it has not.
     by_rays: Callable[[Any], bool] | None = None
+    #: ``error_causes(parameters, (width, height))``: the causes of its errors in an image of that size [pixels], in the
+    #: order in which `airlight bench --decompose` takes them away, one on top of the other.
+    error_causes: Callable[[Any, tuple[int, int]], tuple[ErrorCause, ...]] = no_causes
     check: Callable[[Any], None] | None = None  #: airlight (height, width, 3) -> raises what is wrong with it
 
     @property
