@@ -66,6 +66,8 @@ METHODS: dict[str, Method] = {
         casts_rays=lambda parameters: parameters.evaluation == "vertex",  # to know the triangle of a surface
         provides_visibility=always,
         by_rays=lambda parameters: parameters.evaluation == "pixel",
+        # What is no light's own, and a buffer that rounds, hold for the sum of all lights.
+        lights_at_once=lambda parameters: parameters.buffer == "8bit" or parameters.ambient > 0,
         parameters=ShadowPlaneParameters,
         error_causes=lambda parameters, size: (
             ("buffer", {"buffer": "float"}),
@@ -107,6 +109,7 @@ METHODS: dict[str, Method] = {
         prepared_from=frozenset({"geometry", "light"}),
         casts_rays=lambda parameters: parameters.shadow == "ray",
         carries=hands_on,
+        lights_at_once=always,
         parameters=FroxelFogParameters,
         error_causes=froxel_errors,
     ),

@@ -23,12 +23,14 @@ from realtime.methods.froxel_fog.accumulation import accumulated, airlight_at_pi
 from realtime.methods.froxel_fog.grid import view_grid
 from realtime.methods.froxel_fog.history import averaged, frame_shift
 from realtime.methods.froxel_fog.injection import Visibility, scattered_light
+from realtime.methods.froxel_fog.light_points import LightPointTable, tabulated, with_maps
 from realtime.methods.froxel_fog.media import column_pieces
 from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.method import ErrorCause
 from realtime.methods.interface.view import View
 from realtime.numerics.array_types import bytes_of
 from realtime.parameters import Parameters, parameter
+from realtime.scene.lights import Light
 from realtime.scene.read_scene import Scene
 from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, lit_in_map, map_memory, map_size
 
@@ -79,7 +81,15 @@ class FroxelFogParameters(Parameters):
         return self.width, self.height, self.slices
 
 
-def prepare_froxel_fog(scene: Scene, parameters: FroxelFogParameters) -> Callable[[Scene], tuple[ShadowMap, ...]]:
+@dataclass(frozen=True)
+class FroxelShadows:
+    """What the froxels of a frame need of its lights."""
+
+    maps: tuple[ShadowMap, ...]  #: of the lights without extent; () where rays are cast
+    tables: tuple[LightPointTable, ...]  #: of the others
+
+
+def prepare_froxel_fog(scene: Scene, parameters: FroxelFogParameters) -> Callable[[Scene], FroxelShadows]:
     """Return the function that casts a shadow map for every light of a frame, if they are asked for.
 
     Raises
@@ -92,11 +102,18 @@ def prepare_froxel_fog(scene: Scene, parameters: FroxelFogParameters) -> Callabl
     froxels = _NUMBERS * number * across * down * deep
     check_memory(f"a grid of {across} x {down} x {deep} froxels", froxels, "use fewer")
     if parameters.shadow != "map":
-        return lambda scene: ()
+        return lambda scene: FroxelShadows((), tabulated(scene.lights))
     map = parameters.map
     needed = froxels + sum(map_memory(light, map) for light in scene.lights)
     check_memory(f"map: {map} texels for {len(scene.lights)} light(s)", needed, "use a smaller map")
-    return lambda scene: tuple(cast_shadow_map(scene.geometry, light, map) for light in scene.lights)
+
+    def cast(scene: Scene) -> FroxelShadows:
+        ordinary = [light for light in scene.lights if light.source is None]
+        first = {light.source: light for light in scene.lights}
+        tables = (with_maps(table, scene.geometry, first[table.source], map) for table in tabulated(scene.lights))
+        return FroxelShadows(tuple(cast_shadow_map(scene.geometry, light, map) for light in ordinary), tuple(tables))
+
+    return cast
 
 
 def froxel_fog(view: View, state, lists, *, kernel, parameters: FroxelFogParameters) -> Layers:
@@ -125,8 +142,9 @@ def froxel_fog(view: View, state, lists, *, kernel, parameters: FroxelFogParamet
     pieces = column_pieces(view, grid, dr.arange(mi.UInt32, grid.columns))
     Float = type(view.distance)
     shift = frame_shift(last if parameters.jitter == "frames" else None, Float)
-    visible = _visibility(view, state, parameters.shadow)
-    scattered = scattered_light(view, grid, pieces, shift=shift, visible=visible)
+    shadows = state or FroxelShadows((), ())
+    visible = _visibility(view, shadows, parameters.shadow)
+    scattered = scattered_light(view, grid, pieces, shift=shift, tables=shadows.tables, visible=visible)
     carried = None
     if hands_on(parameters):
         scattered, carried = averaged(
@@ -150,7 +168,18 @@ def froxel_errors(parameters: FroxelFogParameters, size: tuple[int, int]) -> tup
     return ("map", {"shadow": "ray"}), ("resolution", {"width": size[0], "height": size[1]}), ("steps", None)
 
 
-def _visibility(view: View, maps: tuple[ShadowMap, ...], shadow: str) -> Visibility:
-    if shadow == "ray":
-        return lambda point, number: view.visible(point, view.lights[number])
-    return lambda point, number: lit_in_map(maps[number], view.lights[number], point)
+def _visibility(view: View, shadows: FroxelShadows, shadow: str) -> Visibility:
+    def visible(point, light: Light, number: int, place):
+        if shadow == "ray":
+            return view.visible(point, light)
+        if place is not None:
+            table, point_number = place
+            return table.lit(point_number, light, point)
+        if light.source is None:
+            return lit_in_map(shadows.maps[number], light, point)
+        # In bounded media light points come one by one.
+        table = next(table for table in shadows.tables if table.source == light.source)
+        before = next(index for index, other in enumerate(view.lights) if other.source == light.source)
+        return table.lit(mi.UInt32(number - before), light, point)
+
+    return visible
