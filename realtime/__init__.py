@@ -21,7 +21,8 @@ Read in this order:
 - `bounded_media/`: rays, legs and airlight in bounded media;
 - `intervals/`: the lit intervals of rays, their sum, and the nearest crossings;
 - `clouds/`: light scattered more than once: a slab by orders;
-- `methods/`: the methods: `interface/`, `unshadowed`, `ray_march`, `shadow_planes/`, `light_volumes/`, `epipolar/`;
+- `methods/`: the methods: `interface/`, `unshadowed`, `ray_march`, `shadow_planes/`, `light_volumes/`, `epipolar/`,
+  `froxel_fog/`;
 - `frame/`: camera rays, the lit surface, and whole frames, one or the next.
 
 May import: `realtime.errors`.
