@@ -10,8 +10,8 @@ Names are imported when they are first used, so that `airlight --help` imports n
 >>> airlight.compare(truth, frame).metrics.relative_rmse < 0.01
 True
 
-`load_scene`, `render`, `reference`, `compare`, `integrate`, `bench` and `report` are all that a notebook needs; the
-others are what these are made of.
+`load_scene`, `render`, `reference`, `compare`, `integrate`, `bench`, `slab` and `report` are all that a notebook needs;
+the others are what these are made of.
 """
 
 if __name__ == "__main__":  # before all that takes time: what a signal meets during an import ends in a traceback
@@ -40,6 +40,7 @@ if TYPE_CHECKING:  # for editors, which complete names from here; `_API` says th
     from reports.api.images import render as render
     from reports.api.reference import reference as reference
     from reports.api.report import report as report
+    from reports.api.slab import slab as slab
     from reports.api.studies import bench as bench
     from reports.api.studies import integrate as integrate
     from reports.machine.environment import MissingError as MissingError
@@ -67,6 +68,7 @@ _API = {
     "compare": "reports.api.images",
     "integrate": "reports.api.studies",
     "bench": "reports.api.studies",
+    "slab": "reports.api.slab",
     "report": "reports.api.report",
     "InputError": "analytic.errors",
     "MissingError": "reports.machine.environment",

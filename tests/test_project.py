@@ -33,7 +33,8 @@ ALLOWED = {
 }
 # Methods are compared with one another. (The estimators of the truth: tests/test_independence.py.)
 METHODS = tuple(
-    f"realtime.methods.{name}" for name in ("unshadowed", "ray_march", "shadow_planes", "light_volumes", "epipolar")
+    f"realtime.methods.{name}"
+    for name in ("unshadowed", "ray_march", "shadow_planes", "light_volumes", "epipolar", "froxel_fog")
 )
 
 

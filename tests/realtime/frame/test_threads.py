@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A frame does not hang on how many threads draw it. Workers of a test run have one each, so this is a process apart."""
+"""A frame does not hang on how many threads draw it. Workers of a test run have one each: this has a process apart."""
 
 import subprocess
 import sys
