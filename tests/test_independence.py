@@ -23,6 +23,7 @@ READING = {
     "analytic.phase": "the scene's record names the phase function; the two Monte Carlo estimators ask Mitsuba's",
     "reference.scene.camera": "the rays through the pixel centres: where one looks, no light",
     "reference.scene.convex_bounds": "which shapes may bound a medium; where rays cross them is in `visibility`",
+    "reference.scene.area_light": "shape, place and radiance as Mitsuba gives them",
     "reference.scene.directional_light": "direction and irradiance as Mitsuba gives them",
     "reference.scene.read": "coefficients, lights and shapes as Mitsuba gives them",
 }

@@ -7,6 +7,7 @@ Read in this order:
 - `report.py`: what figures read of a report
 - `published_rows.py`: rows of papers, from a report or measured
 - `convergence.py`: orders of kernels and estimators
+- `decomposition.py`: errors by cause
 - `frame_speed.py`: time of frames against error
 - `kernel_errors.py`: errors of kernels over depth and angle
 - `kernel_speed.py`: time of kernels against error
