@@ -18,6 +18,7 @@ FIGURES: dict[str, tuple[str, tuple[str, ...]]] = {
     "kernel-speed": ("kernel_speed", ("quick", "progress")),
     "convergence": ("convergence", ("quick", "progress")),
     "z-distribution": ("z_distribution", ("quick", "progress")),
+    "slab-orders": ("slab_orders", ("quick", "progress")),
     "map-size": ("map_size", ("quick", "progress")),
     "stages": ("stages", ("quick", "progress", "published")),
     "published": ("published", ("quick", "progress", "published")),
