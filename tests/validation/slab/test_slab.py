@@ -167,7 +167,7 @@ def test_files_that_are_no_phase_function(text, words, tmp_path):
     assert words in str(refused.value)
 
 
-@pytest.mark.parametrize("tau", [1e-6, 0.005, 210.0])
+@pytest.mark.parametrize("tau", [1e-6, 0.005, pytest.param(210.0, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("sun", [0.0, 89.99])
 def test_hard_cases_have_finite_numbers(tau, sun):
     numbers = slab_numbers(
