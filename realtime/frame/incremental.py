@@ -45,6 +45,7 @@ class FrameCache:
     state: Any  #: lights and geometry, shadow planes also the camera: `Method.prepared_from`
     lists: Any  #: camera, geometry and lights
     history: History | None = None  #: the last frame, for passes over the image
+    carried: Any = None  #: what the method handed on from the last frame
 
 
 def next_frame(
@@ -88,8 +89,9 @@ def next_frame(
     if renderer.groups is not None:
         return _next_of_groups(renderer, made, cast_again=cast_again)
     state, lists, cast, by_light = _before_method(renderer, made, None, cast_again=cast_again)
-    layers = run_method(renderer, state, cast, by_light, lists, cache.history if cache else None)
-    return evaluated(cast, by_light, layers), FrameCache(cast, state, lists, layers[2])
+    last = (cache.history, cache.carried) if cache else (None, None)
+    *layers, history, carried = run_method(renderer, state, cast, by_light, lists, *last)
+    return evaluated(cast, by_light, layers), FrameCache(cast, state, lists, history, carried)
 
 
 @dataclass(frozen=True)
@@ -131,7 +133,7 @@ def _next_of_groups(renderer: FrameRenderer, made: _Made, *, cast_again: bool):
     """Do what `next_frame` does, group of lights after group."""
     assert renderer.groups is not None
     groups = light_groups(renderer)
-    history = made.cache.history if made.cache else None
+    history, carried = (made.cache.history, made.cache.carried) if made.cache else (None, None)
     sums: Any = None
     beyond: Any = None
     cast: Any = None
@@ -140,8 +142,8 @@ def _next_of_groups(renderer: FrameRenderer, made: _Made, *, cast_again: bool):
         state, lists, cast, by_light = _before_method(group, made.of_group(number), cast, cast_again=cast_again)
         kept.append((state, lists) if number < MOST_KEPT else (None, None))
         if renderer.groups.of_point is None:
-            layers = run_method(group, state, cast, by_light, lists, history)
-            stages, history = evaluated(cast, by_light, layers), layers[2]
+            *layers, history, carried = run_method(group, state, cast, by_light, lists, history, carried)
+            stages = evaluated(cast, by_light, layers)
             continue
         sums = sums or no_light(group.scene, dr.width(cast.distance))
         sums, more = run_group(group, sums, state, lists, cast, by_light)
@@ -150,7 +152,7 @@ def _next_of_groups(renderer: FrameRenderer, made: _Made, *, cast_again: bool):
     if sums is not None:
         surface = sums[1] if beyond is None else sums[1] + beyond
         stages = evaluated(cast, (), (sums[0], surface))
-    return stages, FrameCache(cast, states, all_lists, history)
+    return stages, FrameCache(cast, states, all_lists, history, carried)
 
 
 def _started(prepare: Preparation, scene: Scene) -> Callable[[], Any]:
