@@ -31,7 +31,7 @@ Share = Callable[[float], None]
 
 _RTOL = 1e-8  # of the integral of one point: below the error of a mean over points
 _CHECKS = 1  # random shadow rays of each ray and point: there are many points
-FLOOR = 1e-3  #: of the mean over rays: below this a ray's error need not be small relative to its value
+FLOOR = 0.05  #: of the mean over rays: below this a ray's error need not be small relative to its value
 
 
 @dataclass(frozen=True)
@@ -76,6 +76,7 @@ def area_airlight(
     lights = [(light, *before_light(truth, light)) for light in truth.area]
     squares = [[square_points(plan, i, k) for k in range(REPLICATES)] for i in range(len(lights))]
     active, low, high = np.arange(count), 0, min(plan.first, plan.most)
+    floor: Array | None = None
     rounds = 1 + int(np.log2(max(1, plan.most // max(1, plan.first))))
     done = 0
     while len(active):
@@ -95,7 +96,9 @@ def area_airlight(
         done += 1
         if high >= plan.most:
             break
-        active = _unsettled(total[active] / high, known, active, plan.error)
+        if floor is None:
+            floor = FLOOR * (total.mean(axis=-1) / high + known).mean(axis=0)
+        active = unsettled(total[active] / high, known, active, plan.error, floor)
         low, high = high, 2 * high
     means = total / used[:, None, None]
     return AreaAirlight(means, bound / (REPLICATES * used[:, None]), RandomChecks.of_all(checks))
@@ -106,9 +109,24 @@ def standard_error(replicates: Array) -> Array:
     return replicates.std(axis=-1, ddof=1) / np.sqrt(replicates.shape[-1])
 
 
-def _unsettled(replicates: Array, known: Array, active: NDArray[np.int64], error: float) -> NDArray[np.int64]:
-    """Return which of the active rays have too large a standard error."""
+def unsettled(
+    replicates: Array, known: Array, active: NDArray[np.int64], error: float, floor: Array
+) -> NDArray[np.int64]:
+    """Return which of the active rays have too large a standard error.
+
+    Parameters
+    ----------
+    replicates
+        Of the active rays, (active, 3, replicates) [W/(m^2 sr)].
+    known
+        What else all rays receive, (rays, 3) [W/(m^2 sr)].
+    active
+        Numbers of the rays.
+    error
+        The largest standard error, relative to the value or to `floor` [1].
+    floor
+        (3,) [W/(m^2 sr)].
+    """
     value = replicates.mean(axis=-1) + known[active]
-    floor = FLOOR * value.mean(axis=0)
     above = standard_error(replicates) > error * np.maximum(value, floor)
     return active[above.any(axis=1)]

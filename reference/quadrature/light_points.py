@@ -30,10 +30,11 @@ REPLICATES = 8  #: independent scramblings
 class PointPlan:
     """How many points stand for a light."""
 
-    error: float = 5e-4  #: standard error over value at which a ray needs no more points; 0: all points
+    error: float = 1e-3  #: standard error over value at which a ray needs no more points; 0: all points
     first: int = 16  #: points of each replicate that every ray gets, a power of two
-    most: int = 1024  #: that no ray exceeds, a power of two
+    most: int = 1024  #: points, or scan lines, that no ray exceeds, a power of two
     seed: int = 0  #: of the scramblings
+    shared: bool = False  #: whether all surface points have the same scan lines: their errors are then alike
 
 
 def square_points(plan: PointPlan, light: int, replicate: int) -> Array:
