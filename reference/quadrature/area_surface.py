@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.quadrature.area_airlight import FLOOR, unsettled
-from reference.quadrature.light_points import REPLICATES, PointPlan
+from reference.quadrature.light_points import REPLICATES, PointPlan, mirrored_digits
 from reference.quadrature.segments import optical_depth
 from reference.quadrature.surface import SurfaceHits
 from reference.quadrature.unbounded import sums_of
@@ -180,18 +180,13 @@ def _draws(plan: PointPlan, light: int, count: int) -> tuple[Array, Array]:
 def _lines(draws: tuple[Array, Array], points: Index, numbers: tuple[int, int]) -> tuple[Index, Array, Array, Index]:
     """Return points, directions, places and replicates of the lines of these numbers, sorted by point."""
     low, high = numbers
-    lattice = np.array([_van_der_corput(number) for number in range(low, high)])
+    lattice = np.array([mirrored_digits(number) for number in range(low, high)])
     turn, shift = draws[0][points], draws[1][points]
     place = np.mod(shift[:, :, None] + lattice, 1.0)
     place = 1 - np.abs(2 * place - 1)
     per_point = REPLICATES * len(lattice)
     replicate = np.tile(np.repeat(np.arange(REPLICATES), len(lattice)), len(points))
     return np.repeat(points, per_point), np.repeat(turn.ravel(), len(lattice)), place.ravel(), replicate
-
-
-def _van_der_corput(number: int) -> float:
-    """Return the number with its binary digits mirrored at the point: the first 2^k of them are a lattice."""
-    return float(int(f"{number:064b}"[::-1], 2)) / 2.0**64
 
 
 def _line_values(
