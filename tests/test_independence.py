@@ -17,6 +17,8 @@ ESTIMATORS = {
     "volpath": "reference.monte_carlo.volpath",
 }
 READING = {
+    "analytic.droplets": "phase functions of droplets, by their names; no scene has these names",
+    "analytic.mie": "the same",
     "analytic.errors": "words for the user",
     "analytic.phase": "the scene's record names the phase function; the two Monte Carlo estimators ask Mitsuba's",
     "reference.scene.camera": "the rays through the pixel centres: where one looks, no light",

@@ -19,6 +19,7 @@ import tempfile
 import traceback
 import warnings
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 FOG = {"sigma_t": "0.2, 0.2, 0.2", "albedo": "0.9, 0.8, 0.7", "g": "0.3", "scale": "1", "phase": ""}
@@ -268,11 +269,13 @@ def _orders(kind: str, path: Path) -> list[list[str]]:
         settings += ["--set", "shadow=map"] if number == 1 else []
         file = out / f"frame-{number}.exr"
         orders.append(["render", str(path), "--json", "--method", method, "-o", str(file), *settings])
-    return [*orders, ["compare", str(out / "truth.exr"), str(out / "frame-0.exr"), "--json"]]
+    orders.append(["compare", str(out / "truth.exr"), str(out / "frame-0.exr"), "--json"])
+    asked = ["--quick", "--scenes", str(path), "--methods", "unshadowed,ray-march", "--json"]
+    return [*orders, ["report", *asked, "-o", str(out / "study")]]
 
 
 def _finite_file(path: Path) -> bool:
-    """Return whether a file holds nothing that is not finite; a distance may be infinite."""
+    """Return whether a file, or all images of a report, hold nothing that is not finite; a distance may be infinite."""
     import numpy as np
 
     from reference.storage.exr import read_exr
@@ -280,8 +283,8 @@ def _finite_file(path: Path) -> bool:
     if path.suffix == ".csv":
         header, *lines = (line.split(",") for line in path.read_text().split("\n") if line)
         return all(math.isfinite(float(line[header.index("result")])) for line in lines)
-    image = read_exr(path)
-    return all(np.isfinite(layer).all() for layer in image.layers.values())
+    images = [read_exr(file) for file in ([path] if path.is_file() else path.rglob("*.exr"))]
+    return all(np.isfinite(layer).all() for image in images for layer in image.layers.values())
 
 
 def _fault(order: list[str]) -> tuple[str, str]:
@@ -322,9 +325,13 @@ def _fault(order: list[str]) -> tuple[str, str]:
 
 def _child(kind: str, path: Path, report: Path) -> None:
     from reports.machine.environment import activate
+    from validation.frames import scene_study
 
     os.environ["AIRLIGHT_CACHE_DIR"] = str(path.parent / "cache")
     activate()
+    # The scene's own size, in a second: what a report says of a scene, not how well.
+    small = {"image": (12, 9), "timed": (12, 9), "checked": (12, 9), "seconds": 0.001, "patience": 0.1}
+    scene_study.EFFORTS["quick"] = replace(scene_study.EFFORTS["quick"], **small, batches=16)
     for order in _orders(kind, path):
         if order[0] == "compare" and not all(Path(one).is_file() for one in order[1:3]):
             continue
