@@ -14,6 +14,7 @@ Read in this order:
 - `scene/`: camera, lights, media, phase functions and meshes, read from Mitsuba; the features of a scene; what moves;
 - `rays/`: the geometry of rays and lights, and the cone of a spot;
 - `shadow_maps/`: shadow maps and the field of inverse depth over them;
+- `image_filters/`: Gaussian, bilateral and joint bilateral filters of whole images, and up-sampling;
 - `tiles/`: pixels in tiles of 4 x 4, lists of candidates, and adaptive sampling between the corners of tiles;
 - `kernels/`: the airlight integral between two distances along a ray;
 - `bounded_media/`: rays, legs and airlight in bounded media;
