@@ -11,6 +11,7 @@ Read in this order:
 - `memory.py`: refuses work that needs more memory than the machine has;
 - `parameters.py`: typed parameters of methods, with defaults, ranges and help;
 - `numerics/`: array types, error-free arithmetic, fast functions, Gauss-Legendre nodes;
+- `area_lights/`: lights with extent, and the points that stand for them;
 - `scene/`: camera, lights, media, phase functions and meshes, read from Mitsuba; the features of a scene; what moves;
 - `rays/`: the geometry of rays and lights, and the cone of a spot;
 - `shadow_maps/`: shadow maps and the field of inverse depth over them;

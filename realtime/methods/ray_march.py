@@ -222,7 +222,7 @@ def _march(
             term = weight * media.source(x)
             return index + 1, total + dr.select((width > 0) & lit(point), term, 0)
         weight *= medium.phase.evaluate((foot - x) / r)
-        if light.soft:
+        if light.varies:
             weight *= falloff(geometry, light, x)
         term = per_extinction(medium, lambda sigma_t: weight * dr.exp(-sigma_t * (x + r)))
         return index + 1, total + dr.select((width > 0) & lit(point), term, 0)

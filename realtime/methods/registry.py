@@ -57,6 +57,8 @@ METHODS: dict[str, Method] = {
         casts_rays=lambda parameters: parameters.evaluation == "vertex",  # to know the triangle of a surface
         provides_visibility=always,
         by_rays=lambda parameters: parameters.evaluation == "pixel",
+        # What is no light's own, and a buffer that rounds, hold for the sum of all lights.
+        lights_at_once=lambda parameters: parameters.buffer == "8bit" or parameters.ambient > 0,
         parameters=ShadowPlaneParameters,
     ),
     "light-volumes": Method(

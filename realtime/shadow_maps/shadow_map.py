@@ -135,9 +135,12 @@ def cast_map_rays(scene, light: Light, place, active=True):
     """
     Float = type(light.position.x)
     start, unit = map_ray(light, *place)
+    skipped: Any = 0
+    if light.facing is not None:
+        start, skipped = light.rays_from(unit)
     ray = mi.Ray3f(mi.Point3f(start), mi.Vector3f(unit))
     hit = scene.ray_intersect_preliminary(ray, coherent=True, active=active)
-    return dr.select(hit.is_valid(), Float(hit.t), dr.inf)
+    return dr.select(hit.is_valid(), Float(hit.t + skipped) if light.facing is not None else Float(hit.t), dr.inf)
 
 
 def lit_in_map(shadow_map: ShadowMap, light: Light, point):

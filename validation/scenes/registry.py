@@ -7,9 +7,11 @@ constant of the scene. Every command and report knows the scenes that have a `Sc
 
 from validation.scenes.clutter import SCENE as CLUTTER
 from validation.scenes.colonnade import colonnade
+from validation.scenes.fence import SCENE as FENCE
 from validation.scenes.hall import SCENE as HALL
 from validation.scenes.omni_box import SCENE as OMNI_BOX
 from validation.scenes.open_fog import open_fog
+from validation.scenes.penumbra_plane import SCENE as PENUMBRA_PLANE
 from validation.scenes.record import Animation, SceneRecord
 from validation.scenes.sphere_spot import sphere_spot
 from validation.scenes.tangle import SCENE as TANGLE
@@ -54,5 +56,7 @@ SCENES: dict[str, SceneRecord] = {
         OMNI_BOX,
         TANGLE,
         WINDOWS,
+        PENUMBRA_PLANE,
+        FENCE,
     )
 }
