@@ -20,7 +20,8 @@ Read in this order:
 - `kernels/`: the airlight integral between two distances along a ray;
 - `bounded_media/`: rays, legs and airlight in bounded media;
 - `intervals/`: the lit intervals of rays, their sum, and the nearest crossings;
-- `methods/`: the methods: `interface/`, `unshadowed`, `ray_march`, `shadow_planes/`, `light_volumes/`, `epipolar/`;
+- `methods/`: the methods: `interface/`, `unshadowed`, `ray_march`, `shadow_planes/`, `light_volumes/`, `epipolar/`,
+  `soft_shafts/`;
 - `frame/`: camera rays, the lit surface, and whole frames, one or the next.
 
 May import: `realtime.errors`.

@@ -125,7 +125,7 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
     if not scene.area_lights:
         return _stages(scene, method, kernel, chosen)
     lit = with_light_points(scene, light_points.points, light_points.pattern)
-    if method.passes or method.lights_at_once(chosen):
+    if _has_passes(method, chosen) or method.lights_at_once(chosen):
         groups = LightGroups(light_points, _stages(lit, method, kernel, chosen), None)
     else:
         point = replace(lit, lights=lit.lights[len(scene.lights) :][:1])
@@ -144,7 +144,9 @@ def _stages(scene: Scene, method: Method, kernel: Any, chosen: Any, *, adds_up: 
     provides_visibility = method.provides_visibility(chosen)
     pixel = mi.UInt32(tiled_pixels(camera.width, camera.height))
     corners = tile_corners(pixel, camera, tolerance, by_rays=by_rays, lights=len(scene.lights))
-    surface, shade, shade_casts_rays = surface_stages(scene, provides_visibility=provides_visibility)
+    stages = surface_stages(scene, provides_visibility=provides_visibility, by_source=method.by_source(chosen))
+    surface, shade, shade_casts_rays = stages
+    has_passes = _has_passes(method, chosen)
     tables = prepare_kernel(kernel, type(camera.origin.x)) if method.uses_kernel(chosen) else None
 
     def sort(pixel, camera, medium, lights, state, distance):
@@ -162,7 +164,7 @@ def _stages(scene: Scene, method: Method, kernel: Any, chosen: Any, *, adds_up: 
             return method.render(view, state, lists, kernel=with_tables(kernel, tables), parameters=chosen)
 
         layers = layers_of(view) if corners is None else adaptive_layers(layers_of, view, corners, tolerance)
-        if method.passes:
+        if has_passes:
             return layers
         return composed(layers, by_light) if sums is None else added(sums, layers, by_light)
 
@@ -174,7 +176,7 @@ def _stages(scene: Scene, method: Method, kernel: Any, chosen: Any, *, adds_up: 
     casts_rays = method.casts_rays(chosen)
     render: Callable[..., Any] = run
     passes: Callable[..., Any] | None = None
-    if method.passes:
+    if has_passes:
         passes = image_passes(method, chosen, surfaces=features.surfaces)
     if method.frozen(chosen):
         # Trace one tile without launching anything: what the method refuses must not be raised while a frozen function
@@ -210,6 +212,10 @@ def _stages(scene: Scene, method: Method, kernel: Any, chosen: Any, *, adds_up: 
         shade_casts_rays=shade_casts_rays,
         casts_rays=casts_rays,
     )
+
+
+def _has_passes(method: Method, parameters: Any) -> bool:
+    return bool(method.passes) and method.runs_passes(parameters)
 
 
 def render_frame(renderer: FrameRenderer) -> Frame:
