@@ -68,6 +68,7 @@ class FrameRenderer:
     lane: PerRay | None  #: the entry of every pixel row by row, for passes
     shade_casts_rays: bool  #: whether shading asks Mitsuba for shapes or shadows
     casts_rays: bool  #: whether the method casts rays of its own
+    carries: bool  #: whether the method hands arrays on to the next frame
     groups: LightGroups | None = None  #: where the scene has lights with extent
 
     # A frozen function reads all shapes of a scene that it is given anew at every call.
@@ -125,7 +126,7 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
     if not scene.area_lights:
         return _stages(scene, method, kernel, chosen)
     lit = with_light_points(scene, light_points.points, light_points.pattern)
-    if _has_passes(method, chosen) or method.lights_at_once(chosen):
+    if _has_passes(method, chosen) or method.lights_at_once(chosen) or method.carries(chosen):
         groups = LightGroups(light_points, _stages(lit, method, kernel, chosen), None)
     else:
         point = replace(lit, lights=lit.lights[len(scene.lights) :][:1])
@@ -154,9 +155,27 @@ def _stages(scene: Scene, method: Method, kernel: Any, chosen: Any, *, adds_up: 
         shown = {"features": features, "geometry": None, "medium": medium, "lights": lights}
         return method.cull(frame_view(camera, pixel, distance, **shown), state, chosen)
 
-    def run(geometry, pixel, camera, medium, lights, state, lists, distance, by_light, tables, corners=None, sums=None):
+    carries = method.carries(chosen)
+
+    def run(
+        geometry,
+        pixel,
+        camera,
+        medium,
+        lights,
+        state,
+        lists,
+        distance,
+        by_light,
+        tables,
+        corners=None,
+        sums=None,
+        last=None,
+    ):
         shown = {"features": features, "geometry": geometry, "medium": medium, "lights": lights}
         view = frame_view(camera, pixel, distance, **shown)
+        if carries:
+            view = replace(view, carried=last)
         if provides_visibility:
             view = replace(view, surfaces=by_light)
 
@@ -164,6 +183,9 @@ def _stages(scene: Scene, method: Method, kernel: Any, chosen: Any, *, adds_up: 
             return method.render(view, state, lists, kernel=with_tables(kernel, tables), parameters=chosen)
 
         layers = layers_of(view) if corners is None else adaptive_layers(layers_of, view, corners, tolerance)
+        if carries:
+            carried, layers = layers.carried, replace(layers, carried=None)
+            return (layers if has_passes else composed(layers, by_light)), carried
         if has_passes:
             return layers
         return composed(layers, by_light) if sums is None else added(sums, layers, by_light)
@@ -211,6 +233,7 @@ def _stages(scene: Scene, method: Method, kernel: Any, chosen: Any, *, adds_up: 
         lane=lane,
         shade_casts_rays=shade_casts_rays,
         casts_rays=casts_rays,
+        carries=carries,
     )
 
 
@@ -227,14 +250,11 @@ def image_frame(renderer: FrameRenderer, stages) -> Frame:
     """Bring `stages`, what `run_stages` returned, to the host in the order of the image."""
     distance, surface, airlight = stages
     height, width = renderer.scene.camera.height, renderer.scene.camera.width
-    light = _image(renderer, airlight, (height, width, 3))
     frame = Frame(
-        light,
+        _image(renderer, airlight, (height, width, 3)),
         _image(renderer, surface, (height, width, 3)),
         _image(renderer, distance, (height, width)),
     )
-    if renderer.method.check is not None:
-        renderer.method.check(light)
     check_radiance(renderer.scene, renderer.method.name, frame.airlight, frame.surface, frame.distance)
     return frame
 
@@ -320,8 +340,14 @@ def run_cull(renderer: FrameRenderer, state, distance: Metres):
 
 
 def run_method(
-    renderer: FrameRenderer, state, cast: Cast, by_light, lists=None, history: History | None = None
-) -> tuple[PerRay, PerRay | None, History | None]:
+    renderer: FrameRenderer,
+    state,
+    cast: Cast,
+    by_light,
+    lists=None,
+    history: History | None = None,
+    carried: Any = None,
+) -> tuple[PerRay, PerRay | None, History | None, Any]:
     """Run the stages of the method, and return what they do, not evaluated.
 
     Parameters
@@ -334,6 +360,8 @@ def run_method(
         From `run_cull`; None to run that too.
     history
         What the last frame returned, for passes; None for the first.
+    carried
+        What the method handed on from the last frame; None for the first.
 
     Returns
     -------
@@ -343,26 +371,31 @@ def run_method(
         What is seen through it [W/(m^2 sr)]; None where that is the shaded surface as it is.
     history
         For the next frame; None where the method has no passes.
+    carried
+        For the next frame; None where the method hands nothing on.
     """
     if renderer.groups is not None:
         groups = light_groups(renderer)
         if len(groups) == 1 and renderer.groups.of_point is None:
             only = None if lists is None else lists[0]
             own = state[0] if state else groups[0].prepare(groups[0].scene)
-            return run_method(groups[0], own, cast, by_light[0], only, history)
-        return *_summed(groups, state, cast, by_light, lists), None
+            return run_method(groups[0], own, cast, by_light[0], only, history, carried)
+        return *_summed(groups, state, cast, by_light, lists), None, None
     scene, pixel = renderer.scene, renderer.pixel
     if lists is None:
         lists = run_cull(renderer, state, cast.distance)
     shown = pixel, scene.camera, scene.medium, renderer.lights
     inputs = state, lists, cast.distance, by_light, renderer.tables, renderer.corners
-    layers = renderer.render(renderer.geometry, *shown, *inputs)
+    if renderer.carries:
+        layers, carried = renderer.render(renderer.geometry, *shown, *inputs, None, carried)
+    else:
+        layers = renderer.render(renderer.geometry, *shown, *inputs)
     if renderer.passes is None:
-        return *layers, None
+        return *layers, None, carried
     geometry = scene.geometry if scene.facets is None else None
     place = geometry, scene.facets, pixel, renderer.lane, scene.camera, scene.medium
     airlight, surface, layers, g_buffer = renderer.passes(*place, cast, by_light, layers, history)
-    return airlight, surface, History(layers, g_buffer, scene.camera)
+    return airlight, surface, History(layers, g_buffer, scene.camera), carried
 
 
 def _summed(groups: Sequence[FrameRenderer], states, cast: Cast, by_light, lists) -> tuple[PerRay, PerRay]:

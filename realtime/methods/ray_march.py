@@ -36,6 +36,7 @@ from realtime.intervals.lit_intervals import add_waiting, close_interval, no_int
 from realtime.memory import check_memory
 from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.light_airlight import RayAirlight, integral_type, ray_airlight
+from realtime.methods.interface.method import ErrorCause
 from realtime.methods.interface.view import View, bounded_radiance, radiance, rays_in_media
 from realtime.parameters import Parameters, parameter
 from realtime.rays.ray_light import RayGeometry, distance_to_light, falloff, ray_geometry
@@ -140,6 +141,12 @@ def prepare_maps(scene: Scene, parameters: RayMarchParameters) -> Callable[[Scen
     needed = sum(map_memory(light, map) for light in scene.lights)
     check_memory(f"map: {map} texels for {len(scene.lights)} light(s)", needed, "use a smaller map")
     return lambda scene: tuple(cast_shadow_map(scene.geometry, light, map) for light in scene.lights)
+
+
+def marching_errors(parameters: RayMarchParameters, size: tuple[int, int]) -> tuple[ErrorCause, ...]:
+    """Return the causes of its errors, as `realtime.methods.interface.method.Method.error_causes` has them."""
+    without = "shadows" if parameters.shadow == "none" else "map"
+    return ("resolution", {"tolerance": 0.0}), (without, {"shadow": "ray"}), ("steps", None)
 
 
 def _visibility(view: View, maps, number: int, shadow: str):

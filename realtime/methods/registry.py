@@ -8,6 +8,13 @@ every command and report knows it. `find_method` also finds a user's own, which 
 from realtime.area_lights.points import LightPoints
 from realtime.errors import InputError
 from realtime.methods.epipolar.method import MinMaxParameters, min_max, prepare_min_max
+from realtime.methods.froxel_fog.method import (
+    FroxelFogParameters,
+    froxel_errors,
+    froxel_fog,
+    hands_on,
+    prepare_froxel_fog,
+)
 from realtime.methods.interface.method import Method, always, never
 from realtime.methods.light_volumes.method import (
     LightVolumeParameters,
@@ -16,7 +23,7 @@ from realtime.methods.light_volumes.method import (
     light_volumes,
     prepare_light_volumes,
 )
-from realtime.methods.ray_march import RayMarchParameters, prepare_maps, ray_march
+from realtime.methods.ray_march import RayMarchParameters, marching_errors, prepare_maps, ray_march
 from realtime.methods.shadow_planes.method import (
     ShadowPlaneParameters,
     cull_shadow_planes,
@@ -24,7 +31,12 @@ from realtime.methods.shadow_planes.method import (
     shadow_planes,
 )
 from realtime.methods.soft_shafts.history import accumulate
-from realtime.methods.soft_shafts.method import prepare_soft_shafts, shares_by_source, soft_shafts
+from realtime.methods.soft_shafts.method import (
+    prepare_soft_shafts,
+    shafts_errors,
+    shares_by_source,
+    soft_shafts,
+)
 from realtime.methods.soft_shafts.parameters import SoftShaftsParameters
 from realtime.methods.unshadowed import render_unshadowed
 from realtime.methods.user_method import own_method
@@ -37,6 +49,7 @@ METHODS: dict[str, Method] = {
         "one airlight integral a ray and light, no volumetric shadows",
         "Biri, Arques, Michelin 2006, section 4.1; Sun et al. 2005",
         shadows=False,
+        error_causes=lambda parameters, size: (("shadows", None),),
     ),
     "ray-march": Method(
         "ray-march",
@@ -49,6 +62,7 @@ METHODS: dict[str, Method] = {
         casts_rays=lambda parameters: parameters.shadow == "ray",
         by_rays=always,
         parameters=RayMarchParameters,
+        error_causes=marching_errors,
     ),
     "shadow-planes": Method(
         "shadow-planes",
@@ -64,6 +78,11 @@ METHODS: dict[str, Method] = {
         # What is no light's own, and a buffer that rounds, hold for the sum of all lights.
         lights_at_once=lambda parameters: parameters.buffer == "8bit" or parameters.ambient > 0,
         parameters=ShadowPlaneParameters,
+        error_causes=lambda parameters, size: (
+            ("buffer", {"buffer": "float"}),
+            ("resolution", {"tolerance": 0.0, "evaluation": "pixel"}),
+            ("order", {"order": "exact"}),
+        ),
     ),
     "light-volumes": Method(
         "light-volumes",
@@ -77,6 +96,7 @@ METHODS: dict[str, Method] = {
         by_rays=lambda parameters: parameters.evaluation == "walk",
         frozen=lambda parameters: parameters.evaluation == "walk",  # the crossings of a mesh are counted on the way
         parameters=LightVolumeParameters,
+        error_causes=lambda parameters, size: (("resolution", {"tolerance": 0.0}), ("map", None)),
     ),
     "min-max": Method(
         "min-max",
@@ -86,6 +106,21 @@ METHODS: dict[str, Method] = {
         prepare=prepare_min_max,
         prepared_from=frozenset({"geometry", "light"}),
         parameters=MinMaxParameters,
+        error_causes=lambda parameters, size: (("resolution", {"sampling": "pixels"}), ("map", None)),
+    ),
+    "froxel-fog": Method(
+        "froxel-fog",
+        froxel_fog,
+        "scattered light in a grid along the view, summed front to back: what engines ship",
+        "Wronski 2014; Hillaire 2015",
+        uses_kernel=never,
+        prepare=prepare_froxel_fog,
+        prepared_from=frozenset({"geometry", "light"}),
+        casts_rays=lambda parameters: parameters.shadow == "ray",
+        carries=hands_on,
+        lights_at_once=always,
+        parameters=FroxelFogParameters,
+        error_causes=froxel_errors,
     ),
     "soft-shafts": Method(
         "soft-shafts",
@@ -103,6 +138,7 @@ METHODS: dict[str, Method] = {
         by_source=shares_by_source,
         light_points=LightPoints(5, "ring"),
         parameters=SoftShaftsParameters,
+        error_causes=shafts_errors,
     ),
 }
 

@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`airlight bench [SCENE...]`: speed against error."""
+"""`airlight bench [SCENE...]`: speed against error, and errors by their causes."""
 
 import sys
 from functools import partial
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Any
 
 import typer
 
-from reports.commands.options import USUAL_LIMIT, Force, MethodLimit
+from reports.commands.options import USUAL_LIMIT, Force, MethodLimit, listed
 
 _BATCHES = 4096  # at most: a comparison ends earlier if its interval is narrow enough
 
@@ -17,9 +18,19 @@ def bench(
         list[str] | None, typer.Argument(help="Scenes, or with --kernels kernels; all built-in ones by default.")
     ] = None,
     kernels: Annotated[bool, typer.Option("--kernels", help="Time the kernels alone, on 480 000 rays.")] = False,
+    phase: Annotated[
+        str | None, typer.Option(help="With --kernels: the only phase function, such as hg-draine:12 or mie:6.")
+    ] = None,
     estimators: Annotated[
         bool, typer.Option("--estimators", help="Time single-scatter and volpath at equal error.")
     ] = False,
+    decompose: Annotated[
+        bool, typer.Option("--decompose", help="Split the error of every method by its causes, in place of timing it.")
+    ] = False,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="With --decompose: write images of the parts into this folder, by scene."),
+    ] = None,
     methods: Annotated[
         str | None, typer.Option(help="Comma-separated methods, also your own MODULE:FUNCTION; all by default.")
     ] = None,
@@ -38,14 +49,25 @@ def bench(
     `airlight` is the airlight alone (the kernel with its ray set-up), `frame` a frame with static geometry and light,
     `light moved` a frame after the light moved. Exit status 1 if single-scatter does not confirm the truth within
     +-0.05 %, or volpath within +- the margin, or if a method of your own is at fault.
+
+    --decompose prints by which causes each image is wrong: parts that add up to its error, differences of renders in
+    which one cause after the other is gone.
     """
     if not 0 < margin < 1:
         from analytic.errors import InputError
 
         raise InputError(f"--margin: got {margin:g}, wanted a share between 0 and 1, such as 0.002 for 0.2 %")
+    if output is not None and not decompose:
+        from analytic.errors import InputError
+
+        raise InputError("--output: got a folder without --decompose, which alone writes images; add --decompose")
     if kernels:
-        _bench_kernels(scenes, json=json, markdown=markdown)
+        _bench_kernels(scenes, phase=phase, json=json, markdown=markdown)
         return
+    if phase is not None:
+        from analytic.errors import InputError
+
+        raise InputError("--phase: it is for kernels; add --kernels, a scene has its own phase function")
     if estimators:
         _bench_estimators(scenes, size=size, force=force, json=json)
         return
@@ -64,8 +86,7 @@ def bench(
     from validation.scenes.registry import SCENES
 
     chosen: list[Configuration] = []
-    for name in methods.split(",") if methods else METHODS:
-        name = name.strip()
+    for name in METHODS if methods is None else listed("--methods", methods):
         own = ":" in name
         chosen += [checked_configuration(name, limit=method_limit)] if own else chosen_configurations([name])
     apart = partial(in_own_process, limit=method_limit)
@@ -80,6 +101,9 @@ def bench(
         works.append(truth_work(at, lights=lights))
         works += [frame_work(at, lights=lights, steps=_steps(each)) for each in chosen]
     check_work("bench", works, force=force)
+    if decompose:
+        _decompose(names, pixels, chosen, apart=apart, output=output, json=json, markdown=markdown)
+        return
     benched = []
     with progress_bar("bench") as progress:
         for number, name in enumerate(names):
@@ -98,6 +122,81 @@ def bench(
     agreed = [agreement["statistics"] for scene in benched for agreement in scene["agreement"].values()]
     if faults or not all(statistics["equivalent"] for statistics in agreed):
         raise typer.Exit(1)
+
+
+def _decompose(names, pixels, chosen, *, apart, output: Path | None, json: bool, markdown: bool) -> None:
+    """Print the errors of configurations by cause, and write their images."""
+    import reports.figures.decomposition as figure
+    from reference.storage.files import ensure_folder
+    from reports.commands.printing import print_heading, print_tables
+    from reports.figures.files import plot
+    from reports.machine.environment import describe_environment
+    from reports.machine.progress import part_of, progress_bar
+    from reports.tables.decomposition import decomposition_table
+    from reports.tables.terminal import print_json
+
+    folder = None if output is None else ensure_folder(output)
+    scenes = []
+    with progress_bar("bench --decompose") as progress:
+        for number, name in enumerate(names):
+            step = part_of(progress, number / len(names), (number + 1) / len(names))
+            scene, decomposed = _decomposed_scene(name, pixels, chosen, apart=apart, progress=step)
+            scenes.append(scene)
+            if folder is not None and decomposed:
+                place = ensure_folder(folder / scene["name"])
+                figure.write_parts(place, scene["name"], decomposed)
+                plot(figure, place)
+    if json:
+        print_json({"environment": describe_environment(), "scenes": scenes})
+        return
+    if markdown:
+        print_heading()
+    titles = [
+        "{}, {} x {}: the error of the airlight by cause".format(scene["name"], *scene["size"]) for scene in scenes
+    ]
+    tables = [decomposition_table(title, scene["methods"]) for title, scene in zip(titles, scenes, strict=True)]
+    print_tables(tables, as_markdown=markdown)
+
+
+def _decomposed_scene(name: str, pixels, chosen, *, apart, progress) -> tuple[dict[str, Any], list[Any]]:
+    """Return the errors of a scene by cause, JSON-ready and with their images."""
+    from realtime.errors import InputError
+    from realtime.scene.read_scene import read_scene
+    from validation.estimates.quadrature import truth_image
+    from validation.frames.benchmark import configurations_for, render_by_name
+    from validation.frames.decomposition import decompose, part_numbers
+    from validation.metrics.errors import plain
+    from validation.scenes.loading import load_scene
+
+    loaded = load_scene(name, pixels)
+    scene = read_scene(loaded.scene)
+    size = scene.camera.width, scene.camera.height
+    progress(0.0, f"{loaded.name}: the truth")
+    truth = truth_image(loaded.scene).airlight
+    entries, decomposed = [], []
+    configurations = configurations_for(scene.features, chosen)
+    for number, each in enumerate(configurations):
+        progress((1 + number) / (1 + len(configurations)), f"{loaded.name}: {each.label}")
+
+        def own(configuration, each=each):
+            path = str(loaded.path or loaded.name)
+            return apart(render_by_name, path, size, configuration, name=each.method).airlight
+
+        entry = {
+            "label": each.label,
+            "method": each.method,
+            "kernel": each.kernel,
+            "parameters": dict(each.parameters),
+        }
+        try:
+            split = decompose(scene, each, truth, render=own)
+        except InputError as error:
+            entries.append(entry | {"refused": str(error)})
+            continue
+        decomposed.append(split)
+        parts = [plain(part_numbers(part)) for part in (split.whole, *split.parts)]
+        entries.append(entry | {"refused": None, "whole": parts[0], "parts": parts[1:]})
+    return {"name": loaded.name, "size": list(size), "methods": entries}, decomposed
 
 
 def _steps(chosen) -> float:
@@ -154,7 +253,8 @@ def _bench_scene(name: str, pixels, chosen, *, margin: float | None, apart, prog
     return {"name": loaded.name, "size": size, "methods": rows, "agreement": agreed}
 
 
-def _bench_kernels(names: list[str] | None, *, json: bool, markdown: bool) -> None:
+def _bench_kernels(names: list[str] | None, *, phase: str | None, json: bool, markdown: bool) -> None:
+    from analytic.phase import phase_from_words
     from realtime.kernels.registry import KERNELS
     from reports.commands.printing import print_heading, print_tables
     from reports.machine.environment import activate, describe_environment
@@ -162,14 +262,15 @@ def _bench_kernels(names: list[str] | None, *, json: bool, markdown: bool) -> No
     from reports.tables.kernels import convergence_data, kernel_tables, order_table
     from reports.tables.terminal import print_json
     from validation.configurations.kernel_names import split_name
-    from validation.kernels.benchmark import bench_kernels
+    from validation.kernels.benchmark import PHASES, bench_kernels
     from validation.kernels.convergence import convergence, declared
     from validation.metrics.errors import plain
 
     wanted = [split_name(name)[0].name for name in names] if names else list(KERNELS)
+    phases = PHASES if phase is None else ((phase, phase_from_words(phase).g),)
     activate()
     with progress_bar("bench") as progress:
-        costs = bench_kernels(names, progress=counted(progress))
+        costs = bench_kernels(names, phases=phases, progress=counted(progress))
         rates = [convergence(name) for name in declared() if name in wanted]
     measured, orders = plain(costs), [convergence_data(rate) for rate in rates]
     if json:

@@ -28,6 +28,15 @@ def always(parameters: Any) -> bool:
     return True
 
 
+#: A cause of errors, and the values of parameters with which it is gone; None: all that the method has left.
+ErrorCause = tuple[str, Mapping[str, Any] | None]
+
+
+def no_causes(parameters: Any, size: tuple[int, int]) -> tuple[ErrorCause, ...]:
+    """Return no cause of errors, whatever the parameters and the size of the image."""
+    return ()
+
+
 @dataclass(frozen=True)
 class Method:
     """A method under its name: its stages in the order in which they run, then what a user and a frame must know.
@@ -53,6 +62,8 @@ class Method:
     #: on what `render` returned. All arrays have an entry per pixel, row by row; `history` is None in the first frame.
     passes: tuple[Callable[..., Layers], ...] = ()
     runs_passes: Callable[[Any], bool] = always  #: parameters -> whether these run
+    #: Parameters -> whether `render` hands arrays of any sizes on to the next frame, as `Layers.carried`.
+    carries: Callable[[Any], bool] = never
     uses_kernel: Callable[[Any], bool] = always  #: parameters -> whether `render` calls an airlight kernel
     shadows: bool = True  #: whether it knows shadows; one that does not is wrong where there are occluders
     provides_visibility: Callable[[Any], bool] = never  #: parameters -> whether its layers have a visibility
@@ -61,6 +72,9 @@ class Method:
     #: Parameters -> whether it computes each ray by itself, on any layout: then a frame may interpolate. It has the
     #: parameter `tolerance`, `realtime.tiles.adaptive_sampling.tolerance`. None: it has not.
     by_rays: Callable[[Any], bool] | None = None
+    #: ``error_causes(parameters, (width, height))``: the causes of its errors in an image of that size [pixels], in the
+    #: order in which `airlight bench --decompose` takes them away, one on top of the other.
+    error_causes: Callable[[Any, tuple[int, int]], tuple[ErrorCause, ...]] = no_causes
     #: Parameters -> whether it is given all lights of a frame at once, the points of lights with extent among them. If
     #: not, and if it has no passes over the image, it is given one light point after another, and what it returns is
     #: added up: it is recorded once for all of them.
@@ -69,7 +83,6 @@ class Method:
     #: light: then surfaces are shaded by source too.
     by_source: Callable[[Any], bool] = never
     light_points: LightPoints = field(default_factory=LightPoints)  #: how it renders lights with extent by default
-    check: Callable[[Any], None] | None = None  #: airlight (height, width, 3) -> raises what is wrong with it
 
     @property
     def defaults(self) -> dict[str, Any]:
