@@ -10,26 +10,14 @@ Names are imported when they are first used, so that `airlight --help` imports n
 >>> airlight.compare(truth, frame).metrics.relative_rmse < 0.01
 True
 
-`load_scene`, `render`, `reference`, `compare`, `integrate`, `bench` and `report` are all that a notebook needs; the
-others are what these are made of.
+`load_scene`, `render`, `reference`, `compare`, `integrate`, `bench`, `slab` and `report` are all that a notebook needs;
+the others are what these are made of.
 """
 
-import sys
-
 if __name__ == "__main__":  # before all that takes time: what a signal meets during an import ends in a traceback
-    import signal
+    from reports.commands.start import main as start
 
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
-    from reference.storage.stopping import stop_on_signals
-    from reports.machine.streams import usable_streams
-
-    usable_streams()
-    stop_on_signals()
-    if sys.flags.no_site:  # as the launcher starts it, since Python's own start is not safe from signals either
-        import site
-
-        site.main()
+    start()
 
 import importlib
 from typing import TYPE_CHECKING, Any
@@ -52,6 +40,7 @@ if TYPE_CHECKING:  # for editors, which complete names from here; `_API` says th
     from reports.api.images import render as render
     from reports.api.reference import reference as reference
     from reports.api.report import report as report
+    from reports.api.slab import slab as slab
     from reports.api.studies import bench as bench
     from reports.api.studies import integrate as integrate
     from reports.machine.environment import MissingError as MissingError
@@ -79,6 +68,7 @@ _API = {
     "compare": "reports.api.images",
     "integrate": "reports.api.studies",
     "bench": "reports.api.studies",
+    "slab": "reports.api.slab",
     "report": "reports.api.report",
     "InputError": "analytic.errors",
     "MissingError": "reports.machine.environment",
@@ -123,17 +113,6 @@ def __dir__() -> list[str]:
 
 def main() -> None:
     """Run the `airlight` command."""
-    from reference.storage.stopping import stop_on_signals, wait_if_stopped
-    from reports.machine.streams import usable_streams
+    from reports.commands.start import main as start
 
-    usable_streams()
-    stop_on_signals()
-    from reports.commands.main import run
-
-    status = run(sys.argv[1:])
-    wait_if_stopped()
-    sys.exit(status)
-
-
-if __name__ == "__main__":
-    main()
+    start()

@@ -6,6 +6,8 @@ Names and units are those of DESIGN section 2: lengths in metres, extinction in 
 Read in this order:
 
 - `errors.py`: the one exception for what a user gave wrong;
+- `mie.py`: how a sphere scatters light;
+- `droplets.py`: the droplets of clouds and fog, their extinction and phase functions, full and modified;
 - `phase.py`: phase functions of mean 1 over the sphere;
 - `geometry.py`: foot and height of a ray over a light, and the changes of variables x, theta, q, w;
 - `integral.py`: the airlight integral of one segment in three forms, derived, by adaptive quadrature;

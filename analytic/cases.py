@@ -6,12 +6,14 @@ Two sets of columns are known, each in any order and beside others:
     tag, phase, g, t, h, x0, x1, sigma_t, value                         the ray by foot (t) and height (h)
     phase, g, ox, oy, oz, dx, dy, dz, lx, ly, lz, x0, x1, sigma_t, value      the ray by origin, direction and light
 
-`tag`, `g` (then 0) and `value` may be missing. An x1 of `inf` is a ray that never ends.
+`phase` is in the words of `analytic.phase.phase_from_words`, such as hg or mie:6. `tag`, `g` (then 0) and `value` may
+be missing. An x1 of `inf` is a ray that never ends.
 """
 
 import csv
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +22,7 @@ from numpy.typing import NDArray
 from analytic.errors import InputError
 from analytic.geometry import foot_and_height
 from analytic.panels import airlight_segments
-from analytic.phase import PHASE_NAMES, PhaseFunction, unknown_phase
+from analytic.phase import phase_from_words
 
 Array = NDArray[np.float64]
 
@@ -32,7 +34,7 @@ _FOOT = ("t", "h")
 class Cases:
     """The rows of a table of cases, arrays of shape (n,) in the order of the file."""
 
-    phase: tuple[str, ...]  #: names of phase functions
+    phase: tuple[str, ...]  #: phase functions, in the words of `analytic.phase.phase_from_words`
     g: Array  #: mean cosine, 0 where the phase function has none
     foot: Array  #: [m]
     height: Array  #: [m]
@@ -48,13 +50,16 @@ class Cases:
     rows: tuple[tuple[str, ...], ...]  #: the text of all columns, to write the table out again; none from memory
 
 
-def read_cases(path: str | Path) -> Cases:
+def read_cases(path: str | Path, *, phase: str | None = None) -> Cases:
     """Read a table of cases.
 
     Parameters
     ----------
     path
         A CSV file with a header line; see the module's docstring for the columns.
+    phase
+        Words of a phase function for all rows, in place of the column, which may then be missing; the values of the
+        file, which are of others, are left out.
 
     Raises
     ------
@@ -63,7 +68,14 @@ def read_cases(path: str | Path) -> Cases:
         unknown phase function: the message names file, line (from 1, the header) and column.
     """
     header, lines = _read_text(Path(path))
-    return checked_cases(Table(str(path), header, lines))
+    if phase is None:
+        return checked_cases(Table(str(path), header, lines))
+    phase_from_words(phase)
+    if "phase" not in header:
+        header, lines = [*header, "phase"], [(number, [*cells, ""]) for number, cells in lines]
+    column = header.index("phase")
+    replaced = [(number, [*cells[:column], phase, *cells[column + 1 :]]) for number, cells in lines]
+    return replace(checked_cases(Table(str(path), header, replaced)), value=None)
 
 
 def checked_cases(table: "Table") -> Cases:
@@ -81,8 +93,8 @@ def checked_cases(table: "Table") -> Cases:
     g = table.numbers("g") if "g" in header else np.zeros(table.count)
     phase = tuple(cell.strip().lower() for cell in table.cells("phase"))
     for row, name in enumerate(phase):
-        if name not in PHASE_NAMES or name == "tabulated":
-            reason = "'tabulated' has no place for its table here" if name == "tabulated" else unknown_phase(name)
+        reason = "'tabulated' has no place for its table here" if name == "tabulated" else _fault(name)
+        if reason:
             raise InputError(f"{table.where(row, 'phase')}: {reason}")
     table.check("g", np.abs(g) < 1, "a number between -1 and 1")
     table.check("sigma_t", columns["sigma_t"] >= 0, "a number >= 0")
@@ -123,8 +135,18 @@ def integrate_cases(cases: Cases, *, rtol: float = 1e-10) -> tuple[Array, Array]
     for name, g in sorted(set(zip(cases.phase, cases.g.tolist()))):
         rows = np.flatnonzero((np.array(cases.phase) == name) & (cases.g == g))
         columns = (cases.foot[rows], cases.height[rows], cases.x0[rows], cases.x1[rows], cases.sigma_t[rows])
-        value[rows], error[rows] = airlight_segments(*columns, PhaseFunction(name, g=g), rtol=rtol)
+        value[rows], error[rows] = airlight_segments(*columns, phase_from_words(name, g=g), rtol=rtol)
     return value, error
+
+
+@cache
+def _fault(words: str) -> str:
+    """Return why words name no phase function, nothing where they do."""
+    try:
+        phase_from_words(words)
+    except InputError as reason:
+        return str(reason)
+    return ""
 
 
 @dataclass(frozen=True)

@@ -179,6 +179,8 @@ def _beside_light(foot: Any, s0: Any, s1: Any, sigma_t: Any, phase: PhaseFunctio
 
 def _kinks(phase: PhaseFunction) -> list[Any]:
     """Return the cosines at which the slope of a table jumps, in the current precision."""
+    if phase.table is None:
+        return [mpf(float(c)) for c in phase.kinks]
     last = len(phase.kinks) + 1
     return [mpf(2 * k - last) / last for k in range(1, last)]
 

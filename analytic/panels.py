@@ -180,6 +180,8 @@ def _folds(integrand: _Integrand) -> float:
     if phase.table is not None or integrand.weight is not None:
         return 745.0  # zeros are possible: only what underflows is left out, which costs one panel more
     ends = phase(np.array([-1.0, 0.0, 1.0]))
+    if ends.min() == 0:
+        return 745.0
     return float(_NEGLIGIBLE + np.log(ends.max() / ends.min()))
 
 

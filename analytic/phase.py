@@ -5,7 +5,7 @@ The mean over the sphere is (1/2) int_{-1}^{1} p(c) dc, c the cosine of the scat
 
     up = (1 + c)/2 = cos^2(angle/2),    down = (1 - c)/2 = sin^2(angle/2)
 
-the six functions read
+the functions read
 
     isotropic   1
     rayleigh    3 (1 + c^2)/4
@@ -13,6 +13,14 @@ the six functions read
     murky       (1 + 50 up^32) 33/83    mean of up^32 = 1/33:  1 + 50/33 = 83/33  (the same)
     hg          (1 - g^2) / (1 + g^2 - 2 g c)^(3/2)                               (Henyey and Greenstein 1941)
     tabulated   linear between values at regularly spaced c, divided by their mean (the trapezoid rule, exact here)
+    hg-draine   (1 - w) hg(g_HG) + w (1 + alpha c^2)/(1 + alpha (1 + 2 g_D^2)/3) hg(g_D)
+    mie, mie-modified   water droplets, `analytic.droplets`, at one wavelength
+
+The second term of `hg-draine` is Draine's function (2003, ApJ 598, 1017): the mean of c^2 over an hg is (1 + 2 g^2)/3.
+Jendersie and d'Eon (SIGGRAPH 2023 Talks) fitted both terms to fog and clouds, for diameters d of 5 to 50 um:
+
+    g_HG = exp(-0.0990567/(d - 1.67154))            g_D = exp(-2.20679/(d + 3.91029) - 0.428934)
+    alpha = exp(3.62489 - 8.29288/(d + 5.52825))    w = exp(-0.599085/(d - 0.641583) - 0.665888)
 
 Everything is evaluated from `up` and `down`, which a caller near the forward or backward direction knows without
 cancellation: 1 + g^2 - 2 g c = (1 - g)^2 + 4 g down = (1 + g)^2 - 4 g up, all terms positive in the first for g > 0, in
@@ -29,12 +37,17 @@ import numpy as np
 from mpmath import mp, mpf
 from numpy.typing import ArrayLike, NDArray
 
+from analytic.droplets import WATER, Droplets, Modified, Optics, optics
 from analytic.errors import InputError
 
 Array = NDArray[np.float64]
 
 #: The names that `PhaseFunction` accepts.
 PHASE_NAMES = ("isotropic", "rayleigh", "hazy", "murky", "hg", "tabulated")
+#: Those of droplets, which it accepts too.
+DROPLET_NAMES = ("hg-draine", "mie", "mie-modified")
+
+_DROPLETS = ("mie", "mie-modified")  # those with sizes
 
 _HAZY_MEAN, _MURKY_MEAN = 2.0, 83.0 / 33.0
 
@@ -46,7 +59,7 @@ class PhaseFunction:
     Parameters
     ----------
     name
-        One of `PHASE_NAMES`.
+        One of `PHASE_NAMES` or `DROPLET_NAMES`.
     g
         Mean cosine [1], only for 'hg', in (-1, 1).
     table
@@ -70,9 +83,12 @@ class PhaseFunction:
     name: str
     g: float = 0.0
     table: Sequence[float] | None = None
+    droplets: Droplets | None = None
+    wavelength: float = 0.55
+    diameter: float | None = None
 
     def __post_init__(self):
-        if self.name not in PHASE_NAMES:
+        if self.name not in (*PHASE_NAMES, *DROPLET_NAMES):
             raise InputError(unknown_phase(self.name))
         if not isinstance(self.g, (int, float, np.floating)) or not -1 < self.g < 1:
             raise InputError(f"g is {self.g}; wanted a number between -1 and 1, both excluded: give the mean cosine")
@@ -85,6 +101,28 @@ class PhaseFunction:
             )
         if self.table is not None:
             object.__setattr__(self, "table", _checked_table(self.table))
+        self._check_droplets()
+
+    def _check_droplets(self):
+        """Fill in the droplets of the functions that have some, refuse them for others."""
+        if self.droplets is not None and self.name not in _DROPLETS:
+            raise InputError(f"the phase function '{self.name}' came with droplets; give them for 'mie' and no other")
+        if self.diameter is not None and self.name != "hg-draine":
+            raise InputError(
+                f"the phase function '{self.name}' came with a diameter; give it for 'hg-draine' and no other"
+            )
+        if self.name in _DROPLETS:
+            if self.wavelength not in WATER:
+                known = ", ".join(f"{each:g}" for each in WATER)
+                raise InputError(f"the wavelength of '{self.name}' is {self.wavelength} um; wanted one of {known} um")
+            object.__setattr__(self, "droplets", self.droplets or Droplets())
+        if self.name == "hg-draine":
+            diameter = 12.0 if self.diameter is None else self.diameter
+            if not 5 <= diameter <= 50:
+                raise InputError(
+                    f"the diameter of 'hg-draine' is {diameter} um; wanted 5 to 50 um, where the fit holds"
+                )
+            object.__setattr__(self, "diameter", diameter)
 
     def __call__(self, cos_scatter: ArrayLike) -> Array:
         """Evaluate at cosines of the scattering angle [1], any shape; the result has the same shape."""
@@ -108,6 +146,12 @@ class PhaseFunction:
             g = self.g
             base = (1 - g) ** 2 + 4 * g * down if g >= 0 else (1 + g) ** 2 - 4 * g * up
             return (1 - g) * (1 + g) / (base * np.sqrt(base))
+        if self.name == "hg-draine":
+            fit = hg_draine_fit(self.diameter or 0.0)
+            first, second = (PhaseFunction("hg", g=g).from_half(down, up) for g in (fit.g_hg, fit.g_d))
+            return (1 - fit.weight) * first + fit.weight * second * (1 + fit.alpha * np.square(up - down)) / fit.norm
+        if self.name in _DROPLETS:
+            return self._scattering.from_half(down, up)
         values = np.asarray(self.table)
         scaled = values / _table_mean(values)
         return np.interp(up, np.linspace(0.0, 1.0, len(values)), scaled)
@@ -126,6 +170,14 @@ class PhaseFunction:
         if self.name == "hg":
             g = mpf(self.g)
             return (1 - g * g) / (1 + g * g - 2 * g * c) ** mpf("1.5")
+        if self.name == "hg-draine":
+            fit = hg_draine_fit(self.diameter or 0.0)
+            first, second = (PhaseFunction("hg", g=g).mp(c) for g in (fit.g_hg, fit.g_d))
+            alpha, weight = mpf(fit.alpha), mpf(fit.weight)
+            norm = 1 + alpha * (1 + 2 * mpf(fit.g_d) ** 2) / 3
+            return (1 - weight) * first + weight * second * (1 + alpha * c * c) / norm
+        if self.name in _DROPLETS:
+            return self._mp_droplets(c)
         values = [mpf(v) for v in self.table or ()]
         last = len(values) - 1
         mean = (mp.fsum(values) - (values[0] + values[last]) / 2) / last
@@ -135,19 +187,40 @@ class PhaseFunction:
         return (values[cell] * (1 - share) + values[cell + 1] * share) / mean
 
     @property
+    def _scattering(self) -> Optics | Modified:
+        """What droplets do to light; computed once for each kind."""
+        full = optics(self.droplets, self.wavelength)
+        return full if self.name == "mie" else Modified(full)
+
+    def _mp_droplets(self, c: Any) -> Any:
+        """Evaluate the Legendre series of droplets, whose moments count as exact."""
+        scattering = self._scattering
+        if isinstance(scattering, Modified):
+            if c > self.kinks[0]:
+                return mp.zero
+            return PhaseFunction("mie", droplets=self.droplets, wavelength=self.wavelength).mp(c) / (
+                1 - mpf(scattering.removed)
+            )
+        total, before, last = mp.zero, mp.zero, mp.one
+        for order, moment in enumerate(scattering.chi.tolist()):
+            total += (2 * order + 1) * mpf(moment) * last
+            before, last = last, ((2 * order + 1) * c * last - order * before) / (order + 1)
+        return total
+
+    @property
     def is_constant(self) -> bool:
         """Whether it is 1 in all directions, so that integrands can leave it out."""
         return self.name == "isotropic"
 
     def series(self, degree: int) -> list[float] | None:
-        """Return the coefficients of p(-sin theta) in powers of theta up to a degree; None for one with kinks.
+        """Return the coefficients of p(-sin theta) in powers of theta up to a degree; None for a table or droplets.
 
         With c = -sin theta the lobes are powers of U = (1 + c)/2 (hazy 8, murky 32) and of 1 + g^2 - 2 g c
         (Henyey-Greenstein, -3/2), by the recurrence of J. C. P. Miller (Knuth, Seminumerical Algorithms, 4.7): U P' = n
         U' P for P = U^n, any real n, so k U_0 P_k = sum_{i=1}^{k} (n i - (k - i)) U_i P_{k-i}. U_0 = 1/2 and 1 + g^2
         are never zero.
         """
-        if self.table is not None:
+        if self.table is not None or self.name in _DROPLETS:
             return None
         # c = -sin theta: 0, -1, 0, 1/3!, 0, -1/5!, ...
         c = [0.0 if k % 2 == 0 else (-1.0) ** ((k + 1) // 2) / math.factorial(k) for k in range(degree + 1)]
@@ -159,6 +232,13 @@ class PhaseFunction:
         if self.name == "hg":
             g = self.g
             return [(1 - g * g) * p for p in _power_series(_scaled_plus(c, -2 * g, 1 + g * g), -1.5)]
+        if self.name == "hg-draine":
+            fit = hg_draine_fit(self.diameter or 0.0)
+            first, second = (PhaseFunction("hg", g=g).series(degree) or [] for g in (fit.g_hg, fit.g_d))
+            square = [math.fsum(c[i] * c[k - i] for i in range(k + 1)) for k in range(degree + 1)]
+            rise = _scaled_plus(square, fit.alpha / fit.norm, 1 / fit.norm)
+            draine = [math.fsum(second[i] * rise[k - i] for i in range(k + 1)) for k in range(degree + 1)]
+            return [(1 - fit.weight) * a + fit.weight * b for a, b in zip(first, draine)]
         up = _scaled_plus(c, 0.5, 0.5)
         if self.name == "hazy":
             return _scaled_plus(_power_series(up, 8), 9 / 2, 1 / 2)
@@ -167,16 +247,95 @@ class PhaseFunction:
     @property
     def kinks(self) -> Array:
         """Cosines strictly between -1 and 1 at which the slope jumps, in increasing order; empty if smooth."""
+        if self.name == "mie-modified":
+            return np.cos(np.deg2rad([Modified.angle]))
         if self.table is None:
             return np.empty(0)
         return np.linspace(-1.0, 1.0, len(self.table))[1:-1]
 
 
+@dataclass(frozen=True)
+class HgDraine:
+    """The constants of 'hg-draine' [1]."""
+
+    g_hg: float
+    g_d: float
+    alpha: float
+    weight: float
+
+    @property
+    def norm(self) -> float:
+        """Return the mean of 1 + alpha c^2 over the second lobe [1]."""
+        return 1 + self.alpha * (1 + 2 * self.g_d**2) / 3
+
+
+def hg_draine_fit(diameter: float) -> HgDraine:
+    """Return the fit of Jendersie and d'Eon 2023 for a diameter of droplets [um], 5 to 50."""
+    return HgDraine(
+        math.exp(-0.0990567 / (diameter - 1.67154)),
+        math.exp(-2.20679 / (diameter + 3.91029) - 0.428934),
+        math.exp(3.62489 - 8.29288 / (diameter + 5.52825)),
+        math.exp(-0.599085 / (diameter - 0.641583) - 0.665888),
+    )
+
+
+def hg_draine_moments(diameter: float, count: int) -> Array:
+    """Return the first Legendre moments of 'hg-draine' [1], (count,), for a diameter of droplets [um].
+
+    hg has g^l. Twice c P_l = ((l + 1) P_{l+1} + l P_{l-1})/(2 l + 1) gives the moments of c^2 hg.
+    """
+    fit = hg_draine_fit(diameter)
+    order = np.arange(count)
+    plain = fit.g_d ** np.arange(count + 2.0)
+    once = ((order + 1) * plain[1 : count + 1] + order * np.append(0.0, plain)[:count]) / (2 * order + 1)
+    wide = np.append(once, ((count + 1) * plain[count + 1] + count * plain[count - 1]) / (2 * count + 1))
+    twice = ((order + 1) * wide[1:] + order * np.append(0.0, once)[:count]) / (2 * order + 1)
+    draine = (plain[:count] + fit.alpha * twice) / fit.norm
+    return (1 - fit.weight) * fit.g_hg**order + fit.weight * draine
+
+
+def phase_from_words(words: str, *, g: float = 0.0) -> PhaseFunction:
+    """Return a phase function by words such as 'hg', 'hg-draine:12' and 'mie:6:2:0.55'.
+
+    Parameters
+    ----------
+    words
+        A name of `PHASE_NAMES` or `DROPLET_NAMES`, then by colons for 'hg' g, for 'hg-draine' the diameter [um], for
+        'mie' and 'mie-modified' r_e [um], gamma and the wavelength [um]; what is left out has its default.
+    g
+        Of 'hg' where the words do not say it.
+
+    Raises
+    ------
+    InputError
+        For an unknown name, numbers that are none or too many of them, and those out of range.
+    """
+    name, *cells = words.strip().lower().split(":")
+    most = {"hg": 1, "hg-draine": 1} | dict.fromkeys(_DROPLETS, 3)
+    if name not in (*PHASE_NAMES, *DROPLET_NAMES):
+        raise InputError(unknown_phase(name))
+    if len(cells) > most.get(name, 0):
+        raise InputError(f"the phase function is '{words}'; wanted at most {most.get(name, 0)} numbers after '{name}'")
+    try:
+        numbers = [float(cell) for cell in cells]
+    except ValueError:
+        raise InputError(f"the phase function is '{words}'; wanted numbers after '{name}', parted by colons") from None
+    if name == "hg":
+        return PhaseFunction(name, g=numbers[0] if numbers else g)
+    if name == "hg-draine":
+        return PhaseFunction(name, diameter=numbers[0] if numbers else None)
+    if name in _DROPLETS:
+        radius, gamma, wavelength = numbers + [6.0, 2.0, 0.55][len(numbers) :]
+        return PhaseFunction(name, droplets=Droplets(radius, gamma), wavelength=wavelength)
+    return PhaseFunction(name)
+
+
 def unknown_phase(name: object) -> str:
     """Say that a phase function is unknown, with the nearest name and all of them."""
-    near = difflib.get_close_matches(str(name), PHASE_NAMES, n=1, cutoff=0.3)
+    known = (*PHASE_NAMES, *DROPLET_NAMES)
+    near = difflib.get_close_matches(str(name), known, n=1, cutoff=0.3)
     hint = f"did you mean '{near[0]}'? " if near else ""
-    return f"no phase function is called '{name}'; {hint}Use one of {', '.join(PHASE_NAMES)}"
+    return f"no phase function is called '{name}'; {hint}Use one of {', '.join(known)}"
 
 
 def _power_series(u: list[float], n: float) -> list[float]:

@@ -299,7 +299,7 @@ def test_the_wheel_holds_the_packages_and_nothing_else(tmp_path):
     with zipfile.ZipFile(wheel) as archive:
         held = {name for name in archive.namelist() if not name.endswith("/")}
         scripts = archive.read(next(name for name in held if name.endswith("entry_points.txt"))).decode()
-    assert "airlight = airlight:main" in scripts
+    assert "airlight = reports.commands.start:main" in scripts
     content = {name for name in held if ".dist-info/" not in name}
     expected = {name for name in tracked.stdout.splitlines() if name == "airlight.py" or name.startswith(FOLDERS)}
     pictures = "reports/images/"  # of the README

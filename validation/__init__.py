@@ -16,6 +16,7 @@ Read in this order:
 - `frames/`: errors and cost of whole frames, scene by scene, and the comparison with `baselines/`;
 - `papers/`: the results of papers measured again;
 - `fidelity/`: a verdict for every claim of these papers;
+- `slab/`: a slab by order of scattering, on both sides;
 - `comparison/`: images from files and engines against the truth.
 
 `baselines/` holds the known errors of every configuration as JSON files.

@@ -244,14 +244,11 @@ def image_frame(renderer: FrameRenderer, stages) -> Frame:
     """Bring `stages`, what `run_stages` returned, to the host in the order of the image."""
     distance, surface, airlight = stages
     height, width = renderer.scene.camera.height, renderer.scene.camera.width
-    light = _image(renderer, airlight, (height, width, 3))
     frame = Frame(
-        light,
+        _image(renderer, airlight, (height, width, 3)),
         _image(renderer, surface, (height, width, 3)),
         _image(renderer, distance, (height, width)),
     )
-    if renderer.method.check is not None:
-        renderer.method.check(light)
     check_radiance(renderer.scene, renderer.method.name, frame.airlight, frame.surface, frame.distance)
     return frame
 

@@ -17,5 +17,5 @@ Read in this order:
 - `light_points.py`: lights with extent as light points;
 - `animate.py`: the scene after lights, the medium or objects moved.
 
-May import: `realtime.area_lights`, `realtime.errors`, `realtime.numerics`.
+May import: `realtime.area_lights`, `realtime.droplets`, `realtime.errors`, `realtime.numerics`.
 """

@@ -15,7 +15,7 @@ from realtime.errors import InputError
 from realtime.numerics.array_types import ArrayTypes
 from realtime.scene.convex_bounds import Bounds, holds, mean_distance, overlap, plane_neighbours, read_bounds
 from realtime.scene.medium import BoundedMedium, Medium
-from realtime.scene.phase import HenyeyGreenstein, Isotropic, Phase, Tabulated, named_phase
+from realtime.scene.phase import HenyeyGreenstein, Isotropic, Phase, named_phase, tabulated
 
 _PHASES = {
     "IsotropicPhaseFunction": "isotropic",
@@ -196,5 +196,5 @@ def _read_phase(phase, types: ArrayTypes) -> Phase:
         values = np.array(parameters["values"], dtype=np.float64)
         # The mean over the sphere is half the integral over the cosine: the trapezoidal rule is exact on linear pieces.
         mean = (values.sum() - 0.5 * (values[0] + values[-1])) / (len(values) - 1)
-        return Tabulated(types.scalar(values / mean))
+        return tabulated(types.scalar(values / mean))
     return named_phase(name)

@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The truth by random samples: what both Monte Carlo estimators need to count, and their folders.
+"""The truth by random samples: what both Monte Carlo estimators of images need to count, their folders, and a walk.
 
 Read in this order:
 
 - `batches.py`: means of batches and the spread between them;
 - `allocation.py`: where the samples of a path tracer go;
 - `single_scatter`: an integrator of our own for Mitsuba;
-- `volpath`: Mitsuba's volumetric path tracer.
+- `volpath`: Mitsuba's volumetric path tracer;
+- `slab_walk`: photons in a slab, counted by order of scattering.
 
 May import: `analytic.errors`.
 """

@@ -11,10 +11,11 @@ Read in this order:
 - `images.py`: `load_scene`, `render`, `compare`
 - `reference.py`: `reference`
 - `studies.py`: `integrate`, `bench`
+- `slab.py`: `slab`
 - `report.py`: `report`
 
 May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.scene`, `reference.storage`, `reports.data`,
 `reports.machine`, `reports.plotting`, `reports.report`, `reports.tables`, `validation.comparison`,
 `validation.configurations`, `validation.estimates`, `validation.frames`, `validation.kernels`, `validation.metrics`,
-`validation.scenes`.
+`validation.scenes`, `validation.slab`.
 """

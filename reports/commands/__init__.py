@@ -3,6 +3,7 @@
 
 Read in this order:
 
+- `start.py`: the entry of the command, signals first
 - `main.py`: the command line: the commands, and how mistakes are reported
 - `printing.py`: how commands print the tables of one run
 - `options.py`: options that several commands have
@@ -27,6 +28,7 @@ Read in this order:
 - `reference.py`: `airlight reference`
 - `render.py`: `airlight render`
 - `report.py`: `airlight report`
+- `slab.py`: `airlight slab`
 - `stability.py`: `airlight stability`
 - `test.py`: `airlight test`
 
@@ -35,5 +37,5 @@ May import: `analytic`, `realtime.frame`, `realtime.kernels`, `realtime.methods`
 `reports.figures`, `reports.interchange`, `reports.machine`, `reports.papers`, `reports.plotting`, `reports.report`,
 `reports.tables`, `validation.certified`, `validation.comparison`, `validation.configurations`, `validation.estimates`,
 `validation.fidelity`, `validation.frames`, `validation.kernels`, `validation.metrics`, `validation.mutations`,
-`validation.papers`, `validation.scenes`.
+`validation.papers`, `validation.scenes`, `validation.slab`.
 """

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from reports.commands.options import USUAL_LIMIT, Force, MethodLimit
+from reports.commands.options import USUAL_LIMIT, Force, MethodLimit, listed
 
 _BATCHES = 4096  # at most: a comparison ends earlier if its interval is narrow enough
 
@@ -18,6 +18,9 @@ def bench(
         list[str] | None, typer.Argument(help="Scenes, or with --kernels kernels; all built-in ones by default.")
     ] = None,
     kernels: Annotated[bool, typer.Option("--kernels", help="Time the kernels alone, on 480 000 rays.")] = False,
+    phase: Annotated[
+        str | None, typer.Option(help="With --kernels: the only phase function, such as hg-draine:12 or mie:6.")
+    ] = None,
     estimators: Annotated[
         bool, typer.Option("--estimators", help="Time single-scatter and volpath at equal error.")
     ] = False,
@@ -59,8 +62,12 @@ def bench(
 
         raise InputError("--output: got a folder without --decompose, which alone writes images; add --decompose")
     if kernels:
-        _bench_kernels(scenes, json=json, markdown=markdown)
+        _bench_kernels(scenes, phase=phase, json=json, markdown=markdown)
         return
+    if phase is not None:
+        from analytic.errors import InputError
+
+        raise InputError("--phase: it is for kernels; add --kernels, a scene has its own phase function")
     if estimators:
         _bench_estimators(scenes, size=size, force=force, json=json)
         return
@@ -79,8 +86,7 @@ def bench(
     from validation.scenes.registry import SCENES
 
     chosen: list[Configuration] = []
-    for name in methods.split(",") if methods else METHODS:
-        name = name.strip()
+    for name in METHODS if methods is None else listed("--methods", methods):
         own = ":" in name
         chosen += [checked_configuration(name, limit=method_limit)] if own else chosen_configurations([name])
     apart = partial(in_own_process, limit=method_limit)
@@ -247,7 +253,8 @@ def _bench_scene(name: str, pixels, chosen, *, margin: float | None, apart, prog
     return {"name": loaded.name, "size": size, "methods": rows, "agreement": agreed}
 
 
-def _bench_kernels(names: list[str] | None, *, json: bool, markdown: bool) -> None:
+def _bench_kernels(names: list[str] | None, *, phase: str | None, json: bool, markdown: bool) -> None:
+    from analytic.phase import phase_from_words
     from realtime.kernels.registry import KERNELS
     from reports.commands.printing import print_heading, print_tables
     from reports.machine.environment import activate, describe_environment
@@ -255,14 +262,15 @@ def _bench_kernels(names: list[str] | None, *, json: bool, markdown: bool) -> No
     from reports.tables.kernels import convergence_data, kernel_tables, order_table
     from reports.tables.terminal import print_json
     from validation.configurations.kernel_names import split_name
-    from validation.kernels.benchmark import bench_kernels
+    from validation.kernels.benchmark import PHASES, bench_kernels
     from validation.kernels.convergence import convergence, declared
     from validation.metrics.errors import plain
 
     wanted = [split_name(name)[0].name for name in names] if names else list(KERNELS)
+    phases = PHASES if phase is None else ((phase, phase_from_words(phase).g),)
     activate()
     with progress_bar("bench") as progress:
-        costs = bench_kernels(names, progress=counted(progress))
+        costs = bench_kernels(names, phases=phases, progress=counted(progress))
         rates = [convergence(name) for name in declared() if name in wanted]
     measured, orders = plain(costs), [convergence_data(rate) for rate in rates]
     if json:

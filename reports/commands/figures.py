@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 #: A figure's name is its module's `NAME`; its summary is there too.
 FIGURES: dict[str, tuple[str, tuple[str, ...]]] = {
     "polynomials": ("polynomials", ("rays",)),
+    "phase-functions": ("phase_functions", ()),
     "kernel-errors": ("kernel_errors", ("quick", "progress")),
     "kernel-speed": ("kernel_speed", ("quick", "progress")),
     "convergence": ("convergence", ("quick", "progress")),

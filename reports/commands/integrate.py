@@ -13,6 +13,13 @@ def integrate(
     ],
     kernel: Annotated[str, typer.Option(help="Airlight kernel, see `airlight kernels`.")] = "exact",
     precision: Annotated[str, typer.Option(help="single or double.")] = "single",
+    phase: Annotated[
+        str | None,
+        typer.Option(
+            help="Phase function of all rows, in place of the file's: hg:G, hg-draine:DIAMETER, "
+            "mie:RADIUS:GAMMA:WAVELENGTH, mie-modified, ..."
+        ),
+    ] = None,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Write the rows with a column `result`.")
     ] = None,
@@ -28,7 +35,7 @@ def integrate(
     from reports.tables.terminal import print_json
     from validation.kernels.cases import check_results, integrate_cases, summary, write_results
 
-    read = read_cases(cases)
+    read = read_cases(cases, phase=phase)
     if output is not None:
         ensure_writable(output)
     activate()

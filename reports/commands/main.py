@@ -36,6 +36,7 @@ from reports.commands.published import published
 from reports.commands.reference import reference
 from reports.commands.render import render
 from reports.commands.report import report
+from reports.commands.slab import slab
 from reports.commands.stability import stability
 from reports.commands.test import run_tests
 from reports.machine.environment import VARIANT_VARIABLE, MissingError, check_variant, install_line, missing_packages
@@ -58,6 +59,7 @@ _COMMANDS = (
     diff,
     baselines,
     integrate,
+    slab,
     bench,
     maps,
     published,

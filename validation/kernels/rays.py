@@ -23,7 +23,7 @@ from scipy.stats import qmc
 
 from analytic.cases import Cases
 from analytic.panels import airlight_segments
-from analytic.phase import PHASE_NAMES, PhaseFunction
+from analytic.phase import PHASE_NAMES, PhaseFunction, phase_from_words
 from reference.storage.cache import GENERATION, load_arrays, store_arrays
 from validation.kernels.values import TABLE
 
@@ -152,7 +152,7 @@ def _truth(cases: Cases) -> Array:
     names = np.asarray(cases.phase)
     for name, g in sorted(set(zip(cases.phase, cases.g.tolist()))):
         rows = np.flatnonzero((names == name) & (cases.g == g))
-        phase = PhaseFunction(name, g=g, table=TABLE if name == "tabulated" else None)
+        phase = PhaseFunction(name, table=TABLE) if name == "tabulated" else phase_from_words(name, g=g)
         columns = (cases.foot[rows], cases.height[rows], cases.x0[rows], cases.x1[rows], cases.sigma_t[rows])
         value[rows], _ = airlight_segments(*columns, phase, rtol=1e-12)
     return value

@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.cases import Cases
-from analytic.phase import PhaseFunction
+from analytic.phase import PhaseFunction, phase_from_words
 from validation.kernels.values import TABLE
 
 Array = NDArray[np.float64]
@@ -71,5 +71,5 @@ def _peaks(cases: Cases) -> Array:
 
 
 def _peak(name: str, g: float) -> float:
-    phase = PhaseFunction(name, g=g, table=TABLE if name == "tabulated" else None)
+    phase = PhaseFunction(name, table=TABLE) if name == "tabulated" else phase_from_words(name, g=g)
     return float(np.max(phase(np.array([-1.0, 1.0]))))

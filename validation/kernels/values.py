@@ -93,6 +93,7 @@ def evaluate_rows(
         name,
         g=column(cases.g[rows]) if name == "hg" else None,
         values=column(np.asarray(table)) if name == "tabulated" else None,
+        Float=types.scalar,
     )
     medium = Medium((column(cases.sigma_t[rows]),), types.color(1), phase)
     if cases.light is None or cases.origin is None or cases.direction is None:

@@ -8,6 +8,9 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from analytic.errors import InputError
+from analytic.phase import phase_from_words
+
 Vertices = NDArray[np.float64]  #: (vertices, 3) [m]
 Faces = NDArray[np.int64]  #: (faces, 3), counter-clockwise as seen from outside
 Mesh = tuple[Vertices, Faces]
@@ -156,6 +159,41 @@ def fog(
         "albedo": {"type": "rgb", "value": list(albedo)},
         "phase": phase or {"type": "isotropic"},
     }
+
+
+def tabulated_phase(words: str, values: int = 2001) -> dict[str, Any]:
+    """Return any phase function as a table, which Mitsuba and both readers of scenes take; 'mie' has no other plugin.
+
+    Each value is the mean of the function under the hat of its cosine: the table has the same mean, 1, is nowhere below
+    0, and blurs a peak by a cell, which beside the forward direction is the angle acos(1 - 2/(values - 1)), 2.6 degrees
+    for 2001 values and 0.8 for 20001. Mitsuba, truth and methods then agree on the table, blur included.
+
+    Parameters
+    ----------
+    words
+        The function, see `analytic.phase.phase_from_words`.
+    values
+        How many, at regularly spaced cosines; the truth of a scene takes a time in proportion.
+
+    Raises
+    ------
+    InputError
+        As `phase_from_words`, and for fewer than 2 values.
+    """
+    if values < 2:
+        raise InputError(f"the table of '{words}' has {values} values; wanted at least 2")
+    phase = phase_from_words(words)
+    nodes, weights = np.polynomial.legendre.leggauss(32)
+    t = 0.5 * (nodes + 1)
+    cell = np.arange(values - 1)[:, None]
+    up = (cell + t) / (values - 1)  # (1 + cos)/2
+    down = (values - 2 - cell + (1 - t)) / (values - 1)
+    p = phase.from_half(down, up)
+    hats = np.zeros(values)
+    hats[:-1] += 0.5 * p @ (weights * (1 - t))
+    hats[1:] += 0.5 * p @ (weights * t)
+    hats[[0, -1]] *= 2
+    return {"type": "tabphase", "values": ", ".join(repr(float(value)) for value in hats)}
 
 
 def point_light(position: Sequence[float], intensity: Sequence[float]) -> dict[str, Any]:

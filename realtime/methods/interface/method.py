@@ -79,7 +79,6 @@ class Method:
     #: added up: it is recorded once for all of them.
     lights_at_once: Callable[[Any], bool] = never
     light_points: LightPoints = field(default_factory=LightPoints)  #: how it renders lights with extent by default
-    check: Callable[[Any], None] | None = None  #: airlight (height, width, 3) -> raises what is wrong with it
 
     @property
     def defaults(self) -> dict[str, Any]:

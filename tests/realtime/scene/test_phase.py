@@ -39,3 +39,31 @@ def test_tabulated_interpolates_between_its_cosines(variant):
     cosine = np.linspace(-1, 1, 101)
     value = np.array(evaluate(named_phase("tabulated", values=mi.Float64(values)), mi.Float64(cosine)))
     assert value == pytest.approx(np.interp(cosine, np.linspace(-1, 1, 4), values), rel=1e-12)
+
+
+@pytest.mark.claim("phase-two-sides", tolerance="2e-5 relative in float32, 1e-6 in float64: a table's own error")
+@pytest.mark.parametrize("words", ["hg-draine:5", "hg-draine", "hg-draine:50", "mie:2:8", "mie-modified:2:8", "mie"])
+def test_droplets_are_those_of_the_analytic_side(variant, words):
+    import mitsuba as mi
+
+    from analytic.phase import phase_from_words
+    from realtime.scene.phase import named_phase
+
+    angle = np.concatenate([np.linspace(0.1, np.pi, 700), np.geomspace(1e-4, 0.08, 80)])
+    down = np.sin(0.5 * angle) ** 2
+    for Float, tolerance in ((mi.Float32, 2e-5), (mi.Float64, 1e-6)):
+        rounded = np.array(Float(down), dtype=np.float64)
+        up = np.array(Float(np.cos(0.5 * angle) ** 2), dtype=np.float64)
+        phase = named_phase(words, Float=Float)
+        value = np.array(phase.evaluate_half(Float(rounded), Float(up)), dtype=np.float64)
+        expected = phase_from_words(words).from_half(rounded, up)
+        assert value == pytest.approx(expected, rel=tolerance, abs=1e-12)
+
+
+def test_too_many_numbers_and_impossible_droplets_are_refused(variant):
+    from realtime.errors import InputError
+    from realtime.scene.phase import named_phase
+
+    for words in ("mie:6:2:0.55:1", "mie:51", "hg-draine:4.9", "hg:0.1:0.2", "isotropic:1"):
+        with pytest.raises(InputError):
+            named_phase(words)

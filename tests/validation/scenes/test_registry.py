@@ -86,6 +86,8 @@ def test_sphere_turns_its_axis_to_the_light_and_lies_in_the_cone():
         ("windows", 1_748),
         ("penumbra-plane", 4),
         ("fence", 242),
+        ("soft-hall", 612),
+        ("overlap", 94),
     ],
 )
 def test_triangle_counts(variant, name, triangles):

@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Light along straight lines through a slab: exact exponentials, with the source a polynomial on each panel of depth.
+
+Along a direction of cosine mu, the radiance I obeys, z the optical depth from the top,
+
+    -mu dI/dz = -I + Q      (mu > 0 upwards),
+
+so that over a panel of depth h, with s the depth from the side where light enters,
+
+    I(s) = I(0) exp(-s/|mu|) + int_0^s exp(-(s - s')/|mu|) Q(s') ds'/|mu|.
+
+Q is the polynomial through its values at the Gauss-Legendre nodes of the panel. With y = (s - s')/|mu| the integral is
+int_0^Y exp(-y) Q(s - |mu| y) dy, Y = s/|mu|: Gauss-Legendre over y up to 60, where exp(-y) is below rounding.
+
+Panels are narrow at both boundaries, where radiance changes over the smallest cosine, and grow with the distance from
+them (the source of isotropic light has a term z log z there).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial.legendre import leggauss
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+_GROWTH = 0.7  #: width of a panel over its distance from the boundary
+_WIDEST = 1.25  #: of a panel, in mean free paths, where the distance from the boundaries is not over _DEEP
+_DEEP, _DEEP_GROWTH = 50.0, 0.03
+_NEGLIGIBLE = 60.0  #: exp(-60) is below the rounding of 1
+_CONVOLUTION_NODES = 48
+
+
+@dataclass(frozen=True)
+class DepthPanels:
+    """A grid of depth: panels with Gauss-Legendre nodes.
+
+    Parameters
+    ----------
+    edges
+        (P + 1,), increasing from 0 to the thickness of the slab [mean free paths].
+    nodes
+        (P, K), depths of the nodes.
+    """
+
+    edges: Array
+    nodes: Array
+
+    @property
+    def depths(self) -> Array:
+        """All nodes in one row, (P K,)."""
+        return self.nodes.reshape(-1)
+
+
+def depth_panels(tau: float, narrowest: float, *, depths: Sequence[float] = (), count: int = 8) -> DepthPanels:
+    """Return panels for a slab.
+
+    Parameters
+    ----------
+    tau
+        Thickness [mean free paths].
+    narrowest
+        Width of the panels at both boundaries, where the slab is thicker than that.
+    depths
+        Depths in [0, tau] that become edges, so that results are known there.
+    count
+        Nodes of each panel.
+    """
+    half = [0.0]
+    while half[-1] < tau / 2:
+        widest = max(_WIDEST, _DEEP_GROWTH * (half[-1] - _DEEP))
+        half.append(half[-1] + min(max(narrowest, _GROWTH * half[-1]), widest))
+    upper = np.array(half) * (tau / 2 / half[-1])
+    edges = np.unique(np.concatenate([upper, tau - upper, np.asarray(depths, dtype=np.float64), [0.0, tau]]))
+    # An edge that rounding put beside another, not a depth that was asked for, is left out.
+    keep = [0.0]
+    wanted = {0.0, float(tau), *map(float, depths)}
+    for edge in edges[1:]:
+        if edge - keep[-1] > 1e-12 * tau:
+            keep.append(float(edge))
+        elif float(edge) in wanted:
+            keep[-1] = float(edge)
+    edges = np.array(keep)
+    edges[0], edges[-1] = 0.0, tau
+    nodes, _ = leggauss(count)
+    return DepthPanels(edges=edges, nodes=edges[:-1, None] + np.diff(edges)[:, None] * (nodes + 1) / 2)
+
+
+class Transport:
+    """Light from a source to all depths of a slab, for some directions.
+
+    Parameters
+    ----------
+    panels
+        The grid.
+    mu
+        (J,) cosines, positive upwards, none of them 0.
+    """
+
+    def __init__(self, panels: DepthPanels, mu: Array):
+        self.panels = panels
+        self.mu = mu
+        self._up = np.flatnonzero(mu > 0)
+        self._down = np.flatnonzero(mu < 0)
+        widths = np.diff(panels.edges)
+        self._weights = {
+            sign: _panel_weights(widths[::-sign], np.abs(mu[which]), panels.nodes.shape[1])
+            for sign, which in self._sides()
+        }
+
+    def _sides(self) -> tuple[tuple[int, NDArray[np.intp]], ...]:
+        return ((1, self._up), (-1, self._down))
+
+    def __call__(self, source: Array) -> tuple[Array, Array]:
+        """Return the radiance of a source, at nodes and edges; no light enters from outside.
+
+        Parameters
+        ----------
+        source
+            (F, Z, J): F fields at the Z = P K nodes.
+
+        Returns
+        -------
+        nodes, edges
+            (F, Z, J) and (F, P + 1, J).
+        """
+        fields, _, streams = source.shape
+        panels, count = self.panels.nodes.shape
+        source = source.reshape(fields, panels, count, streams)
+        at_nodes = np.empty_like(source)
+        at_edges = np.zeros((fields, panels + 1, streams))
+        for sign, which in self._sides():
+            if not which.size:
+                continue
+            # Upward light runs through panels and nodes backwards; the nodes of a panel are symmetric.
+            along = slice(None, None, -sign)
+            weights, fade = self._weights[sign]
+            entering = source[:, along, along][..., which]
+            local = np.einsum("pkij,fpij->fpkj", weights, entering)
+            incoming = np.zeros((fields, panels + 1, which.size))
+            for panel in range(panels):
+                incoming[:, panel + 1] = incoming[:, panel] * fade[panel, -1] + local[:, panel, -1]
+            values = local[:, :, :-1] + incoming[:, :-1, None] * fade[:, :-1]
+            at_nodes[..., which] = values[:, along, along]
+            at_edges[..., which] = incoming[:, along]
+        return at_nodes.reshape(fields, panels * count, streams), at_edges
+
+
+def _panel_weights(all_widths: Array, mu: Array, count: int) -> tuple[Array, Array]:
+    """Return (P, K + 1, K, J) weights of the source, and (P, K + 1, J) exponentials, at the nodes and the far edge."""
+    widths, index = np.unique(all_widths, return_inverse=True)
+    reference, _ = leggauss(count)
+    places = np.append((reference + 1) / 2, 1.0)
+    y01, y_weights = leggauss(_CONVOLUTION_NODES)
+    # (W, J, K + 1): depths over the cosine
+    reach = widths[:, None, None] * places / mu[:, None]
+    longest = np.minimum(reach, _NEGLIGIBLE)
+    y = longest[..., None] * (y01 + 1) / 2
+    s = places[:, None] - y * (mu[:, None, None] / widths[:, None, None, None])  # in panel widths
+    kernel = np.exp(-y) * y_weights * (longest[..., None] / 2)
+    inverse = np.linalg.inv(np.polynomial.legendre.legvander(reference, count - 1))
+    # int exp(-y) P_l(2 s - 1) dy, then from coefficients to values at the nodes
+    basis = np.polynomial.legendre.legvander(2 * s - 1, count - 1)
+    by_degree = np.einsum("wjkq,wjkql->wkjl", kernel, basis)
+    weights = np.moveaxis(by_degree @ inverse, 3, 2)
+    fade = np.moveaxis(np.exp(-reach), 2, 1)
+    return np.ascontiguousarray(weights[index]), np.ascontiguousarray(fade[index])

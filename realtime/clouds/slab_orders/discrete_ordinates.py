@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""All orders of scattering of one mode of the azimuth at once: the discrete-ordinate equations, solved directly.
+
+With u and d the upward and downward radiances at the N cosines mu_i of a hemisphere, and sources q,
+
+     mu du/dz = u - a u - b d - q_u,      -mu dd/dz = d - a d - b u - q_d,
+
+a and b the scattering into the same and into the other hemisphere. Sum and difference, p = u + d and r = u - d, obey
+
+    mu p' = E r - q_m,   mu r' = D p - q_p,   E = 1 - a + b,  D = 1 - a - b,  q_m = q_u - q_d,  q_p = q_u + q_d.
+
+Scaled by the square roots of cosines and weights, E and D become symmetric and positive definite matrices A and B:
+
+    p~' = A r~ - q_m~,   r~' = B p~ - q_p~,     p~ = sqrt(w mu) p,   q~ = sqrt(w/mu) q.
+
+With A = L L^T, B = M M^T and the singular values M^T L = U k V^T, the choice p~ = L V P, r~ = L^{-T} V R decouples
+them,
+
+    P' = R - g_p,   R' = k^2 P - g_r,     g_p = V^T L^{-1} q_m~,   g_r = V^T L^T q_p~,
+
+and e+- = R +- k P obey e+' = k e+ - (g_r + k g_p), e-' = -k e- - (g_r - k g_p): lines of cosine 1/k, upwards and
+downwards, along which `depth_panels.Transport` integrates any source. Singular values keep small k to k_max times the
+rounding; eigenvalues k^2 (Stamnes and Swanson 1981) would keep k^2 to k_max^2 times the rounding, and thick slabs that
+absorb nothing would lose 1e-5 of their light.
+
+At albedo 1 one k is 0. The albedo is kept 1e-12 below 1, which costs a slab of thickness tau about 1e-12 tau.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cholesky, solve_triangular
+
+from realtime.clouds.slab_orders.streams import Streams, mode_kernel
+
+Array = NDArray[np.float64]
+
+#: The largest albedo of the direct solution.
+LARGEST_ALBEDO = 1 - 1e-12
+
+
+class Eigenmodes:
+    """The discrete-ordinate equations of one mode of the azimuth, decoupled.
+
+    Parameters
+    ----------
+    streams
+        The directions.
+    m
+        The mode.
+    albedo
+        In [0, 1].
+    moments
+        (2 N,), of the phase function less its peak.
+    peak
+        Share of the scattered light that goes on in its direction.
+    """
+
+    def __init__(self, streams: Streams, m: int, *, albedo: float, moments: Array, peak: float):
+        half = streams.mu.size // 2
+        mu, weights = streams.mu[:half], streams.weights[:half]
+        albedo = min(albedo, LARGEST_ALBEDO)
+        root = np.sqrt(weights)
+        kernel = albedo / 2 * root[:, None] * mode_kernel(m, moments, mu, streams.mu) * np.tile(root, 2)
+        same, other = kernel[:, :half], kernel[:, half:]
+        same = same + albedo * peak * np.eye(half)
+        scale = 1 / np.sqrt(mu)
+        lower = scale[:, None] * cholesky(np.eye(half) - same + other, lower=True)
+        partner = scale[:, None] * cholesky(np.eye(half) - same - other, lower=True)
+        _, rates, right = np.linalg.svd(partner.T @ lower)
+        self.rates: Array = rates
+        self._in = np.sqrt(weights / mu)
+        self._out = 1 / np.sqrt(weights * mu)
+        self._sums = lower @ right.T
+        self._differences = solve_triangular(lower, right.T, lower=True, trans="T")
+
+    @property
+    def cosines(self) -> Array:
+        """(2 N,) cosines 1/k of the lines of e+ and e-, for `Transport`."""
+        return np.concatenate([1 / self.rates, -1 / self.rates])
+
+    def decoupled(self, source: Array) -> Array:
+        """Return the sources of e+ and e- along their lines, (.., 2 N), of a source of radiance, (.., 2 N)."""
+        up, down = np.split(source, 2, axis=-1)
+        g_p = ((up - down) * self._in) @ self._differences
+        g_r = ((up + down) * self._in) @ self._sums
+        return np.concatenate([g_r / self.rates + g_p, g_p - g_r / self.rates], axis=-1)
+
+    def radiance(self, along: Array) -> Array:
+        """Return the radiances of e+ and e-, both (.., 2 N)."""
+        plus, minus = np.split(along, 2, axis=-1)
+        p = ((plus - minus) / (2 * self.rates)) @ self._sums.T * self._out
+        r = ((plus + minus) / 2) @ self._differences.T * self._out
+        return np.concatenate([(p + r) / 2, (p - r) / 2], axis=-1)
+
+    def entering(self, tau: float, top: Array, bottom: Array) -> tuple[Array, Array]:
+        """Return e+ at the bottom and e- at the top for which no light enters from outside.
+
+        Parameters
+        ----------
+        tau
+            Thickness [mean free paths].
+        top, bottom
+            (N,), e+ at the top and e- at the bottom that the sources alone make.
+        """
+        fade, lost = np.exp(-self.rates * tau), -np.expm1(-self.rates * tau)
+        x, y = self._sums / (2 * self.rates), self._differences / 2
+        difference = np.linalg.solve(x * (1 + fade) + y * lost, (x - y) @ (bottom - top))
+        sum_ = np.linalg.solve(x * lost + y * (1 + fade), (x - y) @ (bottom + top))
+        return (sum_ + difference) / 2, (sum_ - difference) / 2

@@ -1,0 +1,235 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The light of each order in a slab, and the moments of its horizontal displacement, without random numbers.
+
+A beam enters a slab at one point. I_n is the radiance of light that was scattered n times; D its horizontal
+displacement from that point, as a complex number x + i y with x along the horizontal direction of the beam. With s the
+optical length along a direction, w = sin theta exp(i phi) its horizontal part, and
+
+    M0 = I,    M1 = <D I>,    M2 = <|D|^2 I>,
+
+what light of order n gains on its way is, since D grows by w ds,
+
+    dM0_n/ds = -M0_n + S[M0_{n-1}]
+    dM1_n/ds = -M1_n + S[M1_{n-1}] + w M0_n
+    dM2_n/ds = -M2_n + S[M2_{n-1}] + 2 Re(conj(w) M1_n)
+
+with S[I](w) = (albedo/4 pi) int P(w, w') I(w') dw'. In modes of the azimuth,
+
+    M0 = sum_m B_m e^{i m phi},   M1 = sum_m A_m e^{i m phi},   M2 = sum_m C_m e^{i m phi}     (all real: y -> -y),
+
+w couples m to m + 1: A_m gains sin theta B_{m-1}, C_0 gains 2 sin theta A_1. Fluxes and fluences, which are integrals
+over all azimuths, need B_0, A_0 and C_0 alone, hence five fields: B_0, B_1 = B_{-1}, A_0, A_1, C_0. The beam is a
+stream of its own, the last, with b, <x b> and <x^2 b>.
+
+The sum X of all orders after n obeys the same equations with S[M_n + X] for S[M_{n-1}], and is solved for directly
+(`discrete_ordinates`): a thick slab that absorbs nothing would need thousands of orders.
+
+References
+----------
+Bouthors, Neyret, Max, Bruneton, Crassin 2008, "Interactive multiple anisotropic scattering in clouds", sections 5.1
+(canonical transport: mean and spread of the exit of light by sets of orders), which samples what is solved here.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realtime.clouds.slab_orders.depth_panels import DepthPanels, Transport, depth_panels
+from realtime.clouds.slab_orders.discrete_ordinates import Eigenmodes
+from realtime.clouds.slab_orders.phases import SlabPhase
+from realtime.clouds.slab_orders.streams import Streams, double_gauss, mode_kernel
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Edges:
+    """Moments of one order, or of a sum of orders, at the edges of the panels, for unit flux across the beam.
+
+    Parameters
+    ----------
+    up, down, fluence
+        (3, P + 1): flux through the horizontal plane and fluence [1], their first moment in x [mean free paths], and
+        their second moment in x^2 + y^2.
+    """
+
+    up: Array
+    down: Array
+    fluence: Array
+
+    def __add__(self, other: "Edges") -> "Edges":
+        return Edges(self.up + other.up, self.down + other.down, self.fluence + other.fluence)
+
+
+@dataclass(frozen=True)
+class _Fields:
+    """B_0, B_1, A_0, A_1, C_0 of one order at the nodes, (Z, 2 N + 1) each, the beam last."""
+
+    b0: Array
+    b1: Array
+    a0: Array
+    a1: Array
+    c0: Array
+
+
+class SlabOrders:
+    """The orders of one slab under one beam.
+
+    Parameters
+    ----------
+    tau
+        Thickness [mean free paths].
+    mu0
+        Cosine of the zenith angle of the beam.
+    phase
+        The phase function.
+    albedo
+        In [0, 1].
+    depths
+        Depths in [0, tau] where moments are wanted besides 0 and tau.
+    streams
+        N, in each hemisphere.
+    nodes
+        Of each panel of depth.
+    """
+
+    def __init__(
+        self,
+        tau: float,
+        mu0: float,
+        phase: SlabPhase,
+        albedo: float,
+        *,
+        depths: Sequence[float] = (),
+        streams: int = 64,
+        nodes: int = 8,
+    ):
+        self.mu0 = mu0
+        self.streams: Streams = double_gauss(streams)
+        narrowest = min(float(self.streams.mu[0]), mu0) / 2
+        self.panels: DepthPanels = depth_panels(tau, narrowest, depths=depths, count=nodes)
+        mu = np.append(self.streams.mu, -mu0)
+        self._transport = Transport(self.panels, mu)
+        self._sines = np.sqrt((1 - mu) * (1 + mu))
+        moments = phase.moments(2 * streams + 1)
+        peak = float(moments[-1])  # what is left out when P becomes polynomials of degree 2 N - 1
+        self.albedo, self.peak, self.kept = albedo, peak, moments[:-1] - peak
+        self.scatter = [self._scattering(m).T.copy() for m in (0, 1)]
+
+    def _scattering(self, m: int) -> Array:
+        """Return S of one mode as a matrix of streams, the beam last."""
+        mu, weights, albedo, moments = self.streams.mu, self.streams.weights, self.albedo, self.kept
+        matrix = np.zeros((mu.size + 1, mu.size + 1))
+        matrix[:-1, :-1] = albedo / 2 * mode_kernel(m, moments, mu, mu) * weights
+        matrix[:-1, -1] = albedo / (4 * np.pi) * mode_kernel(m, moments, mu, np.array([-self.mu0]))[:, 0]
+        return matrix + albedo * self.peak * np.eye(mu.size + 1)
+
+    def beam(self) -> "_Fields":
+        """Return order 0: the beam, which has moved z tan theta_0 at depth z."""
+        depths = self.panels.depths
+        shift = depths * (self._sines[-1] / self.mu0)
+        fields = np.zeros((3, depths.size, self.streams.mu.size + 1))
+        flux = np.exp(-depths / self.mu0)
+        fields[:, :, -1] = flux, shift * flux, shift**2 * flux
+        return _Fields(b0=fields[0], b1=fields[0], a0=fields[1], a1=fields[1], c0=fields[2])
+
+    def following(self, fields: "_Fields") -> tuple["_Fields", Edges]:
+        """Return the next order, and its moments at the edges."""
+        b0, a0, c0 = self._scattered(0, fields.b0, fields.a0, fields.c0)
+        b1, a1 = self._scattered(1, fields.b1, fields.a1)
+        return self._carried(_Fields(b0, b1, a0, a1, c0))
+
+    def _scattered(self, m: int, *fields: Array) -> Array:
+        """Return the sources of some fields of one mode: in one product, which is faster than one for each."""
+        depths = fields[0].shape[0]
+        return (np.concatenate(fields) @ self.scatter[m]).reshape(len(fields), depths, -1)
+
+    def _carried(self, sources: "_Fields") -> tuple["_Fields", Edges]:
+        """Return the light of scattered sources, with the displacement it gains on the way."""
+        (b0, b1), (b0_edges, _) = self._transport(np.stack([sources.b0, sources.b1]))
+        lengths = self._sines
+        first = np.stack([sources.a0 + lengths * b1, sources.a1 + lengths * b0])
+        (a0, a1), (a0_edges, _) = self._transport(first)
+        (c0,), (c0_edges,) = self._transport((sources.c0 + 2 * lengths * a1)[None])
+        return _Fields(b0, b1, a0, a1, c0), self._edges(np.stack([b0_edges, a0_edges, c0_edges]))
+
+    def _edges(self, values: Array) -> Edges:
+        """Return fluxes and fluence of (3, P + 1, 2 N + 1) moments."""
+        mu, weights = self.streams.mu, self.streams.weights
+        diffuse, beam = 2 * np.pi * values[..., :-1] * weights, values[..., -1]
+        upward = mu > 0
+        return Edges(
+            up=(diffuse[..., upward] * mu[upward]).sum(-1),
+            down=(diffuse[..., ~upward] * -mu[~upward]).sum(-1) + self.mu0 * beam,
+            fluence=diffuse.sum(-1) + beam,
+        )
+
+    def rest(self, fields: "_Fields") -> Edges:
+        """Return the sum of all orders after that of `fields`."""
+        zero, one = _AllOrders(self, 0), _AllOrders(self, 1)
+        b0, b1 = zero(fields.b0), one(fields.b1)
+        a0, a1 = zero(fields.a0, self._sines * b1), one(fields.a1, self._sines * b0)
+        c0 = zero(fields.c0, 2 * self._sines * a1)
+        total = _Fields(fields.b0 + b0, fields.b1 + b1, fields.a0 + a0, fields.a1 + a1, fields.c0 + c0)
+        return self.following(total)[1]
+
+
+class _AllOrders:
+    """One mode of a slab under a beam, for all orders at once."""
+
+    def __init__(self, slab: SlabOrders, m: int):
+        self._panels = slab.panels
+        self._scatter = slab.scatter[m]
+        self._modes = Eigenmodes(slab.streams, m, albedo=slab.albedo, moments=slab.kept, peak=slab.peak)
+        self._transport = Transport(slab.panels, self._modes.cosines)
+        # The beam meets only the peak: its sum of orders fades as if the medium were thinner by what goes on.
+        self._passing = 1 - slab.albedo * slab.peak
+        self._beam = Transport(slab.panels, np.array([-slab.mu0 / self._passing]))
+
+    def __call__(self, last: Array, gained: Array | float = 0.0) -> Array:
+        """Return X = T (S (last + X) + gained), with T the way of light through the slab; all (Z, 2 N + 1)."""
+        source = last @ self._scatter + gained
+        beam = self._beam(source[None, :, -1:] / self._passing)[0][0]
+        diffuse = source[:, :-1] + beam * self._scatter[-1, :-1]
+        (along,), (edges,) = self._transport(self._modes.decoupled(diffuse)[None])
+        half, tau = edges.shape[-1] // 2, float(self._panels.edges[-1])
+        bottom, top = self._modes.entering(tau, top=edges[0, :half], bottom=edges[-1, half:])
+        depths = self._panels.depths[:, None]
+        along[:, :half] += bottom * np.exp(-self._modes.rates * (tau - depths))
+        along[:, half:] += top * np.exp(-self._modes.rates * depths)
+        return np.concatenate([self._modes.radiance(along), beam], axis=-1)
+
+
+def order_sets(slab: SlabOrders, sets: Sequence[tuple[int, float]]) -> tuple[list[Edges], Edges]:
+    """Return the moments of sets of orders, and of all orders from 1 on.
+
+    Parameters
+    ----------
+    slab
+        The slab.
+    sets
+        First and last order of each set, the last one `math.inf` for a set without end.
+    """
+    finite = [int(last) for _, last in sets if math.isfinite(last)]
+    finite += [first - 1 for first, last in sets if not math.isfinite(last)]
+    fields = slab.beam()
+    by_order: list[Edges] = []
+    for _ in range(max(finite, default=0)):
+        fields, edges = slab.following(fields)
+        by_order.append(edges)
+    rest = slab.rest(fields)
+    chosen = []
+    for first, last in sets:
+        members = by_order[first - 1 : int(last) if math.isfinite(last) else None]
+        chosen.append(_sum(members if math.isfinite(last) else [*members, rest]))
+    return chosen, _sum([*by_order, rest])
+
+
+def _sum(members: Sequence[Edges]) -> Edges:
+    total = members[0]
+    for member in members[1:]:
+        total = total + member
+    return total

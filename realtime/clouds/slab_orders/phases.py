@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Phase functions as the slab needs them: values and Legendre moments, mean 1 over the sphere.
+
+Moments are chi_l = (1/2) int_{-1}^{1} P(c) P_l(c) dc, chi_0 = 1, chi_1 the mean cosine g; P(c) = sum (2 l + 1) chi_l
+P_l(c). Henyey and Greenstein's function has chi_l = g^l.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.polynomial.legendre import leggauss, legval
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+_PANEL, _PANEL_NODES = np.deg2rad(0.5), 8  #: of the quadrature over angles: P_l of l = 300 has 1.2 waves in a panel
+
+
+class SlabPhase:
+    """A phase function: its values and its moments."""
+
+    def moments(self, count: int) -> Array:
+        """Return chi_0 .. chi_{count - 1}."""
+        raise NotImplementedError
+
+    def values(self, cosines: ArrayLike) -> Array:
+        """Return P at cosines of the scattering angle."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class HenyeyGreensteinPhase(SlabPhase):
+    """The phase function of Henyey and Greenstein 1941; isotropic for g = 0.
+
+    Parameters
+    ----------
+    g
+        Mean cosine, in (-1, 1).
+    """
+
+    g: float
+
+    def moments(self, count: int) -> Array:
+        """Return g^l."""
+        return np.float64(self.g) ** np.arange(count)
+
+    def values(self, cosines: ArrayLike) -> Array:
+        """Return (1 - g^2)/(1 + g^2 - 2 g c)^(3/2), free of cancellation near c = 1."""
+        g = self.g
+        down = (1 - np.asarray(cosines, dtype=np.float64)) / 2
+        return (1 - g * g) / ((1 - g) ** 2 + 4 * g * down) ** 1.5
+
+
+@dataclass(frozen=True, eq=False)
+class SeriesPhase(SlabPhase):
+    """A phase function by its moments, all others being zero.
+
+    Parameters
+    ----------
+    chi
+        (L,), chi_0 = 1.
+    """
+
+    chi: Array
+
+    def moments(self, count: int) -> Array:
+        """Return the moments, zero after the last."""
+        moments = np.zeros(count)
+        kept = min(count, self.chi.size)
+        moments[:kept] = self.chi[:kept]
+        return moments
+
+    def values(self, cosines: ArrayLike) -> Array:
+        """Return the series."""
+        return np.asarray(legval(np.asarray(cosines, dtype=np.float64), (2 * np.arange(self.chi.size) + 1) * self.chi))
+
+
+@dataclass(frozen=True, eq=False)
+class AnglePhase(SlabPhase):
+    """A function of the scattering angle, divided by its mean.
+
+    Parameters
+    ----------
+    heights
+        Takes angles [rad], (A,), and returns values that are not negative, in any unit.
+    breaks
+        Angles in [0, pi] where the function has a jump or a kink [rad], the ends among them.
+    """
+
+    heights: Callable[[Array], Array]
+    breaks: Array
+
+    @cached_property
+    def _nodes(self) -> tuple[Array, Array]:
+        """Cosines of angles by Gauss nodes between the breaks, and weights of the mean of P over the sphere."""
+        nodes, weights = leggauss(_PANEL_NODES)
+        parts = [
+            np.linspace(low, high, max(2, int(np.ceil((high - low) / _PANEL)) + 1))[:-1]
+            for low, high in pairwise(self.breaks)
+        ]
+        edges = np.append(np.concatenate(parts), self.breaks[-1])
+        width = np.diff(edges)[:, None]
+        angles = (edges[:-1, None] + width * (nodes + 1) / 2).reshape(-1)
+        shares = np.sin(angles) * (width / 4 * weights).reshape(-1) * self.heights(angles)
+        return np.cos(angles), shares
+
+    @property
+    def _mean(self) -> float:
+        return float(self._nodes[1].sum())
+
+    def moments(self, count: int) -> Array:
+        """Return the moments by quadrature."""
+        cosines, shares = self._nodes
+        moments = np.empty(count)
+        before, now = np.zeros_like(cosines), np.ones_like(cosines)
+        for degree in range(count):
+            moments[degree] = shares @ now
+            before, now = now, ((2 * degree + 1) * cosines * now - degree * before) / (degree + 1)
+        return moments / self._mean
+
+    def values(self, cosines: ArrayLike) -> Array:
+        """Return the values."""
+        angles = np.arccos(np.clip(np.asarray(cosines, dtype=np.float64), -1.0, 1.0))
+        return self.heights(np.atleast_1d(angles)).reshape(angles.shape) / self._mean
+
+
+def tabulated_phase(angles: Array, heights: Array) -> AnglePhase:
+    """Return the phase function that is linear in the angle between values.
+
+    Parameters
+    ----------
+    angles
+        (A,), increasing from 0 to pi [rad].
+    heights
+        (A,), not negative, in any unit.
+    """
+    return AnglePhase(lambda angle: np.interp(angle, angles, heights), angles)

@@ -1,0 +1,12 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The truth of slabs and clouds by order of scattering: photons, followed in NumPy and float64.
+
+Read in this order:
+
+- `scattering.py`: scattering angles at random;
+- `walk.py`: photons through a slab, counted by order with their distance from the point of entry;
+- `estimates.py`: sets of orders with standard errors;
+- `step_cloud.py`: photons through a cloud that is thin on one side and thick on the other.
+
+May import: nothing of ours.
+"""

@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Photons through a slab, one flight after the other, counted by order with their distance from the point of entry.
+
+A photon enters a slab of thickness tau at the origin, flies an exponentially distributed optical length, is scattered
+by the phase function, and so on until it leaves. All photons of a batch are scattered together, so that the number of
+the flight is the order. Absorption is a weight, albedo^n at order n, which loses no photon.
+
+Counted for each order: what leaves above and below, with the moments 1, x and x^2 + y^2 of the place of exit; and at
+each depth the passages upwards and downwards, and the fluence, which is the sum of 1/|mu| over passages. The latter's
+variance diverges with the logarithm of the smallest |mu|, hence slowly: its standard error can be a little small.
+
+The walk shares nothing with the deterministic computation that it checks (`realtime/clouds/slab_orders/`).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.monte_carlo.slab_walk.scattering import turned
+
+Array = NDArray[np.float64]
+
+#: Weight below which light that is absorbed is followed no more: what is lost is below rounding.
+_LEAST_WEIGHT = 1e-14
+
+
+class Scattering(Protocol):
+    """A phase function that gives random scattering angles."""
+
+    def cosines(self, uniform: Array) -> Array:
+        """Return cosines of the scattering angle from numbers in [0, 1)."""
+
+
+@dataclass(frozen=True)
+class Slab:
+    """A homogeneous slab in the light of the sun.
+
+    Parameters
+    ----------
+    tau
+        Thickness [mean free paths].
+    mu0
+        Cosine of the zenith angle of the sun; its light travels downwards and along +x.
+    albedo
+        In [0, 1].
+    scattering
+        The phase function.
+    depths
+        In [0, tau], where passages are counted.
+    """
+
+    tau: float
+    mu0: float
+    albedo: float
+    scattering: Scattering
+    depths: Sequence[float] = ()
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Sums over the photons of a batch, by order: moments 1, x, x^2 + y^2, each weighted, over the number of photons.
+
+    Parameters
+    ----------
+    reflected, transmitted
+        (3, orders), from order 0 on.
+    up, down, fluence
+        (depths, 3, orders): passages through each depth, and passages over |mu|.
+    """
+
+    reflected: Array
+    transmitted: Array
+    up: Array
+    down: Array
+    fluence: Array
+
+
+def walk(slab: Slab, photons: int, random: np.random.Generator) -> Counts:
+    """Follow a batch of photons until all have left.
+
+    Parameters
+    ----------
+    slab
+        The slab.
+    photons
+        Number of photons.
+    random
+        Where numbers come from.
+    """
+    x, y, z = np.zeros(photons), np.zeros(photons), np.zeros(photons)  # z is the depth
+    sine = np.sqrt((1 - slab.mu0) * (1 + slab.mu0))
+    direction = np.full(photons, sine), np.zeros(photons), np.full(photons, slab.mu0)  # downwards is positive here
+    rows: list[Array] = []
+    weight = 1.0
+    while x.size and weight > _LEAST_WEIGHT:
+        u, v, w = direction
+        flight = random.standard_exponential(x.size)
+        end = z + w * flight
+        left = [end < 0, end > slab.tau]
+        row = np.zeros((2 + 3 * len(slab.depths), 3))
+        for place, (away, boundary) in enumerate(zip(left, (0.0, slab.tau), strict=True)):
+            row[place] = _moments(x, y, z, direction, away, boundary)[0]
+        for place, depth in enumerate(slab.depths):
+            first = 2 + 3 * place
+            rising, falling = (z > depth) & (end <= depth), (z < depth) & (end >= depth)
+            if depth == 0.0:  # nothing begins below and ends at the boundary: what leaves passes it
+                rising = left[0]
+            up, up_fluence = _moments(x, y, z, direction, rising, depth)
+            down, down_fluence = _moments(x, y, z, direction, falling, depth)
+            row[first : first + 3] = up, down, up_fluence + down_fluence
+        rows.append(row * weight)
+        stays = ~(left[0] | left[1])
+        flight, u, v, w = flight[stays], u[stays], v[stays], w[stays]
+        x, y, z = x[stays] + u * flight, y[stays] + v * flight, end[stays]
+        cosines = slab.scattering.cosines(random.random(x.size))
+        direction = turned((u, v, w), cosines, 2 * np.pi * random.random(x.size))
+        weight *= slab.albedo
+    counts = np.moveaxis(np.array(rows), 0, -1) / photons
+    depths = counts[2:].reshape(len(slab.depths), 3, 3, -1)
+    return Counts(counts[0], counts[1], depths[:, 0], depths[:, 1], depths[:, 2])
+
+
+def _moments(
+    x: Array, y: Array, z: Array, direction: tuple[Array, Array, Array], which: NDArray[np.bool_], depth: float
+) -> tuple[Array, Array]:
+    """Return the moments of the places where some photons pass a depth, and the same over |mu|."""
+    u, v, w = (part[which] for part in direction)
+    length = (depth - z[which]) / w
+    at_x, at_y = x[which] + u * length, y[which] + v * length
+    moments = np.stack([np.ones_like(at_x), at_x, at_x * at_x + at_y * at_y])
+    return moments.sum(-1), (moments / np.abs(w)).sum(-1)

@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Phase functions of droplets by their names: means, moments, words, the same in mpmath, certified values, refusals."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpmath import workdps
+
+from analytic.cases import integrate_cases, read_cases
+from analytic.droplets import moments
+from analytic.errors import InputError
+from analytic.phase import PhaseFunction, hg_draine_fit, hg_draine_moments, phase_from_words
+from analytic.series import taylor_coefficients
+from tests.data.airlight_integral_droplets import value
+
+CERTIFIED = Path(__file__).parents[1] / "data" / "airlight_integral_droplets.csv"
+
+
+@pytest.mark.claim("hg-draine", tolerance="1e-8: quadrature across a peak of g = 0.99")
+@pytest.mark.parametrize("diameter", [5, 12, 23.5])
+def test_hg_draine_has_mean_one_and_its_moments(diameter):
+    phase = PhaseFunction("hg-draine", diameter=diameter)
+    expected = moments(phase, 8, breaks=(1.0, 10.0), degree=2000)
+    assert expected[0] == pytest.approx(1, abs=1e-8)
+    assert hg_draine_moments(diameter, 8) == pytest.approx(expected, abs=1e-8)
+
+
+def test_hg_draine_without_its_rise_is_two_lobes(monkeypatch):
+    fit = hg_draine_fit(12)
+    weights = np.array([1 - fit.weight, fit.weight])
+    two = weights @ [PhaseFunction("hg", g=g)(np.array([-0.4, 0.9])) for g in (fit.g_hg, fit.g_d)]
+    monkeypatch.setattr("analytic.phase.hg_draine_fit", lambda _: type(fit)(fit.g_hg, fit.g_d, 0.0, fit.weight))
+    assert PhaseFunction("hg-draine")(np.array([-0.4, 0.9])) == pytest.approx(two)
+
+
+@pytest.mark.parametrize("words", ["hg-draine:5", "hg-draine:50", "mie:2:8", "mie-modified:2:8"])
+def test_mpmath_twin_agrees(words):
+    phase = phase_from_words(words)
+    cosines = np.array([-1.0, -0.77, 0.0, 0.6, 0.99, 0.998, 1.0])
+    with workdps(30):
+        expected = [float(phase.mp(c)) for c in cosines]
+    assert phase(cosines) == pytest.approx(expected, rel=2e-8, abs=1e-14)
+
+
+def test_the_series_of_hg_draine_is_the_function():
+    phase, theta = PhaseFunction("hg-draine"), 0.03
+    series = phase.series(14)
+    assert sum(c * theta**k for k, c in enumerate(series)) == pytest.approx(float(phase(-np.sin(theta))), rel=1e-12)
+    assert taylor_coefficients(np.array([0.5]), phase, 2).shape == (1, 3)
+
+
+@pytest.mark.claim("droplets-certified", tolerance="3e-8 relative: of the spline through Mie's series")
+def test_certified_values():
+    cases = read_cases(CERTIFIED)
+    found, _ = integrate_cases(cases)
+    assert found == pytest.approx(cases.value, rel=3e-8)
+    lobes = np.array([name.startswith("hg-draine") for name in cases.phase])
+    assert found[lobes] == pytest.approx(cases.value[lobes], rel=1e-10)
+
+
+@pytest.mark.claim("droplets-certified")
+@pytest.mark.parametrize("number", [3, pytest.param(50, marks=pytest.mark.slow)])
+def test_a_certified_value_is_certified_again(number):
+    header, *lines = CERTIFIED.read_text().splitlines()
+    row = dict(zip(header.split(","), lines[number].split(",")))
+    assert value(row) == row["value"]
+
+
+def test_the_phase_of_a_table_can_be_replaced(tmp_path):
+    path = tmp_path / "rays.csv"
+    path.write_text("t,h,x0,x1,sigma_t,value\n1,0.5,0,3,0.2,7\n")
+    cases = read_cases(path, phase="mie:2:8")
+    assert cases.phase == ("mie:2:8",)
+    assert cases.value is None
+    with pytest.raises(InputError, match="no column 'phase'"):
+        read_cases(path)
+
+
+@pytest.mark.claim("droplets-refused")
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("mie:51", "effective radius"),
+        ("mie:6:0", "gamma"),
+        ("mie:6:2:0.6", "wavelength"),
+        ("mie:6:2:0.55:3", "at most 3 numbers"),
+        ("mie:six", "wanted numbers"),
+        ("hg-draine:4.9", "5 to 50 um"),
+        ("hg:0.2:0.3", "at most 1 numbers"),
+        ("me", "no phase function is called 'me'"),
+    ],
+)
+def test_wrong_words_are_refused(words, message):
+    with pytest.raises(InputError, match=message):
+        phase_from_words(words)
+
+
+def test_numbers_of_others_are_refused():
+    with pytest.raises(InputError, match="droplets"):
+        PhaseFunction("hg", droplets=phase_from_words("mie").droplets)
+    with pytest.raises(InputError, match="diameter"):
+        PhaseFunction("mie", diameter=12)

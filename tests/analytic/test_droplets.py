@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The droplets of clouds and fog: their extinction, phase functions and moments, full and modified."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from analytic.droplets import Droplets, Modified, moments, optics
+from analytic.errors import InputError
+from analytic.mie import efficiencies
+
+_SMALL = Droplets(2.0, 8.0)  # as quick as allowed
+
+
+@pytest.mark.claim("droplets-figures", tolerance="0.001 each")
+def test_the_droplets_of_clouds_at_055_um():
+    green = optics()
+    assert green.q_extinction == pytest.approx(2.1416, abs=0.001)
+    assert green.g == pytest.approx(0.8495, abs=0.001)
+    assert green.share(0, 5) == pytest.approx(0.444, abs=0.001)
+    assert green.share(0, 90) == pytest.approx(0.9576, abs=0.001)
+    assert green.extinction == pytest.approx(0.0363, abs=1e-4)
+    assert green.mean_free_path == pytest.approx(27.5, abs=0.05)
+    assert green.printed_extinction == pytest.approx(0.0452, abs=1e-4)
+
+
+def test_the_sizes_have_their_moments():
+    droplets = Droplets(7.0, 3.0)
+    radius, weight = droplets.nodes(4000)  # an average weighted by r^2, without the smallest droplets
+    assert 1 / (weight @ radius**-2) == pytest.approx(droplets.mean_square_radius, rel=2e-5)
+    assert weight @ radius == pytest.approx(droplets.effective_radius, rel=1e-6)
+
+
+def test_an_average_is_over_single_spheres():
+    found = optics(_SMALL, sizes=50)
+    radius, weight = _SMALL.nodes(50)
+    single = efficiencies(2 * np.pi * radius / 0.55, 1.333)
+    assert found.q_extinction == pytest.approx(weight @ single.extinction, rel=1e-12)
+    assert found.q_scattering == pytest.approx(found.q_extinction, rel=1e-10)
+    # g, which comes from angles, is that of the efficiencies, which comes from products of coefficients.
+    assert found.g == pytest.approx(weight @ (single.scattering * single.g) / found.q_scattering, rel=1e-10)
+
+
+def test_the_phase_function_has_mean_one_and_its_moments():
+    found = optics(_SMALL)
+    nodes, weights = np.polynomial.legendre.leggauss(1000)
+    assert 0.5 * weights @ found(nodes) == pytest.approx(1, abs=1e-9)
+    assert moments(found, 12) == pytest.approx(found.moments(12), abs=1e-9)
+    assert found(nodes) == pytest.approx(found.series(nodes), rel=1e-8)
+    assert found.moments(2000).shape == (2000,)
+    assert found.moments(2000)[-1] == 0
+
+
+def test_shares_are_integrals():
+    found = optics(_SMALL)
+    share = quad(lambda angle: 0.5 * float(found(np.cos(angle))) * np.sin(angle), 0, np.deg2rad(20), epsabs=1e-11)[0]
+    assert found.share(0, 20) == pytest.approx(share, abs=1e-9)
+    assert found.share(0, 180) == pytest.approx(1, abs=1e-12)
+
+
+def test_absorption_lowers_the_albedo():
+    assert optics(_SMALL, 1.6, index=1.317 + 8.5e-5j, sizes=200).albedo == pytest.approx(0.999, abs=2e-4)
+    assert optics(_SMALL).albedo == pytest.approx(1, abs=1e-10)
+
+
+@pytest.mark.claim("droplets-modified", tolerance="1e-9: what is cut is what the density loses")
+@pytest.mark.parametrize("cut", ["zero", "flat"])
+def test_what_is_cut_is_what_the_density_loses(cut):
+    full = optics()
+    matched = Modified(full, cut=cut)
+    nodes, weights = np.polynomial.legendre.leggauss(2000)
+    edge = np.cos(np.deg2rad(5))
+    half = 0.5 * (edge + 1)
+    outside = -1 + half * (nodes + 1)
+    assert 0.5 * half * weights @ matched(outside) + 0.5 * (1 - edge) * float(matched(1.0)) == pytest.approx(
+        1, abs=1e-9
+    )
+    assert matched.removed == pytest.approx(0.444 if cut == "zero" else 0.392, abs=0.001)
+    # As much light as before is scattered outside of the peak.
+    before = full.extinction * full(np.array([0.3]))
+    assert matched.extinction * matched(np.array([0.3])) == pytest.approx(before, rel=1e-9)
+    assert matched.extinction * matched.single_scattering_factor == pytest.approx(full.extinction, rel=1e-9)
+    printed = Modified(full, cut=cut, share="printed")
+    assert printed.extinction == pytest.approx(0.5 * full.extinction, rel=1e-9)
+    assert printed(0.3) == matched(0.3)
+    assert matched.moments(3)[0] == pytest.approx(1, abs=1e-9)
+    assert matched.g == pytest.approx(matched.moments(3)[1], abs=1e-12)
+
+
+@pytest.mark.claim("droplets-refused")
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"effective_radius": 1.9}, "effective radius is 1.9"),
+        ({"effective_radius": 51}, "2 to 50 um"),
+        ({"effective_radius": float("nan")}, "effective radius"),
+        ({"gamma": 0}, "gamma"),
+        ({"gamma": -1}, "gamma"),
+        ({"number": 0}, "number"),
+    ],
+)
+def test_impossible_droplets_are_refused(arguments, words):
+    with pytest.raises(InputError, match=words):
+        Droplets(**arguments)
+
+
+def test_wrong_light_is_refused():
+    with pytest.raises(InputError, match="refractive index of water"):
+        optics(_SMALL, 0.5)
+    with pytest.raises(InputError, match="wavelength"):
+        optics(_SMALL, 5.0, index=1.3)
+    with pytest.raises(InputError, match="cut"):
+        Modified(optics(_SMALL), cut="soft")
+    with pytest.raises(InputError, match="share"):
+        Modified(optics(_SMALL), share="guessed")
+    with pytest.raises(InputError, match="angle"):
+        Modified(optics(_SMALL), angle=0)

@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Phase functions of a slab by name or from a file, written for each side by itself.
+
+A file has two columns: the scattering angle [degrees], increasing from 0 to 180, and the phase function there, in any
+unit: it is divided by its mean over the sphere. Between rows it is linear in the angle. A first line of names is
+allowed, and so are lines that begin with #.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analytic.droplets import Droplets, Modified, optics
+from analytic.errors import InputError, nearest
+from realtime.clouds.slab_orders.droplets import droplet_phase
+from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase, SlabPhase, tabulated_phase
+from reference.monte_carlo.slab_walk.scattering import HenyeyGreenstein, Tabulated
+from reference.monte_carlo.slab_walk.walk import Scattering
+
+Array = NDArray[np.float64]
+
+NAMES = ("isotropic", "hg:G", "mie", "mie-modified", "FILE.csv")
+#: |g| up to which the streams resolve Henyey and Greenstein's lobe
+LARGEST_G = 0.98
+_DROPLETS = (6.0, 2.0, 0.55)  #: r_e [um], gamma and wavelength [um] of Bouthors 2008
+_TABLE = 20_000  #: rows of the table of droplets
+
+
+@dataclass(frozen=True)
+class PhasePair:
+    """One phase function on both sides.
+
+    Parameters
+    ----------
+    name
+        As it was asked for.
+    deterministic
+        For `realtime.clouds`.
+    sampled
+        Makes it for the photons, when they are asked for.
+    """
+
+    name: str
+    deterministic: SlabPhase
+    sampled: Callable[[], Scattering]
+
+
+def phase_pair(name: str) -> PhasePair:
+    """Return a phase function by its name.
+
+    Parameters
+    ----------
+    name
+        'isotropic', 'hg:G' with the mean cosine G, 'mie' (droplets of r_e = 6 um, green), 'mie-modified' (the same
+        without the peak below 5 degrees), or the path of a CSV file.
+
+    Raises
+    ------
+    InputError
+        For a name that is none, a mean cosine out of range, or a file that cannot be used.
+    """
+    if name == "isotropic":
+        return PhasePair(name, HenyeyGreensteinPhase(0.0), lambda: HenyeyGreenstein(0.0))
+    if name.startswith("hg:"):
+        g = _mean_cosine(name)
+        return PhasePair(name, HenyeyGreensteinPhase(g), lambda: HenyeyGreenstein(g))
+    if name.lower().endswith(".csv"):
+        angles, heights = read_phase_file(Path(name))
+        return PhasePair(name, tabulated_phase(angles, heights), lambda: Tabulated(angles, heights))
+    kind, *words = name.split(":")
+    if kind in ("mie", "mie-modified"):
+        return _droplets(name, words, modified=kind == "mie-modified")
+    raise InputError(f"phase: got {name!r}, wanted one of {', '.join(NAMES)}{nearest(name, NAMES)}")
+
+
+def _droplets(name: str, words: list[str], *, modified: bool) -> PhasePair:
+    """Return droplets: words are r_e [um], gamma and the wavelength [um], as far as they are given."""
+    if len(words) > len(_DROPLETS) or not all(map(_is_number, words)):
+        raise InputError(
+            f"phase: got {name!r}, wanted mie or mie-modified, and if wanted by colons r_e [um], gamma and the "
+            "wavelength [um], for example mie:6:2:0.55"
+        )
+    radius, gamma, wavelength = [*map(float, words), *_DROPLETS[len(words) :]]
+    deterministic = droplet_phase(radius, gamma, wavelength, modified=modified)
+
+    def sampled() -> Scattering:
+        full = optics(Droplets(radius, gamma), wavelength)
+        angles = np.linspace(0.0, np.pi, _TABLE + 1)
+        if not modified:
+            return Tabulated(angles, full(np.cos(angles)))
+        peak = np.deg2rad(Modified(full).angle)
+        angles = np.unique(np.concatenate([angles, [peak * (1 - 1e-12), peak]]))
+        return Tabulated(angles, np.where(angles < peak, 0.0, full(np.cos(angles))))
+
+    return PhasePair(name, deterministic, sampled)
+
+
+def _mean_cosine(name: str) -> float:
+    try:
+        g = float(name.removeprefix("hg:"))
+    except ValueError:
+        raise InputError(f"phase: got {name!r}, wanted hg:G with a mean cosine G, for example hg:0.85") from None
+    if not abs(g) <= LARGEST_G:
+        raise InputError(f"phase: got the mean cosine {g:g}, wanted -{LARGEST_G} to {LARGEST_G}, for example hg:0.85")
+    return g
+
+
+def read_phase_file(path: Path) -> tuple[Array, Array]:
+    """Return angles [rad] and values of a CSV file.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or is not a phase function.
+    """
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "it is not a text file"
+        raise InputError(f"{path}: {reason}; wanted a CSV file of angles [degrees] and values") from None
+    lines = [(number, line.strip()) for number, line in enumerate(text.splitlines(), start=1)]
+    rows = [(number, line.split(",")) for number, line in lines if line and not line.startswith("#")]
+    if rows and not _is_number(rows[0][1][0]):
+        rows = rows[1:]
+    for number, cells in rows:
+        if len(cells) != 2 or not all(map(_is_number, cells)):
+            raise InputError(f"{path}, line {number}: got {','.join(cells)!r}, wanted an angle [degrees] and a value")
+    if len(rows) < 2:
+        raise InputError(f"{path}: got {len(rows)} rows, wanted at least two, of angles from 0 to 180 degrees")
+    table = np.array([[float(cell) for cell in cells] for _, cells in rows])
+    degrees, values = table.T
+    if degrees[0] != 0 or degrees[-1] != 180:
+        raise InputError(f"{path}: got angles from {degrees[0]:g} to {degrees[-1]:g}, wanted 0 to 180 degrees")
+    falling = np.flatnonzero(np.diff(degrees) <= 0)
+    if falling.size:
+        raise InputError(f"{path}, line {rows[int(falling[0]) + 1][0]}: angles must increase from row to row")
+    bad = np.flatnonzero((values < 0) | (values > 1e30))
+    if bad.size:
+        number = rows[int(bad[0])][0]
+        raise InputError(f"{path}, line {number}: got the value {values[bad[0]]:g}, wanted 0 to 1e30")
+    if not values[1:-1].any() and not (len(values) == 2 and values.any()):
+        raise InputError(f"{path}: all values are 0 between 0 and 180 degrees, wanted a phase function")
+    return np.deg2rad(degrees), values / values.max()
+
+
+def _is_number(word: str) -> bool:
+    try:
+        return bool(np.isfinite(float(word)))
+    except ValueError:
+        return False

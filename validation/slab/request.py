@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What is asked of a slab, with its checks."""
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from analytic.errors import InputError
+from validation.slab.phases import PhasePair, phase_pair
+
+#: The sets of orders of Bouthors 2008, section 5.1; order 1 stands apart.
+SETS = ("1", "2", "3-4", "5-6", "7-8", "9-12", "13-18", "19-30", "31-inf")
+LARGEST_ORDER = 1000
+THICKEST, LARGEST_SUN = 1e4, 89.99
+_SMALLEST_TAU = 1e-6
+
+
+@dataclass(frozen=True)
+class SlabRequest:
+    """A slab, the sun, and what is wanted of it.
+
+    Parameters
+    ----------
+    tau
+        Thickness [mean free paths].
+    sun
+        Zenith angle of the sun [degrees].
+    phase
+        The phase function.
+    albedo
+        Single-scattering albedo.
+    orders
+        Names of the sets of orders: '3', '3-4', '31-inf', 'all'.
+    depths
+        Where fluence, flux and radiance are wanted [mean free paths].
+    directions
+        mu, positive upwards, and phi [degrees].
+    """
+
+    tau: float
+    sun: float
+    phase: PhasePair
+    albedo: float
+    orders: tuple[str, ...]
+    depths: tuple[float, ...]
+    directions: tuple[tuple[float, float], ...]
+
+    @property
+    def mu0(self) -> float:
+        """Cosine of the sun's zenith angle."""
+        return math.cos(math.radians(self.sun))
+
+    @property
+    def ranges(self) -> list[tuple[int, float]]:
+        """First and last order of each set."""
+        return [order_range(name) for name in self.orders]
+
+
+def slab_request(
+    tau: float,
+    sun: float,
+    *,
+    phase: str = "isotropic",
+    albedo: float = 1.0,
+    orders: str | Sequence[str | int] = "sets",
+    depths: str | Sequence[float] | None = None,
+    directions: str | Sequence[tuple[float, float]] = (),
+) -> SlabRequest:
+    """Return a request that was checked; words are read as the command takes them.
+
+    Raises
+    ------
+    InputError
+        In one line, for what cannot be computed.
+    """
+    tau, sun, albedo = (_number(name, value) for name, value in (("tau", tau), ("sun", sun), ("albedo", albedo)))
+    if not _SMALLEST_TAU <= tau <= THICKEST:
+        raise InputError(f"tau: got {tau:g}, wanted a thickness of {_SMALLEST_TAU:g} to {THICKEST:g} mean free paths")
+    if not 0 <= sun <= LARGEST_SUN:
+        raise InputError(
+            f"sun: got {sun:g}, wanted a zenith angle of 0 to {LARGEST_SUN} degrees; at 90 no light enters the slab"
+        )
+    if not 0 <= albedo <= 1:
+        raise InputError(f"albedo: got {albedo:g}, wanted a share of 0 to 1")
+    return SlabRequest(
+        tau=tau,
+        sun=sun,
+        phase=phase_pair(phase),
+        albedo=albedo,
+        orders=_orders(orders),
+        depths=_depths(depths, tau),
+        directions=_directions(directions),
+    )
+
+
+def order_range(name: str) -> tuple[int, float]:
+    """Return first and last order of a set by its name.
+
+    Raises
+    ------
+    InputError
+        For a name that is none, order 0 or orders above `LARGEST_ORDER`.
+    """
+    if name == "all":
+        return 1, math.inf
+    form = re.fullmatch(r"(\d{1,9})(?:-(\d{1,9}|inf))?", name)
+    if form is None:
+        raise InputError(f"orders: got {name!r}, wanted for example 1,2,4,8 or 3-4 or 31-inf, or sets, or all")
+    first = int(form[1])
+    last = math.inf if form[2] == "inf" else int(form[2] or first)
+    if first < 1:
+        raise InputError(f"orders: got {name!r}, wanted orders from 1 on; light of order 0 was never scattered")
+    if last < first:
+        raise InputError(f"orders: got {name!r}, which ends before it begins; write {form[2]}-{first}")
+    highest = first - 1 if math.isinf(last) else last
+    if highest > LARGEST_ORDER:
+        raise InputError(f"orders: got {name!r}, wanted orders up to {LARGEST_ORDER}, or {LARGEST_ORDER}-inf")
+    return first, last
+
+
+def _orders(given: str | Sequence[str | int]) -> tuple[str, ...]:
+    words = given.split(",") if isinstance(given, str) else [str(word) for word in given]
+    names = [name for word in words for name in (SETS if word.strip() == "sets" else (word.strip(),))]
+    for name in names:
+        order_range(name)
+    if not names:
+        raise InputError("orders: got none, wanted for example 1,2,4,8 or sets or all")
+    return tuple(dict.fromkeys(names))
+
+
+def _depths(given: str | Sequence[float] | None, tau: float) -> tuple[float, ...]:
+    if given is None:
+        return (0.0, tau)
+    words = [word for word in given.split(",") if word.strip()] if isinstance(given, str) else given
+    depths = tuple(_number("depths", word) for word in words)
+    for depth in depths:
+        if not 0 <= depth <= tau:
+            raise InputError(f"depths: got {depth:g}, wanted depths of 0 to tau, {tau:g} mean free paths")
+    return depths
+
+
+def _directions(given: str | Sequence[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
+    if isinstance(given, str):
+        pairs = [tuple(word.split(":")) for word in given.split(",") if word.strip()]
+    else:
+        pairs = [tuple(map(str, pair)) for pair in given]
+    directions = []
+    for pair in pairs:
+        if len(pair) != 2:
+            raise InputError(f"directions: got {':'.join(pair)!r}, wanted MU:PHI, for example 0.5:180,-1:0")
+        mu, phi = (_number("directions", word) for word in pair)
+        if not 1e-6 <= abs(mu) <= 1:
+            raise InputError(
+                f"directions: got mu = {mu:g}, wanted -1 to 1, positive upwards, and not horizontal (0): from 1e-6 on"
+            )
+        directions.append((mu, phi))
+    return tuple(directions)
+
+
+def _number(name: str, word: str | float) -> float:
+    try:
+        value = float(word)
+    except (TypeError, ValueError):
+        raise InputError(f"{name}: got {word!r}, wanted a number") from None
+    if not math.isfinite(value):
+        raise InputError(f"{name}: got {value}, wanted a finite number")
+    return value
