@@ -55,6 +55,8 @@ def whole_truth(loaded: LoadedScene, truth: TruthImage, *, pixel: str = "centre"
 def layered_truth(name: str, truth: TruthImage) -> Image:
     """Return the quadrature truth of the scene of that name as layers."""
     layers = {"airlight": truth.airlight, "airlight_bound": truth.airlight_bound, "surface": truth.surface}
+    extent = {"airlight_se": truth.airlight_se, "surface_se": truth.surface_se, "emitted": truth.emitted}
+    layers |= {layer: values for layer, values in extent.items() if values is not None}
     return Image(layers, truth.distance, {"airlight:scene": name, "airlight:estimator": "quadrature"})
 
 
