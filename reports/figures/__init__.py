@@ -14,7 +14,7 @@ Read in this order:
 - `map_size.py`: error over the size of the shadow map
 - `methods_table.py`: times and errors of methods
 - `paper_images.py`: the pictures of the papers in our scenes
-- `phase_functions.py`: phase functions of droplets and what stands in for them;
+- `phase_functions.py`: phase functions of droplets and what stands in for them
 - `polynomials.py`: Biri's polynomials
 - `published.py`: frames a second beside the papers
 - `stages.py`: shares of the stages of a frame
