@@ -217,7 +217,8 @@ def area_lights(folder: Path) -> Iterator[tuple[str, str]]:
         yield f"{kind} about the camera", scene(light=at_camera)
         cut = lamp('<scale value="0.3"/><translate x="-0.6" y="0.7" z="0.9"/>', kind=kind)
         yield f"{kind} that cuts the ball", scene(light=cut)
-        yield f"{kind} beside a point light", scene(extra=lamp(f'<scale value="0.3"/>{above}', kind=kind))
+        panel = lamp(f'<scale value="0.3"/>{above}', kind=kind)
+        yield f"{kind} beside a point light", scene(extra=panel.replace('id="lamp"', 'id="panel"'))
         filled = '<ref name="interior" id="fog"/>'
         yield f"{kind} that bounds fog", scene(light=lamp(f'<scale value="0.3"/>{above}', kind=kind, extra=filled))
     yield (
