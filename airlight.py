@@ -14,22 +14,10 @@ True
 the others are what these are made of.
 """
 
-import sys
-
 if __name__ == "__main__":  # before all that takes time: what a signal meets during an import ends in a traceback
-    import signal
+    from reports.commands.start import main as start
 
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
-    from reference.storage.stopping import stop_on_signals
-    from reports.machine.streams import usable_streams
-
-    usable_streams()
-    stop_on_signals()
-    if sys.flags.no_site:  # as the launcher starts it, since Python's own start is not safe from signals either
-        import site
-
-        site.main()
+    start()
 
 import importlib
 from typing import TYPE_CHECKING, Any
@@ -125,17 +113,6 @@ def __dir__() -> list[str]:
 
 def main() -> None:
     """Run the `airlight` command."""
-    from reference.storage.stopping import stop_on_signals, wait_if_stopped
-    from reports.machine.streams import usable_streams
+    from reports.commands.start import main as start
 
-    usable_streams()
-    stop_on_signals()
-    from reports.commands.main import run
-
-    status = run(sys.argv[1:])
-    wait_if_stopped()
-    sys.exit(status)
-
-
-if __name__ == "__main__":
-    main()
+    start()

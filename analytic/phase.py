@@ -43,10 +43,11 @@ from analytic.errors import InputError
 Array = NDArray[np.float64]
 
 #: The names that `PhaseFunction` accepts.
-PHASE_NAMES = ("isotropic", "rayleigh", "hazy", "murky", "hg", "tabulated", "hg-draine", "mie", "mie-modified")
+PHASE_NAMES = ("isotropic", "rayleigh", "hazy", "murky", "hg", "tabulated")
+#: Those of droplets, which it accepts too.
+DROPLET_NAMES = ("hg-draine", "mie", "mie-modified")
 
-#: Those that droplets have.
-_DROPLETS = ("mie", "mie-modified")
+_DROPLETS = ("mie", "mie-modified")  # those with sizes
 
 _HAZY_MEAN, _MURKY_MEAN = 2.0, 83.0 / 33.0
 
@@ -58,7 +59,7 @@ class PhaseFunction:
     Parameters
     ----------
     name
-        One of `PHASE_NAMES`.
+        One of `PHASE_NAMES` or `DROPLET_NAMES`.
     g
         Mean cosine [1], only for 'hg', in (-1, 1).
     table
@@ -87,7 +88,7 @@ class PhaseFunction:
     diameter: float | None = None
 
     def __post_init__(self):
-        if self.name not in PHASE_NAMES:
+        if self.name not in (*PHASE_NAMES, *DROPLET_NAMES):
             raise InputError(unknown_phase(self.name))
         if not isinstance(self.g, (int, float, np.floating)) or not -1 < self.g < 1:
             raise InputError(f"g is {self.g}; wanted a number between -1 and 1, both excluded: give the mean cosine")
@@ -299,8 +300,8 @@ def phase_from_words(words: str, *, g: float = 0.0) -> PhaseFunction:
     Parameters
     ----------
     words
-        A name of `PHASE_NAMES`, then by colons for 'hg' g, for 'hg-draine' the diameter [um], for 'mie' and
-        'mie-modified' r_e [um], gamma and the wavelength [um]; what is left out has its default.
+        A name of `PHASE_NAMES` or `DROPLET_NAMES`, then by colons for 'hg' g, for 'hg-draine' the diameter [um], for
+        'mie' and 'mie-modified' r_e [um], gamma and the wavelength [um]; what is left out has its default.
     g
         Of 'hg' where the words do not say it.
 
@@ -311,7 +312,7 @@ def phase_from_words(words: str, *, g: float = 0.0) -> PhaseFunction:
     """
     name, *cells = words.strip().lower().split(":")
     most = {"hg": 1, "hg-draine": 1} | dict.fromkeys(_DROPLETS, 3)
-    if name not in PHASE_NAMES:
+    if name not in (*PHASE_NAMES, *DROPLET_NAMES):
         raise InputError(unknown_phase(name))
     if len(cells) > most.get(name, 0):
         raise InputError(f"the phase function is '{words}'; wanted at most {most.get(name, 0)} numbers after '{name}'")
@@ -331,9 +332,10 @@ def phase_from_words(words: str, *, g: float = 0.0) -> PhaseFunction:
 
 def unknown_phase(name: object) -> str:
     """Say that a phase function is unknown, with the nearest name and all of them."""
-    near = difflib.get_close_matches(str(name), PHASE_NAMES, n=1, cutoff=0.3)
+    known = (*PHASE_NAMES, *DROPLET_NAMES)
+    near = difflib.get_close_matches(str(name), known, n=1, cutoff=0.3)
     hint = f"did you mean '{near[0]}'? " if near else ""
-    return f"no phase function is called '{name}'; {hint}Use one of {', '.join(PHASE_NAMES)}"
+    return f"no phase function is called '{name}'; {hint}Use one of {', '.join(known)}"
 
 
 def _power_series(u: list[float], n: float) -> list[float]:

@@ -8,10 +8,11 @@ compares both sides.
 Read in this order:
 
 - `errors.py`: the exception for mistakes of the user;
-- `memory.py`: refuses work that needs more memory than the machine has;
+- `memory.py`: refuses work that needs more memory than the machine, its container or the GPU has;
 - `parameters.py`: typed parameters of methods, with defaults, ranges and help;
 - `numerics/`: array types, error-free arithmetic, fast functions, Gauss-Legendre nodes;
 - `droplets/`: phase functions of the droplets of fog and clouds;
+- `area_lights/`: lights with extent, and the points that stand for them;
 - `scene/`: camera, lights, media, phase functions and meshes, read from Mitsuba; the features of a scene; what moves;
 - `rays/`: the geometry of rays and lights, and the cone of a spot;
 - `shadow_maps/`: shadow maps and the field of inverse depth over them;
@@ -20,7 +21,8 @@ Read in this order:
 - `bounded_media/`: rays, legs and airlight in bounded media;
 - `intervals/`: the lit intervals of rays, their sum, and the nearest crossings;
 - `clouds/`: light scattered more than once: a slab by orders;
-- `methods/`: the methods: `interface/`, `unshadowed`, `ray_march`, `shadow_planes/`, `light_volumes/`, `epipolar/`;
+- `methods/`: the methods: `interface/`, `unshadowed`, `ray_march`, `shadow_planes/`, `light_volumes/`, `epipolar/`,
+  `froxel_fog/`;
 - `frame/`: camera rays, the lit surface, and whole frames, one or the next.
 
 May import: `realtime.errors`.

@@ -17,10 +17,13 @@ ESTIMATORS = {
     "volpath": "reference.monte_carlo.volpath",
 }
 READING = {
+    "analytic.droplets": "phase functions of droplets, by their names; no scene has these names",
+    "analytic.mie": "the same",
     "analytic.errors": "words for the user",
     "analytic.phase": "the scene's record names the phase function; the two Monte Carlo estimators ask Mitsuba's",
     "reference.scene.camera": "the rays through the pixel centres: where one looks, no light",
     "reference.scene.convex_bounds": "which shapes may bound a medium; where rays cross them is in `visibility`",
+    "reference.scene.area_light": "shape, place and radiance as Mitsuba gives them",
     "reference.scene.directional_light": "direction and irradiance as Mitsuba gives them",
     "reference.scene.read": "coefficients, lights and shapes as Mitsuba gives them",
 }

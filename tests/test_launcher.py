@@ -168,6 +168,93 @@ def _read(path: Path) -> str:
     return path.read_text() if path.exists() else ""
 
 
+@pytest.fixture
+def real_start(tmp_path):
+    """A function that starts the launcher of a folder whose environment is that of these tests, as made before."""
+    project = tmp_path / "project"
+    (project / ".venv").mkdir(parents=True)
+    for name in ("airlight", "airlight.py", "pyproject.toml", "requirements.lock"):
+        shutil.copy(ROOT / name, project)
+    for name in ("analytic", "realtime", "reference", "validation", "reports"):
+        (project / name).symlink_to(ROOT / name)
+    for name in ("bin", "lib", "pyvenv.cfg"):
+        (project / ".venv" / name).symlink_to(Path(sys.prefix) / name)
+    sums = subprocess.run(
+        ["cksum", project / "requirements.lock", project / "pyproject.toml"], capture_output=True, text=True, check=True
+    )
+    (project / ".venv" / "airlight-stamp").write_text(f"{sums.stdout}python {project}\n\n")
+
+    def start(*arguments, **settings):
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+        return subprocess.Popen([project / "airlight", *arguments], cwd=tmp_path, **pipes, **settings)
+
+    return start
+
+
+_STOPS = {signal.SIGINT: (130, "interrupted"), signal.SIGTERM: (143, "terminated")}
+
+
+@pytest.mark.parametrize("how", _STOPS)
+def test_a_signal_in_the_first_moments_has_its_status_and_no_traceback(real_start, how):
+    """By a shell that has yet to read the launcher, and by `env` that starts, it ends the process: some 3 ms in all."""
+    status, word = _STOPS[how]
+    for after in (0, 0.002, 0.005, 0.01, 0.015, 0.02, 0.03, 0.04, 0.05):
+        process = real_start("scenes")
+        time.sleep(after)
+        process.send_signal(how)
+        out, err = process.communicate(timeout=60)
+        assert process.returncode in (status, -how), after
+        assert out == ""
+        assert err == "" if process.returncode == -how else err.startswith(f"{word}: ") and err.count("\n") == 1, err
+
+
+@pytest.mark.parametrize("how", _STOPS)
+def test_a_signal_while_python_starts_waits_until_it_is_handled(real_start, how):
+    """Both signals are sent before Python begins, and held back as `env` does for the launcher."""
+
+    def send():
+        signal.pthread_sigmask(signal.SIG_BLOCK, _STOPS)
+        os.kill(os.getpid(), how)
+
+    command = [sys.executable, "-S", ROOT / "airlight.py", "scenes"]
+    for program in (command, [sys.executable, "-c", "from reports.commands.start import main; main()"]):
+        done = subprocess.run(program, cwd=ROOT, preexec_fn=send, capture_output=True, text=True, timeout=60)
+        status, word = _STOPS[how]
+        assert (done.returncode, done.stdout) == (status, "")
+        assert done.stderr == f"{word}: no file is left half-written; run the same command again\n"
+
+
+@pytest.mark.parametrize("how", _STOPS)
+def test_a_signal_to_the_script_is_a_status_and_one_line(machine, how):
+    _start(machine)
+    _log(machine)
+    # The shell waits for it; the file says that it does.
+    (machine / "programs" / "cksum").unlink()
+    _program(machine / "programs" / "cksum", f"#!/bin/sh\ntouch {machine}/waits\nsleep 0.3\n")
+    launcher, environment = machine / "a project" / "airlight", {"PATH": f"{machine / 'programs'}:/usr/bin:/bin"}
+    process = subprocess.Popen([launcher], env=environment, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    while not (machine / "waits").exists():
+        time.sleep(0.01)
+    process.send_signal(how)
+    out, err = process.communicate(timeout=30)
+    status, word = _STOPS[how]
+    assert (process.returncode, out) == (status, "")
+    assert err == f"{word}: nothing was begun; run the same command again\n"
+
+
+def test_signals_are_held_back_from_python_where_env_can(machine):
+    _start(machine)
+    for name in ("env", "true"):
+        (machine / "programs" / name).symlink_to(shutil.which(name))
+    told = "import signal; print(*sorted(signal.pthread_sigmask(signal.SIG_BLOCK, ())))"
+    _program(machine / "programs" / "python3.11", f"#!{sys.executable}\n{told}\n")
+    if subprocess.run(["env", "--block-signal=INT", "true"], capture_output=True).returncode == 0:
+        assert _start(machine).stdout == f"{signal.SIGINT!s} {signal.SIGTERM!s}\n"
+    (machine / "programs" / "env").unlink()
+    _program(machine / "programs" / "env", "#!/bin/sh\nexit 125\n")  # another system's
+    assert _start(machine).stdout == "\n"
+
+
 def test_starts_at_the_same_time_install_once(machine):
     (machine / "programs" / "pip-is-slow").touch()
     environment = {"PATH": str(machine / "programs")}

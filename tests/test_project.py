@@ -33,7 +33,8 @@ ALLOWED = {
 }
 # Methods are compared with one another. (The estimators of the truth: tests/test_independence.py.)
 METHODS = tuple(
-    f"realtime.methods.{name}" for name in ("unshadowed", "ray_march", "shadow_planes", "light_volumes", "epipolar")
+    f"realtime.methods.{name}"
+    for name in ("unshadowed", "ray_march", "shadow_planes", "light_volumes", "epipolar", "froxel_fog")
 )
 
 
@@ -298,7 +299,7 @@ def test_the_wheel_holds_the_packages_and_nothing_else(tmp_path):
     with zipfile.ZipFile(wheel) as archive:
         held = {name for name in archive.namelist() if not name.endswith("/")}
         scripts = archive.read(next(name for name in held if name.endswith("entry_points.txt"))).decode()
-    assert "airlight = airlight:main" in scripts
+    assert "airlight = reports.commands.start:main" in scripts
     content = {name for name in held if ".dist-info/" not in name}
     expected = {name for name in tracked.stdout.splitlines() if name == "airlight.py" or name.startswith(FOLDERS)}
     pictures = "reports/images/"  # of the README

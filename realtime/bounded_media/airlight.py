@@ -257,7 +257,7 @@ def _scattered(ray: MediaRay, piece: Piece, transmittance: list[Any], x, r):
     """Return albedo sigma p and the spot's profile times a transmittance, as a colour."""
     Color = type(ray.medium.albedo)
     weight = piece.medium.phase.evaluate((ray.geometry.foot - x) / r)
-    if ray.light.soft:
+    if ray.light.varies:
         weight = weight * falloff(ray.geometry, ray.light, x)
     channels = [sigma * weight * value for sigma, value in zip(piece.medium.sigma_t, transmittance)]
     return piece.medium.albedo * Color(*channels)

@@ -151,7 +151,7 @@ def _sphere_length(segment: MediumSegment, x):
 
 def _largest_tangent(segment: MediumSegment):
     turn = segment.medium.phase.largest_turn()
-    if segment.light.soft:
+    if segment.light.varies:
         turn = dr.minimum(turn, 0.4)
     return _TANGENT * turn
 
@@ -174,7 +174,7 @@ def _panel(segment: MediumSegment, walk: Entry, *, ends, squares, h) -> list[Any
         before = _before_medium(segment, walk, x, r)
         inside = (x - segment.begin) + (r - before)
         weight = share * segment.medium.phase.evaluate(-s / r) / dr.fma(t * t, tangent, 1)
-        if segment.light.soft:
+        if segment.light.varies:
             weight *= falloff(segment.geometry, segment.light, x)
         for channel, (depth, own) in enumerate(zip(segment.before, segment.medium.sigma_t)):
             depth = dr.fma(own, inside, depth)

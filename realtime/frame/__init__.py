@@ -12,6 +12,7 @@ Read in this order:
 - `incremental.py`: the next frame of an animation, and the cache of what stood still.
 - `recorded.py`: functions that Dr.Jit records once and replays.
 
-May import: `realtime.bounded_media`, `realtime.errors`, `realtime.kernels`, `realtime.methods.interface`,
-`realtime.numerics`, `realtime.parameters`, `realtime.rays`, `realtime.scene`, `realtime.tiles`.
+May import: `realtime.area_lights`, `realtime.bounded_media`, `realtime.errors`, `realtime.kernels`,
+`realtime.methods.interface`, `realtime.numerics`, `realtime.parameters`, `realtime.rays`, `realtime.scene`,
+`realtime.tiles`.
 """

@@ -32,6 +32,7 @@ class FrameCache:
     state: Any  #: lights and geometry, shadow planes also the camera: `Method.prepared_from`
     lists: Any  #: camera, geometry and lights
     history: History | None = None  #: the last frame, for passes over the image
+    carried: Any = None  #: what the method handed on from the last frame
 
 
 def next_frame(
@@ -80,8 +81,9 @@ def next_frame(
         by_light = run_shade(renderer, cast)
     state = finish()
     lists = cache.lists if cache and not cull_again else run_cull(renderer, state, cast.distance)
-    layers = run_method(renderer, state, cast, by_light, lists, cache.history if cache else None)
-    return evaluated(cast, by_light, layers), FrameCache(cast, state, lists, layers[2])
+    last = (cache.history, cache.carried) if cache else (None, None)
+    *layers, history, carried = run_method(renderer, state, cast, by_light, lists, *last)
+    return evaluated(cast, by_light, layers), FrameCache(cast, state, lists, history, carried)
 
 
 def _started(prepare: Preparation, scene: Scene) -> Callable[[], Any]:

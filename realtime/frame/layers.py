@@ -5,6 +5,7 @@ Each does nothing, and records nothing, where a method has nothing for it.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import drjit as dr
@@ -82,6 +83,32 @@ def composed(layers: Layers, by_light: tuple[PerRay, ...]) -> tuple[PerRay, PerR
     if layers.background is not None:
         behind = behind + layers.background
     return layers.in_scattered, behind if layers.transmittance is None else layers.transmittance * behind
+
+
+def added(
+    sums: tuple[PerRay, PerRay], layers: Layers, by_light: tuple[PerRay, ...]
+) -> tuple[PerRay, PerRay, PerRay | None]:
+    """Return airlight and surface of some lights with those of others added, and what is seen of no light.
+
+    Parameters
+    ----------
+    sums
+        Airlight and surface of the others [W/(m^2 sr)].
+    layers, by_light
+        Of these, as for `composed`.
+
+    Returns
+    -------
+    airlight, surface
+        The sums [W/(m^2 sr)]. They have an entry per ray.
+    beyond
+        The background of the layers through their transmittance, which is no light's own; None where there is none.
+    """
+    airlight, surface = composed(replace(layers, background=None), by_light)
+    beyond = layers.background
+    if beyond is not None and layers.transmittance is not None:
+        beyond = layers.transmittance * beyond
+    return sums[0] + airlight, sums[1] + (sum(by_light) if surface is None else surface), beyond
 
 
 def _lit_share(share: PerRay, color: PerRay) -> PerRay:

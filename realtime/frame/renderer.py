@@ -5,9 +5,13 @@ Each stage is one frozen function. Frozen functions (`drjit.freeze`) record thei
 them afterwards, so a frame costs its kernels and little else. A method whose arrays change their sizes from frame to
 frame cannot be frozen. All that moves (camera, lights, medium, shadow maps) is passed in as opaque arrays. What of a
 frame serves the next one too: `realtime.frame.incremental`.
+
+Where there are lights with extent, a renderer has groups of lights (`LightGroups`): those without extent together, then
+each light point by itself. The stages for light points are recorded once and replayed for every one; their radiance is
+added up. What the stages of a single group take and return is a tuple by group then: states, surfaces and lists.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,22 +19,35 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from realtime.area_lights.points import LightPoints
 from realtime.errors import InputError
 from realtime.frame.frame_view import frame_view
-from realtime.frame.layers import adaptive_layers, composed, image_passes
+from realtime.frame.layers import adaptive_layers, added, composed, image_passes
 from realtime.frame.light_on_ray import check_radiance
 from realtime.frame.recorded import Frozen
 from realtime.frame.surface import Cast
 from realtime.frame.surface_stages import no_surface, surface_stages
 from realtime.kernels.preparation import prepare_kernel, with_tables
 from realtime.methods.interface.layers import History
-from realtime.methods.interface.method import Method, Preparation
+from realtime.methods.interface.method import Method, Preparation, method_parameters
 from realtime.numerics.array_types import Metres, PerRay
-from realtime.parameters import read_parameters
 from realtime.scene.camera import tiled_pixels
+from realtime.scene.light_points import with_light_points
+from realtime.scene.lights import Light
 from realtime.scene.read_scene import Scene
 from realtime.tiles.adaptive_sampling import Corners, tile_corners
 from realtime.tiles.layout import TILE
+
+_MOST_KEPT = 32  # groups of lights of which states, surfaces and lists are kept; those of others are made when needed
+
+
+@dataclass(frozen=True)
+class LightGroups:
+    """The stages of a frame by groups of lights, for a scene with lights with extent."""
+
+    light_points: LightPoints
+    whole: "FrameRenderer | None"  #: of the lights without extent, or of all at once; None where there are none
+    of_point: "FrameRenderer | None"  #: of one light point; None where a method takes all lights at once
 
 
 @dataclass(frozen=True)
@@ -51,6 +68,8 @@ class FrameRenderer:
     lane: PerRay | None  #: the entry of every pixel row by row, for passes
     shade_casts_rays: bool  #: whether shading asks Mitsuba for shapes or shadows
     casts_rays: bool  #: whether the method casts rays of its own
+    carries: bool  #: whether the method hands arrays on to the next frame
+    groups: LightGroups | None = None  #: where the scene has lights with extent
 
     # A frozen function reads all shapes of a scene that it is given anew at every call.
 
@@ -63,6 +82,12 @@ class FrameRenderer:
     def geometry(self) -> Any:
         """The Mitsuba scene if the method needs it."""
         return self.scene.geometry if self.casts_rays else None
+
+    @property
+    def lights(self) -> tuple[Light, ...]:
+        """The lights for recorded functions: a light point by itself is of no light, as one recording serves all."""
+        lights = self.scene.lights
+        return (replace(lights[0], source=0),) if len(lights) == 1 and lights[0].source else lights
 
 
 @dataclass(frozen=True)
@@ -86,7 +111,8 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
     kernel
         An airlight kernel function; needed where `method.uses_kernel` says so.
     parameters
-        Values of the method's parameters; the others have its defaults.
+        Values of the method's parameters, and of `realtime.area_lights.points.LightPoints`; the others have their
+        defaults.
 
     Raises
     ------
@@ -94,9 +120,25 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
         For a parameter that the method does not have, where a kernel is missing, and for what method or kernel refuse;
         what the kernel of a method that is not frozen refuses comes with the first frame.
     """
-    chosen = read_parameters(method.name, method.parameters, parameters)
+    chosen, light_points = method_parameters(method, parameters)
     if method.uses_kernel(chosen) and kernel is None:
         raise InputError(f"method {method.name}: got no kernel, wanted one of realtime.kernels.registry.KERNELS")
+    if not scene.area_lights:
+        return _stages(scene, method, kernel, chosen)
+    lit = with_light_points(scene, light_points.points, light_points.pattern)
+    if method.passes or method.lights_at_once(chosen) or method.carries(chosen):
+        groups = LightGroups(light_points, _stages(lit, method, kernel, chosen), None)
+    else:
+        point = replace(lit, lights=lit.lights[len(scene.lights) :][:1])
+        whole = _stages(scene, method, kernel, chosen) if scene.lights else None
+        groups = LightGroups(light_points, whole, _stages(point, method, kernel, chosen, adds_up=True))
+    known = groups.whole or groups.of_point
+    assert known is not None
+    return replace(known, scene=scene, prepare=GroupPreparation(groups), groups=groups)
+
+
+def _stages(scene: Scene, method: Method, kernel: Any, chosen: Any, *, adds_up: bool = False) -> FrameRenderer:
+    """Return the stages for the lights of a scene; with `adds_up`, what they render is added to what was before."""
     by_rays = method.by_rays is not None and method.by_rays(chosen)
     tolerance = chosen.tolerance if method.by_rays else 0.0
     features, camera = scene.features, scene.camera
@@ -111,9 +153,27 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
         shown = {"features": features, "geometry": None, "medium": medium, "lights": lights}
         return method.cull(frame_view(camera, pixel, distance, **shown), state, chosen)
 
-    def run(geometry, pixel, camera, medium, lights, state, lists, distance, by_light, tables, corners=None):
+    carries = method.carries(chosen)
+
+    def run(
+        geometry,
+        pixel,
+        camera,
+        medium,
+        lights,
+        state,
+        lists,
+        distance,
+        by_light,
+        tables,
+        corners=None,
+        sums=None,
+        last=None,
+    ):
         shown = {"features": features, "geometry": geometry, "medium": medium, "lights": lights}
         view = frame_view(camera, pixel, distance, **shown)
+        if carries:
+            view = replace(view, carried=last)
         if provides_visibility:
             view = replace(view, surfaces=by_light)
 
@@ -121,7 +181,12 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
             return method.render(view, state, lists, kernel=with_tables(kernel, tables), parameters=chosen)
 
         layers = layers_of(view) if corners is None else adaptive_layers(layers_of, view, corners, tolerance)
-        return layers if method.passes else composed(layers, by_light)
+        if carries:
+            carried, layers = layers.carried, replace(layers, carried=None)
+            return (layers if method.passes else composed(layers, by_light)), carried
+        if method.passes:
+            return layers
+        return composed(layers, by_light) if sums is None else added(sums, layers, by_light)
 
     # Every scene runs it: it checks the parameters also where nothing casts a shadow.
     prepare = method.prepare(scene, chosen) if method.prepare else _no_state
@@ -142,7 +207,8 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
         state = prepare(scene)
         lists = cull(*shown, state, near)
         dark = no_surface(None, None, *shown, None)
-        run(scene.geometry if casts_rays else None, *shown, state, lists, near, dark, tables)
+        sums = no_light(scene, dr.width(few)) if adds_up else None
+        run(scene.geometry if casts_rays else None, *shown, state, lists, near, dark, tables, sums=sums)
         render = Frozen(run)
         cull = Frozen(sort) if cull is sort else cull
         passes = passes and Frozen(passes)
@@ -165,6 +231,7 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
         lane=lane,
         shade_casts_rays=shade_casts_rays,
         casts_rays=casts_rays,
+        carries=carries,
     )
 
 
@@ -177,14 +244,11 @@ def image_frame(renderer: FrameRenderer, stages) -> Frame:
     """Bring `stages`, what `run_stages` returned, to the host in the order of the image."""
     distance, surface, airlight = stages
     height, width = renderer.scene.camera.height, renderer.scene.camera.width
-    light = _image(renderer, airlight, (height, width, 3))
     frame = Frame(
-        light,
+        _image(renderer, airlight, (height, width, 3)),
         _image(renderer, surface, (height, width, 3)),
         _image(renderer, distance, (height, width)),
     )
-    if renderer.method.check is not None:
-        renderer.method.check(light)
     check_radiance(renderer.scene, renderer.method.name, frame.airlight, frame.surface, frame.distance)
     return frame
 
@@ -206,28 +270,78 @@ def evaluated(cast: Cast, by_light, layers):
     return cast.distance, surface, airlight
 
 
+@dataclass(frozen=True)
+class GroupPreparation:
+    """What makes the states of groups of lights; called with the scene as it is now, returns them in a tuple."""
+
+    groups: LightGroups
+
+    def __call__(self, scene: Scene) -> tuple[Any, ...]:
+        """Return the state of each group, None for those that are not kept."""
+        groups = _groups_in(self.groups, scene)
+        return tuple(group.prepare(group.scene) if number < _MOST_KEPT else None for number, group in enumerate(groups))
+
+
+def light_groups(renderer: FrameRenderer) -> tuple[FrameRenderer, ...]:
+    """Return a renderer for each group of lights; a renderer without lights with extent itself."""
+    return (renderer,) if renderer.groups is None else _groups_in(renderer.groups, renderer.scene)
+
+
+def _groups_in(groups: LightGroups, scene: Scene) -> tuple[FrameRenderer, ...]:
+    lit = with_light_points(scene, groups.light_points.points, groups.light_points.pattern)
+    if groups.of_point is None:
+        assert groups.whole is not None
+        return (replace(groups.whole, scene=lit),)
+    whole = (replace(groups.whole, scene=scene),) if groups.whole is not None else ()
+    points = (replace(lit, lights=(point,)) for point in lit.lights[len(scene.lights) :])
+    return whole + tuple(replace(groups.of_point, scene=point) for point in points)
+
+
 def run_cast_and_shade(renderer: FrameRenderer) -> tuple[Cast, Any]:
     """Run the stage of camera rays and lit surface; return what the rays meet, and what `run_shade` returns for it."""
+    if renderer.groups is not None:
+        first, *others = light_groups(renderer)
+        cast, by_light = run_cast_and_shade(first)
+        return cast, (by_light, *_shaded(others, cast, 1))
     scene = renderer.scene
-    return renderer.surface(scene.geometry, scene.facets, renderer.pixel, scene.camera, scene.medium, scene.lights)
+    return renderer.surface(scene.geometry, scene.facets, renderer.pixel, scene.camera, scene.medium, renderer.lights)
 
 
 def run_shade(renderer: FrameRenderer, cast: Cast):
     """Run the stage of the lit surface on what was cast for an earlier frame."""
+    if renderer.groups is not None:
+        return _shaded(light_groups(renderer), cast, 0)
     scene = renderer.scene
-    arguments = (scene.facets, renderer.pixel, scene.camera, scene.medium, scene.lights, cast)
+    arguments = (scene.facets, renderer.pixel, scene.camera, scene.medium, renderer.lights, cast)
     return renderer.shade(renderer.shade_geometry, *arguments)
+
+
+def _shaded(groups: Sequence[FrameRenderer], cast: Cast, before: int) -> tuple[Any, ...]:
+    """Return the surfaces of groups of lights, of which some came `before`; None for those that are not kept."""
+    kept = max(_MOST_KEPT - before, 0)
+    return tuple(run_shade(group, cast) if number < kept else None for number, group in enumerate(groups))
 
 
 def run_cull(renderer: FrameRenderer, state, distance: Metres):
     """Run the stage that sorts by tiles, for rays up to a `distance` [m], and return its lists."""
+    if renderer.groups is not None:
+        groups = light_groups(renderer)
+        states = state or [group.prepare(group.scene) for group in groups[:_MOST_KEPT]]
+        lists = [run_cull(group, own, distance) for group, own in zip(groups[:_MOST_KEPT], states)]
+        return (*lists, *(None for _ in groups[_MOST_KEPT:]))
     scene = renderer.scene
-    return renderer.cull(renderer.pixel, scene.camera, scene.medium, scene.lights, state, distance)
+    return renderer.cull(renderer.pixel, scene.camera, scene.medium, renderer.lights, state, distance)
 
 
 def run_method(
-    renderer: FrameRenderer, state, cast: Cast, by_light, lists=None, history: History | None = None
-) -> tuple[PerRay, PerRay | None, History | None]:
+    renderer: FrameRenderer,
+    state,
+    cast: Cast,
+    by_light,
+    lists=None,
+    history: History | None = None,
+    carried: Any = None,
+) -> tuple[PerRay, PerRay | None, History | None, Any]:
     """Run the stages of the method, and return what they do, not evaluated.
 
     Parameters
@@ -240,6 +354,8 @@ def run_method(
         From `run_cull`; None to run that too.
     history
         What the last frame returned, for passes; None for the first.
+    carried
+        What the method handed on from the last frame; None for the first.
 
     Returns
     -------
@@ -249,19 +365,83 @@ def run_method(
         What is seen through it [W/(m^2 sr)]; None where that is the shaded surface as it is.
     history
         For the next frame; None where the method has no passes.
+    carried
+        For the next frame; None where the method hands nothing on.
     """
+    if renderer.groups is not None:
+        groups = light_groups(renderer)
+        if len(groups) == 1 and renderer.groups.of_point is None:
+            only = None if lists is None else lists[0]
+            own = state[0] if state else groups[0].prepare(groups[0].scene)
+            return run_method(groups[0], own, cast, by_light[0], only, history, carried)
+        return *_summed(groups, state, cast, by_light, lists), None, None
     scene, pixel = renderer.scene, renderer.pixel
     if lists is None:
         lists = run_cull(renderer, state, cast.distance)
-    shown = pixel, scene.camera, scene.medium, scene.lights
+    shown = pixel, scene.camera, scene.medium, renderer.lights
     inputs = state, lists, cast.distance, by_light, renderer.tables, renderer.corners
-    layers = renderer.render(renderer.geometry, *shown, *inputs)
+    if renderer.carries:
+        layers, carried = renderer.render(renderer.geometry, *shown, *inputs, None, carried)
+    else:
+        layers = renderer.render(renderer.geometry, *shown, *inputs)
     if renderer.passes is None:
-        return *layers, None
+        return *layers, None, carried
     geometry = scene.geometry if scene.facets is None else None
     place = geometry, scene.facets, pixel, renderer.lane, scene.camera, scene.medium
     airlight, surface, layers, g_buffer = renderer.passes(*place, cast, by_light, layers, history)
-    return airlight, surface, History(layers, g_buffer, scene.camera)
+    return airlight, surface, History(layers, g_buffer, scene.camera), carried
+
+
+def _summed(groups: Sequence[FrameRenderer], states, cast: Cast, by_light, lists) -> tuple[PerRay, PerRay]:
+    """Return airlight and surface of all groups of lights."""
+    sums, beyond = no_light(groups[0].scene, dr.width(cast.distance)), None
+    for number, group in enumerate(groups):
+        shaded = by_light[number] if by_light[number] is not None else run_shade(group, cast)
+        state = states[number] if states and states[number] is not None else group.prepare(group.scene)
+        own = lists[number] if lists is not None and lists[number] is not None else None
+        if own is None:
+            own = run_cull(group, state, cast.distance)
+        sums, more = run_group(group, sums, state, own, cast, shaded)
+        if number == 0:
+            beyond = more
+    airlight, surface = sums
+    return airlight, surface if beyond is None else surface + beyond
+
+
+def run_group(
+    renderer: FrameRenderer, sums: tuple[PerRay, PerRay], state, lists, cast: Cast, by_light
+) -> tuple[tuple[PerRay, PerRay], PerRay | None]:
+    """Run the method for one group of lights.
+
+    Parameters
+    ----------
+    renderer
+        Of `light_groups`.
+    sums
+        Airlight and surface of the groups before it [W/(m^2 sr)].
+    state, lists, cast, by_light
+        See `run_method`.
+
+    Returns
+    -------
+    sums
+        With this group's, evaluated.
+    beyond
+        What is seen behind all media, of no light; None where there is nothing.
+    """
+    scene = renderer.scene
+    shown = renderer.pixel, scene.camera, scene.medium, renderer.lights
+    inputs = state, lists, cast.distance, by_light, renderer.tables, renderer.corners
+    airlight, surface, beyond = renderer.render(renderer.geometry, *shown, *inputs, sums)
+    dr.eval(airlight, surface, beyond)
+    return (airlight, surface), beyond
+
+
+def no_light(scene: Scene, width: int) -> tuple[PerRay, PerRay]:
+    """Return airlight and surface without any light, for `width` rays."""
+    airlight, surface = (dr.zeros(type(scene.medium.albedo), width) for _ in range(2))
+    dr.make_opaque(airlight, surface)
+    return airlight, surface
 
 
 def _no_state(scene: Scene) -> tuple[()]:

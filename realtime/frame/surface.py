@@ -164,10 +164,12 @@ def _arriving(light: Light, surface: VisibleSurface):
 
 def _profile(light: Light, point, away):
     """Return the relative intensity of the light in the unit direction `away`, from the light to a point."""
+    if light.facing is not None:
+        return dr.maximum(dr.dot(light.normal, away), 0)
     if light.cone is None:
         return type(away.x)(1)
     inside = dr.dot(light.axis, away) > light.cos_cutoff
-    if not light.soft:
+    if light.beam is None:
         return dr.select(inside, type(away.x)(1), 0)
     # The point lies at x = 0 of a ray that starts there.
     return dr.select(inside, falloff(ray_geometry(point, away, light), light, type(away.x)(0)), 0)

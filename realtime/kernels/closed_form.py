@@ -87,10 +87,10 @@ def closed_form(geometry: RayGeometry, x0, x1, medium: Medium, light: Light):
             f"kernel closed-form: phase function {medium.phase.name!r} is no polynomial in the cosine; use the kernel "
             f"'quadrature' or one of {known}"
         )
-    if light.soft:
+    if light.varies:
         raise InputError(
-            "kernel closed-form: a spot that falls off between beam and cut-off has no closed form; use the kernel "
-            "'quadrature' or a spot with beam_width = cutoff_angle"
+            "kernel closed-form: the intensity of a light with extent, or of a spot that falls off between beam and "
+            "cut-off, has no closed form here; use the kernel 'quadrature', or a spot with beam_width = cutoff_angle"
         )
     foot, h = geometry.foot, geometry.height
     Float = type(h)

@@ -35,7 +35,7 @@ from realtime.kernels.quadrature import path_interval, quadrature
 from realtime.kernels.short_segments import FEW, MORE, extent, serves, short_segment
 from realtime.numerics.array_types import is_single
 from realtime.numerics.gauss_legendre import unit_nodes
-from realtime.rays.ray_light import RayGeometry, falloff, smooth_subsegments
+from realtime.rays.ray_light import RayGeometry, falloff_beside, smooth_subsegments
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium, per_extinction
 from realtime.scene.phase import Phase
@@ -74,7 +74,7 @@ def exact(geometry: RayGeometry, x0, x1, medium: Medium, light: Light):
 
 def _in_single(geometry: RayGeometry, segment, extinctions, phase: Phase, light: Light):
     """Return one value per extinction."""
-    if light.soft:
+    if light.varies:
         return _over_subsegments(geometry, segment, extinctions, phase, light)
     x0, x1 = segment
     segment_extent = extent(geometry, x0, x1, extinctions)
@@ -96,7 +96,7 @@ def _in_single(geometry: RayGeometry, segment, extinctions, phase: Phase, light:
 
 
 def _in_double(geometry: RayGeometry, segment, sigma_t, medium: Medium, light: Light):
-    if medium.phase.constant and not light.soft:
+    if medium.phase.constant and not light.varies:
         x0, x1 = segment
         grey = Medium((sigma_t,), medium.albedo, medium.phase)
         return quadrature(geometry, x0, x1, grey, light, nodes=_ISOTROPIC_DOUBLE)
@@ -120,11 +120,11 @@ def _subsegment(geometry: RayGeometry, x0, x1, extinctions, phase: Phase, light:
     width = dr.asinh((difference / scale) * ((f0 + f1) / dr.fma(f1, c0, f0 * c1)))
 
     def weight(e):
-        return falloff(geometry, light, geometry.foot + 0.5 * h * (e - dr.rcp(e)))
+        return falloff_beside(geometry, light, 0.5 * h * (e - dr.rcp(e)))
 
     add_up = panels_mean if is_single(Float) else _double_mean
     decays = [sigma_t * h for sigma_t in extinctions]
-    means = add_up(phase, (f0, c0), scale, width, decays, weight if light.soft else None)
+    means = add_up(phase, (f0, c0), scale, width, decays, weight if light.varies else None)
     r0 = dr.sqrt(dr.fma(x0 - geometry.foot, x0 - geometry.foot, h * h))
     shared = (width * scale) * (2 / h)
     return [mean * shared * dr.exp(-sigma_t * (x0 + r0)) for mean, sigma_t in zip(means, extinctions)]

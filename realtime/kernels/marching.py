@@ -98,7 +98,7 @@ def _integrand(geometry: RayGeometry, medium: Medium, light: Light, sigma_t, poi
     """Return exp(-sigma_t (x + r)) p times the falloff of a spot, at `point` = (x, r)."""
     x, r = point
     value = dr.exp(-sigma_t * (x + r)) * medium.phase.evaluate((geometry.foot - x) / r)
-    return value * falloff(geometry, light, x) if light.soft else value
+    return value * falloff(geometry, light, x) if light.varies else value
 
 
 def _midpoints(term, begin, width, steps: int):

@@ -17,7 +17,7 @@ import drjit as dr
 
 from realtime.numerics.array_types import is_single, smallest
 from realtime.numerics.fast_exp import exp_bounded
-from realtime.rays.ray_light import RayGeometry, falloff
+from realtime.rays.ray_light import RayGeometry, falloff_beside
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium
 from realtime.scene.phase import Phase
@@ -113,7 +113,7 @@ def offset(piece: Piece, begin: Place, x):
 def integrand(piece: Piece, u, geometry: RayGeometry, medium: Medium, light: Light):
     """Return f(u)."""
     start, cosh_start = piece.near.sinh, piece.near.cosh
-    if light.soft:
+    if light.varies:
         sinh, cosh = dr.sincosh(u)  # accurate for small u too: the place in the cone depends on it
     else:
         grown = exp_bounded(u)
@@ -122,14 +122,14 @@ def integrand(piece: Piece, u, geometry: RayGeometry, medium: Medium, light: Lig
     growth = dr.fma(start, sinh * sinh / (1 + cosh), cosh_start * sinh)
     cosh_w = dr.fma(cosh_start, cosh, start * sinh)
     value = exp_bounded(-piece.thickness * growth)
-    if medium.phase.constant and not light.soft:
+    if medium.phase.constant and not light.varies:
         return value / cosh_w
     e = piece.scale * (start + growth)
     squared = e * e
     up = dr.rcp(1 + squared)
     value *= cosh_w * up * medium.phase.evaluate_half(squared * up, up)
-    if light.soft:
-        value *= falloff(geometry, light, piece.foot + 0.5 * piece.height * (e - dr.rcp(e)))
+    if light.varies:
+        value *= falloff_beside(geometry, light, 0.5 * piece.height * (e - dr.rcp(e)))
     return value
 
 

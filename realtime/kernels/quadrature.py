@@ -33,7 +33,7 @@ import numpy as np
 from realtime.errors import InputError
 from realtime.numerics.array_types import is_single, smallest
 from realtime.numerics.fast_exp import exp_bounded
-from realtime.rays.ray_light import RayGeometry, falloff, smooth_subsegments
+from realtime.rays.ray_light import RayGeometry, falloff_beside, smooth_subsegments
 from realtime.scene.lights import Light
 from realtime.scene.medium import Medium, per_extinction
 
@@ -65,7 +65,7 @@ def sum_panels(geometry: RayGeometry, panels, medium: Medium, light: Light, node
 
 
 def _panels(geometry: RayGeometry, x0, x1, medium: Medium, light: Light):
-    if not medium.phase.constant and not light.soft:
+    if not medium.phase.constant and not light.varies:
         split = dr.clip(geometry.foot, x0, x1)
         return [(x0, split), (split, x1)]
     return smooth_subsegments(geometry, light, x0, x1)
@@ -93,7 +93,7 @@ def _panel(geometry: RayGeometry, x0, x1, sigma_t, medium: Medium, light: Light,
     path = x0 + dr.sqrt(dr.fma(x0 - geometry.foot, x0 - geometry.foot, h * h)) + h * step
     total = _pairs(
         geometry,
-        (geometry.foot, h, sigma_t),
+        (h, sigma_t),
         (half, e_mid, c_mid),
         phase=medium.phase,
         light=light,
@@ -134,10 +134,10 @@ def _path_over_height(s, r, h):
 
 
 def _pairs(geometry: RayGeometry, ray, panel, *, phase, light: Light, nodes):
-    """Sum the pairs of nodes of one panel; `ray` is foot, height, extinction and `panel` half width, E_c, C_c."""
-    foot, h, sigma_t = ray
+    """Sum the pairs of nodes of one panel; `ray` is height, extinction and `panel` half width, E_c, C_c."""
+    h, sigma_t = ray
     half, e_mid, c_mid = panel
-    plain = phase.constant and not light.soft
+    plain = phase.constant and not light.varies
     decay_e, decay_c = -(sigma_t * h) * e_mid, -(sigma_t * h) * c_mid
     e_mid_squared = dr.square(e_mid)
     total = type(h)(0)
@@ -155,8 +155,8 @@ def _pairs(geometry: RayGeometry, ray, panel, *, phase, light: Light, nodes):
             continue
         for factor, inverse, sign in ((after, dr.rcp(cosh_after), 1.0), (before, cosh_after / product, -1.0)):
             value = factor * inverse * phase.evaluate(dr.fma(2 * inverse, inverse, -1))
-            if light.soft:
+            if light.varies:
                 e = dr.fma(sign * c_mid, sh, e_mid * ch)
-                value *= falloff(geometry, light, foot + 0.5 * h * (e - dr.rcp(e)))
+                value *= falloff_beside(geometry, light, 0.5 * h * (e - dr.rcp(e)))
             total += weight * value
     return total

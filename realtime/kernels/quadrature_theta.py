@@ -40,7 +40,7 @@ def quadrature_theta(geometry: RayGeometry, x0, x1, medium: Medium, light: Light
     if not isinstance(nodes, int) or nodes < 1:
         raise InputError(f"nodes: got {nodes!r}, wanted a whole number of at least 1")
     split = dr.clip(geometry.foot, x0, x1)
-    whole = medium.phase.constant and not light.soft
+    whole = medium.phase.constant and not light.varies
     panels = [(x0, x1)] if whole else [(x0, split), (split, x1)]
     return per_extinction(
         medium,
@@ -58,7 +58,7 @@ def _panel(geometry: RayGeometry, x0, x1, sigma_t, medium: Medium, light: Light,
         x = dr.fma(h, dr.tan(dr.fma(width, fraction, theta0)), foot)
         r = distance_to_light(geometry, x)
         value = dr.exp(-sigma_t * (x + r)) * medium.phase.evaluate((foot - x) / r)
-        if light.soft:
+        if light.varies:
             value *= falloff(geometry, light, x)
         total += weight * value
     return total * (width / h)

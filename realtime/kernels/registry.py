@@ -5,7 +5,7 @@ A kernel is a function ``kernel(geometry, x0, x1, medium, light, **parameters) -
 `realtime.rays.ray_light.RayGeometry`, ``x0 <= x1`` [m] bound the lit part of the ray (`x1` may be infinite), and the
 result has one value per ray for a grey medium, a colour for a coloured one. The in-scattered radiance is ``albedo
 sigma_t intensity J / (4 pi)``. `airlight_integral` clips the segment to the cone of a spot before it calls the kernel;
-where the intensity falls off inside the cone (``light.soft``), the kernel weighs its integrand by
+where the intensity falls off inside the cone (``light.varies``), the kernel weighs its integrand by
 `realtime.rays.ray_light.falloff`.
 
 `KERNELS` is the registry: add a `Kernel` to it and every method, command and report knows it.

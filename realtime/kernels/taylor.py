@@ -52,7 +52,7 @@ def bounded_integral(geometry: RayGeometry, x0, x1, light: Light, leg: ConstantL
     h = geometry.height
     s0, s1 = x0 - geometry.foot, dr.minimum(x1 - geometry.foot, largest(type(h)))
     theta0, theta1 = dr.atan2(s0, h), dr.atan2(s1, h)
-    if light.soft:
+    if light.varies:
         total = _weighted(geometry, light, (theta0, theta1), coefficients)
     else:
         total = _integrated(geometry, (s0, s1), (theta0, theta1), coefficients)
@@ -92,7 +92,7 @@ def taylor(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, *, degre
     def integral(sigma_t):
         a = sigma_t * h
         coefficients = series_product(_extinction_series(a, degree), series, degree)
-        if light.soft:
+        if light.varies:
             total = _weighted(geometry, light, (theta0, theta1), coefficients)
         else:
             total = _integrated(geometry, (s0, s1), (theta0, theta1), coefficients)

@@ -87,7 +87,7 @@ def taylor_printed(geometry: RayGeometry, x0, x1, medium: Medium, light: Light, 
     def integral(sigma_t):
         a = sigma_t * h
         coefficients = _coefficients(a, medium.phase, degree)
-        if light.soft:
+        if light.varies:
             total = _weighted(geometry, light, (theta0, theta1), coefficients)
         else:
             total = _integrated(geometry, (s0, s1), (theta0, theta1), coefficients)

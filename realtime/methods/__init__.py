@@ -13,7 +13,7 @@ Read in this order:
 - `user_result.py`: what that returned, checked.
 
 May import: `realtime.bounded_media`, `realtime.errors`, `realtime.intervals`, `realtime.kernels`, `realtime.memory`,
-`realtime.methods.epipolar`, `realtime.methods.interface`, `realtime.methods.light_volumes`,
-`realtime.methods.shadow_planes`, `realtime.parameters`, `realtime.rays`, `realtime.scene`, `realtime.shadow_maps`,
-`realtime.tiles`.
+`realtime.methods.epipolar`, `realtime.methods.froxel_fog`, `realtime.methods.interface`,
+`realtime.methods.light_volumes`, `realtime.methods.shadow_planes`, `realtime.parameters`, `realtime.rays`,
+`realtime.scene`, `realtime.shadow_maps`, `realtime.tiles`.
 """

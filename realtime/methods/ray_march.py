@@ -36,6 +36,7 @@ from realtime.intervals.lit_intervals import add_waiting, close_interval, no_int
 from realtime.memory import check_memory
 from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.light_airlight import RayAirlight, integral_type, ray_airlight
+from realtime.methods.interface.method import ErrorCause
 from realtime.methods.interface.view import View, bounded_radiance, radiance, rays_in_media
 from realtime.parameters import Parameters, parameter
 from realtime.rays.ray_light import RayGeometry, distance_to_light, falloff, ray_geometry
@@ -142,6 +143,12 @@ def prepare_maps(scene: Scene, parameters: RayMarchParameters) -> Callable[[Scen
     return lambda scene: tuple(cast_shadow_map(scene.geometry, light, map) for light in scene.lights)
 
 
+def marching_errors(parameters: RayMarchParameters, size: tuple[int, int]) -> tuple[ErrorCause, ...]:
+    """Return the causes of its errors, as `realtime.methods.interface.method.Method.error_causes` has them."""
+    without = "shadows" if parameters.shadow == "none" else "map"
+    return ("resolution", {"tolerance": 0.0}), (without, {"shadow": "ray"}), ("steps", None)
+
+
 def _visibility(view: View, maps, number: int, shadow: str):
     """Return the function that says whether the light of a number reaches a point."""
     light = view.lights[number]
@@ -222,7 +229,7 @@ def _march(
             term = weight * media.source(x)
             return index + 1, total + dr.select((width > 0) & lit(point), term, 0)
         weight *= medium.phase.evaluate((foot - x) / r)
-        if light.soft:
+        if light.varies:
             weight *= falloff(geometry, light, x)
         term = per_extinction(medium, lambda sigma_t: weight * dr.exp(-sigma_t * (x + r)))
         return index + 1, total + dr.select((width > 0) & lit(point), term, 0)

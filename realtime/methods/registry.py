@@ -7,7 +7,14 @@ every command and report knows it. `find_method` also finds a user's own, which 
 
 from realtime.errors import InputError
 from realtime.methods.epipolar.method import MinMaxParameters, min_max, prepare_min_max
-from realtime.methods.interface.method import Method, always
+from realtime.methods.froxel_fog.method import (
+    FroxelFogParameters,
+    froxel_errors,
+    froxel_fog,
+    hands_on,
+    prepare_froxel_fog,
+)
+from realtime.methods.interface.method import Method, always, never
 from realtime.methods.light_volumes.method import (
     LightVolumeParameters,
     cull_light_volumes,
@@ -15,7 +22,7 @@ from realtime.methods.light_volumes.method import (
     light_volumes,
     prepare_light_volumes,
 )
-from realtime.methods.ray_march import RayMarchParameters, prepare_maps, ray_march
+from realtime.methods.ray_march import RayMarchParameters, marching_errors, prepare_maps, ray_march
 from realtime.methods.shadow_planes.method import (
     ShadowPlaneParameters,
     cull_shadow_planes,
@@ -33,6 +40,7 @@ METHODS: dict[str, Method] = {
         "one airlight integral a ray and light, no volumetric shadows",
         "Biri, Arques, Michelin 2006, section 4.1; Sun et al. 2005",
         shadows=False,
+        error_causes=lambda parameters, size: (("shadows", None),),
     ),
     "ray-march": Method(
         "ray-march",
@@ -45,6 +53,7 @@ METHODS: dict[str, Method] = {
         casts_rays=lambda parameters: parameters.shadow == "ray",
         by_rays=always,
         parameters=RayMarchParameters,
+        error_causes=marching_errors,
     ),
     "shadow-planes": Method(
         "shadow-planes",
@@ -57,7 +66,14 @@ METHODS: dict[str, Method] = {
         casts_rays=lambda parameters: parameters.evaluation == "vertex",  # to know the triangle of a surface
         provides_visibility=always,
         by_rays=lambda parameters: parameters.evaluation == "pixel",
+        # What is no light's own, and a buffer that rounds, hold for the sum of all lights.
+        lights_at_once=lambda parameters: parameters.buffer == "8bit" or parameters.ambient > 0,
         parameters=ShadowPlaneParameters,
+        error_causes=lambda parameters, size: (
+            ("buffer", {"buffer": "float"}),
+            ("resolution", {"tolerance": 0.0, "evaluation": "pixel"}),
+            ("order", {"order": "exact"}),
+        ),
     ),
     "light-volumes": Method(
         "light-volumes",
@@ -71,6 +87,7 @@ METHODS: dict[str, Method] = {
         by_rays=lambda parameters: parameters.evaluation == "walk",
         frozen=lambda parameters: parameters.evaluation == "walk",  # the crossings of a mesh are counted on the way
         parameters=LightVolumeParameters,
+        error_causes=lambda parameters, size: (("resolution", {"tolerance": 0.0}), ("map", None)),
     ),
     "min-max": Method(
         "min-max",
@@ -80,6 +97,21 @@ METHODS: dict[str, Method] = {
         prepare=prepare_min_max,
         prepared_from=frozenset({"geometry", "light"}),
         parameters=MinMaxParameters,
+        error_causes=lambda parameters, size: (("resolution", {"sampling": "pixels"}), ("map", None)),
+    ),
+    "froxel-fog": Method(
+        "froxel-fog",
+        froxel_fog,
+        "scattered light in a grid along the view, summed front to back: what engines ship",
+        "Wronski 2014; Hillaire 2015",
+        uses_kernel=never,
+        prepare=prepare_froxel_fog,
+        prepared_from=frozenset({"geometry", "light"}),
+        casts_rays=lambda parameters: parameters.shadow == "ray",
+        carries=hands_on,
+        lights_at_once=always,
+        parameters=FroxelFogParameters,
+        error_causes=froxel_errors,
     ),
 }
 

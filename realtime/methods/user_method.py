@@ -18,7 +18,6 @@ import traceback
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import field, make_dataclass, replace
-from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -26,7 +25,7 @@ from typing import Any
 from realtime.errors import InputError
 from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.method import Method, always, never
-from realtime.methods.user_result import check_finite, checked_layers, checked_radiance
+from realtime.methods.user_result import checked_layers, checked_radiance
 from realtime.parameters import Parameters, values
 from realtime.tiles.adaptive_sampling import tolerance
 
@@ -53,7 +52,7 @@ def own_method(name: str) -> Method:
         return replace(
             named_object,
             render=_guarded_render(named_object.render, name, provides_visibility=named_object.provides_visibility),
-            check=named_object.check or partial(check_finite, name=name),
+            name=name,
         )
     if isinstance(named_object, type) or not callable(named_object):
         kind = "class" if isinstance(named_object, type) else type(named_object).__name__
@@ -75,7 +74,6 @@ def own_method(name: str) -> Method:
         by_rays=always if by_rays else None,
         shadows=bool(getattr(named_object, "shadows", True)),
         parameters=make_dataclass("OwnParameters", fields, bases=(Parameters,), frozen=True),
-        check=partial(check_finite, name=name),
     )
 
 

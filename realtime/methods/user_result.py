@@ -76,23 +76,6 @@ def checked_layers(returned: Any, view: View, name: str, *, visibility: bool) ->
     return replace(returned, in_scattered=checked_radiance(returned.in_scattered, view, name))
 
 
-def check_finite(airlight, *, name: str) -> None:
-    """Refuse the image `airlight`, (height, width, 3) [W/(m^2 sr)], with values that are not finite.
-
-    Raises
-    ------
-    InputError
-        With the method's name and the first such pixel.
-    """
-    wrong = ~np.isfinite(airlight).all(axis=2)
-    if wrong.any():
-        row, column = np.argwhere(wrong)[0]
-        raise InputError(
-            f"method {name}: the radiance of {int(wrong.sum())} of {wrong.size} pixels is not finite, first in column "
-            f"{column} of row {row}: {', '.join(f'{value:g}' for value in airlight[row, column])}"
-        )
-
-
 def _dr_channels(returned: Any, name: str) -> tuple[Any, ...]:
     """Return the three channels of a Dr.Jit array."""
     kind = type(returned)

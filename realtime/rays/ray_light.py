@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The geometry of a ray and a light: the foot of the perpendicular, the height, and the cone of a spot.
+"""The geometry of a ray and a light: the foot of the perpendicular, the height, what of the ray is lit, and how much.
 
 With v = l - w origin, the homogeneous vector from the camera to the light (`realtime.scene.lights`), and a unit
 direction d, ``foot = v . d`` and ``height = |v x d|``. For a light at infinity, w = 0, v has unit length, and they are
@@ -13,6 +13,14 @@ multiply-add gives it to 1.5 units in the last place:
 That is as good as v and d are. The rounding errors of both are known, v's from the subtraction and d's from
 `realtime.scene.camera`, and enter to first order: (v + v') x (d + d') = v x d + v' x d + v x d'. A spot's cone needs
 the cross product to twice the digits (`realtime.rays.spot_cone`); a point light does not pay for them.
+
+A light point with the normal n lights what lies before its plane, with the cosine of the angle to n for a profile. From
+the light to the point of the ray at x, s = x - foot from the foot, leads (v x d) x d + s d, hence
+
+    r cos = axial s + offset,     axial = n . d,     offset = n . ((v x d) x d).
+
+Where that is 0 the ray meets the plane. The vector in brackets has the length of the height, so that the cosine is
+right to rounding as close to the light as v x d is.
 """
 
 from dataclasses import dataclass, replace
@@ -33,10 +41,10 @@ class RayGeometry:
 
     foot: Any  #: signed distance along the ray of the foot of the perpendicular from the light [m]; w = 0: a cosine
     height: Any  #: distance from the light to the ray [m]; w = 0: a sine
-    axial: Any = None  #: spot only: cosine between the ray and the axis of the spot
-    offset: Any = None  #: spot only: component along the axis of the vector from the light to the foot [m]
-    enter: Any = None  #: spot only: distance at which the ray enters the cone, -inf if it misses it [m]
-    leave: Any = None  #: spot only: distance at which it leaves the cone, -inf if it misses it [m]
+    axial: Any = None  #: spot, light point: cosine between the ray and the axis, or the normal
+    offset: Any = None  #: spot, light point: component along that of the vector from the light to the foot [m]
+    enter: Any = None  #: spot, light point: distance at which the ray enters what is lit, -inf if it misses it [m]
+    leave: Any = None  #: spot, light point: distance at which it leaves it, -inf if it misses it [m]
     beam_enter: Any = None  #: soft spot only: the same for the cone of full intensity [m]
     beam_leave: Any = None
     slant: Any = None  #: soft spot only: sine between the ray and the axis
@@ -46,13 +54,14 @@ class RayGeometry:
     def lit_segment(self, x0, x1) -> tuple[Any, Any]:
         """Return the part of [x0, x1] that the light could reach, x1 = x0 where there is none [m].
 
-        That is all of it, but for a spot, which lights what is inside its cone. `x1` may be infinite.
+        That is all of it, but for a spot, which lights what is inside its cone, and a light point, which lights what
+        lies before its plane. `x1` may be infinite.
         """
         return (x0, x1) if self.enter is None else _clip(self.enter, self.leave, x0, x1)
 
 
 def ray_geometry(origin, direction, light: Light, *, low=None) -> RayGeometry:
-    """Return foot and height of rays with respect to one light, and where they are in the cone of a spot.
+    """Return foot and height of rays with respect to one light, and where they are in what it lights.
 
     Parameters
     ----------
@@ -79,7 +88,23 @@ def ray_geometry(origin, direction, light: Light, *, low=None) -> RayGeometry:
     cross += dr.cross(v_low, d)
     if low is not None:
         cross += dr.cross(v, low)
-    return RayGeometry(dr.dot(v, d), dr.norm(cross))
+    geometry = RayGeometry(dr.dot(v, d), dr.norm(cross))
+    if light.facing is None:
+        return geometry
+    normal, normal_low = light.facing.normal, light.facing.normal_low
+    away = dr.cross(cross, d)
+    axial = dr.dot(normal, d) + (dr.dot(normal_low, d) if low is None else dr.dot(normal_low, d) + dr.dot(normal, low))
+    return before_plane(geometry, axial, dr.dot(normal, away) + dr.dot(normal_low, away))
+
+
+def before_plane(geometry: RayGeometry, axial, offset) -> RayGeometry:
+    """Return the geometry of rays and a light point; `axial` [1] and `offset` [m] see `RayGeometry`."""
+    meets = geometry.foot - offset / axial
+    # A ray along the plane is before it as a whole, or nowhere.
+    along = axial == 0
+    enter = dr.select(axial > 0, meets, -dr.inf)
+    leave = dr.select(axial < 0, meets, dr.select(along & (offset <= 0), -dr.inf, dr.inf))
+    return replace(geometry, axial=axial, offset=offset, enter=enter, leave=leave)
 
 
 def _spot_geometry(away, direction, direction_low, light: Light) -> RayGeometry:
@@ -88,7 +113,7 @@ def _spot_geometry(away, direction, direction_low, light: Light) -> RayGeometry:
     foot = dr.dot(away[0], direction)
     enter, leave = (foot + s for s in cone_interval(ray, light.cone))
     geometry = RayGeometry(foot, ray.height, ray.axial, ray.offset, enter, leave)
-    if not light.soft:
+    if light.beam is None:
         return geometry
     begin, end = (foot + s for s in cone_interval(ray, light.beam))
     return replace(geometry, beam_enter=begin, beam_leave=end, **axis_distance(ray))
@@ -106,7 +131,7 @@ def smooth_subsegments(geometry: RayGeometry, light: Light, x0, x1):
     A ray that misses the beam is cut where it is closest to the axis: the closer it passes, the more like a kink.
     Valid for any segment.
     """
-    if not light.soft:
+    if light.beam is None:
         return [(x0, x1)]
     inner0, inner1 = _clip(geometry.beam_enter, geometry.beam_leave, x0, x1)
     crosses = geometry.slant > _PARALLEL
@@ -121,13 +146,24 @@ def _clip(enter, leave, x0, x1):
     return begin, dr.maximum(dr.clip(leave, x0, x1), begin)
 
 
-def falloff(geometry: RayGeometry, light: Light, x):
-    """Return the relative intensity of a spot at the point at `x`: Mitsuba's profile, linear in the angle [1].
+def falloff_beside(geometry: RayGeometry, light: Light, s):
+    """Return `falloff` at `s` = x - foot [m]: of a light point, close to which x has not the digits."""
+    if light.facing is None:
+        return falloff(geometry, light, geometry.foot + s)
+    square = dr.fma(s, s, dr.square(geometry.height))
+    return dr.clip(dr.fma(geometry.axial, s, geometry.offset) * dr.rsqrt(square), 0, 1)
 
-    One inside the beam, zero outside the cut-off; between the two, (cutoff - angle) / (cutoff - beam). The angle is
-    that of the distances from the axis and along it: near the axis a cosine alone has lost it.
+
+def falloff(geometry: RayGeometry, light: Light, x):
+    """Return the relative intensity of a light at the point at `x`, for one that varies [1].
+
+    Of a light point it is the cosine at its normal, 0 behind its plane. Of a spot it is Mitsuba's profile, linear in
+    the angle: one inside the beam, zero outside the cut-off; between the two, (cutoff - angle) / (cutoff - beam). The
+    angle is that of the distances from the axis and along it: near the axis a cosine alone has lost it.
     """
     s = x - geometry.foot
+    if light.facing is not None:
+        return falloff_beside(geometry, light, s)
     t = dr.fma(geometry.slant, s, -geometry.slide)
     away = dr.sqrt(dr.fma(t, t, dr.square(geometry.gap)))
     along = dr.fma(geometry.axial, s, geometry.offset)

@@ -14,7 +14,8 @@ Read in this order:
 - `features.py`: what the scene needs of a method;
 - `read_media.py`: reads the media of a Mitsuba scene;
 - `read_scene.py`: reads a Mitsuba scene;
+- `light_points.py`: lights with extent as light points;
 - `animate.py`: the scene after lights, the medium or objects moved.
 
-May import: `realtime.droplets`, `realtime.errors`, `realtime.numerics`.
+May import: `realtime.area_lights`, `realtime.droplets`, `realtime.errors`, `realtime.numerics`.
 """

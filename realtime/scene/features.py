@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What a scene needs of a method: a frame runs the code that these features ask for, no other (DESIGN section 5)."""
 
+from collections import Counter
 from dataclasses import dataclass
 
 
@@ -18,6 +19,7 @@ class SceneFeatures:
     spot_lights: int
     soft_spots: bool  #: a spot's intensity falls off inside its cone
     directional_lights: int = 0
+    area_lights: tuple[str, ...] = ()  #: the shapes of lights with extent: 'rectangle', 'disk' or 'sphere'
     clear: bool = False  #: bounded: nothing fills the space between the media
     notes: tuple[str, ...] = ()  #: what the user should know of this scene
 
@@ -36,6 +38,7 @@ def describe(features: SceneFeatures) -> dict[str, str]:
         ("directional", features.directional_lights),
     )
     lights = [f"{count} {kind}" for kind, count in counts if count]
+    lights += [f"{count} {shape} with extent" for shape, count in Counter(features.area_lights).items()]
     words = {
         "surfaces": "lit surfaces" if features.surfaces else "none: no ray is cast for the camera",
         "shadows": "visibility tests" if features.shadows else "none: nothing casts a shadow",

@@ -8,6 +8,9 @@ its shadow map (`realtime.shadow_maps.projection`), silhouettes and shadow plane
 
 What a directional light lights is media with bounds; the middle of the rectangle across it where these end stands for
 its place (`realtime.scene.directional_extent`).
+
+A light point stands for a part of a light with extent (`realtime.area_lights`). In the direction w it has the intensity
+I0 max(0, n . w), n its normal: it lights the half space before its plane.
 """
 
 import math
@@ -46,11 +49,21 @@ class DirectionalExtent:
 
 
 @dataclass(frozen=True)
+class Facing:
+    """What only a light point has: how the part of a shape that it stands for faces."""
+
+    normal: Any  #: unit normal of the shape, on the side that shines
+    normal_low: Any  #: what rounding took from it
+    lift: Any  #: how far before the shape rays start, so that they do not meet it [m]
+    chord: Any  #: how long a ray is in the shape that goes along the normal, from behind: twice a sphere's radius [m]
+
+
+@dataclass(frozen=True)
 class Light:
     """A light. The arrays hold one entry and are opaque, so a light that moves recompiles nothing.
 
     Which fields are there says what it can be asked: a `cone` clips rays, a `beam` within it makes the intensity vary
-    along them, and a light with an `extent` is at infinity.
+    along them, `facing` does both, and a light with an `extent` is at infinity.
     """
 
     position: Any  #: three-vector; directional: the middle of `extent` [m]
@@ -62,6 +75,8 @@ class Light:
     beam: Any = None  #: soft spot: the `Cone` in which the intensity is full
     inverse_transition: Any = None  #: soft spot: 1 / (cutoff - beam) [1/rad]
     extent: Any = None  #: directional: the `DirectionalExtent` through which all light of the media comes
+    facing: Facing | None = None  #: light point: how its shape faces
+    source: int | None = None  #: light point: the number of its light in `Scene.area_lights`
 
     @property
     def w(self) -> int:
@@ -70,13 +85,20 @@ class Light:
 
     @property
     def kind(self) -> str:
-        """Its name in messages and counts: 'point', 'spot' or 'directional'."""
+        """Its name in messages and counts: 'point', 'spot', 'directional', or 'area' for a light point."""
+        if self.facing is not None:
+            return "area"
         return "spot" if self.cone is not None else "point" if self.w else "directional"
 
     @property
-    def soft(self) -> bool:
-        """Whether the intensity falls off between beam and cut-off; else it is constant on the lit part of a ray."""
-        return self.beam is not None
+    def normal(self) -> Any:
+        """The normal of a light point, a unit vector; None for other lights."""
+        return self.facing.normal if self.facing is not None else None
+
+    @property
+    def varies(self) -> bool:
+        """Whether the intensity varies along a ray, as in a soft spot; else it is constant on the lit part."""
+        return self.beam is not None or self.facing is not None
 
     @property
     def cos_cutoff(self) -> Any:
@@ -100,6 +122,8 @@ class Light:
             away = 2e-6 * self.extent.depth
             return mi.Ray3f(mi.Point3f(point - self.axis * away), mi.Vector3f(-self.axis))
         start = mi.Point3f(self.position)
+        if self.facing is not None:
+            start += mi.Vector3f(self.facing.normal * self.facing.lift)
         direction = mi.Vector3f(point) - mi.Vector3f(start)
         length = dr.norm(direction)
         # Twenty units in the last place before the point: on a surface the point itself must not block the light.
@@ -110,6 +134,22 @@ class Light:
         if self.w:
             return interaction.spawn_ray_to(mi.Point3f(self.position))
         return interaction.spawn_ray(mi.Vector3f(-self.axis))
+
+    def rays_from(self, unit) -> tuple[Any, Any]:
+        """Return where rays from a light that has a place start, and how far from it that is along them [m].
+
+        Those of a light point start beyond the shape that it lies on, so that they do not meet it.
+
+        Parameters
+        ----------
+        unit
+            Unit directions, in any precision.
+        """
+        if self.facing is None:
+            return self.position, 0
+        cosine = dr.dot(unit, self.facing.normal)
+        skipped = dr.maximum(-self.facing.chord * cosine, 0)
+        return self.position + self.facing.normal * dr.mulsign(self.facing.lift, cosine) + unit * skipped, skipped
 
     def without_cone(self) -> "Light":
         """Return the light all around of which a spot shows a cone."""

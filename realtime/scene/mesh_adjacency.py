@@ -11,7 +11,7 @@ first, and each pair is one entry of `Casters.edges`; one that finds no partner 
 triangles meet two entries: their sum is the same whichever way they are paired.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -22,6 +22,8 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from realtime.area_lights.caster import caster_triangles, caster_vertices
+from realtime.area_lights.shape import AreaLight
 from realtime.errors import InputError
 
 Array = NDArray[np.float64]
@@ -51,22 +53,38 @@ class Casters:
         """The number that stands for no triangle."""
         return len(self.triangles)
 
+    def of_shape(self, name: str) -> NDArray[np.bool_]:
+        """Return which components are of a shape."""
+        firsts = np.array([first for _, first, _ in self.shapes])
+        owner = np.searchsorted(firsts, self.triangles[:, 0], side="right") - 1
+        numbers = [number for number, (own, _, _) in enumerate(self.shapes) if own == name]
+        result = np.zeros(len(self.closed), dtype=bool)
+        result[self.component[np.isin(owner, numbers)]] = True
+        return result
 
-def read_casters(scene) -> Casters:
+
+def read_casters(scene, area_lights: Sequence[AreaLight] = ()) -> Casters:
     """Read the triangles of a Mitsuba scene.
 
     Parameters
     ----------
     scene
         An `mi.Scene`; shapes whose surface lets light pass (`null`) cast no shadow.
+    area_lights
+        Its lights with extent: those that are opaque have triangles even where their shapes have none.
 
     Raises
     ------
     InputError
         For a shape that has no triangles, with its name.
     """
+    known = {light.name: light for light in area_lights}
     meshes = []
     for shape in scene.shapes():
+        if shape.is_emitter() and shape.id() in known:
+            light = known[shape.id()]
+            meshes.append((light.name, caster_vertices(light), caster_triangles(light)))
+            continue
         if shape.bsdf() is not None and mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.Null):
             continue
         meshes.append((shape.id(), *_triangles(shape)))

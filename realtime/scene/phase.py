@@ -446,7 +446,7 @@ def named_phase(words: str, *, g=None, values=None, Float: Any = None) -> Phase:
     if name == HenyeyGreenstein.name:
         return HenyeyGreenstein((Float or mi.Float)(numbers[0]) if numbers else g)
     if name == Tabulated.name:
-        return tabulated(values)
+        return Tabulated(values) if values is None else tabulated(values)
     return {phase.name: phase for phase in PHASES}[name]()
 
 

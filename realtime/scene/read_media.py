@@ -36,6 +36,8 @@ def sort_shapes(scene):
     opaque, boundaries = [], []
     for shape in scene.shapes():
         bsdf, name = shape.bsdf(), shape.id()
+        if shape.is_emitter() and bsdf.class_name() == "Null":
+            continue  # light and nothing else: `realtime.area_lights.read` says what it must be
         bounds = shape.interior_medium() is not None or shape.exterior_medium() is not None
         if bsdf.class_name() != "Null":
             if bounds:

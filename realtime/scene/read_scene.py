@@ -13,6 +13,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from realtime.area_lights.read import is_area_light, read_area_light
+from realtime.area_lights.shape import AreaLight
 from realtime.errors import InputError
 from realtime.numerics.array_types import ArrayTypes, array_types, is_single
 from realtime.scene.camera import Camera
@@ -31,10 +33,11 @@ class Scene:
     geometry: Any  #: an `mi.Scene` of all opaque shapes, for casting rays
     camera: Camera
     medium: Medium
-    lights: tuple[Light, ...]
+    lights: tuple[Light, ...]  #: those without extent
     features: SceneFeatures
     facets: Facets | None = None  #: the triangles, where a table says all that shading needs
     positions: Mapping[str, Any] = field(default_factory=dict)  #: vertices of the shapes that moved, by name [m]
+    area_lights: tuple[AreaLight, ...] = ()  #: those with extent, of which methods render points
 
 
 def read_scene(scene, precision: str = "single") -> Scene:
@@ -57,21 +60,27 @@ def read_scene(scene, precision: str = "single") -> Scene:
     opaque, boundaries = sort_shapes(scene)
     medium = read_medium(sensor, boundaries, types)
     if not scene.emitters():
-        raise InputError("the scene has no light; wanted at least one emitter of type 'point', 'spot' or 'directional'")
+        raise InputError(
+            "the scene has no light; wanted at least one emitter of type 'point', 'spot', 'directional' or 'area'"
+        )
     lights = tuple(
         _read_directional(emitter, medium, opaque, types)
         if emitter.class_name() == "DirectionalEmitter"
         else _read_light(emitter, types)
         for emitter in scene.emitters()
+        if not is_area_light(emitter)
     )
+    here = np.array(camera.origin, dtype=np.float64).ravel()
+    area_lights = tuple(read_area_light(shape, here) for shape in scene.shapes() if shape.is_emitter())
     geometry = opaque_scene(scene, opaque)
     return Scene(
         geometry,
         camera,
         medium,
         lights,
-        _scene_features(scene, opaque, medium, lights),
+        _scene_features(scene, opaque, medium, lights, area_lights),
         read_facets(geometry, types),
+        area_lights=area_lights,
     )
 
 
@@ -103,8 +112,8 @@ def _read_light(emitter, types: ArrayTypes) -> Light:
     kind = {"PointLight": "point", "SpotLight": "spot"}.get(emitter.class_name())
     if kind is None:
         raise InputError(
-            f"the scene has an emitter of class {emitter.class_name()}; wanted emitters of type 'point', 'spot' or "
-            "'directional' only: replace it or remove it"
+            f"the scene has an emitter of class {emitter.class_name()}; wanted emitters of type 'point', 'spot', "
+            "'directional' or 'area' only: replace it or remove it"
         )
     parameters = mi.traverse(emitter)
     if "intensity.value" not in parameters or (kind == "spot" and "texture.value" not in parameters):
@@ -162,7 +171,9 @@ def _read_angles(parameters) -> tuple[float, float]:
     return cutoff, beam
 
 
-def _scene_features(scene, opaque, medium: Medium, lights: tuple[Light, ...]) -> SceneFeatures:
+def _scene_features(
+    scene, opaque, medium: Medium, lights: tuple[Light, ...], area_lights: tuple[AreaLight, ...]
+) -> SceneFeatures:
     notes = camera_notes(scene)
     for shape in opaque:
         flags = shape.bsdf().flags()
@@ -172,7 +183,8 @@ def _scene_features(scene, opaque, medium: Medium, lights: tuple[Light, ...]) ->
             )
     media = [bounded_medium.medium for bounded_medium in medium.bounded_media] + [medium] * (not medium.clear)
     return SceneFeatures(
-        shadows=bool(opaque),
+        # A light never shadows itself.
+        shadows=len(opaque) > (1 if len(area_lights) == 1 and area_lights[0].opaque and not lights else 0),
         surfaces=bool(opaque),
         extinctions=len(medium.sigma_t),
         isotropic=all(filling.phase.constant for filling in media),
@@ -182,6 +194,7 @@ def _scene_features(scene, opaque, medium: Medium, lights: tuple[Light, ...]) ->
         point_lights=sum(light.kind == "point" for light in lights),
         spot_lights=sum(light.kind == "spot" for light in lights),
         directional_lights=sum(light.kind == "directional" for light in lights),
-        soft_spots=any(light.soft for light in lights),
+        soft_spots=any(light.beam is not None for light in lights),
+        area_lights=tuple(light.kind for light in area_lights),
         notes=tuple(dict.fromkeys(notes)),
     )

@@ -8,6 +8,7 @@ Read in this order:
 - `pieces.py`: smooth pieces of lit intervals in bounded media;
 - `adaptive_panels.py`: panels that are halved until a sum meets its tolerance;
 - `bounded.py`: sums over lit intervals in bounded media;
+- `light_airlight.py`: the airlight of one point or spot light;
 - `directional_sums.py`: the same for directional lights;
 - `directional_airlight.py`: the airlight of one directional light;
 - `surface.py`: the lit surface behind the medium;

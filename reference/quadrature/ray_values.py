@@ -17,23 +17,17 @@ shadow rays left in doubt. For directional lights the share of a ray takes the p
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.geometry import foot_and_height
-from reference.quadrature.bounded import sum_media
 from reference.quadrature.directional_airlight import directional_airlight
-from reference.quadrature.segments import camera_segments, scattering_range
+from reference.quadrature.light_airlight import light_airlight
 from reference.quadrature.surface import lit_surface, surface_hits
-from reference.quadrature.unbounded import Rays, sum_intervals
-from reference.scene.read import TruthLight, TruthScene
+from reference.scene.read import TruthScene
 from reference.scene.shapes import Shapes, read_shapes
 from reference.visibility.exact_distance import exact_distance
-from reference.visibility.intervals import LitIntervals, RandomChecks
-from reference.visibility.lit_intervals import lit_intervals
-from reference.visibility.spot_cone import cone_interval, perpendicular
+from reference.visibility.intervals import RandomChecks
 from reference.visibility.surface_shadows import reached_by_shadow_rays
 
 Array = NDArray[np.float64]
@@ -135,7 +129,7 @@ def ray_values(
     how = {"samples": samples, "edges": edges, "shapes": shapes}
     total = len(truth.lights) + len(truth.directional)
     for number, light in enumerate(truth.lights):
-        received = _light_airlight(truth, light, hits.distance, shadow_scale=shadow_scale, how=how)
+        received = light_airlight(truth, light, hits.distance, shadow_scale=shadow_scale, how=how)
         airlight += received.radiance
         bound += received.bound
         light_angle = np.minimum(light_angle, received.angle)
@@ -161,66 +155,3 @@ def ray_values(
             progress(number + 1, total, "quadrature")
     surface = lit_surface(truth, hits, reached=reached, shadow_scale=shadow_scale)
     return RayValues(airlight, bound, surface, cast, light_angle, intervals, transitions, RandomChecks.of_all(checks))
-
-
-@dataclass(frozen=True)
-class _LightAirlight:
-    radiance: Array
-    bound: Array
-    angle: Array
-    lit: LitIntervals
-    reached: NDArray[np.bool_] | None  #: whether the light reaches the end of the ray; None if that was not looked at
-
-
-def _light_airlight(
-    truth: TruthScene, light: TruthLight, distance: Array, *, shadow_scale: float, how: dict[str, Any]
-) -> _LightAirlight:
-    """Compute the airlight of one light; `how` the lit intervals are found is what `lit_intervals` takes for it."""
-    direction = truth.direction
-    foot, height = foot_and_height(np.broadcast_to(truth.origin, direction.shape), direction, light.position)
-    normal = perpendicular(truth.origin, direction, light)
-    theta0 = np.arctan2(-foot, height)
-    ended = np.isfinite(distance)
-    theta1 = np.where(ended, np.arctan2(np.where(ended, distance, 0) - foot, height), np.pi / 2)
-    cone = cone_interval(direction, normal, light, light.cutoff)
-    ends = np.maximum(theta0, cone[0]), np.minimum(theta1, cone[1])
-    segments = camera_segments(truth, distance) if truth.media else None
-    if segments is not None:
-        first, last = (np.arctan2(x - foot, height) for x in scattering_range(segments))
-        ends = np.maximum(ends[0], first), np.minimum(ends[1], last)
-    lit = lit_intervals(truth, light, (direction, normal, height), ends=ends, **how)
-    rays = Rays(direction, normal, foot, height)
-    if segments is None:
-        radiance, bound = sum_intervals(truth.medium, light, rays, lit, shadow_scale)
-    else:
-        radiance, bound = sum_media(truth, light, rays, lit, segments, shadow_scale=shadow_scale)
-    in_front = (foot > 0) & (foot < distance)
-    angle = np.where(in_front, np.arctan2(height, foot), np.pi)
-    bound += _worth_of_doubt(light, rays, lit, truth)
-    # Intervals end at a bound of the media, not at the surface, where there are any.
-    reached = None if segments is not None else _reach(lit, theta1)
-    return _LightAirlight(radiance, bound, angle, lit, reached)
-
-
-def _reach(lit: LitIntervals, end: Array) -> NDArray[np.bool_]:
-    """Return by ray whether its last lit interval goes on to an angle."""
-    last = np.full(len(end), -np.inf)
-    np.maximum.at(last, lit.ray, lit.high)
-    return last >= end - 1e-12
-
-
-def _worth_of_doubt(light: TruthLight, rays: Rays, lit: LitIntervals, truth: TruthScene) -> Array:
-    """Return the most that the angles which the shadow rays left in doubt can be worth, (rays, 3).
-
-    In theta the integrand of J is exp(-sigma_t (x + r)) p / height; the exponential is at most one, and the phase
-    function at most its largest value.
-    """
-    worth = np.zeros((len(rays.foot), 3))
-    if lit.doubt is None:
-        return worth
-    ray, _, width = lit.doubt
-    for medium in (truth.medium, *truth.media):
-        strongest = medium.phase(np.linspace(-1, 1, 1001)).max()
-        factor = medium.albedo * medium.sigma_t * light.intensity / (4 * np.pi) * strongest
-        np.add.at(worth, ray, (width / rays.height[ray])[:, None] * factor)
-    return worth

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.quadrature.segments import optical_depth
+from reference.scene.area_light import is_area
 from reference.scene.directional_light import DirectionalLight, is_directional
 from reference.scene.read import TruthScene
 
@@ -68,7 +69,8 @@ def lit_surface(
         seen = np.where(np.isfinite(hits.distance), hits.distance, 0.0)
         point = truth.origin + seen[:, None] * truth.direction
         to_camera = optical_depth(truth, truth.origin, truth.direction, np.zeros(len(seen)), seen)
-    near = [emitter for emitter in truth.scene.emitters() if not is_directional(emitter)]
+    emitters = truth.scene.emitters()
+    near = [emitter for emitter in emitters if not is_directional(emitter) and not is_area(emitter)]
     for emitter, light, reaches in zip(near, truth.lights, reached, strict=True):
         towards, arriving = emitter.sample_direction(interaction, mi.Point2f(0.5))
         facing = interaction.is_valid()

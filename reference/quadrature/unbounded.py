@@ -25,7 +25,12 @@ class Rays:
 
 
 def sum_intervals(
-    medium: TruthMedium, light: TruthLight, rays: Rays, lit: LitIntervals, shadow_scale: float
+    medium: TruthMedium,
+    light: TruthLight,
+    rays: Rays,
+    lit: LitIntervals,
+    shadow_scale: float,
+    rtol: float = 1e-10,
 ) -> tuple[Array, Array]:
     """Integrate every lit interval and add up the intervals of each ray.
 
@@ -41,6 +46,8 @@ def sum_intervals(
         Their lit intervals, in angles at the light [rad].
     shadow_scale
         The share of the leg from the light that is attenuated over.
+    rtol
+        Relative tolerance of each integral [1].
 
     Returns
     -------
@@ -68,6 +75,7 @@ def sum_intervals(
             medium.phase,
             shadow_scale=shadow_scale,
             weight=profile if light.is_soft else None,
+            rtol=rtol,
         )
         errors[channel] += lit.edge * _edge_worth(rays, ray, (x0, x1), float(sigma_t), medium)
     factor = medium.albedo * medium.sigma_t * light.intensity / (4 * np.pi)
@@ -135,7 +143,7 @@ def lit_stretches(light: TruthLight, rays: Rays, lit: LitIntervals) -> tuple[NDA
 
 def _cut_at_beam(light: TruthLight, rays: Rays, lit: LitIntervals) -> tuple[NDArray[np.int64], Array, Array]:
     """Cut the intervals at the cone of full intensity, where the profile of a soft spot has its kinks."""
-    if not light.is_soft:
+    if not light.is_soft or light.cosine:
         return lit.ray, lit.low, lit.high
     inner0, inner1 = cone_interval(rays.direction[lit.ray], rays.normal[lit.ray], light, light.beam)
     # Where the ray misses the beam the profile is smooth but for the middle of the cone, where it peaks: cut there.

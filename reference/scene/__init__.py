@@ -8,6 +8,7 @@ Read in this order:
 - `camera.py`: directions of rays through positions on the film;
 - `convex_bounds.py`: convex bounds of media, read and checked;
 - `directional_light.py`: directional lights: direction and irradiance;
+- `area_light.py`: lights with extent, read and checked;
 - `read.py`: the whole scene: lights, media, camera rays;
 - `shapes.py`: opaque shapes as triangles and spheres;
 - `shadow_epsilon.py`: how far short of the light Mitsuba's shadow rays end.

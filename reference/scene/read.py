@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from analytic.phase import PhaseFunction
+from reference.scene.area_light import TruthAreaLight, is_area, read_area_light
 from reference.scene.camera import camera_matrix, film_directions, pixel_centres
 from reference.scene.convex_bounds import Bounds, holds, overlap, read_bounds
 from reference.scene.directional_light import DirectionalLight, endless_medium, is_directional, read_directional
@@ -25,18 +26,19 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class TruthLight:
-    """A point or spot light."""
+    """A point or spot light, or a point of a light with extent."""
 
     position: Array  #: [m]
     intensity: Array  #: radiant intensity on the axis [W/sr], RGB
-    axis: Array | None = None  #: spot: unit vector
+    axis: Array | None = None  #: spot: unit vector; of a point of a light with extent the normal
     cutoff: float = np.pi  #: spot: half angle of the cone [rad]
     beam: float = np.pi  #: spot: half angle of full intensity [rad]
+    cosine: bool = False  #: whether the intensity falls off as the cosine of the angle to the axis
 
     @property
     def is_soft(self) -> bool:
-        """Whether the intensity falls off between beam and cut-off."""
-        return self.axis is not None and self.beam < self.cutoff
+        """Whether the intensity falls off within the cone."""
+        return self.cosine or (self.axis is not None and self.beam < self.cutoff)
 
 
 @dataclass(frozen=True)
@@ -71,6 +73,7 @@ class TruthScene:
     lights: tuple[TruthLight, ...]  #: point and spot lights
     media: tuple[BoundedMedium, ...] = ()  #: the media with bounds, disjoint
     directional: tuple[DirectionalLight, ...] = ()  #: directional lights; all media then have bounds
+    area: tuple[TruthAreaLight, ...] = ()  #: lights with extent
 
 
 def read_truth(scene) -> TruthScene:
@@ -85,15 +88,18 @@ def read_truth(scene) -> TruthScene:
         raise InputError("the scene has no camera; wanted a sensor of type 'perspective'")
     sensor = scene.sensors()[0]
     width, height = (int(n) for n in sensor.film().size())
-    far, near = (
-        tuple(emitter for emitter in scene.emitters() if is_directional(emitter) == kind) for kind in (True, False)
-    )
-    if not far + near:
-        raise InputError("the scene has no light; wanted at least one emitter of type 'point', 'spot' or 'directional'")
+    far = tuple(emitter for emitter in scene.emitters() if is_directional(emitter))
+    wide = tuple(emitter for emitter in scene.emitters() if is_area(emitter))
+    near = tuple(emitter for emitter in scene.emitters() if not is_directional(emitter) and not is_area(emitter))
+    if not far + near + wide:
+        raise InputError(
+            "the scene has no light; wanted at least one emitter of type 'point', 'spot', 'directional' or 'area'"
+        )
     lights = tuple(_read_light(emitter) for emitter in near)
+    origin = camera_matrix(sensor)[:3, 3]
+    area = tuple(read_area_light(emitter, origin) for emitter in wide)
     opaque, boundaries = _sorted_shapes(scene)
     media = tuple(_read_bounded(shape) for shape in boundaries)
-    origin = camera_matrix(sensor)[:3, 3]
     _check_disjoint(media)
     medium = _read_ambient(sensor, origin, media, boundaries)
     if far and np.any(medium.sigma_t > 0):
@@ -109,6 +115,7 @@ def read_truth(scene) -> TruthScene:
         lights=lights,
         media=media,
         directional=tuple(read_directional(emitter) for emitter in far),
+        area=area,
     )
 
 
@@ -214,7 +221,8 @@ def _read_light(emitter) -> TruthLight:
     name = emitter.class_name()
     if name not in ("PointLight", "SpotLight"):
         raise InputError(
-            f"the scene has an emitter of class {name}; wanted emitters of type 'point', 'spot' or 'directional' only"
+            f"the scene has an emitter of class {name}; wanted emitters of type 'point', 'spot', 'directional' or "
+            "'area' only"
         )
     parameters = mi.traverse(emitter)
     matrix = np.array(emitter.world_transform().matrix, dtype=np.float64).reshape(4, 4)

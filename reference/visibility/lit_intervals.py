@@ -50,6 +50,7 @@ _BISECTIONS = 26  # theta range / 256 / 2^26 < 1e-10 rad: below the float32 roun
 _CHUNK = 1 << 22  # rays cast at once
 _PARTS = 4  # a suspicious cell is cut into so many
 _LEVELS = 2  # so many times
+_CLEAR = 1e-5  # of the largest coordinate: float32 rounding is 1e-7 of it
 _STEEP = 4.0  # a surface seen within atan(1/4) = 14 degrees of grazing, or a jump, may hide an edge
 
 
@@ -74,6 +75,7 @@ def lit_intervals(
     samples: int = 256,
     edges: str = "auto",
     shapes: Shapes | None = None,
+    checks: int | None = None,
 ) -> LitIntervals:
     """Find the lit intervals of rays between two angles, and have them checked.
 
@@ -94,6 +96,8 @@ def lit_intervals(
         "geometry": exactly, from triangles and spheres. "rays": by casting rays. "auto": by geometry where it can be.
     shapes
         What `reference.scene.shapes.read_shapes` returned for the occluders, if known.
+    checks
+        Random samples of each ray; an eighth of `samples` if None.
 
     Raises
     ------
@@ -105,18 +109,24 @@ def lit_intervals(
     By geometry, valid for all scenes of opaque meshes, rectangles and spheres. By casting rays, valid where shadows
     along a ray are wider than (high - low)/samples in theta; the random checks measure what is not.
     """
-    return found_intervals(
-        truth, _point_legs(truth, light, rays, ends), ends=ends, samples=samples, edges=edges, shapes=shapes
-    )
+    how: dict[str, Any] = {"samples": samples, "edges": edges, "shapes": shapes, "checks": checks}
+    return found_intervals(truth, _point_legs(truth, light, rays, ends), ends=ends, **how)
 
 
 def _point_legs(truth: TruthScene, light: TruthLight, rays: tuple[Array, Array, Array], ends: tuple[Array, Array]):
     return Legs(
-        _shadow_rays(light.position, rays),
+        _shadow_rays(_start(light), rays),
         point_leg(light.position, rays),
         lambda ray, distance: np.log(distance),
         lambda shapes: geometric_intervals(truth, light, rays, ends=ends, shapes=shapes),
     )
+
+
+def _start(light: TruthLight) -> Array:
+    """Return where the shadow rays of a light start: from a light with extent, clear of float32 shapes in its plane."""
+    if not light.cosine or light.axis is None:
+        return light.position
+    return light.position + _CLEAR * (1 + np.abs(light.position).max()) * light.axis
 
 
 def point_leg(position: Array, rays: tuple[Array, Array, Array]) -> Leg:
@@ -131,7 +141,14 @@ def point_leg(position: Array, rays: tuple[Array, Array, Array]) -> Leg:
 
 
 def found_intervals(
-    truth: TruthScene, legs: Legs, *, ends: tuple[Array, Array], samples: int, edges: str, shapes: Shapes | None
+    truth: TruthScene,
+    legs: Legs,
+    *,
+    ends: tuple[Array, Array],
+    samples: int,
+    edges: str,
+    shapes: Shapes | None,
+    checks: int | None = None,
 ) -> LitIntervals:
     """Find and check the lit intervals of rays for any light.
 
@@ -143,7 +160,7 @@ def found_intervals(
         The legs from the light to points of the rays.
     ends
         Between which the rays are looked at, (rays,) each, in the variable of the legs: an angle [rad], or a share.
-    samples, edges, shapes
+    samples, edges, shapes, checks
         As in `lit_intervals`.
 
     Raises
@@ -153,34 +170,35 @@ def found_intervals(
     """
     if edges not in ("auto", "geometry", "rays"):
         raise InputError(f"edges is '{edges}'; wanted 'geometry', 'rays' or 'auto'")
+    checks = max(1, samples // 8) if checks is None else checks
     low, high = ends
     used = np.flatnonzero(high > low)
     if not truth.occluders.shapes() or not len(used):
         return LitIntervals(used, low[used], high[used], 0, edge=0.0)
     if edges == "rays":
-        return _cast_intervals(truth.occluders, legs, ends, samples)
+        return _cast_intervals(truth.occluders, legs, ends, samples, checks)
     shapes = read_shapes(truth.occluders) if shapes is None else shapes
     if edges == "geometry":
         refuse_others(shapes)
     if shapes.others is not None and not shapes.single:
-        return _cast_intervals(shapes.others, legs, ends, samples)
+        return _cast_intervals(shapes.others, legs, ends, samples, checks)
     exact = legs.exact(shapes)
     others = None
     if shapes.others is not None:
         others = _visible(shapes.others, legs.shadow)
-        exact = intersected(exact, _cast_intervals(shapes.others, legs, ends, samples), ends)
+        exact = intersected(exact, _cast_intervals(shapes.others, legs, ends, samples, checks), ends)
     return checked_geometry(
         exact,
         _visible(truth.occluders, legs.shadow),
         (legs.single, shapes),
         ends=ends,
-        checks=max(1, samples // 8),
+        checks=checks,
         others=others,
         rounding=legs.rounding,
     )
 
 
-def _cast_intervals(scene, legs: Legs, ends: tuple[Array, Array], samples: int) -> LitIntervals:
+def _cast_intervals(scene, legs: Legs, ends: tuple[Array, Array], samples: int, checks: int) -> LitIntervals:
     """Find lit intervals by casting rays in a scene, and have them checked and mended."""
     used = np.flatnonzero(ends[1] > ends[0])
     visible = _visible(scene, legs.shadow)
@@ -190,7 +208,6 @@ def _cast_intervals(scene, legs: Legs, ends: tuple[Array, Array], samples: int) 
         _toggles(visible, hits, ends, used[start : start + per_chunk], samples)
         for start in range(0, len(used), per_chunk)
     ]
-    checks = max(1, samples // 8)
     return checked_cast(Toggles.joined(chunks), Rounding(visible, _bisect), ends=ends, checks=checks)
 
 

@@ -73,15 +73,32 @@ def sphere_shadows(spheres: tuple[Array, Array], direction: Array, normal: Array
     tangent = half_chord(distance, radius)[sphere]  # T^2 = |C|^2 - R^2: the same product, with both swapped
 
     outside = ~inside
-    hidden = [_hidden_behind(ray[outside], *(part[outside] for part in (c_y, c_z, disk, height[ray], tangent)))]
+    hidden = [hidden_behind(ray[outside], *(part[outside] for part in (c_y, c_z, disk, height[ray], tangent)))]
     if inside.any():
-        hidden += _hidden_from_inside(ray[inside], *(part[inside] for part in (c_y, c_z, disk, height[ray])))
+        hidden += hidden_from_inside(ray[inside], *(part[inside] for part in (c_y, c_z, disk, height[ray])))
     rows, low, high = (np.concatenate(parts) for parts in zip(*hidden, strict=True))
     return rows, low, high
 
 
-def _hidden_behind(ray: Index, c_y: Array, c_z: Array, disk: Array, height: Array, tangent: Array) -> Shadows:
-    """Return what disks hide of rays from a light outside."""
+def hidden_behind(ray: Index, c_y: Array, c_z: Array, disk: Array, height: Array, tangent: Array) -> Shadows:
+    """Return what disks hide of rays from a light outside.
+
+    Parameters
+    ----------
+    ray
+        Number of the ray of each disk, (n,).
+    c_y, c_z, disk
+        Components of the centre and radius of the disk in the plane of the ray, (n,) each [m].
+    height
+        Of the rays, (n,) [m].
+    tangent
+        Length of the tangents from the light, (n,) [m].
+
+    Returns
+    -------
+    ray, low, high
+        As `sphere_shadows`.
+    """
     middle, half = np.arctan2(c_z, c_y), np.arctan2(disk, tangent)
     chord = half_chord(disk, np.abs(height - c_y))
     ends = []
@@ -94,8 +111,19 @@ def _hidden_behind(ray: Index, c_y: Array, c_z: Array, disk: Array, height: Arra
     return ray[dark], ends[0][dark], ends[1][dark]
 
 
-def _hidden_from_inside(ray: Index, c_y: Array, c_z: Array, disk: Array, height: Array) -> list[Shadows]:
-    """Return what rays hide from a light inside of a disk: all that lies before it and behind it."""
+def hidden_from_inside(ray: Index, c_y: Array, c_z: Array, disk: Array, height: Array) -> list[Shadows]:
+    """Return what disks hide of rays from a light inside: all that lies before the disk and behind it.
+
+    Parameters
+    ----------
+    ray, c_y, c_z, disk, height
+        As in `hidden_behind`.
+
+    Returns
+    -------
+    list
+        Two results like that of `sphere_shadows`.
+    """
     quarter = 0.5 * np.pi
     chord = half_chord(disk, np.abs(height - c_y))
     enters, leaves = np.arctan2(c_z - chord, height), np.arctan2(c_z + chord, height)

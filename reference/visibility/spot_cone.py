@@ -75,7 +75,7 @@ def cone_interval(direction: Array, normal: Array, light: TruthLight, angle: flo
 
 
 def falloff(theta: Array, direction: Array, normal: Array, light: TruthLight) -> Array:
-    """Return Mitsuba's spot profile: one in the beam, then linear in the angle down to the cut-off.
+    """Return Mitsuba's spot profile: one in the beam, then linear in the angle down to the cut-off; or the cosine.
 
     Parameters
     ----------
@@ -91,6 +91,9 @@ def falloff(theta: Array, direction: Array, normal: Array, light: TruthLight) ->
     numpy.ndarray
         Intensity over that on the axis [1], (rays, angles).
     """
+    if light.axis is not None and light.cosine:
+        axial, across = (direction @ light.axis)[:, None], (normal @ light.axis)[:, None]
+        return np.maximum(axial * np.sin(theta) + across * np.cos(theta), 0.0)
     if light.axis is None or light.beam >= light.cutoff:
         return np.ones_like(theta)
     axial, across = (direction @ light.axis)[:, None], (normal @ light.axis)[:, None]

@@ -258,7 +258,7 @@ def _shadows(
 ) -> tuple[Index, Array, Array]:
     """Return the rays and the intervals of theta that triangles hide."""
     row, first, second = plane_sections(corners, rays[:2], pairs)
-    return _clipped(row, first, second, rays[2][row])
+    return clipped(row, first, second, rays[2][row])
 
 
 def plane_sections(
@@ -281,8 +281,29 @@ def plane_sections(
         Number of the ray, and (y, z) of both ends [m], (segments,) each.
     """
     row, triangle = pairs
+    return sections_of(corners[triangle], axes, row)
+
+
+def sections_of(
+    chosen: Array, axes: tuple[Array, Array], row: Index
+) -> tuple[Index, tuple[Array, Array], tuple[Array, Array]]:
+    """Return the segments in which triangles meet planes, a triangle for each plane that is looked at.
+
+    Parameters
+    ----------
+    chosen
+        Corners relative to a point of the plane, (pairs, 3, 3) [m].
+    axes
+        Unit vectors along z and along y, which span the planes, (rays, 3) each.
+    row
+        Number of the ray whose plane each triangle is cut by, (pairs,).
+
+    Returns
+    -------
+    row, first, second
+        As `plane_sections`, in the order of the pairs.
+    """
     direction, normal = axes
-    chosen = corners[triangle]
     side = _components(chosen, np.cross(direction, normal)[row])
     above = side >= 0
     count = above.sum(axis=0)
@@ -308,8 +329,23 @@ def _crossing(a: Index, b: Index, side: Array, parts: tuple[Array, Array]) -> tu
     return first, second
 
 
-def _clipped(row: Index, a: tuple[Array, Array], b: tuple[Array, Array], height: Array) -> tuple[Index, Array, Array]:
-    """Clip the segments from a to b to 0 < y <= height and return the angles of what is left."""
+def clipped(row: Index, a: tuple[Array, Array], b: tuple[Array, Array], height: Array) -> tuple[Index, Array, Array]:
+    """Clip the segments from a to b to 0 < y <= height and return the angles of what is left.
+
+    Parameters
+    ----------
+    row
+        Number of the ray of each segment, (n,).
+    a, b
+        Components y and z of both ends, (n,) each [m].
+    height
+        Of the rays, (n,) [m].
+
+    Returns
+    -------
+    row, low, high
+        Numbers of the rays and angles in [-pi/2, pi/2] [rad], of the segments of which something is left.
+    """
     (y0, z0), (y1, z1) = a, b
     swap = y0 > y1
     y0, y1, z0, z1 = np.where(swap, y1, y0), np.where(swap, y0, y1), np.where(swap, z1, z0), np.where(swap, z0, z1)

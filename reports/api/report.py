@@ -3,11 +3,10 @@
 
 import os
 from collections.abc import Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 from analytic.errors import InputError, nearest
-from reports.api.inputs import Progress, one_error, opened, telling
+from reports.api.inputs import Progress, one_error, telling
 from reports.api.studies import MethodLike, chosen_methods, several
 
 if TYPE_CHECKING:
@@ -63,6 +62,7 @@ def report(
     from reports.api.tables import Report
     from reports.machine.environment import activate
     from reports.machine.progress import Interrupted
+    from reports.report.asked import notes_on, scenes_of_images
     from reports.report.measure import write_report
     from validation.configurations.methods import QUICK, STANDARD
     from validation.frames.scene_study import EFFORTS
@@ -73,7 +73,9 @@ def report(
     activate()
     usual = QUICK if effort == "quick" else STANDARD
     chosen = usual if methods is None else chosen_methods(methods)
-    names, shown = _scenes_and_images(scenes, images, effort)
+    asked = None if scenes is None else [os.fspath(path) for path in several(scenes)]
+    names, shown = scenes_of_images(asked, images, EFFORTS[effort].scenes)
+    notes_on(names)
     try:
         with telling(progress, "report") as callback:
             data = write_report(
@@ -89,23 +91,3 @@ def report(
     except Interrupted as stop:
         raise KeyboardInterrupt(str(stop)) from None
     return Report(folder=target, data=data)
-
-
-def _scenes_and_images(scenes: Any, images: Any, effort: str) -> tuple[list[str], dict[str, Any]]:
-    """Return the scenes to study, by default those of the images; refuse unusable input."""
-    from realtime.scene.read_scene import read_scene
-    from validation.comparison.engine_images import find_images
-    from validation.frames.scene_study import EFFORTS
-    from validation.scenes.registry import SCENES
-
-    asked = [os.fspath(path) for path in several(scenes)] if scenes else []
-    names = asked or list(EFFORTS[effort].scenes)
-    shown: dict[str, Any] = {}
-    if images is not None:
-        shown = find_images(images, {Path(name).stem: name for name in [*SCENES, *asked]})
-        names = asked or list(shown)
-        stems = {Path(name).stem for name in names}
-        shown = {name: files for name, files in shown.items() if name in stems}
-    for name in names:
-        read_scene(opened(name, (8, 6)).scene)
-    return names, shown

@@ -3,6 +3,7 @@
 
 Read in this order:
 
+- `start.py`: the entry of the command, signals first
 - `main.py`: the command line: the commands, and how mistakes are reported
 - `printing.py`: how commands print the tables of one run
 - `options.py`: options that several commands have

@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`airlight bench [SCENE...]`: speed against error."""
+"""`airlight bench [SCENE...]`: speed against error, and errors by their causes."""
 
 import sys
 from functools import partial
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Any
 
 import typer
 
-from reports.commands.options import USUAL_LIMIT, Force, MethodLimit
+from reports.commands.options import USUAL_LIMIT, Force, MethodLimit, listed
 
 _BATCHES = 4096  # at most: a comparison ends earlier if its interval is narrow enough
 
@@ -23,6 +24,13 @@ def bench(
     estimators: Annotated[
         bool, typer.Option("--estimators", help="Time single-scatter and volpath at equal error.")
     ] = False,
+    decompose: Annotated[
+        bool, typer.Option("--decompose", help="Split the error of every method by its causes, in place of timing it.")
+    ] = False,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="With --decompose: write images of the parts into this folder, by scene."),
+    ] = None,
     methods: Annotated[
         str | None, typer.Option(help="Comma-separated methods, also your own MODULE:FUNCTION; all by default.")
     ] = None,
@@ -41,11 +49,18 @@ def bench(
     `airlight` is the airlight alone (the kernel with its ray set-up), `frame` a frame with static geometry and light,
     `light moved` a frame after the light moved. Exit status 1 if single-scatter does not confirm the truth within
     +-0.05 %, or volpath within +- the margin, or if a method of your own is at fault.
+
+    --decompose prints by which causes each image is wrong: parts that add up to its error, differences of renders in
+    which one cause after the other is gone.
     """
     if not 0 < margin < 1:
         from analytic.errors import InputError
 
         raise InputError(f"--margin: got {margin:g}, wanted a share between 0 and 1, such as 0.002 for 0.2 %")
+    if output is not None and not decompose:
+        from analytic.errors import InputError
+
+        raise InputError("--output: got a folder without --decompose, which alone writes images; add --decompose")
     if kernels:
         _bench_kernels(scenes, phase=phase, json=json, markdown=markdown)
         return
@@ -71,8 +86,7 @@ def bench(
     from validation.scenes.registry import SCENES
 
     chosen: list[Configuration] = []
-    for name in methods.split(",") if methods else METHODS:
-        name = name.strip()
+    for name in METHODS if methods is None else listed("--methods", methods):
         own = ":" in name
         chosen += [checked_configuration(name, limit=method_limit)] if own else chosen_configurations([name])
     apart = partial(in_own_process, limit=method_limit)
@@ -87,6 +101,9 @@ def bench(
         works.append(truth_work(at, lights=lights))
         works += [frame_work(at, lights=lights, steps=_steps(each)) for each in chosen]
     check_work("bench", works, force=force)
+    if decompose:
+        _decompose(names, pixels, chosen, apart=apart, output=output, json=json, markdown=markdown)
+        return
     benched = []
     with progress_bar("bench") as progress:
         for number, name in enumerate(names):
@@ -105,6 +122,81 @@ def bench(
     agreed = [agreement["statistics"] for scene in benched for agreement in scene["agreement"].values()]
     if faults or not all(statistics["equivalent"] for statistics in agreed):
         raise typer.Exit(1)
+
+
+def _decompose(names, pixels, chosen, *, apart, output: Path | None, json: bool, markdown: bool) -> None:
+    """Print the errors of configurations by cause, and write their images."""
+    import reports.figures.decomposition as figure
+    from reference.storage.files import ensure_folder
+    from reports.commands.printing import print_heading, print_tables
+    from reports.figures.files import plot
+    from reports.machine.environment import describe_environment
+    from reports.machine.progress import part_of, progress_bar
+    from reports.tables.decomposition import decomposition_table
+    from reports.tables.terminal import print_json
+
+    folder = None if output is None else ensure_folder(output)
+    scenes = []
+    with progress_bar("bench --decompose") as progress:
+        for number, name in enumerate(names):
+            step = part_of(progress, number / len(names), (number + 1) / len(names))
+            scene, decomposed = _decomposed_scene(name, pixels, chosen, apart=apart, progress=step)
+            scenes.append(scene)
+            if folder is not None and decomposed:
+                place = ensure_folder(folder / scene["name"])
+                figure.write_parts(place, scene["name"], decomposed)
+                plot(figure, place)
+    if json:
+        print_json({"environment": describe_environment(), "scenes": scenes})
+        return
+    if markdown:
+        print_heading()
+    titles = [
+        "{}, {} x {}: the error of the airlight by cause".format(scene["name"], *scene["size"]) for scene in scenes
+    ]
+    tables = [decomposition_table(title, scene["methods"]) for title, scene in zip(titles, scenes, strict=True)]
+    print_tables(tables, as_markdown=markdown)
+
+
+def _decomposed_scene(name: str, pixels, chosen, *, apart, progress) -> tuple[dict[str, Any], list[Any]]:
+    """Return the errors of a scene by cause, JSON-ready and with their images."""
+    from realtime.errors import InputError
+    from realtime.scene.read_scene import read_scene
+    from validation.estimates.quadrature import truth_image
+    from validation.frames.benchmark import configurations_for, render_by_name
+    from validation.frames.decomposition import decompose, part_numbers
+    from validation.metrics.errors import plain
+    from validation.scenes.loading import load_scene
+
+    loaded = load_scene(name, pixels)
+    scene = read_scene(loaded.scene)
+    size = scene.camera.width, scene.camera.height
+    progress(0.0, f"{loaded.name}: the truth")
+    truth = truth_image(loaded.scene).airlight
+    entries, decomposed = [], []
+    configurations = configurations_for(scene.features, chosen)
+    for number, each in enumerate(configurations):
+        progress((1 + number) / (1 + len(configurations)), f"{loaded.name}: {each.label}")
+
+        def own(configuration, each=each):
+            path = str(loaded.path or loaded.name)
+            return apart(render_by_name, path, size, configuration, name=each.method).airlight
+
+        entry = {
+            "label": each.label,
+            "method": each.method,
+            "kernel": each.kernel,
+            "parameters": dict(each.parameters),
+        }
+        try:
+            split = decompose(scene, each, truth, render=own)
+        except InputError as error:
+            entries.append(entry | {"refused": str(error)})
+            continue
+        decomposed.append(split)
+        parts = [plain(part_numbers(part)) for part in (split.whole, *split.parts)]
+        entries.append(entry | {"refused": None, "whole": parts[0], "parts": parts[1:]})
+    return {"name": loaded.name, "size": list(size), "methods": entries}, decomposed
 
 
 def _steps(chosen) -> float:

@@ -14,11 +14,13 @@ if TYPE_CHECKING:
 #: A figure's name is its module's `NAME`; its summary is there too.
 FIGURES: dict[str, tuple[str, tuple[str, ...]]] = {
     "polynomials": ("polynomials", ("rays",)),
+    "phase-functions": ("phase_functions", ()),
     "kernel-errors": ("kernel_errors", ("quick", "progress")),
     "kernel-speed": ("kernel_speed", ("quick", "progress")),
     "convergence": ("convergence", ("quick", "progress")),
     "z-distribution": ("z_distribution", ("quick", "progress")),
     "slab-orders": ("slab_orders", ("quick", "progress")),
+    "decomposition": ("decomposition", ("quick", "progress")),
     "map-size": ("map_size", ("quick", "progress")),
     "stages": ("stages", ("quick", "progress", "published")),
     "published": ("published", ("quick", "progress", "published")),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Options that several commands have."""
+"""Options that several commands have, and lists in options."""
 
 from typing import Annotated
 
@@ -14,3 +14,19 @@ MethodLimit = Annotated[
     float, typer.Option("--method-limit", help="Your own method is stopped after so long in a scene [s].")
 ]
 USUAL_LIMIT = LIMIT
+
+
+def listed(option: str, text: str) -> list[str]:
+    """Return the words of an option that commas part.
+
+    Raises
+    ------
+    InputError
+        If one of them is empty.
+    """
+    words = [word.strip() for word in text.split(",")]
+    if not all(words):
+        from analytic.errors import InputError
+
+        raise InputError(f"{option}: got {text!r}, wanted names with commas between them, none of them empty")
+    return words

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from reports.commands.options import Force
+from reports.commands.options import Force, listed
 
 PAPERS = ("biri", "billeter")
 
@@ -57,7 +57,7 @@ def published(
         raise InputError(f"--limit: got {limit:g}, wanted more than 0 [s]")
     papers = PAPERS if paper is None else (paper,)
     wanted = _wanted_scenes(scenes, papers)
-    names = [name.strip() for name in kernels.split(",")]
+    names = listed("--kernels", kernels)
     for name in names:
         find_kernel(name)
     sizes = parse_map_sizes("--maps", maps)
@@ -109,7 +109,7 @@ def _wanted_scenes(scenes: str | None, papers: Sequence[str]) -> list[str]:
         "billeter": [figure.scene for figure in FIGURES] + [view.scene for view in TABLE],
     }
     known = list(dict.fromkeys(name for paper in papers for name in of_paper[paper]))
-    wanted = [name.strip() for name in scenes.split(",")] if scenes else known
+    wanted = known if scenes is None else listed("--scenes", scenes)
     for name in wanted:
         if name not in known:
             raise InputError(f"--scenes: got {name!r}, wanted some of {', '.join(known)}")

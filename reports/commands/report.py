@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from reports.commands.options import USUAL_LIMIT, Force, MethodLimit
+from reports.commands.options import USUAL_LIMIT, Force, MethodLimit, listed
 
 
 def report(
@@ -66,7 +66,7 @@ def report(
             "--fresh": fresh,
         }
         for option, value in given.items():
-            if value:
+            if value not in (None, False, []):
                 raise InputError(f"report: got --from together with {option}; --from measures nothing, leave that out")
         data, target = _redrawn(redraw, output)
         done = "drawn again"
@@ -125,37 +125,22 @@ def _measured(
     force: bool,
 ) -> dict[str, Any]:
     """Measure and write a report; unusable input is refused before the work begins."""
-    from analytic.errors import InputError
-    from realtime.scene.read_scene import read_scene
     from reference.storage.files import ensure_folder
     from reports.commands.printing import print_notes
     from reports.machine.environment import activate
     from reports.machine.progress import progress_bar
+    from reports.report.asked import notes_on, scenes_of_images
     from reports.report.measure import write_report
-    from validation.comparison.engine_images import find_images, images_size
+    from validation.comparison.engine_images import images_size
     from validation.frames.expected_work import check_work, frame_work, truth_work
     from validation.frames.scene_study import EFFORTS
-    from validation.scenes.loading import load_scene
-    from validation.scenes.registry import SCENES
 
-    asked = [name.strip() for name in scenes.split(",")] if scenes else []
-    names = asked or list(EFFORTS[effort_name].scenes)
-    shown = {}
-    if images is not None:
-        shown = find_images(images, {Path(name).stem: name for name in [*SCENES, *asked]})
-        if not asked:
-            names = list(shown)
-        wanted = {Path(path).stem for path in names}
-        if not wanted & set(shown):
-            raise InputError(
-                f"--images: {images} has no image of {', '.join(sorted(wanted))}, only of {', '.join(shown)}"
-            )
-        shown = {name: several for name, several in shown.items() if name in wanted}
+    asked = None if scenes is None else listed("--scenes", scenes)
+    names, shown = scenes_of_images(asked, images, EFFORTS[effort_name].scenes)
     chosen = _configurations(effort_name, methods, own, method_limit)
     ensure_folder(target)
     activate()
-    for name in names:
-        print_notes(read_scene(load_scene(name, (8, 6)).scene).features.notes)
+    print_notes(notes_on(names))
     # The sizes of an effort are known to be right; those of images are the user's.
     sizes = [images_size(tuple(several)) for several in shown.values()]
     works = [truth_work(size) for size in sizes]
@@ -183,10 +168,10 @@ def _configurations(effort_name: str, methods: str | None, own: list[str], limit
 
     check_limit(limit)
 
-    if effort_name == "quick" and not methods:
+    if effort_name == "quick" and methods is None:
         chosen = list(QUICK)
     else:
-        chosen = list(chosen_configurations([name.strip() for name in (methods.split(",") if methods else METHODS)]))
+        chosen = list(chosen_configurations(list(METHODS) if methods is None else listed("--methods", methods)))
     return chosen + [checked_configuration(name, limit=limit) for name in own]
 
 

@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from reports.commands.options import listed
+
 
 def stability(
     kernels: Annotated[
@@ -27,7 +29,7 @@ def stability(
     from validation.kernels.stability import stability as run
     from validation.metrics.errors import plain
 
-    names = None if kernels is None else [name.strip() for name in kernels.split(",") if name.strip()]
+    names = None if kernels is None else listed("--kernels", kernels)
     activate()
     with progress_bar("stability") as progress:
         results = run(names, count=rays, progress=lambda done, total, what: progress(0.9 * done / total, what))

@@ -7,12 +7,14 @@ Read in this order:
 - `report.py`: what figures read of a report
 - `published_rows.py`: rows of papers, from a report or measured
 - `convergence.py`: orders of kernels and estimators
+- `decomposition.py`: errors by cause
 - `frame_speed.py`: time of frames against error
 - `kernel_errors.py`: errors of kernels over depth and angle
 - `kernel_speed.py`: time of kernels against error
 - `map_size.py`: error over the size of the shadow map
 - `methods_table.py`: times and errors of methods
 - `paper_images.py`: the pictures of the papers in our scenes
+- `phase_functions.py`: phase functions of droplets and what stands in for them;
 - `polynomials.py`: Biri's polynomials
 - `published.py`: frames a second beside the papers
 - `slab_orders.py`: a slab by order of scattering

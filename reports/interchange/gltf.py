@@ -12,9 +12,15 @@ scene really has is in the `extras` of each light, camera, material and medium.
 The file is written here, not by trimesh, which writes the ratio of the angles of view as the aspect ratio of a camera,
 3 % off at 52 degrees, and no lights.
 
+glTF has no light with extent, and KHR_lights_punctual none either. Such a light is written as its shape, a mesh whose
+material emits (KHR_materials_emissive_strength, whose unit is cd/m^2: here the largest channel of the radiance in
+W/(m^2 sr), again with no factor of 683 lm/W). Engines that do not treat emitting meshes as lights show it and are not
+lit by it; the `extras` say so, and have the shape in numbers.
+
 References
 ----------
-Khronos 2021, *glTF 2.0 specification*, sections 3 and 4; KHR_lights_punctual; KHR_materials_specular.
+Khronos 2021, *glTF 2.0 specification*, sections 3 and 4; KHR_lights_punctual; KHR_materials_specular;
+KHR_materials_emissive_strength.
 """
 
 import json
@@ -72,13 +78,14 @@ def write_gltf(path: Path, loaded: LoadedScene) -> dict[str, Any]:
     described = describe_scene(loaded)
     truth = read_truth(loaded.scene)
     turn = np.array(_TURNS[described["up"]], dtype=np.float64)
-    opaque = [shape_mesh(shape) for shape in truth.occluders.shapes()]
+    opaque = [shape_mesh(shape) for shape in truth.occluders.shapes() if not shape.is_emitter()]
+    lamps = [shape_mesh(light.shape) for light in truth.area]
     names = {medium.name for medium in truth.media}
     bounds = [shape_mesh(shape) for shape in loaded.scene.shapes() if shape.id() in names]
-    document, binary = _document(described, turn, opaque, bounds)
+    document, binary = _document(described, turn, [*opaque, *bounds, *lamps])
     data = _container(document, binary)
     write_bytes(path, data)
-    meshes = [*opaque, *bounds]
+    meshes = [*opaque, *bounds, *lamps]
     return {
         "path": str(path),
         "triangles": sum(len(mesh.faces) for mesh in meshes),
@@ -87,14 +94,15 @@ def write_gltf(path: Path, loaded: LoadedScene) -> dict[str, Any]:
     }
 
 
-def _document(
-    described: dict[str, Any], turn: Array, opaque: list[ShapeMesh], bounds: list[ShapeMesh]
-) -> tuple[dict[str, Any], bytes]:
-    """Return the JSON and the binary part."""
+def _document(described: dict[str, Any], turn: Array, shapes: list[ShapeMesh]) -> tuple[dict[str, Any], bytes]:
+    """Return the JSON and the binary part; the shapes are surfaces, bounds of media, lights, as described."""
     buffer = _Buffer()
+    punctual = [light for light in described["lights"] if light["kind"] != "area"]
+    extended = [light for light in described["lights"] if light["kind"] == "area"]
     materials = [_material(surface) for surface in described["surfaces"]]
     materials += [_boundary(medium) for medium in described["bounded_media"]]
-    meshes = [buffer.mesh(mesh, turn, number) for number, mesh in enumerate([*opaque, *bounds])]
+    materials += [_emission(light) for light in extended]
+    meshes = [buffer.mesh(mesh, turn, number) for number, mesh in enumerate(shapes)]
     nodes: list[dict[str, Any]] = [{"name": mesh["name"], "mesh": number} for number, mesh in enumerate(meshes)]
     camera = described["camera"]
     nodes.append({"name": "camera", "camera": 0, "matrix": _camera_matrix(camera, turn)})
@@ -104,20 +112,26 @@ def _document(
             "matrix": _light_matrix(light, turn),
             "extensions": {"KHR_lights_punctual": {"light": number}},
         }
-        for number, light in enumerate(described["lights"])
+        for number, light in enumerate(punctual)
     ]
+    used = {
+        "KHR_lights_punctual": punctual,
+        "KHR_materials_specular": materials,
+        "KHR_materials_emissive_strength": extended,
+    }
     document = {
         "asset": {"version": "2.0", "generator": f"airlight {__version__}"},
-        "extensionsUsed": ["KHR_lights_punctual", "KHR_materials_specular"] if materials else ["KHR_lights_punctual"],
+        "extensionsUsed": [name for name, users in used.items() if users],
         "scene": 0,
         "scenes": [
             {"name": described["scene"], "nodes": list(range(len(nodes))), "extras": _scene_extras(described, turn)}
         ],
         "nodes": nodes,
         "cameras": [_camera(camera)],
-        "extensions": {"KHR_lights_punctual": {"lights": [_light(light) for light in described["lights"]]}},
     }
-    if meshes:  # glTF has no empty lists
+    if punctual:  # glTF has no empty lists
+        document["extensions"] = {"KHR_lights_punctual": {"lights": [_light(light) for light in punctual]}}
+    if meshes:
         document |= {
             "meshes": meshes,
             "materials": materials,
@@ -217,6 +231,31 @@ def _material(surface: dict[str, Any]) -> dict[str, Any]:
         "doubleSided": surface["two_sided"],
         "extensions": {"KHR_materials_specular": {"specularFactor": 0.0}},
         "extras": {key: surface[key] for key in ("reflectance", "textured", "diffuse")},
+    }
+
+
+def _emission(light: dict[str, Any]) -> dict[str, Any]:
+    """Return the material of a light with extent: black, and as bright as the light on the side of its normal."""
+    largest = max(light["radiance"])
+    factor = [value / largest for value in light["radiance"]] if largest > 0 else [0.0, 0.0, 0.0]
+    return {
+        "name": f"light {light['name']}",
+        "pbrMetallicRoughness": {
+            "baseColorFactor": [0.0, 0.0, 0.0, 1.0],
+            "metallicFactor": 0.0,
+            "roughnessFactor": 1.0,
+        },
+        "emissiveFactor": factor,
+        "doubleSided": False,
+        "extensions": {
+            "KHR_materials_specular": {"specularFactor": 0.0},
+            "KHR_materials_emissive_strength": {"emissiveStrength": largest},
+        },
+        "extras": {
+            "light": light,
+            "note": "core glTF has no light with extent: this mesh emits; to some engines no mesh is a light",
+            "unit": "emissiveStrength is in W/(m^2 sr): no factor of 683 lm/W is in it",
+        },
     }
 
 

@@ -44,6 +44,8 @@ def _name(number: int, lights: list[Any]) -> str:
 
 
 def _cycles_light(light: dict[str, Any], name: str) -> str:
+    if light["kind"] == "area":
+        return _cycles_area(light, name)
     if light["kind"] == "directional":
         brightest = max(light["irradiance"])
         return f"{name}: Sun of strength {brightest:.7g}, colour {_colour(light['irradiance'], brightest)}, angle 0"
@@ -57,6 +59,21 @@ def _cycles_light(light: dict[str, Any], name: str) -> str:
     return f"{name}: Spot, {colour}, no soft falloff, {size}, {blend}"
 
 
+def _cycles_area(light: dict[str, Any], name: str) -> str:
+    """Return how to make a light with extent: Cycles' own lights are watts, of a flat one 4/pi times its power."""
+    brightest = max(light["radiance"])
+    colour = f"colour {_colour(light['radiance'], brightest)}"
+    if light["shape"] == "sphere":
+        power = math.pi * light["area"] * brightest
+        return (
+            f"{name}: Point of radius {light['radius']:.7g}, power {power:.7g} W, {colour}, no soft falloff (not tried)"
+        )
+    sides = light.get("sides", [2 * light.get("radius", 0.0)] * 2)
+    shape = "Rectangle" if light["shape"] == "rectangle" else "Disk"
+    size = f"{sides[0]:.7g} x {sides[1]:.7g} m, spread 180 degrees"
+    return f"{name}: Area, {shape} of {size}, power {4 * light['area'] * brightest:.7g} W, {colour} (not tried)"
+
+
 def _cycles_media(phases: set[str]) -> str:
     line = "media: Volume Coefficients with sigma_s and sigma_a as Scatter and Absorption, on the world or the body"
     kinds = {"hg": "Henyey-Greenstein", "isotropic": "Henyey-Greenstein of anisotropy 0", "rayleigh": "Rayleigh"}
@@ -66,6 +83,9 @@ def _cycles_media(phases: set[str]) -> str:
 
 
 def _luxcore_light(light: dict[str, Any], name: str) -> str:
+    if light["kind"] == "area":
+        radiance = _plain(light["radiance"])
+        return f"{name}: a mesh of `emission` {radiance}, `emission.theta` 90, no power or efficiency (not tried)"
     if light["kind"] == "directional":
         return f"{name}: `sharpdistant`, colour {_plain(light['irradiance'])} (not tried)"
     colour = f"colour 4 pi I = {_plain([4 * math.pi * value for value in light['intensity']])}, no power or efficiency"

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
+from reference.scene.area_light import TruthAreaLight
 from reference.scene.camera import camera_matrix
 from reference.scene.directional_light import DirectionalLight
 from reference.scene.read import TruthLight, TruthMedium, TruthScene, read_truth
@@ -24,7 +25,10 @@ _FALLOFF = {
     "intensity (cutoff - angle)/(cutoff - beam), linear in the angle; then 1/r^2 exp(-sigma_t r)",
     "directional": "from infinity, parallel: the same irradiance everywhere, times exp(-sigma_t length) of its way in "
     "the media",
+    "area": "the same radiance in every direction on the side of the normal, none behind: irradiance as the light's "
+    "projected solid angle, times exp(-sigma_t r)",
 }
+EFFICACY = 683.0  #: of monochromatic light of 540 THz, which defines the lumen [lm/W]
 CONVENTION = (
     "Linear RGB radiance in W/(m^2 sr), as the light's intensity in W/sr gives it: no exposure, no tone mapping, no "
     "gamma, no bloom. Single scattering: light - one scattering in the medium or one diffuse reflection - eye, "
@@ -47,7 +51,7 @@ def describe_scene(loaded: LoadedScene) -> dict[str, Any]:
     dict
         `scene`, `source`, `purpose`, `up`, `handedness`, `camera`, `medium`, `bounded_media`, `lights`, `surfaces`,
         `radiance`, `file`, `recipes`. Lengths in metres, angles in degrees, extinction in 1/m, intensity in W/sr,
-        power in W.
+        power in W. The shapes of lights with extent are among the lights, not the surfaces.
 
     Raises
     ------
@@ -67,8 +71,8 @@ def describe_scene(loaded: LoadedScene) -> dict[str, Any]:
         "bounded_media": [
             {"name": medium.name, **(_medium(medium) or {}), "bounds": _bounds(medium.bounds)} for medium in truth.media
         ],
-        "lights": [*map(_light, truth.lights), *map(_directional, truth.directional)],
-        "surfaces": [surface(shape) for shape in truth.occluders.shapes()],
+        "lights": [*map(_light, truth.lights), *map(_directional, truth.directional), *map(_area, truth.area)],
+        "surfaces": [surface(shape) for shape in truth.occluders.shapes() if not shape.is_emitter()],
         "radiance": CONVENTION,
         "file": {
             "name": f"{loaded.name}.exr",
@@ -209,6 +213,42 @@ def _directional(light: DirectionalLight) -> dict[str, Any]:
         "irradiance": _numbers(light.irradiance),
         "falloff": _FALLOFF["directional"],
     }
+
+
+def _area(light: TruthAreaLight) -> dict[str, Any]:
+    r"""Return a light with extent: a Lambertian emitter of area A sends pi Le A, from a sphere of 4 pi r^2 too."""
+    radiance = np.array(_numbers(light.radiance))
+    power = np.pi * light.area * radiance
+    described: dict[str, Any] = {
+        "kind": "area",
+        "shape": light.kind,
+        "name": light.name,
+        "material": "black" if light.black else "null",
+        "position": _numbers(light.centre),
+        "area": light.area,
+        "radiance": radiance.tolist(),
+        "power": power.tolist(),
+        "luminous_flux": luminous_flux(power),
+        "falloff": _FALLOFF["area"],
+    }
+    if light.kind == "sphere":
+        return described | {"radius": _number(light.radius)}
+    described |= {"axis": _numbers(light.normal), "across": _numbers(light.frame[0])}
+    if light.kind == "disk":
+        return described | {"radius": _number(light.radius)}
+    return described | {"up": _numbers(light.frame[1]), "sides": _numbers(2 * light.half)}
+
+
+def luminous_flux(power: Array) -> float:
+    """Return the luminous flux [lm] of radiant power in three channels [W].
+
+    The channels are taken for linear RGB with the primaries and the white of sRGB: 683 lm/W times the luminance of the
+    triple, as colour-science has it. That is how Radiance and many engines count; the spectrum of a real lamp of this
+    power and colour has another, lower flux.
+    """
+    from colour.models import RGB_COLOURSPACE_sRGB
+
+    return EFFICACY * float(RGB_COLOURSPACE_sRGB.matrix_RGB_to_XYZ[1] @ power)
 
 
 def _reflectance(shape: Any) -> tuple[list[float], bool]:

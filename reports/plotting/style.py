@@ -40,8 +40,9 @@ _METHODS = {
     "shadow-planes": ("blue", "^"),
     "light-volumes": ("green", "D"),
     "min-max": ("purple", "v"),
+    "froxel-fog": ("orange", "h"),
 }
-_OTHERS = (("orange", "P"), ("wine", "X"), ("navy", "*"))  # methods of users and images of engines
+_OTHERS = (("wine", "X"), ("navy", "*"))  # methods of users and images of engines
 # Kernels that are variants of one idea share the colour.
 _KERNELS = {
     "exact": ("blue", "o"),

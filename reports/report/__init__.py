@@ -3,6 +3,7 @@
 
 Read in this order:
 
+- `asked.py`: the scenes and images that a report is asked for
 - `staging.py`: a folder out of sight until it is whole
 - `expected.py`: how long the parts will take
 - `scene.py`: one scene: truth, its checks, every method
@@ -11,8 +12,8 @@ Read in this order:
 - `kept.py`: what the results of every report have in common
 - `measure.py`: all of these, report.json and the page
 
-May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.methods`, `reference.storage`, `reports.data`,
-`reports.machine`, `reports.page`, `reports.papers`, `reports.plotting`, `validation.comparison`,
+May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.methods`, `realtime.scene`, `reference.storage`,
+`reports.data`, `reports.machine`, `reports.page`, `reports.papers`, `reports.plotting`, `validation.comparison`,
 `validation.configurations`, `validation.estimates`, `validation.fidelity`, `validation.frames`, `validation.kernels`,
 `validation.metrics`, `validation.mutations`, `validation.papers`, `validation.scenes`.
 """

@@ -13,6 +13,7 @@ Read in this order:
 - `agreement.py`: the truth against Monte Carlo, and the verdict
 - `kernels.py`: costs, levels and orders of kernels
 - `stability.py`: where kernels and sums of shadow planes break
+- `decomposition.py`: errors by cause
 - `map_size.py`: error and flicker against the size of the shadow map
 - `slab.py`: a slab by order of scattering
 - `checks.py`: baselines that moved, mutations, light left out

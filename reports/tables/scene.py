@@ -83,7 +83,9 @@ def _medium(name: str, medium: dict[str, Any] | None) -> Iterator[Cells]:
 
 
 def _light(light: dict[str, Any]) -> Iterator[Cells]:
-    if light["kind"] == "directional":
+    if light["kind"] == "area":
+        yield from _area(light)
+    elif light["kind"] == "directional":
         yield "light", "", f"directional, travels along {_vector(light['axis'])}"
         yield "", "irradiance", f"{_colour(light['irradiance'])} W/m^2 on a plane that faces it"
     else:
@@ -99,6 +101,26 @@ def _light(light: dict[str, Any]) -> Iterator[Cells]:
         else:
             yield "", "power", whole
     yield "", "falloff", light["falloff"]
+
+
+def _area(light: dict[str, Any]) -> Iterator[Cells]:
+    opaque = "black: it ends rays and shadows" if light["material"] == "black" else "null: rays pass through it"
+    yield "light", light["name"], f"area, a {light['shape']} about {_vector(light['position'])}; {opaque}"
+    if "axis" in light:
+        yield "", "normal", f"{_vector(light['axis'])}, the side that emits"
+    if "sides" in light:
+        width, height = light["sides"]
+        yield (
+            "",
+            "sides",
+            f"{width:.7g} m along {_vector(light['across'])}, {height:.7g} m along {_vector(light['up'])}",
+        )
+    else:
+        yield "", "radius", f"{light['radius']:.7g} m"
+    yield "", "radiance", f"{_colour(light['radiance'])} W/(m^2 sr)"
+    yield "", "power", f"pi radiance area = {_colour(light['power'])} W, area {light['area']:.7g} m^2"
+    flux = f"{light['luminous_flux']:.7g} lm: 683 lm/W times the luminance of the power as linear sRGB"
+    yield "", "luminous flux", flux
 
 
 def _surfaces(surfaces: list[dict[str, Any]]) -> Iterator[Cells]:

@@ -19,6 +19,7 @@ import tempfile
 import traceback
 import warnings
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 FOG = {"sigma_t": "0.2, 0.2, 0.2", "albedo": "0.9, 0.8, 0.7", "g": "0.3", "scale": "1", "phase": ""}
@@ -185,6 +186,53 @@ def lights(folder: Path) -> Iterator[tuple[str, str]]:
         yield name, scene(light=spot.format(*values), **straight)
 
 
+def area_lights(folder: Path) -> Iterator[tuple[str, str]]:
+    """Yield scenes whose light has extent, of a shape, a place or a number for which there is no image, or hardly."""
+    black = '<bsdf type="diffuse"><rgb name="reflectance" value="0"/></bsdf>'
+    usual = '<rgb name="radiance" value="5, 4, 3"/>'
+
+    def lamp(
+        transform: str, *, kind: str = "rectangle", radiance: str = usual, bsdf: str = black, extra: str = ""
+    ) -> str:
+        return (
+            f'<shape type="{kind}" id="lamp"><transform name="to_world">{transform}</transform>{bsdf}{extra}'
+            f'<emitter type="area">{radiance}</emitter></shape>'
+        )
+
+    above = '<lookat origin="0.3, 0.4, 2.1" target="0.1, 0.2, 0" up="0, 1, 0"/>'
+    for kind in ("rectangle", "disk", "sphere"):
+        for size in ("0", "nan", "inf", "1e30", "1e-30"):
+            yield f"{kind} of size {size}", scene(light=lamp(f'<scale value="{size}"/>{above}', kind=kind))
+        for odd in ("nan", "inf", "1e30", "-1", "0", "1e-44"):
+            radiance = f'<rgb name="radiance" value="{odd}, 4, 3"/>'
+            yield f"{kind} of radiance {odd}", scene(light=lamp(above, kind=kind, radiance=radiance))
+        yield f"{kind} stretched", scene(light=lamp(f'<scale x="0.5" y="0.2" z="1"/>{above}', kind=kind))
+        yield f"flat {kind}", scene(light=lamp(f'<scale x="0.5" y="0" z="1"/>{above}', kind=kind))
+        shear = '<matrix value="0.5 0.2 0 0.3  0 0.5 0 0.4  0 0 0.5 2.1  0 0 0 1"/>'
+        yield f"sheared {kind}", scene(light=lamp(shear, kind=kind))
+        yield f"{kind} of no material", scene(light=lamp(f'<scale value="0.3"/>{above}', kind=kind, bsdf=""))
+        null = lamp(f'<scale value="0.3"/>{above}', kind=kind, bsdf='<bsdf type="null"/>')
+        yield f"{kind} of material null", scene(light=null)
+        at_camera = lamp('<scale value="0.3"/><translate x="0" y="-5" z="1"/>', kind=kind)
+        yield f"{kind} about the camera", scene(light=at_camera)
+        cut = lamp('<scale value="0.3"/><translate x="-0.6" y="0.7" z="0.9"/>', kind=kind)
+        yield f"{kind} that cuts the ball", scene(light=cut)
+        yield f"{kind} beside a point light", scene(extra=lamp(f'<scale value="0.3"/>{above}', kind=kind))
+        filled = '<ref name="interior" id="fog"/>'
+        yield f"{kind} that bounds fog", scene(light=lamp(f'<scale value="0.3"/>{above}', kind=kind, extra=filled))
+    yield (
+        "sphere inside out",
+        scene(light=lamp(above, kind="sphere", extra='<boolean name="flip_normals" value="true"/>')),
+    )
+    for kind in ("cube", "cylinder"):
+        yield f"light on a {kind}", scene(light=lamp(f'<scale value="0.3"/>{above}', kind=kind))
+    light = mesh("0 0 2\n1 0 2\n1 1 2\n0 1 2", "3 0 1 2\n3 0 2 3", folder)
+    yield "light on a mesh", scene(light=light.replace("</shape>", f'<emitter type="area">{usual}</emitter></shape>'))
+    texture = '<texture type="checkerboard" name="radiance"/>'
+    yield "light of a texture", scene(light=lamp(f'<scale value="0.3"/>{above}', radiance=texture))
+    yield "light edge-on", scene(light=lamp('<scale value="0.3"/><translate x="0" y="0" z="1"/>'), origin="0, -5, 1")
+
+
 def rows(folder: Path) -> Iterator[tuple[str, str]]:
     """Yield tables for `airlight integrate` with an odd number in every column."""
     header = "phase,g,t,h,x0,x1,sigma_t"
@@ -197,7 +245,7 @@ def rows(folder: Path) -> Iterator[tuple[str, str]]:
     yield "light on the segment", f"{header}\nisotropic,0,1,0,0,2,0.2\n"
 
 
-KINDS = {one.__name__: one for one in (numbers, geometry, media, lights, rows)}
+KINDS = {one.__name__: one for one in (numbers, geometry, media, lights, area_lights, rows)}
 
 
 def _orders(kind: str, path: Path) -> list[list[str]]:
@@ -220,11 +268,13 @@ def _orders(kind: str, path: Path) -> list[list[str]]:
         settings += ["--set", "shadow=map"] if number == 1 else []
         file = out / f"frame-{number}.exr"
         orders.append(["render", str(path), "--json", "--method", method, "-o", str(file), *settings])
-    return [*orders, ["compare", str(out / "truth.exr"), str(out / "frame-0.exr"), "--json"]]
+    orders.append(["compare", str(out / "truth.exr"), str(out / "frame-0.exr"), "--json"])
+    asked = ["--quick", "--scenes", str(path), "--methods", "unshadowed,ray-march", "--json"]
+    return [*orders, ["report", *asked, "-o", str(out / "study")]]
 
 
 def _finite_file(path: Path) -> bool:
-    """Return whether a file holds nothing that is not finite; a distance may be infinite."""
+    """Return whether a file, or all images of a report, hold nothing that is not finite; a distance may be infinite."""
     import numpy as np
 
     from reference.storage.exr import read_exr
@@ -232,8 +282,8 @@ def _finite_file(path: Path) -> bool:
     if path.suffix == ".csv":
         header, *lines = (line.split(",") for line in path.read_text().split("\n") if line)
         return all(math.isfinite(float(line[header.index("result")])) for line in lines)
-    image = read_exr(path)
-    return all(np.isfinite(layer).all() for layer in image.layers.values())
+    images = [read_exr(file) for file in ([path] if path.is_file() else path.rglob("*.exr"))]
+    return all(np.isfinite(layer).all() for image in images for layer in image.layers.values())
 
 
 def _fault(order: list[str]) -> tuple[str, str]:
@@ -274,9 +324,13 @@ def _fault(order: list[str]) -> tuple[str, str]:
 
 def _child(kind: str, path: Path, report: Path) -> None:
     from reports.machine.environment import activate
+    from validation.frames import scene_study
 
     os.environ["AIRLIGHT_CACHE_DIR"] = str(path.parent / "cache")
     activate()
+    # The scene's own size, in a second: what a report says of a scene, not how well.
+    small = {"image": (12, 9), "timed": (12, 9), "checked": (12, 9), "seconds": 0.001, "patience": 0.1}
+    scene_study.EFFORTS["quick"] = replace(scene_study.EFFORTS["quick"], **small, batches=16)
     for order in _orders(kind, path):
         if order[0] == "compare" and not all(Path(one).is_file() for one in order[1:3]):
             continue

@@ -8,12 +8,8 @@ from tests.helpers.page import HEIGHT, WIDTH
 
 
 def watched(browser, **options):
-    """A new tab, and a list of all that it asks for, prints and throws.
-
-    So high that the first scene is near it from the start: what a key changes is drawn at once in scenes near the
-    window, in others later.
-    """
-    opened = browser.new_page(viewport={"width": 1300, "height": 1800}, **options)
+    """A new tab, and a list of all that it asks for, prints and throws."""
+    opened = browser.new_page(viewport={"width": 1300, "height": 1000}, **options)
     told = []
     opened.on("console", lambda message: told.append(f"console {message.text}"))
     opened.on("pageerror", lambda error: told.append(f"error {error}"))

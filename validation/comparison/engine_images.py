@@ -7,6 +7,7 @@ size, which all images of a scene must share, and by the truth that fits, at pix
 """
 
 import difflib
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -52,7 +53,7 @@ class ImageMeasurement:
         return _light(self.image)
 
 
-def find_images(folder: Path | str, scenes: Mapping[str, str]) -> dict[str, tuple[EngineImage, ...]]:
+def find_images(folder: str | os.PathLike[str], scenes: Mapping[str, str]) -> dict[str, tuple[EngineImage, ...]]:
     """Return the images in a folder by the name of their scene.
 
     Parameters

@@ -9,8 +9,9 @@ from typing import Any
 from analytic.errors import InputError
 from realtime.errors import InputError as MethodError
 from realtime.frame.renderer import FrameRenderer, frame_renderer
+from realtime.methods.interface.method import method_parameters
 from realtime.methods.registry import find_method
-from realtime.parameters import read_parameters
+from realtime.parameters import values
 from realtime.scene.read_scene import Scene
 from validation.configurations.kernel_names import find_kernel
 
@@ -99,7 +100,7 @@ def configuration(
     except MethodError as error:
         raise InputError(str(error)) from error
     try:
-        chosen = read_parameters(method, record.parameters, parameters or {})
+        chosen, light_points = method_parameters(record, parameters or {})
     except MethodError as error:
         raise InputError(str(error)) from error
     uses_kernel = record.uses_kernel(chosen)
@@ -108,7 +109,8 @@ def configuration(
     if uses_kernel:
         kernel = kernel or "exact"
         find_kernel(kernel)
-    return Configuration(method, kernel, tuple((name, getattr(chosen, name)) for name in parameters or {}))
+    known = values(light_points) | values(chosen)
+    return Configuration(method, kernel, tuple((name, known[name]) for name in parameters or {}))
 
 
 def chosen_configurations(methods: Sequence[str]) -> tuple[Configuration, ...]:

@@ -11,6 +11,7 @@ Read in this order:
 - `figures.py`: how rows take their figures from what was measured
 - `equations.py`: the equations as printed against certified integrals
 - `printed.py`: coefficients, phase functions, equations of clouds
+- `droplets.py`: the droplets of clouds by Mie's theory
 - `polynomials.py`: how good kernels of papers are on many rays
 - `ordering.py`: the order of shadow planes and the stencil along a ray
 - `extrusion.py`: silhouettes, the direction of their planes, light on surfaces
@@ -24,6 +25,7 @@ Read in this order:
 - `paper_images.py`: the pictures of the papers again
 - `biri.py`: the rows of Biri, Arques, Michelin 2006
 - `billeter.py`: the rows of Billeter, Sintorn, Assarsson 2010
+- `bouthors.py`: the rows of Bouthors, Neyret, Max, Bruneton, Crassin 2008
 - `others.py`: the rows of other papers
 - `catalogue.py`: all rows and experiments, and the judged rows of a run
 

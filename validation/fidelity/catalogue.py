@@ -5,9 +5,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from validation.fidelity import billeter, biri, others
+from validation.fidelity import billeter, biri, bouthors, others
 from validation.fidelity.billeter_tables import billeter_tables
 from validation.fidelity.biri_tables import biri_tables
+from validation.fidelity.droplets import droplets
 from validation.fidelity.equations import equations
 from validation.fidelity.extrusion import extrusion
 from validation.fidelity.motion import motions, triangles
@@ -29,7 +30,7 @@ PAPERS: Mapping[str, str] = {
     "chen": "Chen, Baran, Durand, Jarosz 2011, Real-time volumetric shadows using 1D min-max mipmaps",
 }
 
-ROWS: tuple[Row, ...] = (*biri.ROWS, *billeter.ROWS, *others.ROWS)
+ROWS: tuple[Row, ...] = (*biri.ROWS, *billeter.ROWS, *bouthors.ROWS, *others.ROWS)
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {
     "nothing": Experiment(dict, 0.0, images=False),
     "equations": Experiment(equations, 0.4, images=False),
     "printed": Experiment(printed, 0.1, images=False),
+    "droplets": Experiment(droplets, 3.0, images=False),
     "ordering": Experiment(ordering, 1.5, images=False),
     "polynomials": Experiment(polynomials, 2.0, images=False),
     "levels": Experiment(levels, 1.0),

@@ -2,47 +2,9 @@
 """The rows of the other papers of the documentation: misprints, kernels and a peer that are built here."""
 
 from validation.fidelity.figures import at, ratio
-from validation.fidelity.row import AtMost, Bound, Equal, Row
-
-_FORMULA = Equal(1e-9, "the printed formula over what it stands for, by quadrature")
+from validation.fidelity.row import AtMost, Bound, Row
 
 ROWS: tuple[Row, ...] = (
-    Row(
-        "bouthors",
-        "eq. 1",
-        "single scattering of a segment, for l linear on it: printed over derived",
-        Bound(1),
-        "printed",
-        at("clouds", "scattering"),
-        _FORMULA,
-    ),
-    Row(
-        "bouthors",
-        "eq. 2",
-        "opacity of a segment: printed over derived",
-        Bound(1),
-        "printed",
-        at("clouds", "opacity"),
-        _FORMULA,
-    ),
-    Row(
-        "bouthors",
-        "eq. 4",
-        "kappa = rho N0 pi r_e^2 with r_e = (gamma + 2) r_n: printed over the mean square radius, gamma = 2",
-        Bound(1),
-        "printed",
-        at("clouds", "radius"),
-        _FORMULA,
-    ),
-    Row(
-        "bouthors",
-        "eq. 5",
-        "radiative transfer: the change of an isotropic field without absorption, in units of the field",
-        Bound(0),
-        "printed",
-        at("clouds", "conservation"),
-        Equal(0, "in a medium of albedo 1 what is scattered out comes back"),
-    ),
     Row(
         "sun",
         "3, dimensionless",

@@ -9,11 +9,12 @@ Read in this order:
 - `result_cache.py`: results on disk, so that a report computes only what changed;
 - `baseline_runs.py`: measures the errors that baselines keep;
 - `baseline_files.py`: baselines as files, their comparison and their revisions;
+- `decomposition.py`: the error of an image by its causes, which add up to it;
 - `map_size.py`: error against the size of the shadow map, and the flicker of a light that moves;
 - `plane_stability.py`: hard cases for sums over shadow planes;
 - `zero_cost.py`: checks that what a scene does not need costs nothing.
 
 May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.kernels`, `realtime.memory`, `realtime.methods`,
-`realtime.scene`, `reference.quadrature`, `reference.scene`, `reference.storage`, `validation.configurations`,
-`validation.estimates`, `validation.metrics`, `validation.scenes`, `validation.statistics`.
+`realtime.parameters`, `realtime.scene`, `reference.quadrature`, `reference.scene`, `reference.storage`,
+`validation.configurations`, `validation.estimates`, `validation.metrics`, `validation.scenes`, `validation.statistics`.
 """

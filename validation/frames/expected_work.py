@@ -13,7 +13,7 @@ import drjit as dr
 import mitsuba as mi
 
 from analytic.errors import InputError
-from realtime.memory import machine_memory
+from realtime.memory import usable_memory
 
 LONGEST = 3600.0  #: seconds that a command may be expected to take without being forced
 
@@ -79,12 +79,12 @@ def check_work(what: str, works: Iterable[Work], *, force: bool) -> None:
         return
     threads = _GPU if (mi.variant() or "").startswith("cuda") else max(1, dr.thread_count())
     seconds, memory = sum(work.seconds for work in works) / threads, max(work.memory for work in works)
-    machine = machine_memory()
+    usable = usable_memory()
     reasons = []
     if seconds > LONGEST:
         reasons.append(f"would take about {_duration(seconds)}")
-    if machine is not None and memory > machine:
-        reasons.append(f"needs about {memory / 1e9:.3g} GB of memory, of which this machine has {machine / 1e9:.3g} GB")
+    if usable is not None and memory > usable.size:
+        reasons.append(f"needs about {memory / 1e9:.3g} GB of memory, of which {usable}")
     if reasons:
         raise InputError(f"{what}: {' and '.join(reasons)}; ask for less, or add --force to start it nevertheless")
 

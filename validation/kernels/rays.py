@@ -23,7 +23,7 @@ from scipy.stats import qmc
 
 from analytic.cases import Cases
 from analytic.panels import airlight_segments
-from analytic.phase import PhaseFunction, phase_from_words
+from analytic.phase import PHASE_NAMES, PhaseFunction, phase_from_words
 from reference.storage.cache import GENERATION, load_arrays, store_arrays
 from validation.kernels.values import TABLE
 
@@ -32,8 +32,6 @@ Array = NDArray[np.float64]
 COLUMNS = ("tag", "phase", "g", "t", "h", "x0", "x1", "sigma_t", "value")
 
 _SEED = 20101
-#: Of the hard rays. Those of droplets have their own cases: others here would move every ray.
-_PHASES = ("isotropic", "rayleigh", "hazy", "murky", "hg", "tabulated")
 _G = np.linspace(-0.95, 0.95, 39).astype(np.float32).astype(np.float64)  # few, since the truth takes one g at a time
 _LARGEST_SOBOL = 1 << 20
 
@@ -50,7 +48,7 @@ def hard_rays(count: int = 100_000) -> Cases:
     x1 = np.where(u[:, 6] < 0.1, np.inf, _rounded(x0 + length))
     thickness = _log(u[:, 7], 1e-6, 60.0)
     sigma_t = _rounded(thickness / (x0 + np.hypot(x0 - foot, height)))
-    phase = np.asarray(_PHASES)[np.minimum((u[:, 8] * len(_PHASES)).astype(int), len(_PHASES) - 1)]
+    phase = np.asarray(PHASE_NAMES)[np.minimum((u[:, 8] * len(PHASE_NAMES)).astype(int), len(PHASE_NAMES) - 1)]
     g = np.where(phase == "hg", _G[np.minimum((u[:, 9] * len(_G)).astype(int), len(_G) - 1)], 0.0)
     tags = np.select(
         [

@@ -249,7 +249,7 @@ _SHADOWS = (
     _quadrature(
         "through-surfaces",
         "rays not ended at the visible surface",
-        "reference.quadrature.ray_values",
+        "reference.quadrature.light_airlight",
         "theta1 = np.where(ended, ",
         "theta1 = np.where(ended & False, ",
     ),

@@ -5,6 +5,7 @@ from validation.mutations.record import Mutation
 
 _DISTANCES = "reference.monte_carlo.single_scatter.distance_sampling"
 _LIGHT = "reference.monte_carlo.single_scatter.estimator"
+_CELLS = "reference.monte_carlo.single_scatter.stretches"
 _LEGS = "reference.monte_carlo.single_scatter.boundary_walk"
 
 
@@ -37,7 +38,7 @@ MUTATIONS: tuple[Mutation, ...] = (
     _single_scatter(
         "equal-cells",
         "the narrower cells at both ends weighed like the others",
-        _LIGHT,
+        _CELLS,
         "return low / (count - 1), (high - low) / (count - 1)",
         "return low / (count - 1), mi.Float(1 / (count - 1))",
     ),

@@ -20,6 +20,10 @@ Read in this order:
 - `omni_box.py`: a lamp amid bars and posts;
 - `tangle.py`: uneven tubes before a spot light;
 - `windows.py`: a directional light through the windows of a room;
+- `penumbra_plane.py`: a disk lamp over the edge of a half-plane;
+- `fence.py`: bars at four distances from a rectangular lamp;
+- `soft_hall.py`: a hall lit by a window;
+- `overlap.py`: two casters whose penumbrae overlap;
 - `probes.py`: small scenes for what the built-in ones lack, used by checks of the checks;
 - `numbers.py`: refuses numbers of which no finite image can come;
 - `loading.py`: a scene by its name or from a Mitsuba XML file;

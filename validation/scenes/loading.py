@@ -78,7 +78,7 @@ def parse_size(text: str) -> tuple[int, int]:
 
 def _existing(name_or_path: str) -> Path:
     path = Path(name_or_path)
-    if path.is_dir():
+    if name_or_path.strip() and path.is_dir():
         raise InputError(f"scene: {name_or_path} is a folder; wanted the path of a Mitsuba XML file in it")
     if path.is_file():
         return path

@@ -201,6 +201,36 @@ def point_light(position: Sequence[float], intensity: Sequence[float]) -> dict[s
     return {"type": "point", "position": list(position), "intensity": {"type": "rgb", "value": list(intensity)}}
 
 
+def area_lamp(
+    shape: str,
+    position: Sequence[float],
+    target: Sequence[float],
+    size: float | tuple[float, float],
+    radiance: Sequence[float],
+) -> dict[str, Any]:
+    """Return a black light with extent, of constant radiance.
+
+    Parameters
+    ----------
+    shape
+        'rectangle' or 'disk', which shine on one side, or 'sphere'.
+    position, target
+        Its middle and a point that it faces, (3,) each [m].
+    size
+        The radius, or half of both sides of a rectangle [m].
+    radiance
+        RGB, (3,) [W/(m^2 sr)].
+    """
+    across, up = size if isinstance(size, tuple) else (size, size)
+    turned = mi.ScalarTransform4f().look_at(origin=list(position), target=list(target), up=[0, 0, 1])
+    return {
+        "type": shape,
+        "to_world": turned @ mi.ScalarTransform4f().scale([across, up, min(across, up)]),
+        "material": {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.0, 0.0, 0.0]}},
+        "emitter": {"type": "area", "radiance": {"type": "rgb", "value": list(radiance)}},
+    }
+
+
 def camera(
     origin: Sequence[float],
     target: Sequence[float],

@@ -7,10 +7,14 @@ constant of the scene. Every command and report knows the scenes that have a `Sc
 
 from validation.scenes.clutter import SCENE as CLUTTER
 from validation.scenes.colonnade import colonnade
+from validation.scenes.fence import SCENE as FENCE
 from validation.scenes.hall import SCENE as HALL
 from validation.scenes.omni_box import SCENE as OMNI_BOX
 from validation.scenes.open_fog import open_fog
+from validation.scenes.overlap import SCENE as OVERLAP
+from validation.scenes.penumbra_plane import SCENE as PENUMBRA_PLANE
 from validation.scenes.record import Animation, SceneRecord
+from validation.scenes.soft_hall import SCENE as SOFT_HALL
 from validation.scenes.sphere_spot import sphere_spot
 from validation.scenes.tangle import SCENE as TANGLE
 from validation.scenes.three_media import SCENE as THREE_MEDIA
@@ -54,5 +58,9 @@ SCENES: dict[str, SceneRecord] = {
         OMNI_BOX,
         TANGLE,
         WINDOWS,
+        PENUMBRA_PLANE,
+        FENCE,
+        SOFT_HALL,
+        OVERLAP,
     )
 }

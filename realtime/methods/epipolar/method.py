@@ -49,7 +49,7 @@ from realtime.methods.interface.light_airlight import RayAirlight, integral_type
 from realtime.methods.interface.view import View, rays_in_media
 from realtime.numerics.array_types import PerMetre, bytes_of
 from realtime.parameters import Parameters, parameter
-from realtime.rays.ray_light import distance_to_light
+from realtime.rays.ray_light import distance_to_light, falloff_beside
 from realtime.scene.camera import Camera
 from realtime.scene.lights import Light
 from realtime.scene.medium import transmittance
@@ -59,6 +59,9 @@ from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, inverse_
 from realtime.tiles.layout import Layout
 
 _MOST = 65536  # slices, and samples of a slice
+
+_LEAST_COSINE = 0.05  # of a light point, in the yardstick
+_NEXT = 6.0  #: pixels from the image of a light point within which nothing is interpolated
 
 
 @dataclass(frozen=True)
@@ -266,11 +269,20 @@ def _yardstick(airlight: RayAirlight):
     x = dr.select(endless, x0 + r0, (x0 * r1 + end * r0) / (r0 + r1))
     r = distance_to_light(geometry, x)
     weight = dr.atan2(across, along) / height * medium.phase.evaluate((foot - x) / r)
+    if airlight.light.facing is not None:
+        # On a ray that nearly meets the light x has not the digits for a cosine.
+        s0, s1 = x0 - foot, end - foot
+        s = dr.select(endless, s0 + r0, (s0 * r1 + s1 * r0) / (r0 + r1))
+        weight *= dr.maximum(falloff_beside(geometry, airlight.light, s), _LEAST_COSINE)
     return dr.select(x1 > x0, transmittance(medium, x + r) * weight, 0)
 
 
 def _interpolated(airlight: RayAirlight, samples: Samples, shares, heights: SliceHeights, point):
     """Return the integral of every pixel: the share of the samples around it, or its own where they do not fit."""
     share, fits = between_samples(samples, shares, point, airlight.view.distance)
+    if airlight.light.facing is not None:
+        # Next to a light that lies on a surface, samples end before it, or beyond.
+        pixel = dr.norm(airlight.view.camera.left)
+        fits &= airlight.geometry.height > _NEXT * pixel * dr.abs(airlight.geometry.foot)
     own = _lit_integral(airlight, heights, _nearest(samples.slices, point), ~fits)
     return dr.select(fits, share * _yardstick(airlight), own)

@@ -8,6 +8,6 @@ Read in this order:
 - `layers.py`: what a method returns, the G-buffer and the last frame for passes, and the formula of a frame.
 - `light_airlight.py`: the airlight of one light along the rays, whatever fills the scene: what methods sum up.
 
-May import: `realtime.bounded_media`, `realtime.errors`, `realtime.kernels`, `realtime.numerics`, `realtime.parameters`,
-`realtime.rays`, `realtime.scene`, `realtime.tiles`.
+May import: `realtime.area_lights`, `realtime.bounded_media`, `realtime.errors`, `realtime.kernels`,
+`realtime.numerics`, `realtime.parameters`, `realtime.rays`, `realtime.scene`, `realtime.tiles`.
 """

@@ -10,6 +10,7 @@ scene and without shadows, summed over the lamps.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 from realtime.numerics.array_types import Metres, PerRay
 from realtime.scene.camera import Camera
@@ -27,6 +28,7 @@ class Layers:
         None  #: share of what comes from behind that passes what the method adds to the scene's media; None: all
     )
     background: PerRay | None = None  #: radiance from behind all media, 0 where a surface hides it [W/(m^2 sr)]
+    carried: Any = None  #: arrays that the next frame finds in its view, whatever their sizes; see `Method.carries`
 
 
 @dataclass(frozen=True)

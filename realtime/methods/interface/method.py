@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The record of a method: its stages, and what a user and a frame must know of it."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
+from realtime.area_lights.points import LightPoints
 from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.view import View
-from realtime.parameters import Parameters, defaults
+from realtime.parameters import Parameters, defaults, read_parameters, values
 from realtime.scene.read_scene import Scene
 
 #: What of a scene may change from frame to frame; `look` is all that moves nothing: the medium and the lights' colours.
@@ -25,6 +26,15 @@ def never(parameters: Any) -> bool:
 def always(parameters: Any) -> bool:
     """Return True, whatever the parameters."""
     return True
+
+
+#: A cause of errors, and the values of parameters with which it is gone; None: all that the method has left.
+ErrorCause = tuple[str, Mapping[str, Any] | None]
+
+
+def no_causes(parameters: Any, size: tuple[int, int]) -> tuple[ErrorCause, ...]:
+    """Return no cause of errors, whatever the parameters and the size of the image."""
+    return ()
 
 
 @dataclass(frozen=True)
@@ -51,6 +61,8 @@ class Method:
     #: ``f(layers, g_buffer, history, *, camera, parameters)`` -> layers: functions over the whole image, run in turn
     #: on what `render` returned. All arrays have an entry per pixel, row by row; `history` is None in the first frame.
     passes: tuple[Callable[..., Layers], ...] = ()
+    #: Parameters -> whether `render` hands arrays of any sizes on to the next frame, as `Layers.carried`.
+    carries: Callable[[Any], bool] = never
     uses_kernel: Callable[[Any], bool] = always  #: parameters -> whether `render` calls an airlight kernel
     shadows: bool = True  #: whether it knows shadows; one that does not is wrong where there are occluders
     provides_visibility: Callable[[Any], bool] = never  #: parameters -> whether its layers have a visibility
@@ -59,9 +71,39 @@ class Method:
     #: Parameters -> whether it computes each ray by itself, on any layout: then a frame may interpolate. It has the
     #: parameter `tolerance`, `realtime.tiles.adaptive_sampling.tolerance`. None: it has not.
     by_rays: Callable[[Any], bool] | None = None
-    check: Callable[[Any], None] | None = None  #: airlight (height, width, 3) -> raises what is wrong with it
+    #: ``error_causes(parameters, (width, height))``: the causes of its errors in an image of that size [pixels], in the
+    #: order in which `airlight bench --decompose` takes them away, one on top of the other.
+    error_causes: Callable[[Any, tuple[int, int]], tuple[ErrorCause, ...]] = no_causes
+    #: Parameters -> whether it is given all lights of a frame at once, the points of lights with extent among them. If
+    #: not, and if it has no passes over the image, it is given one light point after another, and what it returns is
+    #: added up: it is recorded once for all of them.
+    lights_at_once: Callable[[Any], bool] = never
+    light_points: LightPoints = field(default_factory=LightPoints)  #: how it renders lights with extent by default
 
     @property
     def defaults(self) -> dict[str, Any]:
         """The defaults of its parameters by their names."""
         return defaults(self.parameters)
+
+
+def method_parameters(method: Method, given: Mapping[str, Any]) -> tuple[Any, LightPoints]:
+    """Return the parameters of a method, and those of lights with extent, which all methods have in common.
+
+    Parameters
+    ----------
+    method
+        The method.
+    given
+        Values by name; a word is converted to the type of the default.
+
+    Raises
+    ------
+    InputError
+        As `realtime.parameters.read_parameters`.
+    """
+    common = {item.name for item in fields(LightPoints)} - set(method.defaults)
+    own = {name: value for name, value in given.items() if name not in common}
+    asked = {name: value for name, value in given.items() if name in common}
+    chosen = read_parameters(method.name, method.parameters, own)
+    read = values(read_parameters(method.name, LightPoints, asked))
+    return chosen, replace(method.light_points, **{name: read[name] for name in asked})

@@ -48,6 +48,7 @@ class View:
         None  #: by light, what the visible surface sends back unshadowed, for a method that provides visibility
     )
     prepared: Any = ()  #: for a user's plain function: what its `prepare` made
+    carried: Any = None  #: the `Layers.carried` of the last frame; None in the first
 
 
 def radiance(medium: Medium, light: Light, integral):

@@ -46,6 +46,7 @@ from realtime.methods.shadow_planes.view_culling import components_in_view
 from realtime.numerics.array_types import ArrayTypes, types_of
 from realtime.parameters import Parameters, parameter
 from realtime.scene.camera import HostCamera, read_camera
+from realtime.scene.light_points import source_shape
 from realtime.scene.lights import Light, host_position
 from realtime.scene.mesh_adjacency import Casters, read_casters, with_positions
 from realtime.scene.read_scene import Scene
@@ -147,7 +148,10 @@ class PlanePreparation:
         here = self.standing(scene)
         camera = read_camera(scene.camera)
         types = types_of(type(scene.camera.origin.x))
-        each = [plane_finder(here, camera, light, cone=self.cone, types=types) for light in scene.lights]
+        each = [
+            plane_finder(here, camera, light, cone=self.cone, types=types, own=source_shape(scene, light))
+            for light in scene.lights
+        ]
         return lambda: tuple(find() for find in each)
 
     def standing(self, scene: Scene) -> Casters:
@@ -163,13 +167,15 @@ def prepare_shadow_planes(scene: Scene, parameters: ShadowPlaneParameters) -> Pl
     InputError
         For casters without triangles.
     """
-    return PlanePreparation(read_casters(scene.geometry), parameters.cone)
+    return PlanePreparation(read_casters(scene.geometry, scene.area_lights), parameters.cone)
 
 
 def plane_finder(
-    casters: Casters, camera: HostCamera, light: Light, *, cone: int = 0, types: ArrayTypes
+    casters: Casters, camera: HostCamera, light: Light, *, cone: int = 0, types: ArrayTypes, own: str | None = None
 ) -> Callable[[], PlaneIndex]:
     """Return what finds the shadow planes of one light, as a camera needs them; `cone` edges bound a spot.
+
+    The shape `own` is that of the light, which casts no shadow in it.
 
     All that is on the device is read here, and nothing else done: until then the device stands still.
     """
@@ -181,6 +187,8 @@ def plane_finder(
 
     def find() -> PlaneIndex:
         used = components_in_view(casters, camera, position)
+        if own is not None:
+            used &= ~casters.of_shape(own)
         aim = partial(aim_at, camera, spot=seen, types=types)
         return index_planes(casters, position, camera.origin, used=used, types=types, ring=ring, aim=aim)
 
@@ -236,7 +244,7 @@ def shadow_planes(
     buffer = Buffer(parameters.white) if parameters.buffer == "8bit" else None
     surfaces = type(view.medium.albedo)(0)  # what of them the buffer shows
     for number, light in enumerate(view.lights):
-        cone = bool(parameters.cone and light.cone is not None and not light.soft and view.features.shadows)
+        cone = bool(parameters.cone and light.cone is not None and not light.varies and view.features.shadows)
         if cone:
             light = light.without_cone()  # planes bound it
         media = in_media[number] if in_media else None

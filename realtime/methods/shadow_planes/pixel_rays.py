@@ -30,6 +30,9 @@ a sum of positive terms. The linear forms are affine in the pixel like w. Where 
 the chord is the root of it: it is wanted to twice the digits. Columns and rows are whole numbers of some 12 bits, so
 with coefficients of 11 bits, in units of one power of two, products and sums are exact; what the coefficients leave is
 added.
+
+**The normal of a light point** is like the axis of a spot: axial and offset, of `realtime.rays.ray_light`, follow from
+it by the same formulas.
 """
 
 from dataclasses import dataclass, replace
@@ -40,7 +43,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realtime.numerics.array_types import ArrayTypes, is_single
-from realtime.rays.ray_light import RayGeometry
+from realtime.rays.ray_light import RayGeometry, before_plane
 from realtime.rays.spot_cone import AxisGeometry, axis_distance, cone_roots
 from realtime.scene.camera import Camera, HostCamera
 from realtime.scene.lights import Light
@@ -76,7 +79,7 @@ class Aim:
     column: Any  #: c0
     row: Any  #: r0
     way: Affine  #: w
-    axis: Any = None  #: of a spot
+    axis: Any = None  #: of a spot, or the normal of a light point
     cutoff: Tangents | None = None
     beam: Tangents | None = None  #: of a soft spot
 
@@ -93,15 +96,17 @@ class SeenRay:
 
 @dataclass(frozen=True)
 class HostSpot:
-    """The axis of a spot and the sines of its half angles, on the host, in float64."""
+    """The axis of a spot and the sines of its half angles, or a normal alone, on the host, in float64."""
 
     axis: Array
-    cutoff: float
-    beam: float | None
+    cutoff: float | None = None
+    beam: float | None = None
 
 
 def read_spot(light: Light) -> HostSpot | None:
-    """Read the fields of a spot to the host; None for other lights."""
+    """Read the fields of a spot or a light point to the host; None for other lights."""
+    if light.facing is not None:
+        return HostSpot(_both(light.facing.normal, light.facing.normal_low))
     if light.cone is None:
         return None
     sines = [
@@ -133,10 +138,13 @@ def aim_at(camera: HostCamera, axes: Array, spot: HostSpot | None, types: ArrayT
     if spot is None:
         return Aim(*place, way)
     axis = axes @ spot.axis
+    in_frame = types.vector(*(float(component) for component in axis))
+    if spot.cutoff is None:
+        return Aim(*place, way, in_frame)
     vectors = [base, across, down]
     cutoff = _tangents(axis, spot.cutoff, vectors, types)
     beam = None if spot.beam is None else _tangents(axis, spot.beam, vectors, types)
-    return Aim(*place, way, types.vector(*(float(component) for component in axis)), cutoff, beam)
+    return Aim(*place, way, in_frame, cutoff, beam)
 
 
 def seen_rays(aim: Aim, camera: Camera, pixel, distance, light: Light) -> SeenRay:
@@ -151,7 +159,7 @@ def seen_rays(aim: Aim, camera: Camera, pixel, distance, light: Light) -> SeenRa
     distance
         D [m].
     light
-        A point or spot light; the `Aim` of a spot has its cones.
+        A light; the `Aim` of a spot has its cones, that of a light point its normal.
     """
     c, r, w = _aimed(aim, camera, pixel)
     across_square = dr.fma(w.x, w.x, dr.square(w.y))
@@ -159,7 +167,9 @@ def seen_rays(aim: Aim, camera: Camera, pixel, distance, light: Light) -> SeenRa
     x, y, z = w.x * scale, w.y * scale, w.z * scale
     foot, height = -distance * z, distance * scale * dr.sqrt(across_square)
     geometry = RayGeometry(foot, height)
-    if light.cone is not None:
+    if light.facing is not None:
+        geometry = before_plane(geometry, *_along_axis(aim, (x, y, z), distance))
+    elif light.cone is not None:
         geometry = _in_cone(aim, (c, r), (x, y, z, scale), geometry, light=light, distance=distance)
     return SeenRay(x, y, z, geometry)
 
@@ -178,15 +188,24 @@ def _aimed(aim: Aim, camera: Camera, pixel):
     return c, r, _at(aim.way, c, r)
 
 
+def _along_axis(aim: Aim, way, distance):
+    """Return `axial` and `offset` [m]."""
+    x, y, z = way
+    a = aim.axis
+    square = dr.fma(x, x, dr.square(y))
+    along = dr.fma(a.x, x, a.y * y)
+    return dr.fma(a.z, z, along), distance * dr.fma(a.z, square, -z * along)
+
+
 def _in_cone(aim: Aim, place, way, geometry: RayGeometry, *, light: Light, distance) -> RayGeometry:
     """Return a geometry with the fields that only a spot has."""
     x, y, z, scale = way
     a = aim.axis
     square = dr.fma(x, x, dr.square(y))
-    along = dr.fma(a.x, x, a.y * y)
+    axial, offset = _along_axis(aim, (x, y, z), distance)
     ray = AxisGeometry(
-        axial=dr.fma(a.z, z, along),
-        offset=distance * dr.fma(a.z, square, -z * along),
+        axial=axial,
+        offset=offset,
         height=geometry.height,
         square=dr.square(geometry.height),
         square_low=None,
@@ -205,7 +224,7 @@ def _in_cone(aim: Aim, place, way, geometry: RayGeometry, *, light: Light, dista
 
     enter, leave = interval(aim.cutoff, light.cone)
     seen = replace(geometry, axial=ray.axial, offset=ray.offset, enter=enter, leave=leave)
-    if not light.soft:
+    if light.beam is None:
         return seen
     begin, end = interval(aim.beam, light.beam)
     return replace(seen, beam_enter=begin, beam_leave=end, **axis_distance(ray))

@@ -7,7 +7,8 @@ from realtime.methods.shadow_planes.plane_table import light_basis, shadow_plane
 from realtime.methods.shadow_planes.silhouettes import silhouette
 from realtime.methods.shadow_planes.view_culling import components_in_view
 from realtime.scene.camera import HostCamera, read_camera
-from realtime.scene.lights import host_position
+from realtime.scene.light_points import source_shape
+from realtime.scene.lights import Light, host_position
 from realtime.scene.mesh_adjacency import Casters, read_casters, with_positions
 from realtime.scene.read_scene import Scene
 
@@ -41,9 +42,9 @@ def caster_plan(scene: Scene) -> CasterPlan:
     InputError
         For a caster without triangles.
     """
-    casters = with_positions(read_casters(scene.geometry), scene.positions)
+    casters = with_positions(read_casters(scene.geometry, scene.area_lights), scene.positions)
     camera = read_camera(scene.camera)
-    lights = tuple(_light_plan(casters, camera, light) for light in scene.lights)
+    lights = tuple(_light_plan(casters, camera, light, source_shape(scene, light)) for light in scene.lights)
     return CasterPlan(
         shapes=len(casters.shapes),
         components=len(casters.closed),
@@ -70,9 +71,11 @@ def describe_casters(plan: CasterPlan) -> dict[str, str]:
     return words
 
 
-def _light_plan(casters: Casters, camera: HostCamera, light) -> LightPlan:
+def _light_plan(casters: Casters, camera: HostCamera, light: Light, own: str | None) -> LightPlan:
     position = host_position(light)
     used = components_in_view(casters, camera, position)
+    if own is not None:
+        used &= ~casters.of_shape(own)
     seen = silhouette(casters, position, used=used)
     every = len(silhouette(casters, position).edges)
     return LightPlan(

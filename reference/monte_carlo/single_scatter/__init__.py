@@ -6,7 +6,10 @@ Read in this order:
 - `distance_sampling.py`: distances along a ray: equi-angular and free-flight sampling combined;
 - `directional_sampling.py`: distances for directional lights: uniform and free-flight;
 - `boundary_walk.py`: optical depth and visibility through the boundaries of media;
+- `area_sampling.py`: lights with extent, and points on them;
 - `scene_data.py`: what the integrator must know of a scene, read on its own;
+- `stretches.py`: camera rays, their stretches in one medium, cells of samples;
+- `area_estimate.py`: the estimate under lights with extent;
 - `estimator.py`: the estimate of one camera ray;
 - `integrator.py`: the plugin, and its batches.
 

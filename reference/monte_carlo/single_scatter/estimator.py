@@ -9,18 +9,20 @@ For each point or spot light and each medium that a ray crosses, from x0 to x1,
 draws. A surface at the end of the ray adds f cos I/r^2 V T T, which needs no sampling. Intensity I, phase function,
 material f and the coefficients of the media are the answers of Mitsuba's own plugins, and only they. A directional
 light has its irradiance E in the place of I/r^2; its distances come from
-`reference.monte_carlo.single_scatter.directional_sampling`.
+`reference.monte_carlo.single_scatter.directional_sampling`. Lights with extent:
+`reference.monte_carlo.single_scatter.area_estimate`.
 
 In a scene whose extinction depends on the channel all channels use the same distances, with the density of the mixture
 over the channels, so that no channel's variance can become infinite.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
+from reference.monte_carlo.single_scatter.area_estimate import area_airlight, area_surface
 from reference.monte_carlo.single_scatter.boundary_walk import (
     Leg,
     coefficients,
@@ -38,35 +40,7 @@ from reference.monte_carlo.single_scatter.distance_sampling import (
     sample_distance,
 )
 from reference.monte_carlo.single_scatter.scene_data import Light, Task
-
-
-@dataclass(frozen=True)
-class Ray:
-    """Camera rays in both precisions."""
-
-    origin: Any
-    direction: Any
-    origin_double: Any
-    direction_double: Any
-
-
-@dataclass(frozen=True)
-class _Stretch:
-    """The part of camera rays in one medium."""
-
-    start: Any  #: distance from the camera where it begins [m]
-    end: Any  #: where it ends, may be infinite [m]
-    depth: Any  #: optical depth from the camera to its start
-    medium: Any  #: pointer
-    sigma_s: Any  #: [1/m]
-    sigma_t: Any  #: [1/m]
-    at_lights: tuple[Any, ...]  #: pointers to the media in which the lights are
-
-
-def double_ray(origin, direction) -> Ray:
-    """Return rays given in double precision; their directions need not have unit length."""
-    direction = dr.normalize(direction)
-    return Ray(mi.Point3f(origin), dr.normalize(mi.Vector3f(direction)), origin, direction)
+from reference.monte_carlo.single_scatter.stretches import Ray, Stretch, cell_of, point_on
 
 
 def ray_light(task: Task, sampler, ray: Ray, medium, active) -> tuple[Any, Any]:
@@ -93,13 +67,13 @@ def ray_light(task: Task, sampler, ray: Ray, medium, active) -> tuple[Any, Any]:
         return _through_media(task, sampler, ray, medium, active)
     nothing = dr.zeros(mi.Spectrum, dr.width(active))
     at_lights = (medium,) * len(task.lights)
-    stretch = _Stretch(mi.Float(0), mi.Float(dr.inf), nothing, medium, *coefficients(medium, active), at_lights)
+    stretch = Stretch(mi.Float(0), mi.Float(dr.inf), nothing, medium, *coefficients(medium, active), at_lights, medium)
     if not task.around.surfaces:
         return _airlight(task, sampler, ray, stretch, active), nothing
     hit = task.around.scene.ray_intersect(mi.Ray3f(ray.origin, ray.direction), active)
     stretch = replace(stretch, end=dr.select(hit.is_valid(), hit.t, dr.inf))
     airlight = _airlight(task, sampler, ray, stretch, active)
-    return airlight, _surface(task, hit, stretch, active & hit.is_valid())
+    return airlight, _surface(task, sampler, ray, hit, stretch, active & hit.is_valid())
 
 
 def _through_media(task: Task, sampler, ray: Ray, medium, active) -> tuple[Any, Any]:
@@ -111,16 +85,17 @@ def _through_media(task: Task, sampler, ray: Ray, medium, active) -> tuple[Any, 
         hit = task.around.scene.ray_intersect(onward, walking)
         met = walking & hit.is_valid()
         end = dr.select(met, done + hit.t, dr.inf)
-        stretch = _Stretch(start, end, depth, medium, *coefficients(medium, walking), at_lights)
+        stretch = Stretch(start, end, depth, medium, *coefficients(medium, walking), at_lights, at_camera)
         airlight = airlight + _airlight(task, sampler, ray, stretch, walking)
         passed = is_boundary(hit, met)
-        surface = surface + _surface(task, hit, stretch, met & ~passed)
+        surface = surface + _surface(task, sampler, ray, hit, stretch, met & ~passed)
         depth = dr.select(passed, depth + stretch.sigma_t * (end - start), depth)
         changes = passed & hit.is_medium_transition()
         medium = dr.select(changes, hit.target_medium(ray.direction), medium)
         done = dr.select(passed, end + step_beyond(hit.p), done)
         return passed, sampler, done, dr.select(passed, end, start), depth, medium, airlight, surface
 
+    at_camera = medium
     places = [mi.Point3f(light.position) for light in task.lights]
     at_lights = tuple(medium_at(task.around, place, ray.origin, medium, active) for place in places)
     zero, nothing = dr.zeros(mi.Float, dr.width(active)), dr.zeros(mi.Spectrum, dr.width(active))
@@ -139,7 +114,7 @@ def _through_media(task: Task, sampler, ray: Ray, medium, active) -> tuple[Any, 
     return final[-2], final[-1]
 
 
-def _airlight(task: Task, sampler, ray: Ray, stretch: _Stretch, active):
+def _airlight(task: Task, sampler, ray: Ray, stretch: Stretch, active):
     """Estimate what all lights send from a stretch of the ray."""
     total = dr.zeros(mi.Spectrum, dr.width(active))
     active = active & (dr.max(stretch.sigma_s) > 0)
@@ -147,10 +122,12 @@ def _airlight(task: Task, sampler, ray: Ray, stretch: _Stretch, active):
         total += _light_airlight(task, number, sampler, ray, stretch, active)
     for emitter in task.directional:
         total += _directional_airlight(task, emitter, sampler, ray, stretch, active)
+    for extended in task.area:
+        total += area_airlight(task, extended, sampler, ray, stretch, active)
     return total
 
 
-def _light_airlight(task: Task, number: int, sampler, ray: Ray, stretch: _Stretch, active):
+def _light_airlight(task: Task, number: int, sampler, ray: Ray, stretch: Stretch, active):
     """Estimate what one light sends from a stretch of the ray: a loop over the cells of the unit interval."""
     light = task.lights[number]
     approach = closest_approach(ray.origin_double, ray.direction_double, light.position)
@@ -168,7 +145,7 @@ def _light_airlight(task: Task, number: int, sampler, ray: Ray, stretch: _Stretc
     shift = sampler.next_1d(active)
 
     def add_sample(index, total, sampler):
-        cell, width = _cell(index, shift, task.samples)
+        cell, width = cell_of(index, shift, task.samples)
         y, s, density = sample_distance(cell + width * sampler.next_1d(active), mixture)
         r = dr.sqrt(height * height + s * s)
         from_light = (normal * height + ray.direction * s) / r
@@ -182,7 +159,7 @@ def _light_airlight(task: Task, number: int, sampler, ray: Ray, stretch: _Stretc
     return dr.while_loop(state, lambda index, *_: index < task.samples, add_sample, label="distances")[1]
 
 
-def _directional_airlight(task: Task, emitter, sampler, ray: Ray, stretch: _Stretch, active):
+def _directional_airlight(task: Task, emitter, sampler, ray: Ray, stretch: Stretch, active):
     """Estimate what a directional light sends from a stretch of the ray, likewise."""
     length = stretch.end - stretch.start
     active = active & (length > 0) & (length < dr.inf)
@@ -191,9 +168,9 @@ def _directional_airlight(task: Task, emitter, sampler, ray: Ray, stretch: _Stre
     shift = sampler.next_1d(active)
 
     def add_sample(index, total, sampler):
-        cell, width = _cell(index, shift, task.samples)
+        cell, width = cell_of(index, shift, task.samples)
         y, density = sample_stretch(cell + width * sampler.next_1d(active), length, rates)
-        point = _point_on(ray, ray.origin + ray.direction * (stretch.start + y))
+        point = point_on(ray, ray.origin + ray.direction * (stretch.start + y))
         arriving, towards = _arriving(task, emitter, point, active)
         phase, _ = stretch.medium.phase_function().eval_pdf(mi.PhaseFunctionContext(), point, towards, active)
         value = stretch.sigma_s * phase * arriving * dr.exp(-stretch.depth - stretch.sigma_t * y) * (width / density)
@@ -214,34 +191,11 @@ def _arriving(task: Task, emitter, interaction, active) -> tuple[Any, Any]:
     return irradiance * leg, sample.d
 
 
-def _cell(number, shift, count: int) -> tuple[Any, Any]:
-    """Return where a cell of the unit interval begins, and its width.
-
-    All cells are 1/(count - 1) wide but the first and the last, which share that width as `shift` in [0, 1) says. So
-    the edge of a shadow lies anywhere in its cell from batch to batch; in cells that stay, an edge close to the end of
-    one would be felt so rarely that no spread between batches could tell.
-    """
-    if count == 1:
-        return mi.Float(0), mi.Float(1)
-    place = mi.Float(number) + shift
-    low, high = dr.maximum(place - 1, 0), dr.minimum(place, count - 1)
-    return low / (count - 1), (high - low) / (count - 1)
-
-
-def _point_on(ray: Ray, position):
-    """Return a point of a medium on camera rays."""
-    point = dr.zeros(mi.MediumInteraction3f)
-    point.p = position
-    point.wi = -ray.direction
-    point.sh_frame = mi.Frame3f(ray.direction)
-    return point
-
-
-def _scattered(task: Task, number: int, ray: Ray, stretch: _Stretch, from_light, r, active):
+def _scattered(task: Task, number: int, ray: Ray, stretch: Stretch, from_light, r, active):
     """Return sigma_s p/(4 pi) I V T of points at a distance r from a light, in a unit direction from there."""
     light = task.lights[number]
     position = mi.Point3f(light.position)
-    point = _point_on(ray, position + from_light * r)
+    point = point_on(ray, position + from_light * r)
     phase, _ = stretch.medium.phase_function().eval_pdf(mi.PhaseFunctionContext(), point, -from_light, active)
     intensity = _intensity(light, point, active)
     media = Leg(stretch.at_lights[number], stretch.sigma_t)
@@ -249,7 +203,7 @@ def _scattered(task: Task, number: int, ray: Ray, stretch: _Stretch, from_light,
     return stretch.sigma_s * phase * intensity * leg
 
 
-def _surface(task: Task, hit, stretch: _Stretch, active):
+def _surface(task: Task, sampler, ray: Ray, hit, stretch: Stretch, active):
     """Return what all lights send by way of the surface at the end of a stretch."""
     total = dr.zeros(mi.Spectrum, dr.width(active))
     camera_leg = stretch.depth + stretch.sigma_t * dr.select(active, stretch.end - stretch.start, 0)
@@ -267,6 +221,8 @@ def _surface(task: Task, hit, stretch: _Stretch, active):
         arriving, towards = _arriving(task, emitter, hit, active)
         material = hit.bsdf().eval(mi.BSDFContext(), hit, hit.to_local(towards), active)
         total += dr.select(active, material * arriving * dr.exp(-camera_leg), 0)
+    for extended in task.area:
+        total += area_surface(task, extended, sampler, hit, stretch, ray=ray, active=active)
     return total
 
 

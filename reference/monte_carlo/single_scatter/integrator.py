@@ -22,8 +22,9 @@ import numpy as np
 
 from analytic.errors import InputError
 from reference.monte_carlo.batches import LARGEST_BATCH, Batches, check_samples, single_batch
-from reference.monte_carlo.single_scatter.estimator import double_ray, ray_light
+from reference.monte_carlo.single_scatter.estimator import ray_light
 from reference.monte_carlo.single_scatter.scene_data import read_task
+from reference.monte_carlo.single_scatter.stretches import double_ray
 from reference.scene.read import TruthScene
 
 PLUGIN = "single-scatter"
@@ -47,7 +48,7 @@ def _integrator_class(variant: str):
     """Return the integrator's class of a variant, the current one; each variant has its own base class."""
 
     class SingleScatterIntegrator(mi.SamplingIntegrator):
-        """Exactly one scattering of point, spot and directional lights (see
+        """Exactly one scattering of point, spot, directional and area lights (see
         `reference.monte_carlo.single_scatter.integrator`).
         """
 
@@ -80,12 +81,14 @@ def single_scatter_batch(truth: TruthScene, seed: int, samples: int) -> Batches:
     seed
         Seed of the batch; different seeds are independent.
     samples
-        Distances sampled for each ray, light and medium, at most 256.
+        Distances sampled for each ray, light and medium, each from a point of its own of a light with extent, at most
+        256.
 
     Returns
     -------
     Batches
-        Airlight and surface of every pixel [W/(m^2 sr)]. The surface needs no sampling, so all batches agree on it.
+        Airlight and surface of every pixel [W/(m^2 sr)]. The surface needs no sampling but under lights with extent:
+        without these all batches agree on it.
     """
     check_samples(samples)
     medium = truth.scene.sensors()[0].get_medium()

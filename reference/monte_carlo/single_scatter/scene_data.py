@@ -14,6 +14,7 @@ import mitsuba as mi
 import numpy as np
 
 from analytic.errors import InputError
+from reference.monte_carlo.single_scatter.area_sampling import AreaLight, is_area, read_area
 from reference.monte_carlo.single_scatter.boundary_walk import (
     Surroundings,
     coefficients,
@@ -41,6 +42,7 @@ class Task:
     directional: tuple[Any, ...]  #: Mitsuba's directional emitters
     samples: int  #: distances for each ray, light and medium
     grey: bool  #: no medium's extinction depends on the channel
+    area: tuple[AreaLight, ...] = ()  #: lights with extent
 
 
 def read_task(scene, medium, samples: int) -> Task:
@@ -61,7 +63,10 @@ def read_task(scene, medium, samples: int) -> Task:
         For an emitter, a medium or a material that it has no answer for.
     """
     directional = tuple(emitter for emitter in scene.emitters() if _is_directional(emitter))
-    lights = tuple(_read_light(emitter) for emitter in scene.emitters() if not _is_directional(emitter))
+    area = tuple(read_area(emitter) for emitter in scene.emitters() if is_area(emitter))
+    lights = tuple(
+        _read_light(emitter) for emitter in scene.emitters() if not (_is_directional(emitter) or is_area(emitter))
+    )
     around, media = read_surroundings(scene)
     if directional:
         _refuse_endless(scene, medium, directional[0])
@@ -69,7 +74,7 @@ def read_task(scene, medium, samples: int) -> Task:
         require_homogeneous(medium)
         media = [*media, medium]
     known = medium is None or isinstance(medium, mi.Medium)
-    return Task(around, lights, directional, samples, grey=known and all(_is_grey(each) for each in media))
+    return Task(around, lights, directional, samples, grey=known and all(_is_grey(each) for each in media), area=area)
 
 
 def _refuse_endless(scene, medium, emitter) -> None:
@@ -103,7 +108,8 @@ def _read_light(emitter) -> Light:
     name = emitter.class_name()
     if name not in ("PointLight", "SpotLight"):
         raise InputError(
-            f"single-scatter: the scene has an emitter of class {name}; wanted 'point', 'spot' or 'directional' only"
+            f"single-scatter: the scene has an emitter of class {name}; wanted 'point', 'spot', 'directional' or "
+            "'area' only"
         )
     sample, _ = emitter.sample_direction(dr.zeros(mi.Interaction3f), mi.Point2f(0.5))
     position = mi.Point3d(sample.p)

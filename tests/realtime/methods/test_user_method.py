@@ -271,6 +271,6 @@ def test_a_record_keeps_what_it_says(tmp_path):
     )
     method = find_method(f"{path}:mine")
     assert isinstance(method, Method)
-    assert method.name == "mine"
+    assert method.name == f"{path}:mine"  # what messages call it, as the user does
     assert method.parameters == METHODS["ray-march"].parameters
     assert method.prepare is METHODS["ray-march"].prepare

@@ -63,7 +63,10 @@ def test_vacuum_and_black_media_are_read(variant):
         (lambda fog: {"fog": fog | {"sigma_t": -1.0}}, "sigma_t is"),
         (lambda fog: {"fog": fog | {"sigma_t": float("nan")}}, "sigma_t is"),
         (lambda fog: {"fog": fog | {"albedo": 1.5}}, "albedo is"),
-        (lambda fog: {"ball": {"type": "sphere", "emitter": {"type": "area"}}}, "AreaLight"),
+        (
+            lambda fog: {"ball": {"type": "sphere", "bsdf": {"type": "diffuse"}, "emitter": {"type": "area"}}},
+            "'ball': its material reflects light",
+        ),
         (lambda fog: {"ball": {"type": "sphere", "bsdf": {"type": "null"}}}, "transparent"),
         (lambda fog: {"ball": {"type": "sphere", "interior": {"type": "homogeneous"}}}, "bounds a medium"),
         (lambda fog: {"spot": spot(cutoff=95.0, beam=90.0)}, "cutoff_angle"),

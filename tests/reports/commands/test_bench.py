@@ -29,3 +29,31 @@ def test_the_margin_is_that_of_volpath_alone(variant, capfd, monkeypatch, option
 def test_a_margin_that_is_none_is_refused_before_any_work(capfd, margin):
     assert cli.run(["bench", "open-fog", f"--margin={margin}"]) == 2
     assert f"--margin: got {float(margin):g}, wanted a share between 0 and 1" in capfd.readouterr().err
+
+
+@pytest.mark.claim("error-by-cause", tolerance="1e-5 of the largest error: the format's 32 bits")
+def test_errors_by_cause_are_printed_and_drawn(variant, capfd, tmp_path):
+    import numpy as np
+
+    from reference.storage.exr import read_exr
+
+    arguments = ["bench", "colonnade", "--decompose", "--methods", "min-max,froxel-fog", "--size", "32x24"]
+    assert cli.run([*arguments, "--json", "-o", str(tmp_path)]) == 0
+    (scene,) = json.loads(capfd.readouterr().out)["scenes"]
+    assert scene["size"] == [32, 24]
+    for number, entry in enumerate(scene["methods"]):
+        assert sum(part["share"] for part in entry["parts"]) == pytest.approx(1, abs=1e-9)
+        layers = read_exr(tmp_path / "colonnade" / f"decomposition-{number}.exr").layers
+        parts = [layers["error-" + part["cause"].replace(" ", "-")] for part in entry["parts"]]
+        error = np.asarray(layers["image"], dtype=float) - layers["truth"]
+        np.testing.assert_allclose(np.sum(parts, axis=0), error, atol=1e-5 * np.abs(error).max())
+    assert (tmp_path / "colonnade" / "decomposition.png").stat().st_size > 10_000
+    assert cli.run([*arguments, "--markdown"]) == 0
+    printed = capfd.readouterr().out
+    assert "| froxel-fog | whole | truth |" in printed
+    assert "resolution | width=32, height=24 |" in printed
+
+
+def test_a_folder_is_for_errors_by_cause_alone(capfd, tmp_path):
+    assert cli.run(["bench", "open-fog", "-o", str(tmp_path)]) == 2
+    assert "--output: got a folder without --decompose" in capfd.readouterr().err

@@ -46,15 +46,21 @@ COMMANDS = {
     "bench": ["bench", "open-fog", "--size", "64x48", "--methods", "unshadowed,ray-march", "--no-truth"],
 }
 KILLS = 15  #: of each command
-# The shell's status; and for the first hundredth of a second, in which Python itself starts, what it is made from.
+# The shell's status; and for the first milliseconds, in which `env` starts, what it is made from.
 STATUS = {signal.SIGINT: (130, -2), signal.SIGTERM: (143, -15), signal.SIGKILL: (-9,)}
+FIRST = 0.02  #: seconds, on a busy machine
+# As the launcher starts it; where `env` cannot, Python itself starts in the first milliseconds.
+START = [sys.executable, "-S", str(ROOT / "airlight.py")]
+HELD = ["env", "--block-signal=INT,TERM"]
+if subprocess.run([*HELD, "true"], capture_output=True).returncode == 0:
+    START = [*HELD, *START]
 WORDS = {signal.SIGINT: "interrupted: ", signal.SIGTERM: "terminated: "}
 
 
 def run(command, folder, *, stop=None, after=0.0):
     """Run a command in a folder, with a cache beside it; send it a signal after a time [s]."""
     process = subprocess.Popen(
-        [sys.executable, "-S", str(ROOT / "airlight.py"), *COMMANDS[command]],
+        [*START, *COMMANDS[command]],
         cwd=folder,
         env=os.environ | {"AIRLIGHT_CACHE_DIR": str(folder.parent / "cache")},
         stdout=subprocess.PIPE,
@@ -108,9 +114,9 @@ def test_a_kill_at_any_moment_has_its_status_and_leaves_whole_files(command, var
         status, _, err = run(command, folder, stop=stop, after=after)
         what = f"{stop.name} after {after:.3f} s: status {status}\n{err}"
         if status != 0:  # it was faster
-            assert status in STATUS[stop], what
+            assert status in STATUS[stop][: 1 + (after < FIRST)], what
             assert "rror" not in err, what
-            assert "Traceback" not in err or status == -2, what
+            assert "Traceback" not in err, what
             if status > 0:
                 assert err.splitlines()[-1].startswith(WORDS[stop]), what
         check_files(tmp_path / "work", killed=True)

@@ -8,6 +8,7 @@ import pytest
 from analytic.errors import InputError
 from reports.interchange.gltf import write_gltf
 from reports.interchange.meshes import SIDES, shape_mesh
+from tests.helpers.area_lights import lamp
 from tests.helpers.scenes import bounded_medium, spot, tiny_scene
 from validation.scenes.loading import LoadedScene, load_scene
 
@@ -265,3 +266,40 @@ def test_a_light_at_infinity_is_directional_in_watts_a_square_metre(variant, tmp
     x, y, z = np.array([0.737, -0.271, -0.419]) / np.linalg.norm([0.737, -0.271, -0.419])
     # It shines along its own -z; y of glTF is the scene's z.
     np.testing.assert_allclose(-matrix[:3, 2], [x, z, -y], atol=1e-6)
+
+
+@pytest.mark.claim("gltf-area-lights", tolerance="1e-6: float32")
+@pytest.mark.parametrize(
+    ("kind", "flipped"),
+    [("rectangle", False), ("rectangle", True), ("disk", False), ("disk", True), ("sphere", False)],
+)
+def test_a_light_with_extent_is_a_mesh_that_emits_from_the_side_of_its_normal(variant, tmp_path, kind, flipped):
+    """Rationale: core glTF has no such light; faces run counter-clockwise seen from where it shines."""
+    import mitsuba as mi
+
+    scale = {"rectangle": [0.5, 0.3, 1.0], "disk": [0.4] * 3, "sphere": [0.3] * 3}[kind]
+    transform = mi.ScalarTransform4f().look_at([0.9, 0.7, 1.9], [0.1, -0.5, 0.4], [0, 0, 1]).scale(scale)
+    light = lamp(kind, radiance=(5.0, 4.0, 2.5), to_world=transform, flip_normals=flipped)
+    write_gltf(tmp_path / "tiny.glb", loaded(lamp=light))
+    document, binary = parts(tmp_path / "tiny.glb")
+    assert set(document["extensionsUsed"]) == {"KHR_materials_specular", "KHR_materials_emissive_strength"}
+    assert "extensions" not in document
+    names = [mesh["name"] for mesh in document["meshes"]]
+    assert sorted(names) == ["ball", "floor", "lamp"]
+    number = names.index("lamp")
+    material = document["materials"][document["meshes"][number]["primitives"][0]["material"]]
+    assert material["emissiveFactor"] == [1.0, 0.8, 0.5]
+    assert material["extensions"]["KHR_materials_emissive_strength"]["emissiveStrength"] == 5.0
+    assert "core glTF has no light with extent" in material["extras"]["note"]
+    assert material["extras"]["light"]["radiance"] == [5.0, 4.0, 2.5]
+    vertices, _, faces = arrays(document, binary)[number]
+    corners = vertices[faces.reshape(-1, 3)].astype(np.float64)
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    # The disk and the sphere are of 128 sides.
+    assert 0.5 * np.linalg.norm(across, axis=1).sum() == pytest.approx(material["extras"]["light"]["area"], rel=2e-3)
+    turn = np.array(document["scenes"][0]["extras"]["scene_to_gltf"])
+    if kind == "sphere":
+        outward = corners.mean(axis=1) - turn @ material["extras"]["light"]["position"]
+    else:
+        outward = np.broadcast_to(turn @ material["extras"]["light"]["axis"], across.shape)
+    assert np.all(np.sum(across * outward, axis=1) > 0)

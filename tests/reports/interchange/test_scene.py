@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import json
+import math
 import re
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from reports.commands.main import run
 from reports.interchange.scene import describe_scene, spot_power_angle, up_axis
 from reports.tables.scene import description_text
+from tests.helpers.area_lights import lamp
 from tests.helpers.scenes import bounded_medium, spot, tiny_scene
 from validation.scenes.loading import LoadedScene, load_scene
 from validation.scenes.registry import SCENES
@@ -97,6 +99,39 @@ def test_a_light_at_infinity_has_a_direction_and_no_place(variant):
     text = description_text(describe_scene(loaded))
     assert "directional, travels along (0.828" in text
     assert "(33.1, 28.7, 22.3) W/m^2 on a plane that faces it" in text
+
+
+@pytest.mark.claim("describe-area-lights", tolerance="1e-6 relative: float32")
+@pytest.mark.parametrize(
+    ("kind", "scale", "area"),
+    [
+        ("rectangle", [0.5, 0.3, 1.0], 0.6),
+        ("disk", [0.4, 0.4, 1.0], math.pi * 0.16),
+        ("sphere", [0.3] * 3, 4 * math.pi * 0.09),
+    ],
+)
+def test_lights_with_extent_have_radiance_power_and_luminous_flux(variant, kind, scale, area):
+    """Rationale: power pi Le A, and 683 lm/W times 0.2126 R + 0.7152 G + 0.0722 B, here by hand."""
+    import mitsuba as mi
+
+    transform = mi.ScalarTransform4f().look_at([0.9, 0.7, 1.9], [0.1, -0.5, 0.4], [0, 0, 1]).scale(scale)
+    found = described(lamp=lamp(kind, radiance=(5.0, 4.0, 3.0), to_world=transform))
+    (light,) = found["lights"]
+    assert (light["kind"], light["shape"], light["material"]) == ("area", kind, "black")
+    power = math.pi * area * np.array([5.0, 4.0, 3.0])
+    assert light["radiance"] == [5.0, 4.0, 3.0]
+    assert light["power"] == pytest.approx(power, rel=1e-6)
+    # The primaries of sRGB as four digits of IEC 61966-2-1.
+    assert light["luminous_flux"] == pytest.approx(683 * power @ [0.2126, 0.7152, 0.0722], rel=2e-4)
+    assert [surface["name"] for surface in found["surfaces"]] == ["ball", "floor"]
+    text = description_text(found)
+    assert " lm: 683 lm/W times the luminance of the power as linear sRGB" in text
+    assert "(not tried)" in found["recipes"]["Cycles"][0]
+    if kind == "sphere":
+        assert light["radius"] == pytest.approx(0.3, rel=1e-6)
+    else:
+        expected = np.array([-0.8, -1.2, -1.5]) / np.linalg.norm([-0.8, -1.2, -1.5])
+        assert light["axis"] == pytest.approx(expected, abs=1e-6)
 
 
 def test_surfaces_have_their_reflectance(variant):

@@ -4,6 +4,7 @@
 import pytest
 
 from analytic.errors import InputError
+from realtime.memory import Memory
 from reports.commands.main import run
 from validation.frames import expected_work
 from validation.frames.expected_work import Work, check_work
@@ -11,7 +12,7 @@ from validation.frames.expected_work import Work, check_work
 
 def test_an_hour_and_the_memory_are_the_bounds(variant, monkeypatch):
     monkeypatch.setattr(expected_work.dr, "thread_count", lambda: 2)
-    monkeypatch.setattr(expected_work, "machine_memory", lambda: 10**9)
+    monkeypatch.setattr(expected_work, "usable_memory", lambda: Memory(10**9, "this machine has"))
     monkeypatch.setattr(expected_work.mi, "variant", lambda: "llvm_ad_rgb")
     check_work("x", [Work(3600, 1e9), Work(3600, 1e9)], force=False)
     with pytest.raises(InputError, match=r"^x: would take about 1 hours; ask for less, or add --force to start it"):
@@ -42,7 +43,7 @@ def test_an_hour_and_the_memory_are_the_bounds(variant, monkeypatch):
 def test_every_command_that_renders_asks(variant, tmp_path, monkeypatch, capfd, command):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(expected_work.dr, "thread_count", lambda: 2)
-    monkeypatch.setattr(expected_work, "machine_memory", lambda: 16 * 10**9)
+    monkeypatch.setattr(expected_work, "usable_memory", lambda: Memory(16 * 10**9, "this machine has"))
     assert run(command) == 2
     err = capfd.readouterr().err
     assert err.count("\n") == 1
@@ -55,7 +56,7 @@ def test_usual_work_is_not_asked_about(variant, monkeypatch):
     from validation.scenes.registry import SCENES
 
     monkeypatch.setattr(expected_work.dr, "thread_count", lambda: 1)
-    monkeypatch.setattr(expected_work, "machine_memory", lambda: 8 * 10**9)
+    monkeypatch.setattr(expected_work, "usable_memory", lambda: Memory(8 * 10**9, "this machine has"))
     size = (800, 600)
     works = [expected_work.truth_work(size) for _ in SCENES]
     works += [expected_work.frame_work(size, steps=100) for _ in SCENES for _ in range(17)]

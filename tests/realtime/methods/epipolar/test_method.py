@@ -257,7 +257,7 @@ def test_samples_in_a_medium_bounded_by_a_mesh(variant):
 def test_memory_is_counted_before_it_is_taken(variant, monkeypatch):
     import realtime.memory
 
-    monkeypatch.setattr(realtime.memory, "machine_memory", lambda: 10**9)
+    monkeypatch.setattr(realtime.memory, "usable_memory", lambda: realtime.memory.Memory(10**9, "this machine has"))
     scene = scene_with()
     message = r"needs [0-9.]+ GB of memory, this machine has 1 GB; use a smaller map"
     with pytest.raises(InputError, match=r"map: 8192 texels, slices: .*" + message):

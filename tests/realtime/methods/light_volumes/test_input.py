@@ -62,7 +62,7 @@ def test_memory_is_counted_before_it_is_taken(variant, monkeypatch, evaluation):
         raise AssertionError("a map was cast")
 
     loaded = loaded_scene(size=(4, 4))
-    monkeypatch.setattr(realtime.memory, "machine_memory", lambda: 10**9)
+    monkeypatch.setattr(realtime.memory, "usable_memory", lambda: realtime.memory.Memory(10**9, "this machine has"))
     with monkeypatch.context() as patch:
         patch.setattr(realtime.methods.light_volumes.method, "cast_shadow_map", never)
         message = r"map: 4096 texels for 1 light\(s\): needs [0-9.]+ GB of memory, this machine has 1 GB; use a smaller"

@@ -17,6 +17,14 @@ def test_pictures_are_those_of_the_files(page, folder):
         assert np.abs(pixels(page, f"#viewer-0 .{which} canvas") - wanted).max() <= 1
 
 
+def test_the_page_opens_with_pictures(page):
+    """Truth, method, error and the strip of all errors lie in a window of 1300 x 1000."""
+    assert page.viewport_size == {"width": 1300, "height": 1000}
+    for shown in (".reference canvas", ".method canvas", ".error canvas", ".strip"):
+        box = viewer(page).locator(shown).first.bounding_box()
+        assert box["y"] + box["height"] <= 1000, shown
+
+
 def test_error_map_is_that_of_the_pictures(page, folder):
     page.keyboard.press("2")
     assert drawn(page) == "1 airlight signed 0"

@@ -1,0 +1,16 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Froxel fog: scattered light in a grid that is aligned with the view, summed front to back; what engines ship.
+
+Read in this order:
+
+- `grid.py`: where the froxels of a view are, and where a point is among them;
+- `media.py`: which share of a froxel each medium fills;
+- `light_points.py`: the points of lights with extent in tables;
+- `injection.py`: the light that reaches the middle of each froxel and is scattered there to the camera;
+- `history.py`: the shift of the samples from frame to frame, and the mean with what the last frame left;
+- `accumulation.py`: the airlight from the camera to the end of each slice, by the integral within a slice;
+- `method.py`: the parameters, and the stages of a frame.
+
+May import: `realtime.bounded_media`, `realtime.memory`, `realtime.errors`, `realtime.methods.interface`,
+`realtime.numerics`, `realtime.parameters`, `realtime.rays`, `realtime.scene`, `realtime.shadow_maps`.
+"""

@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The grid of a view: columns of froxels behind equal rectangles of the image, cut by planes across its axis.
+
+A place is (u, v, s), all from 0 to 1: u and v across the image from its upper left corner, s in depth. With the camera
+of `realtime.scene.camera`, W x H pixels, it is the point
+
+    origin + z(s) (forward + W (1/2 - u) left + H (1/2 - v) up),
+
+z the distance along the axis. Slices are equal steps of s. Their distribution is exponential,
+
+    z(s) = near ((1 + far/near)^s - 1),        s(z) = log(1 + z/near) / log(1 + far/near),
+
+which begins at the camera: up to the depth `near` slices are about equally thick, beyond it in proportion to their
+depth. It is linear in the limit of a large `near`, z(s) = far s. What lies beyond `far` scatters nothing.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+from realtime.methods.interface.view import View
+from realtime.numerics.array_types import Metres, PerRay, four_numbers
+from realtime.scene.camera import Camera
+from realtime.scene.lights import Light
+from realtime.scene.medium import Medium, least_extinction
+
+_NEAR = 1 / 8  # of `far`, where it is not given
+_OPTICAL_REACH = 3.0  # optical depth behind a light that is worth slices: e^-6 = 0.25 % of the light comes back from it
+_REACH = 32.0  # the same in distances of the light: the airlight beyond x falls like 1/x
+
+
+@dataclass(frozen=True)
+class Grid:
+    """The froxels of one view."""
+
+    width: int  #: froxels across
+    height: int  #: froxels down
+    slices: int  #: froxels in depth
+    camera: Camera
+    far: Metres  #: depth where the last slice ends [m]
+    near: Metres | None  #: depth up to which slices are about equally thick [m]; None: all are
+
+    @property
+    def columns(self) -> int:
+        """How many columns of froxels there are."""
+        return self.width * self.height
+
+    def depth(self, s: PerRay) -> Metres:
+        """Return z(s) [m]."""
+        if self.near is None:
+            return s * self.far
+        return self.near * (dr.exp(s * dr.log(1 + self.far / self.near)) - 1)
+
+    def share(self, depth: Metres) -> PerRay:
+        """Return s(z); `depth` is z [m]."""
+        if self.near is None:
+            return depth / self.far
+        return dr.log(1 + depth / self.near) / dr.log(1 + self.far / self.near)
+
+    def column_ray(self, column: PerRay, shift: tuple[Any, Any] = (0, 0)) -> PerRay:
+        """Return the vector from the camera to depth 1 in columns, `shift` parts of a froxel beside their middle."""
+        Float = type(self.far)
+        row = column // self.width
+        u = (Float(column - row * self.width) + (0.5 + shift[0])) / self.width
+        v = (Float(row) + (0.5 + shift[1])) / self.height
+        camera = self.camera
+        return camera.forward + camera.left * (camera.width * (0.5 - u)) + camera.up * (camera.height * (0.5 - v))
+
+    def place(self, point: Any) -> tuple[Any, Any, Any]:
+        """Return u, v and the depth [m] of points [m]; u and v mean nothing where that is not above 0."""
+        camera = self.camera
+        away = point - camera.origin
+        depth = dr.dot(away, camera.forward)
+        across, upward = (dr.dot(away, side) / (depth * dr.squared_norm(side)) for side in (camera.left, camera.up))
+        return 0.5 - across / camera.width, 0.5 - upward / camera.height, depth
+
+
+def view_grid(view: View, *, size: tuple[int, int, int], near: float, far: float, distribution: str) -> Grid:
+    """Return the grid of a view.
+
+    Parameters
+    ----------
+    view
+        The frame.
+    size
+        Froxels across, down and in depth.
+    near, far
+        Depths [m]; 0: chosen for the frame.
+    distribution
+        'exponential' or 'linear'.
+    """
+    Float = type(view.distance)
+    end = dr.opaque(Float, far) if far else _frame_depth(view)
+    begin = dr.opaque(Float, near) if near else end * _NEAR
+    return Grid(*size, view.camera, end, begin if distribution == "exponential" else None)
+
+
+def _frame_depth(view: View) -> Metres:
+    """Return the depth of the farthest surface, or where rays meet none, where too little light comes from to matter.
+
+    Media in clear air end by themselves.
+    """
+    Float, medium, forward = type(view.distance), view.medium, view.camera.forward
+    met = dr.isfinite(view.distance)
+    depth = view.distance * dr.dot(view.direction, forward)
+    surfaces = dr.max(dr.select(met, depth, 0))
+    beyond = Float(0)
+    if medium.clear:
+        for body in medium.bounded_media:
+            beyond = dr.maximum(beyond, dr.dot(body.centre - view.camera.origin, forward) + body.radius)
+        return dr.maximum(dr.select(dr.all(met), dr.minimum(surfaces, beyond), beyond), 1e-3)
+    for light in view.lights:
+        beyond = dr.maximum(beyond, _reach(view, light, medium))
+    return dr.maximum(dr.select(dr.all(met), surfaces, dr.maximum(surfaces, beyond)), 1e-3)
+
+
+def _reach(view: View, light: Light, medium: Medium) -> Metres:
+    away = light.position - view.camera.origin
+    reach = dr.minimum(_OPTICAL_REACH / least_extinction(medium), _REACH * dr.norm(away))
+    return dr.maximum(dr.dot(away, view.camera.forward), 0) + reach
+
+
+def trilinear(volume: Any, size: tuple[int, int, int], place: tuple[Any, Any, Any]) -> Any:
+    """Return values between the eight neighbours of a place, a colour.
+
+    Parameters
+    ----------
+    volume
+        Four numbers a value, across first, then down, then in depth.
+    size
+        How many values there are across, down and in depth.
+    place
+        Where, in steps of the grid from the first value on; beside the grid it is the value at its border.
+    """
+    Float = type(volume)
+    corners, weights = [], []
+    for steps, last in zip(place, (count - 1 for count in size), strict=True):
+        inside = dr.minimum(dr.maximum(steps, 0), last)
+        # What is no number becomes no index either: whole numbers have the upper bound.
+        low = dr.minimum(mi.UInt32(inside), last)
+        corners.append((low, dr.minimum(low + 1, last)))
+        weights.append(inside - Float(low))
+    x, y, z = corners
+    value = four_numbers(Float)(0)
+    for k, layer in enumerate(z):
+        for j, row in enumerate(y):
+            for i, column in enumerate(x):
+                share = Float(1)
+                for side, weight in zip((i, j, k), weights):
+                    share = share * (weight if side else 1 - weight)
+                index = (layer * size[1] + row) * size[0] + column
+                value = dr.fma(dr.gather(four_numbers(Float), volume, index), share, value)
+    return value.xyz

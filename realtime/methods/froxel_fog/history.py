@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""From frame to frame: the samples move within their froxels, and what they found is averaged over the frames.
+
+Frame n samples at the middle of a froxel plus (n alpha mod 1), which lies in [-1/2, 1/2) on each of three sides, with
+alpha the additive recurrence of Roberts in three dimensions: 1/g, 1/g^2, 1/g^3, where g^4 = g + 1. The first frame
+samples the middles.
+
+A froxel holds then the mean of frames, the newest with the weight 1 - h:
+
+    S_n = (1 - h) S + h S_{n-1}(P).
+
+P is the middle of the froxel, looked up where the last frame's camera saw it; what it did not see starts anew. A change
+of the light is forgotten like h^n: to within a share e after log e / log h frames. That is the ghost. `clamp` cuts the
+history off at the least and the largest value of the froxel and its six neighbours in this frame.
+
+References
+----------
+Roberts 2018, *The unreasonable effectiveness of quasirandom sequences*. Wronski 2014, *Volumetric fog: unified, compute
+shader based solution to atmospheric scattering*. Karis 2014, *High-quality temporal supersampling* (the clamp).
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+from realtime.methods.froxel_fog.grid import Grid, trilinear
+from realtime.numerics.array_types import PerRay, four_numbers, packed
+
+_GROWTH = 1.2207440846057596  # g^4 = g + 1
+_STEPS = tuple(round(2**32 / _GROWTH**power) % 2**32 for power in (1, 2, 3))
+
+
+@dataclass(frozen=True)
+class FroxelHistory:
+    """What a frame leaves to the next one."""
+
+    volume: Any  #: what each froxel scattered, four numbers each [W/(m^3 sr)]
+    grid: Grid
+    frame: Any  #: how many frames there were
+
+
+def frame_shift(last: FroxelHistory | None, Float: Any) -> tuple[Any, Any, Any]:
+    """Return by how much the samples of the frame after `last` are moved, in parts of a froxel."""
+    if last is None:
+        return Float(0), Float(0), Float(0)
+    across, down, deep = (Float(mi.Int32(last.frame * mi.UInt32(step))) * 2.0**-32 for step in _STEPS)
+    return across, down, deep
+
+
+def averaged(
+    scattered: PerRay, grid: Grid, last: FroxelHistory | None, *, weight: float, clamp: bool
+) -> tuple[PerRay, FroxelHistory]:
+    """Return the mean of what froxels scatter in this frame and in those before, and what to hand on.
+
+    Parameters
+    ----------
+    scattered
+        Of this frame, a colour [W/(m^3 sr)].
+    grid
+        Of this frame.
+    last
+        What the last frame handed on; None for the first.
+    weight
+        h, of the history.
+    clamp
+        Whether to cut it off.
+    """
+    Float, Color = type(grid.far), type(scattered)
+    if last is None:
+        frame = dr.opaque(mi.UInt32, 1)
+    else:
+        if clamp:
+            dr.eval(scattered)
+        before, seen = _before(grid, last)
+        before = Color(before)
+        if clamp:
+            before = dr.clip(before, *_bounds(scattered, grid))
+        scattered = dr.select(seen, dr.lerp(scattered, before, weight), scattered)
+        frame = last.frame + 1
+    volume = packed(four_numbers(Float)(scattered.x, scattered.y, scattered.z, 0))
+    # Arrays of its own: those of the camera may be written anew for the next frame.
+    kept = replace(grid, camera=grid.camera)
+    return scattered, FroxelHistory(volume, kept, frame)
+
+
+def _before(grid: Grid, last: FroxelHistory) -> tuple[Any, Any]:
+    """Return what the last frame held at the middles of froxels, and whether it saw them."""
+    Float = type(grid.far)
+    lane = dr.arange(mi.UInt32, grid.columns * grid.slices)
+    number = lane // grid.columns
+    ray = grid.column_ray(lane - number * grid.columns)
+    point = dr.fma(ray, grid.depth((Float(number) + 0.5) / grid.slices), grid.camera.origin)
+    u, v, depth = last.grid.place(point)
+    s = last.grid.share(dr.maximum(depth, 0))
+    seen = (depth > 0) & (s <= 1) & (u >= 0) & (u <= 1) & (v >= 0) & (v <= 1)
+    size = grid.width, grid.height, grid.slices
+    steps = [dr.fma(place, count, -0.5) for place, count in zip((u, v, s), size)]
+    return trilinear(last.volume, size, (steps[0], steps[1], steps[2])), seen
+
+
+def _bounds(scattered: PerRay, grid: Grid) -> tuple[Any, Any]:
+    """Return the least and the largest value of every froxel and its six neighbours."""
+    lane = dr.arange(mi.UInt32, grid.columns * grid.slices)
+    number = lane // grid.columns
+    row = lane // grid.width - number * grid.height
+    column = lane % grid.width
+    least = largest = scattered
+    steps = (column, 1, grid.width), (row, grid.width, grid.height), (number, grid.columns, grid.slices)
+    for place, stride, count in steps:
+        for there in (dr.select(place > 0, lane - stride, lane), dr.select(place + 1 < count, lane + stride, lane)):
+            value = dr.gather(type(scattered), scattered, there)
+            least, largest = dr.minimum(least, value), dr.maximum(largest, value)
+    return least, largest

@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The light that reaches a point of each froxel and is scattered there towards the camera.
+
+With P that point, r its distance from the light, T the transmittance from there and V the visibility, a froxel holds
+
+    S = 1/(4 pi) sum_lights I V T / max(r^2, b^2)  sum_media c albedo sigma_t p        [W/(m^3 sr)],
+
+c the share of the froxel that the medium fills. For a directional light, I / r^2 is the irradiance.
+
+About a light 1/r^2 has no bound, though its mean over a froxel has. With a half the diagonal of the froxel, the mean of
+1/r^2 over a ball of the radius a about the light is
+
+    3/(4 pi a^3) int_0^a (1/r^2) 4 pi r^2 dr = 3/a^2.
+
+So b^2 = a^2/3: a froxel with the light in it has about its mean, those away from the light are as they are, and b
+vanishes with the size of the froxels.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+from realtime.bounded_media.ray_segments import Piece, path_transmittance
+from realtime.methods.froxel_fog.grid import Grid
+from realtime.methods.froxel_fog.light_points import LightPointTable
+from realtime.methods.froxel_fog.media import piece_length
+from realtime.methods.interface.view import View
+from realtime.numerics.array_types import PerRay
+from realtime.rays.ray_light import falloff, ray_geometry
+from realtime.scene.lights import Light
+from realtime.scene.medium import transmittance
+
+#: (point, light, its number among all lights, the table that it is from with its number there) -> whether it is lit.
+Visibility = Callable[[Any, Light, int, tuple[LightPointTable, Any] | None], Any]
+
+_UNROLLED = 4  # lights in one kernel where media have bounds: no loop can write down how a light sees them
+
+
+@dataclass(frozen=True)
+class FroxelPoints:
+    """The points at which froxels are lit, one entry each."""
+
+    point: Any  #: [m]
+    unit: Any  #: from the camera there, of unit length
+    least: Any  #: b^2 [m^2]
+    filled: tuple[tuple[Any, Any], ...]  #: media, and the share of the froxels that each fills
+    some: Any  #: whether any does
+
+
+def scattered_light(
+    view: View,
+    grid: Grid,
+    pieces: tuple[Piece, ...],
+    *,
+    shift: tuple[Any, Any, Any],
+    tables: tuple[LightPointTable, ...],
+    visible: Visibility,
+) -> PerRay:
+    """Return the light that each froxel scatters to the camera, a colour [W/(m^3 sr)].
+
+    Parameters
+    ----------
+    view, grid
+        The frame and its froxels.
+    pieces
+        Of the columns, from `realtime.methods.froxel_fog.media.column_pieces`.
+    shift
+        Of the points from the middles of the froxels, in parts of a froxel across, down and in depth.
+    tables
+        Of the points of lights with extent.
+    visible
+        Which light reaches which point.
+    """
+    points = _froxel_points(view, grid, pieces, shift)
+    total = dr.zeros(type(view.medium.albedo), grid.columns * grid.slices)
+    loops = () if view.features.bounded else tables
+    for number, light in enumerate(view.lights):
+        if any(light.source == table.source for table in loops):
+            continue
+        lit = visible(points.point, light, number, None) if view.features.shadows else True
+        total += light.intensity * _weight(view, light, points, lit)
+        if view.features.bounded and number % _UNROLLED == _UNROLLED - 1:
+            dr.eval(total)
+    for table in loops:
+        like = next(light for light in view.lights if light.source == table.source)
+        total += like.intensity * _sum_over_points(view, table, like, points, visible)
+    if not view.features.bounded:
+        medium = view.medium
+        sigma_t = medium.sigma_t[0] if len(medium.sigma_t) == 1 else type(total)(*medium.sigma_t)
+        total = medium.albedo * (sigma_t * total)
+    return total * (0.25 * dr.inv_pi)
+
+
+def _froxel_points(view: View, grid: Grid, pieces: tuple[Piece, ...], shift: tuple[Any, Any, Any]) -> FroxelPoints:
+    Float = type(view.distance)
+    lane = dr.arange(mi.UInt32, grid.columns * grid.slices)
+    number = lane // grid.columns
+    column = lane - number * grid.columns
+    ray = grid.column_ray(column, shift[:2])
+    begin, end = grid.depth(Float(number) / grid.slices), grid.depth((Float(number) + 1) / grid.slices)
+    point = dr.fma(ray, dr.lerp(begin, end, 0.5 + shift[2]), view.origin)
+    filled: list[tuple[Any, Any]] = []
+    if view.features.bounded:
+        middle = dr.norm(grid.column_ray(column))
+        for piece in pieces:
+            share = piece_length(piece, begin * middle, end * middle, column) / ((end - begin) * middle)
+            filled.append((piece.medium, share))
+    some = sum((share for _, share in filled), Float(0)) > 0 if filled else dr.mask_t(Float)(True)
+    return FroxelPoints(
+        point, ray * dr.rsqrt(dr.squared_norm(ray)), _least_square(grid, begin, end), tuple(filled), some
+    )
+
+
+def _sum_over_points(view: View, table: LightPointTable, like: Light, points: FroxelPoints, visible: Visibility) -> Any:
+    """Return the sum of the weights of the points of a light, in one loop."""
+
+    def step(number, total):
+        light = table.point(number, like)
+        lit = visible(points.point, light, 0, (table, number)) if view.features.shadows else True
+        return number + 1, total + _weight(view, light, points, lit)
+
+    grey = len(view.medium.sigma_t) == 1
+    Value = type(view.distance) if grey else type(view.medium.albedo)
+    _, total = dr.while_loop(
+        state=(mi.UInt32(0), dr.zeros(Value, dr.width(points.point))),
+        cond=lambda number, total: number < table.count,
+        body=step,
+        labels=("number", "total"),
+    )
+    return total
+
+
+def _least_square(grid: Grid, begin: Any, end: Any) -> Any:
+    """Return b^2 of froxels between two depths [m^2]."""
+    camera = grid.camera
+    depth = 0.5 * (begin + end)
+    across = dr.squared_norm(camera.left * (camera.width / grid.width)) + dr.squared_norm(
+        camera.up * (camera.height / grid.height)
+    )
+    return (across * dr.square(depth) + dr.square(end - begin)) / 12
+
+
+def _weight(view: View, light: Light, points: FroxelPoints, lit: Any) -> Any:
+    """Return what S is for a unit of intensity without its factor 1/(4 pi); in one medium also without albedo sigma_t.
+
+    In a grey medium without bounds it is a number, otherwise a colour.
+    """
+    medium, Float, Color = view.medium, type(view.distance), type(view.medium.albedo)
+    toward = light.toward(points.point)
+    square = dr.squared_norm(toward)
+    r = dr.sqrt(square) if light.w else Float(1)
+    # At the light itself there is no direction: any will do.
+    cosine = dr.dot(toward, points.unit) * dr.rcp(dr.maximum(r, 1e-15))
+    strength = (dr.rcp(dr.maximum(square, points.least)) if light.w else Float(1)) * _profile(light, points.point)
+    if not view.features.bounded:
+        strength = dr.select(lit, strength * medium.phase.evaluate(cosine), 0)
+        return strength * transmittance(medium, r)
+    depths = [dr.zeros(Float, dr.width(points.point)) for _ in medium.sigma_t]
+    reached = points.some & (strength > 0)
+    kept = path_transmittance(medium, light, depths=depths, point=points.point, active=reached)
+    density = Color(0)
+    for filling, share in points.filled:
+        sigma_t = filling.sigma_t[0] if len(filling.sigma_t) == 1 else Color(*filling.sigma_t)
+        density += filling.albedo * (sigma_t * (share * filling.phase.evaluate(cosine)))
+    return dr.select(points.some & lit, strength * kept * density, 0)
+
+
+def _profile(light: Light, point: Any) -> Any:
+    """Return the relative intensity of a light towards points."""
+    if light.facing is not None:
+        away = point - light.position
+        return dr.maximum(dr.dot(light.normal, away) * dr.rsqrt(dr.maximum(dr.squared_norm(away), 1e-30)), 0)
+    if light.cone is None:
+        return type(point.x)(1)
+    away = dr.normalize(point - light.position)
+    inside = dr.dot(light.axis, away) > light.cos_cutoff
+    if light.beam is None:
+        return dr.select(inside, type(point.x)(1), 0)
+    # The point lies at x = 0 of a ray that starts there.
+    return dr.select(inside, falloff(ray_geometry(point, away, light), light, type(point.x)(0)), 0)

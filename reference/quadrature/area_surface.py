@@ -1,0 +1,264 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""What surfaces reflect of lights with extent: lit intervals along scan lines of the light.
+
+    L = exp(-tau_camera)  int_A Le V f cos_s cos_l exp(-s tau_leg) / r^2 dA,
+
+f cos_s by Mitsuba's `BSDF.eval`. In the plane of a surface point and a scan line, with the angle theta at the point and
+the distance h between point and line, dU/r^2 = dtheta/h and cos_l = D cos(theta)/h, D the distance between the point
+and the plane of the lines: what is left is a smooth function of theta without a pole, however close the light is. For a
+sphere the same expression is the solid angle of its disk (`reference.visibility.light_lines`), and the distance to the
+sphere has a square root at both ends of the line, which theta = m + w sin(phi) takes out.
+
+Each replicate has a direction of its lines and a shift of their places, drawn for every point; the places are a lattice
+folded by a tent, u = 1 - |2 t - 1|, whose error falls as the square of the number of lines for a continuous function
+(Hickernell 2002, Obtaining O(N^-2+eps) convergence for lattice quadrature rules).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.quadrature.area_airlight import FLOOR, standard_error
+from reference.quadrature.light_points import REPLICATES, PointPlan
+from reference.quadrature.segments import optical_depth
+from reference.quadrature.surface import SurfaceHits
+from reference.quadrature.unbounded import sums_of
+from reference.scene.area_light import TruthAreaLight
+from reference.scene.read import TruthScene
+from reference.scene.shapes import Shapes
+from reference.visibility.before_light import before_light
+from reference.visibility.light_lines import (
+    Facing,
+    Points,
+    ScanLines,
+    distance_on_line,
+    facing,
+    scan_lines,
+    seen_intervals,
+)
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+Share = Callable[[float], None]
+
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(6)
+_PANEL = 0.7  # rad: widest panel in theta or phi
+_BODIES = 0.1  # rad: the same where bounded media dim the leg, whose depth has kinks
+_LINES = 1 << 17  # at once
+_NODES_AT_ONCE = 1 << 20
+_FIRST = 4  # lines of each replicate that every point gets
+
+
+@dataclass(frozen=True)
+class Beam:
+    """A light, and what can stand in it."""
+
+    light: TruthAreaLight
+    scene: TruthScene  #: without the light's own shape
+    shapes: Shapes
+
+
+def area_surface(
+    truth: TruthScene, hits: SurfaceHits, known: Array, *, plan: PointPlan, shadow_scale: float, tell: Share
+) -> Array:
+    """Return the radiance of surfaces lit by lights with extent, by replicate, (rays, 3, replicates) [W/(m^2 sr)].
+
+    Parameters
+    ----------
+    truth, hits
+        The scene and what its rays hit.
+    known
+        The radiance that all other lights give, to which errors are relative too, (rays, 3) [W/(m^2 sr)].
+    plan
+        The standard error that is asked for, the most lines of a replicate, and the seed.
+    shadow_scale
+        See `reference.quadrature.image.quadrature_image`.
+    tell
+        Called with the share of the work that is done.
+
+    Notes
+    -----
+    Valid for shadows of triangles and spheres; other shapes are asked by one shadow ray for each node, so that their
+    edges are as sharp as the nodes are dense, and their errors in the spread of the replicates.
+    """
+    count = len(hits.distance)
+    result = np.zeros((count, 3, REPLICATES))
+    rows = surface_rows(hits)
+    if not len(rows):
+        return result
+    points, bsdf = surface_points(truth, hits, rows)
+    beams = [Beam(light, *before_light(truth, light)) for light in truth.area]
+    faced = [facing(beam.light, points) for beam in beams]
+    total = np.zeros((len(rows), 3, REPLICATES))
+    used, draws = np.zeros(len(rows)), [_draws(plan, number, len(rows)) for number in range(len(beams))]
+    to_camera = np.exp(-optical_depth(truth, truth.origin, truth.direction[rows], 0 * points.normal[:, 0], _far(hits)))
+    active, low, high = np.arange(len(rows)), 0, min(_FIRST, plan.most)
+    rounds, done = 1 + int(np.log2(max(1, plan.most // _FIRST))), 0
+    while len(active):
+        for number, beam in enumerate(beams):
+            looking = active[faced[number].seen[active]]
+            step = max(1, _LINES // (REPLICATES * (high - low)))
+            for first in range(0, len(looking), step):
+                some = looking[first : first + step]
+                line = _lines(draws[number], some, (low, high))
+                lines = scan_lines(beam.light.kind, faced[number], points, line[:3])
+                got = _line_values(beam, faced[number], lines, points, bsdf, shadow_scale)
+                place = np.searchsorted(some, lines.point) * REPLICATES + line[3]
+                sums = sums_of(place, got, len(some) * REPLICATES).reshape(len(some), REPLICATES, 3)
+                total[some] += np.swapaxes(sums, 1, 2)
+                tell((done + (number + (first + len(some)) / len(looking)) / len(beams)) / rounds)
+        used[active] = high
+        done += 1
+        if high >= plan.most:
+            break
+        value = (total[active] / high) * to_camera[active, :, None]
+        active = _unsettled(value, known[rows], active, plan.error)
+        low, high = high, 2 * high
+    result[rows] = total / used[:, None, None] * to_camera[:, :, None]
+    return result
+
+
+def surface_rows(hits: SurfaceHits) -> Index:
+    """Return the numbers of the rays that hit a surface."""
+    return np.flatnonzero(np.isfinite(hits.distance))
+
+
+def _far(hits: SurfaceHits) -> Array:
+    return hits.distance[surface_rows(hits)]
+
+
+def surface_points(truth: TruthScene, hits: SurfaceHits, rows: Index) -> tuple[Points, "Reflection"]:
+    """Return the points where rays hit surfaces, and how these reflect.
+
+    Parameters
+    ----------
+    truth, hits
+        The scene and what its rays hit.
+    rows
+        Numbers of the rays.
+    """
+    direction = truth.direction[rows]
+    place = truth.origin + hits.distance[rows, None] * direction
+    index = mi.UInt32(rows.astype(np.uint32))
+    interaction = dr.gather(mi.SurfaceInteraction3f, hits.interaction, index)
+    normal = np.array(interaction.n, dtype=np.float64).T
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    normal *= -np.sign(np.sum(normal * direction, axis=1))[:, None]
+    return Points(place, normal), Reflection(interaction)
+
+
+@dataclass(frozen=True)
+class Reflection:
+    """Mitsuba's materials at some points."""
+
+    interaction: Any  #: Mitsuba's surface interactions
+
+    def __call__(self, point: Index, towards: Array) -> Array:
+        """Return f cos_s at points of these numbers, (n,), for light from unit directions, (n, 3): (n, 3) [1/sr]."""
+        at = dr.gather(mi.SurfaceInteraction3f, self.interaction, mi.UInt32(point.astype(np.uint32)))
+        local = at.to_local(dr.normalize(mi.Vector3f(towards.T)))
+        return np.array(at.bsdf().eval(mi.BSDFContext(), at, local), dtype=np.float64).reshape(3, -1).T
+
+
+def _draws(plan: PointPlan, light: int, count: int) -> tuple[Array, Array]:
+    """Return directions of the lines [rad] and shifts of their places [1] of every point and replicate."""
+    generator = np.random.default_rng((plan.seed, light, count))
+    turn = np.pi * (np.arange(REPLICATES) + generator.random((count, 1))) / REPLICATES
+    return turn, generator.random((count, REPLICATES))
+
+
+def _lines(draws: tuple[Array, Array], points: Index, numbers: tuple[int, int]) -> tuple[Index, Array, Array, Index]:
+    """Return points, directions, places and replicates of the lines of these numbers, sorted by point."""
+    low, high = numbers
+    lattice = np.array([_van_der_corput(number) for number in range(low, high)])
+    turn, shift = draws[0][points], draws[1][points]
+    place = np.mod(shift[:, :, None] + lattice, 1.0)
+    place = 1 - np.abs(2 * place - 1)
+    per_point = REPLICATES * len(lattice)
+    replicate = np.tile(np.repeat(np.arange(REPLICATES), len(lattice)), len(points))
+    return np.repeat(points, per_point), np.repeat(turn.ravel(), len(lattice)), place.ravel(), replicate
+
+
+def _van_der_corput(number: int) -> float:
+    """Return the number with its binary digits mirrored at the point: the first 2^k of them are a lattice."""
+    return float(int(f"{number:064b}"[::-1], 2)) / 2.0**64
+
+
+def _line_values(
+    beam: Beam, seen: Facing, lines: ScanLines, points: Points, bsdf: Reflection, shadow_scale: float
+) -> Array:
+    """Return what every line stands for of the reflected radiance, before the leg to the camera, (lines, 3)."""
+    line, low, high = seen_intervals(beam.light, seen, lines, points, beam.shapes)
+    start, width = low, high - low
+    if beam.light.kind == "sphere":
+        middle, half = 0.5 * (lines.ends[0] + lines.ends[1]), 0.5 * (lines.ends[1] - lines.ends[0])
+        ends = (np.arcsin(np.clip((end - middle[line]) / half[line], -1.0, 1.0)) for end in (low, high))
+        start, finish = ends
+        width = finish - start
+    widest = _BODIES if beam.scene.media else _PANEL
+    count = np.maximum(np.ceil(width / widest), 1).astype(np.int64)
+    panel = np.repeat(np.arange(len(line)), count)
+    part = (width / count)[panel]
+    begin = start[panel] + (np.arange(len(panel)) - np.repeat(np.cumsum(count) - count, count)) * part
+    total = np.zeros((len(lines.point), 3))
+    step = max(1, _NODES_AT_ONCE // len(_NODES))
+    for first in range(0, len(panel), step):
+        block = slice(first, first + step)
+        of = line[panel[block]]
+        theta = begin[block, None] + 0.5 * part[block, None] * (1 + _NODES)
+        weight = 0.5 * part[block, None] * _WEIGHTS
+        if beam.light.kind == "sphere":
+            weight = weight * half[of, None] * np.cos(theta)
+            theta = middle[of, None] + half[of, None] * np.sin(theta)
+        value = _at_nodes(beam, seen, lines, of, theta, points, bsdf, shadow_scale)
+        total += sums_of(of, np.sum(weight[..., None] * value, axis=1), len(total))
+    return total
+
+
+def _at_nodes(
+    beam: Beam,
+    seen: Facing,
+    lines: ScanLines,
+    of: Index,
+    theta: Array,
+    points: Points,
+    bsdf: Reflection,
+    shadow_scale: float,
+) -> Array:
+    """Return the integrand of lines of these numbers at angles, (n, nodes): (n, nodes, 3)."""
+    point = np.repeat(lines.point[of], theta.shape[1])
+    sine, cosine = np.sin(theta), np.cos(theta)
+    towards = (sine[..., None] * lines.along[of, None] + cosine[..., None] * lines.normal[of, None]).reshape(-1, 3)
+    r = distance_on_line(beam.light, lines, of, theta, points).ravel()
+    if beam.scene.media:
+        target = points.place[point] + r[:, None] * towards
+        depth = optical_depth(beam.scene, target, -towards, (1 - shadow_scale) * r, r)
+    else:
+        depth = (shadow_scale * r)[:, None] * beam.scene.medium.sigma_t
+    value = bsdf(point, towards) * np.exp(-depth)
+    if beam.shapes.others is not None:
+        value *= _clear(beam, bsdf, point, points.place[point] + r[:, None] * towards)[:, None]
+    row = lines.point[of]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        factor = np.where(lines.chord[of] > 0, seen.area[row] / lines.chord[of], 0.0)
+    factor = (factor * seen.depth[row] / lines.height[of] ** 2)[:, None] * cosine
+    return value.reshape(*theta.shape, 3) * factor[..., None] * beam.light.radiance
+
+
+def _clear(beam: Beam, bsdf: Reflection, point: Index, target: Array) -> NDArray[np.bool_]:
+    """Return from which points nothing but triangles and spheres hides points of the light."""
+    at = dr.gather(mi.SurfaceInteraction3f, bsdf.interaction, mi.UInt32(point.astype(np.uint32)))
+    hidden = beam.shapes.others.ray_test(at.spawn_ray_to(mi.Point3f(target.T)))
+    return ~np.array(hidden, dtype=bool)
+
+
+def _unsettled(replicates: Array, known: Array, active: Index, error: float) -> Index:
+    """Return which of the active points have too large a standard error."""
+    value = replicates.mean(axis=-1) + known[active]
+    above = standard_error(replicates) > error * np.maximum(value, FLOOR * value.mean(axis=0))
+    return active[above.any(axis=1)]

@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What can stand in the light of a light with extent.
+
+A rectangle and a disk emit to one side, and a convex body shines on nothing that it hides itself: so a light's own
+shape never shadows it, nor does what lies in or behind the plane of a rectangle or a disk. It is left out, for in
+float64 what lies in that plane would be in front of it or behind it by chance.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from reference.scene.area_light import TruthAreaLight
+from reference.scene.read import TruthScene, scene_of
+from reference.scene.shapes import Shapes, read_shapes
+
+IN_PLANE = 1e-7  #: of the largest coordinate: what is closer to the plane of a light counts as in it; float32 corners
+
+
+def before_light(truth: TruthScene, light: TruthAreaLight) -> tuple[TruthScene, Shapes]:
+    """Return the scene and the shapes that can shadow a light.
+
+    Parameters
+    ----------
+    truth, light
+        The scene and one of its lights with extent.
+    """
+    shapes = truth.occluders.shapes()
+    others = [shape for shape in shapes if shape != light.shape]
+    if len(others) < len(shapes):
+        truth = replace(truth, occluders=scene_of(others, truth.scene))
+    known = read_shapes(truth.occluders)
+    if light.kind != "sphere":
+        largest = max(1.0, float(np.abs(known.triangles).max(initial=0)), float(np.abs(light.centre).max()))
+        before = (known.triangles - light.centre) @ light.normal > IN_PLANE * largest
+        known = replace(known, triangles=known.triangles[before.any(axis=1)])
+    return truth, known

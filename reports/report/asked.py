@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a report is asked for: its scenes and the images from elsewhere, refused before the work if unusable."""
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from analytic.errors import InputError
+from realtime.scene.read_scene import read_scene
+from validation.comparison.engine_images import EngineImage, find_images
+from validation.scenes.loading import load_scene
+from validation.scenes.registry import SCENES
+
+
+def scenes_of_images(
+    asked: Sequence[str] | None, images: str | os.PathLike[str] | None, usual: Sequence[str]
+) -> tuple[list[str], dict[str, tuple[EngineImage, ...]]]:
+    """Return the scenes to study and the images by scene.
+
+    Parameters
+    ----------
+    asked
+        Built-in names and paths of Mitsuba XML files; None for those of the images, or the usual ones without images.
+    images
+        A folder, see `find_images`; of its images those of `asked` are taken.
+    usual
+        Scenes of the effort.
+
+    Raises
+    ------
+    InputError
+        If no scene is asked for, or the folder has no image of the scenes.
+    """
+    if asked is not None and not asked:
+        raise InputError(f"scenes: got none, wanted some of {', '.join(SCENES)}, or the paths of Mitsuba XML files")
+    if images is None:
+        return list(usual if asked is None else asked), {}
+    shown = find_images(images, {Path(name).stem: name for name in [*SCENES, *(asked or ())]})
+    names = list(shown if asked is None else asked)
+    wanted = {Path(name).stem for name in names}
+    if not wanted & set(shown):
+        raise InputError(f"--images: {images} has no image of {', '.join(sorted(wanted))}, only of {', '.join(shown)}")
+    return names, {name: several for name, several in shown.items() if name in wanted}
+
+
+def notes_on(scenes: Sequence[str]) -> list[str]:
+    """Return what to say of scenes before they are studied.
+
+    Raises
+    ------
+    InputError
+        If one of them cannot be read.
+    """
+    return [note for name in scenes for note in read_scene(load_scene(name, (8, 6)).scene).features.notes]

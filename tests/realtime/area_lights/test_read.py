@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Lights with extent are read as they are, and what no method can render is refused by the name of the shape."""
+
+import numpy as np
+import pytest
+
+from realtime.errors import InputError
+from tests.helpers.area_lamps import BLACK, area_lamp
+from tests.helpers.scenes import tiny_scene
+
+
+def read(**changes):
+    import mitsuba as mi
+
+    from realtime.scene.read_scene import read_scene
+
+    return read_scene(mi.load_dict(tiny_scene(**changes)))
+
+
+@pytest.mark.parametrize(
+    ("kind", "size", "area"),
+    [
+        ("rectangle", (0.31, 0.17), 4 * 0.31 * 0.17),
+        ("disk", 0.29, np.pi * 0.29**2),
+        ("sphere", 0.23, 4 * np.pi * 0.23**2),
+    ],
+)
+def test_shape_area_and_power_are_read(variant, kind, size, area):
+    scene = read(lamp=area_lamp(kind, size=size))
+    (light,) = scene.area_lights
+    assert scene.lights == ()
+    assert (light.name, light.kind, light.opaque) == ("lamp", kind, True)
+    assert light.area == pytest.approx(area, rel=1e-6)
+    np.testing.assert_allclose(light.power, np.pi * area * np.array([5.3, 4.1, 2.9]), rtol=1e-6)
+    np.testing.assert_allclose(light.middle, [0.83, 0.61, 1.97], rtol=1e-6)
+    toward = np.array([0.13, 0.07, 0.31]) - light.middle
+    np.testing.assert_allclose(light.normal, toward / np.linalg.norm(toward), atol=1e-6)
+    assert scene.features.area_lights == (kind,)
+
+
+def test_lights_with_extent_stand_beside_others_and_a_flipped_one_shines_on_its_other_side(variant):
+    scene = read(window=area_lamp("rectangle", flip_normals=True))
+    (light,) = scene.area_lights
+    assert (len(scene.lights), light.name) == (1, "window")
+    assert light.normal @ (np.array([0.13, 0.07, 0.31]) - light.middle) < 0
+
+
+def test_a_lamp_of_null_is_nothing_but_light(variant):
+    scene = read(lamp=area_lamp("disk", size=0.29, material={"type": "null"}))
+    assert not scene.area_lights[0].opaque
+    assert "lamp" not in [shape.id() for shape in scene.geometry.shapes()]
+    assert "lamp" in [shape.id() for shape in read(lamp=area_lamp("disk", size=0.29)).geometry.shapes()]
+
+
+def test_a_light_alone_casts_no_shadow(variant):
+    alone = {"ball": None, "floor": None}
+    assert not read(lamp=area_lamp("disk", size=0.29), **alone).features.shadows
+    assert read(window=area_lamp("disk", size=0.29), **alone).features.shadows  # in the light of the lamp
+
+
+def _sheared():
+    import mitsuba as mi
+
+    return mi.ScalarTransform4f(np.array([[1, 0.3, 0, 0.5], [0, 1, 0, 0.7], [0, 0, 1, 1.9], [0, 0, 0, 1]]))
+
+
+def _flat():
+    import mitsuba as mi
+
+    return mi.ScalarTransform4f().translate([0.5, 0.7, 1.9]).scale([1e-30, 1e-30, 1.0])
+
+
+@pytest.mark.claim("scenes-refused-by-name")
+@pytest.mark.parametrize(
+    ("lamp", "message"),
+    [
+        (lambda: area_lamp("cube"), "light 'lamp': its shape is a Cube"),
+        (lambda: area_lamp("rectangle") | {"to_world": _sheared()}, "light 'lamp': the rectangle is sheared"),
+        (lambda: area_lamp("disk") | {"to_world": _sheared()}, "light 'lamp': the disk is s"),
+        (lambda: area_lamp("disk", size=(0.3, 0.2)), "light 'lamp': the disk is scaled by 0.3 x 0.2"),
+        (lambda: area_lamp("rectangle") | {"to_world": _flat()}, "light 'lamp': the rectangle has no area"),
+        (lambda: area_lamp("disk", material=BLACK | {"reflectance": 0.5}), "light 'lamp': its material reflects"),
+        (lambda: area_lamp("disk", material={"type": "dielectric"}), "light 'lamp': its material reflects"),
+        (lambda: area_lamp("sphere", size=0.3, flip_normals=True), "light 'lamp': the sphere shines inwards"),
+        (lambda: area_lamp("sphere", size=9.0), "light 'lamp': the camera is inside of the sphere"),
+        (
+            lambda: area_lamp("disk", emitter={"type": "area", "radiance": {"type": "rgb", "value": [-1.0, 0.0, 0.0]}}),
+            "light 'lamp': its radiance is",
+        ),
+        (
+            lambda: area_lamp("disk", emitter={"type": "area", "radiance": _textured()}),
+            "light 'lamp': its radiance is t",
+        ),
+        (
+            lambda: area_lamp("sphere", material={"type": "null"}, interior={"type": "homogeneous"}),
+            "light 'lamp': its shape bounds a medium",
+        ),
+    ],
+)
+def test_refusals_name_the_light(variant, lamp, message):
+    with pytest.raises(InputError, match=message):
+        read(lamp=lamp())
+
+
+def _textured():
+    import mitsuba as mi
+
+    return {"type": "bitmap", "bitmap": mi.Bitmap(np.full((2, 2, 3), 0.5, dtype=np.float32)), "raw": True}

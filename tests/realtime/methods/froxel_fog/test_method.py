@@ -1,0 +1,243 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Froxel fog: the same sums in plain NumPy, its limits, and its order.
+
+Protects the claims on the integral within a slice, on the limit of fine grids, and on the order of convergence.
+"""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from tests.helpers.scenes import bounded_medium, clear_scene, spot, tiny_scene
+from tests.helpers.suns import brick, pearl, sun, sunny
+from validation.scenes import probes
+
+COARSE = {"width": 5, "height": 4, "slices": 7, "near": 0.6, "far": 7.3}
+
+
+def read(scene, precision="double"):
+    import mitsuba as mi
+
+    from realtime.scene.read_scene import read_scene
+
+    return read_scene(mi.load_dict(scene), precision)
+
+
+def render(scene, method="froxel-fog", precision="double", **parameters):
+    from realtime.frame.renderer import frame_renderer, render_frame
+    from realtime.kernels.registry import KERNELS
+    from realtime.methods.registry import METHODS
+
+    kernel = KERNELS["exact"].function
+    return render_frame(frame_renderer(read(scene, precision), METHODS[method], kernel=kernel, **parameters)).airlight
+
+
+def relative_rmse(one, two):
+    return np.sqrt(np.mean((one - two) ** 2)) / np.mean(two)
+
+
+def lamp_behind(**changes):
+    """A lamp far beside the image: no ray comes near it, so that the integrand is smooth."""
+    return {
+        "type": "point",
+        "position": [2.9, -3.7, 2.3],
+        "intensity": {"type": "rgb", "value": [5.0, 4.0, 3.0]},
+    } | changes
+
+
+def lamp_above():
+    """A lamp over the image, whose shadow of the ball is in it."""
+    return lamp_behind(position=[0.3, 0.4, 3.1])
+
+
+def hazy(sigma_t=(0.11, 0.37, 0.93)):
+    return {
+        "type": "homogeneous",
+        "id": "fog",
+        "sigma_t": {"type": "rgb", "value": list(sigma_t)},
+        "albedo": {"type": "rgb", "value": [0.9, 0.8, 0.7]},
+        "phase": {"type": "hg", "g": 0.43},
+        "has_spectral_extinction": True,
+    }
+
+
+def by_hand(scene, *, width, height, slices, near, far):
+    """Do what the method does in NumPy, from the formulas of its documentation; no shadows, no bounds."""
+    import mitsuba as mi
+
+    from reference.scene.read import read_truth
+
+    truth = read_truth(mi.load_dict(scene))
+    matrix = np.array(mi.load_dict(scene).sensors()[0].world_transform().matrix, dtype=float).reshape(4, 4)
+    origin, forward = matrix[:3, 3], matrix[:3, 2]
+    half = np.tan(np.radians(0.5 * scene["sensor"]["fov"]))
+    left, up = matrix[:3, 0] * half, matrix[:3, 1] * half * truth.height / truth.width
+
+    def depth(s):
+        return near * ((1 + far / near) ** s - 1)
+
+    sigma, albedo, g = truth.medium.sigma_t, truth.medium.albedo, 0.43
+    sums = np.zeros((slices + 1, height, width, 3))
+    for j in range(height):
+        for i in range(width):
+            ray = forward + left * (1 - 2 * (i + 0.5) / width) + up * (1 - 2 * (j + 0.5) / height)
+            stretch, kept = np.linalg.norm(ray), np.ones(3)
+            for k in range(slices):
+                begin, end = depth(k / slices), depth((k + 1) / slices)
+                point = origin + 0.5 * (begin + end) * ray
+                source = np.zeros(3)
+                for light in truth.lights:
+                    toward = light.position - point
+                    r = np.linalg.norm(toward)
+                    cosine = toward @ ray / (r * stretch)
+                    phase = (1 - g * g) / (1 + g * g - 2 * g * cosine) ** 1.5
+                    strength = 1.0
+                    if getattr(light, "axis", None) is not None:
+                        angle = np.degrees(np.arccos(-toward @ light.axis / r))
+                        cutoff, beam = scene["spot"]["cutoff_angle"], scene["spot"]["beam_width"]
+                        strength = np.clip((cutoff - angle) / (cutoff - beam), 0, 1)
+                    source += strength * light.intensity * phase * np.exp(-sigma * r) / r**2
+                source *= albedo * sigma / (4 * np.pi)
+                length = (end - begin) * stretch
+                sums[k + 1, j, i] = sums[k, j, i] + kept * source * (1 - np.exp(-sigma * length)) / sigma
+                kept *= np.exp(-sigma * length)
+    # Between the middles of columns and the ends of slices: rays that meet no surface end at the last slice.
+    image = np.zeros((truth.height, truth.width, 3))
+    for row in range(truth.height):
+        for column in range(truth.width):
+            x = np.clip((column + 0.5) / truth.width * width - 0.5, 0, width - 1)
+            y = np.clip((row + 0.5) / truth.height * height - 0.5, 0, height - 1)
+            for i in range(width):
+                for j in range(height):
+                    share = max(0, 1 - abs(x - i)) * max(0, 1 - abs(y - j))
+                    image[row, column] += share * sums[slices, j, i]
+    return image
+
+
+@pytest.mark.claim("froxel-sums", tolerance="1e-6 relative: positions are float32")
+def test_the_sums_are_those_of_plain_numpy(variant):
+    scene = tiny_scene(
+        size=(13, 11), ball=None, floor=None, fog=hazy(), lamp=lamp_behind(), spot=spot(cutoff=41.0, beam=12.0)
+    )
+    np.testing.assert_allclose(render(scene, **COARSE), by_hand(scene, **COARSE), rtol=2e-6)
+
+
+@pytest.mark.claim("froxel-slice", tolerance="1e-12 relative: the closed form, whatever the number of slices")
+@pytest.mark.parametrize("sigma_t", [1e-9, 0.003, 0.9, 37.0])
+@pytest.mark.parametrize("slices", [1, 5])
+def test_slices_of_constant_light_add_up_to_the_closed_form(variant, sigma_t, slices):
+    import drjit as dr
+    import mitsuba as mi
+
+    from realtime.methods.froxel_fog.accumulation import accumulated
+    from realtime.methods.froxel_fog.grid import Grid
+
+    scene = read(tiny_scene(size=(2, 2)))
+    grid = Grid(2, 1, slices, scene.camera, mi.Float64(3.1), mi.Float64(0.7))
+    medium = SimpleNamespace(sigma_t=(mi.Float64(sigma_t),))
+    view = SimpleNamespace(medium=medium, distance=mi.Float64(0))
+    sums = np.array(accumulated(view, grid, dr.full(mi.Color3d, 1.7, 2 * slices), ())).reshape(slices + 1, 2, 4)
+    x = np.array(grid.depth(dr.arange(mi.Float64, slices + 1) / slices))[:, None]
+    x = x * np.array(dr.norm(grid.column_ray(dr.arange(mi.UInt32, 2))))
+    closed = 1.7 * -np.expm1(-sigma_t * x) / sigma_t
+    for channel in range(3):
+        np.testing.assert_allclose(sums[:, :, channel], closed, rtol=1e-12)
+
+
+SMOOTH = {
+    "one medium": lambda: tiny_scene(size=(24, 18), lamp=lamp_behind(), ball=None, fog=hazy((0.31, 0.31, 0.31))),
+    "three extinctions": lambda: tiny_scene(size=(24, 18), lamp=lamp_behind(), ball=None, fog=hazy()),
+    "spot": lambda: tiny_scene(size=(24, 18), lamp=None, spot=spot(cutoff=60.0, beam=5.0), ball=None),
+    "sphere of fog": lambda: clear_scene(
+        size=(24, 18),
+        lamp=lamp_behind(),
+        fog=bounded_medium({"type": "sphere", "center": [0.1, 0.2, 0.7], "radius": 0.9}, 0.9, (0.9, 0.4, 0.3)),
+    ),
+    "sun": lambda: sunny(size=(24, 18), brick=brick(), pearl=pearl()),
+}
+
+
+@pytest.mark.claim(
+    "froxel-limit", tolerance="relative RMSE 1 %, and 8 % where the outline of a medium is cut into froxels"
+)
+@pytest.mark.parametrize("name", SMOOTH)
+def test_fine_grids_reach_the_integral_of_unshadowed_light(variant, name):
+    scene = SMOOTH[name]()
+    exact = render(scene, "unshadowed", precision="single")
+    errors = [
+        relative_rmse(render(scene, precision="single", width=4 * n, height=3 * n, slices=4 * n), exact)
+        for n in (10, 40)
+    ]
+    assert errors[1] < {"spot": 0.025, "sphere of fog": 0.08, "sun": 0.04}.get(name, 0.01)
+    assert errors[1] < 0.5 * errors[0]
+
+
+@pytest.mark.claim("froxel-order", tolerance="at least 0.7 from four grids, a factor of eight apart")
+@pytest.mark.parametrize("shadow", ["map", "ray"])
+def test_the_error_falls_with_the_grid_in_order(variant, shadow):
+    scene = tiny_scene(size=(64, 48), lamp=lamp_above())
+    exact = render(scene, "ray-march", precision="single", steps=4000)
+    sizes = np.array([8, 16, 32, 64])
+    errors = [
+        relative_rmse(
+            render(scene, precision="single", width=2 * n, height=n, slices=n, shadow=shadow, map=2048), exact
+        )
+        for n in sizes.tolist()
+    ]
+    assert -np.polyfit(np.log(sizes), np.log(errors), 1)[0] > 0.7, errors
+
+
+@pytest.mark.parametrize("shadow", ["map", "ray"])
+@pytest.mark.parametrize("name", ["fog", "sun"])
+def test_shadows_are_there(variant, name, shadow):
+    scene = tiny_scene(size=(24, 18), lamp=lamp_above()) if name == "fog" else probes.sun()
+    exact = render(scene, "ray-march", precision="single", steps=2000)
+    without = render(scene, "unshadowed", precision="single")
+    froxels = render(scene, precision="single", shadow=shadow, map=1024)
+    assert relative_rmse(froxels, exact) < 0.25 * relative_rmse(without, exact)
+
+
+def test_a_light_at_the_middle_of_a_froxel_is_as_bright_as_the_mean_about_it(variant):
+    # The one froxel in the middle of the image and its middle slice hold the lamp.
+    import mitsuba as mi
+
+    from realtime.scene.camera import read_camera
+
+    scene = tiny_scene(size=(9, 9), ball=None, floor=None)
+    camera = read_camera(read(scene).camera)
+    scene["lamp"]["position"] = [float(c) for c in camera.origin + 2.0 * camera.forward]
+    with pytest.raises(Exception, match="from the ray through the centre"):  # that pixel has no finite airlight at all
+        render(scene, width=3, height=3, slices=4, distribution="linear", far=16 / 3.0)
+    scene["sensor"]["film"] |= {"width": 8, "height": 8}
+    mi.load_dict(scene)
+    assert np.isfinite(render(scene, width=3, height=3, slices=4, distribution="linear", far=16 / 3.0)).all()
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        ({"width": 0}, "width: got 0, wanted a whole number from 1 to 4096"),
+        ({"slices": 5000}, "slices: got 5000, wanted a whole number from 1 to 4096"),
+        ({"near": -1.0}, "near: got -1.0, wanted"),
+        ({"near": 3.0, "far": 2.0}, "near: got 3 with far=2, wanted a depth before it"),
+        ({"near": 3.0, "distribution": "linear"}, "near: got 3 with distribution=linear"),
+        ({"history": 1.0}, "history: got 1.0, wanted"),
+        ({"clamp": "neighbours"}, "clamp=neighbours: got history=0"),
+        ({"jitter": "halton"}, "jitter: got 'halton', wanted one of none, frames"),
+        ({"map": 100}, "map: got 100, wanted a power of two"),
+        ({"width": 4096, "height": 4096, "slices": 4096}, "froxels: needs .* GB of memory"),
+    ],
+)
+def test_what_no_grid_can_have_is_refused(variant, parameters, message):
+    from realtime.errors import InputError
+
+    with pytest.raises(InputError, match=message):
+        render(tiny_scene(), **parameters)
+
+
+def test_a_sun_in_a_medium_without_bounds_is_refused_as_by_all(variant):
+    from realtime.errors import InputError
+
+    with pytest.raises(InputError, match="directional light and a medium without bounds"):
+        render(tiny_scene(lamp=None, sun=sun()))

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What work may use is the least of the machine's memory and its containers' limits, and with CUDA the GPU's."""
+
+import ctypes
+import os
+
+import pytest
+
+import realtime.memory
+from realtime.errors import InputError
+from realtime.memory import Memory, check_memory, usable_memory
+
+MACHINE = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+
+
+@pytest.fixture
+def limits(variant, tmp_path, monkeypatch):
+    """A function that sets what /proc/self/cgroup says, and the files of /sys/fs/cgroup."""
+
+    def write(own, files):
+        (tmp_path / "self").write_text(own)
+        for name, text in files.items():
+            (tmp_path / "cgroup" / name).parent.mkdir(parents=True, exist_ok=True)
+            (tmp_path / "cgroup" / name).write_text(text)
+
+    monkeypatch.setattr(realtime.memory, "_OWN_CGROUPS", tmp_path / "self")
+    monkeypatch.setattr(realtime.memory, "_CGROUPS", tmp_path / "cgroup")
+    monkeypatch.setattr(realtime.memory.mi, "variant", lambda: "llvm_ad_rgb")
+    return write
+
+
+@pytest.mark.parametrize(
+    ("own", "files", "least"),
+    [
+        ("0::/\n", {"memory.max": "1000000\n"}, 10**6),
+        ("0::/a/b\n", {"a/b/memory.max": "max\n", "a/memory.max": "2000000\n", "memory.max": "max"}, 2 * 10**6),
+        # Docker without a namespace of its own: the path is the machine's, and is not there.
+        ("0::/docker/0123\n", {"memory.max": "3000000\n"}, 3 * 10**6),
+        ("5:cpu:/a\n4:memory:/a\n0::/\n", {"memory/a/memory.limit_in_bytes": "4000000\n"}, 4 * 10**6),
+        ("4:memory,cpu:/b:c\n", {"memory/memory.limit_in_bytes": "5000000\n"}, 5 * 10**6),
+        ("4:memory:/\n", {"memory/memory.limit_in_bytes": "9223372036854771712\n"}, MACHINE),
+        ("0::/\n", {"memory.max": "max\n"}, MACHINE),
+        ("0::/\n", {}, MACHINE),
+    ],
+)
+def test_the_least_limit_counts(limits, own, files, least):
+    limits(own, files)
+    assert usable_memory() == Memory(least, "this machine has" if least == MACHINE else "this container may use")
+
+
+def test_a_system_without_control_groups(limits):
+    assert usable_memory() == Memory(MACHINE, "this machine has")
+
+
+def test_the_message_names_the_container(limits):
+    limits("0::/\n", {"memory.max": "2000000000"})
+    check_memory("map: 9", 2 * 10**9, "use a smaller map")
+    message = r"^map: 9: needs 3 GB of memory, this container may use 2 GB; use a smaller map$"
+    with pytest.raises(InputError, match=message):
+        check_memory("map: 9", 3 * 10**9, "use a smaller map")
+
+
+class Driver:
+    """Stands for libcuda."""
+
+    def __init__(self, size):
+        self.size = size
+
+    def cuInit(self, flags):
+        return 0 if self.size else 100
+
+    def cuDeviceGet(self, device, number):
+        return 0
+
+    def cuDeviceTotalMem_v2(self, size, device):
+        ctypes.cast(size, ctypes.POINTER(ctypes.c_size_t))[0] = self.size
+        return 0
+
+
+def test_with_cuda_the_memory_of_the_gpu_counts(limits, monkeypatch):
+    limits("0::/\n", {"memory.max": "1000000"})
+    monkeypatch.setattr(realtime.memory.mi, "variant", lambda: "cuda_ad_rgb")
+    monkeypatch.setattr(realtime.memory.ctypes, "CDLL", lambda name: Driver(80 * 10**9))
+    assert str(usable_memory()) == "the GPU has 80 GB"
+    monkeypatch.setattr(realtime.memory.ctypes, "CDLL", lambda name: Driver(0))
+    assert usable_memory() is None
+    check_memory("map: 9", 10**15, "use a smaller map")

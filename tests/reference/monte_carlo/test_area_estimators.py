@@ -1,0 +1,265 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`single-scatter` and `volpath` under lights with extent, against closed forms and against one another."""
+
+import numpy as np
+import pytest
+
+from tests.helpers.area_lights import BLACK, NULL, lamp, lit_scene
+from tests.helpers.scenes import bounded_medium, tiny_scene
+
+_BATCHES = 24
+#: Extinction, height and radius of a sphere light past a ray from -2 to 3 m of its foot, and the integral K: certified
+#: by mpmath over directions and by Gauss' rule over the cap; L = sigma_s Le K / (4 pi).
+SPHERES = (
+    (0.21, 0.83, 0.1, 0.04880854432449),
+    (0.21, 0.83, 0.3, 0.4626164168379),
+    (0.21, 0.83, 0.6, 2.123635219885),
+    (1.3, 0.83, 0.3, 0.02890607888329),
+    (0.21, 0.35, 0.3, 1.619271567439),
+)
+
+
+def _at(place, target, scale):
+    import mitsuba as mi
+
+    return mi.ScalarTransform4f().look_at(list(place), list(target), [0, 0, 1]) @ mi.ScalarTransform4f().scale(scale)
+
+
+def _lamp(kind, bsdf, *, in_view=False):
+    """Return a light above the ball, or one before the camera that faces it."""
+    place, target = ((0.15, -0.9, 1.3), (0.1, -3.0, 0.9)) if in_view else ((0.9, 0.7, 1.9), (0.1, -0.5, 0.4))
+    scale = {"rectangle": [0.5, 0.3, 1.0], "disk": [0.4, 0.4, 1.0], "sphere": [0.3, 0.3, 0.3]}[kind]
+    return lamp(kind, radiance=(5.0, 4.0, 3.0), bsdf=bsdf, to_world=_at(place, target, scale))
+
+
+def _truth(**changes):
+    import mitsuba as mi
+
+    from reference.scene.read import read_truth
+
+    scene = tiny_scene(**changes)
+    if changes.get("fog", scene) is None:
+        scene["sensor"] = {key: entry for key, entry in scene["sensor"].items() if key != "medium"}
+    return read_truth(mi.load_dict(scene))
+
+
+def _run(batch, truth, samples, batches=_BATCHES):
+    from reference.monte_carlo.batches import merged
+
+    done = batch(truth, 0, samples)
+    for seed in range(1, batches):
+        done = merged(done, batch(truth, seed, samples))
+    return done
+
+
+def _pooled(batches, layer):
+    """Return the mean of a layer by channel and its standard error, from the spread of the batches' totals."""
+    totals = batches.totals[:, layer]
+    return totals.mean(axis=0), totals.std(axis=0, ddof=1) / np.sqrt(len(totals))
+
+
+@pytest.mark.claim("area-lights-by-samples", tolerance="four standard errors, which are below 0.25 %")
+@pytest.mark.parametrize("bsdf", [BLACK, NULL], ids=["black", "null"])
+@pytest.mark.parametrize("sphere", SPHERES)
+def test_sphere_light_has_the_certified_airlight(variant, sphere, bsdf):
+    """Rationale: the one shape whose airlight without occluder is known to 13 digits; a black one must not hide itself.
+
+    Setup: 30 000 estimates of one ray of 5 m that a small disk ends, 64 samples each.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    from reference.monte_carlo.single_scatter.estimator import ray_light
+    from reference.monte_carlo.single_scatter.scene_data import read_task
+    from reference.monte_carlo.single_scatter.stretches import double_ray
+
+    sigma_t, height, radius, expected = sphere
+    end = mi.ScalarTransform4f().translate([3.0, 0.0, 0.0]).rotate([0, 1, 0], 90).scale(0.01)
+    scene = mi.load_dict(
+        {
+            "type": "scene",
+            "lamp": lamp("sphere", radiance=(1.0, 1.0, 1.0), bsdf=bsdf, center=[0.0, height, 0.0], radius=radius),
+            "end": {"type": "disk", "to_world": end, "bsdf": BLACK},
+        }
+    )
+    medium = mi.load_dict({"type": "homogeneous", "sigma_t": sigma_t, "albedo": 1.0})
+    count = 30_000
+    sampler = mi.load_dict({"type": "independent"})
+    sampler.seed(17, count)
+    ray = double_ray(mi.Point3d(-2.0, 0.0, 0.0) + dr.zeros(mi.Vector3d, count), mi.Vector3d(1.0, 0.0, 0.0))
+    airlight, _ = ray_light(read_task(scene, medium, 64), sampler, ray, medium, dr.full(mi.Bool, True, count))
+    values = np.array(airlight[0], dtype=np.float64) * 4 * np.pi / sigma_t
+    error = values.std() / np.sqrt(count)
+    assert error < 2.5e-3 * expected
+    assert abs(values.mean() - expected) < 4 * error
+
+
+_CASES = {
+    f"{kind}, {'black' if bsdf is BLACK else 'null'}, {'in view' if in_view else 'above'}": {
+        "lamp": (kind, bsdf, in_view)
+    }
+    for kind in ("rectangle", "disk", "sphere")
+    for bsdf in (BLACK, NULL)
+    for in_view in (False, True)
+}
+_FAST = ("rectangle, black, in view", "sphere, null, in view")
+
+
+@pytest.mark.claim("area-lights-by-samples", tolerance="four standard errors, which are below 1 %")
+@pytest.mark.parametrize("name", [pytest.param(n, marks=[] if n in _FAST else pytest.mark.statistical) for n in _CASES])
+def test_both_estimators_agree(variant, name):
+    """Rationale: they share no sample of the light: one draws points on it, the other asks Mitsuba.
+
+    Setup: ball and floor, 16 x 12 pixels, 24 batches of 256 samples, the light in the picture or not.
+    Expected: airlight and surface pooled within four standard errors, and 0.05 % for the shadow-ray epsilon.
+    """
+    from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
+    from reference.monte_carlo.volpath.integrator import volpath_batch
+
+    kind, bsdf, in_view = _CASES[name]["lamp"]
+    truth = _truth(lamp=_lamp(kind, bsdf, in_view=in_view))
+    ours, theirs = (_run(batch, truth, 256) for batch in (single_scatter_batch, volpath_batch))
+    for layer in (0, 1):
+        (mean, error), (other, other_error) = _pooled(ours, layer), _pooled(theirs, layer)
+        together = np.hypot(error, other_error)
+        assert np.all(together < 0.01 * other)
+        assert np.all(np.abs(mean - other) < 4 * together + 5e-4 * other)
+
+
+@pytest.mark.statistical
+@pytest.mark.claim("area-lights-by-samples", tolerance="four standard errors, which are below 1 %")
+def test_both_estimators_agree_where_the_light_crosses_the_bounds_of_a_medium(variant):
+    """Rationale: each point of the light has a medium of its own.
+
+    Setup: a light of material 'null'. Of a black one volpath loses 5 % here: past a boundary its shadow rays meet the
+    light itself where it is nearer than 0.3 m, since what they start beyond the boundary is more than their epsilon.
+    Expected: four standard errors; single-scatter says the same of a black light.
+    """
+    import mitsuba as mi
+
+    from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
+    from reference.monte_carlo.volpath.integrator import volpath_batch
+
+    cube = {"type": "cube", "to_world": mi.ScalarTransform4f().translate([0.4, 0.3, 1.2]).scale([0.9, 0.8, 0.73])}
+    box = bounded_medium(cube, 0.7, (0.9, 0.8, 0.7))
+    truth, black = (_truth(lamp=_lamp("rectangle", bsdf), box=box, fog=None) for bsdf in (NULL, BLACK))
+    ours, theirs = (_run(batch, truth, 256) for batch in (single_scatter_batch, volpath_batch))
+    (mean, error), (other, other_error) = _pooled(ours, 0), _pooled(theirs, 0)
+    together = np.hypot(error, other_error)
+    assert np.all(together < 0.01 * other)
+    assert np.all(np.abs(mean - other) < 4 * together + 5e-4 * other)
+    assert _pooled(_run(single_scatter_batch, black, 256), 0)[0] == pytest.approx(mean, rel=5e-3)
+
+
+@pytest.mark.claim("area-lights-by-samples", tolerance="four standard errors, which are below 0.2 %")
+@pytest.mark.parametrize("kind", ["rectangle", "disk", "sphere"])
+def test_surfaces_are_those_of_mitsubas_direct_integrator(variant, kind):
+    """Rationale: without fog, Mitsuba's `direct` is a third way to the light on surfaces."""
+    import drjit as dr
+    import mitsuba as mi
+
+    from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
+
+    fog = tiny_scene()["fog"] | {"sigma_t": 0.0}
+    truth = _truth(lamp=_lamp(kind, BLACK), fog=fog)
+    ours = _run(single_scatter_batch, truth, 256)
+    pixels, samples = len(truth.direction), 4096
+    sampler = mi.load_dict({"type": "independent"})
+    sampler.seed(3, pixels * samples)
+    pixel = dr.arange(mi.UInt32, pixels * samples) // samples
+    direction = dr.gather(mi.Vector3f, mi.Vector3f(truth.direction.T), pixel)
+    start = mi.Point3f(*(float(c) for c in truth.origin))
+    direct = mi.load_dict({"type": "direct", "hide_emitters": True})
+    seen, _, _ = direct.sample(truth.scene, sampler, mi.RayDifferential3f(mi.Ray3f(start, direction)))
+    values = np.array(seen, dtype=np.float64).T.reshape(pixels, samples, 3)
+    expected, spread = values.mean(axis=(0, 1)), np.sqrt((values.var(axis=1) / samples).sum(axis=0)) / pixels
+    mean, error = _pooled(ours, 1)
+    together = np.hypot(error, spread)
+    assert np.all(together < 2e-3 * expected)
+    assert np.all(np.abs(mean - expected) < 4 * together)
+
+
+@pytest.mark.parametrize("kind", ["rectangle", "disk"])
+def test_the_back_of_a_light_is_dark(variant, kind):
+    """Rationale: only the side of the normal shines, and no sample of another side may leak."""
+    from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
+    from reference.monte_carlo.volpath.integrator import volpath_batch
+    from reference.scene.read import read_truth
+
+    # The camera looks along z, and nothing that it sees lies before the light, whose normal points away from it.
+    scene = lit_scene(lamp=lamp(kind, to_world=_at((0.3, 0.2, -0.7), (0.3, 0.3, -9.0), 0.5)))
+    for batch in (single_scatter_batch, volpath_batch):
+        assert not batch(read_truth(scene), 0, 32).mean.any()
+
+
+def test_black_lights_end_camera_rays_in_volpath_and_null_ones_do_not(variant):
+    """Rationale: `hide_emitters` hides the light that is seen directly, in Mitsuba 3.9.1 not the shape.
+
+    Setup: a light that faces away, before a floor that a lamp lights.
+    """
+    from reference.monte_carlo.volpath.integrator import volpath_batch
+
+    away = {"to_world": _at((0.15, -2.9, 1.0), (0.3, 3.0, 0.3), [2.5, 2.5, 1.0])}
+    point = tiny_scene()["lamp"]
+    surfaces = [
+        volpath_batch(_truth(lamp=point, light=lamp(bsdf=bsdf, radiance=(1e-9,) * 3, **away)), 0, 64).mean[1]
+        for bsdf in (BLACK, NULL)
+    ]
+    plain = volpath_batch(_truth(), 0, 64).mean[1]
+    assert surfaces[0].max() < 1e-6
+    assert surfaces[1].mean() == pytest.approx(plain.mean(), rel=0.05)
+
+
+@pytest.mark.parametrize("kind", ["rectangle", "disk", "sphere"])
+def test_density_of_points_on_a_light(variant, kind):
+    """Rationale: an importance density that is wrong anywhere is a bias.
+
+    Setup: rays that meet the light, pass beside it and along its edge; a million points each.
+    Expected: the mean of 1/density over any part of the light is the area of that part, within four standard errors.
+    """
+    import mitsuba as mi
+
+    from reference.monte_carlo.single_scatter.area_sampling import read_area, sample_evenly, sample_point
+
+    scene = lit_scene(lamp=_lamp(kind, BLACK))
+    light = read_area(scene.emitters()[0])
+    count = 1 << 20
+    u, v = (mi.Float64(values) for values in np.random.default_rng(5).random((2, count)))
+    centre, across, up = (np.array(vector).ravel() for vector in (light.centre, light.across, light.up))
+    even = sample_evenly(u, v, light)
+    for aside in (0.0, 0.7, 1.0, -1.0, 3.0):
+        through = centre + aside * light.reach[0] * across
+        direction = np.array([0.31, -0.83, 0.29])
+        for origin in (through - 2 * direction, through + 2 * direction):
+            direction /= np.linalg.norm(direction)
+            ray = {"origin": mi.Point3d(*map(float, origin)), "direction": mi.Vector3d(*map(float, direction))}
+            point = sample_point(u, v, light, **ray)
+            density = np.array(point.density)
+            worth = np.divide(1, density, out=np.zeros(count), where=density > 0)
+            for part in (lambda place: place @ across > -9, lambda place: (place @ across > 0.05) & (place @ up < 0.1)):
+                inside = part(np.array(point.position).T - centre)
+                share = float(part(np.array(even.position).T - centre).mean())
+                error = (worth * inside).std() / np.sqrt(count) + 2e-3 * light.area * (share < 1)
+                assert abs((worth * inside).mean() - share * light.area) < 4 * error + 1e-9
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"kind": "cube"}, "is a Cube"),
+        ({"kind": "disk", "scale": [0.5, 0.3, 1.0]}, "sheared or stretched"),
+        ({"kind": "rectangle", "texture": True}, "textured radiance"),
+    ],
+)
+def test_other_lights_are_refused_by_name(variant, change, words):
+    import mitsuba as mi
+
+    from analytic.errors import InputError
+    from reference.monte_carlo.single_scatter.scene_data import read_task
+
+    light = lamp(change["kind"], to_world=_at((0.1, 0.2, 3.0), (0, 0, 0), change.get("scale", [0.5, 0.5, 0.5])))
+    if "texture" in change:
+        bitmap = mi.Bitmap(np.ones((2, 2, 3), dtype=np.float32))
+        light["emitter"] = {"type": "area", "radiance": {"type": "bitmap", "bitmap": bitmap, "raw": True}}
+    with pytest.raises(InputError, match=words):
+        read_task(mi.load_dict({"type": "scene", "lamp": light}), None, 1)
