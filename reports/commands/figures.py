@@ -25,6 +25,7 @@ FIGURES: dict[str, tuple[str, tuple[str, ...]]] = {
     "stages": ("stages", ("quick", "progress", "published")),
     "published": ("published", ("quick", "progress", "published")),
     "paper-images": ("paper_images", ("quick",)),
+    "shafts-strip": ("shafts_strip", ("quick", "progress")),
     "frame-speed": ("frame_speed", ("report",)),
     "strip": ("strip", ("report", "scene", "methods")),
     "methods-table": ("methods_table", ("report",)),

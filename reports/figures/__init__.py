@@ -13,8 +13,9 @@ Read in this order:
 - `kernel_speed.py`: time of kernels against error
 - `map_size.py`: error over the size of the shadow map
 - `methods_table.py`: times and errors of methods
+- `shafts_strip.py`: Fig. 5.8 of Ali 2016 in our scene
 - `paper_images.py`: the pictures of the papers in our scenes
-- `phase_functions.py`: phase functions of droplets and what stands in for them;
+- `phase_functions.py`: phase functions of droplets and what stands in for them
 - `polynomials.py`: Biri's polynomials
 - `published.py`: frames a second beside the papers
 - `slab_orders.py`: a slab by order of scattering
