@@ -126,7 +126,7 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
     if not scene.area_lights:
         return _stages(scene, method, kernel, chosen)
     lit = with_light_points(scene, light_points.points, light_points.pattern)
-    if method.passes or method.lights_at_once(chosen) or method.carries(chosen):
+    if _has_passes(method, chosen) or method.lights_at_once(chosen) or method.carries(chosen):
         groups = LightGroups(light_points, _stages(lit, method, kernel, chosen), None)
     else:
         point = replace(lit, lights=lit.lights[len(scene.lights) :][:1])
@@ -145,7 +145,9 @@ def _stages(scene: Scene, method: Method, kernel: Any, chosen: Any, *, adds_up: 
     provides_visibility = method.provides_visibility(chosen)
     pixel = mi.UInt32(tiled_pixels(camera.width, camera.height))
     corners = tile_corners(pixel, camera, tolerance, by_rays=by_rays, lights=len(scene.lights))
-    surface, shade, shade_casts_rays = surface_stages(scene, provides_visibility=provides_visibility)
+    stages = surface_stages(scene, provides_visibility=provides_visibility, by_source=method.by_source(chosen))
+    surface, shade, shade_casts_rays = stages
+    has_passes = _has_passes(method, chosen)
     tables = prepare_kernel(kernel, type(camera.origin.x)) if method.uses_kernel(chosen) else None
 
     def sort(pixel, camera, medium, lights, state, distance):
@@ -183,8 +185,8 @@ def _stages(scene: Scene, method: Method, kernel: Any, chosen: Any, *, adds_up: 
         layers = layers_of(view) if corners is None else adaptive_layers(layers_of, view, corners, tolerance)
         if carries:
             carried, layers = layers.carried, replace(layers, carried=None)
-            return (layers if method.passes else composed(layers, by_light)), carried
-        if method.passes:
+            return (layers if has_passes else composed(layers, by_light)), carried
+        if has_passes:
             return layers
         return composed(layers, by_light) if sums is None else added(sums, layers, by_light)
 
@@ -196,7 +198,7 @@ def _stages(scene: Scene, method: Method, kernel: Any, chosen: Any, *, adds_up: 
     casts_rays = method.casts_rays(chosen)
     render: Callable[..., Any] = run
     passes: Callable[..., Any] | None = None
-    if method.passes:
+    if has_passes:
         passes = image_passes(method, chosen, surfaces=features.surfaces)
     if method.frozen(chosen):
         # Trace one tile without launching anything: what the method refuses must not be raised while a frozen function
@@ -233,6 +235,10 @@ def _stages(scene: Scene, method: Method, kernel: Any, chosen: Any, *, adds_up: 
         casts_rays=casts_rays,
         carries=carries,
     )
+
+
+def _has_passes(method: Method, parameters: Any) -> bool:
+    return bool(method.passes) and method.runs_passes(parameters)
 
 
 def render_frame(renderer: FrameRenderer) -> Frame:
@@ -373,7 +379,8 @@ def run_method(
         if len(groups) == 1 and renderer.groups.of_point is None:
             only = None if lists is None else lists[0]
             own = state[0] if state else groups[0].prepare(groups[0].scene)
-            return run_method(groups[0], own, cast, by_light[0], only, history, carried)
+            airlight, surface, *left = run_method(groups[0], own, cast, by_light[0], only, history, carried)
+            return airlight, by_light[0][0] if surface is None else surface, *left
         return *_summed(groups, state, cast, by_light, lists), None, None
     scene, pixel = renderer.scene, renderer.pixel
     if lists is None:
