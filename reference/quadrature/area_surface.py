@@ -51,7 +51,7 @@ _PANEL = 0.7  # rad: widest panel in theta or phi
 _BODIES = 0.1  # rad: the same where bounded media dim the leg, whose depth has kinks
 _LINES = 1 << 17  # at once
 _NODES_AT_ONCE = 1 << 20
-_FIRST = 4  # lines of each replicate that every point gets
+_FIRST = 8  # lines of each replicate that every point gets
 
 
 @dataclass(frozen=True)
