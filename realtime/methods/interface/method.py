@@ -63,6 +63,7 @@ class Method:
     passes: tuple[Callable[..., Layers], ...] = ()
     #: Parameters -> whether `render` hands arrays of any sizes on to the next frame, as `Layers.carried`.
     carries: Callable[[Any], bool] = never
+    runs_passes: Callable[[Any], bool] = always  #: parameters -> whether these run
     uses_kernel: Callable[[Any], bool] = always  #: parameters -> whether `render` calls an airlight kernel
     shadows: bool = True  #: whether it knows shadows; one that does not is wrong where there are occluders
     provides_visibility: Callable[[Any], bool] = never  #: parameters -> whether its layers have a visibility
@@ -78,6 +79,9 @@ class Method:
     #: not, and if it has no passes over the image, it is given one light point after another, and what it returns is
     #: added up: it is recorded once for all of them.
     lights_at_once: Callable[[Any], bool] = never
+    #: Parameters -> whether its visibility has one entry for all points of a light with extent, and one for each other
+    #: light: then surfaces are shaded by source too.
+    by_source: Callable[[Any], bool] = never
     light_points: LightPoints = field(default_factory=LightPoints)  #: how it renders lights with extent by default
 
     @property
