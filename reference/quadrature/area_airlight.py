@@ -129,7 +129,10 @@ def _open_airlight(
     is zero.
     """
     count, step = len(distance), max(1, _ROWS // max(1, len(points)))
-    place, normal = np.stack([point.position for point in points]), np.stack([np.asarray(point.axis) for point in points])
+    place, normal = (
+        np.stack([point.position for point in points]),
+        np.stack([np.asarray(point.axis) for point in points]),
+    )
     radiance, bound = np.zeros((count, 3)), np.zeros((count, 3))
     for start in range(0, count, step):
         ray, point = np.divmod(np.arange(len(distance[start : start + step]) * len(points)), len(points))
