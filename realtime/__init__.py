@@ -16,13 +16,14 @@ Read in this order:
 - `scene/`: camera, lights, media, phase functions and meshes, read from Mitsuba; the features of a scene; what moves;
 - `rays/`: the geometry of rays and lights, and the cone of a spot;
 - `shadow_maps/`: shadow maps and the field of inverse depth over them;
+- `image_filters/`: Gaussian, bilateral and joint bilateral filters of whole images, and up-sampling;
 - `tiles/`: pixels in tiles of 4 x 4, lists of candidates, and adaptive sampling between the corners of tiles;
 - `kernels/`: the airlight integral between two distances along a ray;
 - `bounded_media/`: rays, legs and airlight in bounded media;
 - `intervals/`: the lit intervals of rays, their sum, and the nearest crossings;
 - `clouds/`: light scattered more than once: a slab by orders;
 - `methods/`: the methods: `interface/`, `unshadowed`, `ray_march`, `shadow_planes/`, `light_volumes/`, `epipolar/`,
-  `froxel_fog/`;
+  `froxel_fog/`, `soft_shafts/`;
 - `frame/`: camera rays, the lit surface, and whole frames, one or the next.
 
 May import: `realtime.errors`.

@@ -38,7 +38,7 @@ from realtime.scene.read_scene import Scene
 from realtime.tiles.adaptive_sampling import Corners, tile_corners
 from realtime.tiles.layout import TILE
 
-_MOST_KEPT = 32  # groups of lights of which states, surfaces and lists are kept; those of others are made when needed
+MOST_KEPT = 32  # groups of lights of which states, surfaces and lists are kept; those of others are made when needed
 
 
 @dataclass(frozen=True)
@@ -126,7 +126,7 @@ def frame_renderer(scene: Scene, method: Method, *, kernel=None, **parameters) -
     if not scene.area_lights:
         return _stages(scene, method, kernel, chosen)
     lit = with_light_points(scene, light_points.points, light_points.pattern)
-    if method.passes or method.lights_at_once(chosen) or method.carries(chosen):
+    if _has_passes(method, chosen) or method.lights_at_once(chosen) or method.carries(chosen):
         groups = LightGroups(light_points, _stages(lit, method, kernel, chosen), None)
     else:
         point = replace(lit, lights=lit.lights[len(scene.lights) :][:1])
@@ -145,7 +145,9 @@ def _stages(scene: Scene, method: Method, kernel: Any, chosen: Any, *, adds_up: 
     provides_visibility = method.provides_visibility(chosen)
     pixel = mi.UInt32(tiled_pixels(camera.width, camera.height))
     corners = tile_corners(pixel, camera, tolerance, by_rays=by_rays, lights=len(scene.lights))
-    surface, shade, shade_casts_rays = surface_stages(scene, provides_visibility=provides_visibility)
+    stages = surface_stages(scene, provides_visibility=provides_visibility, by_source=method.by_source(chosen))
+    surface, shade, shade_casts_rays = stages
+    has_passes = _has_passes(method, chosen)
     tables = prepare_kernel(kernel, type(camera.origin.x)) if method.uses_kernel(chosen) else None
 
     def sort(pixel, camera, medium, lights, state, distance):
@@ -183,8 +185,8 @@ def _stages(scene: Scene, method: Method, kernel: Any, chosen: Any, *, adds_up: 
         layers = layers_of(view) if corners is None else adaptive_layers(layers_of, view, corners, tolerance)
         if carries:
             carried, layers = layers.carried, replace(layers, carried=None)
-            return (layers if method.passes else composed(layers, by_light)), carried
-        if method.passes:
+            return (layers if has_passes else composed(layers, by_light)), carried
+        if has_passes:
             return layers
         return composed(layers, by_light) if sums is None else added(sums, layers, by_light)
 
@@ -196,7 +198,7 @@ def _stages(scene: Scene, method: Method, kernel: Any, chosen: Any, *, adds_up: 
     casts_rays = method.casts_rays(chosen)
     render: Callable[..., Any] = run
     passes: Callable[..., Any] | None = None
-    if method.passes:
+    if has_passes:
         passes = image_passes(method, chosen, surfaces=features.surfaces)
     if method.frozen(chosen):
         # Trace one tile without launching anything: what the method refuses must not be raised while a frozen function
@@ -233,6 +235,10 @@ def _stages(scene: Scene, method: Method, kernel: Any, chosen: Any, *, adds_up: 
         casts_rays=casts_rays,
         carries=carries,
     )
+
+
+def _has_passes(method: Method, parameters: Any) -> bool:
+    return bool(method.passes) and method.runs_passes(parameters)
 
 
 def render_frame(renderer: FrameRenderer) -> Frame:
@@ -279,7 +285,7 @@ class GroupPreparation:
     def __call__(self, scene: Scene) -> tuple[Any, ...]:
         """Return the state of each group, None for those that are not kept."""
         groups = _groups_in(self.groups, scene)
-        return tuple(group.prepare(group.scene) if number < _MOST_KEPT else None for number, group in enumerate(groups))
+        return tuple(group.prepare(group.scene) if number < MOST_KEPT else None for number, group in enumerate(groups))
 
 
 def light_groups(renderer: FrameRenderer) -> tuple[FrameRenderer, ...]:
@@ -318,7 +324,7 @@ def run_shade(renderer: FrameRenderer, cast: Cast):
 
 def _shaded(groups: Sequence[FrameRenderer], cast: Cast, before: int) -> tuple[Any, ...]:
     """Return the surfaces of groups of lights, of which some came `before`; None for those that are not kept."""
-    kept = max(_MOST_KEPT - before, 0)
+    kept = max(MOST_KEPT - before, 0)
     return tuple(run_shade(group, cast) if number < kept else None for number, group in enumerate(groups))
 
 
@@ -326,9 +332,9 @@ def run_cull(renderer: FrameRenderer, state, distance: Metres):
     """Run the stage that sorts by tiles, for rays up to a `distance` [m], and return its lists."""
     if renderer.groups is not None:
         groups = light_groups(renderer)
-        states = state or [group.prepare(group.scene) for group in groups[:_MOST_KEPT]]
-        lists = [run_cull(group, own, distance) for group, own in zip(groups[:_MOST_KEPT], states)]
-        return (*lists, *(None for _ in groups[_MOST_KEPT:]))
+        states = state or [group.prepare(group.scene) for group in groups[:MOST_KEPT]]
+        lists = [run_cull(group, own, distance) for group, own in zip(groups[:MOST_KEPT], states)]
+        return (*lists, *(None for _ in groups[MOST_KEPT:]))
     scene = renderer.scene
     return renderer.cull(renderer.pixel, scene.camera, scene.medium, renderer.lights, state, distance)
 

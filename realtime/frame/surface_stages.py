@@ -16,10 +16,13 @@ from realtime.bounded_media.ray_segments import camera_insides, optical_depths
 from realtime.frame.recorded import Frozen
 from realtime.frame.surface import Cast, cast_rays, lit_surface, visible_surface
 from realtime.scene.camera import ray_directions
+from realtime.scene.lights import sources_of
 from realtime.scene.read_scene import Scene
 
 
-def surface_stages(scene: Scene, *, provides_visibility: bool) -> tuple[Callable[..., Any], Callable[..., Any], bool]:
+def surface_stages(
+    scene: Scene, *, provides_visibility: bool, by_source: bool = False
+) -> tuple[Callable[..., Any], Callable[..., Any], bool]:
     """Return the stages for a scene.
 
     Parameters
@@ -28,6 +31,8 @@ def surface_stages(scene: Scene, *, provides_visibility: bool) -> tuple[Callable
         The scene; what matters is what cannot move.
     provides_visibility
         Whether the method finds out which surfaces are lit.
+    by_source
+        Whether it does so for all points of a light with extent together.
 
     Returns
     -------
@@ -40,6 +45,7 @@ def surface_stages(scene: Scene, *, provides_visibility: bool) -> tuple[Callable
     """
     if not scene.features.surfaces:
         return _nothing_met, no_surface, False
+    sources = sources_of(scene.lights)
     # The map of a light at infinity covers the media alone; surfaces beside them are lit too.
     asked = [not (light.w and provides_visibility) for light in scene.lights]
 
@@ -59,6 +65,8 @@ def surface_stages(scene: Scene, *, provides_visibility: bool) -> tuple[Callable
         colors = [
             lit_surface(geometry, seen, light=light, shadows=shadows, **shown) for light, shadows in zip(lights, asked)
         ]
+        if by_source:
+            return tuple(sum(colors[number] for number in source) for source in sources)
         return tuple(colors) if provides_visibility else (sum(colors),)
 
     @Frozen

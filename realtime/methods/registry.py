@@ -5,6 +5,7 @@ A method is a record, `realtime.methods.interface.method.Method`. `METHODS` is t
 every command and report knows it. `find_method` also finds a user's own, which is not in it.
 """
 
+from realtime.area_lights.points import LightPoints
 from realtime.errors import InputError
 from realtime.methods.epipolar.method import MinMaxParameters, min_max, prepare_min_max
 from realtime.methods.froxel_fog.method import (
@@ -29,6 +30,14 @@ from realtime.methods.shadow_planes.method import (
     prepare_shadow_planes,
     shadow_planes,
 )
+from realtime.methods.soft_shafts.history import accumulate
+from realtime.methods.soft_shafts.method import (
+    prepare_soft_shafts,
+    shafts_errors,
+    shares_by_source,
+    soft_shafts,
+)
+from realtime.methods.soft_shafts.parameters import SoftShaftsParameters
 from realtime.methods.unshadowed import render_unshadowed
 from realtime.methods.user_method import own_method
 from realtime.parameters import nearest
@@ -112,6 +121,24 @@ METHODS: dict[str, Method] = {
         lights_at_once=always,
         parameters=FroxelFogParameters,
         error_causes=froxel_errors,
+    ),
+    "soft-shafts": Method(
+        "soft-shafts",
+        soft_shafts,
+        "few points of a light, visibility in few levels, smoothed by bilateral filters",
+        "Ali 2016, reconstructed from captions",
+        prepare=prepare_soft_shafts,
+        prepared_from=frozenset({"geometry", "light"}),
+        uses_kernel=never,
+        casts_rays=always,
+        provides_visibility=always,
+        passes=(accumulate,),
+        runs_passes=lambda parameters: parameters.history > 0,
+        lights_at_once=always,
+        by_source=shares_by_source,
+        light_points=LightPoints(5, "ring"),
+        parameters=SoftShaftsParameters,
+        error_causes=shafts_errors,
     ),
 }
 

@@ -85,7 +85,7 @@ def cast_shadow_map(scene, light: Light, size: int) -> ShadowMap:
     Double = mi.Float64
     projection = light_projection(light)
     side, faces = size + 1, projection.faces
-    face, row, column = _tiled_corners(faces, side)
+    face, row, column = tiled_corners(faces, side)
     there = (row < side) & (column < side)
     # Whole numbers and powers of two: exact, so that neighbouring faces cast the same rays along their common edge.
     u, v = (dr.fma(Double(corner), 2.0 / size, -1.0) for corner in (column, row))
@@ -122,7 +122,7 @@ def cast_cube_maps(scene, light_of: Callable[[Any], Light], count: int, size: in
     """
     check_size(size)
     side = size + 1
-    face, row, column = _tiled_corners(6 * count, side)
+    face, row, column = tiled_corners(6 * count, side)
     there = (row < side) & (column < side)
     u, v = (dr.fma(mi.Float64(corner), 2.0 / size, -1.0) for corner in (column, row))
     number = face // 6
@@ -162,7 +162,7 @@ def inverse_depth(shadow_map: ShadowMap):
     return shadow_map.projection.inverse_depth((u, v), distance)
 
 
-def _tiled_corners(faces: int, side: int):
+def tiled_corners(faces: int, side: int):
     """Return face, row and column of corners in squares of 4 x 4, so that rays side by side in a packet stay close.
 
     The last squares reach beyond the face.

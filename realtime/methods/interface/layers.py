@@ -21,9 +21,9 @@ class Layers:
     """What a method says of every ray. What it leaves out costs nothing."""
 
     in_scattered: PerRay  #: radiance that the media scatter into the ray, a colour [W/(m^2 sr)]
-    visibility: tuple[PerRay, ...] | None = (
-        None  #: by light, which share of it reaches the surface: 0 to 1, or a mask; None: shadow rays say it
-    )
+    #: By light, or by source (`Method.by_source`), which share of it reaches the surface: 0 to 1, or a mask; None:
+    #: shadow rays say it.
+    visibility: tuple[PerRay, ...] | None = None
     transmittance: PerRay | None = (
         None  #: share of what comes from behind that passes what the method adds to the scene's media; None: all
     )

@@ -61,6 +61,7 @@ class Method:
     #: ``f(layers, g_buffer, history, *, camera, parameters)`` -> layers: functions over the whole image, run in turn
     #: on what `render` returned. All arrays have an entry per pixel, row by row; `history` is None in the first frame.
     passes: tuple[Callable[..., Layers], ...] = ()
+    runs_passes: Callable[[Any], bool] = always  #: parameters -> whether these run
     #: Parameters -> whether `render` hands arrays of any sizes on to the next frame, as `Layers.carried`.
     carries: Callable[[Any], bool] = never
     uses_kernel: Callable[[Any], bool] = always  #: parameters -> whether `render` calls an airlight kernel
@@ -78,6 +79,9 @@ class Method:
     #: not, and if it has no passes over the image, it is given one light point after another, and what it returns is
     #: added up: it is recorded once for all of them.
     lights_at_once: Callable[[Any], bool] = never
+    #: Parameters -> whether its visibility has one entry for all points of a light with extent, and one for each other
+    #: light: then surfaces are shaded by source too.
+    by_source: Callable[[Any], bool] = never
     light_points: LightPoints = field(default_factory=LightPoints)  #: how it renders lights with extent by default
 
     @property

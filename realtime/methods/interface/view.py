@@ -35,7 +35,9 @@ class View:
     lights: tuple[Light, ...]
     medium: Medium
     features: SceneFeatures  #: what the scene needs; a method leaves out the rest
-    visible: Callable[[Any, Light], Any]  #: (point, light) -> whether the light reaches the point
+    visible: Callable[
+        [Any, Any], Any
+    ]  #: (point, light, or what else has a `shadow_ray`) -> whether it reaches the point
     camera: Camera
     pixel: PerRay  #: pixel number of every ray: row times width plus column
     layout: Layout  #: how the rays lie in the image

@@ -1,0 +1,19 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Soft shafts (Ali 2016): few points of a light, visibility in few levels, and filters that smooth it.
+
+The source prints no equation; what is built here is reconstructed from captions (docs/soft-shafts.md).
+
+Read in this order:
+
+- `parameters.py`: the parameters, and which of them are those of the source.
+- `light_sources.py`: the points of a light as a table, with their shadow maps.
+- `march.py`: the airlight of all points of a light along rays.
+- `surfaces.py`: which share of a light reaches the visible surfaces, and how wide its penumbrae are.
+- `smoothing.py`: the filters that the parameters ask for.
+- `history.py`: the last frame, where it still holds.
+- `method.py`: the method, and how its stages follow one another.
+
+May import: `realtime.bounded_media`, `realtime.errors`, `realtime.image_filters`, `realtime.memory`,
+`realtime.methods.interface`, `realtime.numerics`, `realtime.parameters`, `realtime.rays`, `realtime.scene`,
+`realtime.shadow_maps`, `realtime.tiles`.
+"""

@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The lights of a scene by source: the points of a light with extent as a table with their maps, or an ordinary light.
+
+The table makes all points one loop, whatever their number, and lets every pixel take a point of its own.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import numpy as np
+
+from realtime.numerics.aligned import aligned_array
+from realtime.numerics.array_types import types_of
+from realtime.scene.lights import Light
+from realtime.shadow_maps.hemisphere_map import HemisphereMaps, LightFrame, cast_hemisphere_maps
+from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map
+
+
+@dataclass(frozen=True)
+class SourceState:
+    """What is made of one source when lights or shapes move."""
+
+    frames: LightFrame | None  #: the points of a light with extent, one a lane
+    width: Any  #: of that light, of a square with its mean square extent [m]
+    flat: bool  #: whether all points of that light face the same way
+    maps: HemisphereMaps | ShadowMap | None  #: None where nobody asks them
+
+
+def source_state(scene: Any, lights: list[Light], size: int, *, with_maps: bool) -> SourceState:
+    """Return the state of a source of some `lights`; `size` [texels] is that of its maps."""
+    Float = type(lights[0].position.x)
+    if lights[0].facing is None:
+        maps = cast_shadow_map(scene, lights[0], size) if with_maps else None
+        return SourceState(None, dr.opaque(Float, 0, 1), True, maps)
+    facing = [light.facing for light in lights if light.facing is not None]
+    positions, normals = _rows(light.position for light in lights), _rows(own.normal for own in facing)
+    helper = np.where(np.abs(normals[:, :1]) < 0.5, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+    across = np.cross(helper, normals)
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    lift = np.concatenate([np.array(own.lift, dtype=np.float64).ravel() for own in facing])
+    Vector = types_of(Float).vector
+
+    def lanes(rows: Any) -> Any:
+        return Vector(*(aligned_array(Float, column) for column in rows.T))
+
+    frames = LightFrame(
+        lanes(positions), lanes(across), lanes(np.cross(normals, across)), lanes(normals), aligned_array(Float, lift)
+    )
+    # Of a square of the side L the mean square distance from the middle is L^2 / 6.
+    spread = np.mean(np.sum((positions - positions.mean(axis=0)) ** 2, axis=1))
+    hemispheres = cast_hemisphere_maps(scene, frames, len(lights), size) if with_maps else None
+    flat = bool(np.all(normals == normals[0]))
+    return SourceState(frames, aligned_array(Float, np.array([np.sqrt(6 * spread)])), flat, hemispheres)
+
+
+def frame_at(frames: LightFrame | None, number: Any) -> LightFrame:
+    """Return light points of a table by their numbers."""
+    assert frames is not None
+    return dr.gather(LightFrame, frames, number)
+
+
+def _rows(vectors: Any) -> Any:
+    return np.array([np.array(vector, dtype=np.float64).ravel() for vector in vectors])

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The parameters of soft shafts. The defaults are those of Ali 2016, Fig. 4.9: 5 points, hd = 5, hr = 0.5."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from realtime.errors import InputError
+from realtime.parameters import Parameters, parameter
+from realtime.shadow_maps.shadow_map import map_size
+
+AUTO = "auto"
+MOST_HD = 64.0  #: [pixels]
+
+
+def check_width(value: Any) -> None:
+    """Refuse a width that no filter can have.
+
+    Raises
+    ------
+    InputError
+        If `value` is neither 'auto' nor a number above 0 up to 64 [pixels].
+    """
+    if value == AUTO:
+        return
+    try:
+        width = float(value)
+    except (TypeError, ValueError):
+        width = math.nan
+    if not 0 < width <= MOST_HD:
+        raise InputError(f"hd: got {value!r}, wanted 'auto' or a number above 0 to {MOST_HD:g} [pixels]")
+
+
+def check_range(value: Any) -> None:
+    """Refuse a range that no filter can have.
+
+    Raises
+    ------
+    InputError
+        If `value` is not above 0; it may be infinite.
+    """
+    if not value > 0:
+        raise InputError(f"hr: got {value!r}, wanted a number above 0, or inf for a Gaussian")
+
+
+@dataclass(frozen=True)
+class SoftShaftsParameters(Parameters):
+    """The parameters of soft shafts."""
+
+    steps: int = parameter(32, "steps of every ray and light point", least=1)
+    spacing: str = parameter(
+        "uniform",
+        "of the steps: in the distance, or in the angle at the light point",
+        choices=("uniform", "equiangular"),
+    )
+    shadow: str = parameter(
+        "map", "of the steps: a look-up in a map, a shadow ray, or none", choices=("map", "ray", "none")
+    )
+    surfaces: str = parameter(
+        "map", "visibility of surfaces: by look-ups in the maps, or by a shadow ray", choices=("map", "ray")
+    )
+    map: int = map_size(512, "texels on a side of the map of every light point")
+    scale: int = parameter(
+        1, "airlight is computed in one pixel of so many, in rows and columns, and interpolated", choices=(1, 2, 4, 8)
+    )
+    interleave: bool = parameter(
+        False, "each pixel of a tile of 4 x 4 takes one of the light points and a shift of the steps of its own"
+    )
+    narrow: float = parameter(
+        0.0,
+        "with `interleave` and `hd=auto`: in penumbrae narrower than this every pixel asks all light points",
+        least=0,
+        unit="pixels",
+    )
+    filter: str = parameter("bilateral", "of visibility and airlight", choices=("bilateral", "gauss", "none"))
+    form: str = parameter(
+        "direct", "of the filter: as it is defined, or along rows and then columns", choices=("direct", "separable")
+    )
+    hd: str = parameter(
+        "5",
+        "standard deviation of the filter in the image; auto: by pixel, from the width of the penumbra",
+        unit="pixels",
+        check=check_width,
+        wanted="auto, or a number above 0 to 64",
+    )
+    hr: float = parameter(
+        0.5,
+        "standard deviation of the filter in visibility, and in log(1 + L / mean L) for airlight",
+        check=check_range,
+        wanted="a number above 0, or inf",
+    )
+    guide: str = parameter(
+        "self", "what the bilateral filter compares: the image itself, or depths", choices=("self", "depth")
+    )
+    hz: float = parameter(0.05, "relative difference of depths at which pixels are no longer alike", above=0, most=10)
+    support: float = parameter(3.0, "half side of the square of taps", above=0, most=4, unit="hd")
+    history: float = parameter(0.0, "weight of the last frame where it still holds; 0: none", least=0, below=1)
+
+    def _check_together(self) -> None:
+        if self.hd == AUTO and (self.filter != "bilateral" or self.guide != "depth"):
+            raise InputError("hd: auto has the depth for a guide; wanted filter=bilateral guide=depth with it")
+
+    @property
+    def width(self) -> float:
+        """The standard deviation of the filter [pixels], not a number for `auto`."""
+        return math.nan if self.hd == AUTO else float(self.hd)

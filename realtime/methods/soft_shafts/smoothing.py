@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The filters that the parameters ask for, for the visibility of surfaces and for airlight."""
+
+import math
+from typing import Any
+
+import drjit as dr
+
+from realtime.image_filters.bilateral import bilateral
+from realtime.image_filters.guides import Guide, airlight_guide
+from realtime.image_filters.levels import bilateral_of_levels
+from realtime.image_filters.raster import Raster
+from realtime.image_filters.separable import separable
+from realtime.methods.soft_shafts.parameters import AUTO, SoftShaftsParameters
+
+
+def smooth_share(
+    share: Any, raster: Raster, *, there: Any, depth: Guide, points: int, levels: bool, p: SoftShaftsParameters
+) -> Any:
+    """Return the share of a light that reaches the surfaces, filtered.
+
+    Parameters
+    ----------
+    share
+        From 0 to 1, row by row.
+    raster
+        The image.
+    there
+        Where there are surfaces: the sky takes no part.
+    depth
+        The guide of their depth.
+    points, levels
+        N, and whether the share has N + 1 levels.
+    p
+        The parameters, with a filter whose `hd` is a number.
+    """
+    if p.filter == "gauss" or p.guide == "self":
+        hr = math.inf if p.filter == "gauss" else p.hr
+        if levels and p.form == "direct":
+            return bilateral_of_levels(share, raster, levels=points, hd=p.width, hr=hr, support=p.support, there=there)
+        # The sky is unlike all surfaces.
+        sky = Guide(dr.select(there, type(share)(0), 1), 1e-3)
+        guides = (sky,) if math.isinf(hr) else (sky, Guide(share, hr))
+        return _filtered(share, raster, guides, p.width, p)
+    return _filtered(share, raster, (depth,), p.width, p)
+
+
+def smooth_airlight(integral: Any, raster: Raster, *, depth: Guide, p: SoftShaftsParameters) -> Any:
+    """Return airlight filtered; `hd` counts pixels of the full image, whatever the scale of this one."""
+    if p.filter == "none" or p.hd == AUTO:
+        return integral
+    guides: tuple[Guide, ...] = ()
+    if p.filter == "bilateral" and p.guide == "depth":
+        guides = (depth,)
+    elif p.filter == "bilateral" and not math.isinf(p.hr):
+        guides = (airlight_guide(integral, p.hr),)
+    return _filtered(integral, raster, guides, p.width / p.scale, p)
+
+
+def _filtered(image: Any, raster: Raster, guides: tuple[Guide, ...], hd: float, p: SoftShaftsParameters) -> Any:
+    function = bilateral if p.form == "direct" and guides else separable
+    return function(image, raster, hd=hd, guides=guides, support=p.support)

@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Shadow maps over hemispheres, of all points of a light with extent, in one array.
+
+A light point shines into the half space before its normal. A cube map would spend three of its six faces on nothing; an
+octahedral map (Praun and Hoppe 2003; Cigolle et al. 2014) covers the half space with one square. With the local
+coordinates (a, b, c) of a direction, c along the normal, and s = |a| + |b| + c,
+
+    u = (a + b) / s,     v = (a - b) / s,     both from -1 to 1.
+
+The maps hold 1/s of the first surface, at the corners of the texels. On a plane that is linear in u and v over a
+quadrant, as inverse depth is in a perspective map, and a point is lit where its own 1/s is not smaller.
+
+A point *on* a surface is compared with the value of the nearest corner, where the surface may be nearer to the light:
+by up to half of what 1/s changes from one corner to the next. So a second array holds the values less that, half of the
+slopes to the flatter side of rows and of columns: a plane never shadows itself, and an edge moves by less than half a
+texel.
+
+The maps of N points follow one another, and all are cast at once, so that the number of kernels does not grow with N.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+from realtime.numerics.array_types import bytes_of
+from realtime.shadow_maps.shadow_map import check_size, tiled_corners
+
+
+@dataclass(frozen=True)
+class LightFrame:
+    """A light point, or one of several in each lane, and the orthonormal frame of its normal."""
+
+    position: Any  #: [m]
+    across: Any
+    up: Any
+    normal: Any
+    lift: Any  #: how far before the shape rays start [m]
+
+    def local(self, vector: Any) -> tuple[Any, Any, Any]:
+        """Return the coordinates of a vector in the frame."""
+        return dr.dot(vector, self.across), dr.dot(vector, self.up), dr.dot(vector, self.normal)
+
+    def shadow_ray(self, point: Any) -> Any:
+        """Return the Mitsuba ray that is blocked where a light point does not reach a point [m]."""
+        start = mi.Point3f(self.position + self.normal * self.lift)
+        direction = mi.Vector3f(point) - mi.Vector3f(start)
+        length = dr.norm(direction)
+        # As `realtime.scene.lights.Light.shadow_ray`: a surface at the point itself must not block the light.
+        return mi.Ray3f(start, direction / length, length * (1 - 2e-6), 0.0, [])
+
+
+@dataclass(frozen=True)
+class HemisphereMaps:
+    """What the rays of N light points meet first, map by map, row by row."""
+
+    size: int  #: texels on a side
+    inverse: Any  #: N (size + 1)^2 values 1/s, 0 where there is nothing [1/m]
+    eased: Any  #: the same, less what a plane changes in half a texel [1/m]
+
+    def lit(self, number: Any, place: tuple[Any, Any, Any], active: Any = True) -> Any:
+        """Return whether a light point reaches points in the air, given by local coordinates [m]."""
+        own, corner = self._corner(number, place)
+        return own >= dr.gather(type(own), self.inverse, corner, active)
+
+    def lit_surface(self, number: Any, place: tuple[Any, Any, Any]) -> Any:
+        """Return whether a light point reaches points on surfaces, given by local coordinates [m]."""
+        own, corner = self._corner(number, place)
+        return own >= dr.gather(type(own), self.eased, corner)
+
+    def beyond(self, number: Any, place: tuple[Any, Any, Any], active: Any = True) -> Any:
+        """Return how far points are behind what the map holds, over the distance of that from the light [1]."""
+        own, corner = self._corner(number, place)
+        return dr.gather(type(own), self.inverse, corner, active) / own - 1
+
+    def _corner(self, number: Any, place: tuple[Any, Any, Any]) -> tuple[Any, Any]:
+        """Return 1/s of a place, and the entry of the nearest corner."""
+        a, b, c = place
+        inverse = dr.rcp(dr.abs(a) + dr.abs(b) + dr.maximum(c, 0))
+        scale, middle = 0.5 * self.size * inverse, 0.5 * (self.size + 1)
+        # In whole numbers, whatever the place is: a light itself has no direction.
+        column, row = (
+            dr.minimum(mi.UInt32(dr.maximum(dr.fma(along, scale, middle), 0)), self.size) for along in (a + b, a - b)
+        )
+        return inverse, (number * (self.size + 1) + row) * (self.size + 1) + column
+
+
+def maps_memory(Float: Any, points: int, size: int) -> int:
+    """Return how much the distances of maps take [bytes]."""
+    return 2 * bytes_of(Float) * points * (size + 1) ** 2
+
+
+def cast_hemisphere_maps(scene: Any, frames: LightFrame, points: int, size: int) -> HemisphereMaps:
+    """Cast the maps of all points of a light.
+
+    Parameters
+    ----------
+    scene
+        The Mitsuba scene that holds the occluders.
+    frames
+        The light points, one a lane.
+    points
+        How many there are.
+    size
+        Texels on a side of each map, a power of two.
+
+    Raises
+    ------
+    InputError
+        If `size` is not a power of two from 4 to 8192.
+    """
+    check_size(size)
+    Float, side = type(frames.lift), size + 1
+    number, row, column = tiled_corners(points, side)
+    there = (row < side) & (column < side)
+    u, v = (dr.fma(Float(corner), 2.0 / size, -1.0) for corner in (column, row))
+    a, b = 0.5 * (u + v), 0.5 * (u - v)
+    c = dr.maximum(1 - dr.abs(a) - dr.abs(b), 0)
+    frame = dr.gather(LightFrame, frames, number)
+    aim = frame.across * a + frame.up * b + frame.normal * c
+    length = dr.norm(aim)
+    direction = aim / length
+    start = frame.position + frame.normal * frame.lift
+    hit = scene.ray_intersect_preliminary(
+        mi.Ray3f(mi.Point3f(start), mi.Vector3f(direction)), coherent=True, active=there
+    )
+    met = dr.select(hit.is_valid(), length / Float(hit.t), 0)
+    inverse = dr.empty(Float, points * side * side)
+    dr.scatter(inverse, met, (number * side + row) * side + column, there)
+    dr.eval(inverse)
+    eased = _eased(inverse, points, side)
+    dr.eval(eased)
+    return HemisphereMaps(size, inverse, eased)
+
+
+def _eased(inverse: Any, points: int, side: int) -> Any:
+    """Return values less half of what they change to the flatter side, along rows and along columns."""
+    index = dr.arange(mi.UInt32, points * side * side)
+    line = index // side
+    column, row = index - line * side, line % side
+    slack, between = type(inverse)(0), (row == column) | (row + column == side - 1)
+    for at, step in ((column, 1), (row, side)):
+        before = dr.abs(dr.gather(type(inverse), inverse, dr.select(at > 0, index - step, index)) - inverse)
+        after = dr.abs(dr.gather(type(inverse), inverse, dr.select(at < side - 1, index + step, index)) - inverse)
+        # At the ends of a row there is one side only; between two quadrants a plane has two slopes.
+        both = dr.select(between, dr.maximum(before, after), dr.minimum(before, after))
+        slack += dr.select(at == 0, after, dr.select(at == side - 1, before, both))
+    # Beyond that, rounding: a hit and a point on the surface differ by some units in the last place.
+    return inverse * (1 - 1e-5) - 0.5 * slack

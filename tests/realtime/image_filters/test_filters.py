@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Filters of images obey their laws: no change of a constant, the Gaussian as a limit, mirrors, no leak, no NaN."""
+
+import numpy as np
+import pytest
+
+from tests.helpers.slow_filters import slow_bilateral, slow_tile_average
+
+WIDTH, HEIGHT = 23, 17
+LEVELS = 5
+
+
+def noise(levels=LEVELS, seed=7):
+    return np.random.default_rng(seed).integers(0, levels + 1, (HEIGHT, WIDTH)) / levels
+
+
+def as_lanes(image):
+    import mitsuba as mi
+
+    return mi.Float(np.ascontiguousarray(image, dtype=np.float32).ravel())
+
+
+def as_image(lanes):
+    return np.array(lanes, dtype=np.float64).reshape(HEIGHT, WIDTH)
+
+
+def filtered(name, image, *, hd=1.7, hr=0.5, depth=None, support=3.0):
+    """Run a filter by its name on an image (height, width)."""
+    import mitsuba as mi
+
+    from realtime.image_filters.bilateral import bilateral
+    from realtime.image_filters.guides import Guide, depth_guide
+    from realtime.image_filters.levels import bilateral_of_levels
+    from realtime.image_filters.raster import Raster
+    from realtime.image_filters.separable import separable
+    from realtime.image_filters.tile_average import tile_average
+
+    raster, lanes = Raster(WIDTH, HEIGHT), as_lanes(image)
+    own = () if np.isinf(hr) else (Guide(lanes, hr),)
+    guides = own if depth is None else (depth_guide(as_lanes(depth), 0.1),)
+    if name == "levels":
+        return as_image(bilateral_of_levels(lanes, raster, levels=LEVELS, hd=hd, hr=hr, support=support))
+    if name == "tile":
+        return as_image(tile_average(lanes, raster, guides=guides))
+    if name == "varying":
+        return as_image(separable(lanes, raster, hd=mi.Float(hd) + 0 * lanes, guides=guides, support=support, most=hd))
+    function = {"bilateral": bilateral, "separable": separable}[name]
+    return as_image(function(lanes, raster, hd=hd, guides=guides, support=support))
+
+
+ALL = ("bilateral", "separable", "varying", "levels", "tile")
+JOINT = ("bilateral", "separable", "varying", "tile")
+
+
+@pytest.mark.claim("filters-are-their-definition", tolerance="2e-6: float32 sums of up to 400 weights")
+@pytest.mark.parametrize("hr", [0.5, 0.17, np.inf])
+@pytest.mark.parametrize("name", ["bilateral", "levels"])
+def test_the_sums_are_those_of_the_definition(variant, name, hr):
+    image = noise()
+    guides = () if np.isinf(hr) else ((image, hr),)
+    for support in (3.0, 2.0):
+        wanted = slow_bilateral(image, hd=1.7, guides=guides, support=support)
+        np.testing.assert_allclose(filtered(name, image, hr=hr, support=support), wanted, atol=2e-6)
+
+
+def test_a_guide_of_vectors_counts_all_its_channels(variant):
+    import mitsuba as mi
+
+    from realtime.image_filters.bilateral import bilateral
+    from realtime.image_filters.guides import Guide
+    from realtime.image_filters.raster import Raster
+
+    normal = np.random.default_rng(3).normal(size=(HEIGHT, WIDTH, 3))
+    guide = Guide(mi.Vector3f(*(as_lanes(normal[..., k]) for k in range(3))), 0.8)
+    image = noise()
+    lanes = bilateral(as_lanes(image), Raster(WIDTH, HEIGHT), hd=1.3, guides=(guide,))
+    np.testing.assert_allclose(as_image(lanes), slow_bilateral(image, hd=1.3, guides=((normal, 0.8),)), atol=2e-6)
+
+
+def test_the_tile_average_is_its_definition(variant):
+    image, depth = noise(), np.random.default_rng(4).uniform(1, 1.5, (HEIGHT, WIDTH))
+    np.testing.assert_allclose(filtered("tile", image, hr=np.inf), slow_tile_average(image), atol=2e-6)
+    wanted = slow_tile_average(image, guides=((np.log(depth), 0.1),))
+    np.testing.assert_allclose(filtered("tile", image, depth=depth), wanted, atol=1e-5)
+
+
+def test_every_sample_of_a_tile_counts_alike(variant):
+    """Sixteen samples, another at every pixel of a tile: away from the border the mean is that of all."""
+    row, column = np.mgrid[:HEIGHT, :WIDTH]
+    samples = np.random.default_rng(5).uniform(size=(4, 4))
+    image = samples[row % 4, column % 4]
+    inner = filtered("tile", image, hr=np.inf)[2:-2, 2:-2]
+    np.testing.assert_allclose(inner, samples.mean(), atol=2e-7)
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_a_constant_stays_to_the_bit(variant, name):
+    value = np.float32(3) / 5
+    image = np.full((HEIGHT, WIDTH), value, dtype=np.float32)
+    assert np.all(filtered(name, image) == value)
+
+
+@pytest.mark.parametrize("name", ["bilateral", "varying", "levels"])
+def test_a_wide_range_is_the_gaussian(variant, name):
+    gaussian = filtered("separable", noise(), hr=np.inf)
+    np.testing.assert_allclose(slow_bilateral(noise(), hd=1.7), gaussian, atol=1e-6)
+    np.testing.assert_allclose(filtered(name, noise(), hr=1e5 if name != "levels" else np.inf), gaussian, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["bilateral", "separable", "varying", "levels"])
+def test_a_small_width_changes_nothing(variant, name):
+    image = noise()
+    np.testing.assert_allclose(filtered(name, image, hd=0.05), image, atol=1e-7)
+
+
+@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("axis", [0, 1])
+def test_filters_commute_with_a_mirror(variant, name, axis):
+    image = noise()
+    np.testing.assert_allclose(filtered(name, np.flip(image, axis)), np.flip(filtered(name, image), axis), atol=1e-6)
+
+
+@pytest.mark.claim("filters-do-not-leak", tolerance="1e-3 across a doubling of the depth")
+@pytest.mark.parametrize("name", JOINT)
+def test_nothing_leaks_across_a_depth_edge(variant, name):
+    depth = np.where(np.arange(WIDTH) < 11, 2.0, 4.0) * np.ones((HEIGHT, 1))
+    image = np.where(depth < 3, 0.0, 1.0)
+    assert np.max(np.abs(filtered(name, image, depth=depth) - image)) < 1e-3
+
+
+@pytest.mark.parametrize("name", JOINT)
+def test_sky_and_zero_depth_give_numbers(variant, name):
+    depth = np.random.default_rng(6).choice([0.0, -1.0, np.nan, np.inf, 2.0, 2.05, 1e-40], (HEIGHT, WIDTH))
+    image = noise()
+    result = filtered(name, image, depth=depth)
+    assert np.all(np.isfinite(result))
+    sky = filtered(name, image, depth=np.full((HEIGHT, WIDTH), np.inf))
+    np.testing.assert_allclose(sky, filtered(name, image, hr=np.inf), atol=1e-6)
+
+
+def test_levels_leave_out_what_is_not_there(variant):
+    import mitsuba as mi
+
+    from realtime.image_filters.levels import bilateral_of_levels
+    from realtime.image_filters.raster import Raster
+
+    image, there = noise(), np.random.default_rng(9).uniform(size=(HEIGHT, WIDTH)) < 0.7
+    lanes = bilateral_of_levels(
+        as_lanes(image), Raster(WIDTH, HEIGHT), levels=LEVELS, hd=1.7, hr=0.5, there=mi.Bool(there.ravel())
+    )
+    # Far away from all by a second guide is what is not there.
+    wanted = slow_bilateral(image, hd=1.7, guides=((image, 0.5), (np.where(there, 0.0, 1e3), 1.0)))
+    np.testing.assert_allclose(as_image(lanes)[there], wanted[there], atol=2e-6)
+    assert np.all(as_image(lanes)[~there] == np.float32(image)[~there])
+
+
+def test_a_width_by_pixel_counts_the_taps_of_each_pixel(variant):
+    """Where the width is that of one pixel, so is the result of the Gaussian of this width along one row."""
+    import mitsuba as mi
+
+    from realtime.image_filters.raster import Raster
+    from realtime.image_filters.separable import separable
+
+    row = np.random.default_rng(8).uniform(size=40)
+    widths = np.where(np.arange(40) < 20, 0.8, 2.5)
+    raster = Raster(40, 1)
+    varying = np.array(separable(mi.Float(row), raster, hd=mi.Float(widths), most=2.5))
+    for hd in (0.8, 2.5):
+        wanted = slow_bilateral(row[None], hd=hd)[0]
+        np.testing.assert_allclose(varying[widths == hd], wanted[widths == hd], atol=1e-6)
+
+
+def test_filters_are_recorded_once(variant):
+    import drjit as dr
+    import mitsuba as mi
+
+    from realtime.frame.recorded import Frozen
+    from realtime.image_filters.bilateral import bilateral
+    from realtime.image_filters.guides import airlight_guide
+    from realtime.image_filters.raster import Raster
+
+    raster = Raster(WIDTH, HEIGHT)
+    function = Frozen(lambda lanes: bilateral(lanes, raster, hd=1.2, guides=(airlight_guide(lanes, 0.5),)))
+    for seed in range(4):
+        image = noise(seed=seed) + 0.1
+        lanes = mi.Float(image.ravel())
+        guide = np.log(1 + image / image.mean())
+        np.testing.assert_allclose(
+            as_image(function(lanes)), slow_bilateral(image, hd=1.2, guides=((guide, 0.5),)), atol=3e-6
+        )
+        dr.sync_thread()
+    assert function.n_recordings == 1

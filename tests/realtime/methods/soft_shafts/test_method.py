@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Soft shafts are the sum of their light points, less what steps, scale, sharing and filters take from it."""
+
+import re
+
+import numpy as np
+import pytest
+
+from tests.helpers.lamps import frame, lamp_scene, renderer
+from tests.helpers.scenes import bounded_medium, spot, tiny_scene
+
+NONE = {"filter": "none", "surfaces": "ray"}
+
+
+def relative_rmse(one, two):
+    return np.sqrt(np.mean((one - two) ** 2)) / np.mean(two)
+
+
+@pytest.mark.claim("soft-shafts-sum-of-points", tolerance="2e-3 relative RMSE: 400 steps")
+@pytest.mark.parametrize("shape", ["rectangle", "disk", "sphere"])
+def test_without_filter_it_is_the_sum_of_its_points(variant, shape):
+    import mitsuba as mi
+
+    box = {
+        "type": "cube",
+        "to_world": mi.ScalarTransform4f().translate([0.1, 0.1, 0.7]).rotate([1, 2, 3], 31).scale(0.33),
+    }
+    scene = lamp_scene(shape, size=(40, 32), ball=box)
+    exact = frame(scene, "shadow-planes", kernel="exact", points=3, pattern="ring")
+    ours = frame(scene, points=3, pattern="ring", steps=400, shadow="ray", spacing="equiangular", **NONE)
+    assert relative_rmse(ours.airlight, exact.airlight) < 2e-3
+    # Shadow rays and planes may differ in pixels on an edge.
+    assert np.mean(np.abs(ours.surface - exact.surface) > 1e-5) < 0.02
+
+
+@pytest.mark.parametrize("spacing", ["uniform", "equiangular"])
+def test_all_points_in_a_loop_are_the_points_one_by_one(variant, spacing):
+    """The table of points against the marcher that asks one light after the other."""
+    scene = lamp_scene(size=(24, 20))
+    march = frame(scene, "ray-march", steps=60, spacing=spacing, points=5, pattern="ring")
+    ours = frame(scene, points=5, pattern="ring", steps=60, shadow="ray", spacing=spacing, **NONE)
+    np.testing.assert_allclose(ours.airlight, march.airlight, rtol=2e-3, atol=2e-6)
+    # Where light grazes the ball, shadow rays towards the light and from it differ.
+    assert np.mean(np.abs(ours.surface - march.surface) > 1e-6) < 0.02
+
+
+def test_ordinary_lights_are_one_point(variant):
+    floor = tiny_scene()["floor"]
+    body = bounded_medium({"type": "sphere", "center": [0.1, 0.2, 0.9], "radius": 1.1}, 0.7, (0.8, 0.7, 0.6))
+    clear = {"fog": None, "body": body, "sensor": tiny_scene()["sensor"] | {"medium": None}}
+    clear["sensor"] = {key: entry for key, entry in clear["sensor"].items() if entry is not None}
+    sun = {"type": "directional", "direction": [0.2, 0.3, -0.9], "irradiance": {"type": "rgb", "value": 3.0}}
+    scenes = [tiny_scene(), tiny_scene(lamp=spot(beam=20.0)), tiny_scene(**clear), tiny_scene(lamp=sun, **clear)]
+    assert floor
+    for scene in scenes:
+        march = frame(scene, "ray-march", steps=40)
+        ours = frame(scene, steps=40, shadow="ray", spacing="equiangular", **NONE)
+        np.testing.assert_allclose(ours.airlight, march.airlight, rtol=2e-4, atol=1e-6)
+        np.testing.assert_allclose(ours.surface, march.surface, atol=1e-6)
+
+
+def test_a_light_with_extent_in_bounded_media_is_the_sum_of_its_points(variant):
+    body = bounded_medium({"type": "sphere", "center": [0.1, 0.2, 0.9], "radius": 1.1}, 0.7, (0.8, 0.7, 0.6))
+    sensor = {key: entry for key, entry in tiny_scene()["sensor"].items() if key != "medium"}
+    scene = lamp_scene(fog=None, body=body, sensor=sensor)
+    march = frame(scene, "ray-march", steps=40, points=3)
+    for shadow, tolerance in (("ray", 1e-3), ("map", 0.05)):
+        ours = frame(scene, points=3, pattern="sobol", steps=40, shadow=shadow, spacing="equiangular", **NONE)
+        assert relative_rmse(ours.airlight, march.airlight) < tolerance
+
+
+def test_maps_tend_to_rays(variant):
+    scene = lamp_scene(size=(40, 32))
+    rays = frame(scene, points=3, shadow="ray", **NONE)
+    errors = [
+        (relative_rmse(ours.airlight, rays.airlight), relative_rmse(ours.surface, rays.surface))
+        for ours in (frame(scene, points=3, filter="none", map=map) for map in (64, 1024))
+    ]
+    assert errors[1][0] < 0.25 * errors[0][0] < 0.1
+    assert errors[1][1] < 0.5 * errors[0][1]
+
+
+@pytest.mark.parametrize("scale", [2, 4])
+def test_few_pixels_are_interpolated(variant, scale):
+    """Without casters airlight is smooth, but for the depth; with them its edges are as wide as `scale` pixels."""
+    scene = lamp_scene(size=(48, 32))
+    whole = frame(scene, points=3, **NONE)
+    few = frame(scene, points=3, scale=scale, **NONE)
+    assert relative_rmse(few.airlight, whole.airlight) < 0.06 * scale
+    np.testing.assert_array_equal(few.surface, whole.surface)
+
+
+def test_pixels_share_points_and_steps(variant):
+    """The mean over a tile of 4 x 4 is that of sixteen points and 16 x 8 steps where nothing changes in it."""
+    scene = lamp_scene(size=(48, 32), ball=None)
+    many = frame(scene, points=16, steps=128, spacing="equiangular", **NONE)
+    shared = frame(scene, points=16, steps=8, spacing="equiangular", interleave=True, hz=1.0, **NONE)
+    alone = frame(scene, points=16, steps=8, spacing="equiangular", **NONE)
+    inner = slice(4, -4), slice(4, -4)
+    errors = [relative_rmse(image.airlight[inner], many.airlight[inner]) for image in (shared, alone)]
+    assert errors[0] < 0.02
+    np.testing.assert_allclose(shared.surface[inner], many.surface[inner], rtol=1e-4, atol=1e-6)
+
+
+def test_filters_keep_what_is_not_penumbra(variant):
+    """Far from shadows the filters of a share change nothing: its levels are all 1 there."""
+    scene = lamp_scene(size=(48, 32))
+    plain = frame(scene, points=5, **NONE)
+    for parameters in ({}, {"form": "separable"}, {"guide": "depth"}, {"guide": "depth", "hd": "auto"}):
+        filtered = frame(
+            scene,
+            points=5,
+            surfaces="ray",
+            hd=parameters.get("hd", "1.2"),
+            **{name: value for name, value in parameters.items() if name != "hd"},
+        )
+        difference = np.abs(filtered.surface - plain.surface).max(axis=2)
+        assert 0.05 < np.mean(difference == 0) < 1
+        assert relative_rmse(filtered.airlight, plain.airlight) < 0.2
+
+
+def test_direct_filters_of_levels_are_the_brute_force(variant):
+    """`form=direct` sums by levels; a sphere, whose points count unequally, takes the sum as it stands."""
+    scene = lamp_scene("sphere", size=(32, 24))
+    assert np.all(np.isfinite(frame(scene, points=5).surface))
+
+
+def test_moving_lights_record_nothing_anew(variant):
+    from dataclasses import replace
+
+    from realtime.frame.renderer import light_groups, render_frame
+
+    made = renderer(lamp_scene(size=(16, 12)))
+    render_frame(made)
+    light = made.scene.area_lights[0]
+    before = light_groups(made)[0].render.n_recordings
+    images = []
+    for shift in (0.0, 0.05, 0.1):
+        moved = replace(light, middle=light.middle + np.array([shift, 0, 0]))
+        images.append(render_frame(replace(made, scene=replace(made.scene, area_lights=(moved,)))).airlight)
+    assert light_groups(made)[0].render.n_recordings == before
+    assert np.abs(images[2] - images[0]).max() > 1e-4
+
+
+@pytest.mark.parametrize(
+    ("parameters", "words"),
+    [
+        ({"hr": 0}, "hr: got 0.0, wanted a number above 0"),
+        ({"hr": -1}, "hr: got -1.0, wanted a number above 0"),
+        ({"hd": 65}, "hd: got '65', wanted 'auto' or a number above 0 to 64 [pixels]"),
+        ({"hd": "wide"}, "hd: got 'wide', wanted 'auto' or a number above 0 to 64 [pixels]"),
+        ({"hd": "auto"}, "hd: auto has the depth for a guide; wanted filter=bilateral guide=depth with it"),
+        ({"steps": 0}, "steps: got 0, wanted a whole number of at least 1"),
+        ({"scale": 3}, "scale: got 3, wanted one of 1, 2, 4, 8"),
+        ({"scale": 8}, "scale: got 8 and an image of 16 x 12, wanted one that divides both sides"),
+        ({"interleave": True}, "interleave: got 5 points of a light, wanted 1, 2, 4, 8 or 16"),
+        ({"map": 100}, "map: got 100, wanted a power of two from 4 to 8192"),
+    ],
+)
+def test_wrong_parameters_are_refused_in_one_line(variant, parameters, words):
+    from realtime.errors import InputError
+
+    with pytest.raises(InputError, match=re.escape(words)) as caught:
+        renderer(lamp_scene(size=(16, 12)), **parameters)
+    assert "\n" not in str(caught.value)
