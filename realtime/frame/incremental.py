@@ -89,9 +89,13 @@ def next_frame(
     if renderer.groups is not None:
         return _next_of_groups(renderer, made, cast_again=cast_again)
     state, lists, cast, by_light = _before_method(renderer, made, None, cast_again=cast_again)
-    last = (cache.history, cache.carried) if cache else (None, None)
-    *layers, history, carried = run_method(renderer, state, cast, by_light, lists, *last)
+    *layers, history, carried = run_method(renderer, state, cast, by_light, lists, *_last(cache))
     return evaluated(cast, by_light, layers), FrameCache(cast, state, lists, history, carried)
+
+
+def _last(cache: FrameCache | None) -> tuple[Any, Any]:
+    """Return what the last frame left to passes, and what its method handed on."""
+    return (cache.history, cache.carried) if cache else (None, None)
 
 
 @dataclass(frozen=True)
@@ -133,7 +137,7 @@ def _next_of_groups(renderer: FrameRenderer, made: _Made, *, cast_again: bool):
     """Do what `next_frame` does, group of lights after group."""
     assert renderer.groups is not None
     groups = light_groups(renderer)
-    history, carried = (made.cache.history, made.cache.carried) if made.cache else (None, None)
+    history, carried = _last(made.cache)
     sums: Any = None
     beyond: Any = None
     cast: Any = None

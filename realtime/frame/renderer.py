@@ -379,7 +379,8 @@ def run_method(
         if len(groups) == 1 and renderer.groups.of_point is None:
             only = None if lists is None else lists[0]
             own = state[0] if state else groups[0].prepare(groups[0].scene)
-            return run_method(groups[0], own, cast, by_light[0], only, history, carried)
+            airlight, surface, *left = run_method(groups[0], own, cast, by_light[0], only, history, carried)
+            return airlight, by_light[0][0] if surface is None else surface, *left
         return *_summed(groups, state, cast, by_light, lists), None, None
     scene, pixel = renderer.scene, renderer.pixel
     if lists is None:
