@@ -2,7 +2,7 @@
 """The airlight integral to as many digits as wanted, from two quadratures at two precisions, in mpmath.
 
 Route one takes the definition, over the distance s = x - foot, by tanh-sinh, with 10 digits more than asked for. Route
-two takes the path form (derived in `analytic.integral`) over w = log(q/h), by Gauss-Legendre, with 25 digits more. They
+two takes the path form (derived in docs/conventions.md) over w = log(q/h), by Gauss-Legendre, with 25 digits more. They
 share the inputs, which count as exact, and the phase function; a number is only returned where both agree.
 
 A third route exists for isotropic scattering. With E = q/h and a = sigma_t h,
@@ -37,7 +37,7 @@ def integrate_certified(
     Parameters
     ----------
     foot, height, x0, x1, sigma_t, phase
-        As in `analytic.integral.integrate_distance`; binary numbers, taken as exact.
+        Of the segment [m] and the medium [1/m], x1 may be infinite; binary numbers, taken as exact.
     digits
         Relative precision in decimal digits, at least 15: for less the float64 routes are the right tool.
 
@@ -105,7 +105,7 @@ def isotropic_closed_form(foot: float, height: float, x0: float, x1: float, sigm
 def _special(foot: float, height: float, x0: float, x1: float, sigma_t: float, digits: int) -> float | None:
     """Check the inputs; return J where it takes no quadrature."""
     if digits < _FEWEST_DIGITS:
-        raise InputError(f"digits is {digits}; wanted at least {_FEWEST_DIGITS}: below, use analytic.integral")
+        raise InputError(f"digits is {digits}; wanted at least {_FEWEST_DIGITS}: below, use analytic.panels")
     for name, number in (("foot", foot), ("height", height), ("x0", x0), ("sigma_t", sigma_t)):
         signed = name in ("foot", "x0")
         if not (math.isfinite(number) and (signed or number >= 0)):

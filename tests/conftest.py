@@ -25,6 +25,11 @@ def variant() -> str:
     from reports.machine.environment import activate
 
     chosen = activate()
+    # Workers have a core each: more threads would wait for one another. `tests/realtime/frame/test_threads.py` has all.
+    if "PYTEST_XDIST_WORKER_COUNT" in os.environ:
+        import drjit as dr
+
+        dr.set_thread_count(max(1, len(os.sched_getaffinity(0)) // int(os.environ["PYTEST_XDIST_WORKER_COUNT"])))
     # What was imported stays: `_nothing_left_behind` need not look through it after every module.
     gc.collect()
     gc.freeze()

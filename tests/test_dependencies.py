@@ -35,7 +35,7 @@ def imported(*folders):
     A test that is skipped where a package is missing names it in `importorskip`.
     """
     distributions = packages_distributions()
-    found = {}
+    imported = {}
     for folder in folders:
         path = ROOT / folder
         for file in [path] if path.is_file() else sorted(path.rglob("*.py")):
@@ -49,8 +49,8 @@ def imported(*folders):
                     modules = [ast.literal_eval(node.args[0])]
                 for top in {module.partition(".")[0] for module in modules} - OURS - set(sys.stdlib_module_names):
                     for name in distributions.get(top, [top]):
-                        found.setdefault(canonicalize_name(name), file.relative_to(ROOT).as_posix())
-    return found
+                        imported.setdefault(canonicalize_name(name), file.relative_to(ROOT).as_posix())
+    return imported
 
 
 def test_what_the_product_imports_is_declared():

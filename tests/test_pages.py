@@ -41,7 +41,7 @@ def test_a_folder_opens_with_its_page(folder):
     assert path.is_file()
     words = ast.get_docstring(ast.parse(path.read_text()))
     assert words
-    held = [one.name for one in folder.glob("*.py") if one.name != "__init__.py"]
+    held = [file.name for file in folder.glob("*.py") if file.name != "__init__.py"]
     # A folder of folders alone may leave order and imports to these.
     files, packages = parse_page(words) if held or "May import:" in words else ([], [])
     assert sorted(name for name in files if name.endswith(".py") and "/" not in name) == sorted(held)

@@ -75,9 +75,9 @@ def test_imports_of_a_method_lead_to_no_other(graph):
 def test_every_method_is_kept_apart():
     """Whoever adds a method adds it to the list of those that import none of one another."""
     folder = modules()["realtime.methods.registry"].parent
-    found = {path.stem for path in folder.iterdir() if path.name[0] not in "._"}
+    names = {path.stem for path in folder.iterdir() if path.name[0] not in "._"}
     shared = {"registry", "interface", "user_method", "user_result"}
-    assert {f"realtime.methods.{name}" for name in found - shared} == set(METHODS)
+    assert {f"realtime.methods.{name}" for name in names - shared} == set(METHODS)
 
 
 def test_the_walk_over_imports_finds_what_is_forbidden():
@@ -87,13 +87,13 @@ def test_the_walk_over_imports_finds_what_is_forbidden():
         "realtime.deep": "import reference.read\n",
         "realtime.method": "from realtime import deep\n",
     }
-    found = import_graph(sources)
-    assert found["reference.read"] == {"analytic.phase"}
-    assert reached(found, ["realtime.method"]) == set(sources)
+    graph = import_graph(sources)
+    assert graph["reference.read"] == {"analytic.phase"}
+    assert reached(graph, ["realtime.method"]) == set(sources)
     with pytest.raises(CycleError):
         TopologicalSorter(import_graph(sources | {"analytic.phase": "from realtime.method import f"})).prepare()
     files = {name: ROOT / f"{name.replace('.', '/')}.py" for name in sources}
-    assert folder_graph(found, files) == {
+    assert folder_graph(graph, files) == {
         "analytic": set(),
         "reference": {"analytic"},
         "realtime": {"reference"},

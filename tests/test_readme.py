@@ -37,9 +37,9 @@ def test_python_snippets(code, tmp_path):
     result = subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=300, check=True
     )
-    found = re.fullmatch(r"relative RMSE (\S+), (\S+) ms a frame\n", result.stdout)
-    assert found, result.stdout
-    error, milliseconds = found.groups()
+    printed = re.fullmatch(r"relative RMSE (\S+), (\S+) ms a frame\n", result.stdout)
+    assert printed, result.stdout
+    error, milliseconds = printed.groups()
     assert 0 < float(error) < 0.02  # 64 equi-angular steps against shadow edges
     assert float(milliseconds) > 0
 
@@ -98,10 +98,10 @@ def commands() -> dict:
 
     from reports.commands.main import app
 
-    found = typer.main.get_group(app).commands
+    commands = typer.main.get_group(app).commands
     return {
-        name: {option for one in command.params for option in [*one.opts, *one.secondary_opts]}
-        for name, command in found.items()
+        name: {option for parameter in command.params for option in [*parameter.opts, *parameter.secondary_opts]}
+        for name, command in commands.items()
     }
 
 
@@ -111,8 +111,8 @@ def named_commands(text: str) -> list[tuple[str, list[str]]]:
     lines = [line for block in blocks for line in block.splitlines()]
     lines += re.findall(r"`([^`]+)`", re.sub(r"^```.*?^```", "", text, flags=re.DOTALL | re.MULTILINE))
     lines += re.findall(r"^ {4}(airlight .*(?:\n {8,}[-\[].*)*)", text, flags=re.MULTILINE)
-    found = [re.match(r"(?:\./)?airlight\s+([a-z]+)\b(.*)", line, flags=re.DOTALL) for line in lines]
-    return [(one[1], re.findall(r"(?<!\w)--?[a-z][a-z-]*", one[2])) for one in found if one]
+    matches = [re.match(r"(?:\./)?airlight\s+([a-z]+)\b(.*)", line, flags=re.DOTALL) for line in lines]
+    return [(match[1], re.findall(r"(?<!\w)--?[a-z][a-z-]*", match[2])) for match in matches if match]
 
 
 @pytest.mark.claim("documented-commands")
@@ -143,7 +143,9 @@ def test_links_lead_somewhere(name):
             linked = (ROOT / name).parent / path
             assert linked.exists(), target
             headings = re.findall(r"^#+ (.*)", linked.read_text(encoding="utf-8"), flags=re.MULTILINE) if anchor else []
-            assert not anchor or anchor in [re.sub(r"[^\w -]", "", one.lower()).replace(" ", "-") for one in headings]
+            assert not anchor or anchor in [
+                re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings
+            ]
 
 
 @pytest.mark.claim("margins", tolerance="none: equal")

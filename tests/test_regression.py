@@ -37,8 +37,8 @@ def test_a_fault_of_a_thousandth_is_found(monkeypatch, variant):
     )
     monkeypatch.setattr(baseline_runs, "baseline_configurations", lambda name, features: (YARDSTICK,))
     moves = compare_baseline(read_baseline("open-fog"), measure_baseline("open-fog", times=False))
-    moved = {one.what: one for one in moves if one.label == YARDSTICK.label}
+    moved = {move.what: move for move in moves if move.label == YARDSTICK.label}
     assert moved["airlight relative_bias"].new == pytest.approx(1e-3, rel=1e-3)
     assert {"airlight relative_rmse", "airlight p50", "airlight p99", "airlight max"} <= set(moved)
     # What was not measured is missed too.
-    assert {one.what for one in moves if one.label != YARDSTICK.label} == {"a baseline without its configuration"}
+    assert {move.what for move in moves if move.label != YARDSTICK.label} == {"a baseline without its configuration"}

@@ -61,10 +61,10 @@ def main() -> None:
 
 def properties(values: dict) -> pyluxcore.Properties:
     """Return settings in LuxCore's type."""
-    found = pyluxcore.Properties()
+    properties = pyluxcore.Properties()
     for key, value in values.items():
-        found.Set(pyluxcore.Property(key, list(value) if isinstance(value, list | tuple) else value))
-    return found
+        properties.Set(pyluxcore.Property(key, list(value) if isinstance(value, list | tuple) else value))
+    return properties
 
 
 def media(described: dict) -> dict:
@@ -115,17 +115,17 @@ def camera(described: dict) -> dict:
 
 def lights(described: list[dict]) -> dict:
     """Return point lights: without `power` and `efficiency`, the colour is the flux 4 pi I [W]."""
-    found: dict = {}
+    settings: dict = {}
     for number, light in enumerate(described):
         if light["kind"] != "point":
             raise SystemExit(f"a {light['kind']} light of LuxCore is another one: choose a scene with point lights")
         prefix = f"scene.lights.lamp{number}."
-        found |= {
+        settings |= {
             prefix + "type": "point",
             prefix + "position": light["position"],
             prefix + "color": (4 * np.pi * np.array(light["intensity"])).tolist(),
         }
-    return found
+    return settings
 
 
 def shapes(scene: pyluxcore.Scene, described: dict, path: str) -> None:

@@ -5,7 +5,7 @@
 | --- | --- |
 | camera | camera rays, lists of tiles, and what was prepared if it depends on the camera |
 | geometry | everything |
-| light | what was prepared, lists of tiles |
+| light | what was prepared, lists of tiles; camera rays too where a black light with extent is seen |
 | medium, colours | nothing of these |
 
 Surface and airlight are computed for every frame. Who calls says what moved: nothing is compared, so what moved without
@@ -17,7 +17,20 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from realtime.frame.renderer import FrameRenderer, evaluated, run_cast_and_shade, run_cull, run_method, run_shade
+import drjit as dr
+
+from realtime.frame.renderer import (
+    MOST_KEPT,
+    FrameRenderer,
+    evaluated,
+    light_groups,
+    no_light,
+    run_cast_and_shade,
+    run_cull,
+    run_group,
+    run_method,
+    run_shade,
+)
 from realtime.frame.surface import Cast
 from realtime.methods.interface.layers import History
 from realtime.methods.interface.method import Preparation
@@ -67,23 +80,83 @@ def next_frame(
         For the next frame.
     """
     renderer = replace(renderer, scene=scene)
+    geometry_moved |= light_moved and any(light.opaque for light in scene.area_lights)
     cast_again = camera_moved or geometry_moved
     cull_again = cast_again or light_moved or cache is None
     moved = {"camera": camera_moved, "geometry": geometry_moved, "light": light_moved, "look": True}
-    if cache is None or any(moved[what] for what in renderer.method.prepared_from):
-        finish = _started(renderer.prepare, scene)
+    prepare_again = cache is None or any(moved[what] for what in renderer.method.prepared_from)
+    made = _Made(not prepare_again, not cull_again, cache)
+    if renderer.groups is not None:
+        return _next_of_groups(renderer, made, cast_again=cast_again)
+    state, lists, cast, by_light = _before_method(renderer, made, None, cast_again=cast_again)
+    *layers, history, carried = run_method(renderer, state, cast, by_light, lists, *_last(cache))
+    return evaluated(cast, by_light, layers), FrameCache(cast, state, lists, history, carried)
+
+
+def _last(cache: FrameCache | None) -> tuple[Any, Any]:
+    """Return what the last frame left to passes, and what its method handed on."""
+    return (cache.history, cache.carried) if cache else (None, None)
+
+
+@dataclass(frozen=True)
+class _Made:
+    """What the last frame left, and whether its states and lists serve again."""
+
+    state: bool
+    lists: bool
+    cache: FrameCache | None
+
+    def of_group(self, number: int) -> "_Made":
+        """Return what it left of one group of lights; states and lists of some are not kept."""
+        if self.cache is None:
+            return self
+        state, lists = self.cache.state[number], self.cache.lists[number]
+        kept = replace(self.cache, state=state, lists=lists)
+        return _Made(self.state and state is not None, self.lists and lists is not None, kept)
+
+
+def _before_method(renderer: FrameRenderer, made: _Made, cast: Cast | None, *, cast_again: bool):
+    """Run the stages before the method's for one group of lights; `cast` is what a group before it cast."""
+    cache = made.cache
+    if cache is not None and made.state:
+        finish: Callable[[], Any] = partial(getattr, cache, "state")
     else:
-        finish = partial(getattr, cache, "state")
-    if cast_again:
+        finish = _started(renderer.prepare, renderer.scene)
+    if cast is None and cast_again:
         cast, by_light = run_cast_and_shade(renderer)
     else:
-        cast = cache.cast if cache else run_cast_and_shade(renderer)[0]
+        if cast is None:
+            cast = cache.cast if cache else run_cast_and_shade(renderer)[0]
         by_light = run_shade(renderer, cast)
     state = finish()
-    lists = cache.lists if cache and not cull_again else run_cull(renderer, state, cast.distance)
-    last = (cache.history, cache.carried) if cache else (None, None)
-    *layers, history, carried = run_method(renderer, state, cast, by_light, lists, *last)
-    return evaluated(cast, by_light, layers), FrameCache(cast, state, lists, history, carried)
+    lists = cache.lists if cache is not None and made.lists else run_cull(renderer, state, cast.distance)
+    return state, lists, cast, by_light
+
+
+def _next_of_groups(renderer: FrameRenderer, made: _Made, *, cast_again: bool):
+    """Do what `next_frame` does, group of lights after group."""
+    assert renderer.groups is not None
+    groups = light_groups(renderer)
+    history, carried = _last(made.cache)
+    sums: Any = None
+    beyond: Any = None
+    cast: Any = None
+    kept: list[tuple[Any, Any]] = []
+    for number, group in enumerate(groups):
+        state, lists, cast, by_light = _before_method(group, made.of_group(number), cast, cast_again=cast_again)
+        kept.append((state, lists) if number < MOST_KEPT else (None, None))
+        if renderer.groups.of_point is None:
+            *layers, history, carried = run_method(group, state, cast, by_light, lists, history, carried)
+            stages = evaluated(cast, by_light, layers)
+            continue
+        sums = sums or no_light(group.scene, dr.width(cast.distance))
+        sums, more = run_group(group, sums, state, lists, cast, by_light)
+        beyond = more if number == 0 else beyond
+    states, all_lists = zip(*kept)
+    if sums is not None:
+        surface = sums[1] if beyond is None else sums[1] + beyond
+        stages = evaluated(cast, (), (sums[0], surface))
+    return stages, FrameCache(cast, states, all_lists, history, carried)
 
 
 def _started(prepare: Preparation, scene: Scene) -> Callable[[], Any]:

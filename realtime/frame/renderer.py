@@ -38,7 +38,7 @@ from realtime.scene.read_scene import Scene
 from realtime.tiles.adaptive_sampling import Corners, tile_corners
 from realtime.tiles.layout import TILE
 
-_MOST_KEPT = 32  # groups of lights of which states, surfaces and lists are kept; those of others are made when needed
+MOST_KEPT = 32  # groups of lights of which states, surfaces and lists are kept; those of others are made when needed
 
 
 @dataclass(frozen=True)
@@ -285,7 +285,7 @@ class GroupPreparation:
     def __call__(self, scene: Scene) -> tuple[Any, ...]:
         """Return the state of each group, None for those that are not kept."""
         groups = _groups_in(self.groups, scene)
-        return tuple(group.prepare(group.scene) if number < _MOST_KEPT else None for number, group in enumerate(groups))
+        return tuple(group.prepare(group.scene) if number < MOST_KEPT else None for number, group in enumerate(groups))
 
 
 def light_groups(renderer: FrameRenderer) -> tuple[FrameRenderer, ...]:
@@ -324,7 +324,7 @@ def run_shade(renderer: FrameRenderer, cast: Cast):
 
 def _shaded(groups: Sequence[FrameRenderer], cast: Cast, before: int) -> tuple[Any, ...]:
     """Return the surfaces of groups of lights, of which some came `before`; None for those that are not kept."""
-    kept = max(_MOST_KEPT - before, 0)
+    kept = max(MOST_KEPT - before, 0)
     return tuple(run_shade(group, cast) if number < kept else None for number, group in enumerate(groups))
 
 
@@ -332,9 +332,9 @@ def run_cull(renderer: FrameRenderer, state, distance: Metres):
     """Run the stage that sorts by tiles, for rays up to a `distance` [m], and return its lists."""
     if renderer.groups is not None:
         groups = light_groups(renderer)
-        states = state or [group.prepare(group.scene) for group in groups[:_MOST_KEPT]]
-        lists = [run_cull(group, own, distance) for group, own in zip(groups[:_MOST_KEPT], states)]
-        return (*lists, *(None for _ in groups[_MOST_KEPT:]))
+        states = state or [group.prepare(group.scene) for group in groups[:MOST_KEPT]]
+        lists = [run_cull(group, own, distance) for group, own in zip(groups[:MOST_KEPT], states)]
+        return (*lists, *(None for _ in groups[MOST_KEPT:]))
     scene = renderer.scene
     return renderer.cull(renderer.pixel, scene.camera, scene.medium, renderer.lights, state, distance)
 
@@ -379,7 +379,8 @@ def run_method(
         if len(groups) == 1 and renderer.groups.of_point is None:
             only = None if lists is None else lists[0]
             own = state[0] if state else groups[0].prepare(groups[0].scene)
-            return run_method(groups[0], own, cast, by_light[0], only, history, carried)
+            airlight, surface, *left = run_method(groups[0], own, cast, by_light[0], only, history, carried)
+            return airlight, by_light[0][0] if surface is None else surface, *left
         return *_summed(groups, state, cast, by_light, lists), None, None
     scene, pixel = renderer.scene, renderer.pixel
     if lists is None:

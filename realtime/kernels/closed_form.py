@@ -89,8 +89,8 @@ def closed_form(geometry: RayGeometry, x0, x1, medium: Medium, light: Light):
         )
     if light.varies:
         raise InputError(
-            "kernel closed-form: the intensity of a light with extent, or of a spot that falls off between beam and "
-            "cut-off, has no closed form here; use the kernel 'quadrature', or a spot with beam_width = cutoff_angle"
+            "kernel closed-form: a spot that falls off between beam and cut-off, or a light with extent, has no closed "
+            "form here; use the kernel 'quadrature', or a spot with beam_width = cutoff_angle"
         )
     foot, h = geometry.foot, geometry.height
     Float = type(h)

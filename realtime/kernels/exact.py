@@ -40,8 +40,8 @@ from realtime.scene.lights import Light
 from realtime.scene.medium import Medium, per_extinction
 from realtime.scene.phase import Phase
 
-#: In float64: nodes of the isotropic case, and for the others panels of equal width in v and the nodes of each.
-_ISOTROPIC_DOUBLE, _PANELS, _PANEL_NODES = 40, 10, 24
+#: In float64: nodes of the isotropic case, and of each panel of the others; the phase function says how many panels.
+_ISOTROPIC_DOUBLE, _PANEL_NODES = 40, 24
 
 
 def exact(geometry: RayGeometry, x0, x1, medium: Medium, light: Light):
@@ -135,6 +135,7 @@ def _double_mean(phase: Phase, start, scale, width, decays, weight):
     Float = type(width)
     f0, c0 = start
     (decay,) = decays
+    count = phase.panels_double
 
     def node(fraction):
         grown = dr.exp(width * (0.5 * fraction))
@@ -150,12 +151,12 @@ def _double_mean(phase: Phase, start, scale, width, decays, weight):
 
     def panel(index, total):
         start = Float(index)
-        part = sum(share * node((start + fraction) * (1 / _PANELS)) for fraction, share in unit_nodes(_PANEL_NODES))
-        return index + 1, total + part * (1 / _PANELS)
+        part = sum(share * node((start + fraction) * (1 / count)) for fraction, share in unit_nodes(_PANEL_NODES))
+        return index + 1, total + part * (1 / count)
 
     _, total = dr.while_loop(
         state=(mi.UInt32(0), dr.zeros(Float, dr.width(width))),
-        cond=lambda index, total: index < _PANELS,
+        cond=lambda index, total: index < count,
         body=panel,
         labels=("index", "total"),
     )

@@ -124,8 +124,8 @@ def table(
         )
     if light.varies:
         raise InputError(
-            "kernel table: the intensity of a light with extent, or of a spot that falls off between beam and cut-off, "
-            "is not tabulated; use the kernel 'quadrature', or a spot with beam_width = cutoff_angle"
+            "kernel table: a spot that falls off between beam and cut-off, or a light with extent, is not tabulated; "
+            "use the kernel 'quadrature', or a spot with beam_width = cutoff_angle"
         )
     records = upload_table(type(geometry.height), form=form, size=size) if tables is None else tables
     difference = _sun if form == "sun" else _tail

@@ -31,13 +31,8 @@ from realtime.methods.shadow_planes.method import (
     shadow_planes,
 )
 from realtime.methods.soft_shafts.history import accumulate
-from realtime.methods.soft_shafts.method import (
-    prepare_soft_shafts,
-    shafts_errors,
-    shares_by_source,
-    soft_shafts,
-)
-from realtime.methods.soft_shafts.parameters import SoftShaftsParameters
+from realtime.methods.soft_shafts.method import prepare_soft_shafts, shares_by_source, soft_shafts
+from realtime.methods.soft_shafts.parameters import SoftShaftsParameters, soft_shaft_errors
 from realtime.methods.unshadowed import render_unshadowed
 from realtime.methods.user_method import own_method
 from realtime.parameters import nearest
@@ -138,7 +133,7 @@ METHODS: dict[str, Method] = {
         by_source=shares_by_source,
         light_points=LightPoints(5, "ring"),
         parameters=SoftShaftsParameters,
-        error_causes=shafts_errors,
+        error_causes=soft_shaft_errors,
     ),
 }
 

@@ -15,6 +15,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from realtime.area_lights.caster import caster_vertices
+from realtime.area_lights.shape import AreaLight
 from realtime.errors import InputError
 from realtime.numerics.aligned import aligned_array
 from realtime.numerics.array_types import types_of
@@ -61,9 +63,38 @@ def _turned_directional(light: Light, extent: DirectionalExtent, turn: Array) ->
 def coloured_light(light: Light, share: float) -> Light:
     """Return a light whose red, green and blue rotate by a share of a turn; their sum stays."""
     intensity = np.array(light.intensity, dtype=np.float64).ravel()
+    return replace(light, intensity=_like(light.intensity, _rotated(intensity, share)))
+
+
+def _rotated(colour: Array, share: float) -> Array:
     whole, part = divmod(3 * share, 1)
-    here, there = (np.roll(intensity, int(whole) + step) for step in (0, 1))
-    return replace(light, intensity=_like(light.intensity, (1 - part) * here + part * there))
+    here, there = (np.roll(colour, int(whole) + step) for step in (0, 1))
+    return (1 - part) * here + part * there
+
+
+def coloured_area_light(light: AreaLight, share: float) -> AreaLight:
+    """Return a light with extent whose red, green and blue rotate by a share of a turn; their sum stays."""
+    return replace(light, radiance=_rotated(light.radiance, share))
+
+
+def with_area_lights(scene: Scene, area_lights: Sequence[AreaLight]) -> Scene:
+    """Return a scene with its lights with extent elsewhere; the shapes of black ones move in its Mitsuba scene."""
+    black = [light for light in area_lights if light.opaque]
+    if not black:
+        return replace(scene, area_lights=tuple(area_lights))
+    parameters = mi.traverse(scene.geometry)
+    for light in black:
+        key = f"{light.name}.to_world"
+        if key not in parameters:
+            key = f"{light.name.replace('.', '-')}.to_world"  # as `realtime.scene.read_media.opaque_scene` names it
+        third = np.cross(light.across, light.up)
+        third *= np.linalg.norm(light.across) / np.linalg.norm(third)
+        matrix = np.eye(4)
+        matrix[:3] = np.stack([light.across, light.up, third, light.middle], axis=1)
+        parameters[key] = type(parameters[key])(mi.Matrix4f(matrix.astype(np.float32)))
+    parameters.update()
+    moved = {light.name: caster_vertices(light) for light in black}
+    return replace(scene, area_lights=tuple(area_lights), positions={**scene.positions, **moved})
 
 
 def thicker_medium(medium: Medium, factor: float) -> Medium:
@@ -144,7 +175,7 @@ def turned_objects(scene: Scene, objects: Objects, turn: Array) -> Scene:
         positions[name] = (vertices - middle) @ turn.T + middle
     moved = replace_positions(objects.parameters, positions)
     facets = scene.facets and read_facets(scene.geometry, types_of(type(scene.camera.origin.x)))
-    return replace(scene, positions=moved, facets=facets)
+    return replace(scene, positions={**scene.positions, **moved}, facets=facets)
 
 
 def closed_shapes(casters: Casters) -> tuple[str, ...]:

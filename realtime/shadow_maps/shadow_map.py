@@ -13,7 +13,6 @@ Directions are computed in float64 and rounded once, to the float32 that rays ar
 closely meets the same surface whatever the precision of the method, and one map can stand for both.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -94,61 +93,6 @@ def cast_shadow_map(scene, light: Light, size: int) -> ShadowMap:
     dr.scatter(distance, cast, (face * side + row) * side + column, there)
     dr.eval(distance, projection)  # Evaluate it once: every kernel that reads it would cast the rays again.
     return ShadowMap(size, distance, projection)
-
-
-def cast_cube_maps(scene, light_of: Callable[[Any], Light], count: int, size: int):
-    """Cast the shadow maps of several lights that shine all around or into a half space, in one launch.
-
-    Parameters
-    ----------
-    scene
-        The Mitsuba scene that holds the occluders.
-    light_of
-        Numbers of lights -> a light whose arrays have an entry for each.
-    count
-        How many lights there are.
-    size
-        Texels on a side of a face, a power of two.
-
-    Returns
-    -------
-    distance
-        As in `ShadowMap`, map after map, for `lit_in_cube`.
-
-    Raises
-    ------
-    InputError
-        If `size` is not a power of two from 4 to 8192.
-    """
-    check_size(size)
-    side = size + 1
-    face, row, column = tiled_corners(6 * count, side)
-    there = (row < side) & (column < side)
-    u, v = (dr.fma(mi.Float64(corner), 2.0 / size, -1.0) for corner in (column, row))
-    number = face // 6
-    cast = cast_map_rays(scene, light_of(number), (face - 6 * number, u, v), there)
-    distance = dr.empty(type(cast), 6 * count * side * side)
-    dr.scatter(distance, cast, (face * side + row) * side + column, there)
-    dr.eval(distance)
-    return distance
-
-
-def lit_in_cube(distance, size: int, number, away):
-    """Return whether points `away` from lights [m] are lit by the nearest values of their maps.
-
-    Parameters
-    ----------
-    distance, size
-        From `cast_cube_maps`.
-    number
-        Of the lights.
-    away
-        Vectors from them to points [m].
-    """
-    face, u, v = cube_coordinates(away)
-    column, row = (_nearest(dr.fma(place, 0.5 * size, 0.5 * (size + 1)), size) for place in (u, v))
-    index = ((6 * number + face) * (size + 1) + row) * (size + 1) + column
-    return dr.squared_norm(away) <= dr.square(dr.gather(type(distance), distance, index))
 
 
 def inverse_depth(shadow_map: ShadowMap):

@@ -12,6 +12,10 @@ Read in this order:
 - `directional_sums.py`: the same for directional lights;
 - `directional_airlight.py`: the airlight of one directional light;
 - `surface.py`: the lit surface behind the medium;
+- `light_points.py`: points on lights with extent;
+- `area_airlight.py`: the airlight of lights with extent;
+- `area_surface.py`: the surface that they light;
+- `emission.py`: these lights seen directly;
 - `ray_values.py`: all of this along every ray;
 - `pixel_area.py`: means over the areas of pixels;
 - `image.py`: the image.

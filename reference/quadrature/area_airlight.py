@@ -13,25 +13,30 @@ independent scramblings (`reference.quadrature.light_points`) each give a mean, 
 Points are doubled for the rays whose standard error is above the one that was asked for.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from analytic.geometry import foot_and_height
+from analytic.panels import airlight_segments
 from reference.quadrature.light_airlight import light_airlight
 from reference.quadrature.light_points import REPLICATES, PointPlan, light_points, square_points
-from reference.scene.read import TruthScene
+from reference.scene.read import TruthLight, TruthScene
+from reference.scene.shapes import Shapes
 from reference.visibility.before_light import before_light
 from reference.visibility.intervals import RandomChecks
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
 Share = Callable[[float], None]
 
 _RTOL = 1e-8  # of the integral of one point: below the error of a mean over points
+_ROWS = 1 << 16  # rays and points at once
 _CHECKS = 1  # random shadow rays of each ray and point: there are many points
-FLOOR = 1e-3  #: of the mean over rays: below this a ray's error need not be small relative to its value
+FLOOR = 0.05  #: of the mean over rays: below this a ray's error need not be small relative to its value
 
 
 @dataclass(frozen=True)
@@ -74,8 +79,9 @@ def area_airlight(
     total, bound = np.zeros((count, 3, REPLICATES)), np.zeros((count, 3))
     used, checks = np.zeros(count), []
     lights = [(light, *before_light(truth, light)) for light in truth.area]
-    squares = [[square_points(plan, i, k) for k in range(REPLICATES)] for i in range(len(lights))]
+    squares = [[square_points(plan, i, k, light.kind) for k in range(REPLICATES)] for i, light in enumerate(truth.area)]
     active, low, high = np.arange(count), 0, min(plan.first, plan.most)
+    floor: Array | None = None
     rounds = 1 + int(np.log2(max(1, plan.most // max(1, plan.first))))
     done = 0
     while len(active):
@@ -83,7 +89,13 @@ def area_airlight(
             rays = replace(scene, direction=truth.direction[active])
             ways = how | {"shapes": shapes, "checks": _CHECKS}
             for replicate in range(REPLICATES):
-                for point in light_points(light, squares[number][replicate][low:high]):
+                some = light_points(light, squares[number][replicate][low:high])
+                if _is_open(scene, shapes):
+                    radiance, error = _open_airlight(rays, some, distance[active], shadow_scale)
+                    total[active, :, replicate] += radiance
+                    bound[active] += error
+                    some = []
+                for point in some:
                     sent = light_airlight(
                         rays, point, distance[active], shadow_scale=shadow_scale, how=ways, rtol=_RTOL
                     )
@@ -95,10 +107,60 @@ def area_airlight(
         done += 1
         if high >= plan.most:
             break
-        active = _unsettled(total[active] / high, known, active, plan.error)
+        if floor is None:
+            floor = FLOOR * (total.mean(axis=-1) / high + known).mean(axis=0)
+        active = unsettled(total[active] / high, known, active, plan.error, floor)
         low, high = high, 2 * high
     means = total / used[:, None, None]
     return AreaAirlight(means, bound / (REPLICATES * used[:, None]), RandomChecks.of_all(checks))
+
+
+def _is_open(scene: TruthScene, shapes: Shapes) -> bool:
+    """Return whether nothing can stand in a light, in a medium without bounds."""
+    return not (scene.media or len(shapes.triangles) or len(shapes.radius) or shapes.others)
+
+
+def _open_airlight(
+    truth: TruthScene, points: Sequence[TruthLight], distance: Array, shadow_scale: float
+) -> tuple[Array, Array]:
+    """Return the sums over points in whose light nothing stands, and the bounds of their errors, (rays, 3) each.
+
+    All points at once, and by distance in the place of angles: the cosine is (a + b x)/r, and the ray is cut where that
+    is zero.
+    """
+    count, step = len(distance), max(1, _ROWS // max(1, len(points)))
+    place, normal = (
+        np.stack([point.position for point in points]),
+        np.stack([np.asarray(point.axis) for point in points]),
+    )
+    radiance, bound = np.zeros((count, 3)), np.zeros((count, 3))
+    for start in range(0, count, step):
+        ray, point = np.divmod(np.arange(len(distance[start : start + step]) * len(points)), len(points))
+        direction, n, y = truth.direction[start + ray], normal[point], place[point]
+        foot, height = foot_and_height(truth.origin, direction, y)
+        a, b = np.sum(n * (truth.origin - y), axis=1), np.sum(n * direction, axis=1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            zero = np.where(b != 0, -a / b, np.where(a > 0, -np.inf, np.inf))
+        x0 = np.where(b >= 0, np.maximum(zero, 0.0), 0.0)
+        x1 = np.where(b >= 0, distance[start + ray], np.minimum(zero, distance[start + ray]))
+        lit = np.flatnonzero(x1 > x0)
+        ray, foot, height, x0, x1, a, b = (column[lit] for column in (ray, foot, height, x0, x1, a, b))
+
+        def cosine(
+            x: Array, row: Index, foot: Array = foot, height: Array = height, a: Array = a, b: Array = b
+        ) -> Array:
+            r = np.hypot(height[row, None], x - foot[row, None])
+            return np.maximum(a[row, None] + b[row, None] * x, 0.0) / np.maximum(r, np.finfo(float).tiny)
+
+        for channel, sigma_t in enumerate(truth.medium.sigma_t):
+            sums = airlight_segments(
+                foot, height, x0, x1, sigma_t, truth.medium.phase, shadow_scale=shadow_scale, weight=cosine, rtol=_RTOL
+            )
+            factor = truth.medium.albedo[channel] * sigma_t * points[0].intensity[channel] / (4 * np.pi)
+            rows = slice(start, start + step)
+            for target, values in zip((radiance, bound), sums, strict=True):
+                target[rows, channel] = factor * np.bincount(ray, values, len(target[rows]))
+    return radiance, bound
 
 
 def standard_error(replicates: Array) -> Array:
@@ -106,9 +168,24 @@ def standard_error(replicates: Array) -> Array:
     return replicates.std(axis=-1, ddof=1) / np.sqrt(replicates.shape[-1])
 
 
-def _unsettled(replicates: Array, known: Array, active: NDArray[np.int64], error: float) -> NDArray[np.int64]:
-    """Return which of the active rays have too large a standard error."""
+def unsettled(
+    replicates: Array, known: Array, active: NDArray[np.int64], error: float, floor: Array
+) -> NDArray[np.int64]:
+    """Return which of the active rays have too large a standard error.
+
+    Parameters
+    ----------
+    replicates
+        Of the active rays, (active, 3, replicates) [W/(m^2 sr)].
+    known
+        What else all rays receive, (rays, 3) [W/(m^2 sr)].
+    active
+        Numbers of the rays.
+    error
+        The largest standard error, relative to the value or to `floor` [1].
+    floor
+        (3,) [W/(m^2 sr)].
+    """
     value = replicates.mean(axis=-1) + known[active]
-    floor = FLOOR * value.mean(axis=0)
     above = standard_error(replicates) > error * np.maximum(value, floor)
     return active[above.any(axis=1)]

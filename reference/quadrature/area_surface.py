@@ -23,8 +23,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.quadrature.area_airlight import FLOOR, standard_error
-from reference.quadrature.light_points import REPLICATES, PointPlan
+from reference.quadrature.area_airlight import FLOOR, unsettled
+from reference.quadrature.light_points import REPLICATES, PointPlan, mirrored_digits
 from reference.quadrature.segments import optical_depth
 from reference.quadrature.surface import SurfaceHits
 from reference.quadrature.unbounded import sums_of
@@ -98,6 +98,7 @@ def area_surface(
     used, draws = np.zeros(len(rows)), [_draws(plan, number, len(rows)) for number in range(len(beams))]
     to_camera = np.exp(-optical_depth(truth, truth.origin, truth.direction[rows], 0 * points.normal[:, 0], _far(hits)))
     active, low, high = np.arange(len(rows)), 0, min(_FIRST, plan.most)
+    floor: Array | None = None
     rounds, done = 1 + int(np.log2(max(1, plan.most // _FIRST))), 0
     while len(active):
         for number, beam in enumerate(beams):
@@ -117,7 +118,9 @@ def area_surface(
         if high >= plan.most:
             break
         value = (total[active] / high) * to_camera[active, :, None]
-        active = _unsettled(value, known[rows], active, plan.error)
+        if floor is None:
+            floor = FLOOR * (value.mean(axis=-1) + known[rows]).mean(axis=0)
+        active = unsettled(value, known[rows], active, plan.error, floor)
         low, high = high, 2 * high
     result[rows] = total / used[:, None, None] * to_camera[:, :, None]
     return result
@@ -167,26 +170,23 @@ class Reflection:
 
 def _draws(plan: PointPlan, light: int, count: int) -> tuple[Array, Array]:
     """Return directions of the lines [rad] and shifts of their places [1] of every point and replicate."""
-    generator = np.random.default_rng((plan.seed, light, count))
-    turn = np.pi * (np.arange(REPLICATES) + generator.random((count, 1))) / REPLICATES
-    return turn, generator.random((count, REPLICATES))
+    drawn = 1 if plan.shared else count
+    generator = np.random.default_rng((plan.seed, light, drawn))
+    turn = np.pi * (np.arange(REPLICATES) + generator.random((drawn, 1))) / REPLICATES
+    shift = generator.random((drawn, REPLICATES))
+    return np.broadcast_to(turn, (count, REPLICATES)), np.broadcast_to(shift, (count, REPLICATES))
 
 
 def _lines(draws: tuple[Array, Array], points: Index, numbers: tuple[int, int]) -> tuple[Index, Array, Array, Index]:
     """Return points, directions, places and replicates of the lines of these numbers, sorted by point."""
     low, high = numbers
-    lattice = np.array([_van_der_corput(number) for number in range(low, high)])
+    lattice = np.array([mirrored_digits(number) for number in range(low, high)])
     turn, shift = draws[0][points], draws[1][points]
     place = np.mod(shift[:, :, None] + lattice, 1.0)
     place = 1 - np.abs(2 * place - 1)
     per_point = REPLICATES * len(lattice)
     replicate = np.tile(np.repeat(np.arange(REPLICATES), len(lattice)), len(points))
     return np.repeat(points, per_point), np.repeat(turn.ravel(), len(lattice)), place.ravel(), replicate
-
-
-def _van_der_corput(number: int) -> float:
-    """Return the number with its binary digits mirrored at the point: the first 2^k of them are a lattice."""
-    return float(int(f"{number:064b}"[::-1], 2)) / 2.0**64
 
 
 def _line_values(
@@ -257,8 +257,33 @@ def _clear(beam: Beam, bsdf: Reflection, point: Index, target: Array) -> NDArray
     return ~np.array(hidden, dtype=bool)
 
 
-def _unsettled(replicates: Array, known: Array, active: Index, error: float) -> Index:
-    """Return which of the active points have too large a standard error."""
-    value = replicates.mean(axis=-1) + known[active]
-    above = standard_error(replicates) > error * np.maximum(value, FLOOR * value.mean(axis=0))
-    return active[above.any(axis=1)]
+def visible_share(truth: TruthScene, number: int, points: Points, lines: int, *, seed: int = 0) -> Array:
+    """Return the share of a flat light that points see, by replicate, (points, replicates) [1].
+
+    Parameters
+    ----------
+    truth, number
+        The scene and the number of one of its rectangles or disks in `TruthScene.area`.
+    points
+        Points on surfaces.
+    lines
+        Scan lines of each replicate.
+    seed
+        Of their draws.
+
+    Notes
+    -----
+    Valid for shadows of triangles and spheres; points on the dark side see nothing.
+    """
+    light = truth.area[number]
+    _, shapes = before_light(truth, light)
+    seen = facing(light, points)
+    rows = np.flatnonzero(seen.seen)
+    result = np.zeros((len(points.place), REPLICATES))
+    drawn = _lines(_draws(PointPlan(seed=seed), number, len(points.place)), rows, (0, lines))
+    known = scan_lines(light.kind, seen, points, drawn[:3])
+    line, low, high = seen_intervals(light, seen, known, points, shapes)
+    length = known.height[line] * (np.tan(high) - np.tan(low))
+    share = np.bincount(line, length / known.chord[line], len(known.point))
+    np.add.at(result, (known.point, drawn[3]), share / lines)
+    return result

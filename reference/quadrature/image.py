@@ -2,6 +2,7 @@
 """The truth of an image: the values of the rays through pixel centres, or means over the areas of pixels."""
 
 from analytic.errors import InputError
+from reference.quadrature.light_points import PointPlan
 from reference.quadrature.pixel_area import area_image
 from reference.quadrature.ray_values import Progress, TruthImage, image_of, ray_values
 from reference.scene.read import TruthScene
@@ -15,6 +16,7 @@ def quadrature_image(
     pixel: str = "centre",
     edges: str = "auto",
     progress: Progress | None = None,
+    plan: PointPlan | None = None,
 ) -> TruthImage:
     """Compute the truth of an image.
 
@@ -35,6 +37,8 @@ def quadrature_image(
         `reference.visibility.lit_intervals.lit_intervals`.
     progress
         Called with (done, total, what) as the work goes on.
+    plan
+        How many points and scan lines stand for lights with extent.
 
     Returns
     -------
@@ -48,13 +52,14 @@ def quadrature_image(
 
     Notes
     -----
-    Valid for homogeneous media, point and spot lights, opaque surfaces; for directional lights where all media have
-    bounds. Their legs have no end, so `shadow_scale` leaves them as they are. A pixel whose centre ray meets a light
-    has an infinite airlight; the mean over its area is finite.
+    Valid for homogeneous media, point and spot lights, lights with extent, opaque surfaces; for directional lights
+    where all media have bounds. Their legs have no end, so `shadow_scale` leaves them as they are. A pixel whose centre
+    ray meets a point light has an infinite airlight; the mean over its area is finite.
     """
     if pixel == "area":
-        return area_image(truth, samples=samples, shadow_scale=shadow_scale, edges=edges, progress=progress)
+        return area_image(truth, samples=samples, shadow_scale=shadow_scale, edges=edges, progress=progress, plan=plan)
     if pixel != "centre":
         raise InputError(f"pixel is '{pixel}'; wanted 'centre' or 'area'")
-    values = ray_values(truth, samples=samples, shadow_scale=shadow_scale, edges=edges, progress=progress)
-    return image_of(truth, values, values.airlight, values.bound, values.surface)
+    values = ray_values(truth, samples=samples, shadow_scale=shadow_scale, edges=edges, progress=progress, plan=plan)
+    layers = values.airlight, values.bound, values.surface
+    return image_of(truth, values, layers, (values.emitted, values.replicates))

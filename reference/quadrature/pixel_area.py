@@ -32,6 +32,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.quadrature.light_points import PointPlan
 from reference.quadrature.ray_values import Progress, RayValues, TruthImage, image_of, ray_values
 from reference.quadrature.unbounded import sums_of
 from reference.scene.camera import film_directions, pixel_centres
@@ -56,7 +57,8 @@ _POINTS = np.concatenate([[[0.0, 0.0]], _CORNERS])
 _GRID = 2 ** (_DEEPEST + 1)  # corners and middles of all squares are whole numbers in this fraction of a pixel
 _ROW = 1 << 32  # more than a row of the grid has points: one number per point
 
-_LAYERS = ("airlight", "bound", "surface", "distance", "light_angle", "intervals")  # of `RayValues`, one row per ray
+# Of `RayValues`, one row per ray:
+_LAYERS = ("airlight", "bound", "surface", "distance", "light_angle", "intervals", "emitted", "replicates")
 
 Trace = Callable[[Array], RayValues]
 
@@ -68,8 +70,11 @@ class _Squares:
     pixel: Index  #: number of the pixel, (n,)
     middle: Array  #: in units of pixels, (n, 2)
     size: Array  #: side in units of pixels, (n,)
-    value: Array  #: airlight, then surface, (n, 6) [W/(m^2 sr)]
-    error: Array  #: estimate of its error, a standard deviation where an edge runs through, (n, 6)
+    value: (
+        Array  #: airlight, then surface, then what lights with extent emit if there are any, (n, 6 or 9) [W/(m^2 sr)]
+    )
+    error: Array  #: estimate of its error, a standard deviation where an edge runs through, (n, 6 or 9)
+    replicates: Array  #: of airlight and surface, of lights with extent, flattened, (n, 6 replicates or 0)
     bound: Array  #: bound of the airlight integrals, (n, 3)
     edge: Bools  #: whether an edge runs through it, (n,)
     light: Bools  #: whether a light is close, (n,)
@@ -91,6 +96,7 @@ def area_image(
     edges: str = "auto",
     tolerance: float = 1e-3,
     progress: Progress | None = None,
+    plan: PointPlan | None = None,
 ) -> TruthImage:
     """Compute the means over the areas of all pixels.
 
@@ -98,7 +104,7 @@ def area_image(
     ----------
     truth
         The scene.
-    samples, shadow_scale, edges
+    samples, shadow_scale, edges, plan
         See `reference.quadrature.image.quadrature_image`.
     tolerance
         Relative error [1] to reach in airlight and surface, where `_LEVELS` cuts of a pixel suffice. What was reached
@@ -116,9 +122,10 @@ def area_image(
     Valid for images whose edges are straight within a pixel and further apart than its first thirteen rays; finer
     things between those go unseen. Distances and angles to the light are those of the centres.
     """
-    trace = partial(
-        _traced, truth, samples=samples, shadow_scale=shadow_scale, edges=edges, shapes=read_shapes(truth.occluders)
-    )
+    # Rays that share their draws differ by what they see alone.
+    plan = replace(plan or PointPlan(), shared=True)
+    how: dict[str, Any] = {"samples": samples, "shadow_scale": shadow_scale, "edges": edges, "plan": plan}
+    trace = partial(_traced, truth, shapes=read_shapes(truth.occluders), **how)
     pixels = truth.width * truth.height
     middle = pixel_centres((truth.width, truth.height))
     angle = _pixel_angle(truth)
@@ -146,14 +153,17 @@ def area_image(
         film, newest = _on_grid(film, trace, _quarters(newest, rest), angle)
     if progress is not None:
         progress(_DEEPEST + 1, _DEEPEST + 1, "sub-pixels")
-    value, error, bound = _summed(_joined([*finished, newest]), pixels)
+    squares = _joined([*finished, newest])
+    value, error, bound = _summed(squares, pixels)
+    replicates = sums_of(squares.pixel, squares.replicates, pixels) if truth.area else np.empty((pixels, 0))
     centre = replace(
         centre,
         distance=centre.distance[at_centre],
         light_angle=centre.light_angle[at_centre],
         random_checks=film.rays.random_checks,
     )
-    return image_of(truth, centre, value[:, :3], error[:, :3] + bound, value[:, 3:])
+    layers = value[:, :3], error[:, :3] + bound, value[:, 3:6]
+    return image_of(truth, centre, layers, (value[:, 6:], replicates.reshape(pixels, 6, -1)))
 
 
 def _traced(truth: TruthScene, positions: Array, **how: Any) -> RayValues:
@@ -193,7 +203,7 @@ def _keys(positions: Array) -> Index:
 def _floor(rays: RayValues, at_centre: Index) -> Array:
     """Return the least error worth a cut, of airlight, then surface; rays close to a light do not count."""
     dimmest = max(1, int(0.99 * len(at_centre)))
-    layers = [np.sort(layer[at_centre].mean(axis=1))[:dimmest] for layer in (rays.airlight, rays.surface)]
+    layers = [np.sort(layer[at_centre].mean(axis=1))[:dimmest] for layer in _values(rays)]
     means = np.array([layer[np.isfinite(layer)].mean() if np.isfinite(layer).any() else 0.0 for layer in layers])
     return np.repeat(_FLOOR * means, 3)
 
@@ -216,7 +226,8 @@ def _on_grid(
         film = _sorted_film(np.append(old[0], new), _joined_rays([*old[1], rays]))
     assert film is not None
     of_point = np.searchsorted(film.key, of_square).reshape(5, count)
-    value = np.concatenate([film.rays.airlight, film.rays.surface], axis=1)[of_point]
+    value = np.concatenate(_values(film.rays), axis=1)[of_point]
+    replicates = _flat(film.rays)[of_point]
     edge, sides = _differ(film.rays, of_point), film.rays.light_angle[of_point] / (angle * size)
     sound = (sides >= _CLOSE)[..., None]
     with np.errstate(invalid="ignore"):  # a ray through a light has an infinite value
@@ -227,12 +238,25 @@ def _on_grid(
     mean, error = np.where(whole, mean, rest), np.where(whole, error, rest)
     bound = np.where(sound, film.rays.bound[of_point], 0).max(axis=0)
     light = sides.min(axis=0) < _AROUND
-    return film, _Squares(pixel, middle, size, mean * area, error * area, bound * area, edge, light)
+    replicates = np.where(whole, (8 * replicates[0] + replicates[1:].sum(axis=0)) / 12, replicates.mean(axis=0))
+    return film, _Squares(pixel, middle, size, mean * area, error * area, replicates * area, bound * area, edge, light)
+
+
+def _values(rays: RayValues) -> list[Array]:
+    """Return the layers of rays whose means are taken, (rays, 3) each."""
+    return [rays.airlight, rays.surface, *([rays.emitted] if rays.emitted.size else [])]
+
+
+def _flat(rays: RayValues) -> Array:
+    """Return the replicates of rays, (rays, 6 replicates), or without columns."""
+    count = len(rays.airlight)
+    return rays.replicates.reshape(count, -1) if rays.replicates.size else np.empty((count, 0))
 
 
 def _sorted_film(key: Index, rays: RayValues) -> _Film:
     order = np.argsort(key)
-    return _Film(key[order], replace(rays, **{name: getattr(rays, name)[order] for name in _LAYERS}))
+    layers = {name: getattr(rays, name) for name in _LAYERS}
+    return _Film(key[order], replace(rays, **{name: layer[order] for name, layer in layers.items() if layer.size}))
 
 
 def _at_random(trace: Trace, pixel: Index, middle: Array, size: Array) -> tuple[_Squares, RayValues]:
@@ -240,11 +264,12 @@ def _at_random(trace: Trace, pixel: Index, middle: Array, size: Array) -> tuple[
     count, area = len(pixel), size[:, None] ** 2
     points = 0.5 * (_CORNERS[:, None] + np.random.default_rng(count).uniform(-1, 1, (4, count, 2)))
     rays = trace((middle + 0.5 * size[:, None] * points).reshape(-1, 2))
-    value = np.concatenate([rays.airlight, rays.surface], axis=1).reshape(4, count, 6)
+    value = np.concatenate(_values(rays), axis=1).reshape(4, count, -1)
+    replicates = _flat(rays).reshape(4, count, -1).mean(axis=0)
     error, bound = np.ptp(value, axis=0) / 4, rays.bound.reshape(4, count, 3).mean(axis=0)
     edge, light = np.ones(count, bool), np.zeros(count, bool)
     mean = value.mean(axis=0)
-    return _Squares(pixel, middle, size, mean * area, error * area, bound * area, edge, light), rays
+    return _Squares(pixel, middle, size, mean * area, error * area, replicates * area, bound * area, edge, light), rays
 
 
 def _differ(rays: RayValues, of_point: Index) -> Bools:
@@ -253,6 +278,9 @@ def _differ(rays: RayValues, of_point: Index) -> Bools:
     seen, lit = np.isfinite(distance), (rays.surface.max(axis=1) > 0)[of_point]
     nearest, furthest = distance.min(axis=0), np.where(seen, distance, 0).max(axis=0)
     differ = (intervals != intervals[0]).any(axis=0)
+    if rays.emitted.size:
+        emits = (rays.emitted.max(axis=1) > 0)[of_point]
+        differ |= emits.any(axis=0) & ~emits.all(axis=0)
     differ |= seen.any(axis=0) & ((furthest > (1 + _DEPTH) * nearest) | ~seen.all(axis=0))
     return np.asarray(differ | (lit.any(axis=0) & ~lit.all(axis=0)), dtype=np.bool_)
 

@@ -11,18 +11,25 @@ For each light and each ray, in float64:
 4. the intervals are integrated and added up, with an error estimate (`reference.quadrature.unbounded`).
 
 The bound of a ray adds the estimates, what the rounding of each edge between light and shadow is worth, and what the
-shadow rays left in doubt. For directional lights the share of a ray takes the place of the angle
-(`reference.visibility.parallel_rays`).
+shadow rays left in doubt. Lights with extent come last (`reference.quadrature.area_airlight`,
+`reference.quadrature.area_surface`), with standard errors of their own. For directional lights the share of a ray takes
+the place of the angle (`reference.visibility.parallel_rays`).
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.quadrature.area_airlight import area_airlight, standard_error
+from reference.quadrature.area_surface import area_surface
 from reference.quadrature.directional_airlight import directional_airlight
+from reference.quadrature.emission import emitted_light
 from reference.quadrature.light_airlight import light_airlight
+from reference.quadrature.light_points import PointPlan
 from reference.quadrature.surface import lit_surface, surface_hits
 from reference.scene.read import TruthScene
 from reference.scene.shapes import Shapes, read_shapes
@@ -32,6 +39,8 @@ from reference.visibility.surface_shadows import reached_by_shadow_rays
 
 Array = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]
+
+_STEPS = 1000  # of progress through the points of lights with extent, and through their lines
 
 
 @dataclass(frozen=True)
@@ -49,6 +58,9 @@ class TruthImage:
     disagreements: int = 0  #: of these, how many contradicted them
     refined: int = 0  #: contradictions that were settled, by mending the intervals or by a float64 test
     left: int = 0  #: contradictions that were not: their worth is in the bound
+    emitted: Array | None = None  #: lights with extent seen directly [W/(m^2 sr)]; None where the scene has none
+    airlight_se: Array | None = None  #: standard error of the airlight of such lights [W/(m^2 sr)]
+    surface_se: Array | None = None  #: of the surface that they light [W/(m^2 sr)]
 
 
 @dataclass(frozen=True)
@@ -63,9 +75,18 @@ class RayValues:
     intervals: NDArray[np.int64]  #: how many lit intervals a ray has, those of all lights together, (rays,)
     transitions: int  #: edges between light and shadow
     random_checks: RandomChecks  #: of the lit intervals
+    #: of scenes that have lights with extent: these seen directly, (rays, 3), and for each replicate of their points
+    #: and lines airlight and surface, (rays, 6, replicates) [W/(m^2 sr)]; else without columns
+    emitted: Array = field(default_factory=lambda: np.empty((0, 0)))
+    replicates: Array = field(default_factory=lambda: np.empty((0, 0, 0)))
 
 
-def image_of(truth: TruthScene, centre: RayValues, airlight: Array, bound: Array, surface: Array) -> TruthImage:
+def image_of(
+    truth: TruthScene,
+    centre: RayValues,
+    layers: tuple[Array, Array, Array],
+    wide: tuple[Array, Array],
+) -> TruthImage:
     """Return the image with these layers; its distances, angles and checks are those of the rays through the centres.
 
     Parameters
@@ -74,14 +95,22 @@ def image_of(truth: TruthScene, centre: RayValues, airlight: Array, bound: Array
         The scene.
     centre
         The values of the rays through the centres of the pixels.
-    airlight, bound, surface
-        Radiances and the bound of the first one's error, (pixels, 3) [W/(m^2 sr)].
+    layers
+        Airlight, the bound of its error, and surface, (pixels, 3) each [W/(m^2 sr)].
+    wide
+        Lights with extent seen directly, (pixels, 3), and the replicates, (pixels, 6, replicates), of a scene that has
+        such lights.
     """
     shape, known = (truth.height, truth.width), centre.random_checks
+    airlight, bound, surface = (layer.reshape(*shape, 3) for layer in layers)
+    extra: dict[str, Array] = {}
+    if truth.area:
+        errors = standard_error(wide[1]).reshape(*shape, 6)
+        extra = {"emitted": wide[0].reshape(*shape, 3), "airlight_se": errors[..., :3], "surface_se": errors[..., 3:]}
     return TruthImage(
-        airlight.reshape(*shape, 3),
-        bound.reshape(*shape, 3),
-        surface.reshape(*shape, 3),
+        airlight,
+        bound,
+        surface,
         centre.distance.reshape(shape),
         centre.light_angle.reshape(shape),
         centre.transitions,
@@ -90,6 +119,7 @@ def image_of(truth: TruthScene, centre: RayValues, airlight: Array, bound: Array
         known.disagreements,
         known.refined,
         known.left,
+        **extra,
     )
 
 
@@ -101,6 +131,7 @@ def ray_values(
     edges: str = "auto",
     progress: Progress | None = None,
     shapes: Shapes | None = None,
+    plan: PointPlan | None = None,
 ) -> RayValues:
     """Compute airlight, lit surface, distances and lit intervals of every ray of `truth.direction`.
 
@@ -108,7 +139,7 @@ def ray_values(
     ----------
     truth
         The scene, with any rays.
-    samples, shadow_scale, edges, progress
+    samples, shadow_scale, edges, progress, plan
         See `reference.quadrature.image.quadrature_image`.
     shapes
         What `reference.scene.shapes.read_shapes` returned for the occluders, if that is known.
@@ -127,7 +158,7 @@ def ray_values(
     intervals, transitions, checks = np.zeros(count, np.int64), 0, []
     reached: list[NDArray[np.bool_] | None] = []
     how = {"samples": samples, "edges": edges, "shapes": shapes}
-    total = len(truth.lights) + len(truth.directional)
+    total = len(truth.lights) + len(truth.directional) + 2 * _STEPS * bool(truth.area)
     for number, light in enumerate(truth.lights):
         received = light_airlight(truth, light, hits.distance, shadow_scale=shadow_scale, how=how)
         airlight += received.radiance
@@ -154,4 +185,25 @@ def ray_values(
         if progress is not None:
             progress(number + 1, total, "quadrature")
     surface = lit_surface(truth, hits, reached=reached, shadow_scale=shadow_scale)
-    return RayValues(airlight, bound, surface, cast, light_angle, intervals, transitions, RandomChecks.of_all(checks))
+    wide: dict[str, Any] = {}
+    if truth.area:
+        plan, done = plan or PointPlan(), total - 2 * _STEPS
+        tell = partial(_tell, progress, total)
+        scattered = area_airlight(
+            truth, hits.distance, airlight, plan=plan, shadow_scale=shadow_scale, how=how, tell=partial(tell, done)
+        )
+        lit = area_surface(
+            truth, hits, surface, plan=plan, shadow_scale=shadow_scale, tell=partial(tell, done + _STEPS)
+        )
+        replicates = np.concatenate([scattered.replicates, lit], axis=1)
+        mean = replicates.mean(axis=2)
+        airlight, surface, bound = airlight + mean[:, :3], surface + mean[:, 3:], bound + scattered.bound
+        checks.append(scattered.random_checks)
+        wide = {"emitted": emitted_light(truth, hits.distance), "replicates": replicates}
+    checked = RandomChecks.of_all(checks)
+    return RayValues(airlight, bound, surface, cast, light_angle, intervals, transitions, checked, **wide)
+
+
+def _tell(progress: Progress | None, total: int, done: int, share: float) -> None:
+    if progress is not None:
+        progress(done + int(share * _STEPS), total, "quadrature")

@@ -16,7 +16,9 @@ Read in this order:
 - `parallel_rays.py`: the planes of camera rays and a directional light;
 - `directional_geometry.py`: lit intervals for directional lights by exact geometry;
 - `directional_casting.py`: the same by cast rays;
-- `surface_shadows.py`: which visible surfaces a light reaches.
+- `surface_shadows.py`: which visible surfaces a light reaches;
+- `before_light.py`: what can stand in the light of a light with extent;
+- `light_lines.py`: the parts of such a light that surface points see.
 
 May import: `analytic.errors`, `reference.scene`.
 """

@@ -44,7 +44,9 @@ Bools = NDArray[np.bool_]
 
 _HORIZON = 1e-6  # rad: what rises less above the horizon of a point counts as its own surface; float32 normals
 _OWN = 1e-5  # of its radius: a point closer to a sphere lies on it
-_PAIRS = 1 << 19  # lines and triangles at once
+_PAIRS = 1 << 19  # points and triangles at once
+_POINTS = 16  # whose lines are cut at once
+_ROUNDING = 1e-13  # of the distance: what is nearer to a plane may be on either side of it
 _GROUP = 64  # points for which the triangles are looked through at once
 _NEWTON = 8
 _FAR = 1e150  # m: no sphere reaches that far
@@ -247,34 +249,22 @@ def _triangle_shadows(
         return []
     parts = []
     begin, end = (np.searchsorted(lines.point[used], np.arange(len(points.place)), side) for side in ("left", "right"))
-    looking = np.flatnonzero(end > begin)
-    for group in _groups(points.place, looking):
-        for point, triangle, cut in _near_triangles(light, seen, points, group, shapes.triangles):
-            count = end[point] - begin[point]
-            starts = np.cumsum(count)
-            for first, last in _blocks(starts):
-                chosen = slice(first, last)
-                number = np.repeat(np.arange(first, last), count[chosen])
-                line = used[begin[point[number]] + _counted(count[chosen])]
-                parts += _hidden_lines(light, lines, points, shapes.triangles, (line, triangle[number], cut[number]))
+    plane = np.cross(lines.along[used], lines.normal[used])
+    for group in _groups(points.place, np.flatnonzero(end > begin)):
+        pairs = _near_triangles(light, seen, points, group, shapes.triangles)
+        for first in range(0, len(pairs), _POINTS):
+            met = []
+            for point, triangle, cut in pairs[first : first + _POINTS]:
+                mine = slice(begin[point], end[point])
+                corners = shapes.triangles[triangle] - points.place[point]
+                side = (plane[mine] @ corners.reshape(-1, 3).T).reshape(-1, len(triangle), 3)
+                low, high = side.min(axis=2), side.max(axis=2)
+                size = _ROUNDING * np.abs(corners).max(axis=(1, 2))
+                row, column = np.nonzero((low <= size) & (high >= -size))
+                met.append((used[mine][row], triangle[column], cut[column]))
+            met_line, which, flagged = (np.concatenate(column) for column in zip(*met, strict=True))
+            parts += _hidden_lines(light, lines, points, shapes.triangles, (met_line, which, flagged))
     return parts
-
-
-def _counted(count: Index) -> Index:
-    """Return 0, 1, ... up to each count, one after another."""
-    total = np.cumsum(count)
-    return np.arange(total[-1] if len(total) else 0) - np.repeat(total - count, count)
-
-
-def _blocks(ends: Index) -> list[tuple[int, int]]:
-    """Return ranges of rows of which each has at most `_PAIRS` pairs, or is one row."""
-    blocks, first = [], 0
-    while first < len(ends):
-        before = ends[first - 1] if first else 0
-        last = max(first + 1, int(np.searchsorted(ends, before + _PAIRS, "right")))
-        blocks.append((first, last))
-        first = last
-    return blocks
 
 
 def _groups(place: Array, which: Index) -> list[Index]:
@@ -292,24 +282,23 @@ def _groups(place: Array, which: Index) -> list[Index]:
 
 def _near_triangles(
     light: TruthAreaLight, seen: Facing, points: Points, group: Index, triangles: Array
-) -> list[tuple[Index, Index, Bools]]:
-    """Return pairs of points and triangles that can shadow the light there, and whether the triangle cuts a sphere."""
+) -> list[tuple[int, Index, Bools]]:
+    """Return for points that have any the triangles that can shadow the light there, and which of them cut a sphere."""
     place = points.place[group]
     candidate = _in_tube(place, light, triangles)
-    if not len(candidate):
-        return []
     corners = triangles[candidate]
-    step = max(1, _PAIRS // len(candidate))
-    found = []
+    step = max(1, _PAIRS // max(1, len(candidate)))
+    result = []
     for first in range(0, len(group), step):
         rows = group[first : first + step]
         near = _in_pyramid(light, seen, points, rows, corners)
         cut = np.zeros_like(near)
         if light.kind == "sphere":
             near, cut = _before_sphere(light, points.place[rows], corners, near)
-        point, triangle = np.nonzero(near)
-        found.append((rows[point], candidate[triangle], cut[point, triangle]))
-    return found
+        for row in np.flatnonzero(near.any(axis=1)):
+            chosen = np.flatnonzero(near[row])
+            result.append((int(rows[row]), candidate[chosen], cut[row, chosen]))
+    return result
 
 
 def _in_tube(place: Array, light: TruthAreaLight, triangles: Array) -> Index:
@@ -439,9 +428,9 @@ def _before_disk(
     front = _met_first((y0[missed], z0[missed]), (y1[missed], z1[missed]), (c_y[missed], c_z[missed]), square[missed])
     missed = missed[front]
     parts.append((row[missed], (y0[missed], z0[missed]), (y1[missed], z1[missed])))
-    rows, first, second = zip(*parts, strict=True)
-    ends = [tuple(np.concatenate([end[k] for end in side]) for k in range(2)) for side in (first, second)]
-    return np.concatenate(rows), (ends[0][0], ends[0][1]), (ends[1][0], ends[1][1])
+    numbers, first, second = zip(*parts, strict=True)
+    (y_a, z_a), (y_b, z_b) = ([np.concatenate([end[k] for end in side]) for k in range(2)] for side in (first, second))
+    return np.concatenate(numbers), (y_a, z_a), (y_b, z_b)
 
 
 def _met_first(a: tuple[Array, Array], b: tuple[Array, Array], c: tuple[Array, Array], square: Array) -> Bools:

@@ -2,7 +2,7 @@
 """`airlight bench [SCENE...]`: speed against error, and errors by their causes."""
 
 import sys
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -164,7 +164,7 @@ def _decomposed_scene(name: str, pixels, chosen, *, apart, progress) -> tuple[di
     from realtime.scene.read_scene import read_scene
     from validation.estimates.quadrature import truth_image
     from validation.frames.benchmark import configurations_for, render_by_name
-    from validation.frames.decomposition import decompose, part_numbers
+    from validation.frames.decomposition import decompose, exact_sum, part_numbers
     from validation.metrics.errors import plain
     from validation.scenes.loading import load_scene
 
@@ -173,6 +173,7 @@ def _decomposed_scene(name: str, pixels, chosen, *, apart, progress) -> tuple[di
     size = scene.camera.width, scene.camera.height
     progress(0.0, f"{loaded.name}: the truth")
     truth = truth_image(loaded.scene).airlight
+    exact = cache(partial(exact_sum, scene))
     entries, decomposed = [], []
     configurations = configurations_for(scene.features, chosen)
     for number, each in enumerate(configurations):
@@ -189,7 +190,7 @@ def _decomposed_scene(name: str, pixels, chosen, *, apart, progress) -> tuple[di
             "parameters": dict(each.parameters),
         }
         try:
-            split = decompose(scene, each, truth, render=own)
+            split = decompose(scene, each, truth, render=own, exact=exact)
         except InputError as error:
             entries.append(entry | {"refused": str(error)})
             continue

@@ -6,7 +6,7 @@ The documentation is built from `docs/data/report.json` and the PNG files beside
 `multiple` and `methods`), `pictures` (by method: whose frame it is), `kernels` (costs and errors of `airlight bench
 --kernels`, or null).
 
-Stale numbers fail a test: `stale_scenes` compares what a scene's numbers were measured with and what is measured now.
+Stale numbers fail a test, which compares what a scene's numbers were measured with and what is measured now.
 """
 
 import io
@@ -110,38 +110,6 @@ def _kept_method(entry: dict[str, Any]) -> dict[str, Any]:
     times = {name: entry["times"][name] for name in ("frame", "airlight", "light_moved")} if entry["times"] else None
     error = {name: entry["error"][name] for name in _ERRORS} if entry["error"] else None
     return {name: entry[name] for name in _METHOD} | {"times": times, "error": error}
-
-
-def stale_scenes(kept: dict[str, Any]) -> list[str]:
-    """Return a line for each scene whose numbers are older than the accuracy baselines.
-
-    The images of the documentation are larger than those of the baselines, so errors cannot be compared one by one.
-    But whatever moves an error gives the baseline of its scene a new revision, and a report notes the revision with
-    which it was measured. Which configurations there are, and which of them a scene refuses, must agree as well.
-
-    Parameters
-    ----------
-    kept
-        The content of `docs/data/report.json`.
-    """
-    from validation.configurations.methods import STANDARD
-    from validation.frames.baseline_files import read_baseline
-
-    stale = []
-    standard = {configuration.label for configuration in STANDARD}
-    for scene in kept["scenes"]:
-        name, baseline = scene["name"], read_baseline(scene["name"])
-        if baseline is None:
-            stale.append(f"{name}: there is no such scene any more")
-            continue
-        if scene.get("baseline") != baseline["revision"]:
-            measured, now = scene.get("baseline"), baseline["revision"]
-            stale.append(f"{name}: measured with revision {measured} of its baseline, now it is {now}")
-        kept = {label: entry.get("refused") for label, entry in baseline["configurations"].items() if label in standard}
-        shown = {entry["label"]: entry["refused"] for entry in scene["methods"]}
-        stale += [f"{name}: {label} is not what it was" for label in kept if kept[label] != shown.get(label, "absent")]
-        stale += [f"{name}: {label} is gone" for label in shown if label not in kept]
-    return stale
 
 
 def counts(name: str) -> dict[str, int]:

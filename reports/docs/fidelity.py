@@ -53,18 +53,6 @@ def _without_title(text: str) -> str:
     return text[text.index("| ") :].rstrip()
 
 
-def stale_rows(record: Mapping[str, Any]) -> list[str]:
-    """Return in what the rows of a run differ from those that are measured now, a line each."""
-    from validation.fidelity.catalogue import ROWS, published_figures
-
-    figures = {(figure["paper"], figure["item"]): figure["value"] for figure in published_figures(ROWS)}
-    now = {(row.paper, row.item): (row.claim, row.unit, figures.get((row.paper, row.item))) for row in ROWS}
-    then = {(row["paper"], row["item"]): (row["claim"], row["unit"], row["published"]) for row in record["fidelity"]}
-    stale = [f"{paper}, {item}: not in the run" for paper, item in now if (paper, item) not in then]
-    stale += [f"{paper}, {item}: no such row any more" for paper, item in then if (paper, item) not in now]
-    return stale + [f"{key[0]}, {key[1]}: is not what it was" for key in now if key in then and now[key] != then[key]]
-
-
 def read_record(path: Path) -> dict[str, Any]:
     """Return what `airlight fidelity --json` printed.
 

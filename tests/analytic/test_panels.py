@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from analytic.cases import integrate_cases, read_cases
 from analytic.errors import InputError
-from analytic.integral import integrate_distance
 from analytic.panels import airlight_segments
 from analytic.phase import PhaseFunction
+from tests.helpers.integral_forms import integrate_distance
 
 ISOTROPIC = PhaseFunction("isotropic")
 PHASES = [

@@ -35,9 +35,9 @@ ODD = ("nan", "inf", "-inf", "1e30", "-1e30", "1e39", "-1", "0", "1e-30")
 def scene(**changes: str) -> str:
     """Return a ball in fog as XML, with some of `USUAL` changed."""
     values = USUAL | changes
-    x, y, z = (one.strip() for one in values["position"].split(","))
-    u, v, w = (one.strip() for one in values["center"].split(","))
-    width, height = (one.strip() for one in values["size"].split(","))
+    x, y, z = (word.strip() for word in values["position"].split(","))
+    u, v, w = (word.strip() for word in values["center"].split(","))
+    width, height = (word.strip() for word in values["size"].split(","))
     phase = values["phase"] or f'<phase type="hg"><float name="g" value="{values["g"]}"/></phase>'
     light = values["light"] or (
         f'<emitter type="point" id="lamp"><point name="position" x="{x}" y="{y}" z="{z}"/>'
@@ -72,8 +72,8 @@ def mesh(vertices: str, faces: str, folder: Path, *, boundary: bool = False) -> 
     header = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(corners)}\n"
     header += "".join(f"property float {axis}\n" for axis in "xyz")
     header += f"element face {len(sides)}\nproperty list uchar int vertex_indices\nend_header\n"
-    places = b"".join(struct.pack("<f", float(one)) for corner in corners for one in corner)
-    indices = b"".join(struct.pack("<Biii", *(int(one) for one in side)) for side in sides)
+    places = b"".join(struct.pack("<f", float(number)) for corner in corners for number in corner)
+    indices = b"".join(struct.pack("<Biii", *(int(corner) for corner in side)) for side in sides)
     path = folder / "mesh.ply"
     path.write_bytes(header.encode() + places + indices)
     inside = '<bsdf type="null"/><ref name="interior" id="fog"/>' if boundary else ""
@@ -217,7 +217,8 @@ def area_lights(folder: Path) -> Iterator[tuple[str, str]]:
         yield f"{kind} about the camera", scene(light=at_camera)
         cut = lamp('<scale value="0.3"/><translate x="-0.6" y="0.7" z="0.9"/>', kind=kind)
         yield f"{kind} that cuts the ball", scene(light=cut)
-        yield f"{kind} beside a point light", scene(extra=lamp(f'<scale value="0.3"/>{above}', kind=kind))
+        panel = lamp(f'<scale value="0.3"/>{above}', kind=kind)
+        yield f"{kind} beside a point light", scene(extra=panel.replace('id="lamp"', 'id="panel"'))
         filled = '<ref name="interior" id="fog"/>'
         yield f"{kind} that bounds fog", scene(light=lamp(f'<scale value="0.3"/>{above}', kind=kind, extra=filled))
     yield (
@@ -245,15 +246,15 @@ def rows(folder: Path) -> Iterator[tuple[str, str]]:
     yield "light on the segment", f"{header}\nisotropic,0,1,0,0,2,0.2\n"
 
 
-KINDS = {one.__name__: one for one in (numbers, geometry, media, lights, area_lights, rows)}
+KINDS = {generate.__name__: generate for generate in (numbers, geometry, media, lights, area_lights, rows)}
 
 
 def _orders(kind: str, path: Path) -> list[list[str]]:
     """Return what to do with an input."""
     out = path.parent
     if kind == "rows":
-        found = [["integrate", str(path), "--precision", one, "--json"] for one in ("single", "double")]
-        return [*found, ["integrate", str(path), "-o", str(out / "rows.csv")]]
+        printed = [["integrate", str(path), "--precision", precision, "--json"] for precision in ("single", "double")]
+        return [*printed, ["integrate", str(path), "-o", str(out / "rows.csv")]]
     sampled = ["--target-error", "0.3", "--estimator"]
     orders = [
         ["describe", str(path), "--json"],
@@ -332,7 +333,7 @@ def _child(kind: str, path: Path, report: Path) -> None:
     small = {"image": (12, 9), "timed": (12, 9), "checked": (12, 9), "seconds": 0.001, "patience": 0.1}
     scene_study.EFFORTS["quick"] = replace(scene_study.EFFORTS["quick"], **small, batches=16)
     for order in _orders(kind, path):
-        if order[0] == "compare" and not all(Path(one).is_file() for one in order[1:3]):
+        if order[0] == "compare" and not all(Path(image).is_file() for image in order[1:3]):
             continue
         status, fault = _fault(order)
         with report.open("a") as file:  # what was done before a crash is kept

@@ -46,8 +46,8 @@ def truth_image(
     named = settings if shadow_scale == 1 else settings | {"shadow_start": True}
     key = cache_key(scene, "quadrature", named)
     stored = load_arrays(key)
-    if stored is not None and set(stored) == {field.name for field in fields(TruthImage)}:
-        return TruthImage(**{field.name: _as_kept(field, stored[field.name]) for field in fields(TruthImage)})
+    if stored is not None and _needed(False) <= set(stored) <= _needed(True):
+        return TruthImage(**{field.name: _as_kept(field, stored[field.name]) for field in _fields(set(stored))})
     make_room()
     truth = read_truth(scene)
     check_camera(truth)
@@ -55,8 +55,18 @@ def truth_image(
         check_rays(truth, surface_hits(truth).distance)
     image = quadrature_image(truth, **settings, progress=progress)
     check_values(truth, image)
-    store_arrays(key, {field.name: getattr(image, field.name) for field in fields(TruthImage)})
+    values = {field.name: getattr(image, field.name) for field in fields(TruthImage)}
+    store_arrays(key, {name: value for name, value in values.items() if value is not None})
     return image
+
+
+def _needed(every: bool) -> set[str]:
+    """Return the names of the layers that a kept truth must have, or of `every` one that it may have."""
+    return {field.name for field in fields(TruthImage) if every or field.default is not None}
+
+
+def _fields(names: set[str]) -> list[Field]:
+    return [field for field in fields(TruthImage) if field.name in names]
 
 
 def _as_kept(field: Field, value: Any) -> Any:

@@ -14,7 +14,8 @@ Read in this order:
 - `plane_stability.py`: hard cases for sums over shadow planes;
 - `zero_cost.py`: checks that what a scene does not need costs nothing.
 
-May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.kernels`, `realtime.memory`, `realtime.methods`,
-`realtime.parameters`, `realtime.scene`, `reference.quadrature`, `reference.scene`, `reference.storage`,
-`validation.configurations`, `validation.estimates`, `validation.metrics`, `validation.scenes`, `validation.statistics`.
+May import: `analytic`, `realtime.area_lights`, `realtime.errors`, `realtime.frame`, `realtime.kernels`,
+`realtime.memory`, `realtime.methods`, `realtime.parameters`, `realtime.scene`, `reference.quadrature`,
+`reference.scene`, `reference.storage`, `validation.configurations`, `validation.estimates`, `validation.metrics`,
+`validation.scenes`, `validation.statistics`.
 """

@@ -25,9 +25,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from realtime.area_lights.points import LightPoints
 from realtime.frame.renderer import render_frame
+from realtime.methods.interface.method import method_parameters
 from realtime.methods.registry import find_method
-from realtime.parameters import read_parameters, values
+from realtime.parameters import values
 from realtime.scene.read_scene import Scene
 from validation.configurations.methods import Configuration, prepared
 
@@ -65,7 +67,14 @@ class Decomposition:
         return _part("whole", "truth", difference, difference, self.truth)
 
 
-def decompose(scene: Scene, chosen: Configuration, truth: Array, *, render: Render | None = None) -> Decomposition:
+def decompose(
+    scene: Scene,
+    chosen: Configuration,
+    truth: Array,
+    *,
+    render: Render | None = None,
+    exact: Callable[[LightPoints], Array] | None = None,
+) -> Decomposition:
     """Return the error of a configuration by its causes.
 
     Parameters
@@ -78,6 +87,8 @@ def decompose(scene: Scene, chosen: Configuration, truth: Array, *, render: Rend
         Airlight at pixel centres, (height, width, 3) [W/(m^2 sr)].
     render
         What renders a configuration, for a method of one's own in a process of its own; a frame here by default.
+    exact
+        What renders the exact sum over light points, for callers that keep it; `exact_sum` by default.
 
     Raises
     ------
@@ -91,7 +102,10 @@ def decompose(scene: Scene, chosen: Configuration, truth: Array, *, render: Rend
 
     truth = np.asarray(truth, dtype=np.float64)
     image = last = airlight(chosen)
-    exact = truth
+    best = truth
+    if scene.area_lights:
+        points = method_parameters(find_method(chosen.method), dict(chosen.parameters))[1]
+        best = np.asarray(exact_sum(scene, points) if exact is None else exact(points), dtype=np.float64)
     steps: list[tuple[str, str, Array]] = []
     left = REST
     before = chosen
@@ -102,10 +116,19 @@ def decompose(scene: Scene, chosen: Configuration, truth: Array, *, render: Rend
         better = airlight(without)
         steps.append((cause, _changes(before, without), last - better))
         last, before = better, without
-    steps.append((left, "truth", last - exact))
+    if scene.area_lights:
+        steps.append((left, "exact sum", last - best))
+        steps.append((POINTS, "truth", best - truth))
+    else:
+        steps.append((left, "truth", last - truth))
     whole = image - truth
     parts = tuple(_part(cause, without, part, whole, truth) for cause, without, part in steps)
     return Decomposition(chosen, truth, image, parts)
+
+
+def exact_sum(scene: Scene, points: LightPoints) -> Array:
+    """Return the airlight of the light points of a scene, exactly, (height, width, 3) [W/(m^2 sr)]."""
+    return rendered(scene, Configuration("shadow-planes", "exact", tuple(values(points).items())))
 
 
 def rendered(scene: Scene, chosen: Configuration) -> Array:
@@ -119,7 +142,7 @@ def _configurations(chosen: Configuration, size: tuple[int, int]) -> Iterator[tu
         chosen = replace(chosen, kernel="exact")
         yield "kernel", chosen
     method = find_method(chosen.method)
-    parameters = read_parameters(chosen.method, method.parameters, dict(chosen.parameters))
+    parameters, _ = method_parameters(method, dict(chosen.parameters))
     for cause, better in method.error_causes(parameters, size):
         if better is None:
             yield cause, None

@@ -29,5 +29,5 @@ Read in this order:
 - `loading.py`: a scene by its name or from a Mitsuba XML file;
 - `animation.py`: the scenes of the frames of an animation.
 
-May import: `analytic`, `realtime.scene`.
+May import: `analytic`, `realtime.area_lights`, `realtime.scene`.
 """

@@ -20,13 +20,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
+from realtime.area_lights.shape import turned_area_light
 from realtime.scene.animate import (
     closed_shapes,
+    coloured_area_light,
     coloured_light,
     read_objects,
     thicker_medium,
     turned_light,
     turned_objects,
+    with_area_lights,
 )
 from realtime.scene.mesh_adjacency import read_casters
 from realtime.scene.read_scene import Scene
@@ -93,22 +96,27 @@ def _step(scene: Scene, animation: Animation) -> Callable[[float], Scene]:
     about = np.array(animation.about) if animation.about else middle(scene)
     objects = None
     if "objects" in animation.moves:
-        names = animation.objects or closed_shapes(read_casters(scene.geometry))
+        lamps = {light.name for light in scene.area_lights}
+        closed = closed_shapes(read_casters(scene.geometry, scene.area_lights))
+        names = animation.objects or tuple(name for name in closed if name not in lamps)
         if not names:
             raise InputError("--animate objects: the scene has no closed mesh that could turn; animate the light")
         objects = read_objects(scene, names)
 
     def after(share: float) -> Scene:
         turn = rotation(up.tolist(), 360 * share) if share else np.eye(3)
-        lights, medium = scene.lights, scene.medium
+        lights, area_lights, medium = scene.lights, scene.area_lights, scene.medium
         if "light" in animation.moves:
             lights = tuple(turned_light(light, about, turn) for light in lights)
+            area_lights = tuple(turned_area_light(light, about, turn) for light in area_lights)
         if "colour" in animation.moves:
             lights = tuple(coloured_light(light, share) for light in lights)
+            area_lights = tuple(coloured_area_light(light, share) for light in area_lights)
         if "medium" in animation.moves:
             medium = thicker_medium(medium, 1 + 0.5 * np.sin(2 * np.pi * share))
         moved = replace(scene, lights=lights, medium=medium)
-        return turned_objects(moved, objects, turn) if objects else moved
+        moved = turned_objects(moved, objects, turn) if objects else moved
+        return with_area_lights(moved, area_lights)
 
     return after
 
@@ -127,11 +135,11 @@ def middle(scene: Scene) -> Array:
 
     Without shapes it is the point on the camera's axis that is closest to the first light.
     """
+    light = np.array(scene.lights[0].position).ravel() if scene.lights else scene.area_lights[0].middle
     if scene.geometry.shapes():
         box = scene.geometry.bbox()
         return 0.5 * (np.array(box.min, dtype=np.float64).ravel() + np.array(box.max, dtype=np.float64).ravel())
-    origin, forward, light = (
-        np.array(vector, dtype=np.float64).ravel()
-        for vector in (scene.camera.origin, scene.camera.forward, scene.lights[0].position)
+    origin, forward = (
+        np.array(vector, dtype=np.float64).ravel() for vector in (scene.camera.origin, scene.camera.forward)
     )
     return origin + forward * (forward @ (light - origin)) / (forward @ forward)

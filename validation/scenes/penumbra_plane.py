@@ -3,6 +3,9 @@
 
 The screen reaches so far that its edge alone bounds the shadow on all that the camera sees: seen from a point of the
 floor it cuts the disk of the lamp along a straight line.
+
+The lamp is above the image: of the points that stand for it, those next to a camera ray would count as the peak of a
+point light.
 """
 
 from typing import Any
@@ -22,7 +25,7 @@ def penumbra_plane() -> dict[str, Any]:
     return {
         "type": "scene",
         "fog": fog(0.193, (0.92, 0.89, 0.84)),
-        "sensor": camera((1.37, -5.19, 1.17), (0.23, 0.29, 1.03), fov=53.3, size=(800, 600)),
+        "sensor": camera((1.37, -5.19, 1.17), (0.23, 0.29, 0.173), fov=53.3, size=(800, 600)),
         "lamp": area_lamp("disk", (0.319, 0.271, 2.717), (0.217, 0.133, 0.0), 0.433, (17.3, 15.1, 12.7)),
         "screen": mitsuba_mesh("screen", screen, (0.37, 0.33, 0.29)),
         "floor": mitsuba_mesh(

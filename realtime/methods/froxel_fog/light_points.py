@@ -1,44 +1,57 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The points of lights with extent as tables, so that one loop goes over them, whatever their number.
-
-The shadow maps of all points of a light are cast at once, into one array.
-"""
+"""The points of lights with extent as tables, so that one loop goes over them, whatever their number."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import drjit as dr
+import mitsuba as mi
 import numpy as np
 
 from realtime.numerics.aligned import aligned_array
 from realtime.numerics.array_types import four_numbers
 from realtime.scene.lights import Facing, Light
-from realtime.shadow_maps.shadow_map import cast_cube_maps, lit_in_cube
+from realtime.shadow_maps.hemisphere_map import HemisphereMaps, LightFrame, cast_hemisphere_maps
 
 
 @dataclass(frozen=True)
 class LightPointTable:
-    """The points of one light with extent."""
+    """The points of one light with extent; four numbers a point in each array."""
 
     source: int  #: the number of the light
     count: int  #: how many points it has
-    positions: Any  #: three coordinates [m] and the lift [m], four numbers each
-    normals: Any  #: three components, and the chord [m], four numbers each
-    distances: Any = None  #: of the shadow maps of all points, one after the other [m]; None: rays are cast
-    size: int = 0  #: texels on a side of a face of these
+    places: Any  #: three coordinates and the lift [m]
+    normals: Any  #: unit vectors, and nothing
+    across: Any  #: unit vectors across these, and nothing
+    maps: HemisphereMaps | None = None  #: of all points; None: rays are cast
 
     def point(self, number: Any, like: Light) -> Light:
-        """Return the light points of some numbers; what all have in common is that of `like`, one of them."""
-        Float, Vector = type(self.positions), type(like.position)
-        place = dr.gather(four_numbers(Float), self.positions, number)
-        way = dr.gather(four_numbers(Float), self.normals, number)
-        facing = Facing(Vector(way.x, way.y, way.z), Vector(0), place.w, way.w)
-        return replace(like, position=Vector(place.x, place.y, place.z), facing=facing)
+        """Return the light point of a number; what all have in common is that of `like`, one of them."""
+        Float, Vector = type(self.places), type(like.position)
+        place, way = (dr.gather(four_numbers(Float), rows, number) for rows in (self.places, self.normals))
+        facing = Facing(Vector(way.xyz), Vector(0), place.w, Float(0))
+        return replace(like, position=Vector(place.xyz), facing=facing)
 
     def lit(self, number: Any, light: Light, point: Any) -> Any:
-        """Return whether points [m] are lit by a light point, by its shadow map."""
-        return lit_in_cube(self.distances, self.size, number, point - light.position)
+        """Return whether a light point reaches points in the air [m], by its map."""
+        assert self.maps is not None
+        assert light.facing is not None
+        frame = self._frame(number, light.position, light.facing)
+        return self.maps.lit(number, frame.local(point - light.position))
+
+    def _frame(self, number: Any, position: Any, facing: Facing) -> LightFrame:
+        across = type(position)(dr.gather(four_numbers(type(self.across)), self.across, number).xyz)
+        return LightFrame(position, across, dr.cross(facing.normal, across), facing.normal, facing.lift)
+
+    def with_maps(self, geometry: Any, like: Light, size: int) -> "LightPointTable":
+        """Return the table with maps, of `size` texels on a side, of the shapes of a Mitsuba scene."""
+        number = dr.arange(mi.UInt32, self.count)
+        light = self.point(number, like)
+        assert light.facing is not None
+        frames = self._frame(number, light.position, light.facing)
+        dr.eval(frames)
+        return replace(self, maps=cast_hemisphere_maps(geometry, frames, self.count, size))
 
 
 def tabulated(lights: Sequence[Light]) -> tuple[LightPointTable, ...]:
@@ -49,29 +62,16 @@ def tabulated(lights: Sequence[Light]) -> tuple[LightPointTable, ...]:
 
 def _table(source: int, points: list[Light]) -> LightPointTable:
     Float = type(points[0].position.x)
-    positions, normals = [], []
-    for light in points:
-        facing = light.facing
-        assert facing is not None
-        positions.append([*np.array(light.position).ravel(), *np.array(facing.lift)])
-        normals.append([*np.array(facing.normal).ravel(), *np.array(facing.chord)])
-    columns = (aligned_array(Float, np.array(rows, dtype=np.float64).ravel()) for rows in (positions, normals))
-    return LightPointTable(source, len(points), *columns)
+    facing = [light.facing for light in points if light.facing is not None]
+    normals = np.array([np.array(own.normal, dtype=np.float64).ravel() for own in facing])
+    helper = np.where(np.abs(normals[:, :1]) < 0.5, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+    across = np.cross(helper, normals)
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    positions = np.array([np.array(light.position, dtype=np.float64).ravel() for light in points])
+    lifts = np.array([np.array(own.lift, dtype=np.float64).ravel() for own in facing])
 
+    def rows(vectors: Any, last: Any) -> Any:
+        return aligned_array(Float, np.hstack([vectors, last]).ravel())
 
-def with_maps(table: LightPointTable, geometry: Any, like: Light, size: int) -> LightPointTable:
-    """Return a table with the shadow maps of its points.
-
-    Parameters
-    ----------
-    table
-        Without them.
-    geometry
-        The Mitsuba scene that holds the occluders.
-    like
-        One of the points.
-    size
-        Texels on a side of a face.
-    """
-    distances = cast_cube_maps(geometry, lambda number: table.point(number, like), table.count, size)
-    return replace(table, distances=distances, size=size)
+    nothing = np.zeros((len(points), 1))
+    return LightPointTable(source, len(points), rows(positions, lifts), rows(normals, nothing), rows(across, nothing))

@@ -23,7 +23,7 @@ from realtime.methods.froxel_fog.accumulation import accumulated, airlight_at_pi
 from realtime.methods.froxel_fog.grid import view_grid
 from realtime.methods.froxel_fog.history import averaged, frame_shift
 from realtime.methods.froxel_fog.injection import Visibility, scattered_light
-from realtime.methods.froxel_fog.light_points import LightPointTable, tabulated, with_maps
+from realtime.methods.froxel_fog.light_points import LightPointTable, tabulated
 from realtime.methods.froxel_fog.media import column_pieces
 from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.method import ErrorCause
@@ -32,6 +32,7 @@ from realtime.numerics.array_types import bytes_of
 from realtime.parameters import Parameters, parameter
 from realtime.scene.lights import Light
 from realtime.scene.read_scene import Scene
+from realtime.shadow_maps.hemisphere_map import maps_memory
 from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, lit_in_map, map_memory, map_size
 
 _NUMBERS = 16  # of a froxel: scattered light, airlight, history, four each, and as much on the way
@@ -104,13 +105,15 @@ def prepare_froxel_fog(scene: Scene, parameters: FroxelFogParameters) -> Callabl
     if parameters.shadow != "map":
         return lambda scene: FroxelShadows((), tabulated(scene.lights))
     map = parameters.map
-    needed = froxels + sum(map_memory(light, map) for light in scene.lights)
+    points = sum(light.source is not None for light in scene.lights)
+    needed = froxels + maps_memory(type(scene.camera.origin.x), points, map)
+    needed += sum(map_memory(light, map) for light in scene.lights if light.source is None)
     check_memory(f"map: {map} texels for {len(scene.lights)} light(s)", needed, "use a smaller map")
 
     def cast(scene: Scene) -> FroxelShadows:
         ordinary = [light for light in scene.lights if light.source is None]
         first = {light.source: light for light in scene.lights}
-        tables = (with_maps(table, scene.geometry, first[table.source], map) for table in tabulated(scene.lights))
+        tables = (table.with_maps(scene.geometry, first[table.source], map) for table in tabulated(scene.lights))
         return FroxelShadows(tuple(cast_shadow_map(scene.geometry, light, map) for light in ordinary), tuple(tables))
 
     return cast

@@ -61,9 +61,9 @@ class Method:
     #: ``f(layers, g_buffer, history, *, camera, parameters)`` -> layers: functions over the whole image, run in turn
     #: on what `render` returned. All arrays have an entry per pixel, row by row; `history` is None in the first frame.
     passes: tuple[Callable[..., Layers], ...] = ()
-    runs_passes: Callable[[Any], bool] = always  #: parameters -> whether these run
     #: Parameters -> whether `render` hands arrays of any sizes on to the next frame, as `Layers.carried`.
     carries: Callable[[Any], bool] = never
+    runs_passes: Callable[[Any], bool] = always  #: parameters -> whether these run
     uses_kernel: Callable[[Any], bool] = always  #: parameters -> whether `render` calls an airlight kernel
     shadows: bool = True  #: whether it knows shadows; one that does not is wrong where there are occluders
     provides_visibility: Callable[[Any], bool] = never  #: parameters -> whether its layers have a visibility

@@ -41,7 +41,6 @@ from realtime.image_filters.tile_average import tile_average
 from realtime.image_filters.upsample import small_pixels, upsample
 from realtime.memory import check_memory
 from realtime.methods.interface.layers import Layers
-from realtime.methods.interface.method import ErrorCause
 from realtime.methods.interface.view import View, bounded_radiance, radiance, rays_in_media
 from realtime.methods.soft_shafts.history import turn
 from realtime.methods.soft_shafts.light_sources import SourceState, frame_at, source_state
@@ -144,24 +143,6 @@ def soft_shafts(view: View, state, lists, *, kernel, parameters: SoftShaftsParam
 def shares_by_source(parameters: SoftShaftsParameters) -> bool:
     """Return whether all points of a light have one share: without filter each has its own, and the sum is exact."""
     return parameters.filter != "none" or parameters.interleave
-
-
-def shafts_errors(parameters: SoftShaftsParameters, size: tuple[int, int]) -> tuple[ErrorCause, ...]:
-    """Return the causes of its errors in airlight, as `realtime.methods.interface.method.Method.error_causes` has them.
-
-    Filters go first, as they smooth what all others leave, and the steps last.
-    """
-    filters = {"filter": "none", "hd": "5"} if parameters.hd == AUTO else {"filter": "none"}
-    causes: list[ErrorCause] = []
-    if parameters.filter != "none":
-        causes.append(("filter", filters))
-    if parameters.scale > 1:
-        causes.append(("resolution", {"scale": 1}))
-    if parameters.interleave:
-        causes.append(("shared points", {"interleave": False}))
-    if parameters.shadow == "map":
-        causes.append(("map", {"shadow": "ray"}))
-    return *causes, ("steps", None)
 
 
 class _Frame:

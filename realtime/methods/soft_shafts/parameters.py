@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from realtime.errors import InputError
+from realtime.methods.interface.method import ErrorCause
 from realtime.parameters import Parameters, parameter
 from realtime.shadow_maps.shadow_map import map_size
 
@@ -104,3 +105,16 @@ class SoftShaftsParameters(Parameters):
     def width(self) -> float:
         """The standard deviation of the filter [pixels], not a number for `auto`."""
         return math.nan if self.hd == AUTO else float(self.hd)
+
+
+def soft_shaft_errors(parameters: SoftShaftsParameters, size: tuple[int, int]) -> tuple[ErrorCause, ...]:
+    """Return the causes of its errors, as `realtime.methods.interface.method.Method.error_causes` has them."""
+    plain = {"filter": "none"} | ({"hd": "5"} if parameters.hd == AUTO else {})
+    without = "shadows" if parameters.shadow == "none" else "map"
+    return (
+        ("filter", plain),
+        ("interleaving", {"interleave": False}),
+        ("resolution", {"scale": 1}),
+        (without, {"shadow": "ray"}),
+        ("steps", None),
+    )

@@ -70,8 +70,8 @@ def printed(x, r, foot, height, enter):
     return SIGMA * (foot + MEAN - enter + MEAN * (r + x - foot) / height)
 
 
-def relative_rmse(one, two):
-    return np.sqrt(np.mean((one - two) ** 2)) / np.mean(two)
+def relative_rmse(values, expected):
+    return np.sqrt(np.mean((values - expected) ** 2)) / np.mean(expected)
 
 
 def test_series_of_the_tangent_is_that_of_its_derivatives():

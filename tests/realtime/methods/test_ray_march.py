@@ -22,8 +22,8 @@ def render(method, *, scene, kernel="exact", precision="double", **parameters):
     return render_frame(frame_renderer(read, METHODS[method], kernel=KERNELS[kernel].function, **parameters)).airlight
 
 
-def relative_rmse(one, two):
-    return np.sqrt(np.mean((one - two) ** 2)) / np.mean(two)
+def relative_rmse(values, expected):
+    return np.sqrt(np.mean((values - expected) ** 2)) / np.mean(expected)
 
 
 def lit_by_hand(points, light, centre, radius):
@@ -76,10 +76,10 @@ def test_transitions_are_integrals_over_the_cells_whose_middles_are_lit(variant,
         frame_renderer(read_scene(mi.load_dict(scene), "double"), METHODS["ray-march"], steps=1)
     ).distance
     seen = np.isfinite(distance)
-    found = render("ray-march", scene=scene, steps=17, spacing=spacing, sum="transitions")
+    marched = render("ray-march", scene=scene, steps=17, spacing=spacing, sum="transitions")
     expected = runs_by_hand(scene, np.where(seen, distance, 1.0), 17, spacing)
     # Mitsuba's distances and shadow rays are float32; no sample lies that close to an edge of the shadow.
-    assert relative_rmse(found[seen], expected[seen]) < 1e-5
+    assert relative_rmse(marched[seen], expected[seen]) < 1e-5
     assert relative_rmse(render("unshadowed", scene=scene)[seen], expected[seen]) > 0.01
 
 

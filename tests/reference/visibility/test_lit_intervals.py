@@ -175,17 +175,18 @@ def test_wrong_geometry_is_found_and_left_in_doubt(variant):
 
 @pytest.mark.claim("shadow-ray-certificate")
 def test_doubt_widens_the_bound(variant, monkeypatch):
+    import reference.quadrature.light_airlight as light_airlight
     import reference.quadrature.ray_values as quadrature
 
     truth, *_ = setup(box_scene())
     plain = quadrature.ray_values(truth)
-    compute = quadrature.lit_intervals
+    compute = light_airlight.lit_intervals
 
     def doubtful(*arguments, **settings):
         intervals = compute(*arguments, **settings)
         return replace(intervals, doubt=(np.array([5]), np.array([0.1]), np.array([1e-3])))
 
-    monkeypatch.setattr(quadrature, "lit_intervals", doubtful)
+    monkeypatch.setattr(light_airlight, "lit_intervals", doubtful)
     doubted = quadrature.ray_values(truth)
     assert np.array_equal(doubted.airlight, plain.airlight)
     assert np.flatnonzero((doubted.bound > plain.bound).any(axis=1)).tolist() == [5]

@@ -6,10 +6,21 @@ import copy
 import pytest
 
 from analytic.errors import InputError
-from reports.docs.fidelity import RECORD, ROOT, current_page, joined, page, read_record, redraw, stale_rows
+from reports.docs.fidelity import RECORD, ROOT, current_page, joined, page, read_record, redraw
+from validation.fidelity.catalogue import ROWS, published_figures
 from validation.fidelity.row import VERDICTS
 
 EMPTY = "before\n<!-- verdicts: begin -->\nold\n<!-- verdicts: end -->\nafter\n"
+
+
+def stale_rows(record):
+    """Return in what the rows of a run differ from those that are measured now, a line each."""
+    figures = {(figure["paper"], figure["item"]): figure["value"] for figure in published_figures(ROWS)}
+    now = {(row.paper, row.item): (row.claim, row.unit, figures.get((row.paper, row.item))) for row in ROWS}
+    then = {(row["paper"], row["item"]): (row["claim"], row["unit"], row["published"]) for row in record["fidelity"]}
+    stale = [f"{paper}, {item}: not in the run" for paper, item in now if (paper, item) not in then]
+    stale += [f"{paper}, {item}: no such row any more" for paper, item in then if (paper, item) not in now]
+    return stale + [f"{key[0]}, {key[1]}: is not what it was" for key in now if key in then and now[key] != then[key]]
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +52,7 @@ def test_a_row_that_changed_is_stale(record):
     gone = changed["fidelity"].pop()
     changed["fidelity"].append(gone | {"item": "eq. 99"})
     words = stale_rows(changed)
-    assert any("is not what it was" in one for one in words)
+    assert any("is not what it was" in sentence for sentence in words)
     assert f"{gone['paper']}, {gone['item']}: not in the run" in words
     assert f"{gone['paper']}, eq. 99: no such row any more" in words
 
@@ -69,7 +80,7 @@ def test_the_page_shows_rows_by_paper():
 def test_runs_of_one_paper_each_are_joined():
     first, second = run(row(), row(paper="sun")), run(row(measured=9.0), measured="2026-11-22 21:00:00 +0000")
     both = joined([first, second])
-    assert [(one["paper"], one["measured"]) for one in both["fidelity"]] == [("biri", 9.0), ("sun", 2.5)]
+    assert [(row["paper"], row["measured"]) for row in both["fidelity"]] == [("biri", 9.0), ("sun", 2.5)]
     assert both["measured"] == first["measured"]
     with pytest.raises(InputError, match="different machines"):
         joined([first, run(row(), processor="slide rule")])

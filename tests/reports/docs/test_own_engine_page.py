@@ -55,11 +55,11 @@ def rendered(renderer, scene, folder, capsys, *options):
 )
 def test_what_the_examples_render_is_called_right(renderer, scene, options, variant, tmp_path, capsys):
     interpreter(renderer)
-    found = rendered(renderer, scene, tmp_path, capsys, *options)
-    assert found["verdict"]["right"], found["verdict"]["reasons"]
-    assert found["hints"] == found["failures"] == []
-    assert found["expected"] == ("airlight" if "--layers" in options else "total")
-    assert abs(found["factor"] - 1) < 0.005
+    compared = rendered(renderer, scene, tmp_path, capsys, *options)
+    assert compared["verdict"]["right"], compared["verdict"]["reasons"]
+    assert compared["hints"] == compared["failures"] == []
+    assert compared["expected"] == ("airlight" if "--layers" in options else "total")
+    assert abs(compared["factor"] - 1) < 0.005
 
 
 @pytest.mark.claim("engine-renderers")

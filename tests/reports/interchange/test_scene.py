@@ -180,8 +180,10 @@ def test_recipes_name_what_another_renderer_cannot_do(variant):
     plain = described(ball=None, floor=None)["recipes"]
     assert plain["Cycles"][0] == "light: Point, power 62.83185 W, colour (1, 0.8, 0.6), radius 0, no soft falloff"
     assert plain["LuxCore"][0].startswith("light: `point`, colour 4 pi I = (62.83185, 50.26548, 37.69911)")
-    found = described(soft=spot(cutoff=40.0, beam=25.0), hard=spot(), fog=fog | {"phase": {"type": "hg", "g": 0.37}})
-    cycles, luxcore = (found["recipes"][name] for name in ("Cycles", "LuxCore"))
+    description = described(
+        soft=spot(cutoff=40.0, beam=25.0), hard=spot(), fog=fog | {"phase": {"type": "hg", "g": 0.37}}
+    )
+    cycles, luxcore = (description["recipes"][name] for name in ("Cycles", "LuxCore"))
     assert "spot size 80 degrees, which is the whole angle" in cycles[1]
     assert "this edge cannot be made" in cycles[1]
     assert "spot size 66 degrees" in cycles[2]

@@ -29,8 +29,8 @@ def names(effort, scenes, cache):
 
 def test_efforts_measure_what_they_say(cache):
     measured = list(EXPERIMENTS.values())
-    without_images = [one for one in measured if not one.images]
-    reported = [one for one in measured if one.report]
+    without_images = [experiment for experiment in measured if not experiment.images]
+    reported = [experiment for experiment in measured if experiment.report]
     quick, default, full = (EFFORTS[name] for name in ("quick", "default", "full"))
     assert names(quick, quick.scenes, cache) == len(without_images) > 0
     assert names(default, default.scenes, cache) == names(full, full.scenes, cache) == len(reported) < len(measured)
@@ -53,7 +53,7 @@ def test_rows_follow_the_results_of_a_run():
 
 def test_published_figures_lie_beside_the_tables():
     data = published_data({"biri": [kept(BIRI | {"constant_distance": []})]})
-    figures = {(one["paper"], one["item"]): one for one in data["figures"]}
+    figures = {(figure["paper"], figure["item"]): figure for figure in data["figures"]}
     assert figures["biri", "Table 2, Fig. 7a, FPS"]["value"] == 23
     assert figures["billeter", "Fig. 7c, FPS"] == {
         "paper": "billeter",
@@ -75,8 +75,8 @@ def test_an_experiment_runs_once_for_all_its_rows_and_is_kept(cache, monkeypatch
     rows = [row for row in ROWS if row.experiment == "nothing"]
     told = []
     for _ in range(2):
-        found = measure_fidelity(rows, cache, quick=True, progress=lambda share, what: told.append(what))
-        assert len(found) == len(rows) > 3
+        results = measure_fidelity(rows, cache, quick=True, progress=lambda share, what: told.append(what))
+        assert len(results) == len(rows) > 3
     assert runs == [1]
     assert told == ["nothing, claims of papers"]
     assert len(measure_fidelity(rows, replace(cache, fresh=True), quick=True)) == len(rows)

@@ -111,10 +111,10 @@ def test_pixels_can_be_means(scene, truth, write):
     file = write(airlight=area.airlight)
     assert compare_scene(scene, file, pixel="area").comparison.metrics.relative_rmse < 1e-6
     assert compare_scene(scene, file, pixel="centre").comparison.metrics.relative_rmse > 1e-3
-    found = compare_scene(scene, file)
-    assert (found.pixel, found.fit.area_error < 1e-6, found.fit.centre_error > 0.01) == ("area", True, True)
-    assert found.comparison.metrics.relative_rmse < 1e-6
-    assert "means over the area fit" in found.summary()
+    compared = compare_scene(scene, file)
+    assert (compared.pixel, compared.fit.area_error < 1e-6, compared.fit.centre_error > 0.01) == ("area", True, True)
+    assert compared.comparison.metrics.relative_rmse < 1e-6
+    assert "means over the area fit" in compared.summary()
 
 
 def test_json_has_every_number_once(scene, truth, write):
@@ -162,8 +162,8 @@ def test_numbers_out_of_range_are_refused(scene, truth, write, margin, exposure)
 
 def test_what_a_layer_holds_can_be_said(scene, truth, write):
     file = write(Beauty=truth.airlight)
-    found = compare_scene(scene, file, holds="airlight")
-    assert (found.expected, found.verdict.right) == ("airlight", True)
+    compared = compare_scene(scene, file, holds="airlight")
+    assert (compared.expected, compared.verdict.right) == ("airlight", True)
     (words,) = compare_scene(scene, write(airlight=truth.airlight + truth.surface)).hints.words
     assert words == "the image is all light: say --as total"
     with refused("--as fog; wanted one of airlight, surface, total"):
@@ -179,7 +179,7 @@ def test_odd_images_get_a_verdict_and_no_number_that_is_none(tmp_path, variant, 
     write_exr(
         tmp_path / "odd.exr", Image({"total": np.full((size[1], size[0], 3), value, dtype=np.float32)}), finite=False
     )
-    found = compare_scene(str(path), tmp_path / "odd.exr", all_metrics=True)
-    assert not found.verdict.right
-    assert "nan" not in found.summary()
-    assert not re.search(r"\binf\b", found.summary())
+    compared = compare_scene(str(path), tmp_path / "odd.exr", all_metrics=True)
+    assert not compared.verdict.right
+    assert "nan" not in compared.summary()
+    assert not re.search(r"\binf\b", compared.summary())

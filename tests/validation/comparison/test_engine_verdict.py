@@ -42,12 +42,12 @@ def compared(traced, image):
 @pytest.mark.claim("engine-verdict", "engine-pixels")
 def test_the_right_image_of_a_path_tracer_is_called_right_without_options(traced):
     _, _, image, _ = traced
-    found = compared(traced, image)
-    assert found.pixel == "area"
-    assert found.verdict.right
-    assert found.failures == found.hints.words == ()
-    np.testing.assert_allclose(found.hints.factor, 1, atol=0.002)
-    assert found.summary().splitlines()[-1].startswith("verdict          right: means over 6 x 6 pixels are within")
+    judged = compared(traced, image)
+    assert judged.pixel == "area"
+    assert judged.verdict.right
+    assert judged.failures == judged.hints.words == ()
+    np.testing.assert_allclose(judged.hints.factor, 1, atol=0.002)
+    assert judged.summary().splitlines()[-1].startswith("verdict          right: means over 6 x 6 pixels are within")
 
 
 @pytest.mark.claim("engine-verdict", "engine-pixels")
@@ -55,8 +55,8 @@ def test_the_right_image_of_pixel_centres_is_called_right_too(traced):
     scene, *_ = traced
     centre = truth_layer(truth_image(load_scene(scene, SIZE).scene), "total")
     noise = 1 + 0.02 * np.random.default_rng(8).standard_normal((*centre.shape[:2], 1))
-    found = compared(traced, noise * centre)
-    assert (found.pixel, found.verdict.right) == ("centre", True)
+    judged = compared(traced, noise * centre)
+    assert (judged.pixel, judged.verdict.right) == ("centre", True)
 
 
 def moved(image):
@@ -85,10 +85,10 @@ FAULTS = {
 def test_planted_faults_are_not_called_right(traced, fault):
     _, truth, image, _ = traced
     change, words = FAULTS[fault]
-    found = compared(traced, change(image, truth))
-    assert not found.verdict.right
-    assert words in found.verdict.words
-    assert found.summary().splitlines()[-1].startswith("verdict          not right: ")
+    judged = compared(traced, change(image, truth))
+    assert not judged.verdict.right
+    assert words in judged.verdict.words
+    assert judged.summary().splitlines()[-1].startswith("verdict          not right: ")
 
 
 @pytest.mark.claim("engine-verdict")
@@ -107,8 +107,8 @@ def test_a_dim_image_of_fog_alone_is_not_called_its_surface(traced):
     """In a scene without a surface, an image of nearly nothing is as near to it as to nothing else."""
     image = traced[2]
     words = compared(traced, 1e-3 * image).hints.words
-    assert not any("alone" in one for one in words)
-    assert any("times as bright as it should be" in one for one in words)
+    assert not any("alone" in sentence for sentence in words)
+    assert any("times as bright as it should be" in sentence for sentence in words)
 
 
 @pytest.mark.claim("engine-verdict", tolerance="1e-12 relative")

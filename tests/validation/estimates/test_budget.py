@@ -121,5 +121,5 @@ def test_no_target_is_met_by_what_is_no_number(odd, layer):
     mean = np.ones((2, 4, 3))
     mean[layer, 2] = odd
     batches = Batches(tuple(range(32)), 1, mean, np.zeros_like(mean), np.ones((32, 2, 3)))
-    found = relative_errors(batches, np.zeros(4, dtype=bool))
-    assert (found.pooled, found.worst) == (np.inf, np.inf)
+    errors = relative_errors(batches, np.zeros(4, dtype=bool))
+    assert (errors.pooled, errors.worst) == (np.inf, np.inf)

@@ -18,7 +18,7 @@ def scene_with(position, *, size=(9, 9), **changes):
     scene["sensor"]["to_world"] = mi.ScalarTransform4f().look_at([0, -5, 1], [0, 0, 1], [0, 0, 1])
     if position is not None:
         scene["lamp"]["position"] = position
-    return mi.load_dict({name: one for name, one in (scene | changes).items() if one is not None})
+    return mi.load_dict({name: part for name, part in (scene | changes).items() if part is not None})
 
 
 def truths(scene):

@@ -33,24 +33,24 @@ def test_every_numbered_equation_figure_and_table_has_a_row():
         "biri": ["eq. 1", "eq. 2", "Table 1", "Table 2", *(f"Fig. {number}" for number in range(1, 8))],
         "billeter": ["eq. 1", "eq. 2", "eq. 3", "Table 1", *(f"Fig. {number}" for number in (1, 2, 3, 5, 6, 7, 8))],
     }
-    assert {paper: [one for one in all_of if one not in items[paper]] for paper, all_of in wanted.items()} == {
+    assert {paper: [item for item in all_of if item not in items[paper]] for paper, all_of in wanted.items()} == {
         "biri": [],
         "billeter": [],
     }
 
 
 def test_published_figures_are_those_that_the_tables_are_measured_against():
-    figures = {(one["paper"], one["item"]): one["value"] for one in published_figures(ROWS)}
+    figures = {(figure["paper"], figure["item"]): figure["value"] for figure in published_figures(ROWS)}
     for where, scene, fps, triangles in biri.RATES:
-        (published,) = (one for one in PUBLISHED if one.scene == scene)
+        (published,) = (row for row in PUBLISHED if row.scene == scene)
         assert (figures["biri", f"Table 2, {where}, FPS"], published.fps) == (fps, fps)
         assert figures["biri", f"Table 2, {where}, triangles"] == triangles
         if published.shares:
             shares = biri.SHARES[scene][1]
             assert published.shares == shares
-    cells = sum(len(table.fps) * 2 + sum(len(one) for one in table.passes.values()) for table in TABLE)
+    cells = sum(len(table.fps) * 2 + sum(len(values) for values in table.passes.values()) for table in TABLE)
     assert sum(item.startswith("Table 1") for paper, item in figures if paper == "billeter") == cells
-    assert all(isinstance(one["value"], (int, float)) for one in published_figures(ROWS))
+    assert all(isinstance(figure["value"], (int, float)) for figure in published_figures(ROWS))
 
 
 def timing(rate):
@@ -62,11 +62,11 @@ def biri_tables(speed, shares=(1.0, 2.0, 3.0, 4.0, 90.0)):
     rows = []
     for published in PUBLISHED:
         for white in (1.0, 0.0):
-            one = {"published": {"scene": published.scene}, "size": list(published.size), "kernel": "exact"}
-            one |= {"white": white, "cone": 0, "tolerance": 0, "triangles": 7, "shares": list(shares)}
-            one |= {"light_moved": timing(speed * published.fps), "error": {"relative_rmse": 0.5 / speed}}
-            one |= {"frame_error": {"p50": 0.01}}
-            rows.append(one)
+            row = {"published": {"scene": published.scene}, "size": list(published.size), "kernel": "exact"}
+            row |= {"white": white, "cone": 0, "tolerance": 0, "triangles": 7, "shares": list(shares)}
+            row |= {"light_moved": timing(speed * published.fps), "error": {"relative_rmse": 0.5 / speed}}
+            row |= {"frame_error": {"p50": 0.01}}
+            rows.append(row)
     study = [
         {"relative_bias": -0.3, "relative_rmse": 0.2, "printed": 2.0, "polynomial": 0.4},
         {"relative_bias": 0.1, "relative_rmse": 0.5, "printed": 1.0, "polynomial": 0.6},
@@ -103,8 +103,8 @@ def billeter_tables(speed):
         for texels, rates in view.fps.items():
             for evaluation, rate in zip(("static", "adaptive"), rates):
                 passes = {name: value / speed for name, value in view.passes.get((texels, evaluation), {}).items()}
-                one = {"scene": view.scene, "map": texels, "evaluation": evaluation, "passes": passes, "missing": None}
-                table.append(one | {"light_moved": timing(speed * rate)})
+                row = {"scene": view.scene, "map": texels, "evaluation": evaluation, "passes": passes, "missing": None}
+                table.append(row | {"light_moved": timing(speed * rate)})
     return {"figures": figures, "table": table}
 
 
@@ -131,8 +131,8 @@ def test_a_table_that_was_not_measured_is_no_verdict_but_a_reason():
             assert verdict["verdict"] == "impossible"
             assert "not measured" in verdict["why"]
     missing = billeter_tables(1.0)
-    for one in (*missing["figures"], *missing["table"]):
-        one |= {"light_moved": None, "missing": "a frame takes 99 s"}
+    for row in (*missing["figures"], *missing["table"]):
+        row |= {"light_moved": None, "missing": "a frame takes 99 s"}
     for row in ROWS:
         if row.experiment == "billeter tables":
             verdict = judge(row, missing)

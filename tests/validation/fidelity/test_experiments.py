@@ -12,10 +12,10 @@ from validation.fidelity.scattering import fitted_constant, left_over
 
 
 def test_the_equations_of_both_papers_hold_to_rounding():
-    found = equations()
-    assert set(found) >= {"distance", "angle", "change", "segments", "order", "scaling", "integrated", "two_lit"}
-    assert all(found[name] < 1e-12 for name in found if name != "overlap")
-    assert 0.05 < found["overlap"] < 0.6
+    errors = equations()
+    assert set(errors) >= {"distance", "angle", "change", "segments", "order", "scaling", "integrated", "two_lit"}
+    assert all(errors[name] < 1e-12 for name in errors if name != "overlap")
+    assert 0.05 < errors["overlap"] < 0.6
 
 
 def test_an_error_of_a_thousandth_is_seen(monkeypatch):
@@ -26,10 +26,14 @@ def test_an_error_of_a_thousandth_is_seen(monkeypatch):
 
 @pytest.mark.claim("errata-of-biri", tolerance="1e-9 of the largest value: rounding")
 def test_the_wrong_coefficients_are_those_of_the_errata():
-    found = printed()["coefficients"]
-    wrong = {(phase, number) for phase, values in found.items() for number, one in enumerate(values) if one > 1e-9}
+    coefficients = printed()["coefficients"]
+    wrong = {
+        (phase, number) for phase, values in coefficients.items() for number, error in enumerate(values) if error > 1e-9
+    }
     assert wrong == {("isotropic", 2), ("isotropic", 3), ("rayleigh", 2), ("hazy", 1), ("hazy", 2), ("murky", 1)}
-    assert {phase: len(values) for phase, values in found.items()} == dict(isotropic=5, rayleigh=3, hazy=3, murky=3)
+    assert {phase: len(values) for phase, values in coefficients.items()} == dict(
+        isotropic=5, rayleigh=3, hazy=3, murky=3
+    )
 
 
 def test_the_printed_phase_functions_scatter_too_much():
@@ -37,12 +41,12 @@ def test_the_printed_phase_functions_scatter_too_much():
 
 
 def test_the_equations_of_clouds_as_printed():
-    found = clouds()
+    exponents = clouds()
     # dx/(dx + dl) of the derived form is 16/9, and the printed one has the other sign.
-    assert found["scattering"] == pytest.approx(-9 / 16)
-    assert found["opacity"] == pytest.approx(-1)
-    assert found["radius"] == pytest.approx(16 / 6)
-    assert found["conservation"] == pytest.approx(2)
+    assert exponents["scattering"] == pytest.approx(-9 / 16)
+    assert exponents["opacity"] == pytest.approx(-1)
+    assert exponents["radius"] == pytest.approx(16 / 6)
+    assert exponents["conservation"] == pytest.approx(2)
 
 
 def test_the_stencil_by_hand():
@@ -58,10 +62,10 @@ def test_the_stencil_by_hand():
 
 
 def test_only_one_rule_of_the_stencil_is_right():
-    found = ordering()
-    assert found["plane"] == found["stencil"] == found["inside"] == 1
-    assert found["printed"] < 0.5
-    assert found["unordered"] < 0.5
+    shares = ordering()
+    assert shares["plane"] == shares["stencil"] == shares["inside"] == 1
+    assert shares["printed"] < 0.5
+    assert shares["unordered"] < 0.5
 
 
 def test_the_best_constant_and_what_it_leaves_over_without_noise():

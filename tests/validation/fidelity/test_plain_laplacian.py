@@ -26,7 +26,7 @@ def test_the_laplacian_of_the_depth_by_hand():
 def test_a_mesh_of_all_texels_departs_nowhere_and_a_coarse_one_does():
     curved = heights(lambda u, v: 1 + u * u)
     everything = [np.ones((1, 2**level, 2**level), bool) for level in range(4)]
-    nothing = [np.zeros_like(one) for one in everything]
+    nothing = [np.zeros_like(image) for image in everything]
     assert departures(curved, everything).max() == 0
     # Two triangles over the whole face: along the lower side the chord 1 + u against 1 + u^2.
     u = np.arange(SIZE + 1) / SIZE

@@ -109,3 +109,17 @@ def test_refused_phase_functions_leave_their_laws_open(variant):
     law = by_name(taylor, "phase", "same phase")
     assert (law["phase"].rows, law["phase"].single, law["phase"].double) == (0, None, None)
     assert law["same phase"].rows > 0
+
+
+@pytest.mark.claim("laws-of-the-integral", tolerance="3e-5 in float32")
+def test_laws_hold_in_fog_of_droplets(variant):
+    from realtime.kernels.exact import exact
+    from validation.kernels.rays import wide_rays
+
+    for words in ("mie:2:8", "hg-draine:12"):
+        names = ("unit scaling", "additivity", "camera shift", "intensity")
+        law = {law.name: law for law in laws(exact, wide_rays(256, words, truth=False), names)}
+        assert law["unit scaling"].single == law["intensity"].single == 0
+        for name in ("additivity", "camera shift"):
+            assert law[name].rows > 100
+            assert law[name].single < 3e-5, (words, name)

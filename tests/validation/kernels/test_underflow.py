@@ -30,7 +30,7 @@ def rays(*given):
 
 def faults(cases, J, precision="single"):
     """Return what values break of the bar, if the other precision is right."""
-    values = {one: Values(cases.value, {}, np.ones(len(J), dtype=bool)) for one in ("single", "double")}
+    values = {precision: Values(cases.value, {}, np.ones(len(J), dtype=bool)) for precision in ("single", "double")}
     values[precision] = replace(values[precision], J=np.asarray(J, dtype=np.float64))
     return _broken(Bar(), GENERATED, cases, values)
 
@@ -91,7 +91,7 @@ def test_units_of_a_certified_value_do_not_matter():
 def test_errors_leave_the_allowance_out():
     cases = rays(FLUSHED[0])
     values = Values(np.zeros(1), {}, np.ones(1, dtype=bool))
-    found = errors_by_group(cases, values, "single", {"all": np.ones(1, dtype=bool)})["all"]
-    assert found.max == 0.0
+    error = errors_by_group(cases, values, "single", {"all": np.ones(1, dtype=bool)})["all"]
+    assert error.max == 0.0
     twice = errors_by_group(cases, replace(values, J=8 * cases.value), "single", {"all": np.ones(1, dtype=bool)})["all"]
     assert 3 < twice.max < 7

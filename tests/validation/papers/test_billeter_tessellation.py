@@ -190,7 +190,7 @@ def figure_row(entry: FigureEntry, milliseconds: float, error: float, map_error:
 
 @pytest.mark.claim("conclusions-follow")
 def test_conclusions_about_marching_compare_each_form_of_the_volume_by_itself():
-    entries = {(one.where, one.volume): one for one in FIGURES}
+    entries = {(figure.where, figure.volume): figure for figure in FIGURES}
     rows = [
         figure_row(entries["Fig. 7b", None], 101.0, 0.05, 0.01),
         figure_row(entries["Fig. 7c", "walk"], 10.0, 0.05, 1e-4),
@@ -208,16 +208,16 @@ def test_conclusions_about_marching_compare_each_form_of_the_volume_by_itself():
 
 @pytest.mark.claim("conclusions-follow")
 def test_a_marcher_that_sums_the_integrand_is_not_the_one_of_the_paper():
-    marchers = [one for one in FIGURES if one.method == "ray-march"]
-    assert {dict(one.parameters).get("sum") for one in marchers if one.fps} == {"transitions"}
-    volume = next(one for one in FIGURES if one.where == "Fig. 7c" and one.volume == "mesh")
-    summed = next(one for one in marchers if one.where == "peer")
+    marchers = [figure for figure in FIGURES if figure.method == "ray-march"]
+    assert {dict(figure.parameters).get("sum") for figure in marchers if figure.fps} == {"transitions"}
+    volume = next(figure for figure in FIGURES if figure.where == "Fig. 7c" and figure.volume == "mesh")
+    summed = next(figure for figure in marchers if figure.where == "peer")
     assert conclusions([figure_row(volume, 10.0, 0.1, 0.1), figure_row(summed, 20.0, 0.1, 0.1)], []) == []
 
 
 @pytest.mark.claim("conclusions-follow")
 def test_the_ratio_of_map_sizes_mixes_no_forms_of_the_volume():
-    entries = {(one.where, one.volume): one for one in FIGURES}
+    entries = {(figure.where, figure.volume): figure for figure in FIGURES}
     times = {("Fig. 6a", "mesh"): 10, ("Fig. 6c", "mesh"): 50, ("Fig. 6a", "walk"): 1, ("Fig. 6c", "walk"): 2}
     mesh, walk = conclusions([figure_row(entries[key], ms, 0.1, 0.1) for key, ms in times.items()], [])
     assert "a frame of the mesh takes 5 times as long, published: 9.2." in mesh
@@ -281,7 +281,7 @@ def test_command_prints_the_figures(variant, quick, monkeypatch, capfd):
 
 
 def test_what_is_not_measured_is_printed_with_its_reason():
-    peer = next(one for one in FIGURES if one.method == "min-max")
+    peer = next(figure for figure in FIGURES if figure.method == "min-max")
     figures = [FigureRow(peer, (8, 8), missing="no room")]
     table = [TableRow(TABLE[1], 4096, "static", (8, 8), missing="too slow")]
     out = "".join(text(drawn) for drawn in billeter_tables(billeter_data(figures, table)))
@@ -311,13 +311,13 @@ def test_wrong_options_are_refused(arguments, words, capfd):
 
 def test_rows_by_tiles_are_compared_with_their_own_and_are_not_those_of_the_paper():
     """A marcher, whose frames are shorter by tiles, is not the one that the paper's conclusion is about."""
-    entries = [one for one in FIGURES if one.scene == "colonnade" and one.method == "ray-march"]
-    assert [one.where for one in entries] == ["Fig. 7a", "Fig. 7b", "peer", "peer", TILES]
-    volume = next(one for one in FIGURES if one.where == "Fig. 7c" and one.upright)
+    entries = [figure for figure in FIGURES if figure.scene == "colonnade" and figure.method == "ray-march"]
+    assert [figure.where for figure in entries] == ["Fig. 7a", "Fig. 7b", "peer", "peer", TILES]
+    volume = next(figure for figure in FIGURES if figure.where == "Fig. 7c" and figure.upright)
     rows = [
-        figure_row(one, ms, 0.1, 0.1)
-        for one, ms in ((volume, 100.0), (entries[1], 500.0), (entries[3], 900.0), (entries[4], 300.0))
+        figure_row(figure, ms, 0.1, 0.1)
+        for figure, ms in ((volume, 100.0), (entries[1], 500.0), (entries[3], 900.0), (entries[4], 300.0))
     ]
-    found = conclusions(rows, [])
-    assert any("marching with 400 samples takes 5 times as long" in one for one in found)
-    assert [one for one in found if "corners of tiles" in one and "takes 0.33 of the time" in one]
+    sentences = conclusions(rows, [])
+    assert any("marching with 400 samples takes 5 times as long" in sentence for sentence in sentences)
+    assert [words for words in sentences if "corners of tiles" in words and "takes 0.33 of the time" in words]

@@ -68,7 +68,7 @@ def test_every_entry_is_measured_with_every_kernel(variant):
 @pytest.mark.claim("biri-as-published")
 @pytest.mark.parametrize("scene", ["sphere-spot", "three-media", "clutter"])
 def test_a_row_as_published_has_all_that_the_paper_has(variant, scene):
-    entry = next(one for one in PUBLISHED if one.scene == scene)
+    entry = next(row for row in PUBLISHED if row.scene == scene)
     chosen = as_published("taylor", white=0.7, cone=entry.cone)
     expected = {"order": "paper", "evaluation": "vertex", "buffer": "8bit", "white": 0.7, "cone": entry.cone}
     assert dict(chosen.parameters) == expected

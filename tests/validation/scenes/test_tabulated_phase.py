@@ -65,3 +65,53 @@ def test_methods_and_truth_see_the_same_fog_of_droplets(variant):
     truth = quadrature_image(read_truth(scene), samples=16).airlight.reshape(-1)
     frame = np.array(render(scene, "unshadowed").airlight, dtype=np.float64).T.reshape(-1)
     assert np.sort(frame) == pytest.approx(np.sort(truth), rel=2e-3)
+
+
+def test_bounded_fog_of_droplets(variant):
+    import mitsuba as mi
+
+    from reference.quadrature.image import quadrature_image
+    from reference.scene.read import read_truth
+    from tests.helpers.light_frames import render
+    from tests.helpers.scenes import bounded_medium
+    from validation.scenes.parts import camera, point_light, tabulated_phase
+
+    ball = {"type": "sphere", "center": [0.4, 1.0, 0.3], "radius": 0.9}
+    scene = mi.load_dict(
+        {
+            "type": "scene",
+            "cloud": bounded_medium(ball, 0.8, (1.0, 0.9, 0.8), phase=tabulated_phase("mie", 2001)),
+            "light": point_light((0.7, 3.1, 0.4), (5.0, 4.0, 3.0)),
+            "camera": camera((0.1, -2.3, 0.2), (0.6, 1.9, 0.3), fov=47.0, size=(8, 6), in_fog=False),
+        }
+    )
+    truth = np.sort(quadrature_image(read_truth(scene), samples=16).airlight.reshape(-1))
+    frame = np.sort(np.array(render(scene, "unshadowed").airlight, dtype=np.float64).reshape(-1))
+    assert truth.max() > 0.1
+    # Three nodes for each 0.8 degrees.
+    assert frame == pytest.approx(truth, rel=3e-3)
+
+
+@pytest.mark.claim("droplets-in-scenes", tolerance="1 % bias of Mitsuba's sampling, by its own interval")
+@pytest.mark.statistical
+def test_mitsuba_sees_the_same_fog_of_droplets(variant):
+    from validation.estimates.agreement import agreements
+    from validation.scenes.parts import tabulated_phase
+
+    margins = {"single-scatter": 0.01, "volpath": 0.01}
+    agreed = agreements(fog_of(tabulated_phase("mie", 2001), size=(16, 12)), margins, batches=2048)
+    assert len(agreed) == len(margins)
+    for estimator, agreement in agreed.items():
+        assert agreement.statistics.equivalent, estimator
+
+
+def test_a_mixture_that_no_reader_carries_is_refused_by_name(variant):
+    from realtime.errors import InputError as RealtimeInputError
+    from realtime.scene.read_scene import read_scene
+    from reference.scene.read import read_truth
+
+    lobe = {"type": "hg", "g": 0.5}
+    mixed = {"type": "blendphase", "weight": 0.5, "first": lobe, "second": {"type": "isotropic"}}
+    for read, error in ((read_scene, RealtimeInputError), (read_truth, InputError)):
+        with pytest.raises(error, match="BlendPhaseFunction; wanted one of isotropic, hg, rayleigh, tabphase"):
+            read(fog_of(mixed))

@@ -24,8 +24,8 @@ def render(scene, kernel="exact", *, precision="double", **parameters):
     return render_frame(prepared(read, configuration("shadow-planes", kernel, parameters)))
 
 
-def relative_rmse(one, two):
-    return np.sqrt(np.mean((one - two) ** 2)) / np.mean(two)
+def relative_rmse(values, expected):
+    return np.sqrt(np.mean((values - expected) ** 2)) / np.mean(expected)
 
 
 def caster(centre=(0.55, 0.2, 1.35), radius=0.28):
@@ -58,8 +58,8 @@ def test_the_buffer_holds_surfaces_and_all_lights_pass_by_pass(variant, white):
     for frame in single:
         expected = stored(expected + frame.surface, white)
         expected = stored(expected + frame.airlight, white)
-    found = render({**floor, **lamps}, buffer="8bit", white=white)
-    shown = found.airlight + found.surface
+    frame = render({**floor, **lamps}, buffer="8bit", white=white)
+    shown = frame.airlight + frame.surface
     # A value half way between two steps may fall on either side.
     assert np.mean(np.abs(shown - expected) > 1e-9 * white) < 2e-3
     steps = shown * 255 / white

@@ -123,8 +123,8 @@ def test_agrees_with_the_certified_integral_on_random_rays(variant):
     """
     import mitsuba as mi
 
-    from analytic.integral import integrate_angle
     from analytic.phase import PhaseFunction
+    from tests.helpers.integral_forms import integrate_angle
 
     rng = np.random.default_rng(3)
     light, sigma_t, g = np.array([0.4, -0.3, 0.9]), 0.43, 0.35

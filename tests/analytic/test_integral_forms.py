@@ -8,8 +8,8 @@ import pytest
 
 from analytic.cases import read_cases
 from analytic.errors import InputError
-from analytic.integral import integrate_angle, integrate_distance, integrate_path
 from analytic.phase import PhaseFunction
+from tests.helpers.integral_forms import integrate_angle, integrate_distance, integrate_path
 
 FORMS = [integrate_distance, integrate_angle, integrate_path]
 ISOTROPIC = PhaseFunction("isotropic")

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Lights with extent as the camera sees them: their own radiance through the medium, a layer of its own."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.quadrature.segments import optical_depth
+from reference.scene.area_light import TruthAreaLight
+from reference.scene.read import TruthScene
+from reference.visibility.line_crossings import half_chord
+
+Array = NDArray[np.float64]
+
+_OWN = 1e-4  # relative: a surface this close to a light is the light's own, or touches it
+
+
+def emitted_light(truth: TruthScene, distance: Array) -> Array:
+    """Return the radiance of lights with extent that rays meet before the visible surface, (rays, 3) [W/(m^2 sr)].
+
+    Parameters
+    ----------
+    truth
+        The scene.
+    distance
+        To the visible surface, (rays,), infinite where there is none [m].
+
+    Notes
+    -----
+    Valid for the side that emits; a light of material `null` is seen with what is behind it, a black one ends the ray.
+    """
+    total = np.zeros((len(distance), 3))
+    for light in truth.area:
+        at = _distance(light, truth.origin, truth.direction)
+        rows = np.flatnonzero(at <= distance * (1 + _OWN))
+        depth = optical_depth(truth, truth.origin, truth.direction[rows], np.zeros(len(rows)), at[rows])
+        total[rows] += light.radiance * np.exp(-depth)
+    return total
+
+
+def _distance(light: TruthAreaLight, origin: Array, direction: Array) -> Array:
+    """Return where rays meet the side of a light that emits, (rays,) [m]; NaN where they do not."""
+    away = light.centre - origin
+    if light.kind == "sphere":
+        middle = direction @ away
+        miss = np.linalg.norm(away - middle[:, None] * direction, axis=1)
+        at = middle - half_chord(light.radius, miss)
+        return np.where((miss < light.radius) & (at > 0), at, np.nan)
+    rate = direction @ light.normal
+    with np.errstate(divide="ignore", invalid="ignore"):
+        at = (away @ light.normal) / rate
+        x, y = ((at[:, None] * direction - away) @ light.frame[:2].T).T
+    a, b = light.half
+    inside = (np.abs(x) <= a) & (np.abs(y) <= b) if light.kind == "rectangle" else x * x + y * y <= a * a
+    return np.where((rate < 0) & (at > 0) & inside, at, np.nan)

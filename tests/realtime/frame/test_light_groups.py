@@ -1,0 +1,243 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Lights with extent in frames: every method renders their points, one recording for all, and frames follow moves."""
+
+from dataclasses import replace
+
+import drjit as dr
+import numpy as np
+import pytest
+
+from realtime.area_lights.shape import turned_area_light
+from realtime.frame.incremental import next_frame
+from realtime.frame.recorded import Frozen
+from realtime.frame.renderer import frame_renderer, image_frame, light_groups, render_frame, run_stages
+from realtime.kernels.registry import KERNELS
+from realtime.methods.interface.layers import Layers
+from realtime.methods.interface.method import Method
+from realtime.methods.registry import METHODS
+from realtime.scene.animate import with_area_lights
+from realtime.scene.light_points import with_light_points
+from realtime.scene.read_scene import read_scene
+from tests.helpers.area_lamps import area_lamp, lit_by
+from tests.helpers.scenes import tiny_scene
+from validation.scenes.loading import load_scene
+from validation.scenes.parts import rotation
+
+SIZE = (32, 24)
+#: Methods with what brings them close to the truth, and the relative RMSE of airlight that remains.
+CLOSE = {
+    "ray-march": ({"steps": 300}, 1e-3),
+    "ray-march transitions": ({"steps": 300, "sum": "transitions"}, 3e-3),
+    "ray-march map": ({"steps": 300, "shadow": "map", "map": 1024}, 5e-3),
+    "shadow-planes": ({}, 1e-3),
+    "shadow-planes adaptive": ({"tolerance": 0.005}, 5e-3),
+    "light-volumes": ({"map": 1024}, 3e-3),
+    "light-volumes mesh": ({"map": 512, "evaluation": "mesh"}, 2e-2),
+    "min-max": ({"map": 1024, "sampling": "pixels", "slices": 400}, 2e-2),
+}
+
+
+def scene_of(precision="single", **changes):
+    import mitsuba as mi
+
+    return read_scene(mi.load_dict(lit_by(**({"changes": {"size": SIZE}} | changes))), precision)
+
+
+def renderer_of(scene, name, **parameters):
+    method = METHODS[name.split()[0]]
+    return frame_renderer(scene, method, kernel=KERNELS["exact"].function, **parameters)
+
+
+def relative(values, wanted):
+    return float(np.sqrt(np.mean((values - wanted) ** 2)) / wanted.mean())
+
+
+@pytest.fixture(scope="module")
+def one_by_one(variant):
+    """Frames of each of five points as the only light, added up: what every method must come close to."""
+    airlight = surface = 0.0
+    scene = scene_of()
+    lit = with_light_points(scene, 5, "sobol")
+    for point in lit.lights:
+        alone = replace(scene, lights=(replace(point, source=None),), area_lights=())
+        frame = render_frame(renderer_of(alone, "ray-march", steps=2000))
+        airlight, surface = airlight + frame.airlight, surface + frame.surface
+    return airlight, surface
+
+
+@pytest.mark.parametrize("name", CLOSE)
+def test_every_method_renders_the_points_of_a_light(variant, one_by_one, name):
+    parameters, bound = CLOSE[name]
+    frame = render_frame(renderer_of(scene_of(), name, points=5, pattern="sobol", **parameters))
+    assert relative(frame.airlight, one_by_one[0]) < bound
+    assert relative(frame.surface, one_by_one[1]) < (0.1 if name.startswith("light-volumes") else 1e-4)
+
+
+def test_without_shadows_the_sum_is_that_of_all_points_at_once(variant):
+    scene = scene_of()
+    lit = replace(with_light_points(scene, 5, "grid"), area_lights=())
+    wanted = render_frame(renderer_of(lit, "unshadowed"))
+    frame = render_frame(renderer_of(scene, "unshadowed", points=5, pattern="grid"))
+    np.testing.assert_allclose(frame.airlight, wanted.airlight, rtol=1e-5)
+    np.testing.assert_allclose(frame.surface, wanted.surface, rtol=1e-5, atol=1e-7)
+
+
+def test_points_of_a_small_light_are_a_point_light(variant):
+    """Beside a cosine: of a small sphere the points together shine like a point light of pi R^2 Le."""
+    import mitsuba as mi
+
+    radius = 0.003
+    place = [0.83, 0.61, 1.97]
+    intensity = [value * np.pi * radius**2 for value in (5.3, 4.1, 2.9)]
+    lamp = {"type": "point", "position": place, "intensity": {"type": "rgb", "value": intensity}}
+    wanted = render_frame(renderer_of(read_scene(mi.load_dict(lit_by() | {"lamp": lamp})), "shadow-planes"))
+    small = scene_of(kind="sphere", size=radius, changes={"size": (16, 12)})
+    frame = render_frame(renderer_of(small, "shadow-planes", points=256, pattern="ring"))
+    # The lamp itself is seen in one pixel at most, where a surface ends the ray.
+    seen = np.isclose(frame.distance, wanted.distance, rtol=1e-4)
+    assert (~seen).sum() <= 2
+    assert relative(frame.airlight[seen], wanted.airlight[seen]) < 1e-2
+    assert relative(frame.surface[seen], wanted.surface[seen]) < 1e-2
+
+
+@pytest.mark.parametrize("name", ["fence", "penumbra-plane"])
+def test_a_larger_number_of_points_converges(variant, name):
+    """In `fence` sixteen points are within 1e-2 and 64 within 2e-3, the bars of the design."""
+    scene = read_scene(load_scene(name, SIZE).scene)
+    wanted = render_frame(renderer_of(scene, "shadow-planes", points=512))
+    frames = [render_frame(renderer_of(scene, "shadow-planes", points=points)) for points in (4, 16, 64)]
+    airlight, surface = (
+        [relative(getattr(frame, layer), getattr(wanted, layer)) for frame in frames]
+        for layer in ("airlight", "surface")
+    )
+    assert airlight[0] > 2 * airlight[1] > 4 * airlight[2]
+    assert surface[0] > surface[1] > surface[2]
+    assert airlight[1] < (1e-2 if name == "fence" else 2e-2)
+    assert airlight[2] < (2e-3 if name == "fence" else 4e-3)
+
+
+def test_all_points_share_one_recording(variant):
+    """What is recorded, and how often, does not depend on the number of points."""
+    recorded = {}
+    for points in (2, 12):
+        renderer = renderer_of(scene_of(), "shadow-planes", points=points)
+        render_frame(renderer)
+        (group, *_) = light_groups(renderer)
+        stages = [
+            stage for stage in (group.surface, group.shade, group.cull, group.render) if isinstance(stage, Frozen)
+        ]
+        recorded[points] = [stage.n_recordings for stage in stages]
+        assert len(light_groups(renderer)) == points
+    assert recorded[2] == recorded[12] == [1, 1, 1, 1]
+
+
+def test_ordinary_lights_and_several_lamps_add_up(variant):
+    import mitsuba as mi
+
+    def frame_of(**lights):
+        scene = lit_by() | {"lamp": None} | lights
+        read = read_scene(mi.load_dict({name: entry for name, entry in scene.items() if entry is not None}))
+        return render_frame(renderer_of(read, "shadow-planes", points=3, pattern="ring"))
+
+    lamps = {
+        "lamp": tiny_scene()["lamp"],
+        "window": area_lamp("disk", size=0.2, material={"type": "null"}),
+        "other": area_lamp("rectangle", material={"type": "null"}) | {"to_world": _elsewhere()},
+    }
+    each = [frame_of(**{name: lamp}) for name, lamp in lamps.items()]
+    together = frame_of(**lamps)
+    np.testing.assert_allclose(together.airlight, sum(frame.airlight for frame in each), rtol=1e-5)
+    np.testing.assert_allclose(together.surface, sum(frame.surface for frame in each), rtol=1e-5, atol=1e-6)
+
+
+def _elsewhere():
+    import mitsuba as mi
+
+    return mi.ScalarTransform4f().look_at([-1.3, -0.4, 1.7], [0.1, 0.1, 0.5], [0, 0, 1]).scale(0.2)
+
+
+def test_a_black_lamp_shadows_others_and_not_itself(variant):
+    """A disk before the point light of the scene: what is behind it gets its own light alone."""
+    import mitsuba as mi
+
+    def frames(material):
+        screen = area_lamp("disk", size=0.3, material=material) | {
+            "to_world": mi.ScalarTransform4f().look_at([0.75, 0.6, 1.5], [0.1, 0.1, -3.0], [0, 1, 0]).scale(0.3)
+        }
+        scene = read_scene(
+            mi.load_dict(lit_by(changes={"size": SIZE}) | {"lamp": tiny_scene()["lamp"], "screen": screen})
+        )
+        return [
+            render_frame(renderer_of(scene, name, points=2, **parameters))
+            for name, parameters in (("shadow-planes", {}), ("ray-march", {"steps": 1000}))
+        ]
+
+    planes, marched = frames(None)
+    assert relative(planes.airlight, marched.airlight) < 4e-3  # a polygon stands for the disk
+    clear, _ = frames({"type": "null"})
+    assert planes.airlight.mean() < 0.97 * clear.airlight.mean()
+
+
+def test_what_a_method_shows_of_no_light_is_added_once(variant):
+    def render(view, state, lists, *, kernel, parameters):
+        light = sum(light.intensity for light in view.lights) * view.distance * 0 + sum(
+            light.intensity for light in view.lights
+        )
+        return Layers(light, transmittance=type(view.distance)(0.5), background=type(view.medium.albedo)(0.25))
+
+    method = Method("veil", render, "a veil", "none", uses_kernel=lambda parameters: False)
+    scene = scene_of(changes={"size": (16, 12), "ball": None, "floor": None})
+    frame = render_frame(frame_renderer(scene, method, points=4))
+    np.testing.assert_allclose(frame.surface, 0.125, rtol=1e-6)
+    light = scene.area_lights[0]
+    np.testing.assert_allclose(frame.airlight[0, 0], light.radiance * light.area, rtol=1e-5)
+    at_once = replace(method, lights_at_once=lambda parameters: True)
+    again = render_frame(frame_renderer(scene, at_once, points=4))
+    np.testing.assert_allclose(again.surface, frame.surface, rtol=1e-6)
+    np.testing.assert_allclose(again.airlight, frame.airlight, rtol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["unshadowed", "ray-march", "shadow-planes", "light-volumes"])
+@pytest.mark.parametrize("material", [None, {"type": "null"}])
+def test_the_next_frame_is_that_of_the_moved_light(variant, name, material):
+    parameters = {"steps": 20} if name == "ray-march" else {"map": 64} if name == "light-volumes" else {}
+    scene = scene_of(kind="disk", size=0.31, material=material, changes={"size": SIZE})
+    renderer = renderer_of(scene, name, points=3, **parameters)
+    about = np.array([0.1, 0.1, 0.0])
+    still = {"camera_moved": False, "geometry_moved": False, "light_moved": False}
+    stages, cache = next_frame(renderer, scene, None, **still)
+    np.testing.assert_array_equal(image_frame(renderer, stages).airlight, render_frame(renderer).airlight)
+    again, cache = next_frame(renderer, scene, cache, **still)
+    np.testing.assert_array_equal(np.array(again[2]), np.array(stages[2]))
+    turned = turned_area_light(scene.area_lights[0], about, rotation((0, 0, 1), 40.0))
+    moved = with_area_lights(scene, [turned])
+    stages, cache = next_frame(renderer, moved, cache, **(still | {"light_moved": True}))
+    afresh = renderer_of(moved, name, points=3, **parameters)
+    wanted = run_stages(afresh, afresh.prepare(moved))
+    for got, expected in zip(stages, wanted, strict=True):
+        np.testing.assert_allclose(np.array(got), np.array(expected), rtol=1e-5, atol=1e-6)
+    assert not np.allclose(np.array(stages[2]), np.array(again[2]), rtol=1e-2)
+    with_area_lights(scene, scene.area_lights)
+
+
+def test_more_points_than_are_kept_cost_no_more_memory_and_agree(variant, monkeypatch):
+    from realtime.frame import incremental, renderer
+
+    scene = scene_of(changes={"size": (16, 12)})
+    many = renderer_of(scene, "shadow-planes", points=7)
+    wanted = render_frame(many).airlight
+    for module in (incremental, renderer):
+        monkeypatch.setattr(module, "MOST_KEPT", 3)
+    np.testing.assert_array_equal(render_frame(many).airlight, wanted)
+    still = {"camera_moved": False, "geometry_moved": False, "light_moved": False}
+    stages, cache = next_frame(many, scene, None, **still)
+    assert [state is None for state in cache.state] == [False] * 3 + [True] * 4
+    stages, _ = next_frame(many, scene, cache, **still)
+    np.testing.assert_array_equal(image_frame(many, stages).airlight, wanted)
+
+
+def test_a_sphere_of_one_point_and_double_precision(variant):
+    scene = scene_of("double", kind="sphere", size=0.2, changes={"size": (16, 12)})
+    frame = render_frame(renderer_of(scene, "shadow-planes", points=1))
+    assert np.isfinite(frame.airlight).all()
+    assert dr.itemsize_v(type(with_light_points(scene, 1, "ring").lights[0].position.x)) == 8

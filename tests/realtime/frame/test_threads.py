@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A frame does not hang on how many threads draw it. Workers of a test run have one each: this has a process apart."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[3]
+
+PROGRAM = """
+from reports.machine.environment import activate
+activate()
+import drjit as dr
+import numpy as np
+from realtime.frame.renderer import render_frame
+from realtime.methods.registry import METHODS
+from realtime.scene.read_scene import read_scene
+from validation.configurations.methods import configuration, prepared
+from validation.scenes.loading import load_scene
+
+# As many pixels as several blocks of work have, so that each of the threads gets some.
+scene = read_scene(load_scene("sphere-spot", (128, 96)).scene)
+for method in METHODS.values():
+    chosen = configuration(method.name, None, {"map": 128} if "map" in method.defaults else {})
+    frames = []
+    for threads in (2, 1):
+        dr.set_thread_count(threads)
+        assert dr.thread_count() == threads
+        frames.append(render_frame(prepared(scene, chosen)))
+    two, one_thread = frames
+    assert np.isfinite(two.airlight).all() and two.airlight.mean() > 0, method.name
+    for layer in ("airlight", "surface", "distance"):
+        np.testing.assert_array_equal(getattr(two, layer), getattr(one_thread, layer), f"{method.name}: {layer}")
+print("the same")
+"""
+
+
+def test_two_threads_draw_what_one_does():
+    done = subprocess.run([sys.executable, "-c", PROGRAM], cwd=ROOT, capture_output=True, text=True, timeout=600)
+    assert done.stdout == "the same\n", done.stderr

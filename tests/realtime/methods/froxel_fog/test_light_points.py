@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Lights with extent in froxels: one loop over the points of a table is the sum over the lights one by one.
+
+Protects the claim on the order of convergence in `penumbra-plane`.
+"""
+
+import numpy as np
+import pytest
+
+from tests.helpers.area_lamps import lit_by
+from tests.helpers.scenes import bounded_medium
+from tests.realtime.methods.froxel_fog.test_method import relative_rmse
+
+
+def frame(scene, method="froxel-fog", **parameters):
+    from realtime.frame.renderer import frame_renderer, render_frame
+    from realtime.kernels.registry import KERNELS
+    from realtime.methods.registry import METHODS
+
+    return render_frame(frame_renderer(scene, METHODS[method], kernel=KERNELS["exact"].function, **parameters))
+
+
+def read(scene):
+    import mitsuba as mi
+
+    from realtime.scene.read_scene import read_scene
+
+    return read_scene(mi.load_dict(scene))
+
+
+@pytest.mark.claim("froxel-order", tolerance="at least 0.7 from four grids, a factor of eight apart")
+def test_the_error_falls_with_the_grid_under_a_light_with_extent(variant):
+    from realtime.scene.read_scene import read_scene
+    from validation.scenes.loading import load_scene
+
+    scene = read_scene(load_scene("penumbra-plane", (80, 60)).scene)
+    exact = frame(scene, "shadow-planes", points=4).airlight
+    sizes = np.array([8, 16, 32, 64])
+    errors = [
+        relative_rmse(frame(scene, points=4, width=2 * n, height=n, slices=n).airlight, exact) for n in sizes.tolist()
+    ]
+    assert -np.polyfit(np.log(sizes), np.log(errors), 1)[0] > 0.7, errors
+    assert errors[-1] < 0.05
+
+
+def test_one_point_is_the_sum_of_the_table_and_of_a_light_alone(variant):
+    """A table is read in a loop; a light point that no table holds goes the way of ordinary lights."""
+    import drjit as dr
+    import mitsuba as mi
+
+    from realtime.methods.froxel_fog.light_points import tabulated
+    from realtime.scene.light_points import with_light_points
+
+    lights = with_light_points(read(lit_by("sphere")), 7, "sobol").lights
+    (table,) = tabulated(lights)
+    assert (table.source, table.count) == (0, 7)
+    for number, light in enumerate(lights):
+        point = table.point(mi.UInt32(number), lights[0])
+        for mine, own in ((point.position, light.position), (point.normal, light.normal)):
+            np.testing.assert_array_equal(np.array(mine).ravel(), np.array(own).ravel())
+        assert float(point.facing.lift[0]) == float(light.facing.lift[0])
+    assert dr.width(table.across) == 4 * 7
+
+
+@pytest.mark.parametrize("kind", ["rectangle", "disk", "sphere"])
+def test_surfaces_are_those_of_other_methods_and_airlight_nearly(variant, kind):
+    scene = read(lit_by(kind))
+    froxels = frame(scene, points=3, width=32, height=24, slices=96, shadow="ray")
+    marched = frame(scene, "ray-march", points=3, steps=400)
+    np.testing.assert_allclose(froxels.surface, marched.surface, rtol=1e-4, atol=1e-5 * marched.surface.mean())
+    relative = np.abs(froxels.airlight - marched.airlight) / marched.airlight.mean()
+    assert np.median(relative) < 0.03
+    mapped = frame(scene, points=3, width=32, height=24, slices=96, map=512)
+    assert np.median(np.abs(mapped.airlight - froxels.airlight) / froxels.airlight.mean()) < 0.003
+
+
+def test_light_points_in_bounded_media_come_one_by_one(variant):
+    fog = bounded_medium({"type": "sphere", "center": [0.1, 0.2, 0.7], "radius": 0.6}, 0.9, (0.9, 0.4, 0.3))
+    scene = lit_by(changes={"fog": None, "mist": fog, "ball": None})
+    scene["sensor"] = {key: entry for key, entry in scene["sensor"].items() if key != "medium"}
+    now = read(scene)
+    froxels = frame(now, points=5, width=32, height=24, slices=96).airlight
+    exact = frame(now, "ray-march", points=5, steps=400).airlight
+    within = exact > 0.3 * exact.max()  # not at the outline of the sphere, which is cut into columns
+    np.testing.assert_allclose(froxels[within].mean(), exact[within].mean(), rtol=0.02)
+    assert np.median(np.abs(froxels[within] / exact[within] - 1)) < 0.03
