@@ -255,3 +255,35 @@ def _clear(beam: Beam, bsdf: Reflection, point: Index, target: Array) -> NDArray
     at = dr.gather(mi.SurfaceInteraction3f, bsdf.interaction, mi.UInt32(point.astype(np.uint32)))
     hidden = beam.shapes.others.ray_test(at.spawn_ray_to(mi.Point3f(target.T)))
     return ~np.array(hidden, dtype=bool)
+
+
+def visible_share(truth: TruthScene, number: int, points: Points, lines: int, *, seed: int = 0) -> Array:
+    """Return the share of a flat light that points see, by replicate, (points, replicates) [1].
+
+    Parameters
+    ----------
+    truth, number
+        The scene and the number of one of its rectangles or disks in `TruthScene.area`.
+    points
+        Points on surfaces.
+    lines
+        Scan lines of each replicate.
+    seed
+        Of their draws.
+
+    Notes
+    -----
+    Valid for shadows of triangles and spheres; points on the dark side see nothing.
+    """
+    light = truth.area[number]
+    _, shapes = before_light(truth, light)
+    seen = facing(light, points)
+    rows = np.flatnonzero(seen.seen)
+    result = np.zeros((len(points.place), REPLICATES))
+    drawn = _lines(_draws(PointPlan(seed=seed), number, len(points.place)), rows, (0, lines))
+    known = scan_lines(light.kind, seen, points, drawn[:3])
+    line, low, high = seen_intervals(light, seen, known, points, shapes)
+    length = known.height[line] * (np.tan(high) - np.tan(low))
+    share = np.bincount(line, length / known.chord[line], len(known.point))
+    np.add.at(result, (known.point, drawn[3]), share / lines)
+    return result

@@ -8,11 +8,11 @@ import typer
 
 from reports.commands.options import Force, listed
 
-PAPERS = ("biri", "billeter")
+PAPERS = ("biri", "billeter", "ali")
 
 
 def published(
-    paper: Annotated[str | None, typer.Option(help="biri or billeter; both by default.")] = None,
+    paper: Annotated[str | None, typer.Option(help="biri, billeter or ali; all by default.")] = None,
     scenes: Annotated[
         str | None, typer.Option(help="Comma-separated scenes of the papers; all that are built in by default.")
     ] = None,
@@ -33,13 +33,14 @@ def published(
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
     markdown: Annotated[bool, typer.Option("--markdown", help="Print tables for a README, dated.")] = False,
 ) -> None:
-    """Measure the results of Biri, Arques, Michelin 2006 and of Billeter, Sintorn, Assarsson 2010 again.
+    """Measure the results of Biri, Arques, Michelin 2006, Billeter, Sintorn, Assarsson 2010 and Ali 2016 again.
 
-    biri: Tables 1 and 2 with `shadow-planes`: share of time by stage, frames a second; with `three-media`, the error of
-    the constant R of section 4.2 by size and depth. billeter: Figures 6 and 7 and
-    Table 1 with `light-volumes` and its peers: frames a second, static against adaptive tessellation, the passes, and
-    which of the paper's conclusions hold here. Each at the published sizes, after the light moved, everything rebuilt
-    or camera rays kept, beside the published figures, with the error of the airlight.
+    biri: Tables 1 and 2 with `shadow-planes`: share of time by stage, frames a second; with `three-media`, the
+    error of the constant R of section 4.2 by size and depth. billeter: Figures 6 and 7 and Table 1 with `light-
+    volumes` and its peers: frames a second, static against adaptive tessellation, the passes, and which of the
+    paper's conclusions hold here. ali: Fig. 5.8 with `soft-shafts` and what goes with it, by errors in the
+    penumbrae and times. Each at the published sizes, after the light moved, everything rebuilt or camera rays kept,
+    beside the published figures, with the error of the airlight.
     """
     from analytic.errors import InputError
     from reports.commands.maps import parse_map_sizes
@@ -72,6 +73,8 @@ def published(
             data |= _biri(wanted, names, scale=scale, zero_cost=zero_cost, progress=progress)
         if "billeter" in papers:
             data |= _billeter(wanted, names[0], scale=scale, maps=sizes, limit=limit, progress=progress)
+        if "ali" in papers and "fence" in wanted:
+            data |= _ali(scale=scale, progress=progress)
     if json:
         print_json({"environment": describe_environment()} | data)
     else:
@@ -81,6 +84,7 @@ def published(
 def _print(data: dict[str, Any], *, as_markdown: bool) -> None:
     """Print the tables of the papers and what follows from them."""
     from reports.commands.printing import print_heading, print_tables
+    from reports.papers.ali import ali_tables
     from reports.papers.billeter import billeter_tables
     from reports.papers.biri import biri_notes, biri_tables
 
@@ -90,11 +94,23 @@ def _print(data: dict[str, Any], *, as_markdown: bool) -> None:
         print_tables(biri_tables(data), as_markdown=as_markdown)
         for note in biri_notes(data):
             print(f"\n{note}")
+    if "ali" in data:
+        print_tables(ali_tables(data["ali"]), as_markdown=as_markdown)
     if "billeter" in data:
         print_tables(billeter_tables(data["billeter"]), as_markdown=as_markdown)
         if data["billeter"]["conclusions"]:
             print("\nWhat follows:\n")
             print("\n".join(f"- {sentence}" for sentence in data["billeter"]["conclusions"]))
+
+
+def _ali(*, scale: float, progress: Callable) -> dict[str, Any]:
+    """Measure the figures of Ali 2016."""
+    from validation.fidelity.ali_figures import study_data
+    from validation.papers.ali import SIZE, shafts_study
+
+    # Whole tiles of 4 x 4 pixels.
+    size = (4 * max(1, round(0.25 * scale * SIZE[0])), 4 * max(1, round(0.25 * scale * SIZE[1])))
+    return {"ali": study_data(shafts_study(size, progress=progress))}
 
 
 def _wanted_scenes(scenes: str | None, papers: Sequence[str]) -> list[str]:
@@ -106,6 +122,7 @@ def _wanted_scenes(scenes: str | None, papers: Sequence[str]) -> list[str]:
 
     of_paper = {
         "biri": [row.scene for row in PUBLISHED if row.scene in SCENES],
+        "ali": ["fence"],
         "billeter": [figure.scene for figure in FIGURES] + [view.scene for view in TABLE],
     }
     known = list(dict.fromkeys(name for paper in papers for name in of_paper[paper]))

@@ -14,15 +14,17 @@ Read in this order:
 - `kernel_speed.py`: time of kernels against error
 - `map_size.py`: error over the size of the shadow map
 - `methods_table.py`: times and errors of methods
+- `shafts_strip.py`: Fig. 5.8 of Ali 2016 in our scene
 - `paper_images.py`: the pictures of the papers in our scenes
 - `phase_functions.py`: phase functions of droplets and what stands in for them
 - `polynomials.py`: Biri's polynomials
 - `published.py`: frames a second beside the papers
+- `slab_orders.py`: a slab by order of scattering
 - `stages.py`: shares of the stages of a frame
 - `strip.py`: images with insets and errors
 - `z_distribution.py`: standardised errors of the estimators
 
 May import: `analytic`, `realtime.kernels`, `reference.storage`, `reports.data`, `reports.machine`, `reports.papers`,
 `reports.plotting`, `reports.tables`, `validation.configurations`, `validation.estimates`, `validation.frames`,
-`validation.fidelity`, `validation.kernels`, `validation.papers`, `validation.scenes`.
+`validation.fidelity`, `validation.kernels`, `validation.papers`, `validation.scenes`, `validation.slab`.
 """

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from realtime.frame.renderer import Frame
 from reference.monte_carlo.batches import LARGEST_SEED, LAYERS, Batches, seed_ranges
+from reference.quadrature.light_points import REPLICATES
 from reference.quadrature.ray_values import TruthImage
 from reference.quadrature.surface import surface_hits
 from reference.scene.read import read_truth
@@ -57,7 +58,10 @@ def layered_truth(name: str, truth: TruthImage) -> Image:
     layers = {"airlight": truth.airlight, "airlight_bound": truth.airlight_bound, "surface": truth.surface}
     extent = {"airlight_se": truth.airlight_se, "surface_se": truth.surface_se, "emitted": truth.emitted}
     layers |= {layer: values for layer, values in extent.items() if values is not None}
-    return Image(layers, truth.distance, {"airlight:scene": name, "airlight:estimator": "quadrature"})
+    made: dict[str, str | int | float] = {"airlight:scene": name, "airlight:estimator": "quadrature"}
+    if truth.airlight_se is not None:
+        made["airlight:batches"] = REPLICATES
+    return Image(layers, truth.distance, made)
 
 
 def layered_frame(name: str, chosen: Configuration, frame: Frame) -> Image:

@@ -21,11 +21,13 @@ Read in this order:
 - `scattering.py`: ambient fog against multiple scattering
 - `motion.py`: what moves, and numbers of triangles
 - `biri_tables.py`: the tables that rows of Biri need
+- `ali_figures.py`: R1 to R4 of Ali 2016 and what goes with them
 - `billeter_tables.py`: the figures and the table that rows of Billeter need
 - `paper_images.py`: the pictures of the papers again
 - `biri.py`: the rows of Biri, Arques, Michelin 2006
 - `billeter.py`: the rows of Billeter, Sintorn, Assarsson 2010
 - `bouthors.py`: the rows of Bouthors, Neyret, Max, Bruneton, Crassin 2008
+- `ali.py`: the rows of Ali 2016
 - `others.py`: the rows of other papers
 - `catalogue.py`: all rows and experiments, and the judged rows of a run
 

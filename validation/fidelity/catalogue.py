@@ -5,7 +5,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from validation.fidelity import billeter, biri, bouthors, others
+from validation.fidelity import ali, billeter, biri, bouthors, others
+from validation.fidelity.ali_figures import ali_figures
 from validation.fidelity.billeter_tables import billeter_tables
 from validation.fidelity.biri_tables import biri_tables
 from validation.fidelity.droplets import droplets
@@ -24,13 +25,14 @@ from validation.fidelity.tessellation import tessellation
 PAPERS: Mapping[str, str] = {
     "biri": "Biri, Arques, Michelin 2006, Real time rendering of atmospheric scattering and volumetric shadows",
     "billeter": "Billeter, Sintorn, Assarsson 2010, Real time volumetric shadows using polygonal light volumes",
+    "ali": "Ali 2016, Rendering of light shaft and shadow for indoor environments (reconstructed from captions)",
     "bouthors": "Bouthors, Neyret, Max, Bruneton, Crassin 2008, Interactive multiple anisotropic scattering in clouds",
     "sun": "Sun, Ramamoorthi, Narasimhan, Nayar 2005, A practical analytic single scattering model",
     "pegoraro": "Pegoraro, Parker 2009, An analytical solution to single scattering in homogeneous participating media",
     "chen": "Chen, Baran, Durand, Jarosz 2011, Real-time volumetric shadows using 1D min-max mipmaps",
 }
 
-ROWS: tuple[Row, ...] = (*biri.ROWS, *billeter.ROWS, *bouthors.ROWS, *others.ROWS)
+ROWS: tuple[Row, ...] = (*biri.ROWS, *billeter.ROWS, *bouthors.ROWS, *ali.ROWS, *others.ROWS)
 
 
 @dataclass(frozen=True)
@@ -65,6 +67,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {
     "motions": Experiment(motions, 15.0),
     "triangles": Experiment(triangles, 15.0),
     "biri tables": Experiment(biri_tables, 90.0),
+    "ali figures": Experiment(ali_figures, 60.0, report=False),
     "billeter tables": Experiment(billeter_tables, 150.0, report=False),
 }
 

@@ -22,7 +22,8 @@ With L = albedo sigma_t / (4 pi) int I p exp(-sigma_t (x + r)) / r^2 dx, summed 
 - An absorbing medium has no airlight and dims a surface by exp(-sigma_t path); the path through a sphere of radius R is
   a chord of length 2 sqrt(R^2 - b^2), b the distance of its centre from the ray.
 - A light in a closed box gives exactly nothing outside.
-- What directional lights obey is in `validation.known_answers.directional`.
+- What directional lights obey is in `validation.known_answers.directional`, lights with extent in
+  `validation.known_answers.area_lights`.
 
 Scale factors are powers of two and coordinates multiples of 1/1024, so that float32 scenes obey the laws exactly, too.
 Monte Carlo estimators are held against them with the same random numbers on both sides.
@@ -53,6 +54,7 @@ from validation.certified.model import (
     mitsuba_dict,
 )
 from validation.certified.scenes import fog_scenes
+from validation.known_answers.area_lights import area_answers
 from validation.known_answers.directional import directional_answers
 from validation.known_answers.record import ESTIMATORS, EXACT, FLOAT32, KnownAnswer, largest_difference, layers
 
@@ -72,7 +74,7 @@ def known_answers() -> list[KnownAnswer]:
     quadrature = (lights_add_up, turned, moved, mirrored, vacuum_limit, vacuum, fluence, absorbing_medium)
     answers += [law() for law in quadrature]
     answers += [absorbing_sphere(estimator) for estimator in ("quadrature", "single-scatter")]
-    return answers + directional_answers()
+    return answers + directional_answers() + area_answers()
 
 
 def albedo_linear(estimator: str = "quadrature") -> KnownAnswer:

@@ -7,7 +7,8 @@ Read in this order:
 - `constant_distance.py`: how wrong the constant R of their section 4.2 is, by size and depth;
 - `billeter_images.py`: Figures 6 and 7 of Billeter, Sintorn, Assarsson 2010;
 - `billeter_tessellation.py`: their Table 1;
-- `billeter_conclusions.py`: which of their conclusions hold here.
+- `billeter_conclusions.py`: which of their conclusions hold here;
+- `ali.py`: the figures of Ali 2016 that captions describe.
 
 May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.methods`, `realtime.scene`,
 `realtime.shadow_maps`, `realtime.tiles`, `reference.quadrature`, `reference.scene`, `validation.configurations`,

@@ -47,7 +47,13 @@ from realtime.methods.soft_shafts.light_sources import SourceState, frame_at, so
 from realtime.methods.soft_shafts.march import Share, integral_of_light, integral_of_points
 from realtime.methods.soft_shafts.parameters import AUTO, SoftShaftsParameters
 from realtime.methods.soft_shafts.smoothing import smooth_airlight, smooth_share
-from realtime.methods.soft_shafts.surfaces import filter_width, reached_surfaces
+from realtime.methods.soft_shafts.surfaces import (
+    AUTO_WIDTH,
+    AUTO_WIDTH_SHARED,
+    Reached,
+    penumbra_width,
+    reached_surfaces,
+)
 from realtime.numerics.array_types import two_numbers
 from realtime.scene.lights import sources_of
 from realtime.scene.read_scene import Scene
@@ -205,25 +211,34 @@ class _Frame:
         reached = reached_surfaces(whole, state, len(lights), share, p)
         lit = reached.share
         if p.interleave:
-            sums = two_numbers(type(view.distance))(reached.lit, reached.all)
-            averaged = tile_average(sums, self.raster, guides=(self.depth,))
-            lit = dr.select(averaged.y > 0, averaged.x / averaged.y, 1)
-        if p.filter != "none":
-            lit = self._smooth(lit, reached, state, len(lights))
+            lit = self._over_tiles(reached)
+        if p.hd == AUTO:
+            lit = self._smooth_by_width(lit, reached, state, len(lights))
+        elif p.filter != "none":
+            there, levels = dr.isfinite(whole.distance), state.flat and not p.interleave
+            lit = smooth_share(lit, self.raster, there=there, depth=self.depth, points=len(lights), levels=levels, p=p)
         lit = dr.clip(lit, 0, 1)
         dr.eval(lit)
         lit = dr.gather(type(lit), lit, view.pixel)
         return [lit]
 
-    def _smooth(self, lit: Any, reached: Any, state: SourceState, points: int) -> Any:
+    def _over_tiles(self, reached: Reached) -> Any:
+        """Return the share over a tile: the mean of what reaches the surfaces over the mean of all that could."""
+        sums = two_numbers(type(self.view.distance))(reached.lit, reached.all)
+        averaged = tile_average(sums, self.raster, guides=(self.depth,))
+        return dr.select(averaged.y > 0, averaged.x / averaged.y, 1)
+
+    def _smooth_by_width(self, lit: Any, reached: Reached, state: SourceState, points: int) -> Any:
         p, guides = self.parameters, (self.depth,)
-        if p.hd == AUTO:
-            width = filter_width(self.whole, reached, state, self.raster, points=points, guides=guides, most=_MOST_AUTO)
-            dr.eval(lit, width)
-            return separable(lit, self.raster, hd=width, guides=guides, support=2.0, most=_MOST_AUTO)
-        there = dr.isfinite(self.whole.distance)
-        levels = state.flat and not p.interleave
-        return smooth_share(lit, self.raster, there=there, depth=self.depth, points=points, levels=levels, p=p)
+        penumbra = penumbra_width(self.whole, reached, state, self.raster, guides=guides)
+        dr.eval(lit, penumbra)
+        if p.interleave and p.narrow:
+            asked = (lit > 0) & (lit < 1) & (penumbra < p.narrow)
+            own = reached_surfaces(self.whole, state, points, None, p, asked).share
+            lit = dr.select(asked, own, lit)
+            dr.eval(lit)
+        width = dr.clip((AUTO_WIDTH_SHARED if p.interleave else AUTO_WIDTH) / points * penumbra, 0.3, _MOST_AUTO)
+        return separable(lit, self.raster, hd=width, guides=guides, support=2.0, most=_MOST_AUTO)
 
     def _lit(self, number: int, light: int, place: int) -> Callable[[Any], Any]:
         """Return what says whether a light reaches points of the few rays."""

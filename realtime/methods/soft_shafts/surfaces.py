@@ -31,6 +31,8 @@ from realtime.shadow_maps.hemisphere_map import HemisphereMaps
 
 #: c of hd = c w / N: what smooths the staircase of N levels best (`tests/.../test_auto_width.py` fits it again).
 AUTO_WIDTH = 0.4
+#: The same where pixels share the points, whose mean over a tile is no staircase: the least error in `fence`.
+AUTO_WIDTH_SHARED = 0.8
 _SEARCH = 4.0  # how far pixels take the width of a penumbra from their neighbours, a standard deviation [pixels]
 _NEARER = 0.01  # what is this much nearer to the light than a surface, of its own distance, is not that surface
 
@@ -51,9 +53,9 @@ class Reached:
 
 
 def reached_surfaces(
-    view: View, state: SourceState, points: int, share: Share | None, p: SoftShaftsParameters
+    view: View, state: SourceState, points: int, share: Share | None, p: SoftShaftsParameters, asked: Any = True
 ) -> Reached:
-    """Return what of a light with extent reaches the surfaces of a view.
+    """Return what of a light with extent reaches the surfaces of a view, where they are `asked` for.
 
     Parameters
     ----------
@@ -63,9 +65,11 @@ def reached_surfaces(
         See `realtime.methods.soft_shafts.march.integral_of_points`.
     p
         The parameters.
+    asked
+        Which rays are asked for; the others return 0.
     """
     Float = type(view.distance)
-    there = dr.isfinite(view.distance)
+    there = dr.isfinite(view.distance) & asked
     place = view.origin + view.direction * dr.select(there, view.distance, 0)
     if share is not None:
         return Reached(*_of_point(view, state, place, there, share.number, p))
@@ -76,7 +80,7 @@ def reached_surfaces(
 
     _, sums = dr.while_loop(
         state=(mi.UInt32(0), [dr.zeros(Float, dr.width(view.distance)) for _ in range(4)]),
-        cond=lambda number, sums: number < points,
+        cond=lambda number, sums: there & (number < points),
         body=add,
         labels=("number", "sums"),
     )
@@ -113,17 +117,10 @@ def share_is_plain(p: SoftShaftsParameters) -> bool:
     return not p.interleave
 
 
-def filter_width(
-    view: View,
-    reached: Reached,
-    state: SourceState,
-    raster: Raster,
-    *,
-    points: int,
-    guides: tuple[Guide, ...],
-    most: float,
+def penumbra_width(
+    view: View, reached: Reached, state: SourceState, raster: Raster, *, guides: tuple[Guide, ...]
 ) -> Any:
-    """Return hd = c w / N of every pixel [pixels], from `least` = 0.3, which changes nothing, to `most`.
+    """Return how wide the penumbra of a light is about every pixel [pixels], 0 where nothing blocks it.
 
     Parameters
     ----------
@@ -133,12 +130,8 @@ def filter_width(
         The light.
     raster
         The image.
-    points
-        N.
     guides
         Which pixels are alike.
-    most
-        Upper bound [pixels].
     """
     sums = two_numbers(type(view.distance))(reached.near, reached.blocked)
     dr.eval(sums)
@@ -146,4 +139,4 @@ def filter_width(
     near, blocked = separable(sums, raster, hd=_SEARCH, guides=guides, support=2.0)
     mean = dr.select(blocked > 1e-4, near / dr.maximum(blocked, 1e-4), 0)
     pixel = dr.norm(view.camera.left) * dr.select(dr.isfinite(view.distance), view.distance, 1)
-    return dr.clip(AUTO_WIDTH / points * state.width * mean / pixel, 0.3, most)
+    return state.width * mean / pixel

@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 #: Photons of a batch: their arrays fit into the cache of a core.
 BATCH = 25_000
 _FEWEST = 5
+_MOST_COARSE = 64  #: batches there are at least, so that standard errors are known to 9 %
 
 
 @dataclass(frozen=True)
@@ -86,7 +87,7 @@ def slab_estimate(
     sets
         First and last order of each set, the last `math.inf` for a set without end; order 0 is the beam.
     photons
-        At least two; they are walked in batches of at most `BATCH`, at least 20 if there are as many photons.
+        At least two; they are walked in batches of at most `BATCH`, at least 64 if there are as many photons.
     seed
         The same seed gives the same numbers, whatever the number of workers.
     workers
@@ -94,7 +95,7 @@ def slab_estimate(
     progress
         Called with (share done, what).
     """
-    batches = max(math.ceil(photons / BATCH), min(photons, 20))
+    batches = max(math.ceil(photons / BATCH), min(photons, _MOST_COARSE))
     sizes = [photons // batches + (number < photons % batches) for number in range(batches)]
     seeds = np.random.SeedSequence(seed).spawn(batches)
     ranges = [*sets, (0, math.inf), (1, math.inf)]

@@ -31,19 +31,19 @@ def test_the_automatic_width_is_nearly_the_best(variant, levels, width):
 
 
 def test_the_width_of_a_penumbra_follows_from_similar_triangles(variant):
-    """A bar over a floor: hd = c w / N with w = L (d_r - d_b) / d_b, over the size of a pixel there."""
+    """A bar over a floor: w = L (d_r - d_b) / d_b, over the size of a pixel there."""
     import drjit as dr
     import mitsuba as mi
 
     from realtime.image_filters.guides import depth_guide
     from realtime.image_filters.raster import Raster
     from realtime.methods.soft_shafts.light_sources import SourceState
-    from realtime.methods.soft_shafts.surfaces import AUTO_WIDTH, Reached, filter_width
+    from realtime.methods.soft_shafts.surfaces import Reached, penumbra_width
     from realtime.scene.read_scene import read_scene
     from tests.helpers.scenes import tiny_scene
 
     class FrameOf:
-        """What `filter_width` asks of a view."""
+        """What `penumbra_width` asks of a view."""
 
     scene = read_scene(mi.load_dict(tiny_scene(size=(160, 120))))
     view, count = FrameOf(), 160 * 120
@@ -53,6 +53,6 @@ def test_the_width_of_a_penumbra_follows_from_similar_triangles(variant):
     reached = Reached(half, dr.full(mi.Float, 1, count), ratio * (1 - half), 1 - half)
     state = SourceState(None, mi.Float(light), True, None)
     raster, guides = Raster(160, 120), (depth_guide(view.distance, 0.1),)
-    width = np.array(filter_width(view, reached, state, raster, points=3, guides=guides, most=64.0))
+    width = np.array(penumbra_width(view, reached, state, raster, guides=guides))
     pixel = 3.0 * np.linalg.norm(np.array(scene.camera.left).ravel())
-    np.testing.assert_allclose(width, AUTO_WIDTH / 3 * light * ratio / pixel, rtol=1e-4)
+    np.testing.assert_allclose(width, light * ratio / pixel, rtol=1e-4)

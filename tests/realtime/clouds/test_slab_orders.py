@@ -1,0 +1,235 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Claim: the light of a slab by orders agrees with published tables and, summed over all orders, with DISORT."""
+
+import math
+import warnings
+
+import numpy as np
+import pytest
+from PythonicDISORT.pydisort import pydisort
+
+from realtime.clouds.slab_orders.depth_panels import Transport, depth_panels
+from realtime.clouds.slab_orders.moments import SlabOrders, order_sets
+from realtime.clouds.slab_orders.phases import AnglePhase, HenyeyGreensteinPhase, SeriesPhase, tabulated_phase
+from realtime.clouds.slab_orders.radiance import slab_radiance
+from realtime.clouds.slab_orders.slab import slab_light
+from realtime.clouds.slab_orders.streams import double_gauss, mode_kernel
+
+ALL = [(1, math.inf)]
+ISOTROPIC, HG = HenyeyGreensteinPhase(0.0), HenyeyGreensteinPhase(0.75)
+
+
+@pytest.fixture(scope="module")
+def cloud_c1(data_folder):
+    table = np.loadtxt(data_folder / "cloud_c1_moments.csv", delimiter=",", skiprows=3)
+    return SeriesPhase(table[:, 1] / (2 * table[:, 0] + 1))
+
+
+def summed(tau, mu0, phase, albedo, depths, streams=32):
+    """Return upward and diffuse downward flux at depths, of all orders, for a flux of pi across the beam."""
+    slab = SlabOrders(tau, mu0, phase, albedo, depths=depths, streams=streams)
+    _, total = order_sets(slab, ALL)
+    places = [int(np.argmin(np.abs(slab.panels.edges - depth))) for depth in depths]
+    return np.pi * total.up[0, places], np.pi * total.down[0, places]
+
+
+def disort(tau, mu0, phase, albedo, *, streams):
+    """Return PythonicDISORT's functions, of `streams` cosines in each hemisphere."""
+    moments = phase.moments(2 * streams + 1)
+    peak = moments[-1] if moments[-1] > 1e-13 else 0.0
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        albedo = min(albedo, 1 - 1e-9)
+        return pydisort(tau, albedo, 2 * streams, moments[None, :-1], mu0, np.pi, 0.0, f_arr=peak)
+
+
+@pytest.mark.claim("slab-sums-are-disort", tolerance="1e-5 of the flux, the figure; measured 1e-6 and below")
+@pytest.mark.parametrize("albedo", [0.2, 0.5, 0.9, 0.99, 1.0])
+@pytest.mark.parametrize("mu0", [0.2, 0.6, 1.0])
+def test_sums_of_orders_are_disort(albedo, mu0):
+    for tau, phase in ((2.0, ISOTROPIC), (7.3, HG)):
+        depths = [0.0, 0.3, tau / 2, tau]
+        up, down = summed(tau, mu0, phase, albedo, depths)
+        _, disort_up, disort_down, _, _ = disort(tau, mu0, phase, albedo, streams=16)
+        assert up[:-1] == pytest.approx(disort_up(np.array(depths[:-1])), rel=1e-5)
+        assert down[1:] == pytest.approx(disort_down(np.array(depths[1:]))[0], rel=1e-5)
+
+
+@pytest.mark.claim("slab-radiance-is-disort", tolerance="1e-6 relative; measured 2e-7")
+def test_radiance_inside_and_outside_is_disort():
+    tau, mu0, albedo, streams = 2.0, 0.4, 0.9, 32
+    mu, *_, radiance = disort(tau, mu0, HG, albedo, streams=streams)
+    chosen = [(3, 0.3), (20, 2.0), (streams + 10, 1.0), (streams - 1, 3.1)]
+    depths = [0.0, 0.7, tau]
+    ours = slab_radiance(
+        tau, mu0, HG, albedo, depths=depths, directions=[(mu[place], phi) for place, phi in chosen], streams=48
+    )
+    theirs = np.array([[radiance(depth, phi)[place] for place, phi in chosen] for depth in depths])
+    np.testing.assert_allclose(np.pi * ours, theirs, rtol=1e-6, atol=1e-12)
+
+
+@pytest.mark.claim("slab-published", tolerance="2e-5 relative: five to six printed digits")
+def test_fluxes_of_cloud_c1(cloud_c1):
+    """Garcia and Siewert 1985, Tables 19 and 20; DISORT's test 5."""
+    up, down = summed(64.0, 1.0, cloud_c1, 1.0, [0.0, 32.0, 64.0])
+    assert up[:2] == pytest.approx([2.66174, 1.76783], rel=2e-5)
+    assert down[1:] == pytest.approx([2.24768, 0.479851], rel=2e-5)
+    assert up[0] + down[-1] == pytest.approx(math.pi, rel=1e-9)
+    up, down = summed(64.0, 1.0, cloud_c1, 0.9, [3.2, 12.8, 48.0])
+    assert up == pytest.approx([0.270485, 0.0374252, 1.02904e-5], rel=2e-5)
+    assert down == pytest.approx([1.74767, 0.233975, 6.38345e-5], rel=2e-5)
+
+
+def test_radiance_of_cloud_c1(cloud_c1):
+    """DISORT's test 5 prints what 48 streams give; resolved, its glory is 0.8 % darker, as DISORT with 200 has it."""
+    directions = [(0.1, 0.0), (0.5, 0.0), (1.0, 0.0)]
+    few = slab_radiance(64.0, 1.0, cloud_c1, 1.0, depths=[0.0], directions=directions, streams=24)[0]
+    assert np.pi * few == pytest.approx([0.458927, 0.772983, 1.07196], rel=2e-4)
+    many, more = (
+        slab_radiance(64.0, 1.0, cloud_c1, 1.0, depths=[0.0], directions=directions, streams=streams)[0]
+        for streams in (100, 160)
+    )
+    assert many == pytest.approx(more, rel=3e-4)
+    assert np.pi * more == pytest.approx([0.458734, 0.772606, 1.063698], rel=1e-5)
+
+
+@pytest.mark.claim("slab-published", tolerance="half of the last printed digit, and 1e-5")
+def test_tables_of_van_de_hulst():
+    """Multiple Light Scattering (1980), Tables 12 and 37; radiance is R mu0 for a flux of pi across the beam."""
+    for mu0, reflection in ((1.0, 0.28616), (0.5, 0.39102), (0.1, 0.53214)):
+        (value,) = slab_radiance(2.0, mu0, ISOTROPIC, 0.8, depths=[0.0], directions=[(0.5, 0.0)])[0]
+        assert np.pi * value / mu0 == pytest.approx(reflection, abs=6e-6)
+    for mu0, transmission in ((1.0, 0.14864), (0.3, 0.09425), (0.1, 0.06601)):
+        (value,) = slab_radiance(2.0, mu0, ISOTROPIC, 0.8, depths=[2.0], directions=[(-0.5, 0.0)])[0]
+        assert np.pi * value / mu0 == pytest.approx(transmission, abs=6e-6)
+    for tau, up, down in ((1.0, 0.247374, 1.73849), (8.0, 1.59096, 1.54958)):
+        ours_up, ours_down = summed(tau, 1.0, HG, 1.0, [0.0, tau])
+        assert (ours_up[0], ours_down[1]) == pytest.approx((up, down), abs=1.2e-5)
+    light, _ = slab_light(2.0, 1.0, HG, 0.9, sets=ALL)
+    assert (light.reflectance, light.transmittance) == pytest.approx((0.09739, 0.66096), abs=6e-6)
+
+
+def test_disort_1_with_its_own_streams_and_resolved():
+    """Isotropic, albedo 1, mu0 = 0.1, a flux of pi/mu0: the printed digits are those of 16 streams."""
+    for tau, printed, converged in (
+        (1 / 32, (0.422922, 0.420233), (0.42287, 0.42028)),
+        (32.0, (3.07390, 0.0676954), (3.07390, 0.0676954)),
+    ):
+        for streams, expected in ((8, printed), (64, converged)):
+            up, down = summed(tau, 0.1, ISOTROPIC, 1.0, [0.0, tau], streams)
+            assert (up[0] / 0.1, down[1] / 0.1) == pytest.approx(expected, rel=1.5e-5)
+
+
+@pytest.mark.claim("slab-orders-add-up", tolerance="1e-9 relative: rounding of the direct solution")
+def test_orders_one_by_one_add_up_to_all_and_the_rest_is_the_rest():
+    slab = SlabOrders(6.0, 0.5, HG, 0.95, depths=[2.0], streams=16)
+    singles, total = order_sets(slab, [(order, order) for order in range(1, 41)] + [(41, math.inf)])
+    _, at_once = order_sets(slab, ALL)
+    for name in ("up", "down", "fluence"):
+        by_orders = sum(getattr(edges, name) for edges in singles)
+        np.testing.assert_allclose(by_orders, getattr(total, name), rtol=1e-13, atol=1e-300)
+        np.testing.assert_allclose(by_orders, getattr(at_once, name), rtol=1e-9, atol=1e-13)
+    (pair, thirds), _ = order_sets(slab, [(1, 2), (3, 3)])
+    np.testing.assert_allclose(pair.up, (singles[0] + singles[1]).up, rtol=1e-14)
+    np.testing.assert_allclose(thirds.up, singles[2].up, rtol=1e-14)
+
+
+def test_order_one_is_its_closed_form():
+    """Reflected isotropic light of order 1, and its displacement, by quadrature over depth and angle."""
+    tau, mu0, albedo = 1.7, 0.6, 0.8
+    depth, depth_weight = (each / 2 for each in np.polynomial.legendre.leggauss(60))
+    depth, depth_weight = tau * (depth + 0.5), tau * depth_weight
+    mu, mu_weight = np.polynomial.legendre.leggauss(400)
+    mu, mu_weight = (mu + 1) / 2, mu_weight / 2
+    rate = albedo / (2 * mu0) * np.exp(-depth[:, None] / mu0 - depth[:, None] / mu)
+    weight = depth_weight[:, None] * mu_weight * rate
+    tangent0, tangent = math.sqrt(1 - mu0**2) / mu0, np.sqrt(1 - mu**2) / mu
+    square = (depth**2)[:, None] * (tangent0**2 + tangent**2)
+    reflected = weight.sum()
+    light, _ = slab_light(tau, mu0, ISOTROPIC, albedo, sets=[(1, 1)])
+    found = light.sets[0].reflected
+    assert found.value == pytest.approx(reflected, rel=1e-6)
+    assert found.mean == pytest.approx((weight.sum(1) @ depth) * tangent0 / reflected, rel=1e-6)
+    assert found.rms == pytest.approx(math.sqrt((weight * square).sum() / reflected), rel=1e-5)
+
+
+@pytest.mark.claim("slab-conserves", tolerance="1e-8: the albedo is kept 1e-12 below 1")
+@pytest.mark.parametrize("tau", [1e-4, 0.01, 3.0, 300.0])
+def test_light_is_neither_made_nor_lost(tau):
+    for mu0 in (1e-3, 0.5, 1.0):
+        light, _ = slab_light(tau, mu0, HG, 1.0, sets=ALL)
+        assert light.reflectance + light.transmittance == pytest.approx(1, abs=1e-8)
+        assert light.reflectance > 0
+
+
+def test_thin_slabs_scatter_in_proportion_and_nothing_scatters_nothing():
+    thin, thinner = (slab_light(tau, 0.7, ISOTROPIC, 0.6, sets=[(1, 1), (2, 2)])[0] for tau in (2e-4, 1e-4))
+    assert thin.sets[0].reflected.value == pytest.approx(2 * thinner.sets[0].reflected.value, rel=1e-2)
+    assert thinner.sets[0].reflected.value == pytest.approx(0.6 * 1e-4 / 0.7 / 2, rel=1e-2)
+    dark, _ = slab_light(2.0, 0.7, HG, 0.0, sets=ALL, depths=[1.0], directions=[(0.5, 0.0)])
+    assert dark.reflectance == 0
+    assert dark.transmittance == pytest.approx(math.exp(-2 / 0.7), rel=1e-12)
+    assert dark.sets[0].reflected.mean is None
+    assert dark.sets[0].reflected.rms is None
+    assert not dark.radiance.any()
+
+
+def test_the_estimated_error_covers_the_change_with_more_streams():
+    fine, coarse = slab_light(1.0, 0.3, HG, 0.9, sets=[(1, 1), (2, 4)], depths=[0.4])
+    slab = SlabOrders(1.0, 0.3, HG, 0.9, depths=[0.4], streams=128, nodes=10)
+    best, _ = order_sets(slab, [(1, 1), (2, 4)])
+    for found, other, edges in zip(fine.sets, coarse.sets, best, strict=True):
+        expected = edges.up[0, 0] / 0.3
+        error = abs(found.reflected.value - other.reflected.value)
+        assert abs(found.reflected.value - expected) <= error + 1e-12
+
+
+def test_azimuth_is_forward_at_zero_and_mirrored():
+    mu0 = 0.5
+    directions = [(-mu0, 0.0), (-mu0, math.pi), (0.3, 1.0), (0.3, -1.0)]
+    forward, back, left, right = slab_radiance(1.0, mu0, HG, 0.9, depths=[1.0, 0.0], directions=directions).T
+    assert forward[0] > 20 * back[0]  # along the beam, its peak of order 1
+    assert left[1] == pytest.approx(right[1], rel=1e-12)
+
+
+def test_scattering_by_modes_is_the_phase_function():
+    """The addition theorem: sum over m of (2 - delta) cos(m phi) K_m is P of the angle between."""
+    to, source, phi = np.array([0.3, -0.8]), np.array([-0.55]), 0.7
+    moments = HG.moments(160)
+    total = sum((2 if m else 1) * math.cos(m * phi) * mode_kernel(m, moments, to, source)[:, 0] for m in range(160))
+    cosines = to * source + np.sqrt((1 - to**2) * (1 - source**2)) * math.cos(phi)
+    assert total == pytest.approx(HG.values(cosines), rel=1e-10)
+
+
+def test_transport_is_exact_for_polynomials():
+    panels = depth_panels(3.0, 1e-3, depths=[0.123], count=6)
+    assert 0.123 in panels.edges
+    mu = np.array([0.01, 2.0, -0.5, -1e5])
+    transport = Transport(panels, mu)
+    source = np.repeat((panels.depths**2)[:, None], 4, axis=1)
+    nodes, edges = transport(source[None])
+    z = panels.edges
+    # I = z^2 + 2 mu z + 2 mu^2 solves -mu I' = -I + z^2 reversed in sign; less what would enter from outside.
+    for place, cosine in enumerate(mu[:3]):
+        free = lambda depth, c=cosine: depth**2 + 2 * c * depth + 2 * c * c  # noqa: E731
+        outside = free(3.0) if cosine > 0 else free(0.0)
+        way = (3.0 - z) / cosine if cosine > 0 else -z / cosine
+        assert edges[0, :, place] == pytest.approx(free(z) - outside * np.exp(-way), rel=1e-9, abs=1e-10)
+    assert edges[0, :, 3] == pytest.approx(z**3 / 3e5, rel=1e-4, abs=1e-15)
+    assert nodes.shape == (1, panels.depths.size, 4)
+
+
+def test_streams_integrate_each_hemisphere():
+    streams = double_gauss(8)
+    assert streams.weights[:8] @ streams.mu[:8] ** 15 == pytest.approx(1 / 16, rel=1e-13)
+    assert np.all(streams.mu[8:] == -streams.mu[:8])
+
+
+def test_phases_by_angle_have_the_moments_of_their_series():
+    g = 0.6
+    angles = AnglePhase(lambda angle: 7 * HenyeyGreensteinPhase(g).values(np.cos(angle)), np.array([0.0, np.pi]))
+    assert angles.moments(40) == pytest.approx(g ** np.arange(40), abs=1e-12)
+    assert angles.values([1.0, 0.0, -1.0]) == pytest.approx(HenyeyGreensteinPhase(g).values([1.0, 0.0, -1.0]), rel=1e-7)
+    linear = tabulated_phase(np.array([0.0, np.pi]), np.array([2.0, 0.0]))
+    assert linear.moments(2) == pytest.approx([1.0, 0.25], rel=1e-12)  # <cos> of 1 - angle/pi
+    assert linear.values(0.0) == pytest.approx(1.0, rel=1e-12)

@@ -1,0 +1,301 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Airlight, surfaces and emission of lights with extent: against brute force, and as certain as they say."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analytic.area_light import sphere_airlight
+from reference.quadrature import area_airlight as airlight_module
+from reference.quadrature.area_airlight import area_airlight, standard_error
+from reference.quadrature.area_surface import area_surface, surface_points, surface_rows, visible_share
+from reference.quadrature.image import quadrature_image
+from reference.quadrature.light_points import PointPlan, light_points, square_points
+from reference.quadrature.surface import surface_hits
+from reference.scene.read import read_truth
+from reference.visibility.before_light import before_light
+from reference.visibility.light_lines import Points
+from reference.visibility.surface_shadows import segments_blocked
+from tests.helpers.area_lights import NULL, fog, lamp, lit_scene
+
+HOW = {"samples": 64, "edges": "auto"}
+GREY = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.6, 0.5, 0.4]}}
+
+
+def turned(place, angle, scale):
+    import mitsuba as mi
+
+    return mi.ScalarTransform4f().translate(list(place)).rotate([0.8, 0.6, 0.0], angle).scale(list(scale))
+
+
+def flat(kind="rectangle", **changes):
+    return lamp(kind, to_world=turned((0.3, 0.4, 2.9), 163, (0.5, 0.5 if kind == "disk" else 0.3, 1.0)), **changes)
+
+
+def ball(**changes):
+    return lamp("sphere", center=[0.3, 0.4, 2.9], radius=0.4, **changes)
+
+
+LAMPS = {"rectangle": flat, "disk": lambda **changes: flat("disk", **changes), "sphere": ball}
+
+
+def room(light, *, size=(5, 4), medium=None, **shapes):
+    """Return a floor with a leaning block and a ball under a light, seen from the side."""
+    import mitsuba as mi
+
+    shapes = {
+        "floor": {"type": "rectangle", "to_world": mi.ScalarTransform4f().scale(5.1), "bsdf": GREY},
+        "block": {"type": "cube", "to_world": turned((0.4, 0.2, 0.9), 27, (0.4, 0.2, 0.3)), "bsdf": GREY},
+        "ball": {"type": "sphere", "center": [-0.6, 0.3, 0.6], "radius": 0.31, "bsdf": GREY},
+    } | shapes
+    camera = mi.ScalarTransform4f().look_at([0.2, -4.1, 1.9], [0.1, 0.0, 0.7], [0, 0, 1])
+    chosen = {name: shape for name, shape in shapes.items() if shape is not None}
+    return read_truth(lit_scene(size=size, to_world=camera, medium=medium, lamp=light, **chosen))
+
+
+def empty(light, **changes):
+    return room(light, floor=None, block=None, ball=None, **changes)
+
+
+def airlight(truth, plan, distance=None):
+    distance = surface_hits(truth).distance if distance is None else distance
+    known = np.zeros((len(distance), 3))
+    return area_airlight(truth, distance, known, plan=plan, shadow_scale=1.0, how=HOW, tell=lambda share: None)
+
+
+def fixed(points, seed=0):
+    return PointPlan(error=0.0, first=points, most=points, seed=seed)
+
+
+@pytest.mark.parametrize("kind", LAMPS)
+def test_points_are_on_the_light_and_uniform(variant, kind):
+    light = empty(LAMPS[kind]()).area[0]
+    points = light_points(light, square_points(fixed(1024), 0, 0, kind))
+    from_centre = np.array([point.position for point in points]) - light.centre
+    normals = np.array([point.axis for point in points])
+    assert np.abs(from_centre.mean(axis=0)).max() < 2e-3
+    # The mean square distance from the centre: (a^2 + b^2)/3, R^2/2, R^2.
+    square = {"rectangle": np.sum(light.half**2) / 3, "disk": light.radius**2 / 2, "sphere": light.radius**2}[kind]
+    assert np.mean(np.sum(from_centre**2, axis=1)) == pytest.approx(square, rel=3e-3)
+    if kind == "sphere":
+        assert normals == pytest.approx(from_centre / light.radius, abs=1e-12)
+    else:
+        assert normals == pytest.approx(np.tile(light.normal, (1024, 1)))
+        assert np.abs(from_centre @ light.normal).max() < 1e-12
+    assert np.allclose([point.intensity for point in points], light.radiance * light.area)
+
+
+@pytest.mark.parametrize("kind", LAMPS)
+def test_open_air_and_lit_intervals_give_the_same(variant, kind, monkeypatch):
+    truth = empty(LAMPS[kind]())
+    distance = np.full(len(truth.direction), np.inf)
+    distance[::3] = 4.2
+    quick = airlight(truth, fixed(4), distance)
+    monkeypatch.setattr(airlight_module, "_is_open", lambda *_: False)
+    slow = airlight(truth, fixed(4), distance)
+    assert quick.replicates == pytest.approx(slow.replicates, rel=1e-7)
+    assert np.all(slow.bound < 1e-6 * slow.replicates.mean(axis=2) + 1e-300)
+
+
+def test_one_point_by_plain_quadrature(variant):
+    """The integral along the ray of cos_l V/r^2 exp(-sigma_t (x + r)), with the cosine as a dot product."""
+    truth = empty(flat())
+    point = light_points(truth.area[0], np.array([[0.3, 0.8]]))[0]
+    nodes, weights = np.polynomial.legendre.leggauss(2000)
+    x = 3.5 * (nodes + 1)
+    got = airlight_module._open_airlight(truth, [point], np.full(len(truth.direction), 7.0), 1.0)[0]
+    for ray, direction in enumerate(truth.direction):
+        away = truth.origin + x[:, None] * direction - point.position
+        r = np.linalg.norm(away, axis=1)
+        f = np.maximum(away @ point.axis / r, 0) / r**2 * np.exp(-truth.medium.sigma_t[0] * (x + r))
+        expected = truth.medium.albedo * truth.medium.sigma_t * point.intensity / (4 * np.pi) * 3.5 * (f @ weights)
+        assert got[ray] == pytest.approx(expected, rel=1e-5)
+
+
+@pytest.mark.parametrize("kind", LAMPS)
+def test_a_light_does_not_shadow_itself_and_black_is_null_for_what_it_sends(variant, kind):
+    images = [quadrature_image(room(LAMPS[kind](bsdf=bsdf)), plan=fixed(4)) for bsdf in (None, NULL)]
+    clear = [image.distance == images[1].distance for image in images]
+    same = clear[0]
+    assert images[0].airlight[same] == pytest.approx(images[1].airlight[same], rel=1e-9)
+    assert images[0].surface[same] == pytest.approx(images[1].surface[same], rel=1e-6, abs=1e-12)
+
+
+def test_the_back_is_dark(variant):
+    behind = lamp(to_world=turned((0.3, 0.4, 2.9), -17, (0.5, 0.3, 1.0)))
+    image = quadrature_image(room(behind, size=(3, 2)), plan=fixed(4))
+    assert image.surface.max() == 0
+
+
+def test_ceiling_in_the_plane_of_a_lamp_hides_nothing(variant):
+    import mitsuba as mi
+
+    down = mi.ScalarTransform4f().translate([0.3, 0.4, 2.9]).rotate([1, 0, 0], 180)
+    light = lamp(to_world=down @ mi.ScalarTransform4f().scale([0.5, 0.3, 1.0]), bsdf=NULL)
+    ceiling = {"type": "rectangle", "to_world": down @ mi.ScalarTransform4f().scale(2.0), "bsdf": GREY}
+    images = [quadrature_image(room(light, **lid), plan=fixed(4)) for lid in ({}, {"ceiling": ceiling})]
+    same = images[0].distance == images[1].distance
+    assert same.mean() > 0.5
+    assert images[0].airlight[same] == pytest.approx(images[1].airlight[same], rel=1e-9)
+    assert images[0].surface[same] == pytest.approx(images[1].surface[same], rel=1e-9)
+    assert images[1].left == 0
+
+
+@pytest.mark.parametrize("kind", LAMPS)
+def test_surfaces_by_many_shadow_rays(variant, kind):
+    truth = room(LAMPS[kind](), size=(8, 6))
+    hits = surface_hits(truth)
+    known = np.zeros((len(hits.distance), 3))
+    plan = fixed(64)
+    lit = area_surface(truth, hits, known, plan=plan, shadow_scale=1.0, tell=lambda share: None)
+    mean, error = lit.mean(axis=2), standard_error(lit)
+    rows = surface_rows(hits)
+    points, bsdf = surface_points(truth, hits, rows)
+    light, (_, shapes) = truth.area[0], before_light(truth, truth.area[0])
+    expected = np.zeros((len(rows), 3))
+    count = 512
+    for point in light_points(light, square_points(fixed(count), 3, 0, kind)):
+        way = point.position - points.place
+        r = np.linalg.norm(way, axis=1)
+        way /= r[:, None]
+        start = points.place + 1e-6 * points.normal
+        end = np.broadcast_to(point.position + 1e-6 * point.axis, start.shape)
+        seen = ~segments_blocked(start, end, shapes) & (np.sum(way * points.normal, axis=1) > 0)
+        sent = np.maximum(-way @ point.axis, 0) / r**2 * seen
+        leg = np.exp(-np.outer(r + hits.distance[rows], truth.medium.sigma_t))
+        expected += bsdf(np.arange(len(rows)), way) * sent[:, None] * leg * point.intensity / count
+    assert 0.1 < np.mean(mean[rows, 0] > 0) < 1
+    scale = mean[rows].mean()
+    # 512 points of a light that is cut by an edge are right to a few per cent of a pixel.
+    assert np.abs(mean[rows] - expected).max() < 0.12 * expected.max()
+    assert abs((mean[rows] - expected).mean()) < 5e-3 * scale
+    assert np.sqrt(np.mean(error**2)) < 5e-3 * scale
+
+
+def test_a_lamp_that_cuts_the_floor(variant):
+    """Half of a sphere is under the floor: what is above it is seen as if nothing were below."""
+    import mitsuba as mi
+
+    low = lamp("sphere", center=[0.3, 0.4, 0.0], radius=0.4)
+    place = np.array([[2.3, 0.4, 0.0], [-1.1, 1.7, 0.0]])
+    floor = {"type": "rectangle", "to_world": mi.ScalarTransform4f().scale(5.1), "bsdf": GREY}
+    truth = room(low, block=None, ball=None, floor=floor)
+    points = Points(place, np.tile([0.0, 0, 1], (2, 1)))
+    # By symmetry the horizon halves the disk that a point on the floor sees.
+    assert visible_share(truth, 0, points, 16).mean(axis=1) == pytest.approx([0.5, 0.5], abs=2e-2)
+    above = Points(np.array([[2.3, 0.4, 1.1]]), np.array([[0.0, 0, 1]]))
+    up = Points(above.place, np.array([[-1.0, 0, 0]]))
+    assert visible_share(truth, 0, above, 16).mean() < 0.01
+    assert 0.5 < visible_share(truth, 0, up, 16).mean() < 0.95
+
+
+def test_emission_is_seen_through_fog_and_not_from_behind(variant):
+    light = lamp(to_world=turned((0.0, 0.0, 0.0), 0, (0.3, 0.3, 1.0)), bsdf=NULL)
+    facing = read_truth(lit_scene(size=(9, 9), to_world=turned((0.0, 0.0, 2.0), 180, (1, 1, 1)), lamp=light))
+    behind = read_truth(lit_scene(size=(9, 9), to_world=turned((0.0, 0.0, -2.0), 0, (1, 1, 1)), lamp=light))
+    image = quadrature_image(facing, plan=fixed(2))
+    assert image.emitted[4, 4] == pytest.approx(np.array([3, 2, 1]) * np.exp(-0.21 * 2), rel=1e-6)
+    assert (image.emitted[0, 0] == 0).all()
+    assert quadrature_image(behind, plan=fixed(2)).emitted.max() == 0
+
+
+def test_a_scene_without_extent_has_no_such_layers(variant):
+    import mitsuba as mi
+
+    from tests.helpers.scenes import tiny_scene
+
+    image = quadrature_image(read_truth(mi.load_dict(tiny_scene(size=(2, 2)))))
+    assert (image.emitted, image.airlight_se, image.surface_se) == (None, None, None)
+
+
+def test_bounded_media_that_fill_everything_are_as_no_bounds(variant):
+    import mitsuba as mi
+
+    big = {"type": "cube", "to_world": turned((0, 0, 0), 0, (40, 40, 40)), "bsdf": NULL, "interior": fog()}
+    light = flat(bsdf=NULL)
+    distance = np.full(20, 6.0)
+    open_air = airlight(empty(light), fixed(4), distance)
+    camera = mi.ScalarTransform4f().look_at([0.2, -4.1, 1.9], [0.1, 0.0, 0.7], [0, 0, 1])
+    body = mi.load_dict({"type": "scene", "sensor": {"type": "perspective"}, "big": big})
+    sensor = {
+        "type": "perspective",
+        "fov": 60.0,
+        "to_world": camera,
+        "film": {"type": "hdrfilm", "width": 5, "height": 4},
+        "medium": body.shapes()[0].interior_medium(),
+    }
+    bounded = read_truth(mi.load_dict({"type": "scene", "sensor": sensor, "big": body.shapes()[0], "lamp": light}))
+    assert len(bounded.media) == 1
+    got = airlight(bounded, fixed(4), distance)
+    assert got.replicates == pytest.approx(open_air.replicates, rel=1e-7)
+
+
+def test_pixel_means_of_an_open_lamp_are_near_the_centres(variant):
+    truth = empty(flat(bsdf=NULL), size=(6, 4))
+    centre = quadrature_image(truth, plan=fixed(4))
+    area = quadrature_image(truth, plan=fixed(4), pixel="area")
+    assert area.airlight.mean() == pytest.approx(centre.airlight.mean(), rel=0.05)
+    assert area.airlight_se.shape == area.emitted.shape == (4, 6, 3)
+    assert 0 < area.airlight_se.mean() < 0.5 * area.airlight.mean()
+
+
+def test_progress_counts_to_the_end(variant):
+    told = []
+    quadrature_image(
+        room(flat(), size=(2, 2)), plan=fixed(2), progress=lambda done, total, what: told.append(done / total)
+    )
+    assert told == sorted(told)
+    assert told[-1] == pytest.approx(1.0, abs=1e-3)
+
+
+def test_points_are_doubled_where_the_error_is_large(variant):
+    truth = room(flat(), size=(4, 3))
+    coarse, fine = (quadrature_image(truth, plan=PointPlan(error=error, first=4, most=64)) for error in (0.3, 0.01))
+    assert fine.airlight_se.max() < coarse.airlight_se.max()
+    relative = (fine.airlight_se / fine.airlight).max()
+    assert relative < 0.02
+
+
+@pytest.mark.statistical
+def test_the_standard_error_covers_the_truth_as_often_as_it_says(variant):
+    """With 8 replicates the 95 % interval is 2.365 standard errors wide on either side."""
+    sigma_t, radius, height, foot = 0.21, 0.3, 0.83, 2.0
+    truth = empty(ball(), medium=fog(sigma_t, 1.0))
+    light = replace(truth.area[0], centre=np.array([height, 0.0, foot]), half=np.full(2, radius), frame=np.eye(3))
+    light = replace(light, radiance=np.ones(3))
+    medium = replace(truth.medium, sigma_t=np.full(3, sigma_t), albedo=np.ones(3))
+    ray = replace(truth, area=(light,), medium=medium, origin=np.zeros(3), direction=np.array([[0.0, 0, 1]]))
+    expected = sphere_airlight(sigma_t, height, radius, foot=foot, x0=0.0, x1=5.0) * sigma_t / (4 * np.pi)
+    covered, widths = 0, []
+    for seed in range(40):
+        replicates = airlight(ray, fixed(1024, seed), np.array([5.0])).replicates[0, 0]
+        width = 2.365 * standard_error(replicates)
+        covered += abs(replicates.mean() - expected) <= width
+        widths.append(width / expected)
+    # 95 % of 40 is 38; fewer than 34 happen once in 100 tries of intervals that are right.
+    assert covered >= 34
+    assert np.median(widths) <= 1e-4
+
+
+@pytest.mark.statistical
+def test_the_surface_error_covers_the_truth_as_often_as_it_says(variant):
+    from analytic.area_light import disk_share
+    from validation.known_answers.area_lights import _occluder, _round, _truth, base_scene
+
+    truth = _truth(_round(base_scene("disk")))
+    light = replace(
+        truth.area[0], centre=np.array([0.125, 0.25, 4.0]), half=np.full(2, 0.5), frame=np.diag([1.0, 1, -1])
+    )
+    lid = _occluder(np.array([[0.0, -64], [64, -64], [64, 64], [0, 64]]), 2.0)
+    truth = replace(truth, area=(light,), occluders=lid)
+    x = np.linspace(-0.55, 0.3, 40)
+    points = Points(np.stack([x, 0.2 + 0 * x, 0 * x], axis=1), np.tile([0.0, 0, 1], (40, 1)))
+    expected = disk_share((x + 0.125) / 0.5)
+    covered, tried = 0, 0
+    for seed in range(5):
+        share = visible_share(truth, 0, points, 32, seed=seed)
+        covered += int(np.sum(np.abs(share.mean(axis=1) - expected) <= 2.365 * standard_error(share) + 1e-12))
+        tried += len(x)
+    # 190 of 200 are expected; fewer than 179 happen once in 1000 tries.
+    assert covered >= 179 * tried / 200

@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Claim: the orders of a slab by the deterministic computation are those of photons; bad input is refused by name."""
+
+import math
+
+import numpy as np
+import pytest
+
+from analytic.errors import InputError
+from validation.slab.light import slab_numbers
+from validation.slab.phases import phase_pair, read_phase_file
+from validation.slab.request import SETS, order_range, slab_request
+
+
+def paired(first, second, errors):
+    """Yield numbers of two structures with the standard error of the second, where there is one."""
+    if isinstance(errors, dict):
+        for name in errors:
+            if name not in ("depth", "orders", "mu", "phi") or isinstance(errors[name], list):
+                yield from paired(first[name], second[name], errors[name])
+    elif isinstance(errors, list):
+        for each in zip(first, second, errors, strict=True):
+            yield from paired(*each)
+    elif errors:
+        yield first, second, errors
+
+
+def compared(tau, sun, phase, photons, **more):
+    numbers = slab_numbers(slab_request(tau, sun, phase=phase, **more), photons=photons, seed=5)
+    walked = numbers["photons"]
+    triples = list(paired(numbers, walked, walked["standard_error"]))
+    return numbers, np.array([(second - first) / error for first, second, error in triples])
+
+
+@pytest.mark.statistical
+@pytest.mark.claim(
+    "slab-orders-are-photons",
+    tolerance="4.5 standard errors each, mean square 0.3 to 2.5, as for 15 independent; seeds are fixed",
+)
+@pytest.mark.parametrize(
+    ("tau", "sun", "phase", "albedo"),
+    [(5.0, 60.0, "hg:0.75", 0.9), (1.0, 25.0, "isotropic", 1.0), (0.3, 80.0, "hg:-0.3", 0.7)],
+)
+def test_orders_are_those_of_photons(tau, sun, phase, albedo):
+    numbers, z = compared(tau, sun, phase, 400_000, albedo=albedo, orders="1,2,3-4,5-inf,all", depths=[tau / 3, tau])
+    assert np.abs(z).max() < 4.5
+    assert 0.3 < (z**2).mean() < 2.5
+    assert len(z) > 60
+    errors = numbers["photons"]["standard_error"]["orders"]
+    assert errors[0]["reflectance"] < 0.01 * numbers["orders"][0]["reflectance"]
+
+
+@pytest.mark.statistical
+@pytest.mark.slow
+@pytest.mark.claim("slab-orders-are-photons", tolerance="4.5 standard errors each; seeds are fixed")
+@pytest.mark.parametrize(("phase", "tau"), [("mie", 3.7), ("mie-modified", 2.1)])
+def test_orders_of_droplets_are_those_of_photons(phase, tau):
+    """Both sides compute the droplets by themselves; 44 % of the light is below 5 degrees."""
+    _, z = compared(tau, 40.0, phase, 500_000, albedo=0.97, orders="1,2,3-4,5-6,7-inf", depths=[0.0, tau / 2])
+    assert np.abs(z).max() < 4.5
+    assert 0.3 < (z**2).mean() < 2.5
+
+
+def test_a_table_of_a_function_is_the_function(tmp_path):
+    degrees = np.concatenate([np.linspace(0, 20, 401), np.linspace(20.25, 180, 640)])
+    g = 0.75
+    values = 17 / (1 + g * g - 2 * g * np.cos(np.deg2rad(degrees))) ** 1.5
+    path = tmp_path / "phase.csv"
+    rows = "\n".join(f"{angle:.4f}, {value:.10g}" for angle, value in zip(degrees, values, strict=True))
+    path.write_text(f"# of a measurement\nangle,value\n{rows}\n")
+    tabulated, exact = (
+        slab_numbers(slab_request(2.0, 30.0, phase=name, albedo=0.9, orders="1,2", directions="-0.5:20"))
+        for name in (str(path), "hg:0.75")
+    )
+    assert tabulated["phase"] == str(path)
+    for name in ("reflectance", "transmitted_rms"):
+        assert tabulated["orders"][1][name] == pytest.approx(exact["orders"][1][name], rel=1e-4)
+    ours, theirs = (each["total"]["radiance"][-1]["value"] for each in (tabulated, exact))
+    assert ours == pytest.approx(theirs, rel=1e-4)
+    _, z = compared(2.0, 30.0, str(path), 20_000, orders="1,2-inf")
+    assert np.abs(z).max() < 4.5
+
+
+def test_the_peak_of_modified_droplets_is_gone_on_both_sides():
+    pair = phase_pair("mie-modified")
+    cosines = np.cos(np.deg2rad([0.0, 4.99, 5.01, 90.0, 180.0]))
+    values = pair.deterministic.values(cosines)
+    assert list(values[:2]) == [0, 0]
+    assert np.all(values[2:] > 0)
+    full = phase_pair("mie").deterministic.values(cosines)
+    assert values[2:] / full[2:] == pytest.approx(np.full(3, 1 / (1 - 0.444)), rel=2e-3)
+    sampled = pair.sampled().cosines(np.random.default_rng(1).random(10_000))
+    assert sampled.max() < math.cos(math.radians(4.99))
+
+
+def test_every_number_has_its_error_in_its_place():
+    numbers = slab_numbers(slab_request(1.0, 0.0, orders="1,31-inf", depths=[0.5], directions=[(1.0, 0.0)]))
+    assert numbers["error"]["orders"][1]["orders"] == "31-inf"
+    assert numbers["error"]["total"]["radiance"][0]["mu"] == 1.0
+    flat = list(paired(numbers, numbers, numbers["error"]))
+    assert flat
+    assert all(error <= 1e-4 * abs(value) + 1e-12 for value, _, error in flat)
+    assert numbers["orders"][0]["reflected_mean"] == pytest.approx(0, abs=1e-12)  # nothing is forward at noon
+
+
+def test_names_of_orders():
+    assert slab_request(1, 0).orders == SETS
+    assert slab_request(1, 0, orders="1, 2,sets,all").orders == (*SETS, "all")
+    assert slab_request(1, 0, orders=[4, "5-6"]).orders == ("4", "5-6")
+    assert order_range("31-inf") == (31, math.inf)
+    assert order_range("all") == (1, math.inf)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"tau": -1}, "wanted a thickness"),
+        ({"tau": 0}, "wanted a thickness"),
+        ({"tau": 1e9}, "wanted a thickness"),
+        ({"tau": math.nan}, "wanted a finite number"),
+        ({"sun": 90}, "at 90 no light enters"),
+        ({"sun": -1}, "wanted a zenith angle"),
+        ({"albedo": 1.01}, "wanted a share of 0 to 1"),
+        ({"orders": "0"}, "was never scattered"),
+        ({"orders": "4-3"}, "write 3-4"),
+        ({"orders": "1,two"}, "wanted for example 1,2,4,8"),
+        ({"orders": "1001"}, "1000-inf"),
+        ({"orders": []}, "got none"),
+        ({"depths": "0,2.5"}, "wanted depths of 0 to tau"),
+        ({"depths": "deep"}, "wanted a number"),
+        ({"directions": "0:0"}, "not horizontal"),
+        ({"directions": "1.2:0"}, "wanted -1 to 1"),
+        ({"directions": "0.5"}, "wanted MU:PHI"),
+        ({"phase": "hg:1"}, "wanted -0.98 to 0.98"),
+        ({"phase": "hg:high"}, "wanted hg:G"),
+        ({"phase": "isotopic"}, "did you mean 'isotropic'"),
+        ({"phase": "mie:6:2:0.55:1"}, "for example mie:6:2:0.55"),
+        ({"phase": "missing.csv"}, "wanted a CSV file"),
+    ],
+)
+def test_what_is_refused(change, words):
+    with pytest.raises(InputError, match=r"got|missing\.csv") as refused:
+        slab_request(**{"tau": 2.0, "sun": 30.0, **change})
+    assert words in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "got 0 rows"),
+        ("0,1\n", "got 1 rows"),
+        ("0,1\n90,1\n", "wanted 0 to 180 degrees"),
+        ("0,1\n90\n180,1\n", "line 2"),
+        ("0,1\n90,x\n180,1\n", "line 2"),
+        ("0,1\n90,nan\n180,1\n", "line 2"),
+        ("0,1\n90,-2\n180,1\n", "line 2: got the value -2"),
+        ("angle,p\n0,1\n90,1\n80,1\n180,1\n", "line 4: angles must increase"),
+        ("0,1\n90,0\n180,1\n", "all values are 0"),
+    ],
+)
+def test_files_that_are_no_phase_function(text, words, tmp_path):
+    path = tmp_path / "phase.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match=r"phase\.csv") as refused:
+        read_phase_file(path)
+    assert words in str(refused.value)
+
+
+@pytest.mark.parametrize("tau", [1e-6, 0.005, pytest.param(210.0, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("sun", [0.0, 89.99])
+def test_hard_cases_have_finite_numbers(tau, sun):
+    numbers = slab_numbers(
+        slab_request(tau, sun, phase="hg:0.85", orders="1,2-3,4-inf", directions="1:0,-1:0,0.001:180,-1e-6:0")
+    )
+    values = [value for value, _, _ in paired(numbers, numbers, numbers["error"])]
+    assert values
+    assert np.all(np.isfinite(values))
+    total = numbers["total"]
+    assert total["reflectance"] + total["transmittance"] == pytest.approx(1, abs=1e-8)
+    assert all(row["value"] >= 0 for row in total["radiance"])
