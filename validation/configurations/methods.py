@@ -40,6 +40,22 @@ class Configuration:
 #: The tolerance of adaptive sampling in tables: with it, 99 % of the pixels are within 1e-3.
 TOLERANCE = 0.005
 
+#: What `soft-shafts` does beyond Ali 2016: the pixels of a tile share sixteen light points and their steps.
+SHARED_POINTS: tuple[tuple[str, int | float | str], ...] = (
+    ("points", 16),
+    ("pattern", "sobol"),
+    ("interleave", True),
+    ("scale", 2),
+    ("steps", 16),
+    ("spacing", "equiangular"),
+    ("map", 128),
+    ("surfaces", "ray"),
+    ("guide", "depth"),
+    ("hd", "auto"),
+    ("hz", 0.02),
+    ("narrow", 16.0),
+)
+
 #: The configurations that `bench` and `report` measure by default.
 STANDARD: tuple[Configuration, ...] = (
     Configuration("unshadowed", "taylor"),
@@ -59,6 +75,9 @@ STANDARD: tuple[Configuration, ...] = (
     Configuration("light-volumes", "exact"),
     Configuration("light-volumes", "taylor"),
     Configuration("light-volumes", "exact", (("map", 2048),)),
+    Configuration("soft-shafts"),
+    Configuration("soft-shafts", None, (("scale", 2),)),
+    Configuration("soft-shafts", None, SHARED_POINTS),
 )
 
 #: The configurations that `report --quick` measures: one of each kind.
@@ -70,6 +89,7 @@ QUICK: tuple[Configuration, ...] = (
     Configuration("shadow-planes", "taylor"),
     Configuration("min-max", "exact"),
     Configuration("light-volumes", "exact"),
+    Configuration("soft-shafts"),
 )
 
 
@@ -155,6 +175,12 @@ def prepared(scene: Scene, chosen: Configuration) -> FrameRenderer:
     """
     kernel = find_kernel(chosen.kernel) if chosen.kernel else None
     return frame_renderer(scene, find_method(chosen.method), kernel=kernel, **dict(chosen.parameters))
+
+
+def rendered_lights(scene: Scene, chosen: Configuration) -> int:
+    """Return how many lights a method renders in a scene, the points of those with extent among them."""
+    points = dict(chosen.parameters).get("points", find_method(chosen.method).light_points.points)
+    return len(scene.lights) + int(points) * len(scene.area_lights)
 
 
 def _function_name(function: Callable[..., Any]) -> str:
