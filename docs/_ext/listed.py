@@ -105,6 +105,16 @@ def parameters(method: str) -> str:
     return table(("`--set`", "values", "what it does"), rows, 3) if rows else "The method has no parameters."
 
 
+def light_points() -> str:
+    """Return a table of the parameters that all methods have for lights with extent."""
+    from dataclasses import fields
+
+    from realtime.area_lights.points import LightPoints
+
+    rows = [(f"`{item.name}`", *_parameter(item)) for item in fields(LightPoints)]
+    return table(("`--set`", "values", "what it does"), rows, 3)
+
+
 def _parameter(item: Any) -> tuple[str, str]:
     """Return the values of a parameter, its default first, and what it does."""
     from realtime.parameters import limits_of, wanted_values

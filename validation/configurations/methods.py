@@ -177,6 +177,12 @@ def prepared(scene: Scene, chosen: Configuration) -> FrameRenderer:
     return frame_renderer(scene, find_method(chosen.method), kernel=kernel, **dict(chosen.parameters))
 
 
+def rendered_lights(scene: Scene, chosen: Configuration) -> int:
+    """Return how many lights a method renders in a scene, the points of those with extent among them."""
+    points = dict(chosen.parameters).get("points", find_method(chosen.method).light_points.points)
+    return len(scene.lights) + int(points) * len(scene.area_lights)
+
+
 def _function_name(function: Callable[..., Any]) -> str:
     """Return 'module:function', the name by which a function can be imported again."""
     name = f"{getattr(function, '__module__', '')}:{getattr(function, '__qualname__', '')}"
