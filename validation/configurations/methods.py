@@ -56,7 +56,8 @@ SHARED_POINTS: tuple[tuple[str, int | float | str], ...] = (
     ("narrow", 24.0),
 )
 
-#: The configurations that `bench` and `report` measure by default.
+#: The configurations that `bench` and `report` measure by default. Those that say their light points are left out where
+#: no light has an extent.
 STANDARD: tuple[Configuration, ...] = (
     Configuration("unshadowed", "taylor"),
     Configuration("unshadowed", "quadrature"),
@@ -75,9 +76,10 @@ STANDARD: tuple[Configuration, ...] = (
     Configuration("light-volumes", "exact"),
     Configuration("light-volumes", "taylor"),
     Configuration("light-volumes", "exact", (("map", 2048),)),
-    Configuration("soft-shafts"),
-    Configuration("soft-shafts", None, (("scale", 2),)),
+    Configuration("soft-shafts", None, (("points", 5),)),
+    Configuration("soft-shafts", None, (("points", 5), ("scale", 2))),
     Configuration("soft-shafts", None, SHARED_POINTS),
+    Configuration("froxel-fog", None, (("points", 16),)),
 )
 
 #: The configurations that `report --quick` measures: one of each kind.
@@ -89,7 +91,8 @@ QUICK: tuple[Configuration, ...] = (
     Configuration("shadow-planes", "taylor"),
     Configuration("min-max", "exact"),
     Configuration("light-volumes", "exact"),
-    Configuration("soft-shafts"),
+    Configuration("soft-shafts", None, (("points", 5),)),
+    Configuration("froxel-fog", None, (("points", 16),)),
 )
 
 
@@ -134,7 +137,7 @@ def configuration(
 
 
 def chosen_configurations(methods: Sequence[str]) -> tuple[Configuration, ...]:
-    """Return the standard configurations of some methods; a method without any has its defaults.
+    """Return the standard configurations of some methods; one without any for every scene has its defaults too.
 
     Raises
     ------
@@ -144,7 +147,9 @@ def chosen_configurations(methods: Sequence[str]) -> tuple[Configuration, ...]:
     chosen: list[Configuration] = []
     for method in methods:
         default = configuration(method)
-        chosen += [standard for standard in STANDARD if standard.method == method] or [default]
+        standard = [known for known in STANDARD if known.method == method]
+        everywhere = any("points" not in dict(known.parameters) for known in standard)
+        chosen += standard if everywhere else [default, *standard]
     return tuple(chosen)
 
 
