@@ -63,7 +63,7 @@ def _by_estimator(single_scatter: Any, volpath: Any) -> Mapping[str, Any]:
 
 # `report --quick` studies scenes that take seconds. The default effort leaves out `tangle`, of which a frame takes up
 # to minutes, and `clutter`, in which the checks of the truth take long and show what `hall` shows.
-_QUICK = ("open-fog", "sphere-spot", "two-pens")
+_QUICK = ("open-fog", "sphere-spot", "two-pens", "penumbra-plane")
 _HEAVY = ("clutter", "tangle")
 
 # Few samples per batch would be a waste: then launches take all the time, and `single-scatter`, which stratifies its
