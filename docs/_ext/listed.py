@@ -120,7 +120,7 @@ def _parameter(item: Any) -> tuple[str, str]:
     from realtime.parameters import limits_of, wanted_values
 
     limits = limits_of(item)
-    if isinstance(item.default, str):
+    if isinstance(item.default, str) and limits.choices:
         values = ", ".join(f"`{choice}`" for choice in dict.fromkeys((item.default, *limits.choices)))
     else:
         values = f"{item.default}; {wanted_values(item)}"

@@ -68,6 +68,7 @@ def read_area_light(shape: Any, camera: Array) -> AreaLight:
     middle = matrix[:3, 3]
     normal = np.cross(across, up)
     if kind == "sphere":
+        # Mitsuba 3.9.1 does not turn the normals that it samples on a sphere with the sphere.
         if shape.has_flipped_normals():
             raise InputError(f"light '{name}': the sphere shines inwards; remove flip_normals")
         if np.linalg.norm(camera - middle) <= sizes[0]:

@@ -7,8 +7,13 @@ wrote. It attenuates over a shadow ray that ends a relative epsilon before the l
 compared with the quadrature image of *that* integral, exp(-sigma_t (x + (1 - epsilon) r)), with the epsilon measured on
 this machine. The bias without this correction is given beside it.
 
+Under lights with extent the quadrature has standard errors of its own, and both sides' count. volpath's light comes in
+part by rays that the phase function sends on, which are not shortened: the bias that is corrected for is the most that
+the epsilon can do, and the one without correction is given beside it.
+
 Rays that pass closer to a light than `MASK_PIXELS` pixel widths are left out: the contribution of one path there is
-bounded only by 1/h^2, so that no number of samples gives a standard error to trust (DESIGN section 6.6).
+bounded only by 1/h^2, so that no number of samples gives a standard error to trust (DESIGN section 6.6). Lights with
+extent leave out none: their fluence is bounded.
 """
 
 import time
@@ -20,6 +25,7 @@ from numpy.typing import NDArray
 
 from reference.monte_carlo.allocation import allocated
 from reference.monte_carlo.batches import LARGEST_SEED, LAYERS, Batches
+from reference.quadrature.light_points import REPLICATES
 from reference.quadrature.ray_values import TruthImage
 from reference.scene.read import TruthScene, read_truth
 from reference.scene.shadow_epsilon import measure_shadow_epsilon
@@ -100,7 +106,7 @@ def agreement(
     def compared(traced: Batches, layer: str) -> Statistics:
         mask = masks[layer]
         test = batch_estimate(traced, layer, mask)
-        return compare_statistics(Estimate(getattr(shortened, layer)), test, mask=mask, margin=margin)
+        return compare_statistics(truth_estimate(shortened, layer, test), test, mask=mask, margin=margin)
 
     start = time.monotonic()
     counts = None
@@ -200,6 +206,20 @@ def agreements(
         )
         by_name |= {f"{estimator} {layer}": result for layer, result in by_layer.items()}
     return by_name
+
+
+def truth_estimate(image: TruthImage, layer: str, test: Estimate) -> Estimate:
+    """Return a layer of a quadrature image as the reference of a comparison with some batches.
+
+    Under lights with extent it has standard errors, of `REPLICATES` scramblings. All pixels share their points, so
+    their errors may add up; the standard error of a pooled bias takes them for independent. A value that no sample of
+    the batches reached has no standard error of theirs, and must not be judged by that of the quadrature alone.
+    """
+    error = getattr(image, f"{layer}_se")
+    reached = np.asarray(test.standard_error) > 0
+    if error is None or not error.any():
+        return Estimate(getattr(image, layer))
+    return Estimate(getattr(image, layer), np.where(reached, error, 0.0), REPLICATES)
 
 
 def _bias(expected: Array, batches: Batches, layer: str, mask: Mask) -> float:

@@ -9,6 +9,7 @@ Read in this order:
 - `quadrature.py`: faults of the quadrature;
 - `single_scatter.py`: faults of the integrator `single-scatter`;
 - `directional.py`: faults of either under directional lights;
+- `area.py`: faults of either under lights with extent;
 - `catalogue.py`: all of them by name;
 - `module_copies.py`: copies of modules in which a text is replaced;
 - `test_beds.py`: small scenes with the images of unchanged estimators;

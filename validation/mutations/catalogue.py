@@ -8,13 +8,16 @@ formula moves its mutation too.
 from collections.abc import Sequence
 
 from analytic.errors import InputError, nearest
+from validation.mutations import area as area_mutations
 from validation.mutations import directional as directional_mutations
 from validation.mutations import quadrature as quadrature_mutations
 from validation.mutations import single_scatter as single_scatter_mutations
 from validation.mutations.record import Mutation
 
-QUADRATURE = quadrature_mutations.MUTATIONS + directional_mutations.QUADRATURE
-SINGLE_SCATTER = single_scatter_mutations.MUTATIONS + directional_mutations.SINGLE_SCATTER
+QUADRATURE = quadrature_mutations.MUTATIONS + directional_mutations.QUADRATURE + area_mutations.QUADRATURE
+SINGLE_SCATTER = (
+    single_scatter_mutations.MUTATIONS + directional_mutations.SINGLE_SCATTER + area_mutations.SINGLE_SCATTER
+)
 MUTATIONS: tuple[Mutation, ...] = QUADRATURE + SINGLE_SCATTER
 
 

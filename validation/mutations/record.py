@@ -15,6 +15,7 @@ class Mutation:
     old: str  #: its text, which occurs once
     new: str  #: what stands in its place
     remark: str = ""  #: why the built-in scenes need not show it
+    wide: bool = False  #: a fault of lights with extent, tried in the probes of these alone
 
 
 #: The modules that a run of each estimator asks for.

@@ -29,7 +29,7 @@ from validation.mutations.test_beds import (
     loaded_stage,
     stage_of,
 )
-from validation.scenes.probes import PROBES
+from validation.scenes.probes import PROBES, WIDE_PROBES
 from validation.statistics.comparison import Statistics
 
 Array = NDArray[np.float64]
@@ -115,7 +115,7 @@ def study_mutations(
         Called with (share done, what) now and then.
     """
     tell = progress or (lambda share, what: None)
-    names = (*SCENES, *PROBES)
+    names = (*SCENES, *PROBES, *(WIDE_PROBES if any(mutation.wide for mutation in mutations) else ()))
     stages = []
     for number, name in enumerate(names):
         tell(0.7 * number / len(names), f"unchanged images, {name}")
@@ -124,7 +124,8 @@ def study_mutations(
     results = []
     for number, mutation in enumerate(mutations):
         tell(0.7 + 0.3 * number / len(mutations), mutation.name)
-        results.append(judged(mutation, seen(mutation, stages)))
+        tried = [stage for stage in stages if (stage.plan is not None) == mutation.wide]
+        results.append(judged(mutation, seen(mutation, tried)))
     return MutationStudy(control, tuple(results))
 
 
@@ -150,7 +151,9 @@ def _quadrature_seen(copies: ModuleCopies, stage: Stage) -> Iterator[Sighting]:
     """Compare a changed quadrature with every opponent."""
     truth = copies["reference.scene.read"].read_truth(stage.scene)
     for opponent in stage.opponents:
-        images = copies["reference.quadrature.image"].quadrature_image(truth, shadow_scale=opponent.shadow_scale)
+        images = copies["reference.quadrature.image"].quadrature_image(
+            truth, shadow_scale=opponent.shadow_scale, plan=stage.plan
+        )
         for layer, mask in stage.masks.items():
             image, unchanged = getattr(images, layer), getattr(opponent.image, layer)
             statistics = image_statistics(opponent, layer, image, mask)

@@ -5,6 +5,9 @@
 fog. Each built-in scene has one light, without a soft edge and before the camera, and no fog scatters backward. So only
 this scene can reveal a fault in the formula for soft spots or in the sum over lights.
 
+`wide-lights`, in `WIDE_PROBES`, has lights with extent of each shape, black ones and one of material `null`, some in
+view, before casters. Its truth takes many points of each light, so it is tried with faults of such lights alone.
+
 `sun` has a directional light on two bounded media, a box and a sphere of coloured fog, with occluders before them.
 """
 
@@ -12,7 +15,7 @@ from typing import Any
 
 import mitsuba as mi
 
-from validation.scenes.parts import camera, fog, point_light
+from validation.scenes.parts import area_lamp, camera, fog, point_light
 
 
 def many_lights() -> dict[str, Any]:
@@ -80,5 +83,30 @@ def sun() -> dict[str, Any]:
     }
 
 
+def wide_lights() -> dict[str, Any]:
+    """Return a rectangle, a disk and a sphere of constant radiance about a box over a floor, in forward fog."""
+    transform = mi.ScalarTransform4f()
+    grey = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.43, 0.47, 0.53]}}
+    panel = area_lamp("rectangle", (0.93, 0.61, 2.07), (0.17, 0.13, 0.31), (0.43, 0.27), (5.3, 4.7, 3.9))
+    disk = area_lamp("disk", (-1.13, 0.83, 1.53), (-0.31, -1.07, 0.83), 0.31, (7.1, 6.3, 5.9))
+    ball = area_lamp("sphere", (0.31, -0.41, 1.67), (0.0, 0.0, 0.0), 0.19, (6.7, 7.3, 8.9))
+    return {
+        "type": "scene",
+        "fog": fog(0.173, (0.91, 0.83, 0.74), {"type": "hg", "g": 0.41}),
+        "sensor": camera((0.23, -4.13, 1.37), (0.11, 0.07, 0.93), fov=49.7, size=(24, 18)),
+        "panel": panel,
+        "disk": disk | {"material": {"type": "null"}},
+        "ball": ball,
+        "box": {
+            "type": "cube",
+            "to_world": transform.translate([0.37, 0.29, 0.83]).rotate([0.1, 0.2, 1], 23).scale([0.29, 0.23, 0.31]),
+            "bsdf": grey,
+        },
+        "floor": {"type": "rectangle", "to_world": transform.scale(7.1), "bsdf": grey},
+    }
+
+
 #: Scenes of this module by name, as in `validation.scenes.registry.SCENES`.
 PROBES = {"many-lights": many_lights, "sun": sun}
+#: The same of lights with extent.
+WIDE_PROBES = {"wide-lights": wide_lights}
