@@ -48,6 +48,7 @@ _LEVELS = 4  # with an edge: squares of 1/16 of a pixel, with points in their qu
 _DEEPEST = 8  # around a light: of 1/256
 _AROUND = 3.0  # sides of a square: squares with a light closer than this are cut so deep
 _CHUNK = 1 << 17  # rays at once
+_POINTS_OF_LIGHTS = 256  # of lights with extent, at most: a pixel has many rays
 _DEPTH = 0.05  # neighbouring depths that differ by more are of two surfaces, or of one seen edge-on
 _CLOSE = 0.05  # sides of a square: a ray that comes closer to a light says nothing of the rest of the square
 _FLOOR = 1e-3  # of the mean of the image: below this a pixel's error need not be small relative to it
@@ -123,7 +124,7 @@ def area_image(
     things between those go unseen. Distances and angles to the light are those of the centres.
     """
     # Rays that share their draws differ by what they see alone.
-    plan = replace(plan or PointPlan(), shared=True)
+    plan = replace(plan or PointPlan(most=_POINTS_OF_LIGHTS), shared=True)
     how: dict[str, Any] = {"samples": samples, "shadow_scale": shadow_scale, "edges": edges, "plan": plan}
     trace = partial(_traced, truth, shapes=read_shapes(truth.occluders), **how)
     pixels = truth.width * truth.height

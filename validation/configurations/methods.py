@@ -53,7 +53,7 @@ SHARED_POINTS: tuple[tuple[str, int | float | str], ...] = (
     ("guide", "depth"),
     ("hd", "auto"),
     ("hz", 0.02),
-    ("narrow", 16.0),
+    ("narrow", 24.0),
 )
 
 #: The configurations that `bench` and `report` measure by default. Those that say their light points are left out where

@@ -18,21 +18,21 @@ def _row(item: str, claim: str, bound: float, figure: Take, rule: AtMost | AtLea
 
 ROWS: tuple[Row, ...] = (
     _row(
-        "Fig. 5.8",
+        "Fig. 5.8, R2",
         "R4 beats R2, given as long: error of R4 over that of R2",
         1.0,
         ratio(_error("R4"), _error("R2 at the time of R4")),
         AtMost(f"a better picture has a smaller error; {_SCENE}", "differs"),
     ),
     _row(
-        "Fig. 5.8",
+        "Fig. 5.8, R3",
         "R4 beats R3, given as long: error of R4 over that of R3",
         1.0,
         ratio(_error("R4"), _error("R3 at the time of R4")),
         AtMost(f"a better picture has a smaller error; {_SCENE}", "differs"),
     ),
     _row(
-        "Fig. 5.8",
+        "Fig. 5.8, R1",
         "32 samples and the filter look like 150: error of R4 over that of R1",
         1.1,
         ratio(_error("R4"), _error("R1")),
@@ -46,14 +46,14 @@ ROWS: tuple[Row, ...] = (
         AtMost(f"enough is read as twice the error at most; {_SCENE}", "differs"),
     ),
     _row(
-        "Fig. 4.9",
+        "Fig. 4.9, points",
         "5 light points are enough with the filter: error over that of 16 points",
         2.0,
         ratio(_error("5 points, hd 5"), _error("16 points, hd 5")),
         AtMost(f"enough is read as twice the error at most; {_SCENE}", "differs"),
     ),
     _row(
-        "Fig. 4.9",
+        "Fig. 4.9, edges",
         "the bilateral filter keeps edges: gradient at the steepest edges over that of the truth",
         0.8,
         at("rows", "R4", "edges"),

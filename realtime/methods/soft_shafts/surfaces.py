@@ -33,7 +33,7 @@ from realtime.shadow_maps.hemisphere_map import HemisphereMaps
 #: c of hd = c w / N: what smooths the staircase of N levels best (`tests/.../test_auto_width.py` fits it again).
 AUTO_WIDTH = 0.4
 #: The same where pixels share the points, whose mean over a tile is no staircase: the least error in `fence`.
-AUTO_WIDTH_SHARED = 0.8
+AUTO_WIDTH_SHARED = 1.2
 _STEP = 4  # pixels from one place where the width is looked for to the next
 _SEARCH = 4.0  # how far pixels take the width of a penumbra from their neighbours, a standard deviation [pixels]
 _NEARER = 0.01  # what is this much nearer to the light than a surface, of its own distance, is not that surface

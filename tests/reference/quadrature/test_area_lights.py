@@ -258,6 +258,7 @@ def test_points_are_doubled_where_the_error_is_large(variant):
 
 
 @pytest.mark.statistical
+@pytest.mark.claim("area-light-errors", tolerance="a binomial test at 1 % and 0.1 %")
 def test_the_standard_error_covers_the_truth_as_often_as_it_says(variant):
     """With 8 replicates the 95 % interval is 2.365 standard errors wide on either side."""
     sigma_t, radius, height, foot = 0.21, 0.3, 0.83, 2.0
@@ -279,6 +280,7 @@ def test_the_standard_error_covers_the_truth_as_often_as_it_says(variant):
 
 
 @pytest.mark.statistical
+@pytest.mark.claim("area-light-errors", tolerance="a binomial test at 1 % and 0.1 %")
 def test_the_surface_error_covers_the_truth_as_often_as_it_says(variant):
     from analytic.area_light import disk_share
     from validation.known_answers.area_lights import _occluder, _round, _truth, base_scene

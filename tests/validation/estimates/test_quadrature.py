@@ -109,6 +109,7 @@ def loaded(scene):
     return LoadedScene("tiny", scene, "A tiny scene.", "")
 
 
+@pytest.mark.claim("area-light-goes-on")
 def test_truth_of_an_area_light_goes_on_where_it_was_interrupted(own_cache, monkeypatch):
     from reference.quadrature import area_airlight
     from tests.helpers.area_lights import lamp, lit_scene

@@ -16,6 +16,7 @@ def test_quadrature_obeys(variant, law):
 
 
 @pytest.mark.claim("known-answers")
+@pytest.mark.claim("area-light-closed-forms", tolerance="1e-6 of the share by 8 x 16384 lines")
 @pytest.mark.parametrize("lines", [64, pytest.param(16384, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("law", ["half_plane_before_disk", "triangle_before_lights"])
 def test_shares_of_a_light(variant, law, lines):
@@ -25,6 +26,7 @@ def test_shares_of_a_light(variant, law, lines):
 
 @pytest.mark.slow
 @pytest.mark.claim("known-answers")
+@pytest.mark.claim("area-light-closed-forms", tolerance="2e-6 by 8 x 16384 points, whose standard error is 5e-7")
 def test_sphere_beside_a_ray(variant):
     answer = area_lights.sphere_beside_rays()
     assert answer.passed, answer

@@ -30,7 +30,10 @@ def test_what_does_not_lead_to_the_change_is_shared():
     assert "reference.quadrature.image" in set(copies)
     assert len(copies) == len(set(copies))
     assert copies["analytic.phase"] is sys.modules["analytic.phase"]
-    assert copies["reference.quadrature.ray_values"].foot_and_height is sys.modules["analytic.geometry"].foot_and_height
+    assert (
+        copies["reference.quadrature.light_airlight"].foot_and_height
+        is sys.modules["analytic.geometry"].foot_and_height
+    )
 
 
 def test_imports_inside_functions_are_served_too():

@@ -71,13 +71,13 @@ def test_verdicts_follow_from_the_rows(study):
 
     data = study_data(study)
     judged = {(row["item"], row["claim"][:9]): row for row in (judge(row, data) for row in ROWS)}
-    beats = judged["Fig. 5.8", "R4 beats "]
+    beats = judged["Fig. 5.8, R3", "R4 beats "]
     assert beats["measured"] == pytest.approx(
         data["rows"]["R4"]["error"] / data["rows"]["R3 at the time of R4"]["error"]
     )
     assert judged["user study", "63 % foun"]["verdict"] == "impossible"
     data["rows"]["R4"]["error"] *= 100
-    assert {judge(row, data)["verdict"] for row in ROWS if row.item == "Fig. 5.8"} == {"differs"}
+    assert {judge(row, data)["verdict"] for row in ROWS if row.item.startswith("Fig. 5.8")} == {"differs"}
 
 
 def test_the_tables_show_every_row(study):
