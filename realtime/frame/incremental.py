@@ -20,9 +20,9 @@ from typing import Any
 import drjit as dr
 
 from realtime.frame.renderer import (
-    MOST_KEPT,
     FrameRenderer,
     evaluated,
+    kept_groups,
     light_groups,
     no_light,
     run_cast_and_shade,
@@ -144,7 +144,8 @@ def _next_of_groups(renderer: FrameRenderer, made: _Made, *, cast_again: bool):
     kept: list[tuple[Any, Any]] = []
     for number, group in enumerate(groups):
         state, lists, cast, by_light = _before_method(group, made.of_group(number), cast, cast_again=cast_again)
-        kept.append((state, lists) if number < MOST_KEPT else (None, None))
+        first = kept[0][0] if kept else state
+        kept.append((state, lists) if number < kept_groups(first) else (None, None))
         if renderer.groups.of_point is None:
             *layers, history, carried = run_method(group, state, cast, by_light, lists, history, carried)
             stages = evaluated(cast, by_light, layers)

@@ -12,7 +12,7 @@ added up. What the stages of a single group take and return is a tuple by group 
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, is_dataclass, replace
 from typing import Any
 
 import drjit as dr
@@ -38,7 +38,8 @@ from realtime.scene.read_scene import Scene
 from realtime.tiles.adaptive_sampling import Corners, tile_corners
 from realtime.tiles.layout import TILE
 
-MOST_KEPT = 32  # groups of lights of which states, surfaces and lists are kept; those of others are made when needed
+_ROOM = 2**30  # of states of groups of lights, such as shadow maps [bytes]
+_MOST_KEPT = 32  # groups of lights of which states, surfaces and lists are kept; those of others are made when needed
 
 
 @dataclass(frozen=True)
@@ -284,8 +285,27 @@ class GroupPreparation:
 
     def __call__(self, scene: Scene) -> tuple[Any, ...]:
         """Return the state of each group, None for those that are not kept."""
-        groups = _groups_in(self.groups, scene)
-        return tuple(group.prepare(group.scene) if number < MOST_KEPT else None for number, group in enumerate(groups))
+        states: list[Any] = []
+        for group in _groups_in(self.groups, scene):
+            kept = not states or len(states) < kept_groups(states[0])
+            states.append(group.prepare(group.scene) if kept else None)
+        return tuple(states)
+
+
+def kept_groups(state: Any) -> int:
+    """Return of how many groups of lights states like this are kept: not more than fill the room for them."""
+    return min(_MOST_KEPT, max(1, _ROOM // max(_bytes_in(state), 1)))
+
+
+def _bytes_in(value: Any) -> int:
+    """Return the size of the Dr.Jit arrays in a state [bytes]."""
+    if isinstance(value, tuple | list):
+        return sum(_bytes_in(item) for item in value)
+    if is_dataclass(value):
+        return sum(_bytes_in(item) for item in vars(value).values())
+    if not dr.is_array_v(value):
+        return 0
+    return sum(map(_bytes_in, value)) if dr.depth_v(value) > 1 else dr.width(value) * dr.itemsize_v(value)
 
 
 def light_groups(renderer: FrameRenderer) -> tuple[FrameRenderer, ...]:
@@ -324,7 +344,7 @@ def run_shade(renderer: FrameRenderer, cast: Cast):
 
 def _shaded(groups: Sequence[FrameRenderer], cast: Cast, before: int) -> tuple[Any, ...]:
     """Return the surfaces of groups of lights, of which some came `before`; None for those that are not kept."""
-    kept = max(MOST_KEPT - before, 0)
+    kept = max(_MOST_KEPT - before, 0)
     return tuple(run_shade(group, cast) if number < kept else None for number, group in enumerate(groups))
 
 
@@ -332,9 +352,10 @@ def run_cull(renderer: FrameRenderer, state, distance: Metres):
     """Run the stage that sorts by tiles, for rays up to a `distance` [m], and return its lists."""
     if renderer.groups is not None:
         groups = light_groups(renderer)
-        states = state or [group.prepare(group.scene) for group in groups[:MOST_KEPT]]
-        lists = [run_cull(group, own, distance) for group, own in zip(groups[:MOST_KEPT], states)]
-        return (*lists, *(None for _ in groups[MOST_KEPT:]))
+        states = state or renderer.prepare(renderer.scene)
+        return tuple(
+            None if own is None else run_cull(group, own, distance) for group, own in zip(groups, states, strict=True)
+        )
     scene = renderer.scene
     return renderer.cull(renderer.pixel, scene.camera, scene.medium, renderer.lights, state, distance)
 

@@ -221,13 +221,12 @@ def test_the_next_frame_is_that_of_the_moved_light(variant, name, material):
 
 
 def test_more_points_than_are_kept_cost_no_more_memory_and_agree(variant, monkeypatch):
-    from realtime.frame import incremental, renderer
+    from realtime.frame import renderer
 
     scene = scene_of(changes={"size": (16, 12)})
     many = renderer_of(scene, "shadow-planes", points=7)
     wanted = render_frame(many).airlight
-    for module in (incremental, renderer):
-        monkeypatch.setattr(module, "MOST_KEPT", 3)
+    monkeypatch.setattr(renderer, "_MOST_KEPT", 3)
     np.testing.assert_array_equal(render_frame(many).airlight, wanted)
     still = {"camera_moved": False, "geometry_moved": False, "light_moved": False}
     stages, cache = next_frame(many, scene, None, **still)
@@ -241,3 +240,14 @@ def test_a_sphere_of_one_point_and_double_precision(variant):
     frame = render_frame(renderer_of(scene, "shadow-planes", points=1))
     assert np.isfinite(frame.airlight).all()
     assert dr.itemsize_v(type(with_light_points(scene, 1, "ring").lights[0].position.x)) == 8
+
+
+def test_large_states_are_kept_of_few_points(variant, monkeypatch):
+    from realtime.frame import renderer
+
+    scene = scene_of(changes={"size": (16, 12)})
+    maps = renderer_of(scene, "light-volumes", points=5, map=64)
+    wanted = render_frame(maps).airlight
+    monkeypatch.setattr(renderer, "_ROOM", 2 * renderer._bytes_in(maps.prepare(scene)[0]))
+    assert [state is None for state in maps.prepare(scene)] == [False] * 2 + [True] * 3
+    np.testing.assert_array_equal(render_frame(maps).airlight, wanted)
