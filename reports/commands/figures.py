@@ -20,6 +20,7 @@ FIGURES: dict[str, tuple[str, tuple[str, ...]]] = {
     "convergence": ("convergence", ("quick", "progress")),
     "z-distribution": ("z_distribution", ("quick", "progress")),
     "decomposition": ("decomposition", ("quick", "progress")),
+    "froxels": ("froxels", ("quick", "progress")),
     "slab-orders": ("slab_orders", ("quick", "progress")),
     "map-size": ("map_size", ("quick", "progress")),
     "stages": ("stages", ("quick", "progress", "published")),

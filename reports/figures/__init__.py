@@ -9,6 +9,7 @@ Read in this order:
 - `convergence.py`: orders of kernels and estimators
 - `decomposition.py`: errors by cause
 - `frame_speed.py`: time of frames against error
+- `froxels.py`: grids and ghosts of froxel fog
 - `kernel_errors.py`: errors of kernels over depth and angle
 - `kernel_speed.py`: time of kernels against error
 - `map_size.py`: error over the size of the shadow map
@@ -23,7 +24,8 @@ Read in this order:
 - `strip.py`: images with insets and errors
 - `z_distribution.py`: standardised errors of the estimators
 
-May import: `analytic`, `realtime.kernels`, `reference.storage`, `reports.data`, `reports.machine`, `reports.papers`,
-`reports.plotting`, `reports.tables`, `validation.configurations`, `validation.estimates`, `validation.frames`,
-`validation.fidelity`, `validation.kernels`, `validation.papers`, `validation.scenes`, `validation.slab`.
+May import: `analytic`, `realtime.kernels`, `realtime.scene`, `reference.storage`, `reports.data`, `reports.machine`,
+`reports.papers`, `reports.plotting`, `reports.tables`, `validation.configurations`, `validation.estimates`,
+`validation.frames`, `validation.fidelity`, `validation.kernels`, `validation.papers`, `validation.scenes`,
+`validation.slab`.
 """

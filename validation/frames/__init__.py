@@ -10,6 +10,7 @@ Read in this order:
 - `baseline_runs.py`: measures the errors that baselines keep;
 - `baseline_files.py`: baselines as files, their comparison and their revisions;
 - `decomposition.py`: the error of an image by its causes, which add up to it;
+- `froxel_study.py`: which grid froxel fog needs, and the ghosts of its history;
 - `map_size.py`: error against the size of the shadow map, and the flicker of a light that moves;
 - `plane_stability.py`: hard cases for sums over shadow planes;
 - `zero_cost.py`: checks that what a scene does not need costs nothing.

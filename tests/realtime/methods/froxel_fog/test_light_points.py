@@ -79,8 +79,7 @@ def test_light_points_in_bounded_media_come_one_by_one(variant):
     scene = lit_by(changes={"fog": None, "mist": fog, "ball": None})
     scene["sensor"] = {key: entry for key, entry in scene["sensor"].items() if key != "medium"}
     now = read(scene)
-    froxels = frame(now, points=5, width=32, height=24, slices=96).airlight
+    froxels = frame(now, points=5, width=128, height=96, slices=128).airlight
     exact = frame(now, "ray-march", points=5, steps=400).airlight
-    within = exact > 0.3 * exact.max()  # not at the outline of the sphere, which is cut into columns
-    np.testing.assert_allclose(froxels[within].mean(), exact[within].mean(), rtol=0.02)
-    assert np.median(np.abs(froxels[within] / exact[within] - 1)) < 0.03
+    within = exact > 0  # not at the outline of the sphere, which is cut into columns
+    np.testing.assert_allclose(froxels[within], exact[within], rtol=0.01)
