@@ -25,6 +25,7 @@ def _traced(name: str, meaning: str, module: str, old: str, new: str) -> Mutatio
 
 
 _SENT = "intensity, quarter = light.radiance * light.area,"
+_OPAQUE = "        if not null:\n"
 _EACH = "        for place, normal in zip(places, normals, strict=True)\n"
 
 QUADRATURE: tuple[Mutation, ...] = (
@@ -109,15 +110,15 @@ QUADRATURE: tuple[Mutation, ...] = (
         "area-null-is-opaque",
         "a light of material null that ends rays and casts shadows",
         _SCENE,
-        'null = shape.bsdf().class_name() == "Null"',
-        'null = shape.bsdf().class_name() == "Null" and not shape.is_emitter()',
+        _OPAQUE,
+        _OPAQUE.replace("not null", "not null or shape.is_emitter()"),
     ),
     _fault(
         "area-black-is-clear",
         "a black light that neither ends rays nor casts shadows",
         _SCENE,
-        'null = shape.bsdf().class_name() == "Null"',
-        'null = shape.bsdf().class_name() == "Null" or shape.is_emitter()',
+        _OPAQUE,
+        _OPAQUE.replace("not null", "not null and not shape.is_emitter()"),
     ),
     _fault(
         "area-surface-without-cosine",

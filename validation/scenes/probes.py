@@ -88,7 +88,7 @@ def wide_lights() -> dict[str, Any]:
     transform = mi.ScalarTransform4f()
     grey = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.43, 0.47, 0.53]}}
     panel = area_lamp("rectangle", (0.93, 0.61, 2.07), (0.17, 0.13, 0.31), (0.43, 0.27), (5.3, 4.7, 3.9))
-    disk = area_lamp("disk", (-1.13, 0.83, 1.53), (-0.31, -1.07, 0.83), 0.31, (7.1, 6.3, 5.9))
+    disk = area_lamp("disk", (-0.57, -1.61, 1.33), (-0.31, 1.07, 0.83), 0.37, (7.1, 6.3, 5.9))
     ball = area_lamp("sphere", (0.31, -0.41, 1.67), (0.0, 0.0, 0.0), 0.19, (6.7, 7.3, 8.9))
     return {
         "type": "scene",
