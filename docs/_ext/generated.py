@@ -22,6 +22,7 @@ PARTS = {
     "commands": listed.commands,
     "methods": listed.methods,
     "parameters": listed.parameters,
+    "light-points": listed.light_points,
     "kernels": listed.kernels,
     "method": measured.method,
     "kernel-costs": measured.kernel_costs,

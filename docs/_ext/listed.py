@@ -105,12 +105,22 @@ def parameters(method: str) -> str:
     return table(("`--set`", "values", "what it does"), rows, 3) if rows else "The method has no parameters."
 
 
+def light_points() -> str:
+    """Return a table of the parameters that all methods have for lights with extent."""
+    from dataclasses import fields
+
+    from realtime.area_lights.points import LightPoints
+
+    rows = [(f"`{item.name}`", *_parameter(item)) for item in fields(LightPoints)]
+    return table(("`--set`", "values", "what it does"), rows, 3)
+
+
 def _parameter(item: Any) -> tuple[str, str]:
     """Return the values of a parameter, its default first, and what it does."""
     from realtime.parameters import limits_of, wanted_values
 
     limits = limits_of(item)
-    if isinstance(item.default, str):
+    if isinstance(item.default, str) and limits.choices:
         values = ", ".join(f"`{choice}`" for choice in dict.fromkeys((item.default, *limits.choices)))
     else:
         values = f"{item.default}; {wanted_values(item)}"

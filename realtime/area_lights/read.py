@@ -67,14 +67,13 @@ def read_area_light(shape: Any, camera: Array) -> AreaLight:
         raise InputError(f"light '{name}': the {kind} is scaled by {scales}; wanted one scale for all its axes")
     middle = matrix[:3, 3]
     normal = np.cross(across, up)
-    facing = np.array(shape.sample_position(0.0, mi.Point2f(0.31, 0.47)).n, dtype=np.float64).ravel()
     if kind == "sphere":
         # Mitsuba 3.9.1 does not turn the normals that it samples on a sphere with the sphere.
         if shape.has_flipped_normals():
             raise InputError(f"light '{name}': the sphere shines inwards; remove flip_normals")
         if np.linalg.norm(camera - middle) <= sizes[0]:
             raise InputError(f"light '{name}': the camera is inside of the sphere; move the camera or the light")
-    elif facing @ normal < 0:
+    elif np.array(shape.sample_position(0.0, mi.Point2f(0.31, 0.47)).n, dtype=np.float64).ravel() @ normal < 0:
         normal = -normal
     return AreaLight(name, kind, middle, across, up, normal / np.linalg.norm(normal), radiance, opaque)
 

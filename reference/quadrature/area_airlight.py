@@ -13,8 +13,9 @@ independent scramblings (`reference.quadrature.light_points`) each give a mean, 
 Points are doubled for the rays whose standard error is above the one that was asked for.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,8 @@ from reference.visibility.intervals import RandomChecks
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Share = Callable[[float], None]
+Kept = Mapping[str, Array]
+Keep = Callable[[str, Callable[[], Kept]], Kept]
 
 _RTOL = 1e-8  # of the integral of one point: below the error of a mean over points
 _ROWS = 1 << 16  # rays and points at once
@@ -57,6 +60,7 @@ def area_airlight(
     shadow_scale: float,
     how: dict[str, Any],
     tell: Share,
+    keep: Keep = lambda name, work: work(),
 ) -> AreaAirlight:
     """Compute the airlight of all lights with extent along every ray.
 
@@ -74,6 +78,8 @@ def area_airlight(
         As in `reference.quadrature.light_airlight.light_airlight`.
     tell
         Called with the share of the work that is done.
+    keep
+        Called with the name of each part of the work and a function that does it; may return what it did before.
     """
     count = len(truth.direction)
     total, bound = np.zeros((count, 3, REPLICATES)), np.zeros((count, 3))
@@ -90,18 +96,12 @@ def area_airlight(
             ways = how | {"shapes": shapes, "checks": _CHECKS}
             for replicate in range(REPLICATES):
                 some = light_points(light, squares[number][replicate][low:high])
-                if _is_open(scene, shapes):
-                    radiance, error = _open_airlight(rays, some, distance[active], shadow_scale)
-                    total[active, :, replicate] += radiance
-                    bound[active] += error
-                    some = []
-                for point in some:
-                    sent = light_airlight(
-                        rays, point, distance[active], shadow_scale=shadow_scale, how=ways, rtol=_RTOL
-                    )
-                    total[active, :, replicate] += sent.radiance
-                    bound[active] += sent.bound
-                    checks.append(sent.lit.random_checks)
+                work = partial(_sums_over, rays, some, distance[active], shadow_scale, ways)
+                sums = keep(f"airlight-{number}-{high}-{replicate}", work)
+                total[active, :, replicate] += sums["radiance"]
+                bound[active] += sums["bound"]
+                checked, disagreements, refined, left = (int(value) for value in sums["checks"][:4])
+                checks.append(RandomChecks(checked, disagreements, refined, left, float(sums["checks"][4])))
                 tell((done + (number + (replicate + 1) / REPLICATES) / len(lights)) / rounds)
         used[active] = high
         done += 1
@@ -113,6 +113,20 @@ def area_airlight(
         low, high = high, 2 * high
     means = total / used[:, None, None]
     return AreaAirlight(means, bound / (REPLICATES * used[:, None]), RandomChecks.of_all(checks))
+
+
+def _sums_over(
+    rays: TruthScene, points: Sequence[TruthLight], distance: Array, shadow_scale: float, how: dict[str, Any]
+) -> Kept:
+    """Return sums over points: radiances and bounds of their errors, (rays, 3) each, and counts of the checks."""
+    if _is_open(rays, how["shapes"]):
+        radiance, bound = _open_airlight(rays, points, distance, shadow_scale)
+        return {"radiance": radiance, "bound": bound, "checks": np.zeros(5)}
+    sent = [light_airlight(rays, point, distance, shadow_scale=shadow_scale, how=how, rtol=_RTOL) for point in points]
+    known = RandomChecks.of_all([each.lit.random_checks for each in sent])
+    checks = known.checked, known.disagreements, known.refined, known.left, known.missed
+    radiance, bound = (np.sum([getattr(each, name) for each in sent], axis=0) for name in ("radiance", "bound"))
+    return {"radiance": radiance, "bound": bound, "checks": np.array(checks)}
 
 
 def _is_open(scene: TruthScene, shapes: Shapes) -> bool:

@@ -14,8 +14,8 @@ folded by a tent, u = 1 - |2 t - 1|, whose error falls as the square of the numb
 (Hickernell 2002, Obtaining O(N^-2+eps) convergence for lattice quadrature rules).
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import drjit as dr
@@ -23,7 +23,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.quadrature.area_airlight import FLOOR, unsettled
+from reference.quadrature.area_airlight import FLOOR, Keep, Kept, Share, unsettled
 from reference.quadrature.light_points import REPLICATES, PointPlan, mirrored_digits
 from reference.quadrature.segments import optical_depth
 from reference.quadrature.surface import SurfaceHits
@@ -44,14 +44,13 @@ from reference.visibility.light_lines import (
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-Share = Callable[[float], None]
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(6)
 _PANEL = 0.7  # rad: widest panel in theta or phi
 _BODIES = 0.1  # rad: the same where bounded media dim the leg, whose depth has kinks
 _LINES = 1 << 17  # at once
 _NODES_AT_ONCE = 1 << 20
-_FIRST = 4  # lines of each replicate that every point gets
+_FIRST = 8  # lines of each replicate that every point gets
 
 
 @dataclass(frozen=True)
@@ -64,7 +63,14 @@ class Beam:
 
 
 def area_surface(
-    truth: TruthScene, hits: SurfaceHits, known: Array, *, plan: PointPlan, shadow_scale: float, tell: Share
+    truth: TruthScene,
+    hits: SurfaceHits,
+    known: Array,
+    *,
+    plan: PointPlan,
+    shadow_scale: float,
+    tell: Share,
+    keep: Keep = lambda name, work: work(),
 ) -> Array:
     """Return the radiance of surfaces lit by lights with extent, by replicate, (rays, 3, replicates) [W/(m^2 sr)].
 
@@ -78,8 +84,8 @@ def area_surface(
         The standard error that is asked for, the most lines of a replicate, and the seed.
     shadow_scale
         See `reference.quadrature.image.quadrature_image`.
-    tell
-        Called with the share of the work that is done.
+    tell, keep
+        As in `reference.quadrature.area_airlight.area_airlight`.
 
     Notes
     -----
@@ -102,17 +108,11 @@ def area_surface(
     rounds, done = 1 + int(np.log2(max(1, plan.most // _FIRST))), 0
     while len(active):
         for number, beam in enumerate(beams):
-            looking = active[faced[number].seen[active]]
-            step = max(1, _LINES // (REPLICATES * (high - low)))
-            for first in range(0, len(looking), step):
-                some = looking[first : first + step]
-                line = _lines(draws[number], some, (low, high))
-                lines = scan_lines(beam.light.kind, faced[number], points, line[:3])
-                got = _line_values(beam, faced[number], lines, points, bsdf, shadow_scale)
-                place = np.searchsorted(some, lines.point) * REPLICATES + line[3]
-                sums = sums_of(place, got, len(some) * REPLICATES).reshape(len(some), REPLICATES, 3)
-                total[some] += np.swapaxes(sums, 1, 2)
-                tell((done + (number + (first + len(some)) / len(looking)) / len(beams)) / rounds)
+            share = partial(_share_of, tell, (done + number / len(beams)) / rounds, 1 / (len(beams) * rounds))
+            work = partial(
+                _sums_over, beam, faced[number], points, bsdf, shadow_scale, draws[number], active, (low, high), share
+            )
+            total[active] += keep(f"surface-{number}-{high}", work)["radiance"]
         used[active] = high
         done += 1
         if high >= plan.most:
@@ -124,6 +124,37 @@ def area_surface(
         low, high = high, 2 * high
     result[rows] = total / used[:, None, None] * to_camera[:, :, None]
     return result
+
+
+def _share_of(tell: Share, done: float, part: float, share: float) -> None:
+    tell(done + part * share)
+
+
+def _sums_over(
+    beam: Beam,
+    seen: Facing,
+    points: Points,
+    bsdf: "Reflection",
+    shadow_scale: float,
+    draws: tuple[Array, Array],
+    active: Index,
+    numbers: tuple[int, int],
+    tell: Share,
+) -> Kept:
+    """Return what lines of these numbers stand for at some points, before the leg to the camera, added up."""
+    total = np.zeros((len(points.place), 3, REPLICATES))
+    looking = active[seen.seen[active]]
+    step = max(1, _LINES // (REPLICATES * (numbers[1] - numbers[0])))
+    for first in range(0, len(looking), step):
+        some = looking[first : first + step]
+        line = _lines(draws, some, numbers)
+        lines = scan_lines(beam.light.kind, seen, points, line[:3])
+        got = _line_values(beam, seen, lines, points, bsdf, shadow_scale)
+        place = np.searchsorted(some, lines.point) * REPLICATES + line[3]
+        sums = sums_of(place, got, len(some) * REPLICATES).reshape(len(some), REPLICATES, 3)
+        total[some] += np.swapaxes(sums, 1, 2)
+        tell((first + len(some)) / len(looking))
+    return {"radiance": total[active]}
 
 
 def surface_rows(hits: SurfaceHits) -> Index:

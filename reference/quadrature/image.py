@@ -2,6 +2,7 @@
 """The truth of an image: the values of the rays through pixel centres, or means over the areas of pixels."""
 
 from analytic.errors import InputError
+from reference.quadrature.area_airlight import Keep
 from reference.quadrature.light_points import PointPlan
 from reference.quadrature.pixel_area import area_image
 from reference.quadrature.ray_values import Progress, TruthImage, image_of, ray_values
@@ -17,6 +18,7 @@ def quadrature_image(
     edges: str = "auto",
     progress: Progress | None = None,
     plan: PointPlan | None = None,
+    keep: Keep | None = None,
 ) -> TruthImage:
     """Compute the truth of an image.
 
@@ -39,6 +41,9 @@ def quadrature_image(
         Called with (done, total, what) as the work goes on.
     plan
         How many points and scan lines stand for lights with extent.
+    keep
+        Called with the name of each part of that work and a function that does it: it may keep what it returns, and
+        give it back when the same image is computed again. Not for means over pixels.
 
     Returns
     -------
@@ -60,6 +65,8 @@ def quadrature_image(
         return area_image(truth, samples=samples, shadow_scale=shadow_scale, edges=edges, progress=progress, plan=plan)
     if pixel != "centre":
         raise InputError(f"pixel is '{pixel}'; wanted 'centre' or 'area'")
-    values = ray_values(truth, samples=samples, shadow_scale=shadow_scale, edges=edges, progress=progress, plan=plan)
+    values = ray_values(
+        truth, samples=samples, shadow_scale=shadow_scale, edges=edges, progress=progress, plan=plan, keep=keep
+    )
     layers = values.airlight, values.bound, values.surface
     return image_of(truth, values, layers, (values.emitted, values.replicates))

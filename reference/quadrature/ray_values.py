@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.quadrature.area_airlight import area_airlight, standard_error
+from reference.quadrature.area_airlight import Keep, area_airlight, standard_error
 from reference.quadrature.area_surface import area_surface
 from reference.quadrature.directional_airlight import directional_airlight
 from reference.quadrature.emission import emitted_light
@@ -132,6 +132,7 @@ def ray_values(
     progress: Progress | None = None,
     shapes: Shapes | None = None,
     plan: PointPlan | None = None,
+    keep: Keep | None = None,
 ) -> RayValues:
     """Compute airlight, lit surface, distances and lit intervals of every ray of `truth.direction`.
 
@@ -139,7 +140,7 @@ def ray_values(
     ----------
     truth
         The scene, with any rays.
-    samples, shadow_scale, edges, progress, plan
+    samples, shadow_scale, edges, progress, plan, keep
         See `reference.quadrature.image.quadrature_image`.
     shapes
         What `reference.scene.shapes.read_shapes` returned for the occluders, if that is known.
@@ -189,12 +190,10 @@ def ray_values(
     if truth.area:
         plan, done = plan or PointPlan(), total - 2 * _STEPS
         tell = partial(_tell, progress, total)
-        scattered = area_airlight(
-            truth, hits.distance, airlight, plan=plan, shadow_scale=shadow_scale, how=how, tell=partial(tell, done)
-        )
-        lit = area_surface(
-            truth, hits, surface, plan=plan, shadow_scale=shadow_scale, tell=partial(tell, done + _STEPS)
-        )
+        how_kept: dict[str, Any] = {"plan": plan, "shadow_scale": shadow_scale} | ({"keep": keep} if keep else {})
+        scattered = area_airlight(truth, hits.distance, airlight, how=how, tell=partial(tell, done), **how_kept)
+        lit = area_surface(truth, hits, surface, tell=partial(tell, done + _STEPS), **how_kept)
+        tell(total, 0.0)
         replicates = np.concatenate([scattered.replicates, lit], axis=1)
         mean = replicates.mean(axis=2)
         airlight, surface, bound = airlight + mean[:, :3], surface + mean[:, 3:], bound + scattered.bound

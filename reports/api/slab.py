@@ -83,7 +83,7 @@ def slab(
     tau
         Thickness [mean free paths], 1e-6 to 1e4.
     sun
-        Zenith angle of the sun [degrees], 0 to 89.99.
+        Zenith angle of the sun [degrees], from 0 to below 90.
     phase
         'isotropic', 'hg:G', 'mie', 'mie-modified', or the path of a CSV file of angles [degrees] and values.
     albedo

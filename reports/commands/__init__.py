@@ -32,10 +32,10 @@ Read in this order:
 - `stability.py`: `airlight stability`
 - `test.py`: `airlight test`
 
-May import: `analytic`, `realtime.frame`, `realtime.kernels`, `realtime.methods`, `realtime.methods.shadow_planes`,
-`realtime.scene`, `realtime.shadow_maps`, `reference.storage`, `reports.data`, `reports.diff`, `reports.docs`,
-`reports.figures`, `reports.interchange`, `reports.machine`, `reports.papers`, `reports.plotting`, `reports.report`,
-`reports.tables`, `validation.certified`, `validation.comparison`, `validation.configurations`, `validation.estimates`,
-`validation.fidelity`, `validation.frames`, `validation.kernels`, `validation.metrics`, `validation.mutations`,
-`validation.papers`, `validation.scenes`, `validation.slab`.
+May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.kernels`, `realtime.methods`,
+`realtime.methods.shadow_planes`, `realtime.scene`, `realtime.shadow_maps`, `reference.storage`, `reports.data`,
+`reports.diff`, `reports.docs`, `reports.figures`, `reports.interchange`, `reports.machine`, `reports.papers`,
+`reports.plotting`, `reports.report`, `reports.tables`, `validation.certified`, `validation.comparison`,
+`validation.configurations`, `validation.estimates`, `validation.fidelity`, `validation.frames`, `validation.kernels`,
+`validation.metrics`, `validation.mutations`, `validation.papers`, `validation.scenes`, `validation.slab`.
 """

@@ -82,7 +82,12 @@ def bench(
     from reports.machine.own_process import in_own_process
     from reports.machine.progress import part_of, progress_bar
     from reports.tables.terminal import print_json
-    from validation.configurations.methods import Configuration, chosen_configurations, parse_settings
+    from validation.configurations.methods import (
+        Configuration,
+        chosen_configurations,
+        parse_settings,
+        rendered_lights,
+    )
     from validation.frames.expected_work import check_work, frame_work, truth_work
     from validation.scenes.loading import load_scene, parse_size
     from validation.scenes.registry import SCENES
@@ -104,9 +109,9 @@ def bench(
     for name in names:  # refuses unusable input before an hour of work, not after
         scene = read_scene(load_scene(name, pixels).scene)
         print_notes(scene.features.notes)
-        at, lights = (scene.camera.width, scene.camera.height), len(scene.lights)
-        works.append(truth_work(at, lights=lights))
-        works += [frame_work(at, lights=lights, steps=_steps(each)) for each in chosen]
+        at = scene.camera.width, scene.camera.height
+        works.append(truth_work(at, lights=len(scene.lights) + len(scene.area_lights)))
+        works += [frame_work(at, lights=rendered_lights(scene, each), steps=_steps(each)) for each in chosen]
     check_work("bench", works, force=force)
     if decompose:
         _decompose(names, pixels, chosen, apart=apart, output=output, json=json, markdown=markdown)

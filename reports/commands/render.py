@@ -3,6 +3,7 @@
 
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -95,13 +96,21 @@ def _plan(name_or_path: str, pixels: tuple[int, int] | None, precision: str, cho
     from realtime.methods.registry import find_method
     from realtime.methods.shadow_planes.method import prepare_shadow_planes
     from realtime.methods.shadow_planes.plane_counts import caster_plan, describe_casters
+    from realtime.parameters import values
     from realtime.scene.features import describe
+    from realtime.scene.light_points import with_light_points
     from realtime.scene.read_scene import read_scene
     from validation.scenes.loading import load_scene
 
     scene = read_scene(load_scene(name_or_path, pixels).scene, precision)
     words, notes = describe(scene.features), list(scene.features.notes)
-    if find_method(chosen.method).prepare is prepare_shadow_planes:
+    method = find_method(chosen.method)
+    if scene.area_lights:
+        own = {name: value for name, value in chosen.parameters if name in values(method.light_points)}
+        points = replace(method.light_points, **own)
+        words["light points"] = f"{points.points} of each light with extent, {points.pattern}"
+        scene = with_light_points(scene, 1, "ring")  # the casters as the middle of each sees them
+    if method.prepare is prepare_shadow_planes:
         casters = caster_plan(scene)
         words |= describe_casters(casters)
         _warn(casters.warnings)
@@ -124,12 +133,15 @@ def _warn(warnings) -> None:
 
 
 def _check_work(name: str, scene, chosen, frames: int | None = None, *, force: bool) -> None:
+    from validation.configurations.methods import rendered_lights
     from validation.frames.expected_work import TIMED, check_work, frame_work, steps_of
 
     size = scene.camera.width, scene.camera.height
     marches = chosen.method == "ray-march" or "steps" in dict(chosen.parameters)
     steps = steps_of(chosen.parameters) if marches else 0
-    work = frame_work(size, lights=len(scene.lights), steps=steps, frames=TIMED if frames is None else frames)
+    work = frame_work(
+        size, lights=rendered_lights(scene, chosen), steps=steps, frames=TIMED if frames is None else frames
+    )
     check_work(f"render {name}, {size[0]} x {size[1]}, {chosen.label}", [work], force=force)
 
 
@@ -141,8 +153,9 @@ def _prepared(scene, chosen):
 
     print_notes(scene.features.notes)
     renderer = prepared(scene, chosen)
-    if isinstance(renderer.prepare, PlanePreparation):
-        _warn(renderer.prepare.casters.warnings)
+    stages = renderer.groups.of_point if renderer.groups is not None else renderer
+    if stages is not None and isinstance(stages.prepare, PlanePreparation):
+        _warn(stages.prepare.casters.warnings)
     return renderer
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The truth of a scene, from the cache where it was computed before."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import Field, fields
 from typing import Any
 
@@ -9,7 +9,7 @@ from reference.quadrature.image import quadrature_image
 from reference.quadrature.ray_values import TruthImage
 from reference.quadrature.surface import surface_hits
 from reference.scene.read import read_truth
-from reference.storage.cache import load_arrays, store_arrays
+from reference.storage.cache import drop_arrays, load_arrays, store_arrays
 from reference.storage.cache_size import make_room
 from reference.storage.scene_digest import cache_key
 from validation.estimates.light_on_ray import check_camera, check_rays, check_values
@@ -53,11 +53,35 @@ def truth_image(
     check_camera(truth)
     if pixel == "centre":
         check_rays(truth, surface_hits(truth).distance)
-    image = quadrature_image(truth, **settings, progress=progress)
+    parts = _Parts(key)
+    # Only lights with extent take so long that a run is worth going on with.
+    keep = parts if truth.area and pixel == "centre" else None
+    image = quadrature_image(truth, **settings, keep=keep, progress=progress)
     check_values(truth, image)
     values = {field.name: getattr(image, field.name) for field in fields(TruthImage)}
     store_arrays(key, {name: value for name, value in values.items() if value is not None})
+    parts.drop()
     return image
+
+
+class _Parts:
+    """Parts of a truth, kept until it is done: a run that was interrupted goes on from them."""
+
+    def __init__(self, key: str) -> None:
+        self._key, self._names = key, list[str]()
+
+    def __call__(self, name: str, work: Callable[[], Mapping[str, Any]]) -> Mapping[str, Any]:
+        self._names.append(f"{self._key}-parts/{name}")
+        stored = load_arrays(self._names[-1])
+        if stored is None:
+            stored = dict(work())
+            store_arrays(self._names[-1], stored)
+        return stored
+
+    def drop(self) -> None:
+        """Forget all parts."""
+        for name in self._names:
+            drop_arrays(name)
 
 
 def _needed(every: bool) -> set[str]:

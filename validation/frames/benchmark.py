@@ -64,10 +64,11 @@ def configurations_for(
     """Return the configurations that differ in this scene from the ones before them.
 
     Variants of the shadows are left out if nothing casts a shadow. The published treatment of bounded media is left out
-    if the scene has none, or if they do not lie in clear air.
+    if the scene has none, or if they do not lie in clear air, and so are light points where no light has an extent.
     """
     without_effect = set() if features.shadows else {"shadow", "order", "map"}
     without_effect |= set() if features.clear else {"media"}
+    without_effect |= set() if features.area_lights else {"points", "pattern"}
     return tuple(chosen for chosen in configurations if not without_effect & set(dict(chosen.parameters)))
 
 

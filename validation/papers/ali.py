@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from realtime.frame.renderer import render_frame, run_cast_and_shade
 from realtime.scene.read_scene import Scene, read_scene
-from validation.configurations.methods import Configuration, prepared
+from validation.configurations.methods import SHARED_POINTS, Configuration, prepared
 from validation.configurations.timing import Timing, moved_light, time_in_turns
 from validation.scenes.loading import load_scene
 
@@ -54,20 +54,7 @@ VARIANTS: Mapping[str, dict[str, Any]] = {
     "16 points, hd 5": {"points": 16},
     "scale 2": {"scale": 2},
     "hd auto": {"guide": "depth", "hd": "auto", "surfaces": "ray"},
-    "shared points": dict(
-        points=16,
-        pattern="sobol",
-        interleave=True,
-        scale=2,
-        steps=16,
-        spacing="equiangular",
-        map=128,
-        surfaces="ray",
-        guide="depth",
-        hd="auto",
-        hz=0.02,
-        narrow=16.0,
-    ),
+    "shared points": dict(SHARED_POINTS),
 }
 
 

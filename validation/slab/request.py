@@ -12,7 +12,8 @@ from validation.slab.phases import PhasePair, phase_pair
 #: The sets of orders of Bouthors 2008, section 5.1; order 1 stands apart.
 SETS = ("1", "2", "3-4", "5-6", "7-8", "9-12", "13-18", "19-30", "31-inf")
 LARGEST_ORDER = 1000
-THICKEST, LARGEST_SUN = 1e4, 89.99
+THICKEST = 1e4
+LARGEST_SUN = 89.999999  #: [degrees]; above, the cosine loses its digits
 _SMALLEST_TAU = 1e-6
 
 
@@ -79,7 +80,7 @@ def slab_request(
         raise InputError(f"tau: got {tau:g}, wanted a thickness of {_SMALLEST_TAU:g} to {THICKEST:g} mean free paths")
     if not 0 <= sun <= LARGEST_SUN:
         raise InputError(
-            f"sun: got {sun:g}, wanted a zenith angle of 0 to {LARGEST_SUN} degrees; at 90 no light enters the slab"
+            f"sun: got {sun:g}, wanted a zenith angle from 0 to below 90 degrees; at 90 no light enters the slab"
         )
     if not 0 <= albedo <= 1:
         raise InputError(f"albedo: got {albedo:g}, wanted a share of 0 to 1")

@@ -54,7 +54,7 @@ from realtime.methods.soft_shafts.surfaces import (
     penumbra_width,
     reached_surfaces,
 )
-from realtime.numerics.array_types import two_numbers
+from realtime.numerics.array_types import four_numbers
 from realtime.scene.lights import sources_of
 from realtime.scene.read_scene import Scene
 from realtime.shadow_maps.hemisphere_map import HemisphereMaps, maps_memory
@@ -211,7 +211,8 @@ class _Frame:
         reached = reached_surfaces(whole, state, len(lights), share, p)
         lit = reached.share
         if p.interleave:
-            lit = self._over_tiles(reached)
+            reached = self._over_tiles(reached)
+            lit = reached.share
         if p.hd == AUTO:
             lit = self._smooth_by_width(lit, reached, state, len(lights))
         elif p.filter != "none":
@@ -222,15 +223,14 @@ class _Frame:
         lit = dr.gather(type(lit), lit, view.pixel)
         return [lit]
 
-    def _over_tiles(self, reached: Reached) -> Any:
-        """Return the share over a tile: the mean of what reaches the surfaces over the mean of all that could."""
-        sums = two_numbers(type(self.view.distance))(reached.lit, reached.all)
-        averaged = tile_average(sums, self.raster, guides=(self.depth,))
-        return dr.select(averaged.y > 0, averaged.x / averaged.y, 1)
+    def _over_tiles(self, reached: Reached) -> Reached:
+        """Return the means over a tile: the share is then one mean over another."""
+        sums = four_numbers(type(self.view.distance))(reached.lit, reached.all, reached.near, reached.blocked)
+        return Reached(*tile_average(sums, self.raster, guides=(self.depth,)))
 
     def _smooth_by_width(self, lit: Any, reached: Reached, state: SourceState, points: int) -> Any:
         p, guides = self.parameters, (self.depth,)
-        penumbra = penumbra_width(self.whole, reached, state, self.raster, guides=guides)
+        penumbra = penumbra_width(self.whole, reached, state, self.raster, guide=self.depth)
         dr.eval(lit, penumbra)
         if p.interleave and p.narrow:
             asked = (lit > 0) & (lit < 1) & (penumbra < p.narrow)

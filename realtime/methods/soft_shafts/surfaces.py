@@ -22,6 +22,7 @@ import mitsuba as mi
 from realtime.image_filters.guides import Guide
 from realtime.image_filters.raster import Raster
 from realtime.image_filters.separable import separable
+from realtime.image_filters.upsample import small_pixels, upsample
 from realtime.methods.interface.view import View
 from realtime.methods.soft_shafts.light_sources import SourceState, frame_at
 from realtime.methods.soft_shafts.march import Share
@@ -33,6 +34,7 @@ from realtime.shadow_maps.hemisphere_map import HemisphereMaps
 AUTO_WIDTH = 0.4
 #: The same where pixels share the points, whose mean over a tile is no staircase: the least error in `fence`.
 AUTO_WIDTH_SHARED = 0.8
+_STEP = 4  # pixels from one place where the width is looked for to the next
 _SEARCH = 4.0  # how far pixels take the width of a penumbra from their neighbours, a standard deviation [pixels]
 _NEARER = 0.01  # what is this much nearer to the light than a surface, of its own distance, is not that surface
 
@@ -117,9 +119,7 @@ def share_is_plain(p: SoftShaftsParameters) -> bool:
     return not p.interleave
 
 
-def penumbra_width(
-    view: View, reached: Reached, state: SourceState, raster: Raster, *, guides: tuple[Guide, ...]
-) -> Any:
+def penumbra_width(view: View, reached: Reached, state: SourceState, raster: Raster, *, guide: Guide) -> Any:
     """Return how wide the penumbra of a light is about every pixel [pixels], 0 where nothing blocks it.
 
     Parameters
@@ -130,13 +130,24 @@ def penumbra_width(
         The light.
     raster
         The image.
-    guides
-        Which pixels are alike.
+    guide
+        Of the depth.
     """
-    sums = two_numbers(type(view.distance))(reached.near, reached.blocked)
-    dr.eval(sums)
+    # Widths change slowly: one pixel of some is enough to look about, where these divide the image.
+    step = _STEP if raster.width % _STEP == 0 and raster.height % _STEP == 0 else 1
+    few = Raster(raster.width // step, raster.height // step)
+    chosen = small_pixels(few, step, raster.width)
+    dr.eval(reached.near, reached.blocked, guide.values)
+    near, blocked, alike = (
+        dr.gather(type(values), values, chosen) for values in (reached.near, reached.blocked, guide.values)
+    )
+    few_guide = Guide(alike, guide.width)
     # The mean over a neighbourhood of what is there: both are divided by the same sum of weights.
-    near, blocked = separable(sums, raster, hd=_SEARCH, guides=guides, support=2.0)
+    sums = two_numbers(type(view.distance))(near, blocked)
+    sums = separable(sums, few, hd=_SEARCH / step, guides=(few_guide,), support=2.0)
+    dr.eval(sums, few_guide.values)
+    column, row = raster.places()
+    near, blocked = upsample(sums, few_guide, guide.values, few, scale=step, column=column, row=row)
     mean = dr.select(blocked > 1e-4, near / dr.maximum(blocked, 1e-4), 0)
     pixel = dr.norm(view.camera.left) * dr.select(dr.isfinite(view.distance), view.distance, 1)
     return state.width * mean / pixel

@@ -97,6 +97,12 @@ def test_what_is_no_method_is_one_line_before_any_work(variant, mine, capsys, ow
     assert not any(own_cache.rglob("*.npz"))  # not even the truth
 
 
+@pytest.mark.parametrize("words", [("--scenes", ""), ("--scenes", "open-fog,,hall"), ("--methods", " ")])
+def test_an_empty_name_is_no_list(capsys, words):
+    printed = refused(capsys, "--quick", *words)
+    assert f"{words[0]}: got {words[1]!r}, wanted names with commas between them" in printed
+
+
 FAULTS = {
     "broken": "fog_of_mine.py, line 11: KeyError: 'nothing'",
     "flat": "returned an array of shape (3, 7) for",

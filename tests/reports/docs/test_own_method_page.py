@@ -61,7 +61,8 @@ def test_the_worked_example_refuses_by_name_what_it_cannot_do(fog, variant):
     scene = tiny_scene(fog=None, ball=ball)
     scene["sensor"] = {key: entry for key, entry in scene["sensor"].items() if key != "medium"}
     measurement = measure(read_scene(mi.load_dict(scene)), configuration(f"{fog}:interleaved"), truth=None)
-    assert measurement.refused == "interleaved: wanted one medium without bounds, and spots without a soft edge"
+    refusal = "interleaved: wanted one medium without bounds, no soft spots and no lights with extent"
+    assert measurement.refused == refusal
 
 
 @pytest.mark.claim("own-method")

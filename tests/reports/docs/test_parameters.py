@@ -27,6 +27,6 @@ def test_a_page_lists_every_parameter_with_its_values_the_default_first(name, mo
     for item in fields(METHODS[name].parameters):
         values = listed_values[item.name]
         assert values[0] == str(item.default), item.name
-        if isinstance(item.default, str):
+        if isinstance(item.default, str) and limits_of(item).choices:
             assert set(values) == set(limits_of(item).choices), item.name
     assert all(words for *_, words in rows)

@@ -109,6 +109,39 @@ def loaded(scene):
     return LoadedScene("tiny", scene, "A tiny scene.", "")
 
 
+def test_truth_of_an_area_light_goes_on_where_it_was_interrupted(own_cache, monkeypatch):
+    from reference.quadrature import area_airlight
+    from tests.helpers.area_lights import lamp, lit_scene
+    from validation.estimates.images import layered_truth
+
+    scene = lit_scene(size=(2, 2), lamp=lamp("sphere", center=[0.3, 0.2, 3.0], radius=0.4))
+    done, compute = [], area_airlight._sums_over
+
+    def some(*arguments):
+        if len(done) == 5:
+            raise KeyboardInterrupt
+        done.append(arguments)
+        return compute(*arguments)
+
+    monkeypatch.setattr(area_airlight, "_sums_over", some)
+    with pytest.raises(KeyboardInterrupt):
+        truth_image(scene)
+    counted = []
+    monkeypatch.setattr(area_airlight, "_sums_over", lambda *arguments: (counted.append(1), compute(*arguments))[1])
+    again = truth_image(scene)
+    went_on = len(counted)
+    assert not list(own_cache.glob("**/airlight-*"))
+    assert_same(truth_image(scene), again)
+    for path in own_cache.glob("**/quadrature-*.npz"):
+        path.unlink()
+    counted.clear()
+    assert_same(truth_image(scene), again)
+    assert len(counted) == went_on + 5
+    image = layered_truth("lamp", again)
+    assert {"emitted", "airlight_se", "surface_se", "airlight_bound"} <= set(image.layers)
+    assert image.attributes["airlight:batches"] == 8
+
+
 def test_quadrature_reference_is_the_truth_in_layers(loaded, own_cache):
     from validation.estimates.images import quadrature_reference
 

@@ -56,6 +56,9 @@ def test_unknown_name_without_a_likeness_lists_what_there_is(variant):
 
 
 def test_folder_is_refused(variant, tmp_path):
+    for empty in ("", " "):
+        with refused(f"scene: got {empty!r}, wanted one of open-fog"):
+            load_scene(empty)
     with refused(f"{tmp_path} is a folder"):
         load_scene(str(tmp_path))
 

@@ -119,6 +119,7 @@ def test_methods_and_truth_can_read_every_scene_alike(variant, name):
     np.testing.assert_allclose(np.broadcast_to(sigma_t, 3), truth.medium.sigma_t, rtol=3e-7)
     np.testing.assert_allclose(np.array(scene.medium.albedo).reshape(-1), truth.medium.albedo, rtol=3e-7)
     if truth.area:
+        assert scene.lights == truth.lights == truth.directional == ()
         (wide,), (counterpart,) = scene.area_lights, truth.area
         assert (wide.name, wide.kind, wide.opaque) == (counterpart.name, counterpart.kind, counterpart.black)
         np.testing.assert_allclose(wide.middle, counterpart.centre, rtol=3e-7)

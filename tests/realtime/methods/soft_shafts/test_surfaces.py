@@ -49,10 +49,12 @@ def test_the_width_of_a_penumbra_follows_from_similar_triangles(variant):
     view, count = FrameOf(), 160 * 120
     view.camera, view.distance = scene.camera, dr.full(mi.Float, 3.0, count)
     ratio, light = 0.7, 0.31
-    half = mi.Float(np.tile([1.0, 0.0], count // 2))  # every other pixel is lit, and takes the width of its neighbours
+    half = mi.Float(
+        np.repeat(np.tile([1.0, 0.0], count // 8), 4)
+    )  # four of eight are lit, and take the width of its neighbours
     reached = Reached(half, dr.full(mi.Float, 1, count), ratio * (1 - half), 1 - half)
     state = SourceState(None, mi.Float(light), True, None)
-    raster, guides = Raster(160, 120), (depth_guide(view.distance, 0.1),)
-    width = np.array(penumbra_width(view, reached, state, raster, guides=guides))
+    raster, guide = Raster(160, 120), depth_guide(view.distance, 0.1)
+    width = np.array(penumbra_width(view, reached, state, raster, guide=guide))
     pixel = 3.0 * np.linalg.norm(np.array(scene.camera.left).ravel())
     np.testing.assert_allclose(width, light * ratio / pixel, rtol=1e-4)
