@@ -34,6 +34,10 @@ def bench(
     methods: Annotated[
         str | None, typer.Option(help="Comma-separated methods, also your own MODULE:FUNCTION; all by default.")
     ] = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="Parameter of all named methods, NAME=VALUE; one configuration of each then."),
+    ] = None,
     method_limit: MethodLimit = USUAL_LIMIT,
     size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels; the scene's own by default.")] = None,
     truth: Annotated[bool, typer.Option(help="Also compare the truth with single-scatter and volpath.")] = True,
@@ -53,13 +57,11 @@ def bench(
     --decompose prints by which causes each image is wrong: parts that add up to its error, differences of renders in
     which one cause after the other is gone.
     """
-    if not 0 < margin < 1:
-        from analytic.errors import InputError
+    from analytic.errors import InputError
 
+    if not 0 < margin < 1:
         raise InputError(f"--margin: got {margin:g}, wanted a share between 0 and 1, such as 0.002 for 0.2 %")
     if output is not None and not decompose:
-        from analytic.errors import InputError
-
         raise InputError("--output: got a folder without --decompose, which alone writes images; add --decompose")
     if kernels:
         _bench_kernels(scenes, phase=phase, json=json, markdown=markdown)
@@ -80,15 +82,25 @@ def bench(
     from reports.machine.own_process import in_own_process
     from reports.machine.progress import part_of, progress_bar
     from reports.tables.terminal import print_json
-    from validation.configurations.methods import Configuration, chosen_configurations, rendered_lights
+    from validation.configurations.methods import (
+        Configuration,
+        chosen_configurations,
+        parse_settings,
+        rendered_lights,
+    )
     from validation.frames.expected_work import check_work, frame_work, truth_work
     from validation.scenes.loading import load_scene, parse_size
     from validation.scenes.registry import SCENES
 
+    given = parse_settings(settings or [])
+    if given and not methods:
+        raise InputError("--set: got parameters without --methods; name the methods that have them")
     chosen: list[Configuration] = []
     for name in METHODS if methods is None else listed("--methods", methods):
-        own = ":" in name
-        chosen += [checked_configuration(name, limit=method_limit)] if own else chosen_configurations([name])
+        if ":" in name or given:
+            chosen.append(checked_configuration(name, None, given, limit=method_limit))
+            continue
+        chosen += chosen_configurations([name])
     apart = partial(in_own_process, limit=method_limit)
     pixels = parse_size(size) if size else None
     activate()

@@ -57,3 +57,14 @@ def test_errors_by_cause_are_printed_and_drawn(variant, capfd, tmp_path):
 def test_a_folder_is_for_errors_by_cause_alone(capfd, tmp_path):
     assert cli.run(["bench", "open-fog", "-o", str(tmp_path)]) == 2
     assert "--output: got a folder without --decompose" in capfd.readouterr().err
+
+
+def test_named_methods_are_benched_with_the_parameters_that_are_set(variant, capfd):
+    arguments = ["bench", "open-fog", "--decompose", "--size", "16x12", "--json", "--methods", "froxel-fog"]
+    assert cli.run([*arguments, "--set", "slices=9", "--set", "width=8"]) == 0
+    (scene,) = json.loads(capfd.readouterr().out)["scenes"]
+    assert [entry["parameters"] for entry in scene["methods"]] == [{"slices": 9, "width": 8}]
+    assert cli.run([*arguments[:-2], "--set", "slices=9"]) == 2
+    assert "--set: got parameters without --methods" in capfd.readouterr().err
+    assert cli.run([*arguments, "--set", "slice=9"]) == 2
+    assert "did you mean 'slices'" in capfd.readouterr().err
