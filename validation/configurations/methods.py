@@ -52,8 +52,8 @@ SHARED_POINTS: tuple[tuple[str, int | float | str], ...] = (
     ("surfaces", "ray"),
     ("guide", "depth"),
     ("hd", "auto"),
-    ("hz", 0.01),
-    ("narrow", 48.0),
+    ("hz", 0.02),
+    ("narrow", 64.0),
 )
 
 #: The configurations that `bench` and `report` measure by default. Those that say their light points are left out where
