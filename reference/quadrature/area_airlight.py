@@ -42,7 +42,8 @@ Keep = Callable[[str, Callable[[], Kept]], Kept]
 
 _RTOL = 1e-6  # of the integral of one point, whose estimate is many digits too large: far below the error of a mean
 _ROWS = 1 << 16  # rays and points at once
-_PAIRS = 1 << 18  # the same, where lit intervals are looked for
+_PAIRS = 1 << 17  # the same, where lit intervals are looked for
+_SHADOWS = 1 << 22  # shadows of that many rays and points at once
 _CHECKS = 1  # random shadow rays of each ray and point: there are many points
 FLOOR = 0.05  #: of the mean over rays: below this a ray's error need not be small relative to its value
 
@@ -161,7 +162,7 @@ def _geometric_airlight(
     """Return the sums over points before triangles and spheres, the bounds of their errors, and the random checks."""
     place, normal = _place_and_normal(points)
     radiance, bound, checks = np.zeros((len(distance), 3)), np.zeros((len(distance), 3)), []
-    step = max(1, _PAIRS // len(points))
+    step = max(1, min(_PAIRS, _SHADOWS // max(1, known.most)) // len(points))
     for start in range(0, len(distance), step):
         rows = slice(start, start + step)
         number, direction = np.arange(len(distance))[rows], truth.direction[rows]

@@ -10,9 +10,9 @@ of centre C and radius R, to the points of a ray from O to E lie in the hull of 
 that has the hull on one side is left out; the planes used are those that hold the direction of the ray, or are at right
 angles to the plane of ray and C.
 
-**One compiled loop for each ray and point.** It begins at the end t of the ray at the camera. Shadows that begin
-before t and end after it move t to their end, until none does; then the ray is lit from t to where the next shadow
-begins, and t moves there. Nothing is sorted and nothing kept but the lit intervals.
+**Compiled loops, a lane for each ray and point.** The first computes the shadows. The second begins at the end t of the
+ray at the camera: shadows that begin before t and end after it move t to their end, until none does; then the ray is
+lit from t to where the next shadow begins, and t moves there. Nothing is sorted.
 """
 
 from dataclasses import dataclass
@@ -43,6 +43,11 @@ class Blockers:
     shapes: Shapes
     triangle: tuple[Index, Index]  #: where the triangles of each ray begin, (rays + 1,), and their numbers
     sphere: tuple[Index, Index]  #: the same for spheres
+
+    @property
+    def most(self) -> int:
+        """How many shapes no ray exceeds."""
+        return sum(int(np.diff(start).max(initial=0)) for start, _ in (self.triangle, self.sphere))
 
 
 @dataclass(frozen=True)
@@ -188,7 +193,7 @@ def pair_intervals(
     lanes = _Lanes(y, w, across, dr.cross(w, across), height)
     slots = _SLOTS
     while True:
-        used, begin, end = _compiled(lanes, (low, high), _ranges(known, number, row), slots)
+        used, begin, end = _compiled(lanes, (low, high), _ranges(known, number, row), slots, known.most)
         most = int(used.max(initial=0))
         if most <= slots:
             break
@@ -224,7 +229,7 @@ def _ranges(known: Blockers, number: Index, row: Any) -> list:
     return result
 
 
-def _compiled(lanes: _Lanes, ends: tuple, ranges: list, slots: int) -> tuple[Index, Array, Array]:
+def _compiled(lanes: _Lanes, ends: tuple, ranges: list, slots: int, size: int) -> tuple[Index, Array, Array]:
     """Return how many lit intervals each lane has, and where they begin and end, (lanes * slots,) each."""
     low, high = ends
     count = dr.width(low)
@@ -233,21 +238,35 @@ def _compiled(lanes: _Lanes, ends: tuple, ranges: list, slots: int) -> tuple[Ind
     dr.make_opaque(most)
     first = lane * most
 
+    # What casts a shadow is computed once, and stored lane by lane.
+    lows, highs = (dr.empty(mi.Float64, count * max(1, size)) for _ in range(2))
+    known, stride = dr.zeros(mi.UInt32, count), mi.UInt32(count)
+    dr.make_opaque(stride)
+    for shadow, data, numbers, begin, end in ranges:
+
+        def keep(j, known, shadow=shadow, data=data, numbers=numbers):
+            start, finish = shadow(lanes, data, dr.gather(mi.UInt32, numbers, j))
+            casts = (start < finish) & (start < high) & (finish > low)
+            dr.scatter(lows, start, known * stride + lane, casts)
+            dr.scatter(highs, finish, known * stride + lane, casts)
+            return j + 1, known + dr.select(casts, mi.UInt32(1), mi.UInt32(0))
+
+        _, known = dr.while_loop((mi.UInt32(begin), known), lambda j, known, end=end: j < end, keep)
+    dr.eval(known, lows, highs)
+
     def body(t, used):
-        after, moved = mi.Float64(high), mi.Bool(False)
-        for shadow, data, numbers, begin, end in ranges:
+        def turn(j, t, after, moved):
+            start, finish = (dr.gather(mi.Float64, column, j * stride + lane) for column in (lows, highs))
+            limit = t + _MERGE * (1 + dr.abs(t))
+            covers = (start <= limit) & (finish > t)
+            after = dr.select(start > limit, dr.minimum(after, start), after)
+            return j + 1, dr.select(covers, finish, t), after, moved | covers
 
-            def turn(j, t, after, moved, shadow=shadow, data=data, numbers=numbers):
-                low, high = shadow(lanes, data, dr.gather(mi.UInt32, numbers, j))
-                limit = t + _MERGE * (1 + dr.abs(t))
-                covers = (low <= limit) & (high > t)
-                after = dr.select((low > limit) & (low < high), dr.minimum(after, low), after)
-                return j + 1, dr.select(covers, high, t), after, moved | covers
-
-            _, t, after, moved = dr.while_loop(
-                (mi.UInt32(begin), t, after, moved), lambda j, t, after, moved, end=end: (j < end) & (t < high), turn
-            )
-        after = dr.minimum(after, high)
+        _, t, after, moved = dr.while_loop(
+            (mi.UInt32(0), t, mi.Float64(high), mi.Bool(False)),
+            lambda j, t, after, moved: (j < known) & (t < high),
+            turn,
+        )
         lit = ~moved & (t < high)
         wide = lit & (after - t > _MERGE * (1 + dr.abs(t)))
         here = wide & (used < most)
