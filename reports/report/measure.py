@@ -102,7 +102,7 @@ def write_report(
     results: list[CachedResult] = []
     start = time.monotonic()
     cache = report_cache(environment, fresh=fresh)
-    efforts = {name: effort.at(sizes.get(Path(name).stem)) for name in scenes}
+    efforts = {name: effort.of(name).at(sizes.get(Path(name).stem)) for name in scenes}
     others = [*other_parts(effort, scenes, cache), *fidelity_parts(effort, scenes, cache)]
     steps = _steps(progress, cache, efforts, configurations, others)
     apart = None if method_limit is None else partial(in_own_process, limit=method_limit)

@@ -53,7 +53,7 @@ SHARED_POINTS: tuple[tuple[str, int | float | str], ...] = (
     ("guide", "depth"),
     ("hd", "auto"),
     ("hz", 0.02),
-    ("narrow", 24.0),
+    ("narrow", 64.0),
 )
 
 #: The configurations that `bench` and `report` measure by default. Those that say their light points are left out where
@@ -159,14 +159,16 @@ def parse_settings(settings: Sequence[str]) -> dict[str, str]:
     Raises
     ------
     InputError
-        If a word has another form.
+        If a word has another form, or two words give one name different values.
     """
-    pairs = {}
+    pairs: dict[str, str] = {}
     for setting in settings:
         name, separator, value = setting.partition("=")
         if not separator or not name or not value:
             raise InputError(f"--set: got {setting!r}, wanted NAME=VALUE, for example steps=100")
-        pairs[name.strip()] = value.strip()
+        name, value = name.strip(), value.strip()
+        if pairs.setdefault(name, value) != value:
+            raise InputError(f"--set: got {name}={pairs[name]} and {name}={value}, wanted one of them")
     return pairs
 
 

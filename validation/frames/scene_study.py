@@ -56,15 +56,21 @@ class Effort:
         """Return the effort with images and timed frames of another size [pixels]; itself for None."""
         return self if size is None else replace(self, image=size, timed=size)
 
+    def of(self, scene: str) -> "Effort":
+        """Return the effort for a scene: built-in ones lit by lights with extent are compared at half the width."""
+        return replace(self, image=(self.image[0] // 2, self.image[1] // 2)) if scene in _WIDE else self
+
 
 def _by_estimator(single_scatter: Any, volpath: Any) -> Mapping[str, Any]:
     return {"single-scatter": single_scatter, "volpath": volpath}
 
 
 # `report --quick` studies scenes that take seconds. The default effort leaves out `tangle`, of which a frame takes up
-# to minutes, and `clutter`, in which the checks of the truth take long and show what `hall` shows.
+# to minutes, and `clutter` and `soft-hall`, in which the truth or its checks take long and show what `hall` and `fence`
+# show. The truth of a light with extent sums thousands of points.
 _QUICK = ("open-fog", "sphere-spot", "two-pens", "penumbra-plane")
-_HEAVY = ("clutter", "tangle")
+_HEAVY = ("clutter", "tangle", "soft-hall")
+_WIDE = ("penumbra-plane", "fence", "overlap", "soft-hall")
 
 # Few samples per batch would be a waste: then launches take all the time, and `single-scatter`, which stratifies its
 # samples over the ray, gains more than a factor of four from four times as many.

@@ -62,6 +62,8 @@ from realtime.shadow_maps.shadow_map import lit_in_map, map_memory
 from realtime.tiles.layout import Layout
 
 _MOST_AUTO = 8.0  # the widest filter of hd=auto [pixels]
+_LEAST_AUTO, _LEAST_SHARED = 0.3, 0.5  # its narrowest, and that where pixels share the points [pixels]
+_GROUP = 4  # how many light points a pixel of a narrow penumbra asks
 
 
 @dataclass(frozen=True)
@@ -207,14 +209,23 @@ class _Frame:
         state = self.states[number]
         if p.filter == "none" and not p.interleave:
             return [there & self._reached(state, place, light, point) for place, light in enumerate(lights)]
-        share = self._share(self.raster, lights) if p.interleave else None
-        reached = reached_surfaces(whole, state, len(lights), share, p)
-        lit = reached.share
+        own = None
         if p.interleave:
-            reached = self._over_tiles(reached)
+            number = self._share(self.raster, lights).number
+            own = reached_surfaces(whole, state, lambda _: number, 1, p)
+            reached = self._over_tiles(own)
+            lit = reached.share
+            # All at once: what is asked for later would compute the means again.
+            dr.eval(lit, reached.near, reached.blocked)
+        else:
+            reached = reached_surfaces(whole, state, lambda index: index, len(lights), p)
             lit = reached.share
         if p.hd == AUTO:
-            lit = self._smooth_by_width(lit, reached, state, len(lights))
+            width = penumbra_width(whole, reached, state, self.raster, guide=self.depth)
+            dr.eval(lit, width)
+            if own is not None and p.narrow:
+                lit = self._where_narrow(lit, width, own, number, state, len(lights))
+            lit = self._smooth_by_width(lit, width, len(lights))
         elif p.filter != "none":
             there, levels = dr.isfinite(whole.distance), state.flat and not p.interleave
             lit = smooth_share(lit, self.raster, there=there, depth=self.depth, points=len(lights), levels=levels, p=p)
@@ -228,17 +239,30 @@ class _Frame:
         sums = four_numbers(type(self.view.distance))(reached.lit, reached.all, reached.near, reached.blocked)
         return Reached(*tile_average(sums, self.raster, guides=(self.depth,)))
 
-    def _smooth_by_width(self, lit: Any, reached: Reached, state: SourceState, points: int) -> Any:
-        p, guides = self.parameters, (self.depth,)
-        penumbra = penumbra_width(self.whole, reached, state, self.raster, guide=self.depth)
-        dr.eval(lit, penumbra)
-        if p.interleave and p.narrow:
-            asked = (lit > 0) & (lit < 1) & (penumbra < p.narrow)
-            own = reached_surfaces(self.whole, state, points, None, p, asked).share
-            lit = dr.select(asked, own, lit)
-            dr.eval(lit)
-        width = dr.clip((AUTO_WIDTH_SHARED if p.interleave else AUTO_WIDTH) / points * penumbra, 0.3, _MOST_AUTO)
-        return separable(lit, self.raster, hd=width, guides=guides, support=2.0, most=_MOST_AUTO)
+    def _where_narrow(self, lit: Any, width: Any, own: Reached, number: Any, state: SourceState, points: int) -> Any:
+        """Return the share with that of a few points where penumbrae are narrow: neighbours then ask the others.
+
+        Pixels side by side lie in other groups of `_GROUP` points, four of which the filter that follows brings
+        together. Of its own group a pixel has asked one point before.
+        """
+        p = self.parameters
+        group = min(_GROUP, points)
+        asked = (lit > 0) & (lit < 1) & (width < p.narrow)
+
+        def other(index: Any) -> Any:
+            return number // group * group + (number + 1 + index) % group
+
+        more = reached_surfaces(self.whole, state, other, group - 1, p, asked)
+        summed = Reached(own.lit + more.lit, own.all + more.all, own.near, own.blocked)
+        lit = dr.select(asked, summed.share, lit)
+        dr.eval(lit)
+        return lit
+
+    def _smooth_by_width(self, lit: Any, width: Any, points: int) -> Any:
+        p = self.parameters
+        share, least = (AUTO_WIDTH_SHARED, _LEAST_SHARED) if p.interleave else (AUTO_WIDTH, _LEAST_AUTO)
+        hd = dr.clip(share / points * width, least, _MOST_AUTO)
+        return separable(lit, self.raster, hd=hd, guides=(self.depth,), support=2.0, most=_MOST_AUTO)
 
     def _lit(self, number: int, light: int, place: int) -> Callable[[Any], Any]:
         """Return what says whether a light reaches points of the few rays."""

@@ -69,7 +69,7 @@ class SoftShaftsParameters(Parameters):
     )
     narrow: float = parameter(
         0.0,
-        "with `interleave` and `hd=auto`: in penumbrae narrower than this every pixel asks all light points",
+        "with `interleave` and `hd=auto`: in penumbrae narrower than this every pixel asks four light points",
         least=0,
         unit="pixels",
     )

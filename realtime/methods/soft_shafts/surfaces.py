@@ -13,6 +13,7 @@ with d_b the mean of what the maps hold in the direction of the surface, where t
 points reach, or whose blocker the maps do not see, takes the width of its neighbours.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,7 +26,6 @@ from realtime.image_filters.separable import separable
 from realtime.image_filters.upsample import small_pixels, upsample
 from realtime.methods.interface.view import View
 from realtime.methods.soft_shafts.light_sources import SourceState, frame_at
-from realtime.methods.soft_shafts.march import Share
 from realtime.methods.soft_shafts.parameters import AUTO, SoftShaftsParameters
 from realtime.numerics.array_types import two_numbers
 from realtime.shadow_maps.hemisphere_map import HemisphereMaps
@@ -55,7 +55,12 @@ class Reached:
 
 
 def reached_surfaces(
-    view: View, state: SourceState, points: int, share: Share | None, p: SoftShaftsParameters, asked: Any = True
+    view: View,
+    state: SourceState,
+    number_of: Callable[[Any], Any],
+    count: int,
+    p: SoftShaftsParameters,
+    asked: Any = True,
 ) -> Reached:
     """Return what of a light with extent reaches the surfaces of a view, where they are `asked` for.
 
@@ -63,8 +68,10 @@ def reached_surfaces(
     ----------
     view
         The rays, row by row.
-    state, points, share
-        See `realtime.methods.soft_shafts.march.integral_of_points`.
+    state
+        The light.
+    number_of, count
+        Which light point each ray asks first, second and so on, counted from 0, and how many.
     p
         The parameters.
     asked
@@ -73,18 +80,18 @@ def reached_surfaces(
     Float = type(view.distance)
     there = dr.isfinite(view.distance) & asked
     place = view.origin + view.direction * dr.select(there, view.distance, 0)
-    if share is not None:
-        return Reached(*_of_point(view, state, place, there, share.number, p))
+    if count == 1:
+        return Reached(*_of_point(view, state, place, there, number_of(mi.UInt32(0)), p))
 
-    def add(number: Any, sums: Any):
-        more = _of_point(view, state, place, there, number, p)
-        return number + 1, [so_far + one for so_far, one in zip(sums, more, strict=True)]
+    def add(index: Any, sums: Any):
+        more = _of_point(view, state, place, there, number_of(index), p)
+        return index + 1, [so_far + one for so_far, one in zip(sums, more, strict=True)]
 
     _, sums = dr.while_loop(
         state=(mi.UInt32(0), [dr.zeros(Float, dr.width(view.distance)) for _ in range(4)]),
-        cond=lambda number, sums: there & (number < points),
+        cond=lambda index, sums: there & (index < count),
         body=add,
-        labels=("number", "sums"),
+        labels=("index", "sums"),
     )
     return Reached(*sums)
 

@@ -161,7 +161,13 @@ def test_ones_own_methods_come_after_the_others(variant, mine, handed_on, capsys
 
 def test_without_scenes_those_of_the_effort_are_studied(variant, mine, handed_on):
     assert run(["report", "--quick"]) == 0
-    assert tuple(handed_on["scenes"]) == handed_on["effort"].scenes == ("open-fog", "sphere-spot", "two-pens")
+    assert tuple(handed_on["scenes"]) == handed_on["effort"].scenes
+    assert handed_on["effort"].scenes == (
+        "open-fog",
+        "sphere-spot",
+        "two-pens",
+        "penumbra-plane",
+    )
     assert handed_on["fresh"] is False
     assert run(["report", "--quick", "--fresh", "-o", "elsewhere"]) == 0
     assert handed_on["fresh"] is True

@@ -18,6 +18,7 @@ from validation.scenes.registry import SCENES
 
 MACHINE = {"processor": "abacus", "threads": "2"}
 EFFORT = replace(EFFORTS["default"], papers=())
+USED = tuple(chosen for chosen in STANDARD if "points" not in dict(chosen.parameters))  #: where no light has an extent
 #: Seconds on this machine: truth, checks, multiple scattering, each method.
 COSTS = {"open-fog": (1.0, 6.0, 1.0, 1.0), "hall": (20.0, 80.0, 9.0, 12.0), "windows": (4.0, 90.0, 5.0, 3.0)}
 STABILITY = 40.0
@@ -40,7 +41,7 @@ def keep_all(cache):
         entries = SceneEntries.of(cache, name, EFFORT)
         for kind, seconds in zip(("truth", "agreement", "multiple"), parts):
             store_result(entries.part(kind), ({}, {}), seconds)
-        for chosen in STANDARD:
+        for chosen in USED:
             store_result(entries.method(chosen), ({}, {}), method)
     store_result(cache_entry(cache, "stability", identity={"rays": EFFORT.rays}), ({}, {}), STABILITY)
 
@@ -49,11 +50,11 @@ def simulated(cache, *, speed=1.0):
     """Run a report on a clock of our own; return pairs of the time left that it would print and the true one [s]."""
     now, told = 0.0, []
     others = other_parts(EFFORT, list(COSTS), cache)
-    steps = _steps(lambda share, what: told.append((now, share)), cache, dict.fromkeys(COSTS, EFFORT), STANDARD, others)
+    steps = _steps(lambda share, what: told.append((now, share)), cache, dict.fromkeys(COSTS, EFFORT), USED, others)
     for name, (*parts, method) in COSTS.items():
-        expected = scene_seconds(SceneEntries.of(cache, name, EFFORT), STANDARD, complete=True)
+        expected = scene_seconds(SceneEntries.of(cache, name, EFFORT), USED, complete=True)
         inner = {part: part_of(steps[name], *share) for part, share in shares(expected).items()}
-        costs = dict(zip(("truth", "agreement", "multiple"), parts)) | {each.label: method for each in STANDARD}
+        costs = dict(zip(("truth", "agreement", "multiple"), parts)) | {each.label: method for each in USED}
         for part, seconds in costs.items():
             inner[part](0.0, part)
             now += seconds / speed
@@ -84,16 +85,16 @@ def test_on_a_new_machine_the_time_left_is_known_within_a_factor_of_two(own_cach
 def test_what_is_kept_takes_no_time(cache, later):
     keep_all(cache)
     entries = SceneEntries.of(cache, "hall", EFFORT)
-    assert set(scene_seconds(entries, STANDARD).values()) == {0.0}
+    assert set(scene_seconds(entries, USED).values()) == {0.0}
     assert other_seconds(cache_entry(cache, "stability", identity={"rays": EFFORT.rays}), "stability") == 0.0
-    assert sum(scene_seconds(SceneEntries.of(later, "hall", EFFORT), STANDARD).values()) > 200
+    assert sum(scene_seconds(SceneEntries.of(later, "hall", EFFORT), USED).values()) > 200
 
 
 def test_a_variant_that_a_scene_never_needed_takes_no_time_until_it_is_known_to_be_measured(cache):
     keep_all(cache)
     entries, new = SceneEntries.of(cache, "hall", EFFORT), Configuration("ray-march", None, (("steps", 7),))
-    assert scene_seconds(entries, [*STANDARD, new])[new.label] == 0.0
-    assert scene_seconds(entries, [*STANDARD, new], complete=True)[new.label] > 0.0
+    assert scene_seconds(entries, [*USED, new])[new.label] == 0.0
+    assert scene_seconds(entries, [*USED, new], complete=True)[new.label] > 0.0
 
 
 def test_a_scene_of_the_users_own_may_have_changed(cache, tmp_path):

@@ -128,6 +128,12 @@ def test_setting_that_is_no_pair_is_refused(word):
         parse_settings([word])
 
 
+def test_a_setting_given_twice_is_refused_unless_both_say_the_same():
+    with refused("--set: got points=3 and points=5, wanted one of them"):
+        parse_settings(["points=3", "pattern=grid", "points=5"])
+    assert parse_settings(["points=3", " points = 3"]) == {"points": "3"}
+
+
 def test_kernels_of_ones_own_come_through_the_same_door(variant):
     import mitsuba as mi
 

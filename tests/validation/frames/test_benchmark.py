@@ -124,8 +124,8 @@ def test_variants_of_shadows_are_left_out_where_nothing_casts_one():
     (left_out,) = (configuration for configuration in STANDARD if configuration not in unbounded)
     assert dict(left_out.parameters) == {"media": "paper"}
     without_points = configurations_for(FEATURES)
-    assert set(unbounded) - set(without_points) == {one for one in STANDARD if "points" in dict(one.parameters)}
-    left = configurations_for(replace(FEATURES, shadows=False))
+    assert set(unbounded) - set(without_points) == {given for given in STANDARD if "points" in dict(given.parameters)}
+    left = configurations_for(replace(lamp, shadows=False))
     assert 0 < len(left) < len(STANDARD)
     assert all(not {"shadow", "map"} & set(dict(configuration.parameters)) for configuration in left)
     assert {configuration.method for configuration in left} == {configuration.method for configuration in STANDARD}

@@ -20,6 +20,18 @@ def test_every_effort_studies_scenes_that_there_are():
     assert set(quick) < set(default) < set(full) == set(SCENES)
 
 
+def test_scenes_lit_by_lights_with_extent_are_compared_at_half_the_width(variant):
+    emitters = {name: SCENES[name].build().values() for name in SCENES}
+    wide = {name for name, parts in emitters.items() if any(isinstance(p, dict) and "emitter" in p for p in parts)}
+    assert len(wide) == 4
+    for effort in EFFORTS.values():
+        sizes = {name: effort.of(name) for name in SCENES}
+        width, height = effort.image
+        assert {name for name, of in sizes.items() if of.image == (width // 2, height // 2)} == wide
+        assert all(sizes[name] == effort for name in set(SCENES) - wide)
+        assert {of.timed for of in sizes.values()} == {effort.timed}
+
+
 @pytest.mark.parametrize(
     ("flip", "count"), [("none", 0), ("kinds", len(QUICK) + 1), ("all", len({*QUICK, *STANDARD}) + 1)]
 )

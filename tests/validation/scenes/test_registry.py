@@ -118,6 +118,10 @@ def test_methods_and_truth_can_read_every_scene_alike(variant, name):
     # Mitsuba holds both in float32: 6e-8.
     np.testing.assert_allclose(np.broadcast_to(sigma_t, 3), truth.medium.sigma_t, rtol=3e-7)
     np.testing.assert_allclose(np.array(scene.medium.albedo).reshape(-1), truth.medium.albedo, rtol=3e-7)
+    _check_lights(scene, truth)
+
+
+def _check_lights(scene, truth):
     if truth.area:
         assert scene.lights == truth.lights == truth.directional == ()
         (wide,), (counterpart,) = scene.area_lights, truth.area
