@@ -15,7 +15,7 @@ Points are doubled for the rays whose standard error is above the one that was a
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -25,10 +25,14 @@ from analytic.geometry import foot_and_height
 from analytic.panels import airlight_segments
 from reference.quadrature.light_airlight import light_airlight
 from reference.quadrature.light_points import REPLICATES, PointPlan, light_points, square_points
+from reference.quadrature.unbounded import Rays, edge_worth
+from reference.scene.area_light import TruthAreaLight
 from reference.scene.read import TruthLight, TruthScene
 from reference.scene.shapes import Shapes
 from reference.visibility.before_light import before_light
 from reference.visibility.intervals import RandomChecks
+from reference.visibility.many_points import Blockers, blockers, pair_intervals
+from reference.visibility.pair_checks import checked_pairs
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -36,8 +40,10 @@ Share = Callable[[float], None]
 Kept = Mapping[str, Array]
 Keep = Callable[[str, Callable[[], Kept]], Kept]
 
-_RTOL = 1e-8  # of the integral of one point: below the error of a mean over points
+_RTOL = 1e-6  # of the integral of one point, whose estimate is many digits too large: far below the error of a mean
 _ROWS = 1 << 16  # rays and points at once
+_PAIRS = 1 << 17  # the same, where lit intervals are looked for
+_SHADOWS = 1 << 22  # shadows of that many rays and points at once
 _CHECKS = 1  # random shadow rays of each ray and point: there are many points
 FLOOR = 0.05  #: of the mean over rays: below this a ray's error need not be small relative to its value
 
@@ -94,6 +100,10 @@ def area_airlight(
         for number, (light, scene, shapes) in enumerate(lights):
             rays = replace(scene, direction=truth.direction[active])
             ways = how | {"shapes": shapes, "checks": _CHECKS}
+            if _is_geometric(rays, light, ways):
+                ways["blockers"] = cache(
+                    partial(blockers, light, shapes, truth.origin, rays.direction, distance[active])
+                )
             for replicate in range(REPLICATES):
                 some = light_points(light, squares[number][replicate][low:high])
                 work = partial(_sums_over, rays, some, distance[active], shadow_scale, ways)
@@ -122,16 +132,61 @@ def _sums_over(
     if _is_open(rays, how["shapes"]):
         radiance, bound = _open_airlight(rays, points, distance, shadow_scale)
         return {"radiance": radiance, "bound": bound, "checks": np.zeros(5)}
-    sent = [light_airlight(rays, point, distance, shadow_scale=shadow_scale, how=how, rtol=_RTOL) for point in points]
-    known = RandomChecks.of_all([each.lit.random_checks for each in sent])
+    if "blockers" in how:
+        radiance, bound, known = _geometric_airlight(rays, points, distance, shadow_scale, how["blockers"]())
+    else:
+        sent = [
+            light_airlight(rays, point, distance, shadow_scale=shadow_scale, how=how, rtol=_RTOL) for point in points
+        ]
+        known = RandomChecks.of_all([each.lit.random_checks for each in sent])
+        radiance, bound = (np.sum([getattr(each, name) for each in sent], axis=0) for name in ("radiance", "bound"))
     checks = known.checked, known.disagreements, known.refined, known.left, known.missed
-    radiance, bound = (np.sum([getattr(each, name) for each in sent], axis=0) for name in ("radiance", "bound"))
     return {"radiance": radiance, "bound": bound, "checks": np.array(checks)}
 
 
 def _is_open(scene: TruthScene, shapes: Shapes) -> bool:
     """Return whether nothing can stand in a light, in a medium without bounds."""
     return not (scene.media or len(shapes.triangles) or len(shapes.radius) or shapes.others)
+
+
+def _is_geometric(scene: TruthScene, light: TruthAreaLight, how: dict[str, Any]) -> bool:
+    """Return whether nothing but triangles, and spheres beside the light, stands in it, in a medium without bounds."""
+    shapes = how["shapes"]
+    apart = np.linalg.norm(shapes.centre - light.centre, axis=1) > shapes.radius + light.radius
+    return not scene.media and not shapes.others and how["edges"] != "rays" and bool(apart.all())
+
+
+def _geometric_airlight(
+    truth: TruthScene, points: Sequence[TruthLight], distance: Array, shadow_scale: float, known: Blockers
+) -> tuple[Array, Array, RandomChecks]:
+    """Return the sums over points before triangles and spheres, the bounds of their errors, and the random checks."""
+    place, normal = _place_and_normal(points)
+    radiance, bound, checks = np.zeros((len(distance), 3)), np.zeros((len(distance), 3)), []
+    step = max(1, min(_PAIRS, _SHADOWS // max(1, known.most)) // len(points))
+    for start in range(0, len(distance), step):
+        rows = slice(start, start + step)
+        number, direction = np.arange(len(distance))[rows], truth.direction[rows]
+        lit = pair_intervals(known, truth.origin, (number, direction, distance[rows]), (place, normal))
+        ray, point = np.divmod(lit.pair, len(points))
+        height, foot = lit.height[lit.pair], lit.foot[lit.pair]
+        x0, x1 = np.maximum(foot + height * lit.low, 0.0), foot + height * lit.high
+        stretches = start + ray, point, foot, height, x0, np.maximum(x0, x1)
+        sums = _stretch_sums(truth, points, stretches, shadow_scale, edge=lit.edge)
+        radiance, bound = radiance + sums[0], bound + sums[1]
+        checked, doubtful = checked_pairs(
+            truth.occluders, known.shapes, lit, (truth.origin, direction), (place, normal)
+        )
+        checks.append(checked)
+        # As if all of a ray were lit where a contradiction is left, at the most that an angle there can be worth.
+        theta = np.arctan(lit.ends[1][doubtful]) - np.arctan(lit.ends[0][doubtful])
+        strongest = truth.medium.phase(np.linspace(-1, 1, 1001)).max()
+        factor = truth.medium.albedo * truth.medium.sigma_t * points[0].intensity / (4 * np.pi) * strongest
+        np.add.at(bound, start + doubtful // len(points), (theta / lit.height[doubtful])[:, None] * factor)
+    return radiance, bound, RandomChecks.of_all(checks)
+
+
+def _place_and_normal(points: Sequence[TruthLight]) -> tuple[Array, Array]:
+    return np.stack([point.position for point in points]), np.stack([np.asarray(point.axis) for point in points])
 
 
 def _open_airlight(
@@ -143,37 +198,60 @@ def _open_airlight(
     is zero.
     """
     count, step = len(distance), max(1, _ROWS // max(1, len(points)))
-    place, normal = (
-        np.stack([point.position for point in points]),
-        np.stack([np.asarray(point.axis) for point in points]),
-    )
+    place, normal = _place_and_normal(points)
     radiance, bound = np.zeros((count, 3)), np.zeros((count, 3))
     for start in range(0, count, step):
         ray, point = np.divmod(np.arange(len(distance[start : start + step]) * len(points)), len(points))
-        direction, n, y = truth.direction[start + ray], normal[point], place[point]
+        ray += start
+        direction, n, y = truth.direction[ray], normal[point], place[point]
         foot, height = foot_and_height(truth.origin, direction, y)
         a, b = np.sum(n * (truth.origin - y), axis=1), np.sum(n * direction, axis=1)
         with np.errstate(divide="ignore", invalid="ignore"):
             zero = np.where(b != 0, -a / b, np.where(a > 0, -np.inf, np.inf))
         x0 = np.where(b >= 0, np.maximum(zero, 0.0), 0.0)
-        x1 = np.where(b >= 0, distance[start + ray], np.minimum(zero, distance[start + ray]))
+        x1 = np.where(b >= 0, distance[ray], np.minimum(zero, distance[ray]))
         lit = np.flatnonzero(x1 > x0)
-        ray, foot, height, x0, x1, a, b = (column[lit] for column in (ray, foot, height, x0, x1, a, b))
+        stretches = ray[lit], point[lit], foot[lit], height[lit], x0[lit], x1[lit]
+        sums = _stretch_sums(truth, points, stretches, shadow_scale)
+        radiance, bound = radiance + sums[0], bound + sums[1]
+    return radiance, bound
 
-        def cosine(
-            x: Array, row: Index, foot: Array = foot, height: Array = height, a: Array = a, b: Array = b
-        ) -> Array:
-            r = np.hypot(height[row, None], x - foot[row, None])
-            return np.maximum(a[row, None] + b[row, None] * x, 0.0) / np.maximum(r, np.finfo(float).tiny)
 
-        for channel, sigma_t in enumerate(truth.medium.sigma_t):
-            sums = airlight_segments(
+def _stretch_sums(
+    truth: TruthScene,
+    points: Sequence[TruthLight],
+    stretches: tuple[Index, Index, Array, Array, Array, Array],
+    shadow_scale: float,
+    edge: float = 0.0,
+) -> tuple[Array, Array]:
+    """Integrate lit stretches of rays and add up those of each ray, with the bounds of their errors, (rays, 3) each.
+
+    A stretch has the numbers of its ray and point, the foot and height of the ray over the point, and both ends [m],
+    which are uncertain by `edge` of their distance from the point.
+    """
+    ray, point, foot, height, x0, x1 = stretches
+    place, normal = _place_and_normal(points)
+    n, direction = normal[point], truth.direction[ray]
+    a, b = np.sum(n * (truth.origin - place[point]), axis=1), np.sum(n * direction, axis=1)
+    radiance, bound = np.zeros((len(truth.direction), 3)), np.zeros((len(truth.direction), 3))
+
+    def cosine(x: Array, row: Index) -> Array:
+        r = np.hypot(height[row, None], x - foot[row, None])
+        return np.maximum(a[row, None] + b[row, None] * x, 0.0) / np.maximum(r, np.finfo(float).tiny)
+
+    known: dict[float, tuple[Array, Array]] = {}
+    for channel, sigma_t in enumerate(truth.medium.sigma_t.tolist()):
+        if sigma_t not in known:
+            values, errors = airlight_segments(
                 foot, height, x0, x1, sigma_t, truth.medium.phase, shadow_scale=shadow_scale, weight=cosine, rtol=_RTOL
             )
-            factor = truth.medium.albedo[channel] * sigma_t * points[0].intensity[channel] / (4 * np.pi)
-            rows = slice(start, start + step)
-            for target, values in zip((radiance, bound), sums, strict=True):
-                target[rows, channel] = factor * np.bincount(ray, values, len(target[rows]))
+            if edge:
+                lines = Rays(direction, n, foot, height)
+                errors = errors + edge * edge_worth(lines, np.arange(len(ray)), (x0, x1), sigma_t, truth.medium)
+            known[sigma_t] = values, errors
+        factor = truth.medium.albedo[channel] * sigma_t * points[0].intensity[channel] / (4 * np.pi)
+        for target, column in zip((radiance, bound), known[sigma_t], strict=True):
+            target[:, channel] = factor * np.bincount(ray, column, len(target))
     return radiance, bound
 
 

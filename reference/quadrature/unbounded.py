@@ -77,16 +77,31 @@ def sum_intervals(
             weight=profile if light.is_soft else None,
             rtol=rtol,
         )
-        errors[channel] += lit.edge * _edge_worth(rays, ray, (x0, x1), float(sigma_t), medium)
+        errors[channel] += lit.edge * edge_worth(rays, ray, (x0, x1), float(sigma_t), medium)
     factor = medium.albedo * medium.sigma_t * light.intensity / (4 * np.pi)
     pixels = len(rays.foot)
     return sums_of(ray, values.T, pixels) * factor, sums_of(ray, errors.T, pixels) * factor
 
 
-def _edge_worth(
+def edge_worth(
     rays: Rays, ray: NDArray[np.int64], ends: tuple[Array, Array], sigma_t: float, medium: TruthMedium
 ) -> Array:
-    """Return what a relative uncertainty of one of the distances of the ends of each interval is worth."""
+    """Return what a relative uncertainty of one of the distances of the ends of each interval is worth.
+
+    Parameters
+    ----------
+    rays, ray
+        The rays, and the number of that of each interval, (intervals,).
+    ends
+        Distances at which they begin and end, (intervals,) each [m].
+    sigma_t, medium
+        One of the extinction coefficients [1/m], and the medium.
+
+    Returns
+    -------
+    numpy.ndarray
+        (intervals,) [1/m].
+    """
     total = np.zeros(len(ray))
     for x in ends:
         s = np.where(np.isfinite(x), x, 0) - rays.foot[ray]

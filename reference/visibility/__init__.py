@@ -18,6 +18,8 @@ Read in this order:
 - `directional_casting.py`: the same by cast rays;
 - `surface_shadows.py`: which visible surfaces a light reaches;
 - `before_light.py`: what can stand in the light of a light with extent;
+- `many_points.py`: lit intervals for many points of such a light at once;
+- `pair_checks.py`: checks these by random shadow rays;
 - `light_lines.py`: the parts of such a light that surface points see.
 
 May import: `analytic.errors`, `reference.scene`.

@@ -50,7 +50,7 @@ _BISECTIONS = 26  # theta range / 256 / 2^26 < 1e-10 rad: below the float32 roun
 _CHUNK = 1 << 22  # rays cast at once
 _PARTS = 4  # a suspicious cell is cut into so many
 _LEVELS = 2  # so many times
-_CLEAR = 1e-5  # of the largest coordinate: float32 rounding is 1e-7 of it
+CLEAR = 1e-5  #: of the largest coordinate: float32 rounding is 1e-7 of it
 _STEEP = 4.0  # a surface seen within atan(1/4) = 14 degrees of grazing, or a jump, may hide an edge
 
 
@@ -126,7 +126,7 @@ def _start(light: TruthLight) -> Array:
     """Return where the shadow rays of a light start: from a light with extent, clear of float32 shapes in its plane."""
     if not light.cosine or light.axis is None:
         return light.position
-    return light.position + _CLEAR * (1 + np.abs(light.position).max()) * light.axis
+    return light.position + CLEAR * (1 + np.abs(light.position).max()) * light.axis
 
 
 def point_leg(position: Array, rays: tuple[Array, Array, Array]) -> Leg:

@@ -30,7 +30,7 @@ Leg = Callable[[np.int64, np.float64], tuple[Array, Array]]
 
 _ROUNDS = 4
 ROUNDING = 1e-5  # of the angle: float32 shadow rays end 2e-6 early, and start and direction are rounded to 1e-7
-_JUDGED = 256  # contradictions that are tested against every shape; more than a few mean that something is wrong
+JUDGED = 256  #: contradictions that are tested against every shape; more than a few mean that something is wrong
 _CHUNK = 1 << 22  # rays cast at once
 
 
@@ -133,11 +133,11 @@ def checked_geometry(
     wrong = np.flatnonzero(
         (_cast(visible, ray, theta) != predicted) & (gap > np.broadcast_to(rounding, len(ends[0]))[ray])
     )
-    judged = wrong[:_JUDGED]
-    lit = np.array([_lit_by_all_shapes(geometry, ray[k], theta[k]) for k in judged], dtype=bool)
+    judged = wrong[:JUDGED]
+    lit = np.array([lit_by_all_shapes(geometry, ray[k], theta[k]) for k in judged], dtype=bool)
     if others is not None:
         lit &= _cast(others, ray[judged], theta[judged])
-    unsettled = np.append(judged[lit != predicted[judged]], wrong[_JUDGED:])
+    unsettled = np.append(judged[lit != predicted[judged]], wrong[JUDGED:])
     random_checks = RandomChecks(
         len(ray), len(wrong), len(wrong) - len(unsettled), len(unsettled), len(wrong) / max(len(ray), 1)
     )
@@ -231,8 +231,16 @@ def _with_doubt(
     return replace(intervals, doubt=joined_doubt(intervals.doubt, new))
 
 
-def _lit_by_all_shapes(geometry: tuple[Leg, Shapes], ray: np.int64, theta: np.float64) -> bool:
-    """Test one shadow ray against every triangle and every sphere in float64."""
+def lit_by_all_shapes(geometry: tuple[Leg, Shapes], ray: np.int64, theta: np.float64) -> bool:
+    """Test one shadow ray against every triangle and every sphere in float64.
+
+    Parameters
+    ----------
+    geometry
+        As in `checked_geometry`.
+    ray, theta
+        Number of the ray, and the angle at the light [rad].
+    """
     leg, shapes = geometry
     triangles = shapes.triangles
     position, way = leg(ray, theta)

@@ -32,9 +32,9 @@ QUADRATURE: tuple[Mutation, ...] = (
     _fault(
         "area-without-cosine",
         "the cosine at the light dropped",
-        "reference.visibility.spot_cone",
-        "np.maximum(axial * np.sin(theta) + across * np.cos(theta), 0.0)",
-        "np.ones_like(theta)",
+        _SUMS,
+        "np.maximum(a[row, None] + b[row, None] * x, 0.0) / np.maximum(r, np.finfo(float).tiny)",
+        "np.ones_like(r)",
     ),
     _fault(
         "area-both-sides",
