@@ -81,7 +81,9 @@ def values(parameters: Parameters) -> dict[str, Any]:
     return {item.name: getattr(parameters, item.name) for item in fields(parameters)}
 
 
-def read_parameters(method: str, kind: type[Parameters], given: Mapping[str, Any]) -> Any:
+def read_parameters(
+    method: str, kind: type[Parameters], given: Mapping[str, Any], *, others: Iterable[str] = ()
+) -> Any:
     """Return the parameters of a method from values or words, the others with their defaults.
 
     Parameters
@@ -92,6 +94,8 @@ def read_parameters(method: str, kind: type[Parameters], given: Mapping[str, Any
         The class of its parameters.
     given
         Values by name; a word is converted to the type of the default.
+    others
+        Names that are known elsewhere, for messages.
 
     Raises
     ------
@@ -102,9 +106,10 @@ def read_parameters(method: str, kind: type[Parameters], given: Mapping[str, Any
     converted = {}
     for name, value in given.items():
         if name not in known:
-            wanted = ", ".join(known) or "none"
+            names = [*known, *others]
+            wanted = ", ".join(names) or "none"
             raise InputError(
-                f"method {method}: got a parameter {name!r}, wanted one of: {wanted}{nearest(name, known)}"
+                f"method {method}: got a parameter {name!r}, wanted one of: {wanted}{nearest(name, names)}"
             )
         converted[name] = _converted(f"method {method}: {name}", value, known[name])
     return kind(**converted)

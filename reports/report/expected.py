@@ -30,10 +30,10 @@ _TYPICAL: Mapping[str, tuple[float, float, float, float]] = {
     "omni-box": (8.0, 30.0, 20.0, 5.0),
     "tangle": (20.0, 60.0, 25.0, 40.0),
     "windows": (10.0, 45.0, 25.0, 6.0),
-    "penumbra-plane": (30.0, 15.0, 10.0, 20.0),
-    "fence": (60.0, 25.0, 15.0, 40.0),
-    "soft-hall": (120.0, 30.0, 20.0, 60.0),
-    "overlap": (60.0, 20.0, 15.0, 30.0),
+    "penumbra-plane": (80.0, 60.0, 60.0, 20.0),
+    "fence": (300.0, 60.0, 60.0, 40.0),
+    "soft-hall": (1200.0, 60.0, 60.0, 60.0),
+    "overlap": (480.0, 60.0, 60.0, 30.0),
 }
 _USUAL = (6.0, 25.0, 20.0, 4.0)  #: the same of any other scene
 _OTHERS = {"stability": 20.0, "mutations": 500.0, "biri": 8.0, "zero_cost": 60.0, "billeter": 300.0, "fidelity": 8.0}

@@ -105,9 +105,9 @@ def method_parameters(method: Method, given: Mapping[str, Any]) -> tuple[Any, Li
     InputError
         As `realtime.parameters.read_parameters`.
     """
-    common = {item.name for item in fields(LightPoints)} - set(method.defaults)
+    common = [item.name for item in fields(LightPoints) if item.name not in method.defaults]
     own = {name: value for name, value in given.items() if name not in common}
     asked = {name: value for name, value in given.items() if name in common}
-    chosen = read_parameters(method.name, method.parameters, own)
+    chosen = read_parameters(method.name, method.parameters, own, others=common)
     read = values(read_parameters(method.name, LightPoints, asked))
     return chosen, replace(method.light_points, **{name: read[name] for name in asked})

@@ -43,7 +43,7 @@ def test_unknown_parameter_is_refused_with_the_nearest():
 
 
 def test_parameter_of_a_method_without_any_is_refused():
-    with refused("wanted one of: none"):
+    with refused("wanted one of: points, pattern"):
         configuration("unshadowed", None, {"steps": 7})
 
 
