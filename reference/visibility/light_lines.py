@@ -471,10 +471,10 @@ def _sphere_shadows(
         if light.kind == "sphere":
             behind &= _nearer(light, points, (lines, used[row]), (c_y, c_z))
             h = np.full(len(row), _FAR)
-        one = used[row]
-        shadows.append(hidden_behind(one[behind], *(v[behind] for v in (c_y, c_z, disk, h, tangent))))
+        line = used[row]
+        shadows.append(hidden_behind(line[behind], *(v[behind] for v in (c_y, c_z, disk, h, tangent))))
         if within.any():
-            shadows += hidden_from_inside(one[within], *(v[within] for v in (c_y, c_z, disk, height[row])))
+            shadows += hidden_from_inside(line[within], *(v[within] for v in (c_y, c_z, disk, height[row])))
     return shadows
 
 

@@ -58,8 +58,8 @@ def compute(folder: Path | str, *, quick: bool = False, scene: str = SCENE, prog
             errors = grid_errors(read, grids, points=_POINTS, frames=frames)
             rows += [(panel, name, size, each.relative_rmse, each.p50) for size, each in zip(sizes, errors)]
         tell(number + 1, 3, panel)
-    found = ghosts(read, loaded.animation, HISTORIES, grid=GHOST, points=_POINTS, turn=TURN, frames=FRAMES)
-    for ghost in found:
+    by_weight = ghosts(read, loaded.animation, HISTORIES, grid=GHOST, points=_POINTS, turn=TURN, frames=FRAMES)
+    for ghost in by_weight:
         name = f"history={ghost.weight:g}" + (", clamp" if ghost.clamp else "")
         rows += [("ghost", name, number, error, None) for number, error in enumerate(ghost.errors)]
     tell(3, 3, "ghost")

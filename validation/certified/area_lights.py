@@ -150,14 +150,14 @@ def _phase(c: Any, g: float | None) -> Any:
 def _agreed(first: Callable[[], Any], second: Callable[[], Any]) -> Any:
     """Return what two routes at two precisions agree on to `_DIGITS` digits."""
     with mp.workdps(_DIGITS + 8):
-        one = first()
+        coarse = first()
     with mp.workdps(_DIGITS + 15):
-        two = second()
-        if mp.fabs(one - two) > mpf(10) ** -_DIGITS * mp.fabs(two):
+        fine = second()
+        if mp.fabs(coarse - fine) > mpf(10) ** -_DIGITS * mp.fabs(fine):
             raise InputError(
-                f"two routes give {mp.nstr(one, 20)} and {mp.nstr(two, 20)}; wanted {_DIGITS} equal digits"
+                f"two routes give {mp.nstr(coarse, 20)} and {mp.nstr(fine, 20)}; wanted {_DIGITS} equal digits"
             )
-        return two
+        return fine
 
 
 def _text(value: Any) -> str:

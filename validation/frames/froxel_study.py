@@ -55,11 +55,11 @@ def grid_errors(scene: Scene, grids: Sequence[Grid], *, points: int, frames: int
     """
     exact = exact_sum(scene, replace(METHODS["froxel-fog"].light_points, points=points))
     history = {"jitter": "frames", "history": 1 - 2 / frames} if frames > 1 else {}
-    found = []
+    errors = []
     for grid in grids:
         *_, last = _airlight([(scene, False)] * frames, _parameters(grid, points=points) | history)
-        found.append(error_metrics(exact, last))
-    return found
+        errors.append(error_metrics(exact, last))
+    return errors
 
 
 def ghosts(
@@ -93,15 +93,15 @@ def ghosts(
     places = [now for now, _ in zip(animate(scene, moved, whole), range(moving + 1))]
     steps = [(now, number > 0) for number, now in enumerate(places)] + [(places[-1], False)] * resting
     alone = list(_airlight(steps, _parameters(grid, points=points)))
-    found = []
+    measured = []
     for weight, clamp in kinds:
         history = {"history": weight, "clamp": "neighbours" if clamp else "none"}
         images = _airlight(steps, _parameters(grid, points=points) | history)
         errors = [
             float(np.sqrt(np.mean((image - without) ** 2)) / without.mean()) for image, without in zip(images, alone)
         ]
-        found.append(Ghost(weight, clamp, tuple(errors)))
-    return found
+        measured.append(Ghost(weight, clamp, tuple(errors)))
+    return measured
 
 
 def _parameters(grid: Grid, *, points: int) -> dict[str, Any]:

@@ -169,10 +169,10 @@ class SlabOrders:
 
     def rest(self, fields: "_Fields") -> Edges:
         """Return the sum of all orders after that of `fields`."""
-        zero, one = _AllOrders(self, 0), _AllOrders(self, 1)
-        b0, b1 = zero(fields.b0), one(fields.b1)
-        a0, a1 = zero(fields.a0, self._sines * b1), one(fields.a1, self._sines * b0)
-        c0 = zero(fields.c0, 2 * self._sines * a1)
+        mean, wave = _AllOrders(self, 0), _AllOrders(self, 1)  # by azimuthal mode
+        b0, b1 = mean(fields.b0), wave(fields.b1)
+        a0, a1 = mean(fields.a0, self._sines * b1), wave(fields.a1, self._sines * b0)
+        c0 = mean(fields.c0, 2 * self._sines * a1)
         total = _Fields(fields.b0 + b0, fields.b1 + b1, fields.a0 + a0, fields.a1 + a1, fields.c0 + c0)
         return self.following(total)[1]
 

@@ -35,14 +35,14 @@ def accumulate(
     if history is None:
         return layers
     raster = Raster(camera.width, camera.height)
-    column, row, found = _last_place(g_buffer, history, camera, raster)
+    column, row, was_seen = _last_place(g_buffer, history, camera, raster)
     corners = _corners(column, row, raster)
 
     def mixed(now: Any, before: Any) -> Any:
         if dr.is_mask_v(now):
             return now
         values = [
-            _mixed(own, past, corners, raster, dr.select(found, parameters.history, 0))
+            _mixed(own, past, corners, raster, dr.select(was_seen, parameters.history, 0))
             for own, past in zip(channels(now), channels(before), strict=True)
         ]
         return type(now)(*values)

@@ -85,7 +85,7 @@ def reached_surfaces(
 
     def add(index: Any, sums: Any):
         more = _of_point(view, state, place, there, number_of(index), p)
-        return index + 1, [so_far + one for so_far, one in zip(sums, more, strict=True)]
+        return index + 1, [so_far + term for so_far, term in zip(sums, more, strict=True)]
 
     _, sums = dr.while_loop(
         state=(mi.UInt32(0), [dr.zeros(Float, dr.width(view.distance)) for _ in range(4)]),
