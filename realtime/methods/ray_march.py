@@ -30,23 +30,20 @@ from dataclasses import dataclass
 import drjit as dr
 import mitsuba as mi
 
-from realtime.bounded_media.airlight import LitRay
 from realtime.errors import InputError
 from realtime.intervals.lit_intervals import add_waiting, close_interval, no_intervals, sum_at_end
 from realtime.memory import check_memory
 from realtime.methods.interface.layers import Layers
 from realtime.methods.interface.light_airlight import RayAirlight, integral_type, ray_airlight
+from realtime.methods.interface.marching import OPTICAL_REACH, marched_integral, within
 from realtime.methods.interface.method import ErrorCause
 from realtime.methods.interface.view import View, bounded_radiance, radiance, rays_in_media
 from realtime.parameters import Parameters, parameter
-from realtime.rays.ray_light import RayGeometry, distance_to_light, falloff, ray_geometry
-from realtime.scene.lights import Light
-from realtime.scene.medium import least_extinction, per_extinction
+from realtime.scene.medium import least_extinction
 from realtime.scene.read_scene import Scene
 from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, lit_in_map, map_memory, map_size
 from realtime.tiles.adaptive_sampling import tolerance
 
-_OPTICAL_REACH = 20.0
 _DUE = 3  # in the last bits of a step's number: there an interval that has ended is integrated
 
 
@@ -103,26 +100,14 @@ def ray_march(view: View, state, lists, *, kernel, parameters: RayMarchParameter
     asked = kernel if parameters.sum == "transitions" else None
     in_media = rays_in_media(view, kernel=asked) if view.features.bounded else ()
     for number, light in enumerate(view.lights):
-        x0, x1 = type(view.distance)(0), view.distance
         media = in_media[number] if in_media else None
         if parameters.sum == "transitions":
             airlight = ray_airlight(view, light, kernel, media)
             lit = _visibility(view, state, number, parameters.shadow)
             total += airlight.radiance(_lit_runs(airlight, steps=steps, spacing=spacing, lit=lit))
             continue
-        if media and not light.w:
-            lit = _visibility(view, state, number, parameters.shadow)
-            integral = _march_parallel(view, media, _within(media, x0, x1), steps=steps, lit=lit)
-            total += bounded_radiance(light, integral)
-            continue
-        geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
-        x0, x1 = geometry.lit_segment(x0, x1)
-        if spacing == "uniform" and not view.medium.clear:
-            x1 = dr.minimum(x1, x0 + _OPTICAL_REACH / least_extinction(view.medium))
-        if media and view.medium.clear:
-            x0, x1 = _within(media, x0, x1)
         lit = _visibility(view, state, number, parameters.shadow)
-        integral = _march(view, light, geometry, (x0, x1), steps=steps, spacing=spacing, lit=lit, media=media)
+        integral = marched_integral(view, light, media, steps=steps, spacing=spacing, lit=lit)
         total += bounded_radiance(light, integral) if media else radiance(view.medium, light, integral)
     return Layers(total)
 
@@ -159,24 +144,15 @@ def _visibility(view: View, maps, number: int, shadow: str):
     return lambda point: view.visible(point, light)
 
 
-def _within(media: LitRay, x0, x1):
-    """Return the part of a segment from the first to the last bounded medium."""
-    first, last = x1, x0
-    for piece in media.pieces:
-        first = dr.minimum(first, piece.begin)
-        last = dr.maximum(last, dr.select(dr.isfinite(piece.begin), piece.end, x0))
-    return dr.maximum(first, x0), dr.minimum(last, x1)
-
-
 def _lit_runs(airlight: RayAirlight, *, steps: int, spacing: str, lit):
     """Integrate the runs of cells whose middles are lit."""
     view, light, geometry, media = airlight.view, airlight.light, airlight.geometry, airlight.media
     Float, lanes = type(view.distance), dr.width(view.distance)
     x0, x1 = airlight.segment
     if media and view.medium.clear:
-        x0, x1 = _within(media, x0, x1)
+        x0, x1 = within(media, x0, x1)
     elif spacing == "uniform":
-        x1 = dr.minimum(x1, x0 + _OPTICAL_REACH / least_extinction(view.medium))
+        x1 = dr.minimum(x1, x0 + OPTICAL_REACH / least_extinction(view.medium))
     uniform = spacing == "uniform" or not light.w
     theta1 = dr.select(dr.isfinite(x1), dr.atan2(x1 - geometry.foot, geometry.height), 0.5 * dr.pi)
     begin = x0 if uniform else dr.atan2(x0 - geometry.foot, geometry.height)
@@ -205,62 +181,3 @@ def _lit_runs(airlight: RayAirlight, *, steps: int, spacing: str, lit):
         labels=("index", "was_lit", "opened", "intervals"),
     )
     return sum_at_end(intervals, airlight.integral, x1, opened=opened, lit=was_lit, active=meets)
-
-
-def _march(
-    view: View, light: Light, geometry: RayGeometry, segment, *, steps: int, spacing: str, lit, media: LitRay | None
-):
-    """Sum the steps of every ray in one loop, so that the kernel does not grow with their number."""
-    x0, x1 = segment
-    Float = type(geometry.height)
-    foot, height, medium = geometry.foot, geometry.height, view.medium
-    theta0 = dr.atan2(x0 - foot, height)
-    theta1 = dr.select(dr.isfinite(x1), dr.atan2(x1 - foot, height), 0.5 * dr.pi)
-    begin, end = (x0, x1) if spacing == "uniform" else (theta0, theta1)
-    width = (end - begin) / steps
-
-    def step(index, total):
-        u = dr.fma(Float(index) + 0.5, width, begin)
-        x = u if spacing == "uniform" else dr.fma(height, dr.tan(u), foot)
-        r = distance_to_light(geometry, x)
-        weight = dr.rcp(dr.square(r)) if spacing == "uniform" else dr.rcp(height)
-        point = view.origin + view.direction * x
-        if media:
-            term = weight * media.source(x)
-            return index + 1, total + dr.select((width > 0) & lit(point), term, 0)
-        weight *= medium.phase.evaluate((foot - x) / r)
-        if light.varies:
-            weight *= falloff(geometry, light, x)
-        term = per_extinction(medium, lambda sigma_t: weight * dr.exp(-sigma_t * (x + r)))
-        return index + 1, total + dr.select((width > 0) & lit(point), term, 0)
-
-    total = Float(0) if len(medium.sigma_t) == 1 and not media else type(medium.albedo)(0)
-    _, total = dr.while_loop(
-        state=(mi.UInt32(0), total + dr.zeros(Float, dr.width(width))),
-        cond=lambda index, total: index < steps,
-        body=step,
-        labels=("index", "total"),
-    )
-    return total * width
-
-
-def _march_parallel(view: View, media: LitRay, segment, *, steps: int, lit):
-    """Sum equal steps of every ray under a directional light; see `_march`."""
-    x0, x1 = segment
-    Float = type(view.distance)
-    # Rays that miss all bounded media take steps of length 0: a map has no place for points at infinity.
-    meets = x1 > x0
-    x0, width = dr.select(meets, x0, 0), dr.select(meets, (x1 - x0) / steps, 0)
-
-    def step(index, total):
-        x = dr.fma(Float(index) + 0.5, width, x0)
-        reached = (width > 0) & lit(view.origin + view.direction * x)
-        return index + 1, total + dr.select(reached, media.source(x), 0)
-
-    _, total = dr.while_loop(
-        state=(mi.UInt32(0), type(view.medium.albedo)(0) + dr.zeros(Float, dr.width(width))),
-        cond=lambda index, total: index < steps,
-        body=step,
-        labels=("index", "total"),
-    )
-    return total * width

@@ -7,6 +7,7 @@ Read in this order:
 - `view.py`: the rays of a frame, the lights and the media, as a method sees them.
 - `layers.py`: what a method returns, the G-buffer and the last frame for passes, and the formula of a frame.
 - `light_airlight.py`: the airlight of one light along the rays, whatever fills the scene: what methods sum up.
+- `marching.py`: the same integral by midpoint steps: what marchers sum up.
 
 May import: `realtime.area_lights`, `realtime.bounded_media`, `realtime.errors`, `realtime.kernels`,
 `realtime.numerics`, `realtime.parameters`, `realtime.rays`, `realtime.scene`, `realtime.tiles`.

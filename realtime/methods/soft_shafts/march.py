@@ -12,24 +12,19 @@ look-up. A first loop is over the points, a second over the steps: the kernel gr
 Uniform steps that no surface ends stop at 20 optical depths, where e^-20 = 2e-9 is left.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
-from realtime.bounded_media.airlight import LitRay
+from realtime.methods.interface.marching import OPTICAL_REACH
 from realtime.methods.interface.view import View
 from realtime.methods.soft_shafts.light_sources import SourceState, frame_at
 from realtime.methods.soft_shafts.parameters import SoftShaftsParameters
 from realtime.numerics.fast_exp import exp_bounded
-from realtime.rays.ray_light import distance_to_light, falloff, ray_geometry
-from realtime.scene.lights import Light
 from realtime.scene.medium import least_extinction, per_extinction
 from realtime.shadow_maps.hemisphere_map import HemisphereMaps
-
-_OPTICAL_REACH = 20.0
 
 
 @dataclass(frozen=True)
@@ -82,7 +77,7 @@ def _of_point(view: View, state: SourceState, number: Any, shift: Any, p: SoftSh
     along = sum(o * d for o, d in zip(origin, direction))
     begin, end = Float(0), view.distance
     if p.spacing == "uniform":
-        end = dr.minimum(end, _OPTICAL_REACH / least_extinction(medium))
+        end = dr.minimum(end, OPTICAL_REACH / least_extinction(medium))
     # The plane of the light point cuts the ray.
     meets = -origin[2] / direction[2]
     begin = dr.select(direction[2] > 0, dr.maximum(meets, begin), begin)
@@ -123,74 +118,3 @@ def _of_point(view: View, state: SourceState, number: Any, shift: Any, p: SoftSh
         labels=("index", "total"),
     )
     return total * dr.select(lit_part, width / height, 0)
-
-
-def integral_of_light(
-    view: View, light: Light, lit_at: Callable[[Any], Any], media: LitRay | None, p: SoftShaftsParameters
-) -> Any:
-    """Return the airlight integral of one light by the midpoint rule.
-
-    Parameters
-    ----------
-    view
-        The rays.
-    light
-        Any light.
-    lit_at
-        Says whether the light reaches points [m].
-    media
-        The rays in bounded media; None where there are none.
-    p
-        The parameters.
-
-    Returns
-    -------
-    integral
-        J [1/m]; in bounded media albedo sigma_t J [1/m^2].
-    """
-    Float, medium = type(view.distance), view.medium
-    geometry = ray_geometry(view.origin, view.direction, light, low=view.direction_low)
-    begin, end = geometry.lit_segment(Float(0), view.distance) if light.w else (Float(0), view.distance)
-    uniform = p.spacing == "uniform" or not light.w
-    if media is not None:
-        first, last = +end, +begin
-        for piece in media.pieces:
-            first = dr.minimum(first, piece.begin)
-            last = dr.maximum(last, dr.select(dr.isfinite(piece.begin), piece.end, begin))
-        if medium.clear:
-            begin, end = dr.maximum(first, begin), dr.minimum(last, end)
-    if uniform and not medium.clear:
-        end = dr.minimum(end, begin + _OPTICAL_REACH / least_extinction(medium))
-    lit_part = end > begin
-    if not uniform:
-        begin = dr.atan2(begin - geometry.foot, geometry.height)
-        end = dr.select(dr.isfinite(end), dr.atan2(end - geometry.foot, geometry.height), 0.5 * dr.pi)
-    begin, end = dr.select(lit_part, begin, 0), dr.select(lit_part, end, 0)
-    width = (end - begin) / p.steps
-
-    def step(index: Any, total: Any):
-        u = dr.fma(Float(index) + 0.5, width, begin)
-        x = u if uniform else dr.fma(geometry.height, dr.tan(u), geometry.foot)
-        point = view.origin + view.direction * x
-        lit = lit_part & lit_at(point)
-        if not light.w:
-            return index + 1, total + dr.select(lit, media.source(x), 0)  # type: ignore[union-attr]
-        r = distance_to_light(geometry, x)
-        weight = dr.rcp(dr.square(r)) if uniform else dr.rcp(geometry.height)
-        if media is not None:
-            return index + 1, total + dr.select(lit, weight * media.source(x), 0)
-        weight *= medium.phase.evaluate((geometry.foot - x) / r)
-        if light.varies:
-            weight *= falloff(geometry, light, x)
-        term = per_extinction(medium, lambda sigma_t: weight * dr.exp(-sigma_t * (x + r)))
-        return index + 1, total + dr.select(lit, term, 0)
-
-    grey = len(medium.sigma_t) == 1 and media is None
-    kind = Float if grey else type(medium.albedo)
-    _, total = dr.while_loop(
-        state=(mi.UInt32(0), kind(0) + dr.zeros(Float, dr.width(view.distance))),
-        cond=lambda index, total: index < p.steps,
-        body=step,
-        labels=("index", "total"),
-    )
-    return total * width

@@ -41,10 +41,11 @@ from realtime.image_filters.tile_average import tile_average
 from realtime.image_filters.upsample import small_pixels, upsample
 from realtime.memory import check_memory
 from realtime.methods.interface.layers import Layers
+from realtime.methods.interface.marching import marched_integral
 from realtime.methods.interface.view import View, bounded_radiance, radiance, rays_in_media
 from realtime.methods.soft_shafts.history import turn
 from realtime.methods.soft_shafts.light_sources import SourceState, frame_at, source_state
-from realtime.methods.soft_shafts.march import Share, integral_of_light, integral_of_points
+from realtime.methods.soft_shafts.march import Share, integral_of_points
 from realtime.methods.soft_shafts.parameters import AUTO, SoftShaftsParameters
 from realtime.methods.soft_shafts.smoothing import smooth_airlight, smooth_share
 from realtime.methods.soft_shafts.surfaces import (
@@ -174,7 +175,14 @@ class _Frame:
         if view.features.bounded or lights[0].facing is None or not self.states:
             media = rays_in_media(few) if view.features.bounded else [None] * len(view.lights)
             integral = sum(
-                integral_of_light(few, few.lights[light], self._lit(number, light, place), media[light], p)
+                marched_integral(
+                    few,
+                    few.lights[light],
+                    media[light],
+                    steps=p.steps,
+                    spacing=p.spacing,
+                    lit=self._lit(number, light, place),
+                )
                 for place, light in enumerate(source)
             )
         else:
