@@ -172,12 +172,9 @@ def froxel_errors(parameters: FroxelFogParameters, size: tuple[int, int]) -> tup
 
 
 def _visibility(view: View, shadows: FroxelShadows, shadow: str) -> Visibility:
-    def visible(point, light: Light, number: int, place):
+    def visible(point, light: Light, number: int):
         if shadow == "ray":
             return view.visible(point, light)
-        if place is not None:
-            table, point_number = place
-            return table.lit(point_number, light, point)
         if light.source is None:
             return lit_in_map(shadows.maps[number], light, point)
         # In bounded media light points come one by one.
