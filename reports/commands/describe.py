@@ -6,19 +6,23 @@ from typing import Annotated
 
 import typer
 
+from reports.commands.options import Json, Scene, Size
+
 
 def describe(
-    scene: Annotated[str, typer.Argument(help="A built-in scene or a Mitsuba XML file.", show_default=False)],
-    size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels; the scene's own by default.")] = None,
+    scene: Scene,
+    size: Size = None,
     gltf: Annotated[
-        Path | None, typer.Option(help="Write the scene as binary glTF 2.0, a .glb file.", show_default=False)
+        Path | None,
+        typer.Option(metavar="FILE", help="Write the scene as binary glTF 2.0, a .glb file.", show_default=False),
     ] = None,
-    json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    json: Json = False,
 ) -> None:
-    """Print everything that another renderer needs to render a scene, so that its image can be judged.
+    """Print all that another renderer needs to render a scene.
 
-    Camera, media, lights, surfaces, what the pixels hold and what file to write. The glTF file has the same camera,
-    lights and meshes; media are in its extras.
+    Its image can then be judged, by `airlight compare SCENE IMAGE.exr`. Camera, media, lights, surfaces, what the
+    pixels hold and what file to write. The glTF file has the same camera, lights and meshes; media are in its
+    extras.
     """
     from analytic.errors import InputError
     from reference.storage.files import ensure_writable

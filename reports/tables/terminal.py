@@ -2,12 +2,18 @@
 """What commands print: tables, and the same data as JSON."""
 
 import json
+import os
 import shutil
 import sys
 from typing import Any
 
 from reports.tables.drawing import markdown, text
 from reports.tables.table import Table
+
+
+def colours_wanted() -> bool:
+    """Return whether colours and bold letters may be printed: NO_COLOR is not set, or empty (https://no-color.org)."""
+    return not os.environ.get("NO_COLOR")
 
 
 def print_json(data: Any) -> None:
@@ -38,4 +44,4 @@ def print_table(table: Table, *, as_markdown: bool = False) -> None:
         return
     terminal = sys.stdout.isatty()
     width = shutil.get_terminal_size().columns if terminal else None
-    print(text(table, width=width, styled=terminal), end="")
+    print(text(table, width=width, styled=terminal and colours_wanted()), end="")

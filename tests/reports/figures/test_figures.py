@@ -118,5 +118,5 @@ def test_drawing_from_a_folder_without_data_says_what_to_run(tmp_path):
 
 
 def test_options_of_the_strip_are_refused_without_it(tmp_path):
-    with pytest.raises(InputError, match="--scene and --methods choose images of the figure strip"):
+    with pytest.raises(InputError, match="a scene and --methods choose images of the figure strip"):
         figures(["polynomials"], output=tmp_path, scene="hall")
