@@ -30,7 +30,7 @@ def describe(
     from reports.interchange.scene import describe_scene
     from reports.machine.environment import activate
     from reports.tables.scene import description_text
-    from reports.tables.terminal import print_json
+    from reports.tables.terminal import print_json, terminal_width
     from validation.scenes.loading import load_scene, parse_size
 
     if gltf is not None:
@@ -45,7 +45,7 @@ def describe(
     if json:
         print_json(described | ({} if written is None else {"gltf": written}))
         return
-    print(description_text(described))
+    print(description_text(described, terminal_width() or 120))
     if written is not None:
         cut = ", ".join(written["tessellated"])
         print(f"{written['path']}: {written['triangles']} triangles" + (f"; cut into triangles: {cut}" if cut else ""))

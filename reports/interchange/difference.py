@@ -60,6 +60,9 @@ def write_difference(path: Path, reference: Any, test: Any, *, kept: Any = None)
     floor = np.maximum(np.where(finite, reference, 0), FLOOR * mean)
     relative = np.divide(difference, floor, out=np.zeros_like(test), where=floor > 0)
     left_out = int((~finite.all(axis=-1)).sum())
-    attributes = {"airlight:difference": "test - reference", "airlight:not_finite": left_out}
+    attributes: dict[str, str | int | float] = {
+        "airlight:difference": "test - reference",
+        "airlight:not_finite": left_out,
+    }
     write_exr(path, Image({"total": difference, "relative": relative}, attributes=attributes))
     return "test - reference in R, G, B, over the reference in the layer relative"

@@ -16,6 +16,11 @@ def colours_wanted() -> bool:
     return not os.environ.get("NO_COLOR")
 
 
+def terminal_width() -> int | None:
+    """Return how wide the terminal is that is printed to [characters]; None where it is none."""
+    return shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+
+
 def print_json(data: Any) -> None:
     """Print data as JSON.
 
@@ -42,6 +47,5 @@ def print_table(table: Table, *, as_markdown: bool = False) -> None:
     if as_markdown:
         print(f"\n{markdown(table)}", end="")
         return
-    terminal = sys.stdout.isatty()
-    width = shutil.get_terminal_size().columns if terminal else None
-    print(text(table, width=width, styled=terminal and colours_wanted()), end="")
+    width = terminal_width()
+    print(text(table, width=width, styled=width is not None and colours_wanted()), end="")
