@@ -266,14 +266,11 @@ def _print_times(times: dict[str, Any], *, json: bool) -> None:
         return
     stages = ", ".join(f"{stage['name']} {stage['ms']:.3g} ms" for stage in times["stages"])
     print(f"{times['scene']}, {times['method']}: {times['frame_ms']:.3g} ms a frame ({rate_words(times['frame_ms'])})")
-    print(
-        f"  {stages}; {times['light_moved_ms']:.3g} ms after the light moved, {times['objects_moved_ms']:.3g} ms after "
-        "objects moved"
-    )
-    print(
-        f"  camera rays kept: {times['light_moved_camera_kept_ms']:.3g} ms after the light moved, "
-        f"{times['colours_changed_ms']:.3g} ms after only medium or colours changed"
-    )
+    print(f"  {stages}")
+    moved, objects = times["light_moved_ms"], times["objects_moved_ms"]
+    print(f"  {moved:.3g} ms after the light moved, {objects:.3g} ms after objects moved")
+    print(f"  camera rays kept: {times['light_moved_camera_kept_ms']:.3g} ms after the light moved,")
+    print(f"    {times['colours_changed_ms']:.3g} ms after only medium or colours changed")
     print(f"  {times['device']}, {times['threads']} threads")
     size = " x ".join(map(str, times["size"]))
     for path in times["files"]:

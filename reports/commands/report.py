@@ -183,9 +183,9 @@ def _measured(
     chosen = named_configurations(methods, kernels, settings, usual=usual, limit=method_limit)
     if methods and all(":" in name for name in methods):
         print_notes(["what --method names is measured alone; --method all adds the built-in methods"])
-    ensure_folder(target)
     activate()
     print_notes(notes_on(names))
+    ensure_folder(target)  # not before the scenes are known to be right: a mistake leaves no empty folder
     # The sizes of an effort are known to be right; those of images are the user's.
     sizes = [images_size(tuple(several)) for several in shown.values()]
     works = [truth_work(size) for size in sizes]

@@ -79,7 +79,10 @@ def text(table: Table, *, width: int | None = None, styled: bool = False) -> str
             grid.add_row(*(cells[place] for place in kept))
         drawn = io.StringIO()
         Console(file=drawn, highlight=False, markup=False, width=width or 10_000, force_terminal=styled).print(grid)
-        lines = [*(line.rstrip() for line in drawn.getvalue().splitlines()), *_wrapped(note, width)]
+        lines = [
+            *(line.rstrip() for line in drawn.getvalue().splitlines()),
+            *([*_wrapped(note, width), ""] if note else []),
+        ]
     below = [line for words in _below(table) for line in _wrapped(words, width)]
     return "\n".join([*_wrapped(table.title, width), *lines, *below]) + "\n"
 

@@ -252,6 +252,12 @@ def test_two_sizes_of_one_scene_are_refused_before_any_work(variant, images, cap
     assert "render all images of a scene at one size" in printed
 
 
+def test_a_mistake_leaves_no_folder(variant, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert "did you mean 'hall'" in refused(capsys, "--quick", "hal")
+    assert not list(tmp_path.iterdir())
+
+
 def test_two_efforts_at_once_are_refused(capsys):
     assert "both --quick and --full" in refused(capsys, "--quick", "--full")
 
