@@ -51,7 +51,7 @@ def frame_view(
         lights=lights,
         medium=medium,
         features=features,
-        visible=lambda point, light: ~geometry.ray_test(light.shadow_ray(point)),
+        visible=lambda point, light, asked=True: ~geometry.ray_test(light.shadow_ray(point), asked),
         camera=camera,
         pixel=pixel,
         layout=_layout(camera) if layout is None else layout,

@@ -10,6 +10,7 @@ both exponents are sums over the media that the two legs cross (`realtime.bounde
 surface is black from behind, as in Mitsuba's `diffuse`.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,10 +19,13 @@ import mitsuba as mi
 
 from realtime.bounded_media.ray_segments import path_transmittance
 from realtime.numerics.array_types import Metres, PerRay
+from realtime.numerics.fast_exp import exp_bounded
 from realtime.rays.ray_light import falloff, ray_geometry
 from realtime.scene.lights import Light
-from realtime.scene.medium import Medium, transmittance
+from realtime.scene.medium import Medium, per_extinction, transmittance
 from realtime.scene.triangle_table import Facets, facet_at, facet_number
+
+_NO_DISTANCE = 1e-12  # what stands for the square of a distance of 0, of which no power is finite [m^2]
 
 
 @dataclass(frozen=True)
@@ -147,6 +151,40 @@ def lit_surface(scene, surface: VisibleSurface, *, medium: Medium, light: Light,
     else:
         kept = transmittance(medium, dr.select(lit, surface.distance + r, 0))
     return dr.select(lit, reflected * kept, type(medium.albedo)(0))
+
+
+def lit_by_points(scene, surface: VisibleSurface, *, medium: Medium, lights: Sequence[Light], shadows: bool):
+    """Return the sum of `lit_surface` over the points of a light with extent [W/(m^2 sr)].
+
+    What they have in common is taken out of the sum: their intensity, the albedo and the leg to the eye.
+
+    Parameters
+    ----------
+    scene, surface, shadows
+        As for `lit_surface`.
+    medium
+        Without bounded media in it.
+    lights
+        The points of one light.
+    """
+
+    def weight(light: Light):
+        toward = light.toward(surface.point)
+        square = dr.maximum(dr.squared_norm(toward), _NO_DISTANCE)
+        inverse = dr.rsqrt(square)
+        facing = dr.maximum(-dr.dot(light.normal, toward), 0) * dr.maximum(dr.dot(surface.normal, toward), 0)
+        r = square * inverse
+        strength = facing * dr.square(dr.square(inverse))
+        if shadows:
+            reached = surface.seen & (strength > 0)
+            reached &= ~scene.ray_test(light.shadow_ray_from(surface.interaction), reached)
+            strength = dr.select(reached, strength, 0)
+        return per_extinction(medium, lambda sigma_t: strength * exp_bounded(-sigma_t * r))
+
+    total = sum(weight(light) for light in lights)
+    kept = transmittance(medium, dr.select(surface.seen, surface.distance, 0))
+    reflected = surface.albedo * lights[0].intensity * (dr.inv_pi * kept * total)
+    return dr.select(surface.seen, reflected, type(medium.albedo)(0))
 
 
 def _arriving(light: Light, surface: VisibleSurface):

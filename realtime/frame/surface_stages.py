@@ -14,7 +14,7 @@ import drjit as dr
 
 from realtime.bounded_media.ray_segments import camera_insides, optical_depths
 from realtime.frame.recorded import Frozen
-from realtime.frame.surface import Cast, cast_rays, lit_surface, visible_surface
+from realtime.frame.surface import Cast, cast_rays, lit_by_points, lit_surface, visible_surface
 from realtime.scene.camera import ray_directions
 from realtime.scene.lights import sources_of
 from realtime.scene.read_scene import Scene
@@ -62,12 +62,22 @@ def surface_stages(
         seen = visible_surface(cast, facets, camera.origin, direction, color=type(medium.albedo))
         depths = optical_depths(medium, cast.distance, cast.insides) if medium.bounded_media else None
         shown = {"medium": medium, "depths": depths}
-        colors = [
-            lit_surface(geometry, seen, light=light, shadows=shadows, **shown) for light, shadows in zip(lights, asked)
-        ]
-        if by_source:
-            return tuple(sum(colors[number] for number in source) for source in sources)
-        return tuple(colors) if provides_visibility else (sum(colors),)
+
+        def lit(number: int):
+            return lit_surface(geometry, seen, light=lights[number], shadows=asked[number], **shown)
+
+        def lit_by(source: list[int]):
+            if len(source) == 1:
+                return lit(source[0])
+            if medium.bounded_media:
+                return sum(lit(number) for number in source)
+            points = [lights[number] for number in source]
+            return lit_by_points(geometry, seen, medium=medium, lights=points, shadows=asked[source[0]])
+
+        if provides_visibility and not by_source:
+            return tuple(lit(number) for number in range(len(lights)))
+        colors = tuple(lit_by(source) for source in sources)
+        return colors if by_source else (sum(colors),)
 
     @Frozen
     def surface(geometry, facets, pixel, camera, medium, lights):

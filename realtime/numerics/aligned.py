@@ -23,11 +23,33 @@ def aligned_array(scalar: Any, numbers: NDArray[Any]) -> Any:
     numbers
         (n,), in any unit.
     """
-    floats: dict[Any, np.dtype[Any]] = {dr.VarType.Float32: np.dtype("f4"), dr.VarType.Float64: np.dtype("f8")}
-    dtype = floats.get(dr.type_v(scalar), numbers.dtype)  # truth values and whole numbers come in their own type
-    # Embree may read a vector beyond the last number.
-    memory = np.empty(numbers.size * dtype.itemsize + 2 * _ALIGNMENT, dtype=np.uint8)
-    begin = -memory.ctypes.data % _ALIGNMENT
-    aligned = memory[begin : begin + numbers.size * dtype.itemsize].view(dtype)
+    dtype = _dtype(scalar, numbers)
+    aligned = _memory(numbers.size * dtype.itemsize)[: numbers.size * dtype.itemsize].view(dtype)
     aligned[:] = numbers
     return scalar(aligned)
+
+
+def aligned_numbers(scalar: Any, numbers: NDArray[Any]) -> list[Any]:
+    """Return numbers as Dr.Jit arrays of one entry each, as `aligned_array` makes them.
+
+    Parameters
+    ----------
+    scalar, numbers
+        As of `aligned_array`.
+    """
+    dtype = _dtype(scalar, numbers)
+    step = _ALIGNMENT // dtype.itemsize
+    aligned = _memory(numbers.size * _ALIGNMENT)[: numbers.size * _ALIGNMENT].view(dtype)
+    aligned[::step] = numbers
+    return [scalar(aligned[place : place + 1]) for place in range(0, numbers.size * step, step)]
+
+
+def _dtype(scalar: Any, numbers: NDArray[Any]) -> np.dtype[Any]:
+    floats: dict[Any, np.dtype[Any]] = {dr.VarType.Float32: np.dtype("f4"), dr.VarType.Float64: np.dtype("f8")}
+    return floats.get(dr.type_v(scalar), numbers.dtype)  # truth values and whole numbers come in their own type
+
+
+def _memory(size: int) -> NDArray[np.uint8]:
+    """Return at least so many bytes of aligned memory, and as many again as Embree may read beyond the last number."""
+    memory = np.empty(size + 2 * _ALIGNMENT, dtype=np.uint8)
+    return memory[-memory.ctypes.data % _ALIGNMENT :]

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from realtime.area_lights.points import PlacedPoints, place_points
-from realtime.numerics.aligned import aligned_array
+from realtime.numerics.aligned import aligned_numbers
 from realtime.numerics.array_types import ArrayTypes, types_of
 from realtime.scene.lights import Facing, Light, with_low
 from realtime.scene.read_scene import Scene
@@ -57,19 +57,20 @@ def source_shape(scene: Scene, light: Light) -> str | None:
 
 
 def _points_of(placed: PlacedPoints, source: int, types: ArrayTypes) -> list[Light]:
-    lights = []
-    for position, normal in zip(placed.positions, placed.normals):
-        high, low = with_low(normal, types)
-        sizes = (_number(size, types) for size in (placed.lift, placed.chord))
-        facing = Facing(_vector(high, types), _vector(low, types), *sizes)
-        intensity = types.color(*(_number(value, types) for value in placed.intensity))
-        lights.append(Light(_vector(position, types), intensity, facing=facing, source=source))
-    return lights
+    # What the points have in common is there once: a frame after a light moved makes all arrays anew.
+    intensity = types.color(*aligned_numbers(types.scalar, placed.intensity))
+    lift, chord = aligned_numbers(types.scalar, np.array([placed.lift, placed.chord]))
+    alike = len(placed.normals) > 1 and bool(np.all(placed.normals == placed.normals[0]))
+    normals = placed.normals[:1] if alike else placed.normals
+    facings = [
+        Facing(_vector(high, types), _vector(low, types), lift, chord)
+        for high, low in (with_low(normal, types) for normal in normals)
+    ]
+    return [
+        Light(_vector(position, types), intensity, facing=facings[0 if alike else number], source=source)
+        for number, position in enumerate(placed.positions)
+    ]
 
 
 def _vector(values, types: ArrayTypes):
-    return types.vector(*(_number(value, types) for value in values))
-
-
-def _number(value, types: ArrayTypes):
-    return aligned_array(types.scalar, np.array([float(value)]))
+    return types.vector(*aligned_numbers(types.scalar, values))

@@ -57,7 +57,7 @@ class HemisphereMaps:
 
     size: int  #: texels on a side
     inverse: Any  #: N (size + 1)^2 values 1/s, 0 where there is nothing [1/m]
-    eased: Any  #: the same, less what a plane changes in half a texel [1/m]
+    eased: Any  #: the same, less what a plane changes in half a texel [1/m]; None where no surface is asked for
 
     def lit(self, number: Any, place: tuple[Any, Any, Any], active: Any = True) -> Any:
         """Return whether a light point reaches points in the air, given by local coordinates [m]."""
@@ -66,6 +66,7 @@ class HemisphereMaps:
 
     def lit_surface(self, number: Any, place: tuple[Any, Any, Any]) -> Any:
         """Return whether a light point reaches points on surfaces, given by local coordinates [m]."""
+        assert self.eased is not None
         own, corner = self._corner(number, place)
         return own >= dr.gather(type(own), self.eased, corner)
 
@@ -91,7 +92,9 @@ def maps_memory(Float: Any, points: int, size: int) -> int:
     return 2 * bytes_of(Float) * points * (size + 1) ** 2
 
 
-def cast_hemisphere_maps(scene: Any, frames: LightFrame, points: int, size: int) -> HemisphereMaps:
+def cast_hemisphere_maps(
+    scene: Any, frames: LightFrame, points: int, size: int, *, for_surfaces: bool = True
+) -> HemisphereMaps:
     """Cast the maps of all points of a light.
 
     Parameters
@@ -104,6 +107,8 @@ def cast_hemisphere_maps(scene: Any, frames: LightFrame, points: int, size: int)
         How many there are.
     size
         Texels on a side of each map, a power of two.
+    for_surfaces
+        Whether points on surfaces will be asked for, not only those in the air.
 
     Raises
     ------
@@ -129,7 +134,7 @@ def cast_hemisphere_maps(scene: Any, frames: LightFrame, points: int, size: int)
     inverse = dr.empty(Float, points * side * side)
     dr.scatter(inverse, met, (number * side + row) * side + column, there)
     dr.eval(inverse)
-    eased = _eased(inverse, points, side)
+    eased = _eased(inverse, points, side) if for_surfaces else None
     dr.eval(eased)
     return HemisphereMaps(size, inverse, eased)
 

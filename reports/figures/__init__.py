@@ -4,6 +4,7 @@
 Read in this order:
 
 - `files.py`: the files of a figure
+- `picture_grid.py`: six pictures from EXR files
 - `report.py`: what figures read of a report
 - `published_rows.py`: rows of papers, from a report or measured
 - `convergence.py`: orders of kernels and estimators

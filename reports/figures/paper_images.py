@@ -7,14 +7,13 @@
 from pathlib import Path
 
 from reference.storage.files import ensure_folder
-from reports.figures.files import new_figure, read_data, value, write_data
-from reports.plotting.style import WIDTHS
+from reports.figures.files import Row, read_data, value, write_data
+from reports.figures.picture_grid import LAYER, picture_grid, stored_image
 
 NAME = "paper-images"
 SUMMARY = "the pictures of both papers in our scenes: three ways to light a hall, two lamps, tessellations"
 
 _HEADER = ("file", "paper", "label", "kind", "exposure")
-_LAYER = "total"
 
 
 def compute(folder: Path | str, *, quick: bool = False) -> None:
@@ -42,7 +41,7 @@ def compute(folder: Path | str, *, quick: bool = False) -> None:
         panels.append(("Billeter 2010, Fig. 8b", label, "side", np.repeat(side[:, :, None], 3, axis=2)))
     rows = []
     for number, (paper, label, kind, image) in enumerate(panels):
-        write_exr(target / f"{NAME}-{number}.exr", Image({_LAYER: image}))
+        write_exr(target / f"{NAME}-{number}.exr", Image({LAYER: image}))
         factor = exposure(panels[2][3] if number < 3 else image) if kind == "light" else 1.0
         rows.append((f"{NAME}-{number}.exr", paper, label, kind, factor))
     write_data(target, NAME, _HEADER, rows, size=list(size))
@@ -52,21 +51,13 @@ def draw(folder: Path, column: str):
     """Return the figure of the data in a folder."""
     import numpy as np
 
-    from reference.storage.exr import layer, read_exr
     from reports.plotting.pictures import tone_mapped
 
-    rows = read_data(folder, NAME)
-    wide = WIDTHS[column]
-    figure = new_figure(wide, 0.62 * wide)
-    for panel, row in zip(figure.subplots(2, 3, squeeze=False).ravel(), rows):
-        path = folder / row["file"]
-        image = np.asarray(layer(read_exr(path), _LAYER, path), dtype=np.float64)
+    def picture(row: Row):
+        image = stored_image(folder / row["file"])
         if row["kind"] == "light":
-            panel.imshow(tone_mapped(image, value(row, "exposure") or 1.0), interpolation="nearest")
-        else:
-            panel.imshow(np.log2(image[::-1, :, 0]), interpolation="nearest", cmap="gray")
-        panel.set_xticks([])
-        panel.set_yticks([])
-        panel.grid(False)
-        panel.set_title(f"{row['paper']}\n{row['label']}", fontsize=6 if column == "double" else 4.5)
-    return figure
+            return tone_mapped(image, value(row, "exposure") or 1.0)
+        return np.log2(image[::-1, :, 0])
+
+    rows = read_data(folder, NAME)
+    return picture_grid(((f"{row['paper']}\n{row['label']}", picture(row)) for row in rows), column)

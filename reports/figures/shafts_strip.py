@@ -8,15 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from reference.storage.files import ensure_folder
-from reports.figures.files import new_figure, read_data, value, write_data
+from reports.figures.files import Row, read_data, value, write_data
+from reports.figures.picture_grid import LAYER, picture_grid, stored_image
 from reports.machine.progress import Progress
-from reports.plotting.style import WIDTHS
 
 NAME = "shafts-strip"
 SUMMARY = "Fig. 5.8 of Ali 2016 again: 150 or 32 samples, Gaussian, bilateral, shared points, the truth"
 
 _HEADER = ("file", "label", "error", "ms", "exposure")
-_LAYER = "total"
 _SHOWN = ("R1", "R2", "R3", "R4", "shared points")
 _WORDS = {
     "R1": "R1: 150 samples",
@@ -54,30 +53,20 @@ def compute(folder: Path | str, *, quick: bool = False, progress: Progress | Non
     factor, lines = exposure(study.truth.image), []
     for number, (label, image, error, milliseconds) in enumerate(pictures):
         assert image is not None
-        write_exr(target / f"{NAME}-{number}.exr", Image({_LAYER: image}))
+        write_exr(target / f"{NAME}-{number}.exr", Image({LAYER: image}))
         lines.append((f"{NAME}-{number}.exr", label, error, milliseconds, factor))
     write_data(target, NAME, _HEADER, lines, size=list(size))
 
 
 def draw(folder: Path, column: str):
     """Return the figure of the data in a folder."""
-    import numpy as np
-
-    from reference.storage.exr import layer, read_exr
     from reports.plotting.pictures import tone_mapped
 
-    rows = read_data(folder, NAME)
-    wide = WIDTHS[column]
-    figure = new_figure(wide, 0.62 * wide)
-    for panel, row in zip(figure.subplots(2, 3, squeeze=False).ravel(), rows):
-        path = folder / row["file"]
-        image = np.asarray(layer(read_exr(path), _LAYER, path), dtype=np.float64)
-        panel.imshow(tone_mapped(image, value(row, "exposure") or 1.0), interpolation="nearest")
-        panel.set_xticks([])
-        panel.set_yticks([])
-        panel.grid(False)
-        title, error = row["label"], value(row, "error")
-        if error:
-            title += f"\nerror {error:.3f}, {value(row, 'ms'):.0f} ms"
-        panel.set_title(title, fontsize=6 if column == "double" else 4.5)
-    return figure
+    def title(row: Row) -> str:
+        error = value(row, "error")
+        return row["label"] + (f"\nerror {error:.3f}, {value(row, 'ms'):.0f} ms" if error else "")
+
+    def picture(row: Row):
+        return tone_mapped(stored_image(folder / row["file"]), value(row, "exposure") or 1.0)
+
+    return picture_grid(((title(row), picture(row)) for row in read_data(folder, NAME)), column)

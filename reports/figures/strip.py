@@ -13,6 +13,7 @@ from analytic.errors import InputError, nearest
 from reference.storage.files import ensure_folder
 from reports.data.reader import read_report
 from reports.figures.files import new_figure, read_data, value, write_data
+from reports.figures.picture_grid import show_picture
 from reports.figures.report import measured, report_origin
 from reports.plotting.style import COLOURS, WIDTHS
 
@@ -183,10 +184,7 @@ def draw(folder: Path, column: str):
 
 
 def _show(panel, picture, colour: str | None = None) -> None:
-    panel.imshow(picture, interpolation="nearest")
-    panel.set_xticks([])
-    panel.set_yticks([])
-    panel.grid(False)
+    show_picture(panel, picture)
     for spine in panel.spines.values():
         spine.set(edgecolor=colour or "black", linewidth=1.2 if colour else 0.4)
 

@@ -46,14 +46,14 @@ SHARED_POINTS: tuple[tuple[str, int | float | str], ...] = (
     ("pattern", "sobol"),
     ("interleave", True),
     ("scale", 2),
-    ("steps", 16),
+    ("steps", 12),
     ("spacing", "equiangular"),
     ("map", 128),
     ("surfaces", "ray"),
     ("guide", "depth"),
     ("hd", "auto"),
     ("hz", 0.02),
-    ("narrow", 64.0),
+    ("narrow", 16.0),
 )
 
 #: The configurations that `bench` and `report` measure by default. Those that say their light points are left out where

@@ -90,7 +90,7 @@ def agreement(
         Batches at most, and samples a pixel in each; those of volpath go where its pilot spread most
         (`reference.monte_carlo.allocation`).
     seconds
-        Trace no further batch after so long; without a limit by default.
+        Trace no further batch after so long, the pilot not counted; without a limit by default.
     progress
         Called with (done, total, what) after every batch.
 
@@ -110,11 +110,12 @@ def agreement(
         test = batch_estimate(traced, layer, mask)
         return compare_statistics(truth_estimate(shortened, layer, test), test, mask=mask, margin=margin)
 
-    start = time.monotonic()
     counts = None
     if estimator == "volpath" and layers:
         pilot = monte_carlo_batches(scene, estimator, batches=_PILOT, samples=samples, first_seed=LARGEST_SEED // 2)
         counts = allocated(pilot.batches, samples, shape=plain.distance.shape, masks=masks)
+    # From here on: where a pilot alone takes long, no time was left for the batches that count.
+    start = time.monotonic()
     go_on = None if seconds is None else (lambda done: time.monotonic() - start <= seconds)
     expected = least = _LEAST_BATCHES[estimator]
 

@@ -6,7 +6,8 @@ fog. Each built-in scene has one light, without a soft edge and before the camer
 this scene can reveal a fault in the formula for soft spots or in the sum over lights.
 
 `wide-lights`, in `WIDE_PROBES`, has lights with extent of each shape, black ones and one of material `null`, some in
-view, before casters. Its truth takes many points of each light, so it is tried with faults of such lights alone.
+view, before casters. Plates before the disk hide the corners of a square around it, whose light would nearly be that of
+the disk. Its truth takes many points of each light, so it is tried with faults of such lights alone.
 
 `sun` has a directional light on two bounded media, a box and a sphere of coloured fog, with occluders before them.
 """
@@ -90,12 +91,23 @@ def wide_lights() -> dict[str, Any]:
     panel = area_lamp("rectangle", (0.93, 0.61, 2.07), (0.17, 0.13, 0.31), (0.43, 0.27), (5.3, 4.7, 3.9))
     disk = area_lamp("disk", (-0.57, -1.61, 1.33), (-0.31, 1.07, 0.83), 0.37, (7.1, 6.3, 5.9))
     ball = area_lamp("sphere", (0.31, -0.41, 1.67), (0.0, 0.0, 0.0), 0.19, (6.7, 7.3, 8.9))
+    # Plates before what a square around the disk would have more than the disk: they hide its corners, not the disk.
+    corners = {
+        f"plate-{turn}": {
+            "type": "rectangle",
+            "to_world": disk["to_world"]
+            @ transform.rotate([0, 0, 1], turn).translate([1.24, 0, 0.027]).scale([0.22, 0.47, 1]),
+            "bsdf": grey,
+        }
+        for turn in (45, 135, 225, 315)
+    }
     return {
         "type": "scene",
         "fog": fog(0.173, (0.91, 0.83, 0.74), {"type": "hg", "g": 0.41}),
         "sensor": camera((0.23, -4.13, 1.37), (0.11, 0.07, 0.93), fov=49.7, size=(24, 18)),
         "panel": panel,
         "disk": disk | {"material": {"type": "null"}},
+        **corners,
         "ball": ball,
         "box": {
             "type": "cube",

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 from numpy.polynomial.legendre import leggauss, legval
@@ -19,20 +20,18 @@ Array = NDArray[np.float64]
 _PANEL, _PANEL_NODES = np.deg2rad(0.5), 8  #: of the quadrature over angles: P_l of l = 300 has 1.2 waves in a panel
 
 
-class SlabPhase:
+class SlabPhase(Protocol):
     """A phase function: its values and its moments."""
 
     def moments(self, count: int) -> Array:
         """Return chi_0 .. chi_{count - 1}."""
-        raise NotImplementedError
 
     def values(self, cosines: ArrayLike) -> Array:
         """Return P at cosines of the scattering angle."""
-        raise NotImplementedError
 
 
 @dataclass(frozen=True)
-class HenyeyGreensteinPhase(SlabPhase):
+class HenyeyGreensteinPhase:
     """The phase function of Henyey and Greenstein 1941; isotropic for g = 0.
 
     Parameters
@@ -55,7 +54,7 @@ class HenyeyGreensteinPhase(SlabPhase):
 
 
 @dataclass(frozen=True, eq=False)
-class SeriesPhase(SlabPhase):
+class SeriesPhase:
     """A phase function by its moments, all others being zero.
 
     Parameters
@@ -79,7 +78,7 @@ class SeriesPhase(SlabPhase):
 
 
 @dataclass(frozen=True, eq=False)
-class AnglePhase(SlabPhase):
+class AnglePhase:
     """A function of the scattering angle, divided by its mean.
 
     Parameters

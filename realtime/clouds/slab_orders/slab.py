@@ -107,12 +107,13 @@ def slab_light(
         mu, positive upwards, not 0, and phi [rad], 0 along the horizontal direction of the sun's light.
     """
     streams = needed_streams(phase)
-    return tuple(  # type: ignore[return-value]
-        _slab_light(
+
+    def light(count: int, nodes: int) -> SlabLight:
+        return _slab_light(
             tau, mu0, phase, albedo, sets=sets, depths=depths, directions=directions, streams=count, nodes=nodes
         )
-        for count, nodes in ((streams, _NODES), (3 * streams // 4, _NODES - 2))
-    )
+
+    return light(streams, _NODES), light(3 * streams // 4, _NODES - 2)
 
 
 def needed_streams(phase: SlabPhase) -> int:

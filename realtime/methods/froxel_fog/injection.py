@@ -29,12 +29,13 @@ from realtime.methods.froxel_fog.light_points import LightPointTable
 from realtime.methods.froxel_fog.media import piece_length
 from realtime.methods.interface.view import View
 from realtime.numerics.array_types import PerRay
+from realtime.numerics.fast_exp import exp_bounded
 from realtime.rays.ray_light import falloff, ray_geometry
 from realtime.scene.lights import Light
-from realtime.scene.medium import transmittance
+from realtime.scene.medium import per_extinction, transmittance
 
-#: (point, light, its number among all lights, the table that it is from with its number there) -> whether it is lit.
-Visibility = Callable[[Any, Light, int, tuple[LightPointTable, Any] | None], Any]
+#: (point, light, its number among all lights) -> whether it is lit.
+Visibility = Callable[[Any, Light, int], Any]
 
 _UNROLLED = 4  # lights in one kernel where media have bounds: no loop can write down how a light sees them
 
@@ -80,13 +81,13 @@ def scattered_light(
     for number, light in enumerate(view.lights):
         if any(light.source == table.source for table in loops):
             continue
-        lit = visible(points.point, light, number, None) if view.features.shadows else True
+        lit = visible(points.point, light, number) if view.features.shadows else True
         total += light.intensity * _weight(view, light, points, lit)
         if view.features.bounded and number % _UNROLLED == _UNROLLED - 1:
             dr.eval(total)
     for table in loops:
         like = next(light for light in view.lights if light.source == table.source)
-        total += like.intensity * _sum_over_points(view, table, like, points, visible)
+        total += like.intensity * _sum_over_points(view, table, like, points)
     if not view.features.bounded:
         medium = view.medium
         sigma_t = medium.sigma_t[0] if len(medium.sigma_t) == 1 else type(total)(*medium.sigma_t)
@@ -114,16 +115,31 @@ def _froxel_points(view: View, grid: Grid, pieces: tuple[Piece, ...], shift: tup
     )
 
 
-def _sum_over_points(view: View, table: LightPointTable, like: Light, points: FroxelPoints, visible: Visibility) -> Any:
-    """Return the sum of the weights of the points of a light, in one loop."""
+def _sum_over_points(view: View, table: LightPointTable, like: Light, points: FroxelPoints) -> Any:
+    """Return the sum of the weights of the points of a light, in one loop.
+
+    All that a weight needs follows from the coordinates of a froxel in the frame of the light point, c along its
+    normal: r, the cosine c/r at the light, and the place in its map.
+    """
+    medium = view.medium
 
     def step(number, total):
-        light = table.point(number, like)
-        lit = visible(points.point, light, 0, (table, number)) if view.features.shadows else True
-        return number + 1, total + _weight(view, light, points, lit)
+        frame = table.frame(number, like)
+        away = points.point - frame.position
+        a, b, c = frame.local(away)
+        square = dr.fma(a, a, dr.fma(b, b, c * c))
+        # At the light itself there is no direction: any will do.
+        inverse = dr.rsqrt(dr.maximum(square, 1e-30))
+        strength = dr.maximum(c, 0) * inverse * dr.rcp(dr.maximum(square, points.least))
+        strength *= medium.phase.evaluate(-dr.dot(away, points.unit) * inverse)
+        if view.features.shadows:
+            lit = view.visible(points.point, frame) if table.maps is None else table.maps.lit(number, (a, b, c))
+            strength = dr.select(lit, strength, 0)
+        r = square * inverse
+        return number + 1, total + per_extinction(medium, lambda sigma_t: strength * exp_bounded(-sigma_t * r))
 
-    grey = len(view.medium.sigma_t) == 1
-    Value = type(view.distance) if grey else type(view.medium.albedo)
+    grey = len(medium.sigma_t) == 1
+    Value = type(view.distance) if grey else type(medium.albedo)
     _, total = dr.while_loop(
         state=(mi.UInt32(0), dr.zeros(Value, dr.width(points.point))),
         cond=lambda number, total: number < table.count,

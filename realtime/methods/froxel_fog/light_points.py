@@ -40,18 +40,21 @@ class LightPointTable:
         frame = self._frame(number, light.position, light.facing)
         return self.maps.lit(number, frame.local(point - light.position))
 
+    def frame(self, number: Any, like: Light) -> LightFrame:
+        """Return the light point of a number with its frame; `like` is one of them."""
+        light = self.point(number, like)
+        assert light.facing is not None
+        return self._frame(number, light.position, light.facing)
+
     def _frame(self, number: Any, position: Any, facing: Facing) -> LightFrame:
         across = type(position)(dr.gather(four_numbers(type(self.across)), self.across, number).xyz)
         return LightFrame(position, across, dr.cross(facing.normal, across), facing.normal, facing.lift)
 
     def with_maps(self, geometry: Any, like: Light, size: int) -> "LightPointTable":
         """Return the table with maps, of `size` texels on a side, of the shapes of a Mitsuba scene."""
-        number = dr.arange(mi.UInt32, self.count)
-        light = self.point(number, like)
-        assert light.facing is not None
-        frames = self._frame(number, light.position, light.facing)
+        frames = self.frame(dr.arange(mi.UInt32, self.count), like)
         dr.eval(frames)
-        return replace(self, maps=cast_hemisphere_maps(geometry, frames, self.count, size))
+        return replace(self, maps=cast_hemisphere_maps(geometry, frames, self.count, size, for_surfaces=False))
 
 
 def tabulated(lights: Sequence[Light]) -> tuple[LightPointTable, ...]:
@@ -63,12 +66,12 @@ def tabulated(lights: Sequence[Light]) -> tuple[LightPointTable, ...]:
 def _table(source: int, points: list[Light]) -> LightPointTable:
     Float = type(points[0].position.x)
     facing = [light.facing for light in points if light.facing is not None]
-    normals = np.array([np.array(own.normal, dtype=np.float64).ravel() for own in facing])
+    normals = np.array([[component[0] for component in own.normal] for own in facing])
     helper = np.where(np.abs(normals[:, :1]) < 0.5, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
     across = np.cross(helper, normals)
     across /= np.linalg.norm(across, axis=1, keepdims=True)
-    positions = np.array([np.array(light.position, dtype=np.float64).ravel() for light in points])
-    lifts = np.array([np.array(own.lift, dtype=np.float64).ravel() for own in facing])
+    positions = np.array([[component[0] for component in light.position] for light in points])
+    lifts = np.array([[own.lift[0]] for own in facing])
 
     def rows(vectors: Any, last: Any) -> Any:
         return aligned_array(Float, np.hstack([vectors, last]).ravel())

@@ -66,7 +66,10 @@ class FroxelFogParameters(Parameters):
         choices=("none", "neighbours"),
     )
     shadow: str = parameter("map", "a look-up in a shadow map a froxel, or a shadow ray", choices=("map", "ray"))
-    map: int = map_size(512, "texels on a side of a face of the map, with `shadow=map`")
+    map: int = map_size(
+        512,
+        "texels on a side of a face of the map, with `shadow=map`; half as many for each point of a light with extent",
+    )
 
     def _check_together(self) -> None:
         if self.far and self.near >= self.far:
@@ -75,6 +78,11 @@ class FroxelFogParameters(Parameters):
             raise InputError(f"clamp={self.clamp}: got history=0, wanted a weight above 0, or clamp=none")
         if self.distribution == "linear" and self.near:
             raise InputError(f"near: got {self.near:g} with distribution=linear, wanted 0: all slices are equal")
+
+    @property
+    def point_map(self) -> int:
+        """Texels on a side of the map of a light point: the errors of many maps average, and a froxel is no smaller."""
+        return max(self.map // 2, 4)
 
     @property
     def grid_size(self) -> tuple[int, int, int]:
@@ -106,14 +114,17 @@ def prepare_froxel_fog(scene: Scene, parameters: FroxelFogParameters) -> Callabl
         return lambda scene: FroxelShadows((), tabulated(scene.lights))
     map = parameters.map
     points = sum(light.source is not None for light in scene.lights)
-    needed = froxels + maps_memory(type(scene.camera.origin.x), points, map)
+    needed = froxels + maps_memory(type(scene.camera.origin.x), points, parameters.point_map)
     needed += sum(map_memory(light, map) for light in scene.lights if light.source is None)
     check_memory(f"map: {map} texels for {len(scene.lights)} light(s)", needed, "use a smaller map")
 
     def cast(scene: Scene) -> FroxelShadows:
         ordinary = [light for light in scene.lights if light.source is None]
         first = {light.source: light for light in scene.lights}
-        tables = (table.with_maps(scene.geometry, first[table.source], map) for table in tabulated(scene.lights))
+        tables = (
+            table.with_maps(scene.geometry, first[table.source], parameters.point_map)
+            for table in tabulated(scene.lights)
+        )
         return FroxelShadows(tuple(cast_shadow_map(scene.geometry, light, map) for light in ordinary), tuple(tables))
 
     return cast
@@ -172,12 +183,9 @@ def froxel_errors(parameters: FroxelFogParameters, size: tuple[int, int]) -> tup
 
 
 def _visibility(view: View, shadows: FroxelShadows, shadow: str) -> Visibility:
-    def visible(point, light: Light, number: int, place):
+    def visible(point, light: Light, number: int):
         if shadow == "ray":
             return view.visible(point, light)
-        if place is not None:
-            table, point_number = place
-            return table.lit(point_number, light, point)
         if light.source is None:
             return lit_in_map(shadows.maps[number], light, point)
         # In bounded media light points come one by one.

@@ -35,9 +35,7 @@ class View:
     lights: tuple[Light, ...]
     medium: Medium
     features: SceneFeatures  #: what the scene needs; a method leaves out the rest
-    visible: Callable[
-        [Any, Any], Any
-    ]  #: (point, light, or what else has a `shadow_ray`) -> whether it reaches the point
+    visible: Callable[..., Any]  #: (point, light or what else has a `shadow_ray`, asked=True) -> whether it is lit
     camera: Camera
     pixel: PerRay  #: pixel number of every ray: row times width plus column
     layout: Layout  #: how the rays lie in the image

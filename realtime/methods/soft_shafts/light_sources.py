@@ -27,8 +27,10 @@ class SourceState:
     maps: HemisphereMaps | ShadowMap | None  #: None where nobody asks them
 
 
-def source_state(scene: Any, lights: list[Light], size: int, *, with_maps: bool) -> SourceState:
-    """Return the state of a source of some `lights`; `size` [texels] is that of its maps."""
+def source_state(
+    scene: Any, lights: list[Light], size: int, *, with_maps: bool, for_surfaces: bool = True
+) -> SourceState:
+    """Return the state of a source of some `lights`; `size` [texels] is that of its maps, also `for_surfaces`."""
     Float = type(lights[0].position.x)
     if lights[0].facing is None:
         maps = cast_shadow_map(scene, lights[0], size) if with_maps else None
@@ -38,7 +40,7 @@ def source_state(scene: Any, lights: list[Light], size: int, *, with_maps: bool)
     helper = np.where(np.abs(normals[:, :1]) < 0.5, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
     across = np.cross(helper, normals)
     across /= np.linalg.norm(across, axis=1, keepdims=True)
-    lift = np.concatenate([np.array(own.lift, dtype=np.float64).ravel() for own in facing])
+    lift = np.array([own.lift[0] for own in facing])
     Vector = types_of(Float).vector
 
     def lanes(rows: Any) -> Any:
@@ -49,7 +51,9 @@ def source_state(scene: Any, lights: list[Light], size: int, *, with_maps: bool)
     )
     # Of a square of the side L the mean square distance from the middle is L^2 / 6.
     spread = np.mean(np.sum((positions - positions.mean(axis=0)) ** 2, axis=1))
-    hemispheres = cast_hemisphere_maps(scene, frames, len(lights), size) if with_maps else None
+    hemispheres = None
+    if with_maps:
+        hemispheres = cast_hemisphere_maps(scene, frames, len(lights), size, for_surfaces=for_surfaces)
     flat = bool(np.all(normals == normals[0]))
     return SourceState(frames, aligned_array(Float, np.array([np.sqrt(6 * spread)])), flat, hemispheres)
 
@@ -61,4 +65,5 @@ def frame_at(frames: LightFrame | None, number: Any) -> LightFrame:
 
 
 def _rows(vectors: Any) -> Any:
-    return np.array([np.array(vector, dtype=np.float64).ravel() for vector in vectors])
+    # Number by number: NumPy would have a kernel make an array of each vector.
+    return np.array([[component[0] for component in vector] for vector in vectors])

@@ -9,8 +9,9 @@ distance d_b and a surface at d_r from it,
 
     w = L (d_r - d_b) / d_b,
 
-with d_b the mean of what the maps hold in the direction of the surface, where that is nearer than it. A pixel that all
-points reach, or whose blocker the maps do not see, takes the width of its neighbours.
+with d_b what a map holds in the direction of the surface, where that is nearer than it. Over the light points and the
+neighbours of a pixel the geometric mean of w is taken: where edges at several distances shadow a pixel, the narrow
+penumbrae count, which a wide filter would smear. Widths change slowly, so that they are looked for in few pixels.
 """
 
 from collections.abc import Callable
@@ -26,14 +27,15 @@ from realtime.image_filters.separable import separable
 from realtime.image_filters.upsample import small_pixels, upsample
 from realtime.methods.interface.view import View
 from realtime.methods.soft_shafts.light_sources import SourceState, frame_at
-from realtime.methods.soft_shafts.parameters import AUTO, SoftShaftsParameters
+from realtime.methods.soft_shafts.parameters import SoftShaftsParameters
 from realtime.numerics.array_types import two_numbers
+from realtime.scene.camera import Camera
 from realtime.shadow_maps.hemisphere_map import HemisphereMaps
 
 #: c of hd = c w / N: what smooths the staircase of N levels best (`tests/.../test_auto_width.py` fits it again).
 AUTO_WIDTH = 0.4
 #: The same where pixels share the points, whose mean over a tile is no staircase: the least error in `fence`.
-AUTO_WIDTH_SHARED = 1.2
+AUTO_WIDTH_SHARED = 1.6
 _STEP = 4  # pixels from one place where the width is looked for to the next
 _SEARCH = 4.0  # how far pixels take the width of a penumbra from their neighbours, a standard deviation [pixels]
 _NEARER = 0.01  # what is this much nearer to the light than a surface, of its own distance, is not that surface
@@ -45,8 +47,6 @@ class Reached:
 
     lit: Any  #: sum of the weights of the light points that reach them
     all: Any  #: sum of all weights
-    near: Any  #: sum of (d_r - d_b) / d_b over the points that something blocks
-    blocked: Any  #: how many these are
 
     @property
     def share(self) -> Any:
@@ -88,7 +88,7 @@ def reached_surfaces(
         return index + 1, [so_far + term for so_far, term in zip(sums, more, strict=True)]
 
     _, sums = dr.while_loop(
-        state=(mi.UInt32(0), [dr.zeros(Float, dr.width(view.distance)) for _ in range(4)]),
+        state=(mi.UInt32(0), [dr.zeros(Float, dr.width(view.distance)) for _ in range(2)]),
         cond=lambda index, sums: there & (index < count),
         body=add,
         labels=("index", "sums"),
@@ -104,21 +104,14 @@ def _of_point(view: View, state: SourceState, place: Any, there: Any, number: An
     square = dr.fma(a, a, dr.fma(b, b, c * c))
     r = dr.sqrt(square)
     weight = Float(1) if state.flat and share_is_plain(p) else dr.maximum(c, 0) / (square * r)
-    near = blocked = Float(0)
-    if state.maps is not None and (p.hd == AUTO or p.surfaces == "map"):
-        assert isinstance(state.maps, HemisphereMaps)
-        if p.hd == AUTO:
-            beyond = state.maps.beyond(number, (a, b, c), there)
-            before = there & (beyond > _NEARER) & (c > 0)
-            near, blocked = dr.select(before, beyond, 0), dr.select(before, Float(1), 0)
     if not view.features.shadows:
         lit = there
     elif p.surfaces == "map":
         assert isinstance(state.maps, HemisphereMaps)
         lit = state.maps.lit_surface(number, (a, b, c))
     else:
-        lit = view.visible(place, frame)
-    return [dr.select(there & lit, weight, 0), dr.select(there, weight, 0), near, blocked]
+        lit = view.visible(place, frame, there)
+    return [dr.select(there & lit, weight, 0), dr.select(there, weight, 0)]
 
 
 def share_is_plain(p: SoftShaftsParameters) -> bool:
@@ -126,35 +119,72 @@ def share_is_plain(p: SoftShaftsParameters) -> bool:
     return not p.interleave
 
 
-def penumbra_width(view: View, reached: Reached, state: SourceState, raster: Raster, *, guide: Guide) -> Any:
+def few_pixels(raster: Raster) -> tuple[Raster, int]:
+    """Return the image of the pixels in which penumbrae are looked for, and how many pixels it is to the next one."""
+    # One pixel of some is enough to look about, where these divide the image.
+    step = _STEP if raster.width % _STEP == 0 and raster.height % _STEP == 0 else 1
+    return Raster(raster.width // step, raster.height // step), step
+
+
+def penumbra_width(blockers: Any, distance: Any, camera: Camera, width: Any, raster: Raster, *, guide: Guide) -> Any:
     """Return how wide the penumbra of a light is about every pixel [pixels], 0 where nothing blocks it.
 
     Parameters
     ----------
-    view
-        The rays, row by row.
-    reached, state
-        The light.
+    blockers
+        From `blockers_of`, in the pixels of `few_pixels`.
+    distance
+        How far all surfaces of the image are, row by row [m].
+    camera, width
+        Of the image, and how wide the light is [m].
     raster
         The image.
     guide
         Of the depth.
     """
-    # Widths change slowly: one pixel of some is enough to look about, where these divide the image.
-    step = _STEP if raster.width % _STEP == 0 and raster.height % _STEP == 0 else 1
-    few = Raster(raster.width // step, raster.height // step)
-    chosen = small_pixels(few, step, raster.width)
-    dr.eval(reached.near, reached.blocked, guide.values)
-    near, blocked, alike = (
-        dr.gather(type(values), values, chosen) for values in (reached.near, reached.blocked, guide.values)
+    few, step = few_pixels(raster)
+    dr.eval(guide.values)
+    few_guide = Guide(
+        dr.gather(type(distance), guide.values, small_pixels(few, step, raster.width)),
+        guide.width,
     )
-    few_guide = Guide(alike, guide.width)
     # The mean over a neighbourhood of what is there: both are divided by the same sum of weights.
-    sums = two_numbers(type(view.distance))(near, blocked)
-    sums = separable(sums, few, hd=_SEARCH / step, guides=(few_guide,), support=2.0)
+    sums = separable(blockers, few, hd=_SEARCH / step, guides=(few_guide,), support=2.0)
     dr.eval(sums, few_guide.values)
     column, row = raster.places()
     near, blocked = upsample(sums, few_guide, guide.values, few, scale=step, column=column, row=row)
-    mean = dr.select(blocked > 1e-4, near / dr.maximum(blocked, 1e-4), 0)
-    pixel = dr.norm(view.camera.left) * dr.select(dr.isfinite(view.distance), view.distance, 1)
-    return state.width * mean / pixel
+    mean = dr.select(blocked > 1e-4, dr.exp(near / dr.maximum(blocked, 1e-4)), 0)
+    pixel = dr.norm(camera.left) * dr.select(dr.isfinite(distance), distance, 1)
+    return width * mean / pixel
+
+
+def blockers_of(view: View, state: SourceState, count: int) -> Any:
+    """Return the sum of log((d_r - d_b) / d_b) over the light points that something blocks, and how many these are.
+
+    Parameters
+    ----------
+    view
+        Rays to surfaces.
+    state, count
+        The light, with its maps, and how many points it has.
+    """
+    Float = type(view.distance)
+    there = dr.isfinite(view.distance)
+    place = view.origin + view.direction * dr.select(there, view.distance, 0)
+
+    def add(number: Any, near: Any, blocked: Any):
+        assert isinstance(state.maps, HemisphereMaps)
+        frame = frame_at(state.frames, number)
+        local = frame.local(place - frame.position)
+        beyond = state.maps.beyond(number, local, there)
+        before = there & (beyond > _NEARER) & (local[2] > 0)
+        return number + 1, near + dr.select(before, dr.log(beyond), 0), blocked + dr.select(before, Float(1), 0)
+
+    nothing = dr.zeros(Float, dr.width(view.distance))
+    _, near, blocked = dr.while_loop(
+        state=(mi.UInt32(0), nothing, +nothing),
+        cond=lambda number, near, blocked: number < count,
+        body=add,
+        labels=("number", "near", "blocked"),
+    )
+    return two_numbers(Float)(near, blocked)

@@ -53,11 +53,10 @@ def _walk(sun: float, photons: int, random: np.random.Generator) -> Array:
     """Return how many photons leave above through each column."""
     largest = THICK / THICKNESS
     x, z = WIDTH * random.random(photons), np.zeros(photons)  # z is the depth
-    direction = np.full(photons, math.sin(sun)), np.zeros(photons), np.full(photons, math.cos(sun))
+    u, v, w = np.full(photons, math.sin(sun)), np.zeros(photons), np.full(photons, math.cos(sun))
     phase = HenyeyGreenstein(_G)
     counts = np.zeros(COLUMNS)
     while x.size:
-        u, _, w = direction
         flight = random.standard_exponential(x.size) / largest
         end = z + w * flight
         above = end < 0
@@ -67,10 +66,9 @@ def _walk(sun: float, photons: int, random: np.random.Generator) -> Array:
             counts += np.bincount(column, minlength=COLUMNS)
         stays = ~(above | (end > THICKNESS))
         x, z = np.mod(x[stays] + u[stays] * flight[stays], WIDTH), end[stays]
-        direction = tuple(part[stays] for part in direction)  # type: ignore[assignment]
+        u, v, w = u[stays], v[stays], w[stays]
         real = (x >= WIDTH / 2) | (random.random(x.size) < THIN / THICK)
         cosines = phase.cosines(random.random(int(real.sum())))
-        scattered = turned(tuple(part[real] for part in direction), cosines, 2 * np.pi * random.random(cosines.size))  # type: ignore[arg-type]
-        for part, new in zip(direction, scattered, strict=True):
-            part[real] = new
+        azimuths = 2 * np.pi * random.random(cosines.size)
+        u[real], v[real], w[real] = turned((u[real], v[real], w[real]), cosines, azimuths)
     return counts

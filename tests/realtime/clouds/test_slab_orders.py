@@ -211,7 +211,10 @@ def test_transport_is_exact_for_polynomials():
     z = panels.edges
     # I = z^2 + 2 mu z + 2 mu^2 solves -mu I' = -I + z^2 reversed in sign; less what would enter from outside.
     for place, cosine in enumerate(mu[:3]):
-        free = lambda depth, c=cosine: depth**2 + 2 * c * depth + 2 * c * c  # noqa: E731
+
+        def free(depth, c=cosine):
+            return depth**2 + 2 * c * depth + 2 * c * c
+
         outside = free(3.0) if cosine > 0 else free(0.0)
         way = (3.0 - z) / cosine if cosine > 0 else -z / cosine
         assert edges[0, :, place] == pytest.approx(free(z) - outside * np.exp(-way), rel=1e-9, abs=1e-10)

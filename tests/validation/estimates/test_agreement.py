@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from reference.scene.read import read_truth
 from tests.helpers.scenes import tiny_scene
+from validation.estimates import agreement as agreement_module
 from validation.estimates.agreement import MASK_PIXELS, agreement, pixel_angle
+from validation.estimates.monte_carlo import monte_carlo_batches
 
 pytestmark = pytest.mark.statistical
 
@@ -140,6 +143,22 @@ def test_out_of_time_is_said_and_is_no_verdict(scene, own_cache):
     assert {verdict.batches for verdict in verdicts.values()} == {2}
     assert not verdicts["airlight"].finished
     assert verdicts["airlight"].statistics.equivalent is False
+
+
+def test_the_time_of_the_pilot_does_not_count(scene, own_cache, monkeypatch):
+    """A pilot that takes longer than all the time leaves that time to the batches."""
+    now = 0.0
+
+    def traced(scene, estimator, *, first_seed=0, **options):
+        nonlocal now
+        now += 100.0 if first_seed else 0.0
+        return monte_carlo_batches(scene, estimator, first_seed=first_seed, **options)
+
+    monkeypatch.setattr(agreement_module, "monte_carlo_batches", traced)
+    monkeypatch.setattr(agreement_module, "time", SimpleNamespace(monotonic=lambda: now))
+    verdicts = agreement(scene, margin=1e-7, batches=9, samples=4, seconds=50.0)
+    assert now == 100.0
+    assert {verdict.batches for verdict in verdicts.values()} == {9}
 
 
 def test_what_became_narrow_enough_is_finished(scene):

@@ -181,24 +181,24 @@ def test_a_study_passes_only_if_the_control_agrees_and_nine_in_ten_are_caught(st
 def test_the_standard_run_catches_nine_in_ten(variant):
     study = study_mutations()
     assert study.passed
-    # The margin against single-scatter is 0.05 %, 0.25 % under lights with extent: two faults are smaller, one of them
-    # on purpose.
+    # The margin against single-scatter is 0.05 %, 0.25 % under lights with extent: one fault is smaller, on purpose.
     missed = {result.name for result in study.results if not result.caught}
-    assert missed == {"one-in-ten-thousand", "area-square-for-disk"}
+    assert missed == {"one-in-ten-thousand"}
     assert all(result.reason for result in study.results if not result.caught_by_built_in)
 
 
 @pytest.mark.claim("area-mutations-are-caught")
 @pytest.mark.slow
 @pytest.mark.statistical
-def test_every_fault_of_lights_with_extent_but_one_is_caught(variant):
+def test_every_fault_of_lights_with_extent_is_caught(variant):
     """Rationale: with the margins of the standard run, 1 % against volpath and 0.25 % against single-scatter.
 
-    The square around the disk of the probe in its place changes the airlight by 0.1 %, less than the margin. A disk
-    that showed it needs more points than the probe's truth has, or the control itself does not agree.
+    The square around the disk of the probe in its place would change the airlight by 0.1 %, less than the margin, but
+    for the plates before its corners: they make it 2.4 %.
     """
     wide = stage_of("wide-lights", loaded_stage("wide-lights", (48, 36)), margin=0.01)
     assert all(sighting.agrees for sighting in seen(None, [wide]))
     faults = [mutation for mutation in MUTATIONS if mutation.wide]
     missed = [fault.name for fault in faults if not judged(fault, seen(fault, [wide])).caught]
-    assert missed == ["area-square-for-disk"]
+    assert len(faults) == 25
+    assert not missed

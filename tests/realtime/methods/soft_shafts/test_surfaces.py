@@ -30,31 +30,28 @@ def test_the_automatic_width_is_nearly_the_best(variant, levels, width):
     assert own < 0.6 * staircase_error(width, levels, 1e-3)
 
 
-def test_the_width_of_a_penumbra_follows_from_similar_triangles(variant):
-    """A bar over a floor: w = L (d_r - d_b) / d_b, over the size of a pixel there."""
+@pytest.mark.parametrize("ratios", [(0.7,), (0.2, 0.8)])
+def test_the_width_of_a_penumbra_follows_from_similar_triangles(variant, ratios):
+    """Bars over a floor: w = L (d_r - d_b) / d_b, over the size of a pixel there; of two the geometric mean."""
     import drjit as dr
     import mitsuba as mi
 
     from realtime.image_filters.guides import depth_guide
     from realtime.image_filters.raster import Raster
-    from realtime.methods.soft_shafts.light_sources import SourceState
-    from realtime.methods.soft_shafts.surfaces import Reached, penumbra_width
+    from realtime.methods.soft_shafts.surfaces import few_pixels, penumbra_width
+    from realtime.numerics.array_types import two_numbers
     from realtime.scene.read_scene import read_scene
     from tests.helpers.scenes import tiny_scene
 
-    class FrameOf:
-        """What `penumbra_width` asks of a view."""
-
-    scene = read_scene(mi.load_dict(tiny_scene(size=(160, 120))))
-    view, count = FrameOf(), 160 * 120
-    view.camera, view.distance = scene.camera, dr.full(mi.Float, 3.0, count)
-    ratio, light = 0.7, 0.31
-    half = mi.Float(
-        np.repeat(np.tile([1.0, 0.0], count // 8), 4)
-    )  # four of eight are lit, and take the width of its neighbours
-    reached = Reached(half, dr.full(mi.Float, 1, count), ratio * (1 - half), 1 - half)
-    state = SourceState(None, mi.Float(light), True, None)
-    raster, guide = Raster(160, 120), depth_guide(view.distance, 0.1)
-    width = np.array(penumbra_width(view, reached, state, raster, guide=guide))
-    pixel = 3.0 * np.linalg.norm(np.array(scene.camera.left).ravel())
-    np.testing.assert_allclose(width, light * ratio / pixel, rtol=1e-4)
+    camera = read_scene(mi.load_dict(tiny_scene(size=(160, 120)))).camera
+    raster, distance = Raster(160, 120), dr.full(mi.Float, 3.0, 160 * 120)
+    few, step = few_pixels(raster)
+    assert (few, step) == (Raster(40, 30), 4)
+    light = 0.31
+    # Every second pixel is lit, and takes the width of its neighbours.
+    blocked = mi.Float(np.tile([0.0, 1.0], few.count // 2))
+    blockers = two_numbers(mi.Float)(blocked * sum(np.log(ratios)), blocked * len(ratios))
+    guide = depth_guide(distance, 0.1)
+    width = np.array(penumbra_width(blockers, distance, camera, mi.Float(light), raster, guide=guide))
+    pixel = 3.0 * np.linalg.norm(np.array(camera.left).ravel())
+    np.testing.assert_allclose(width, light * np.prod(ratios) ** (1 / len(ratios)) / pixel, rtol=1e-4)
