@@ -3,15 +3,18 @@
 
 import os
 import re
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 from xml.parsers import expat
 
 import mitsuba as mi
 
 from analytic.errors import InputError, nearest
+from validation.scenes.changes import change_scene
 from validation.scenes.numbers import check_numbers
 from validation.scenes.record import Animation
 from validation.scenes.registry import SCENES
@@ -32,7 +35,9 @@ class LoadedScene:
     animation: Animation = field(default_factory=Animation)  #: what moves in it
 
 
-def load_scene(name_or_path: str, size: tuple[int, int] | None = None) -> LoadedScene:
+def load_scene(
+    name_or_path: str, size: tuple[int, int] | None = None, changes: Mapping[str, Sequence[float]] = MappingProxyType({})
+) -> LoadedScene:
     """Load a built-in scene or a Mitsuba XML file into the active variant.
 
     Parameters
@@ -41,11 +46,14 @@ def load_scene(name_or_path: str, size: tuple[int, int] | None = None) -> Loaded
         A name of `validation.scenes.registry.SCENES`, or the path of a Mitsuba scene file.
     size
         Width and height of the image [pixels]; the scene's own by default.
+    changes
+        What is not as the scene has it, values by name, see `validation.scenes.changes`.
 
     Raises
     ------
     InputError
-        For an unknown name, a missing or malformed file, and a size that no image can have. This function does not
+        For an unknown name, a missing or malformed file, a size that no image can have, and a change that the scene
+        cannot have. This function does not
         check whether the methods or the truth support the scene: `realtime.scene.read_scene.read_scene` and
         `reference.scene.read.read_truth` do.
     """
@@ -59,6 +67,8 @@ def load_scene(name_or_path: str, size: tuple[int, int] | None = None) -> Loaded
     if size is not None:
         resize(loaded.scene, size)
     _check_films(loaded)
+    if changes:
+        change_scene(loaded.scene, changes)
     return loaded
 
 
