@@ -39,6 +39,7 @@ from reports.commands.report import report
 from reports.commands.slab import slab
 from reports.commands.stability import stability
 from reports.commands.test import run_tests
+from reports.commands.view import view
 from reports.machine.environment import VARIANT_VARIABLE, MissingError, check_variant, install_line, missing_packages
 from reports.machine.progress import Interrupted
 
@@ -53,6 +54,7 @@ _COMMANDS = (
     kernels,
     describe,
     render,
+    view,
     reference,
     merge,
     compare,

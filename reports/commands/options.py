@@ -14,6 +14,12 @@ MethodLimit = Annotated[
     float, typer.Option("--method-limit", help="Your own method is stopped after so long in a scene [s].")
 ]
 USUAL_LIMIT = LIMIT
+Changes = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--change", help="NAME=VALUE, a camera, light or medium that differs: medium.sigma_t=0.1, for instance."
+    ),
+]
 
 
 def listed(option: str, text: str) -> list[str]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from reports.commands.options import Force
+from reports.commands.options import Changes, Force
 
 if TYPE_CHECKING:
     from reports.machine.progress import Progress
@@ -60,6 +60,7 @@ def reference(
     ] = Target.pooled,
     pixel: Annotated[Pixel, typer.Option(help="quadrature: the radiance at the centre, or the mean.")] = Pixel.centre,
     seed: Annotated[int, typer.Option(min=0, help="Monte Carlo: seed of the first batch; the others count up.")] = 0,
+    change: Changes = None,
     size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels; the scene's own by default.")] = None,
     force: Force = False,
     json: Annotated[bool, typer.Option("--json", help="Print a summary as JSON.")] = False,
@@ -80,6 +81,7 @@ def reference(
     from validation.estimates.budget import Budget
     from validation.estimates.images import quadrature_reference
     from validation.frames.expected_work import check_work, sampled_work, truth_work
+    from validation.scenes.changes import parse_changes
     from validation.scenes.loading import load_scene, parse_size
 
     sampled = estimator is not Estimator.quadrature
@@ -88,8 +90,9 @@ def reference(
     budget = Budget(samples=usual, error=target_error, seconds=time_budget, target=target.value) if sampled else None
     check_ending("--output", output, ".exr")
     ensure_writable(output)
+    changes = parse_changes(change or [])
     activate()
-    loaded = load_scene(scene, parse_size(size) if size else None)
+    loaded = load_scene(scene, parse_size(size) if size else None, changes)
     print_notes(camera_notes(loaded.scene))
     pixels = loaded.scene.sensors()[0].film().size() if loaded.scene.sensors() else (1, 1)
     if budget is None:

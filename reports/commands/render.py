@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from reports.commands.options import USUAL_LIMIT, Force, MethodLimit
+from reports.commands.options import USUAL_LIMIT, Changes, Force, MethodLimit
 
 Scene = Annotated[str, typer.Argument(help="A built-in scene or a Mitsuba XML file.", show_default=False)]
 Size = Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels; the scene's own by default.")]
@@ -22,6 +22,7 @@ def render(
     ] = "ray-march",
     kernel: Annotated[str | None, typer.Option(help="Airlight kernel, see `airlight kernels`.")] = None,
     set_: Annotated[list[str] | None, typer.Option("--set", help="NAME=VALUE, a parameter of the method.")] = None,
+    change: Changes = None,
     size: Size = None,
     precision: Annotated[str, typer.Option(help="single or double.")] = "single",
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Write layered EXR here.")] = None,
@@ -51,20 +52,24 @@ def render(
     from reports.machine.environment import activate
     from reports.machine.own_process import in_own_process
     from validation.configurations.methods import parse_settings
+    from validation.scenes.changes import parse_changes
     from validation.scenes.loading import parse_size
 
     chosen = checked_configuration(method, kernel, parse_settings(set_ or []), limit=method_limit)
     outputs = {"exr": output, "png": preview}
     _check_outputs(outputs, frames, animate)
     pixels = parse_size(size) if size else None
+    changes = parse_changes(change or [])
     variant = activate()
     call = partial(in_own_process, name=method, limit=method_limit) if chosen.own else _call
     if plan:
-        _print_plan(call(_plan, scene, pixels, precision, chosen), json=json)
+        _print_plan(call(_plan, scene, pixels, changes, precision, chosen), json=json)
     elif frames is None:
-        _print_times(call(_render, scene, pixels, precision, chosen, outputs, force) | {"device": variant}, json=json)
+        _print_times(
+            call(_render, scene, pixels, changes, precision, chosen, outputs, force) | {"device": variant}, json=json
+        )
     else:
-        rendered = call(_render_frames, scene, pixels, precision, chosen, outputs, frames, animate, force)
+        rendered = call(_render_frames, scene, pixels, changes, precision, chosen, outputs, frames, animate, force)
         _print_frames(rendered | {"device": variant}, json=json)
 
 
@@ -91,7 +96,7 @@ def _check_outputs(outputs: dict[str, Path | None], frames: int | None, animate:
             ensure_writable(path if frames is None else numbered(path, 1, frames))
 
 
-def _plan(name_or_path: str, pixels: tuple[int, int] | None, precision: str, chosen) -> dict[str, Any]:
+def _plan(name_or_path: str, pixels: tuple[int, int] | None, changes: dict, precision: str, chosen) -> dict[str, Any]:
     """Return what a scene needs of a method."""
     from realtime.methods.registry import find_method
     from realtime.methods.shadow_planes.method import prepare_shadow_planes
@@ -102,7 +107,7 @@ def _plan(name_or_path: str, pixels: tuple[int, int] | None, precision: str, cho
     from realtime.scene.read_scene import read_scene
     from validation.scenes.loading import load_scene
 
-    scene = read_scene(load_scene(name_or_path, pixels).scene, precision)
+    scene = read_scene(load_scene(name_or_path, pixels, changes).scene, precision)
     words, notes = describe(scene.features), list(scene.features.notes)
     method = find_method(chosen.method)
     if scene.area_lights:
@@ -162,6 +167,7 @@ def _prepared(scene, chosen):
 def _render(
     name_or_path: str,
     pixels: tuple[int, int] | None,
+    changes: dict,
     precision: str,
     chosen,
     outputs: dict[str, Path | None],
@@ -176,7 +182,7 @@ def _render(
     from validation.configurations.timing import time_frame
     from validation.scenes.loading import load_scene
 
-    loaded = load_scene(name_or_path, pixels)
+    loaded = load_scene(name_or_path, pixels, changes)
     scene = read_scene(loaded.scene, precision)
     _check_work(loaded.name, scene, chosen, force=force)
     renderer = _prepared(scene, chosen)
@@ -203,6 +209,7 @@ def _render(
 def _render_frames(
     name_or_path: str,
     pixels: tuple[int, int] | None,
+    changes: dict,
     precision: str,
     chosen,
     outputs: dict[str, Path | None],
@@ -219,7 +226,7 @@ def _render_frames(
     from validation.scenes.animation import parse_moves
     from validation.scenes.loading import load_scene
 
-    loaded = load_scene(name_or_path, pixels)
+    loaded = load_scene(name_or_path, pixels, changes)
     scene = read_scene(loaded.scene, precision)
     animation = loaded.animation
     if animate is not None:

@@ -10,12 +10,12 @@ A change goes into Mitsuba's own scene, so the methods and the truth read the sa
 | `camera.fov` | horizontal field of view [degrees] |
 | `light.position` | of a point or spot light, a point [m] |
 | `light.direction` | in which a spot or directional light shines |
-| `light.intensity`, `light.irradiance`, `light.radiance` | of a point or spot, directional, area light: RGB or one number |
+| `light.intensity`, `light.irradiance`, `light.radiance` | of a point or spot, a directional, an area light: RGB |
 | `medium.sigma_t` | extinction [1/m]: one number, or RGB where the scene gives RGB |
-| `medium.albedo` | single-scattering albedo: RGB or one number |
+| `medium.albedo` | single-scattering albedo: RGB |
 | `medium.g` | mean cosine of a Henyey-Greenstein phase function |
 
-The second light is `light-2`, the third `light-3`, and so are media: first the one around the camera, then those with
+One number for an RGB value is grey. The second light is `light-2`, the third `light-3`, and so are media: first the one around the camera, then those with
 bounds in the order of their shapes.
 """
 
@@ -274,4 +274,3 @@ def _change_medium(medium, changed: Mapping[str, Values]) -> None:
 def _set_colour(parameters, key: str, values: Values) -> None:
     kind = type(parameters[key])
     parameters[key] = kind(*values) if len(values) == 3 else kind(values[0])
-

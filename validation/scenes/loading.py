@@ -36,7 +36,9 @@ class LoadedScene:
 
 
 def load_scene(
-    name_or_path: str, size: tuple[int, int] | None = None, changes: Mapping[str, Sequence[float]] = MappingProxyType({})
+    name_or_path: str,
+    size: tuple[int, int] | None = None,
+    changes: Mapping[str, Sequence[float]] = MappingProxyType({}),
 ) -> LoadedScene:
     """Load a built-in scene or a Mitsuba XML file into the active variant.
 

@@ -128,5 +128,5 @@ def test_a_change_that_cannot_be_is_one_line(change, message):
 
 
 def test_two_values_of_one_name_are_refused():
-    with pytest.raises(InputError, match="two values of medium.g"):
+    with pytest.raises(InputError, match=r"two values of medium\.g"):
         parse_changes(["medium.g=0.1", "medium.g=0.2"])
