@@ -15,8 +15,8 @@ A change goes into Mitsuba's own scene, so the methods and the truth read the sa
 | `medium.albedo` | single-scattering albedo: RGB |
 | `medium.g` | mean cosine of a Henyey-Greenstein phase function |
 
-One number for an RGB value is grey. The second light is `light-2`, the third `light-3`, and so are media: first the one around the camera, then those with
-bounds in the order of their shapes.
+One number for an RGB value is grey. The second light is `light-2`, the third `light-3`, and so are media: first the one
+around the camera, then those with bounds in the order of their shapes.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
