@@ -161,4 +161,5 @@ class LiveScene:
         chosen, _ = method_parameters(made.method, dict(self.chosen.parameters))
         key = self.scene.features, made.method.provides_visibility(chosen), made.method.by_source(chosen)
         known = self._surfaces.setdefault(key, made)
-        return replace(made, surface=known.surface, shade=known.shade)
+        # The pixels too: a recorded function tells arrays apart by how they lie in memory.
+        return replace(made, pixel=known.pixel, surface=known.surface, shade=known.shade)

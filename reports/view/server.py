@@ -113,8 +113,8 @@ class Server:
         from websockets.datastructures import Headers
         from websockets.http11 import Response
 
-        token, _, file = request.path.partition("?")[0].removeprefix("/").partition("/")
-        known = secrets.compare_digest(token.encode(), self._token.encode())
+        token, slash, file = request.path.partition("?")[0].removeprefix("/").partition("/")
+        known = secrets.compare_digest(token.encode(), self._token.encode()) and slash
         if known and file == "socket":
             return None
         if not (known and file in _FILES):

@@ -43,6 +43,7 @@ _QUIET = 0.15  # after so long without a change the page is told where all stand
 _STILL = 0.4  # after so long the truth is begun [s]
 _NEWS = 0.4  # between two pictures of what is known of the truth [s]
 _BY_STAGE = 8  # of so many frames one is timed by stage
+_STOPS = 20.0  # of exposure, brighter or darker
 _GOES_ON = 64  # frames drawn of a still scene where each builds on the last
 
 
@@ -187,14 +188,19 @@ class Session:
             self._sent = self._drawn = 0
             self._open(page)
         elif kind == "drawn":
-            self._drawn = max(self._drawn, int(message.get("frame", 0)))
+            self._drawn = max(self._drawn, int(_number(message.get("frame"))))
         elif kind == "choose":
             self._try(page, lambda: self._choose(message), of_scene=False)
             self._tell_state(page)
         elif kind == "show":
-            self._show |= {name: message[name] for name in self._show if name in message}
-            if self._show["layer"] not in LAYERS:
-                self._show["layer"] = "total"
+            given = self._show | {name: message[name] for name in self._show if name in message}
+            layer, other = (str(given[name]) for name in ("layer", "other"))
+            self._show = {
+                "layer": layer if layer in LAYERS else "total",
+                "exposure": min(max(_number(given["exposure"]), -_STOPS), _STOPS),
+                "other": other if other in ("truth", "error") else "none",
+                "run": bool(given["run"]),
+            }
             if message.get("expose"):
                 self._factor = None
             self._wanted, self._news = max(self._wanted, 1), True
@@ -336,6 +342,11 @@ def sparing(method: str, kernel: Any, given: Mapping[str, Any]) -> Configuration
     usual = values(record.light_points) | record.defaults
     differing = {name: now[name] for name in given if now[name] != usual[name]}
     return configuration(method, str(kernel) if kernel and record.uses_kernel(own) else None, differing)
+
+
+def _number(value: Any) -> float:
+    """Return a number of a page's message; 0 for anything else."""
+    return float(value) if isinstance(value, int | float) and np.isfinite(value) else 0.0
 
 
 def _numbers(changes: Any) -> dict[str, Values]:

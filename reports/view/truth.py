@@ -43,7 +43,8 @@ class TruthInBackground:
             env=os.environ | {"PYTHONPATH": os.pathsep.join(paths), VARIANT_VARIABLE: variant},
             start_new_session=True,  # Ctrl-C reaches the view alone, which ends this
         )
-        threading.Thread(target=self._listen, daemon=True).start()
+        self._listener = threading.Thread(target=self._listen, daemon=True)
+        self._listener.start()
 
     def start(self, scene: str, size: tuple[int, int], changes: Mapping[str, Values]) -> None:
         """Compute the truth of a scene from now on.
@@ -69,8 +70,12 @@ class TruthInBackground:
 
     def end(self) -> None:
         """End the process."""
+        assert self.process.stdin is not None
         self.process.kill()
+        with suppress(OSError):
+            self.process.stdin.close()
         self.process.wait()
+        self._listener.join(1)
 
     def _send(self, task: Task | None) -> None:
         assert self.process.stdin is not None
@@ -80,9 +85,9 @@ class TruthInBackground:
 
     def _listen(self) -> None:
         assert self.process.stdout is not None
-        with suppress(EOFError, OSError, pickle.UnpicklingError):
+        with self.process.stdout as given, suppress(EOFError, OSError, pickle.UnpicklingError):
             while True:
-                self._take(pickle.load(self.process.stdout))
+                self._take(pickle.load(given))
         with self._lock:
             self.failure = self.failure or "the process that computes the truth has ended; start the view again"
         self._told()

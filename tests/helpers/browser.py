@@ -1,10 +1,28 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What tests see and do in a browser that shows a report's page."""
 
+import shutil
+from contextlib import contextmanager
+
 import numpy as np
+import pytest
 
 from reference.storage.exr import read_exr
 from tests.helpers.page import HEIGHT, WIDTH
+
+
+@contextmanager
+def chromium():
+    """Chromium, without a window; a test is skipped where there is none."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright drives the browser; see the dev extra")
+    path = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    if path is None:
+        pytest.skip("no Chromium on this machine; Debian's package is chromium")
+    with playwright.sync_playwright() as running:
+        # As root, as in a container, Chromium's own sandbox cannot work.
+        launched = running.chromium.launch(executable_path=path, args=["--no-sandbox"])
+        yield launched
+        launched.close()
 
 
 def watched(browser, **options):
