@@ -146,10 +146,11 @@ class Session:
         return max(min(waits), 0.001)
 
     def _take(self, page: Page, said: list[tuple[Page, dict[str, Any]]]) -> None:
-        """Do what the page asks; changes that follow one another are one."""
+        """Do what the page asks; changes that follow one another are one, and of values of one parameter the last."""
         changes: dict[str, Values] = {}
-        for sender, message in said:
-            if sender is not page:
+        own = [message for sender, message in said if sender is page]
+        for message, following in zip(own, [*own[1:], {}]):
+            if message.get("kind") == "choose" and _chooses(message) == _chooses(following):
                 continue
             if message.get("kind") == "change":
                 changes |= _numbers(message.get("changes"))
@@ -308,9 +309,8 @@ class Session:
         if error is None or self._show["other"] == "none":
             return
         if self._show["other"] == "error":
-            known = truth.known[..., None]
-            reference = np.where(known, truth.airlight, frame.airlight)
-            picture = rgba(error_map(reference, np.asarray(frame.airlight, dtype=np.float64)))
+            test = truth.filled(np.asarray(frame.airlight, dtype=np.float64))
+            picture = rgba(error_map(truth.filled(truth.airlight), test))
         else:
             weights = LAYERS[self._show["layer"]]
             layers = truth.filled(truth.airlight), truth.filled(truth.surface)
@@ -342,6 +342,11 @@ def sparing(method: str, kernel: Any, given: Mapping[str, Any]) -> Configuration
     usual = values(record.light_points) | record.defaults
     differing = {name: now[name] for name in given if now[name] != usual[name]}
     return configuration(method, str(kernel) if kernel and record.uses_kernel(own) else None, differing)
+
+
+def _chooses(message: Mapping[str, Any]) -> tuple[Any, ...]:
+    """Return what a message of the page chooses, without its value."""
+    return message.get("kind"), "method" in message, "kernel" in message, message.get("parameter")
 
 
 def _number(value: Any) -> float:

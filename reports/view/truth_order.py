@@ -49,7 +49,7 @@ class KnownTruth:
             layer.reshape(-1, 3)[pixels] = values
 
     def filled(self, layer: Array) -> Array:
-        """Return a layer with the nearest pixel of the finest grid that is whole in place of what is not known."""
+        """Return a layer of the truth, or of a frame: where the truth is not known, a near pixel where it is."""
         known = self.known
         step = next((step for step in reversed(STEPS) if known[::step, ::step].all()), None)
         if step is None:

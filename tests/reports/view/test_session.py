@@ -222,6 +222,18 @@ def test_changes_that_wait_are_one_frame(view):
     assert session.live.changes["camera.origin"] == (0.19, 0.0, 0.0)
 
 
+def test_of_the_values_of_a_slider_the_last_is_chosen(view, monkeypatch):
+    session, page = view("sphere-spot", "ray-march")
+    chosen = []
+    choose = session.live.choose
+    monkeypatch.setattr(session.live, "choose", lambda wanted: chosen.append(wanted) or choose(wanted))
+    for steps in range(2, 20):
+        session.told(page, {"kind": "choose", "parameter": "steps", "value": steps})
+    session.told(page, {"kind": "choose", "parameter": "spacing", "value": "uniform"})
+    session.turn()
+    assert [dict(wanted.parameters) for wanted in chosen] == [{"steps": 19}, {"steps": 19, "spacing": "uniform"}]
+
+
 def test_frames_wait_for_a_page_that_shows_them(view):
     session, page = view()
     page.session = type("Nobody", (), {"told": lambda *_: None})()
