@@ -32,7 +32,7 @@ class Pictures:
         self._levels = mi.UInt32(self._table.astype(np.uint32))
         self._draw: Callable[..., Any] = Frozen(_drawn)
 
-    def of_frame(self, pixel, surface, airlight, *, layer: str, factor: float) -> bytes:
+    def of_frame(self, pixel, surface, airlight, *, layer: str, factor: float) -> memoryview:
         """Return the picture of a frame on the device, 8-bit RGBA row by row.
 
         Parameters
@@ -47,7 +47,7 @@ class Pictures:
             Exposure.
         """
         weights = [dr.opaque(mi.Float, factor * weight) for weight in LAYERS[layer]]
-        return np.array(self._draw(self._levels, pixel, surface, airlight, *weights)).tobytes()
+        return np.array(self._draw(self._levels, pixel, surface, airlight, *weights)).data.cast("B")
 
     def of_image(self, radiance: NDArray[np.float64], factor: float) -> bytes:
         """Return the picture of an image on the host, (height, width, 3) [W/(m^2 sr)], in the same form."""

