@@ -22,7 +22,7 @@ from realtime.methods.interface.method import method_parameters
 from realtime.scene.read_scene import read_again, read_scene
 from reports.view.stages import timed_stages
 from validation.configurations.methods import Configuration, prepared
-from validation.scenes.changes import Values, change_scene, changeable
+from validation.scenes.changes import Values, change_scene, changeable, isotropic_media
 from validation.scenes.loading import load_scene
 
 _KEPT = 6  # configurations of which the recorded functions are kept
@@ -43,6 +43,7 @@ class LiveScene:
     def __init__(self, name: str, size: tuple[int, int], chosen: Configuration, changes: Mapping[str, Values]) -> None:
         self.name, self.size = name, size
         self.chosen, self.changes = chosen, dict(changes)
+        self._isotropic = isotropic_media(load_scene(name, size).scene)
         self._renderers: OrderedDict[Any, FrameRenderer] = OrderedDict()
         self._surfaces: dict[Any, FrameRenderer] = {}
         self._load()
@@ -58,6 +59,10 @@ class LiveScene:
         self._moved = {"camera_moved": False, "light_moved": False}
         self._renderers.clear()
         self._surfaces.clear()
+
+    def _lobes(self, changes: Mapping[str, Values]) -> set[str]:
+        """Return which isotropic media changes give a lobe: the scene is loaded anew for others."""
+        return {name for name, value in changes.items() if name in self._isotropic and any(value)}
 
     @property
     def there(self) -> dict[str, Any]:
@@ -100,9 +105,13 @@ class LiveScene:
         wanted = before | dict(changes)
         moved = {name for name, value in changes.items() if before.get(name) != tuple(value)}
         try:
-            change_scene(self.source, wanted)
-            self.scene = read_again(self.scene, self.source)
-            self.changes = wanted
+            if self._lobes(wanted) == self._lobes(before):
+                change_scene(self.source, wanted)
+                self.scene = read_again(self.scene, self.source)
+                self.changes = wanted
+            else:
+                self.changes = wanted
+                self._load()
             renderer = self._find_renderer()
         except (InputError, MethodError):
             self.changes = before

@@ -13,7 +13,7 @@ A change goes into Mitsuba's own scene, so the methods and the truth read the sa
 | `light.intensity`, `light.irradiance`, `light.radiance` | of a point or spot, a directional, an area light: RGB |
 | `medium.sigma_t` | extinction [1/m]: one number, or RGB where the scene gives RGB |
 | `medium.albedo` | single-scattering albedo: RGB |
-| `medium.g` | mean cosine of a Henyey-Greenstein phase function |
+| `medium.g` | mean cosine of an isotropic or a Henyey-Greenstein phase function |
 
 One number for an RGB value is grey. The second light is `light-2`, the third `light-3`, and so are media: first the one
 around the camera, then those with bounds in the order of their shapes.
@@ -255,8 +255,9 @@ def _of_medium(prefix: str, medium) -> Iterable[Changeable]:
     yield Changeable(f"{prefix}.sigma_t", _values(sigma_t), sizes, 0, LARGEST_LENGTH, "1/m")
     albedo = _values(parameters["albedo.value.value"])
     yield Changeable(f"{prefix}.albedo", albedo, (1, 3) if len(albedo) == 3 else (1,), 0, 1)
-    if "phase_function.g" in parameters:
-        yield Changeable(f"{prefix}.g", _values(parameters["phase_function.g"]), (1,), -0.99, 0.99)
+    if "phase_function.g" in parameters or _is_isotropic(medium):
+        g = _values(parameters["phase_function.g"]) if "phase_function.g" in parameters else (0.0,)
+        yield Changeable(f"{prefix}.g", g, (1,), -0.99, 0.99)
 
 
 def _change_medium(medium, changed: Mapping[str, Values]) -> None:
@@ -266,9 +267,21 @@ def _change_medium(medium, changed: Mapping[str, Values]) -> None:
         _set_colour(parameters, "sigma_t.value.value", changed["sigma_t"])
     if "albedo" in changed:
         _set_colour(parameters, "albedo.value.value", changed["albedo"])
-    if "g" in changed:
+    if "g" in changed and "phase_function.g" in parameters:
         parameters["phase_function.g"] = changed["g"][0]
+    elif changed.get("g", (0.0,)) != (0.0,):
+        raise InputError(f"medium '{medium.id()}' is isotropic here; wanted its g when the scene is loaded")
     parameters.update()
+
+
+def _is_isotropic(medium) -> bool:
+    return medium.phase_function().class_name() == "IsotropicPhaseFunction"
+
+
+def isotropic_media(scene) -> dict[str, str]:
+    """Return the ids of the isotropic media of a Mitsuba scene by the names of their mean cosines."""
+    numbered = enumerate(_media(scene), 1)
+    return {f"{_numbered('medium', number)}.g": medium.id() for number, medium in numbered if _is_isotropic(medium)}
 
 
 def _set_colour(parameters, key: str, values: Values) -> None:

@@ -5,7 +5,7 @@ import os
 import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -14,7 +14,8 @@ from xml.parsers import expat
 import mitsuba as mi
 
 from analytic.errors import InputError, nearest
-from validation.scenes.changes import change_scene
+from validation.scenes.changes import change_scene, isotropic_media
+from validation.scenes.lobes import scene_with_lobes
 from validation.scenes.numbers import check_numbers
 from validation.scenes.record import Animation
 from validation.scenes.registry import SCENES
@@ -66,6 +67,12 @@ def load_scene(
     else:
         path = _existing(name_or_path)
         loaded = LoadedScene(path.stem, _parse(path), f"The user's own scene, {path.name}.", "", path)
+    isotropic = isotropic_media(loaded.scene) if changes else {}
+    lobes = {isotropic[name]: value[0] for name, value in changes.items() if name in isotropic and any(value)}
+    if lobes:
+        scene = scene_with_lobes(name_or_path if loaded.path else SCENES[name_or_path].build(), lobes)
+        name_shapes(scene)
+        loaded = replace(loaded, scene=scene)
     if size is not None:
         resize(loaded.scene, size)
     _check_films(loaded)

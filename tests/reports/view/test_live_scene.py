@@ -49,6 +49,7 @@ def recordings(scene):
     [
         ("sphere-spot", "shadow-planes", (CAMERA, LIGHT, MEDIUM)),
         ("colonnade", "light-volumes", (FAR, LAMP)),
+        ("sphere-spot", "ray-march", ({"medium.g": (0.3,)}, LIGHT | {"medium.g": (-0.2,)}, {"medium.g": (0.0,)})),
         ("windows", "ray-march", ({"light.direction": (0.6, -0.4, -0.7)}, {"medium.sigma_t": (0.3,)})),
     ],
 )

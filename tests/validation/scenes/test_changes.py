@@ -13,6 +13,7 @@ from realtime.scene.read_scene import read_again, read_scene
 from reference.scene.read import read_truth
 from validation.scenes.changes import change_scene, change_words, changeable, parse_changes
 from validation.scenes.loading import load_scene
+from validation.scenes.registry import SCENES
 
 pytestmark = pytest.mark.usefixtures("variant")
 
@@ -125,6 +126,28 @@ def test_a_change_that_cannot_be_is_one_line(change, message):
         load_scene("colonnade", (16, 12), parse_changes([change]))
     assert message in str(raised.value)
     assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize("as_file", [False, True])
+def test_an_isotropic_medium_gets_a_lobe_for_methods_and_truth(tmp_path, as_file):
+    name = "open-fog"
+    if as_file:
+        name = str(tmp_path / "fog.xml")
+        parsed = mi.parser.parse_dict(mi.parser.ParserConfig(mi.variant()), SCENES["open-fog"].build())
+        mi.parser.write_file(parsed, name)
+    scene = load_scene(name, (16, 12), {"medium.g": (0.31,), "medium.sigma_t": (0.2,)}).scene
+    assert float(read_scene(scene).medium.phase.g[0]) == pytest.approx(0.31)
+    truth = read_truth(scene)
+    assert (truth.medium.phase.name, truth.medium.phase.g) == ("hg", pytest.approx(0.31))
+    np.testing.assert_allclose(truth.medium.sigma_t, 0.2, rtol=1e-6)
+    same = load_scene(name, (16, 12), {"medium.g": (0.0,)}).scene
+    assert read_truth(same).medium.phase.name == "isotropic"
+    assert changeable(same)["medium.g"].value == (0.0,)
+
+
+def test_a_medium_without_a_description_of_its_own_keeps_its_phase_function():
+    with pytest.raises(InputError, match="medium 'red-medium': its g cannot be changed"):
+        load_scene("three-media", (16, 12), {"medium.g": (0.3,)})
 
 
 def test_two_values_of_one_name_are_refused():
