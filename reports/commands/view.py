@@ -5,22 +5,29 @@ from typing import Annotated
 
 import typer
 
-from reports.commands.options import Changes
+from reports.commands import completion
+from reports.commands.options import Changes, Kernel, Scene, Settings
 
 
 def view(
-    scene: Annotated[str, typer.Argument(help="A built-in scene or a Mitsuba XML file.", show_default=False)],
+    scene: Scene,
     method: Annotated[
-        str, typer.Option(help="Real-time method, see `airlight methods`, or MODULE:FUNCTION.")
+        str,
+        typer.Option(
+            metavar="NAME",
+            help="A method of `airlight list methods`, or your own as MODULE:FUNCTION or FILE.py:FUNCTION.",
+            autocompletion=completion.methods,
+        ),
     ] = "shadow-planes",
-    kernel: Annotated[str | None, typer.Option(help="Airlight kernel, see `airlight kernels`.")] = None,
-    set_: Annotated[list[str] | None, typer.Option("--set", help="NAME=VALUE, a parameter of the method.")] = None,
+    kernel: Kernel = None,
+    settings: Settings = None,
     change: Changes = None,
-    size: Annotated[str, typer.Option(help="WIDTHxHEIGHT in pixels.")] = "640x480",
+    size: Annotated[str, typer.Option(metavar="WxH", help="Width and height in pixels.")] = "640x480",
     host: Annotated[
-        str, typer.Option(help="Address to listen at. Others than 127.0.0.1 let other machines in that know the token.")
+        str,
+        typer.Option(metavar="ADDRESS", help="Where to listen; beyond 127.0.0.1, whoever knows the token may come in."),
     ] = "127.0.0.1",
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen at; 0 is any free one.")] = 0,
+    port: Annotated[int, typer.Option(min=0, max=65535, metavar="N", help="Port to listen at; 0 is any free one.")] = 0,
     open_: Annotated[bool, typer.Option("--open", help="Open the page in the browser, too.")] = False,
 ) -> None:
     """Show a scene live in the browser.
@@ -37,7 +44,7 @@ def view(
     from validation.scenes.changes import parse_changes
     from validation.scenes.loading import parse_size
 
-    chosen = configuration(method, kernel, parse_settings(set_ or []))
+    chosen = configuration(method, kernel, parse_settings(settings or []))
     changes = parse_changes(change or [])
     pixels = parse_size(size)
     variant = activate()

@@ -8,6 +8,7 @@ Read in this order:
 - `fidelity.py`: the page of verdicts on papers
 - `full_run.py`: the last full run of all tests
 - `live_view.py`: the picture of the live view
+- `release.py`: one number, a source distribution, a wheel
 - `verification.py`: the page of claims and of the tests that protect them
 
 May import: `analytic`, `reference.storage`, `reports.data`, `reports.machine`, `reports.papers`, `reports.tables`,
