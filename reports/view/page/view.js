@@ -62,8 +62,9 @@ hear.frame = (said, pixels) => {
   put($("#method"), said.size, pixels);
   const now = performance.now();
   browser = now - begin;
+  if (now - arrivals.at(-1) > 3000) arrivals.length = 0;
   arrivals.push(now);
-  while (arrivals.length > 2 && now - arrivals[0] > 2000) arrivals.shift();
+  while (arrivals.length > 4 && now - arrivals[0] > 2000) arrivals.shift();
   say("drawn", {frame: said.frame});
   camera.taken = said.taken;
   if (camera.moved) aimed();
@@ -74,9 +75,10 @@ hear.other = (said, pixels) => {
   put($("#other"), said.size, pixels);
   $("#other").dataset.known = said.known / said.pixels;
 };
+// Of the last two seconds, or of four frames where these take longer.
 const rate = () => {
-  const recent = arrivals.filter((time) => performance.now() - time < 2000);
-  return recent.length > 2 ? 1000 * (recent.length - 1) / (recent.at(-1) - recent[0]) : 0;
+  if (performance.now() - arrivals.at(-1) > 3000) return 0;
+  return arrivals.length > 1 ? 1000 * (arrivals.length - 1) / (arrivals.at(-1) - arrivals[0]) : 0;
 };
 setInterval(() => {
   const frames = rate();
