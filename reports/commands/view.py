@@ -6,20 +6,30 @@ from typing import Annotated
 import typer
 
 from reports.commands import completion
-from reports.commands.options import Changes, Kernel, Scene, Settings
+from reports.commands.options import Changes, Scene, Settings, single
 
 
 def view(
     scene: Scene,
     method: Annotated[
-        str,
+        list[str] | None,
         typer.Option(
             metavar="NAME",
-            help="A method of `airlight list methods`, or your own as MODULE:FUNCTION or FILE.py:FUNCTION.",
+            help="A method of `airlight list methods`, or your own as MODULE:FUNCTION or FILE.py:FUNCTION; "
+            "shadow-planes by default.",
+            show_default=False,
             autocompletion=completion.methods,
         ),
-    ] = "shadow-planes",
-    kernel: Kernel = None,
+    ] = None,
+    kernel: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help="Airlight kernel of the method, see `airlight list kernels`.",
+            show_default=False,
+            autocompletion=completion.kernels,
+        ),
+    ] = None,
     settings: Settings = None,
     change: Changes = None,
     size: Annotated[str, typer.Option(metavar="WxH", help="Width and height in pixels.")] = "640x480",
@@ -44,7 +54,8 @@ def view(
     from validation.scenes.changes import parse_changes
     from validation.scenes.loading import parse_size
 
-    chosen = configuration(method, kernel, parse_settings(settings or []))
+    name = single("--method", method) or "shadow-planes"
+    chosen = configuration(name, single("--kernel", kernel), parse_settings(settings or []))
     changes = parse_changes(change or [])
     pixels = parse_size(size)
     variant = activate()

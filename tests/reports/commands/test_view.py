@@ -28,6 +28,7 @@ def run(*arguments, status):
         (["colonade"], "did you mean 'colonnade'?"),
         (["no-such.xml"], "there is no file no-such.xml"),
         (["sphere-spot", "--method", "shadow-plains"], "did you mean 'shadow-planes'?"),
+        (["sphere-spot", "--method", "ray-march", "--method", "min-max"], "--method"),
         (["sphere-spot", "--kernel", "exakt"], "did you mean 'exact'?"),
         (["sphere-spot", "--set", "tolerence=1"], "did you mean 'tolerance'?"),
         (["sphere-spot", "--set", "tolerance=-1"], "tolerance: got -1"),
