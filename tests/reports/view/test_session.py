@@ -92,7 +92,6 @@ def xml_scene(folder):
 @pytest.mark.parametrize("scene", ["sphere-spot", "xml"])
 def test_the_command_on_the_page_renders_what_is_shown(view, tmp_path, scene):
     if scene == "xml":
-        pytest.importorskip("mitsuba")
         scene = xml_scene(tmp_path)
     session, page = view(scene)
     ask(session, page, kind="change", changes=AIM)
