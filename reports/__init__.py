@@ -14,6 +14,7 @@ Read in this order:
 - `figures/`: figures and tables for papers, one module each;
 - `report/`: measures what a report asks for and writes it;
 - `api/`: the functions of `import airlight` and their results;
+- `view/`: the live view in the browser;
 - `commands/`: the commands, one module each;
 - `docs/`: builds the documentation.
 

@@ -246,7 +246,7 @@ def test_the_lock_pins_what_the_project_asks_for_and_all_that_it_needs():
     locked = _locked()
     project = _project()
     extras = project["optional-dependencies"]
-    waiting = [Requirement(text) for text in project["dependencies"] + extras["test"] + extras["docs"]]
+    waiting = [Requirement(text) for text in project["dependencies"] + extras["test"] + extras["docs"] + extras["view"]]
     checked = set()
     while waiting:
         wanted = waiting.pop()

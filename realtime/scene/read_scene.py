@@ -6,7 +6,7 @@ Mitsuba's own scene is the scene; nothing of ours is needed in it. What no metho
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import drjit as dr
@@ -16,7 +16,7 @@ import numpy as np
 from realtime.area_lights.read import is_area_light, read_area_light
 from realtime.area_lights.shape import AreaLight
 from realtime.errors import InputError
-from realtime.numerics.array_types import ArrayTypes, array_types, is_single
+from realtime.numerics.array_types import ArrayTypes, array_types, is_single, types_of
 from realtime.scene.camera import Camera
 from realtime.scene.directional_extent import directional_fields, distance_before, media_spheres
 from realtime.scene.features import SceneFeatures, camera_notes
@@ -56,6 +56,32 @@ def read_scene(scene, precision: str = "single") -> Scene:
         For a scene that no method can render, with the name of what it cannot do.
     """
     types = array_types(precision)
+    parts, opaque = _read_parts(scene, types)
+    geometry = opaque_scene(scene, opaque)
+    return Scene(geometry, facets=read_facets(geometry, types), **parts)
+
+
+def read_again(known: Scene, scene) -> Scene:
+    """Return what was read of a Mitsuba scene with camera, medium and lights as they are now; the shapes stay.
+
+    Parameters
+    ----------
+    known
+        As `read_scene` returned it.
+    scene
+        The `mi.Scene` of which it was read.
+
+    Raises
+    ------
+    InputError
+        As `read_scene`.
+    """
+    parts, _ = _read_parts(scene, types_of(type(known.camera.origin.x)))
+    return replace(known, **parts)
+
+
+def _read_parts(scene, types: ArrayTypes) -> tuple[dict[str, Any], list[Any]]:
+    """Return the fields of a `Scene` but for its shapes, and the opaque shapes."""
     camera, sensor = _read_camera(scene, types)
     opaque, boundaries = sort_shapes(scene)
     medium = read_medium(sensor, boundaries, types)
@@ -72,16 +98,9 @@ def read_scene(scene, precision: str = "single") -> Scene:
     )
     here = np.array(camera.origin, dtype=np.float64).ravel()
     area_lights = tuple(read_area_light(shape, here) for shape in scene.shapes() if shape.is_emitter())
-    geometry = opaque_scene(scene, opaque)
-    return Scene(
-        geometry,
-        camera,
-        medium,
-        lights,
-        _scene_features(scene, opaque, medium, lights, area_lights),
-        read_facets(geometry, types),
-        area_lights=area_lights,
-    )
+    features = _scene_features(scene, opaque, medium, lights, area_lights)
+    parts = {"camera": camera, "medium": medium, "lights": lights, "features": features, "area_lights": area_lights}
+    return parts, opaque
 
 
 def _read_camera(scene, types: ArrayTypes):

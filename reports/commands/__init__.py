@@ -33,11 +33,12 @@ Read in this order:
 - `slab.py`: `airlight slab`
 - `stability.py`: `airlight stability`
 - `test.py`: `airlight test`
+- `view.py`: `airlight view`
 
 May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.kernels`, `realtime.methods`,
 `realtime.methods.shadow_planes`, `realtime.parameters`, `realtime.scene`, `realtime.shadow_maps`, `reference.storage`,
 `reports.data`, `reports.diff`, `reports.docs`, `reports.figures`, `reports.interchange`, `reports.machine`,
-`reports.papers`, `reports.plotting`, `reports.report`, `reports.tables`, `validation.certified`,
+`reports.papers`, `reports.plotting`, `reports.report`, `reports.tables`, `reports.view`, `validation.certified`,
 `validation.comparison`, `validation.configurations`, `validation.estimates`, `validation.fidelity`,
 `validation.frames`, `validation.kernels`, `validation.metrics`, `validation.mutations`, `validation.papers`,
 `validation.scenes`, `validation.slab`.

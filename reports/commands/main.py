@@ -41,6 +41,7 @@ from reports.commands.report import report
 from reports.commands.slab import slab
 from reports.commands.stability import stability
 from reports.commands.test import run_tests
+from reports.commands.view import view
 from reports.machine.environment import (
     VARIANT_VARIABLE,
     VARIANTS,
@@ -56,7 +57,7 @@ DONE, FAILED, WRONG_INPUT, MISSING, INTERRUPTED = 0, 1, 2, 3, 130
 
 #: The panels of --help, by what one wants to do, and their commands in its order.
 _PANELS: dict[str, tuple[Callable[..., None], ...]] = {
-    "Start": (doctor, list_, render, cache),
+    "Start": (doctor, list_, render, view, cache),
     "Measure": (report, diff, bench, maps, stability),
     "Images": (reference, compare, merge, describe, integrate, slab),
     "Papers": (published, figures, fidelity),

@@ -74,6 +74,15 @@ USUAL_LIMIT = LIMIT
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 Markdown = Annotated[bool, typer.Option("--markdown", help="Print tables for a README, dated.")]
 OutputFile = Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="The file to write.")]
+Changes = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--change",
+        metavar="NAME=VALUE",
+        help="A camera, light or medium unlike the scene's, such as medium.sigma_t=0.1; may be given several times.",
+        show_default=False,
+    ),
+]
 
 
 def single(option: str, words: list[str] | None) -> str | None:

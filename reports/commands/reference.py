@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from reports.commands.options import Force, Scene, Size
+from reports.commands.options import Changes, Force, Scene, Size
 
 if TYPE_CHECKING:
     from reports.machine.progress import Progress
@@ -82,6 +82,7 @@ def reference(
     seed: Annotated[
         int, typer.Option(min=0, metavar="N", help="Monte Carlo: seed of the first batch; the others count up.")
     ] = 0,
+    change: Changes = None,
     size: Size = None,
     force: Force = False,
     json: Annotated[bool, typer.Option("--json", help="Print a summary as JSON.")] = False,
@@ -103,6 +104,7 @@ def reference(
     from validation.estimates.budget import Budget
     from validation.estimates.images import quadrature_reference
     from validation.frames.expected_work import check_work, sampled_work, truth_work
+    from validation.scenes.changes import parse_changes
     from validation.scenes.loading import load_scene, parse_size
 
     sampled = estimator is not Estimator.quadrature
@@ -111,8 +113,9 @@ def reference(
     budget = Budget(samples=usual, error=target_error, seconds=time_budget, target=target.value) if sampled else None
     check_ending("--output", output, ".exr")
     ensure_writable(output)
+    changes = parse_changes(change or [])
     activate()
-    loaded = load_scene(scene, parse_size(size) if size else None)
+    loaded = load_scene(scene, parse_size(size) if size else None, changes)
     print_notes(camera_notes(loaded.scene))
     pixels = loaded.scene.sensors()[0].film().size() if loaded.scene.sensors() else (1, 1)
     if budget is None:

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from reports.commands import completion
-from reports.commands.options import USUAL_LIMIT, Force, MethodLimit, Scene, Settings, Size, single
+from reports.commands.options import USUAL_LIMIT, Changes, Force, MethodLimit, Scene, Settings, Size, single
 
 
 def render(
@@ -35,6 +35,7 @@ def render(
         ),
     ] = None,
     settings: Settings = None,
+    change: Changes = None,
     size: Size = None,
     precision: Annotated[
         str,
@@ -82,6 +83,7 @@ def render(
     from reports.machine.environment import activate
     from reports.machine.own_process import in_own_process
     from validation.configurations.methods import parse_settings
+    from validation.scenes.changes import parse_changes
     from validation.scenes.loading import parse_size
 
     name = single("--method", method) or "ray-march"
@@ -89,14 +91,17 @@ def render(
     outputs = {"exr": output, "png": preview}
     _check_outputs(outputs, frames, animate)
     pixels = parse_size(size) if size else None
+    changes = parse_changes(change or [])
     variant = activate()
     call = partial(in_own_process, name=name, limit=method_limit) if chosen.own else _call
     if plan:
-        _print_plan(call(_plan, scene, pixels, precision, chosen), json=json)
+        _print_plan(call(_plan, scene, pixels, changes, precision, chosen), json=json)
     elif frames is None:
-        _print_times(call(_render, scene, pixels, precision, chosen, outputs, force) | {"device": variant}, json=json)
+        _print_times(
+            call(_render, scene, pixels, changes, precision, chosen, outputs, force) | {"device": variant}, json=json
+        )
     else:
-        rendered = call(_render_frames, scene, pixels, precision, chosen, outputs, frames, animate, force)
+        rendered = call(_render_frames, scene, pixels, changes, precision, chosen, outputs, frames, animate, force)
         _print_frames(rendered | {"device": variant}, json=json)
 
 
@@ -123,7 +128,7 @@ def _check_outputs(outputs: dict[str, Path | None], frames: int | None, animate:
             ensure_writable(path if frames is None else numbered(path, 1, frames))
 
 
-def _plan(name_or_path: str, pixels: tuple[int, int] | None, precision: str, chosen) -> dict[str, Any]:
+def _plan(name_or_path: str, pixels: tuple[int, int] | None, changes: dict, precision: str, chosen) -> dict[str, Any]:
     """Return what a scene needs of a method."""
     from realtime.methods.registry import find_method
     from realtime.methods.shadow_planes.method import prepare_shadow_planes
@@ -134,7 +139,7 @@ def _plan(name_or_path: str, pixels: tuple[int, int] | None, precision: str, cho
     from realtime.scene.read_scene import read_scene
     from validation.scenes.loading import load_scene
 
-    scene = read_scene(load_scene(name_or_path, pixels).scene, precision)
+    scene = read_scene(load_scene(name_or_path, pixels, changes).scene, precision)
     words, notes = describe(scene.features), list(scene.features.notes)
     method = find_method(chosen.method)
     if scene.area_lights:
@@ -194,6 +199,7 @@ def _prepared(scene, chosen):
 def _render(
     name_or_path: str,
     pixels: tuple[int, int] | None,
+    changes: dict,
     precision: str,
     chosen,
     outputs: dict[str, Path | None],
@@ -208,7 +214,7 @@ def _render(
     from validation.configurations.timing import time_frame
     from validation.scenes.loading import load_scene
 
-    loaded = load_scene(name_or_path, pixels)
+    loaded = load_scene(name_or_path, pixels, changes)
     scene = read_scene(loaded.scene, precision)
     _check_work(loaded.name, scene, chosen, force=force)
     renderer = _prepared(scene, chosen)
@@ -237,6 +243,7 @@ def _render(
 def _render_frames(
     name_or_path: str,
     pixels: tuple[int, int] | None,
+    changes: dict,
     precision: str,
     chosen,
     outputs: dict[str, Path | None],
@@ -253,7 +260,7 @@ def _render_frames(
     from validation.scenes.animation import parse_moves
     from validation.scenes.loading import load_scene
 
-    loaded = load_scene(name_or_path, pixels)
+    loaded = load_scene(name_or_path, pixels, changes)
     scene = read_scene(loaded.scene, precision)
     animation = loaded.animation
     if animate is not None:

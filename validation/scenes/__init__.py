@@ -26,6 +26,8 @@ Read in this order:
 - `overlap.py`: two casters whose penumbrae overlap;
 - `probes.py`: small scenes for what the built-in ones lack, used by checks of the checks;
 - `numbers.py`: refuses numbers of which no finite image can come;
+- `changes.py`: camera, lights and media of a scene changed by name;
+- `lobes.py`: isotropic media given a mean cosine;
 - `loading.py`: a scene by its name or from a Mitsuba XML file;
 - `animation.py`: the scenes of the frames of an animation.
 

@@ -3,15 +3,19 @@
 
 import os
 import re
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 from xml.parsers import expat
 
 import mitsuba as mi
 
 from analytic.errors import InputError, nearest
+from validation.scenes.changes import change_scene, isotropic_media
+from validation.scenes.lobes import scene_with_lobes
 from validation.scenes.numbers import check_numbers
 from validation.scenes.record import Animation
 from validation.scenes.registry import SCENES
@@ -32,7 +36,11 @@ class LoadedScene:
     animation: Animation = field(default_factory=Animation)  #: what moves in it
 
 
-def load_scene(name_or_path: str, size: tuple[int, int] | None = None) -> LoadedScene:
+def load_scene(
+    name_or_path: str,
+    size: tuple[int, int] | None = None,
+    changes: Mapping[str, Sequence[float]] = MappingProxyType({}),
+) -> LoadedScene:
     """Load a built-in scene or a Mitsuba XML file into the active variant.
 
     Parameters
@@ -41,11 +49,14 @@ def load_scene(name_or_path: str, size: tuple[int, int] | None = None) -> Loaded
         A name of `validation.scenes.registry.SCENES`, or the path of a Mitsuba scene file.
     size
         Width and height of the image [pixels]; the scene's own by default.
+    changes
+        What is not as the scene has it, values by name, see `validation.scenes.changes`.
 
     Raises
     ------
     InputError
-        For an unknown name, a missing or malformed file, and a size that no image can have. This function does not
+        For an unknown name, a missing or malformed file, a size that no image can have, and a change that the scene
+        cannot have. This function does not
         check whether the methods or the truth support the scene: `realtime.scene.read_scene.read_scene` and
         `reference.scene.read.read_truth` do.
     """
@@ -56,9 +67,17 @@ def load_scene(name_or_path: str, size: tuple[int, int] | None = None) -> Loaded
     else:
         path = _existing(name_or_path)
         loaded = LoadedScene(path.stem, _parse(path), f"The user's own scene, {path.name}.", "", path)
+    isotropic = isotropic_media(loaded.scene) if changes else {}
+    lobes = {isotropic[name]: value[0] for name, value in changes.items() if name in isotropic and any(value)}
+    if lobes:
+        scene = scene_with_lobes(name_or_path if loaded.path else SCENES[name_or_path].build(), lobes)
+        name_shapes(scene)
+        loaded = replace(loaded, scene=scene)
     if size is not None:
         resize(loaded.scene, size)
     _check_films(loaded)
+    if changes:
+        change_scene(loaded.scene, changes)
     return loaded
 
 

@@ -1,27 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A page of two scenes, opened in a real browser."""
 
-import shutil
-
 import pytest
 
 from reports.page.render import render_page
-from tests.helpers.browser import watched
+from tests.helpers.browser import chromium, watched
 from tests.helpers.page import engine_image, report_data, write_files
 from tests.helpers.published import BILLETER, BIRI, MUTATIONS, STABILITY
 
 
 @pytest.fixture(scope="module")
 def browser():
-    playwright = pytest.importorskip("playwright.sync_api", reason="playwright drives the browser; see the dev extra")
-    chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-    if chromium is None:
-        pytest.skip("no Chromium on this machine; Debian's package is chromium")
-    with playwright.sync_playwright() as running:
-        # As root, as in a container, Chromium's own sandbox cannot work.
-        chromium_running = running.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
-        yield chromium_running
-        chromium_running.close()
+    with chromium() as launched:
+        yield launched
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A scene that changes from frame to frame, and no more than that is made anew.
+
+Camera, lights and media are opaque arrays, so their changes record nothing. A configuration has its own recorded
+functions: they are kept for the last few, and configurations share those that cast and shade, which know nothing of a
+method but whether it finds out which surfaces are lit. What the camera rays meet is kept while the camera stands still.
+"""
+
+import time
+from collections import OrderedDict
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import drjit as dr
+
+from analytic.errors import InputError
+from realtime.errors import InputError as MethodError
+from realtime.frame.incremental import FrameCache, next_frame
+from realtime.frame.renderer import Frame, FrameRenderer, image_frame
+from realtime.methods.interface.method import method_parameters
+from realtime.scene.read_scene import read_again, read_scene
+from reports.view.stages import timed_stages
+from validation.configurations.methods import Configuration, prepared
+from validation.scenes.changes import Values, change_scene, changeable, isotropic_media
+from validation.scenes.loading import load_scene
+
+_KEPT = 6  # configurations of which the recorded functions are kept
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A frame on the device, and what it cost."""
+
+    stages: tuple[Any, Any, Any]  #: distance, surface, airlight, as `realtime.frame.renderer.run_stages` returns them
+    frame_ms: float  #: until the arrays are ready
+    stages_ms: dict[str, float]  #: by stage; empty where they were not timed
+
+
+class LiveScene:
+    """A scene, its configuration, and what the last frame left to the next."""
+
+    def __init__(self, name: str, size: tuple[int, int], chosen: Configuration, changes: Mapping[str, Values]) -> None:
+        self.name, self.size = name, size
+        self.chosen, self.changes = chosen, dict(changes)
+        self._isotropic = isotropic_media(load_scene(name, size).scene)
+        self._renderers: OrderedDict[Any, FrameRenderer] = OrderedDict()
+        self._surfaces: dict[Any, FrameRenderer] = {}
+        self._load()
+        self.renderer = self._find_renderer()
+
+    def _load(self) -> None:
+        loaded = load_scene(self.name, self.size, self.changes)
+        self.label = loaded.name
+        self.source = loaded.scene
+        self.scene = read_scene(loaded.scene)
+        self._cache: FrameCache | None = None
+        self._other_method = False
+        self._moved = {"camera_moved": False, "light_moved": False}
+        self._renderers.clear()
+        self._surfaces.clear()
+
+    def _lobes(self, changes: Mapping[str, Values]) -> set[str]:
+        """Return which isotropic media changes give a lobe: the scene is loaded anew for others."""
+        return {name for name, value in changes.items() if name in self._isotropic and any(value)}
+
+    @property
+    def there(self) -> dict[str, Any]:
+        """What can be changed in the scene, with its values now."""
+        return changeable(self.source)
+
+    @property
+    def goes_on(self) -> bool:
+        """Whether a frame builds on the last one, so that frames differ while nothing moves."""
+        return self.renderer.carries or self.renderer.passes is not None
+
+    def choose(self, chosen: Configuration) -> float:
+        """Render by another configuration from now on; return what its preparation takes [ms].
+
+        Raises
+        ------
+        InputError
+            If the method refuses the scene or a parameter; then all is as it was.
+        """
+        begin = time.perf_counter()
+        before, self.chosen = self.chosen, chosen
+        try:
+            renderer = self._find_renderer()
+        except (InputError, MethodError):
+            self.chosen = before
+            raise
+        self._other_method |= renderer is not self.renderer
+        self.renderer = renderer
+        return 1e3 * (time.perf_counter() - begin)
+
+    def change(self, changes: Mapping[str, Values]) -> None:
+        """Change the scene; names that are not given are as they were.
+
+        Raises
+        ------
+        InputError
+            If the scene or the method cannot have that; then all is as it was.
+        """
+        before, renderer = self.changes, self.renderer
+        wanted = before | dict(changes)
+        moved = {name for name, value in changes.items() if before.get(name) != tuple(value)}
+        try:
+            if self._lobes(wanted) == self._lobes(before):
+                change_scene(self.source, wanted)
+                self.scene = read_again(self.scene, self.source)
+                self.changes = wanted
+            else:
+                self.changes = wanted
+                self._load()
+            renderer = self._find_renderer()
+        except (InputError, MethodError):
+            self.changes = before
+            self._load()  # the numbers of before, bit by bit
+            self.renderer = self._find_renderer()
+            raise
+        self._other_method |= renderer is not self.renderer
+        self.renderer = renderer
+        self._moved["camera_moved"] |= any(name.startswith("camera") for name in moved)
+        self._moved["light_moved"] |= any(name.endswith((".position", ".direction")) for name in moved)
+
+    def reset(self) -> None:
+        """Make the scene as it was read, without any change."""
+        self.changes = {}
+        self._load()
+        self.renderer = self._find_renderer()
+
+    def frame(self, *, by_stage: bool = False) -> Shown:
+        """Render the next frame; `by_stage` times its stages, which makes it a little slower.
+
+        Raises
+        ------
+        realtime.errors.InputError
+            For what the method refuses in its first frame.
+        """
+        begin = time.perf_counter()
+        renderer, times = timed_stages(self.renderer) if by_stage else (self.renderer, {})
+        cache, moved = self._cache, dict(self._moved)
+        if self._other_method and cache is not None:
+            keeps = renderer.groups is None and not moved["camera_moved"]
+            cache = FrameCache(cache.cast, None, None) if keeps else None
+            moved["light_moved"] = True
+        stages, self._cache = next_frame(renderer, self.scene, cache, geometry_moved=False, **moved)
+        dr.sync_thread()
+        self._other_method = False
+        self._moved = dict.fromkeys(self._moved, False)
+        return Shown(stages, 1e3 * (time.perf_counter() - begin), times)
+
+    def on_host(self, shown: Shown) -> Frame:
+        """Bring a frame to the host in the order of the image."""
+        return image_frame(replace(self.renderer, scene=self.scene), shown.stages)
+
+    def _find_renderer(self) -> FrameRenderer:
+        """Return the renderer of the configuration for a scene with these features."""
+        key = self.chosen, self.scene.features
+        if key not in self._renderers:
+            made = prepared(self.scene, self.chosen)
+            self._renderers[key] = made if made.groups is not None else self._with_known_surface(made)
+            while len(self._renderers) > _KEPT:
+                self._renderers.popitem(last=False)
+        self._renderers.move_to_end(key)
+        return self._renderers[key]
+
+    def _with_known_surface(self, made: FrameRenderer) -> FrameRenderer:
+        """Return a renderer that casts and shades by the functions that another one has recorded."""
+        chosen, _ = method_parameters(made.method, dict(self.chosen.parameters))
+        key = self.scene.features, made.method.provides_visibility(chosen), made.method.by_source(chosen)
+        known = self._surfaces.setdefault(key, made)
+        # The pixels too: a recorded function tells arrays apart by how they lie in memory.
+        return replace(made, pixel=known.pixel, surface=known.surface, shade=known.shade)

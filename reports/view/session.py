@@ -1,0 +1,371 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The loop of the view: it draws what the page asks for, and computes its truth while nothing moves.
+
+Threads of the server put what the page says into a list; this loop alone touches Dr.Jit. It takes all that has come
+since the last frame at once, so frames that nobody would see are not drawn, and it waits for the page to show a frame
+before it sends the next but one.
+"""
+
+import threading
+import time
+from collections.abc import Mapping
+from dataclasses import asdict, replace
+from typing import Any
+
+import numpy as np
+
+from analytic.errors import InputError
+from realtime.errors import InputError as MethodError
+from realtime.methods.interface.method import method_parameters
+from realtime.methods.registry import find_method
+from realtime.parameters import values
+from reports.plotting.pictures import ERROR_CEILING, ERROR_FLOOR, error_map, error_scale, exposure
+from reports.view.live_scene import LiveScene, Shown
+from reports.view.picture import LAYERS, Pictures, rgba
+from reports.view.server import Page
+from reports.view.stages import WORDS
+from reports.view.state import ViewState
+from reports.view.truth import TruthInBackground
+from reports.view.truth_order import view_error
+from reports.view.widgets import (
+    calls_kernel,
+    kernel_widgets,
+    method_widgets,
+    parameter_widgets,
+    scene_widgets,
+)
+from validation.configurations.methods import Configuration, configuration
+from validation.metrics.errors import plain
+from validation.scenes.changes import Values
+
+_AHEAD = 2  # frames that are sent before the page has shown the first of them
+_QUIET = 0.15  # after so long without a change the page is told where all stands [s]
+_STILL = 0.4  # after so long the truth is begun [s]
+_NEWS = 0.4  # between two pictures of what is known of the truth [s]
+_BY_STAGE = 8  # of so many frames one is timed by stage
+_STOPS = 20.0  # of exposure, brighter or darker
+_GOES_ON = 64  # frames drawn of a still scene where each builds on the last
+
+
+class Session:
+    """What is shown, to whom, and what they asked for."""
+
+    def __init__(self, state: ViewState, variant: str) -> None:
+        self._given = state
+        self.live = LiveScene(state.scene, state.size, state.chosen, state.changes)
+        self.truth = TruthInBackground(self._wake, variant)
+        self._pictures = Pictures()
+        self._condition = threading.Condition()
+        self._said: list[tuple[Page, dict[str, Any]]] = []
+        self._page: Page | None = None
+        self._show: dict[str, Any] = {"layer": "total", "exposure": 0.0, "other": "none", "run": False}
+        self._factor: float | None = None
+        self._sent = self._drawn = self._wanted = 0
+        self._moves = 0  # of the camera that the page has sent and that are taken
+        self._shown: Shown | None = None
+        self._stages: dict[str, float] = {}
+        self._changed_at = time.perf_counter()
+        self._asked_at: float | None = None  # of the change whose cost the next frame tells
+        self._told = self._news_at = 0.0
+        self._truth_of: Any = None
+        self._news = False
+
+    # What the server's threads call -----------------------------------------------------------------------------------
+
+    def opened(self, page: Page) -> None:
+        """Show this page what there is from now on, and no other."""
+        with self._condition:
+            before, self._page = self._page, page
+            self._said.append((page, {"kind": "opened"}))
+            self._condition.notify()
+        if before is not None:
+            before.close("this view was opened in another tab")
+
+    def told(self, page: Page, said: dict[str, Any]) -> None:
+        """Note what a page says."""
+        with self._condition:
+            if page is self._page:
+                self._said.append((page, said))
+                self._condition.notify()
+
+    def closed(self, page: Page) -> None:
+        """Draw nothing for a page that was closed."""
+        with self._condition:
+            if page is self._page:
+                self._page = None
+                self._condition.notify()
+
+    def _wake(self) -> None:
+        with self._condition:
+            self._news = True
+            self._condition.notify()
+
+    def command(self) -> str:
+        """Say how to see again what is shown."""
+        return f"the same view again: {self._state().command('view')}"
+
+    # The loop ---------------------------------------------------------------------------------------------------------
+
+    def run(self) -> None:
+        """Draw until the process ends."""
+        while True:
+            self.turn()
+
+    def turn(self) -> None:
+        """Wait for something to do, and do it."""
+        with self._condition:
+            if not self._said and not self._can_draw():
+                self._condition.wait(self._patience())
+            said, self._said = self._said, []
+            page = self._page
+        if page is None:
+            if self._truth_of is not None:
+                self._truth_of = None
+                self.truth.stop()
+            return
+        self._take(page, said)
+        if self._can_draw():
+            self._draw(page)
+        self._after(page)
+
+    def _can_draw(self) -> bool:
+        ahead = self._sent - self._drawn
+        return self._page is not None and ahead < _AHEAD and (self._wanted > 0 or self._show["run"])
+
+    def _patience(self) -> float:
+        """Return how long to wait for news [s]."""
+        if self._page is None:
+            return 60.0
+        now = time.perf_counter()
+        waits = [60.0]
+        if self._told < self._changed_at:
+            waits.append(self._changed_at + _QUIET - now)
+        if self._truth_of is None:
+            waits.append(self._changed_at + _STILL - now)
+        if self._news:
+            waits.append(self._news_at + _NEWS - now)
+        return max(min(waits), 0.001)
+
+    def _take(self, page: Page, said: list[tuple[Page, dict[str, Any]]]) -> None:
+        """Do what the page asks; changes that follow one another are one, and of values of one parameter the last."""
+        changes: dict[str, Values] = {}
+        own = [message for sender, message in said if sender is page]
+        for message, following in zip(own, [*own[1:], {}]):
+            if message.get("kind") == "choose" and _chooses(message) == _chooses(following):
+                continue
+            if message.get("kind") == "change":
+                changes |= _numbers(message.get("changes"))
+                self._moves = max(self._moves, int(_number(message.get("moves"))))
+                continue
+            changes = self._change(page, changes)
+            self._do(page, message)
+        self._change(page, changes)
+
+    def _change(self, page: Page, changes: dict[str, Values]) -> dict[str, Values]:
+        if changes:
+            self._try(page, lambda: self.live.change(changes), of_scene=True)
+        return {}
+
+    def _try(self, page: Page, work, *, of_scene: bool) -> None:
+        """Change what is shown; a mistake is told in one line, and changes nothing."""
+        self._asked_at = self._asked_at or time.perf_counter()
+        try:
+            work()
+        except (InputError, MethodError) as error:
+            page.tell("mistake", message=" ".join(str(error).split()))
+        else:
+            page.tell("mistake", message="")
+            if of_scene and self._truth_of is not None:
+                self._truth_of = None
+                self.truth.stop()
+            self._news = True
+        self._touch()
+
+    def _touch(self) -> None:
+        self._changed_at = time.perf_counter()
+        self._wanted = _GOES_ON if self.live.goes_on else 1
+
+    def _do(self, page: Page, message: Mapping[str, Any]) -> None:
+        kind = message.get("kind")
+        if kind == "opened":
+            self._sent = self._drawn = self._moves = 0
+            self._open(page)
+        elif kind == "drawn":
+            self._drawn = max(self._drawn, int(_number(message.get("frame"))))
+        elif kind == "choose":
+            self._try(page, lambda: self._choose(message), of_scene=False)
+            self._tell_state(page)
+        elif kind == "show":
+            given = self._show | {name: message[name] for name in self._show if name in message}
+            layer, other = (str(given[name]) for name in ("layer", "other"))
+            self._show = {
+                "layer": layer if layer in LAYERS else "total",
+                "exposure": min(max(_number(given["exposure"]), -_STOPS), _STOPS),
+                "other": other if other in ("truth", "error") else "none",
+                "run": bool(given["run"]),
+            }
+            if message.get("expose"):
+                self._factor = None
+            self._wanted, self._news = max(self._wanted, 1), True
+        elif kind == "reset":
+            self._try(page, self.live.reset, of_scene=True)
+
+    def _choose(self, message: Mapping[str, Any]) -> None:
+        """Choose another method, kernel or value of a parameter."""
+        chosen = self.live.chosen
+        method = str(message.get("method", chosen.method))
+        given: dict[str, Any] = dict(chosen.parameters) if method == chosen.method else {}
+        if "parameter" in message:
+            given[str(message["parameter"])] = message.get("value")
+        self.live.choose(sparing(method, message.get("kernel", chosen.kernel), given))
+
+    # What the page is told --------------------------------------------------------------------------------------------
+
+    def _open(self, page: Page) -> None:
+        page.tell(
+            "opened",
+            scene=self.live.label,
+            size=self._size(),
+            methods=method_widgets(self.live.chosen.method),
+            kernels=kernel_widgets(),
+            layers=list(LAYERS),
+            stages=WORDS,
+            show=self._show,
+            scale={"colours": error_scale()[0].tolist(), "floor": ERROR_FLOOR, "ceiling": ERROR_CEILING},
+        )
+        self._tell_state(page)
+        self._touch()
+        self._news = True
+
+    def _tell_state(self, page: Page) -> None:
+        self._told = time.perf_counter()
+        live, state = self.live, self._state()
+        page.tell(
+            "state",
+            method=live.chosen.method,
+            kernel=live.chosen.kernel,
+            calls_kernel=calls_kernel(live.chosen),
+            parameters=plain(parameter_widgets(live.chosen, area_lights=bool(live.scene.area_lights))),
+            changeable=plain(scene_widgets(live.there)),
+            changed=list(live.changes),
+            commands={name: state.command(name) for name in ("view", "render", "reference")},
+            notes=list(live.scene.features.notes),
+        )
+
+    def _draw(self, page: Page) -> None:
+        by_stage = self._sent % _BY_STAGE == 0
+        try:
+            shown = self.live.frame(by_stage=by_stage)
+            if self._factor is None:
+                frame = self.live.on_host(shown)
+                self._factor = exposure(frame.airlight + frame.surface)
+        except (InputError, MethodError) as error:
+            page.tell("mistake", message=" ".join(str(error).split()))
+            self._wanted, self._show["run"], self._asked_at = 0, False, None
+            return
+        self._shown, self._wanted = shown, max(self._wanted - 1, 0)
+        if by_stage:
+            self._stages = shown.stages_ms
+        begin = time.perf_counter()
+        _, surface, airlight = shown.stages
+        how = {"layer": self._show["layer"], "factor": self._exposed()}
+        picture = self._pictures.of_frame(self.live.renderer.pixel, surface, airlight, **how)
+        now = time.perf_counter()
+        self._sent += 1
+        page.show(
+            picture,
+            kind="frame",
+            frame=self._sent,
+            size=self._size(),
+            frame_ms=shown.frame_ms,
+            picture_ms=1e3 * (now - begin),
+            stages=self._stages,
+            taken=self._moves,
+            change_ms=None if self._asked_at is None else 1e3 * (now - self._asked_at),
+        )
+        if self._asked_at is not None:
+            self._changed_at = now  # whoever moves on waits for this frame first
+        self._asked_at = None
+
+    def _after(self, page: Page) -> None:
+        """Tell where all stands, begin the truth and show what is known of it, when it is time."""
+        now = time.perf_counter()
+        if self._told < self._changed_at and now >= self._changed_at + _QUIET:
+            self._tell_state(page)
+        if self._truth_of is None and now >= self._changed_at + _STILL and self._shown is not None:
+            self._truth_of = dict(self.live.changes)
+            self.truth.start(self._given.scene, self._given.size, self._truth_of)
+        if self._news and now >= self._news_at + _NEWS and self._truth_of is not None and self._shown is not None:
+            self._news, self._news_at = False, now
+            self._tell_error(page, self._shown)
+
+    def _tell_error(self, page: Page, shown: Shown) -> None:
+        truth = self.truth.truth
+        if self.truth.failure or truth is None:
+            page.tell("error", failure=self.truth.failure)
+            return
+        try:
+            frame = self.live.on_host(shown)
+        except (InputError, MethodError) as mistake:
+            page.tell("error", failure=" ".join(str(mistake).split()))
+            return
+        error = view_error(truth, frame.airlight)
+        page.tell("error", failure="", error=plain(asdict(error)) if error else None, done=self.truth.done)
+        if error is None or self._show["other"] == "none":
+            return
+        if self._show["other"] == "error":
+            test = truth.filled(np.asarray(frame.airlight, dtype=np.float64))
+            picture = rgba(error_map(truth.filled(truth.airlight), test))
+        else:
+            weights = LAYERS[self._show["layer"]]
+            layers = truth.filled(truth.airlight), truth.filled(truth.surface)
+            radiance = sum(weight * layer for weight, layer in zip(weights, layers, strict=True) if weight)
+            picture = self._pictures.of_image(np.asarray(radiance), self._exposed())
+        page.show(picture, kind="other", size=self._size(), known=error.known, pixels=error.pixels)
+
+    def _state(self) -> ViewState:
+        return replace(self._given, chosen=self.live.chosen, changes=self.live.changes)
+
+    def _size(self) -> tuple[int, int]:
+        return self.live.scene.camera.width, self.live.scene.camera.height
+
+    def _exposed(self) -> float:
+        return (self._factor or 1.0) * 2.0 ** float(self._show["exposure"])
+
+
+def sparing(method: str, kernel: Any, given: Mapping[str, Any]) -> Configuration:
+    """Return a configuration that names only what differs from the method's defaults, and a kernel only if it has one.
+
+    Raises
+    ------
+    InputError
+        As `validation.configurations.methods.configuration`.
+    """
+    record = find_method(method)
+    own, light_points = method_parameters(record, given)
+    now = values(light_points) | values(own)
+    usual = values(record.light_points) | record.defaults
+    differing = {name: now[name] for name in given if now[name] != usual[name]}
+    return configuration(method, str(kernel) if kernel and record.uses_kernel(own) else None, differing)
+
+
+def _chooses(message: Mapping[str, Any]) -> tuple[Any, ...]:
+    """Return what a message of the page chooses, without its value."""
+    return message.get("kind"), "method" in message, "kernel" in message, message.get("parameter")
+
+
+def _number(value: Any) -> float:
+    """Return a number of a page's message; 0 for anything else."""
+    return float(value) if isinstance(value, int | float) and np.isfinite(value) else 0.0
+
+
+def _numbers(changes: Any) -> dict[str, Values]:
+    """Return the changes of a page's message that have the form of changes."""
+    if not isinstance(changes, dict):
+        return {}
+    lists = {name: value for name, value in changes.items() if isinstance(value, list)}
+    return {
+        name: tuple(float(number) for number in value)
+        for name, value in lists.items()
+        if all(isinstance(number, int | float) for number in value)
+    }

@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The stages of a frame, each timed by itself: the device must come to rest between them, which a frame need not do."""
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import drjit as dr
+
+from realtime.frame.renderer import FrameRenderer
+
+#: The stages of a `FrameRenderer`, in their order, and what the page calls them.
+WORDS = {
+    "prepare": "shadow maps or planes",
+    "surface": "camera rays and surface",
+    "shade": "surface, rays kept",
+    "cull": "tiles",
+    "render": "airlight",
+    "passes": "passes over the image",
+}
+
+
+def timed_stages(renderer: FrameRenderer) -> tuple[FrameRenderer, dict[str, float]]:
+    """Return a renderer that does the same, and a dictionary that its next frame fills with the time of stages [ms]."""
+    times: dict[str, float] = {}
+    return _timed(renderer, times), times
+
+
+def _timed(renderer: FrameRenderer, times: dict[str, float]) -> FrameRenderer:
+    if renderer.groups is not None:
+        whole, of_point = (part and _timed(part, times) for part in (renderer.groups.whole, renderer.groups.of_point))
+        renderer = replace(renderer, groups=replace(renderer.groups, whole=whole, of_point=of_point))
+    stages: dict[str, Any] = {name: getattr(renderer, name) for name in WORDS}
+    clocked: dict[str, Any] = {name: _clocked(name, stage, times) for name, stage in stages.items() if stage}
+    return replace(renderer, **clocked)
+
+
+def _clocked(name: str, stage: Callable[..., Any], times: dict[str, float]) -> Callable[..., Any]:
+    def clocked(*arguments):
+        dr.sync_thread()
+        begin = time.perf_counter()
+        result = stage(*arguments)
+        if name != "prepare":  # whose states need not be arrays alone
+            dr.eval(result)
+        dr.sync_thread()
+        times[name] = times.get(name, 0.0) + 1e3 * (time.perf_counter() - begin)
+        return result
+
+    return clocked

@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""In which order the truth of an image is computed, and what is known of it on the way.
+
+Pixels of a coarse grid come first, then those of grids of half its step. Within a grid the order is random, so that
+what is known is a fair sample of the image at any time, and the picture of it grows sharper.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from validation.metrics.errors import error_metrics
+
+Array = NDArray[np.float64]
+STEPS = (16, 8, 4, 2, 1)
+
+
+def pixel_order(width: int, height: int) -> NDArray[np.int64]:
+    """Return the numbers of all pixels in their order, (pixels,)."""
+    row, column = np.divmod(np.arange(width * height), width)
+    level = np.full(width * height, len(STEPS) - 1)
+    for number, step in reversed(list(enumerate(STEPS))):
+        level[(row % step == 0) & (column % step == 0)] = number
+    return np.lexsort([np.random.default_rng(0).random(width * height), level])
+
+
+@dataclass(frozen=True)
+class KnownTruth:
+    """What is known of the truth of an image; what is not is NaN."""
+
+    airlight: Array  #: (height, width, 3) [W/(m^2 sr)]
+    surface: Array  #: with lights with extent that are seen directly [W/(m^2 sr)]
+    bound: Array  #: of the error of the airlight; with lights with extent, and twice its standard error [W/(m^2 sr)]
+
+    @staticmethod
+    def of_size(width: int, height: int) -> "KnownTruth":
+        """Return what is known before there is anything."""
+        return KnownTruth(*(np.full((height, width, 3), np.nan) for _ in range(3)))
+
+    @property
+    def known(self) -> NDArray[np.bool_]:
+        """Which pixels are known, (height, width)."""
+        return np.isfinite(self.airlight[..., 0])
+
+    def add(self, pixels: NDArray[np.int64], airlight: Array, surface: Array, bound: Array) -> None:
+        """Note the truth of some pixels, (pixels, 3) each."""
+        for layer, values in ((self.airlight, airlight), (self.surface, surface), (self.bound, bound)):
+            layer.reshape(-1, 3)[pixels] = values
+
+    def filled(self, layer: Array) -> Array:
+        """Return a layer of the truth, or of a frame: where the truth is not known, a near pixel where it is."""
+        known = self.known
+        step = next((step for step in reversed(STEPS) if known[::step, ::step].all()), None)
+        if step is None:
+            return np.where(known[..., None], layer, 0)
+        rows, columns = (np.arange(size) // step * step for size in known.shape)
+        return np.where(known[..., None], layer, layer[np.ix_(rows, columns)])
+
+
+@dataclass(frozen=True)
+class ViewError:
+    """The error of the airlight of a frame against what is known of its truth, as shares of the truth's mean."""
+
+    relative_rmse: float
+    interval: float  #: half of the 95 % interval of that, for the pixels that are not known yet
+    relative_bias: float
+    p99: float  #: see `validation.metrics.errors`
+    bound: float  #: root mean square of the truth's own bound: the most by which it changes the error
+    known: int  #: pixels
+    pixels: int
+
+
+def view_error(truth: KnownTruth, airlight: Array) -> ViewError | None:
+    """Return the error of the airlight of a frame, (height, width, 3) [W/(m^2 sr)]; None if nothing is known."""
+    known = truth.known
+    count, pixels = int(known.sum()), known.size
+    if count == 0:
+        return None
+    reference, test = truth.airlight[known], np.asarray(airlight, dtype=np.float64)[known]
+    metrics = error_metrics(reference[None], test[None])
+    mean = float(reference.mean())
+    square = np.mean((test - reference) ** 2, axis=1)
+    spread = float(square.std()) / np.sqrt(count) * np.sqrt(1 - count / pixels)
+    rmse = float(np.sqrt(square.mean()))
+    interval = 1.96 * spread / (2 * rmse) if rmse > 0 else 0.0
+    bound = float(np.sqrt(np.mean(truth.bound[known] ** 2)))
+    return ViewError(
+        metrics.relative_rmse,
+        interval / mean if mean > 0 else np.nan,
+        metrics.relative_bias,
+        metrics.p99,
+        bound / mean if mean > 0 else np.nan,
+        count,
+        pixels,
+    )

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the page can change, as data for its widgets: all of it follows from typed records, nothing is listed here."""
+
+from dataclasses import Field, fields
+from typing import Any
+
+from realtime.area_lights.points import LightPoints
+from realtime.kernels.registry import KERNELS
+from realtime.methods.interface.method import Method, method_parameters
+from realtime.methods.registry import METHODS, find_method
+from realtime.parameters import limits_of
+from validation.configurations.methods import Configuration
+from validation.scenes.changes import Changeable
+
+
+def method_widgets(own: str) -> list[dict[str, Any]]:
+    """Return the methods; `own` is the one that the user named, which may not be in the registry."""
+    names = [*METHODS, *([own] if own not in METHODS else [])]
+    return [{"name": name, "summary": find_method(name).summary} for name in names]
+
+
+def kernel_widgets() -> list[dict[str, Any]]:
+    """Return the kernels, each with the name and the default of the number that may follow its name."""
+    return [
+        {"name": kernel.name, "summary": kernel.summary, "number": next(iter(kernel.parameters.items()), None)}
+        for kernel in KERNELS.values()
+    ]
+
+
+def parameter_widgets(chosen: Configuration, *, area_lights: bool) -> list[dict[str, Any]]:
+    """Return the parameters of a method with their values, ranges and help.
+
+    Parameters
+    ----------
+    chosen
+        The configuration.
+    area_lights
+        Whether the scene has lights with extent, of which each method has parameters.
+    """
+    method = find_method(chosen.method)
+    own, light_points = method_parameters(method, dict(chosen.parameters))
+    widgets = [_parameter(item, getattr(own, item.name)) for item in fields(own)]
+    if area_lights:
+        names = {widget["name"] for widget in widgets}
+        common = [item for item in fields(LightPoints) if item.name not in names]
+        widgets += [_parameter(item, getattr(light_points, item.name)) for item in common]
+    return widgets
+
+
+def calls_kernel(chosen: Configuration) -> bool:
+    """Return whether a method calls a kernel with its parameters."""
+    method: Method = find_method(chosen.method)
+    return method.uses_kernel(method_parameters(method, dict(chosen.parameters))[0])
+
+
+def scene_widgets(there: dict[str, Changeable]) -> list[dict[str, Any]]:
+    """Return what can be changed in a scene, with values and ranges."""
+    return [
+        {"name": item.name, "value": item.value, "least": item.least, "most": item.most, "unit": item.unit}
+        for item in there.values()
+    ]
+
+
+def _parameter(item: Field, value: Any) -> dict[str, Any]:
+    limits = limits_of(item)
+    widget: dict[str, Any] = {"name": item.name, "value": value, "help": limits.help, "unit": limits.unit}
+    if limits.choices:
+        return widget | {"kind": "choice", "choices": limits.choices}
+    if isinstance(item.default, bool):
+        return widget | {"kind": "switch"}
+    if isinstance(item.default, str):
+        return widget | {"kind": "word"}
+    return widget | {
+        "kind": "number",
+        "whole": isinstance(item.default, int),
+        "least": limits.above if limits.least is None else limits.least,
+        "most": limits.below if limits.most is None else limits.most,
+    }

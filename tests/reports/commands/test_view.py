@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`airlight view`: it listens here alone, refuses in one line, and Ctrl-C ends it with all that it started."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+import urllib.request
+from pathlib import Path
+
+import pytest
+
+from reports.commands import main as cli
+
+ROOT = Path(__file__).resolve().parents[3]
+SMALL = ["--size", "16x12"]
+
+
+def run(*arguments, status):
+    assert cli.run(["view", *arguments]) == status
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["colonade"], "did you mean 'colonnade'?"),
+        (["no-such.xml"], "there is no file no-such.xml"),
+        (["sphere-spot", "--method", "shadow-plains"], "did you mean 'shadow-planes'?"),
+        (["sphere-spot", "--method", "ray-march", "--method", "min-max"], "--method"),
+        (["sphere-spot", "--kernel", "exakt"], "did you mean 'exact'?"),
+        (["sphere-spot", "--set", "tolerence=1"], "did you mean 'tolerance'?"),
+        (["sphere-spot", "--set", "tolerance=-1"], "tolerance: got -1"),
+        (["sphere-spot", "--change", "medium.sigma=1"], "did you mean 'medium.sigma_t'?"),
+        (["sphere-spot", "--change", "camera"], "wanted NAME=NUMBER"),
+        (["sphere-spot", "--size", "huge"], "wanted WIDTHxHEIGHT"),
+        (["sphere-spot", "--host", "192.0.2.1"], "cannot listen at 192.0.2.1"),
+        (["sphere-spot", "--port", "70000"], "65535"),
+        (["sphere-spot", "--methods", "exact"], "--method"),
+    ],
+)
+def test_a_mistake_is_one_line_and_ends_with_2(variant, capfd, arguments, says):
+    run(*arguments, *(SMALL if "--size" not in arguments else []), status=2)
+    said = capfd.readouterr()
+    assert said.out == ""
+    assert says in said.err
+    assert len(said.err.strip().splitlines()) == 1
+
+
+def test_a_port_that_is_taken_is_refused(variant, capfd):
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        run("sphere-spot", *SMALL, "--port", str(taken.getsockname()[1]), status=2)
+    assert "wanted an address of this machine, and a port that is free: 0 finds one" in capfd.readouterr().err
+
+
+@pytest.mark.claim("view-extra")
+def test_without_the_extra_one_line_says_what_to_type(monkeypatch, capfd):
+    monkeypatch.setitem(sys.modules, "websockets.sync.server", None)
+    run("sphere-spot", status=3)
+    said = capfd.readouterr()
+    assert said.err == (
+        "airlight: error: the live view needs the package websockets: install it with `pip install 'airlight[view]'`\n"
+    )
+
+
+def _children(parent):
+    found = []
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = path.read_text().rsplit(")", 1)[1].split()
+        except OSError:
+            continue
+        if fields[1] == str(parent) and fields[0] != "Z":
+            found.append(int(path.parent.name))
+    return found
+
+
+@pytest.mark.claim("view-ends")
+@pytest.mark.parametrize(
+    ("number", "status", "word"), [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")]
+)
+def test_ctrl_c_ends_it_with_one_line_and_no_traceback(number, status, word):
+    process = subprocess.Popen(
+        [sys.executable, str(ROOT / "airlight.py"), "view", "sphere-spot", *SMALL, "--set", "tolerance=0.01"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    address = process.stdout.readline().strip()
+    assert address.startswith("http://127.0.0.1:")
+    assert process.stdout.readline() == "Ctrl-C ends the view.\n"
+    opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))
+    with opener.open(address, timeout=30) as response:
+        assert response.status == 200
+    children = _children(process.pid) if sys.platform == "linux" else []
+    assert len(children) == (1 if sys.platform == "linux" else 0)  # the truth
+    process.send_signal(number)
+    out, err = process.communicate(timeout=30)
+    assert (process.returncode, out) == (status, "")
+    line = f"{word}: the same view again: airlight view sphere-spot --method shadow-planes --kernel exact"
+    assert err == f"{line} --set tolerance=0.01 --size 16x12\n"
+    stop = time.monotonic() + 10
+    while any(os.path.exists(f"/proc/{child}") for child in children):
+        assert time.monotonic() < stop, "what it started goes on"
+        time.sleep(0.05)

@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A live scene shows what a scene made anew shows, bit by bit, and makes no more than it must."""
+
+import numpy as np
+import pytest
+
+from analytic.errors import InputError
+from realtime.errors import InputError as MethodError
+from realtime.frame.renderer import render_frame
+from realtime.scene.read_scene import read_scene
+from reports.interchange.frames import STAGES
+from reports.view.live_scene import LiveScene
+from validation.configurations.methods import configuration, prepared
+from validation.scenes.loading import load_scene
+
+pytestmark = pytest.mark.usefixtures("variant")
+
+SIZE = (32, 24)
+CAMERA = {"camera.origin": (0.6, -0.3, 0.4), "camera.target": (0.2, 0.1, 4.0), "camera.up": (0.0, 1.0, 0.0)}
+LIGHT = {"light.position": (0.41, 0.3, 4.2), "light.intensity": (31.0, 43.0, 57.0)}
+MEDIUM = {"medium.sigma_t": (0.41,), "medium.albedo": (0.7, 0.6, 0.5)}
+FAR = {"camera.origin": (-4.1, -8.3, 1.5), "camera.target": (1.0, 2.7, 2.2), "camera.up": (0.0, 0.0, 1.0)}
+LAMP = {"light.position": (5.4, 1.7, 4.1), "medium.g": (0.21,)}
+
+
+def live(name="sphere-spot", method="shadow-planes", **parameters):
+    return LiveScene(name, SIZE, configuration(method, None, parameters), {})
+
+
+def shown(scene):
+    frame = scene.on_host(scene.frame())
+    return frame.airlight, frame.surface, frame.distance
+
+
+def anew(scene):
+    """The layers of the scene as a command would render it."""
+    loaded = load_scene(scene.name, scene.size, scene.changes)
+    frame = render_frame(prepared(read_scene(loaded.scene), scene.chosen))
+    return frame.airlight, frame.surface, frame.distance
+
+
+def recordings(scene):
+    return {name: getattr(getattr(scene.renderer, name), "n_recordings", 0) for name in STAGES}
+
+
+@pytest.mark.claim("view-shows-the-scene", tolerance="bit by bit")
+@pytest.mark.parametrize(
+    ("name", "method", "moves"),
+    [
+        ("sphere-spot", "shadow-planes", (CAMERA, LIGHT, MEDIUM)),
+        ("colonnade", "light-volumes", (FAR, LAMP)),
+        ("sphere-spot", "ray-march", ({"medium.g": (0.3,)}, LIGHT | {"medium.g": (-0.2,)}, {"medium.g": (0.0,)})),
+        ("windows", "ray-march", ({"light.direction": (0.6, -0.4, -0.7)}, {"medium.sigma_t": (0.3,)})),
+    ],
+)
+def test_after_each_change_the_frame_is_that_of_a_scene_made_anew(name, method, moves):
+    scene = live(name, method)
+    frames = [shown(scene)]
+    for move in moves:
+        scene.change(move)
+        frames.append(shown(scene))
+        for layer, fresh in zip(frames[-1], anew(scene), strict=True):
+            np.testing.assert_array_equal(layer, fresh)
+        assert not np.array_equal(frames[-1][0], frames[-2][0])
+
+
+@pytest.mark.claim("view-changes-record-nothing")
+def test_camera_light_and_medium_record_nothing():
+    scene = live()
+    shown(scene)
+    scene.change(LIGHT)
+    shown(scene)  # the first frame that shades what was cast before
+    scene.change(CAMERA)
+    shown(scene)
+    before = recordings(scene)
+    for share in (1.1, 1.2, 1.3):
+        scene.change({"camera.origin": tuple(share * value for value in CAMERA["camera.origin"])})
+        shown(scene)
+        scene.change({"light.position": tuple(share * value for value in LIGHT["light.position"])})
+        shown(scene)
+        scene.change({"medium.sigma_t": (0.41 * share,)})
+        shown(scene)
+    assert recordings(scene) == before
+
+
+@pytest.mark.claim("view-changes-record-nothing")
+def test_a_parameter_records_the_methods_stages_and_not_the_surface():
+    scene = live("colonnade", "ray-march", steps=4)
+    shown(scene)
+    scene.change(LAMP)
+    shown(scene)
+    before, first = recordings(scene), scene.renderer
+    scene.choose(configuration("ray-march", None, {"steps": 5}))
+    layers = shown(scene)
+    after = recordings(scene)
+    assert scene.renderer is not first
+    assert (after["surface"], after["shade"]) == (before["surface"], before["shade"])
+    assert after["render"] == 1
+    for layer, fresh in zip(layers, anew(scene), strict=True):
+        np.testing.assert_array_equal(layer, fresh)
+    scene.choose(configuration("ray-march", None, {"steps": 4}))
+    shown(scene)
+    assert scene.renderer is first
+    assert recordings(scene) == before
+
+
+def test_another_method_takes_over_the_cast_rays():
+    scene = live()
+    shown(scene)
+    scene.change(CAMERA)
+    for method in ("light-volumes", "unshadowed", "min-max", "froxel-fog", "shadow-planes"):
+        scene.choose(configuration(method))
+        for layer, fresh in zip(shown(scene), anew(scene), strict=True):
+            np.testing.assert_array_equal(layer, fresh)
+
+
+def test_lights_with_extent_change_their_radiance():
+    scene = live("overlap", "ray-march", steps=3, points=2)
+    dark = shown(scene)[0]
+    scene.change({"light.radiance": (3.0, 2.0, 1.0)})
+    for layer, fresh in zip(shown(scene), anew(scene), strict=True):
+        np.testing.assert_array_equal(layer, fresh)
+    assert not np.array_equal(shown(scene)[0], dark)
+
+
+def test_a_medium_that_turns_coloured_or_empty_has_another_renderer():
+    scene = live("three-media", "ray-march", steps=4)
+    shown(scene)
+    scene.change({"medium.sigma_t": (0.0,)})
+    for layer, fresh in zip(shown(scene), anew(scene), strict=True):
+        np.testing.assert_array_equal(layer, fresh)
+
+
+@pytest.mark.parametrize("change", [{"medium.sigma_t": (-1.0,)}, {"camera.fov": (0.0,)}, {"lamp.position": (1.0,)}])
+def test_a_change_that_cannot_be_leaves_all_as_it_was(change):
+    scene = live()
+    scene.change(LIGHT)
+    before = shown(scene)
+    with pytest.raises(InputError):
+        scene.change(change)
+    assert scene.changes == LIGHT
+    for layer, same in zip(shown(scene), before, strict=True):
+        np.testing.assert_array_equal(layer, same)
+
+
+def test_a_camera_that_enters_a_medium_is_refused_and_stays():
+    scene = live("three-media", "ray-march", steps=4)
+    before = shown(scene)
+    middle = np.array(scene.scene.medium.bounded_media[0].centre).ravel()
+    with pytest.raises((InputError, MethodError), match="the camera is inside of shape"):
+        scene.change({"camera.origin": tuple(middle), "camera.target": tuple(middle + 1)})
+    assert scene.changes == {}
+    for layer, same in zip(shown(scene), before, strict=True):
+        np.testing.assert_array_equal(layer, same)
+
+
+def test_a_method_that_refuses_leaves_the_one_before():
+    scene = live("windows", "ray-march", steps=4)
+    with pytest.raises((InputError, MethodError)):
+        scene.choose(configuration("shadow-planes", "taylor", {"media": "printed"}))
+    assert scene.chosen == configuration("ray-march", None, {"steps": 4})
+    assert np.isfinite(shown(scene)[0]).all()
+
+
+def test_reset_is_the_scene_as_it_was_read():
+    scene = live()
+    first = shown(scene)
+    scene.change(CAMERA | LIGHT)
+    shown(scene)
+    scene.reset()
+    assert scene.changes == {}
+    for layer, same in zip(shown(scene), first, strict=True):
+        np.testing.assert_array_equal(layer, same)
+
+
+def test_stages_are_timed_and_make_the_same_frame():
+    scene = live()
+    plain = shown(scene)
+    timed = scene.frame(by_stage=True)
+    assert set(timed.stages_ms) == {"shade", "render"}  # what was prepared, cast and sorted is kept
+    scene.change(CAMERA)
+    timed = scene.frame(by_stage=True)
+    assert set(timed.stages_ms) >= {"prepare", "surface", "cull", "render"}
+    assert all(milliseconds >= 0 for milliseconds in timed.stages_ms.values())
+    scene.reset()
+    scene.frame()
+    np.testing.assert_array_equal(scene.on_host(scene.frame(by_stage=True)).airlight, plain[0])

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The server of the view: nothing for who does not know the token, over HTTP and over the socket."""
+
+import errno
+import json
+import socket
+import struct
+import urllib.error
+import urllib.request
+
+import pytest
+
+from reports.view.server import Server
+
+websockets = pytest.importorskip("websockets.sync.client", reason="the extra `view` has it")
+
+
+@pytest.fixture
+def heard():
+    return []
+
+
+@pytest.fixture
+def server(heard):
+    def opened(page):
+        page.tell("hello", number=3)
+        page.show(b"\1\2\3\4", kind="frame", frame=1)
+
+    serving = Server(
+        "127.0.0.1",
+        0,
+        opened=opened,
+        told=lambda page, said: heard.append(said),
+        closed=lambda page: heard.append("closed"),
+    )
+    serving.start()
+    yield serving
+    serving.stop()
+
+
+def fetched(address):
+    """Status, headers and body; no proxy of this machine is asked."""
+    opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))
+    try:
+        with opener.open(address, timeout=10) as response:
+            return response.status, response.headers, response.read()
+    except urllib.error.HTTPError as error:
+        with error:
+            return error.code, error.headers, error.read()
+
+
+@pytest.mark.parametrize(
+    ("file", "kind", "holds"),
+    [("", "text/html", b"<title>"), ("view.js", "text/javascript", b"WebSocket"), ("view.css", "text/css", b"#stage")],
+)
+def test_who_knows_the_token_gets_the_page(server, file, kind, holds):
+    status, headers, body = fetched(server.address + file)
+    assert status == 200
+    assert headers["Content-Type"].startswith(kind)
+    assert holds in body
+    assert headers["Referrer-Policy"] == "no-referrer"
+    assert "default-src 'none'" in headers["Content-Security-Policy"]
+
+
+@pytest.mark.claim("view-token")
+@pytest.mark.parametrize(
+    "path",
+    [
+        *("/", "/view.js", "/socket", "/favicon.ico", "//view.css", "/wrong/", "/wrong/view.js", "/%2e/{token}/"),
+        *("/{short}/", "/{long}/view.js", "/{token}", "/{token}/server.py", "/{token}/../server.py"),
+    ],
+)
+def test_who_does_not_gets_nothing(server, path):
+    base, token = server.address.rstrip("/").rsplit("/", 1)
+    status, _, body = fetched(base + path.format(token=token, short=token[:-1], long=token + "x"))
+    assert (status, body) == (404, b"not found\n")
+
+
+@pytest.mark.claim("view-token")
+def test_the_socket_wants_the_token_too(server, heard):
+    address = server.address.replace("http", "ws")
+    for wrong in (address.rstrip("/")[:-1] + "/socket", address.rsplit("/", 2)[0] + "/socket"):
+        with pytest.raises(websockets.InvalidStatus) as raised:
+            websockets.connect(wrong, proxy=None)
+        assert raised.value.response.status_code == 404
+    assert heard == []
+    with websockets.connect(address + "socket", proxy=None) as right:
+        assert json.loads(right.recv(timeout=10)) == {"kind": "hello", "number": 3}
+        message = right.recv(timeout=10)
+        (size,) = struct.unpack_from("<I", message)
+        assert size % 4 == 0
+        assert json.loads(message[4 : 4 + size]) == {"kind": "frame", "frame": 1}
+        assert message[4 + size :] == b"\1\2\3\4"
+        for said in ("{", "[1]", '{"kind": "reset"}'):
+            right.send(said)
+    server.stop()
+    assert heard == [{"kind": "reset"}, "closed"]
+
+
+def test_tokens_differ_and_cannot_be_guessed(server):
+    other = Server("127.0.0.1", 0, opened=print, told=print, closed=print)
+    tokens = {address.split("/")[3] for address in (server.address, other.address)}
+    assert len(tokens) == 2
+    assert all(len(token) >= 32 for token in tokens)
+    other.start()
+    other.stop()
+
+
+@pytest.mark.claim("view-this-machine")
+def test_only_this_machine_is_served(server):
+    port = server.port
+    own = socket.gethostbyname(socket.gethostname())
+    if own.startswith("127."):
+        own = "127.0.0.2"  # this machine too, by another address
+    with socket.socket() as other:
+        other.settimeout(5)
+        assert other.connect_ex((own, port)) == errno.ECONNREFUSED
+    with socket.socket() as other:
+        assert other.connect_ex(("127.0.0.1", port)) == 0

@@ -1,0 +1,289 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Changes of a scene by name: its camera, lights and media, as `--change NAME=VALUE` and the live view make them.
+
+A change goes into Mitsuba's own scene, so the methods and the truth read the same. The names:
+
+| name | value |
+| --- | --- |
+| `camera.origin`, `camera.target` | a point [m]: where the camera is, where it looks |
+| `camera.up` | a direction: up in the image |
+| `camera.fov` | horizontal field of view [degrees] |
+| `light.position` | of a point or spot light, a point [m] |
+| `light.direction` | in which a spot or directional light shines |
+| `light.intensity`, `light.irradiance`, `light.radiance` | of a point or spot, a directional, an area light: RGB |
+| `medium.sigma_t` | extinction [1/m]: one number, or RGB where the scene gives RGB |
+| `medium.albedo` | single-scattering albedo: RGB |
+| `medium.g` | mean cosine of an isotropic or a Henyey-Greenstein phase function |
+
+One number for an RGB value is grey. The second light is `light-2`, the third `light-3`, and so are media: first the one
+around the camera, then those with bounds in the order of their shapes.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from analytic.errors import InputError, nearest
+from validation.scenes.numbers import LARGEST_LENGTH, LARGEST_LIGHT
+
+Array = NDArray[np.float64]
+Values = tuple[float, ...]
+_LIGHTS = {"intensity": "W/sr", "irradiance": "W/m^2", "radiance": "W/(m^2 sr)"}
+
+
+@dataclass(frozen=True)
+class Changeable:
+    """A number, point, direction or colour of a scene that has a name."""
+
+    name: str
+    value: Values  #: as the scene has it
+    sizes: tuple[int, ...]  #: how many numbers a value may have
+    least: float
+    most: float
+    unit: str = ""
+    direction: bool = False  #: of which only the direction matters: not all of it may be 0
+
+
+def changeable(scene) -> dict[str, Changeable]:
+    """Return what can be changed in a Mitsuba scene, by name, with its values."""
+    found = list(_of_camera(scene.sensors()[0])) if scene.sensors() else []
+    for number, emitter in enumerate(scene.emitters(), 1):
+        found += _of_light(_numbered("light", number), emitter)
+    for number, medium in enumerate(_media(scene), 1):
+        found += _of_medium(_numbered("medium", number), medium)
+    return {item.name: item for item in found}
+
+
+def parse_changes(words: Iterable[str]) -> dict[str, Values]:
+    """Return values by name from words of the form 'NAME=VALUE' or 'NAME=X,Y,Z'.
+
+    Raises
+    ------
+    InputError
+        If a word has another form, or two words give one name different values.
+    """
+    changes: dict[str, Values] = {}
+    for word in words:
+        name, separator, text = word.partition("=")
+        try:
+            values = tuple(float(number) for number in text.split(","))
+        except ValueError:
+            values = ()
+        if not (name.strip() and separator and values):
+            raise InputError(
+                f"--change: got {word!r}, wanted NAME=NUMBER or NAME=X,Y,Z, for example medium.sigma_t=0.1"
+            )
+        if changes.setdefault(name.strip(), values) != values:
+            raise InputError(f"--change: got two values of {name.strip()}, wanted one of them")
+    return changes
+
+
+def change_words(changes: Mapping[str, Sequence[float]]) -> list[str]:
+    """Return the words that `parse_changes` reads, to the last digit."""
+    return [f"{name}={','.join(_word(value) for value in values)}" for name, values in changes.items()]
+
+
+def change_scene(scene, changes: Mapping[str, Sequence[float]]) -> None:
+    """Change a Mitsuba scene in place.
+
+    Parameters
+    ----------
+    scene
+        The `mi.Scene`.
+    changes
+        Values by name, see the module. What is not named stays.
+
+    Raises
+    ------
+    InputError
+        For a name that the scene does not have (the nearest is named), and a value that it cannot have. The scene is
+        as it was then.
+    """
+    known = changeable(scene)
+    wanted = {name: _checked(name, values, known) for name, values in changes.items()}
+    camera = {name.partition(".")[2]: values for name, values in wanted.items() if name.startswith("camera.")}
+    if camera:
+        _change_camera(scene.sensors()[0], {name: known[f"camera.{name}"].value for name in _AIM} | camera, camera)
+    for kind, parts, change in (("light", scene.emitters(), _change_light), ("medium", _media(scene), _change_medium)):
+        for number, part in enumerate(parts, 1):
+            prefix = _numbered(kind, number) + "."
+            own = {name.removeprefix(prefix): values for name, values in wanted.items() if name.startswith(prefix)}
+            if own:
+                change(part, own)
+
+
+def _numbered(kind: str, number: int) -> str:
+    return kind if number == 1 else f"{kind}-{number}"
+
+
+def _word(value: float) -> str:
+    """Return the shortest decimals that are this number in single precision, if it is one, or in double."""
+    single = np.float32(value)
+    return np.format_float_positional(single if float(single) == value else np.float64(value), trim="-")
+
+
+def _checked(name: str, values: Sequence[float], known: Mapping[str, Changeable]) -> Values:
+    if name not in known:
+        raise InputError(f"--change: got {name!r}, wanted one of {', '.join(known)}{nearest(name, known)}")
+    item = known[name]
+    if len(values) not in item.sizes:
+        sizes = " or ".join(str(size) for size in item.sizes)
+        raise InputError(f"{name}: got {len(values)} numbers, wanted {sizes}, with commas between them")
+    numbers = np.array(values, dtype=np.float64)
+    if not np.all((numbers >= item.least) & (numbers <= item.most)):
+        given = ",".join(f"{value:g}" for value in values)
+        unit = f" [{item.unit}]" if item.unit else ""
+        raise InputError(f"{name}: got {given}, wanted finite numbers from {item.least:g} to {item.most:g}{unit}")
+    if item.direction and not np.any(numbers):
+        raise InputError(f"{name}: got {','.join('0' for _ in values)}, wanted a direction: not all of it 0")
+    return tuple(float(value) for value in values)
+
+
+def _point(name: str, value: Array, *, unit: str = "m", direction: bool = False) -> Changeable:
+    least, most = -LARGEST_LENGTH, LARGEST_LENGTH
+    return Changeable(name, _values(value), (3,), least, most, "" if direction else unit, direction)
+
+
+def _values(value: Any) -> Values:
+    return tuple(float(number) for number in np.array(value, dtype=np.float64).ravel())
+
+
+def _matrix(part) -> Array:
+    return np.array(part.world_transform().matrix, dtype=np.float64).reshape(4, 4)
+
+
+# The camera -----------------------------------------------------------------------------------------------------------
+
+_AIM = ("origin", "target", "up")
+
+
+def _of_camera(sensor) -> Iterable[Changeable]:
+    parameters = mi.traverse(sensor)
+    if "x_fov" not in parameters:
+        return
+    matrix = _matrix(sensor)
+    yield _point("camera.origin", matrix[:3, 3])
+    yield _point("camera.target", matrix[:3, 3] + matrix[:3, 2])
+    yield _point("camera.up", matrix[:3, 1], direction=True)
+    yield Changeable("camera.fov", _values(parameters["x_fov"]), (1,), 0.1, 179.0, "degrees")
+
+
+def _change_camera(sensor, aim: Mapping[str, Values], changed: Mapping[str, Values]) -> None:
+    parameters = mi.traverse(sensor)
+    if set(changed) & set(_AIM):
+        parameters["to_world"] = _looking(parameters["to_world"], *(aim[name] for name in _AIM))
+    if "fov" in changed:
+        parameters["x_fov"] = changed["fov"][0]
+    parameters.update()
+
+
+def _looking(like, origin: Values, target: Values, up: Values):
+    """Return the transform of a camera that looks from a point at another, of the type of another transform."""
+    forward = np.subtract(target, origin)
+    left = np.cross(up, forward)
+    if not np.linalg.norm(left) > 1e-9 * np.linalg.norm(up) * np.linalg.norm(forward):
+        raise InputError(
+            "camera: got a target at the origin, or straight up from it; wanted another camera.target or camera.up"
+        )
+    return type(like)().look_at(origin=list(origin), target=list(target), up=list(up))
+
+
+# Lights ---------------------------------------------------------------------------------------------------------------
+
+
+def _of_light(prefix: str, emitter) -> Iterable[Changeable]:
+    parameters = mi.traverse(emitter)
+    kind = emitter.class_name()
+    if kind == "PointLight":
+        yield _point(f"{prefix}.position", np.array(parameters["position"]))
+    if kind == "SpotLight":
+        yield _point(f"{prefix}.position", _matrix(emitter)[:3, 3])
+    if kind in ("SpotLight", "DirectionalEmitter"):
+        yield _point(f"{prefix}.direction", _matrix(emitter)[:3, 2], direction=True)
+    for name, unit in _LIGHTS.items():
+        if f"{name}.value" in parameters:
+            value = _values(parameters[f"{name}.value"])
+            yield Changeable(f"{prefix}.{name}", value, (1, 3) if len(value) == 3 else (1,), 0, LARGEST_LIGHT, unit)
+
+
+def _change_light(emitter, changed: Mapping[str, Values]) -> None:
+    parameters = mi.traverse(emitter)
+    if "position" in parameters and "position" in changed:
+        parameters["position"] = type(parameters["position"])(*changed["position"])
+    elif "position" in changed or "direction" in changed:
+        parameters["to_world"] = _shining(emitter, parameters["to_world"], changed)
+    for name in _LIGHTS:
+        if name in changed:
+            _set_colour(parameters, f"{name}.value", changed[name])
+    parameters.update()
+
+
+def _shining(emitter, like, changed: Mapping[str, Values]):
+    """Return the transform of a light that shines along a direction from a position."""
+    matrix = _matrix(emitter)
+    if "position" in changed:
+        matrix[:3, 3] = changed["position"]
+    if "direction" in changed:
+        axis = np.array(changed["direction"]) / np.linalg.norm(changed["direction"])
+        across = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
+        across /= np.linalg.norm(across)
+        matrix[:3, :3] = np.stack([across, np.cross(axis, across), axis], axis=1)
+    return type(like)(matrix)
+
+
+# Media ----------------------------------------------------------------------------------------------------------------
+
+
+def _media(scene) -> list[Any]:
+    """Return the media of a scene: the one around the camera, and those that shapes bound, each once."""
+    media: list[Any] = []
+    around = [sensor.get_medium() for sensor in scene.sensors()[:1]]
+    for medium in around + [shape.interior_medium() for shape in scene.shapes()]:
+        if medium is not None and medium.is_homogeneous() and medium not in media:
+            media.append(medium)
+    return media
+
+
+def _of_medium(prefix: str, medium) -> Iterable[Changeable]:
+    parameters = mi.traverse(medium)
+    sigma_t = np.array(parameters["sigma_t.value.value"], dtype=np.float64).ravel() * float(parameters["scale"])
+    sizes = (1, 3) if len(sigma_t) == 3 else (1,)
+    yield Changeable(f"{prefix}.sigma_t", _values(sigma_t), sizes, 0, LARGEST_LENGTH, "1/m")
+    albedo = _values(parameters["albedo.value.value"])
+    yield Changeable(f"{prefix}.albedo", albedo, (1, 3) if len(albedo) == 3 else (1,), 0, 1)
+    if "phase_function.g" in parameters or _is_isotropic(medium):
+        g = _values(parameters["phase_function.g"]) if "phase_function.g" in parameters else (0.0,)
+        yield Changeable(f"{prefix}.g", g, (1,), -0.99, 0.99)
+
+
+def _change_medium(medium, changed: Mapping[str, Values]) -> None:
+    parameters = mi.traverse(medium)
+    if "sigma_t" in changed:
+        parameters["scale"] = 1.0
+        _set_colour(parameters, "sigma_t.value.value", changed["sigma_t"])
+    if "albedo" in changed:
+        _set_colour(parameters, "albedo.value.value", changed["albedo"])
+    if "g" in changed and "phase_function.g" in parameters:
+        parameters["phase_function.g"] = changed["g"][0]
+    elif changed.get("g", (0.0,)) != (0.0,):
+        raise InputError(f"medium '{medium.id()}' is isotropic here; wanted its g when the scene is loaded")
+    parameters.update()
+
+
+def _is_isotropic(medium) -> bool:
+    return medium.phase_function().class_name() == "IsotropicPhaseFunction"
+
+
+def isotropic_media(scene) -> dict[str, str]:
+    """Return the ids of the isotropic media of a Mitsuba scene by the names of their mean cosines."""
+    numbered = enumerate(_media(scene), 1)
+    return {f"{_numbered('medium', number)}.g": medium.id() for number, medium in numbered if _is_isotropic(medium)}
+
+
+def _set_colour(parameters, key: str, values: Values) -> None:
+    kind = type(parameters[key])
+    parameters[key] = kind(*values) if len(values) == 3 else kind(values[0])
