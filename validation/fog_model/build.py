@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""All single-scattering paths of some pixels of a scene."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.quadrature.light_points import PointPlan, light_points, square_points
+from reference.quadrature.surface import SurfaceHits, surface_hits
+from reference.scene.area_light import TruthAreaLight
+from reference.scene.camera import film_directions, pixel_centres
+from reference.scene.directional_light import DirectionalLight
+from reference.scene.read import TruthLight, TruthScene
+from reference.scene.shapes import read_shapes
+from reference.visibility.exact_distance import exact_distance
+from validation.fog_model.directional_paths import directional_nodes
+from validation.fog_model.paths import LightPaths, Nodes, ScatteringPaths, SurfacePoints
+from validation.fog_model.point_paths import point_nodes
+from validation.fog_model.surface_paths import surface_points
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+Progress = Callable[[float, str], None]
+
+_POINTS = 16  # of lights with extent
+
+
+def scattering_paths(
+    truth: TruthScene,
+    *,
+    pixels: Index | None = None,
+    rays_per_side: int = 0,
+    offset: tuple[float, float] = (0.0, 0.0),
+    shadows: bool = True,
+    airlight: bool = True,
+    surface: bool = True,
+    points: int = _POINTS,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> ScatteringPaths:
+    """Return the paths of some pixels.
+
+    Parameters
+    ----------
+    truth
+        The scene.
+    pixels
+        Numbers of the pixels, row by row; all by default.
+    rays_per_side
+        0: one ray through the centre of each pixel. n: n x n rays, one at a random place of each cell of a grid, whose
+        mean is that over the pixel.
+    offset
+        Moves all rays on the film, to the right and down [pixels].
+    shadows
+        False where surfaces hide nothing from the lights.
+    airlight, surface
+        Which paths are wanted.
+    points
+        How many points stand for a light with extent.
+    seed
+        Of the random places.
+    progress
+        Called with (share done, what).
+    """
+    size = truth.width, truth.height
+    pixels = np.arange(size[0] * size[1]) if pixels is None else np.unique(pixels)
+    positions = _positions(pixel_centres(size)[pixels], rays_per_side, seed) + np.asarray(offset)
+    directions = film_directions(truth.scene.sensors()[0], positions, size)
+    rays = replace(truth, direction=directions)
+    shapes = read_shapes(truth.occluders)
+    hits = surface_hits(rays)
+    hits = SurfaceHits(exact_distance(rays, hits.interaction, hits.distance, shapes), hits.interaction)
+    open_rays = rays if shadows else replace(rays, occluders=mi.load_dict({"type": "scene"}))
+    how: dict[str, Any] = {"shapes": shapes if shadows else None}
+    sources = _sources(truth, points, seed)
+    lights = []
+    for number, (name, intensity, parts) in enumerate(sources):
+        nodes = [_nodes(open_rays, part, hits.distance, how) for part in parts] if airlight else []
+        lit = [surface_points(rays, part, hits, shadows=shadows) for part in parts] if surface else []
+        lights.append(_light_paths(name, intensity, nodes, lit, len(truth.media) + 1))
+        if progress is not None:
+            progress((number + 1) / len(sources), "lit intervals")
+    return ScatteringPaths(
+        shape=(truth.height, truth.width),
+        pixels=pixels,
+        ray_pixel=np.repeat(np.arange(len(pixels)), max(1, rays_per_side) ** 2),
+        rays_per_pixel=max(1, rays_per_side) ** 2,
+        media=(truth.medium, *truth.media),
+        media_names=("medium", *(medium.name for medium in truth.media)),
+        lights=tuple(lights),
+    )
+
+
+def _positions(centres: Array, rays_per_side: int, seed: int) -> Array:
+    """Return places on the film, those of a pixel one after another."""
+    if not rays_per_side:
+        return centres
+    row, column = np.divmod(np.arange(rays_per_side**2), rays_per_side)
+    cells = np.stack([column, row], axis=1)
+    random = np.random.default_rng(seed).random((len(centres), rays_per_side**2, 2))
+    return (centres[:, None, :] - 0.5 + (cells + random) / rays_per_side).reshape(-1, 2)
+
+
+Source = tuple[str, Array, Sequence[TruthLight | DirectionalLight]]
+
+
+def _sources(truth: TruthScene, points: int, seed: int) -> list[Source]:
+    """Return by light of the scene its name, what multiplies its paths, and the lights that stand for it."""
+    emitters = truth.scene.emitters()
+    names = {
+        "near": [e.id() for e in emitters if e.class_name() in ("PointLight", "SpotLight")],
+        "far": [e.id() for e in emitters if e.class_name() == "DirectionalEmitter"],
+    }
+    sources: list[Source] = []
+    for name, light in zip(names["near"], truth.lights, strict=True):
+        sources.append((name, light.intensity, (light,)))
+    for name, far in zip(names["far"], truth.directional, strict=True):
+        sources.append((name, far.irradiance, (far,)))
+    for number, wide in enumerate(truth.area):
+        sources.append((wide.name, wide.radiance * wide.area / points, _points(wide, number, points, seed)))
+    return sources
+
+
+def _points(light: TruthAreaLight, number: int, points: int, seed: int) -> Sequence[TruthLight]:
+    plan = PointPlan(most=points, seed=seed)
+    return light_points(light, square_points(plan, number, 0, light.kind))
+
+
+def _nodes(truth: TruthScene, light: TruthLight | DirectionalLight, distance: Array, how: dict[str, Any]) -> Nodes:
+    if isinstance(light, DirectionalLight):
+        return directional_nodes(truth, light, distance, how)
+    return point_nodes(truth, light, distance, how)
+
+
+def _light_paths(
+    name: str, intensity: Array, nodes: list[Nodes], surface: list[SurfacePoints], media: int
+) -> LightPaths:
+    empty, none, lengths = np.empty(0), np.empty(0, np.int64), np.empty((0, media))
+    no_nodes = Nodes(none, none, empty, empty, empty, empty, lengths, lengths)
+    no_surface = SurfacePoints(none, np.empty((0, 3)), empty, lengths, lengths)
+    return LightPaths(
+        name, np.asarray(intensity), Nodes.joined([no_nodes, *nodes]), SurfacePoints.joined([no_surface, *surface])
+    )
