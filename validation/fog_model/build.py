@@ -89,6 +89,7 @@ def scattering_paths(
         pixels=pixels,
         ray_pixel=np.repeat(np.arange(len(pixels)), max(1, rays_per_side) ** 2),
         rays_per_pixel=max(1, rays_per_side) ** 2,
+        direction=directions,
         media=(truth.medium, *truth.media),
         media_names=("medium", *(medium.name for medium in truth.media)),
         lights=tuple(lights),
@@ -132,6 +133,8 @@ def _points(light: TruthAreaLight, number: int, points: int, seed: int) -> Seque
 
 def _nodes(truth: TruthScene, light: TruthLight | DirectionalLight, distance: Array, how: dict[str, Any]) -> Nodes:
     if isinstance(light, DirectionalLight):
+        if not truth.media:
+            return _light_paths("", np.zeros(3), [], [], 1).nodes  # nothing scatters
         return directional_nodes(truth, light, distance, how)
     return point_nodes(truth, light, distance, how)
 
@@ -139,9 +142,9 @@ def _nodes(truth: TruthScene, light: TruthLight | DirectionalLight, distance: Ar
 def _light_paths(
     name: str, intensity: Array, nodes: list[Nodes], surface: list[SurfacePoints], media: int
 ) -> LightPaths:
-    empty, none, lengths = np.empty(0), np.empty(0, np.int64), np.empty((0, media))
-    no_nodes = Nodes(none, none, empty, empty, empty, empty, lengths, lengths)
-    no_surface = SurfacePoints(none, np.empty((0, 3)), empty, lengths, lengths)
+    empty, none, lengths, vectors = np.empty(0), np.empty(0, np.int64), np.empty((0, media)), np.empty((0, 3))
+    no_nodes = Nodes(none, none, empty, empty, empty, empty, lengths, lengths, vectors)
+    no_surface = SurfacePoints(none, vectors, empty, lengths, lengths, vectors)
     return LightPaths(
         name, np.asarray(intensity), Nodes.joined([no_nodes, *nodes]), SurfacePoints.joined([no_surface, *surface])
     )

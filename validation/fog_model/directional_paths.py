@@ -52,4 +52,5 @@ def directional_nodes(truth: TruthScene, light: DirectionalLight, distance: Arra
         weight * width[owner],
         lengths(truth, truth.origin, direction, nothing, x),
         lengths(truth, truth.origin + x[:, None] * direction, towards, nothing, np.full(len(x), np.inf)),
+        np.zeros_like(direction),
     )

@@ -4,7 +4,7 @@
 from dataclasses import dataclass, replace
 from typing import Any
 
-from validation.fog_model.paths import ScatteringPaths
+from reference.scene.read import TruthScene
 
 Colour = tuple[Any, Any, Any]  # numbers, or Dr.Jit numbers that carry derivatives
 
@@ -17,24 +17,28 @@ class Fog:
     albedo: tuple[Colour, ...]  #: single-scattering albedo [1]
     g: tuple[Any, ...]  #: of Henyey and Greenstein's function; None: the phase function of the scene
     intensity: tuple[Any, ...]  #: factors on the lights [1]
+    moved: tuple[Colour, ...]  #: how far the lights are from where the paths begin, x, y, z [m]
     exposure: Colour = (1.0, 1.0, 1.0)  #: factor on the image [1]
     camera_leg: Any = 1.0  #: share of the extinction that dims the way to the camera [1]
     light_leg: Any = 1.0  #: share of the extinction that dims the way from the light [1]
     distance_power: Any = 2.0  #: the irradiance falls as the distance to this power [1]
 
-    def with_medium(self, name: str, number: int, value: Any) -> "Fog":
-        """Return the fog with another `sigma_t`, `albedo` or `g` of one medium."""
+    def with_entry(self, name: str, number: int, value: Any) -> "Fog":
+        """Return the fog with another entry of one of its tuples, such as the `sigma_t` of a medium."""
         old = getattr(self, name)
         return replace(self, **{name: (*old[:number], value, *old[number + 1 :])})
 
 
-def scene_fog(paths: ScatteringPaths) -> Fog:
+def scene_fog(truth: TruthScene) -> Fog:
     """Return the fog as the scene has it."""
+    media = truth.medium, *truth.media
+    lights = len(truth.lights) + len(truth.directional) + len(truth.area)
     return Fog(
-        sigma_t=tuple(_colour(medium.sigma_t) for medium in paths.media),
-        albedo=tuple(_colour(medium.albedo) for medium in paths.media),
-        g=tuple(medium.phase.g if medium.phase.name == "hg" else None for medium in paths.media),
-        intensity=(1.0,) * len(paths.lights),
+        sigma_t=tuple(_colour(medium.sigma_t) for medium in media),
+        albedo=tuple(_colour(medium.albedo) for medium in media),
+        g=tuple(medium.phase.g if medium.phase.name == "hg" else None for medium in media),
+        intensity=(1.0,) * lights,
+        moved=((0.0, 0.0, 0.0),) * lights,
     )
 
 

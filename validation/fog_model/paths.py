@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Single-scattering paths of an image: camera, node, light, with the length of each leg in every medium."""
 
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,14 +26,12 @@ class Nodes:
     weight: Array  #: length of the ray that the node stands for, times the profile of the light [m]
     camera: Array  #: length in each medium between camera and node, (n, media) [m]
     leg: Array  #: length in each medium between light and node, (n, media) [m]
+    towards: Array  #: unit vector from the light to the node, (n, 3); 0 for a directional light
 
     @staticmethod
     def joined(parts: "list[Nodes]") -> "Nodes":
         """Join nodes of several lights."""
         return Nodes(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Nodes)))
-
-    def __getitem__(self, rows: Any) -> "Nodes":
-        return replace(self, **{f.name: getattr(self, f.name)[rows] for f in fields(self)})
 
 
 @dataclass(frozen=True)
@@ -46,6 +43,7 @@ class SurfacePoints:
     r: Array  #: distance from the light [m]; 1 for a directional light
     camera: Array  #: length in each medium between camera and surface, (n, media) [m]
     leg: Array  #: length in each medium between light and surface, (n, media) [m]
+    towards: Array  #: unit vector from the light to the surface, (n, 3); 0 for a directional light
 
     @staticmethod
     def joined(parts: "list[SurfacePoints]") -> "SurfacePoints":
@@ -72,6 +70,7 @@ class ScatteringPaths:
     pixels: Index  #: numbers of the pixels that have paths, row by row, ascending, (m,)
     ray_pixel: Index  #: by ray, which of these pixels it belongs to, (rays,)
     rays_per_pixel: int
+    direction: Array  #: of the rays, unit, (rays, 3)
     media: tuple[TruthMedium, ...]  #: that without bounds first
     media_names: tuple[str, ...]
     lights: tuple[LightPaths, ...]

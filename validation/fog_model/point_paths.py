@@ -73,6 +73,7 @@ def point_nodes(truth: TruthScene, light: TruthLight, distance: Array, how: dict
         weight * r * profile,
         lengths(truth, truth.origin, truth.direction[ray], np.zeros_like(x), x),
         lengths(truth, light.position, towards, np.zeros_like(x), r),
+        towards,
     )
 
 

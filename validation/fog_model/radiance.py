@@ -6,7 +6,12 @@ With the lengths c_k to the camera and l_k to the light in the medium k, a node 
     albedo_m sigma_m I p_m(cos) / (4 pi)  weight / r^2  exp(-sum_k sigma_k (a c_k + b l_k)),
 
 a and b the shares of the extinction that dim either leg, 1 by right. A surface point adds its radiance times the same
-exponential. Visibility is held: no derivative moves an edge of a shadow.
+exponential. Visibility is held: no derivative moves an edge of a shadow. Where a light is moved by d from where the
+paths begin, a node at r v from it (v of unit length, w along the ray) has
+
+    r' = |r v - d|,    cos = -(r v - d) . w / r',
+
+and the lengths of its leg change as r'/r, which is right where the medium has no bounds.
 """
 
 from dataclasses import dataclass
@@ -31,9 +36,11 @@ class _Legs:
     """The legs of nodes or surface points of a light, on the device."""
 
     pixel: Any
-    log_r: Any
+    r: Any
     camera: tuple[Any, ...]
     leg: tuple[Any, ...]
+    towards: Any
+    direction: Any  # of the rays
 
 
 @dataclass(frozen=True)
@@ -43,7 +50,7 @@ class _DeviceLight:
     surface: _Legs
     medium: Any
     cosine: Any
-    strength: Any  # weight/(4 pi r^2)
+    strength: Any  # weight/(4 pi)
     phases: tuple[Any, ...]  # by medium, the values of the scene's own phase function at all nodes
     reflected: Columns
 
@@ -76,7 +83,7 @@ def _device_light(paths: ScatteringPaths, light: LightPaths) -> _DeviceLight:
         _legs(paths, surface),
         mi.UInt32(nodes.medium.astype(np.uint32)),
         mi.Float64(nodes.cosine),
-        mi.Float64(nodes.weight / (4 * np.pi * nodes.r**2)),
+        mi.Float64(nodes.weight / (4 * np.pi)),
         phases,
         tuple(mi.Float64(np.ascontiguousarray(column)) for column in surface.radiance.T),  # type: ignore[arg-type]
     )
@@ -89,9 +96,14 @@ def _legs(paths: ScatteringPaths, points: Nodes | SurfacePoints) -> _Legs:
         tuple(mi.Float64(np.ascontiguousarray(column)) for column in part.T) for part in (points.camera, points.leg)
     )
     legs = _Legs(
-        mi.UInt32(paths.ray_pixel[points.ray].astype(np.uint32)), mi.Float64(np.log(points.r)), camera, leg
+        mi.UInt32(paths.ray_pixel[points.ray].astype(np.uint32)),
+        mi.Float64(points.r),
+        camera,
+        leg,
+        mi.Vector3d(points.towards.T),
+        mi.Vector3d(paths.direction[points.ray].T),
     )
-    dr.eval(legs.pixel, legs.log_r, legs.camera, legs.leg)
+    dr.eval(legs.pixel, legs.r, legs.camera, legs.leg, legs.towards, legs.direction)
     return legs
 
 
@@ -125,37 +137,60 @@ def _sums(paths: DevicePaths, fog: Fog, pick: Any, term: Any) -> Columns:
             legs = pick(light)
             if dr.width(legs.pixel):
                 factor = light.intensity[channel] * paths.share * fog.intensity[number] * fog.exposure[channel]
-                dr.scatter_reduce(dr.ReduceOp.Add, total, term(light, fog, channel) * factor, legs.pixel)
+                dr.scatter_reduce(dr.ReduceOp.Add, total, term(light, fog, number, channel) * factor, legs.pixel)
         totals.append(total)
     red, green, blue = totals
     return red, green, blue
 
 
-def _airlight(light: _DeviceLight, fog: Fog, channel: int) -> Any:
+def _airlight(light: _DeviceLight, fog: Fog, number: int, channel: int) -> Any:
+    place = _moved(light.nodes, fog.moved[number])
+    cosine = light.cosine if place is None else -dr.dot(place.away, light.nodes.direction) / place.r
     values = []
     for sigma_t, albedo, g, own in zip(fog.sigma_t, fog.albedo, fog.g, light.phases, strict=True):
-        phase = own if g is None else _henyey_greenstein(g, light.cosine)
+        phase = own if g is None else _henyey_greenstein(g, cosine)
         values.append(albedo[channel] * sigma_t[channel] * phase)
     source = values[0]
-    for number, value in enumerate(values[1:], start=1):
-        source = dr.select(light.medium == number, value, source)
-    return source * light.strength * _dimmed(light.nodes, fog, channel)
+    for medium, value in enumerate(values[1:], start=1):
+        source = dr.select(light.medium == medium, value, source)
+    r = light.nodes.r if place is None else place.r
+    falls = dr.rcp(dr.square(r)) if _is_right(fog) else dr.exp(-fog.distance_power * dr.log(r))
+    return source * light.strength * falls * _dimmed(light.nodes, fog, channel, place)
 
 
-def _surface(light: _DeviceLight, fog: Fog, channel: int) -> Any:
-    return light.reflected[channel] * _dimmed(light.surface, fog, channel)
+def _surface(light: _DeviceLight, fog: Fog, number: int, channel: int) -> Any:
+    place = _moved(light.surface, fog.moved[number])
+    value = light.reflected[channel] * _dimmed(light.surface, fog, channel, place)
+    if place is not None:
+        value = value * dr.square(light.surface.r / place.r)
+    return value if _is_right(fog) else value * dr.exp((2.0 - fog.distance_power) * dr.log(light.surface.r))
 
 
-def _dimmed(legs: _Legs, fog: Fog, channel: int) -> Any:
-    """Return the share of the light that both legs leave, and r^2 over the power of r that the fog has in its place."""
+@dataclass(frozen=True)
+class _Place:
+    away: Any  # from the moved light
+    r: Any
+
+
+def _moved(legs: _Legs, moved: Colour) -> _Place | None:
+    if all(isinstance(each, float) and each == 0 for each in moved):
+        return None
+    away = legs.towards * legs.r - mi.Vector3d(*moved)
+    return _Place(away, dr.norm(away))
+
+
+def _is_right(fog: Fog) -> bool:
+    return isinstance(fog.distance_power, float) and fog.distance_power == 2.0
+
+
+def _dimmed(legs: _Legs, fog: Fog, channel: int, place: _Place | None) -> Any:
+    """Return the share of the light that both legs leave."""
+    longer = 1.0 if place is None else place.r / legs.r
     parts = [
-        sigma_t[channel] * (fog.camera_leg * camera + fog.light_leg * leg)
+        sigma_t[channel] * (fog.camera_leg * camera + fog.light_leg * leg * longer)
         for sigma_t, camera, leg in zip(fog.sigma_t, legs.camera, legs.leg, strict=True)
     ]
-    depth = reduce(lambda a, b: a + b, parts)
-    if not (isinstance(fog.distance_power, float) and fog.distance_power == 2.0):
-        depth = depth + (fog.distance_power - 2.0) * legs.log_r
-    return dr.exp(-depth)
+    return dr.exp(-reduce(lambda a, b: a + b, parts))
 
 
 def _henyey_greenstein(g: Any, cosine: Any) -> Any:

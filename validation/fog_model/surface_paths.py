@@ -64,6 +64,7 @@ def surface_points(
         r[ray],
         lengths(truth, truth.origin, truth.direction[ray], nothing, hits.distance[ray]),
         lengths(truth, point[ray], towards[ray], nothing, reach[ray]),
+        0 * towards[ray] if isinstance(light, DirectionalLight) else -towards[ray],
     )
 
 
@@ -79,5 +80,5 @@ def _profile(light: TruthLight, direction: Array) -> Array:
 def _none(media: int) -> SurfacePoints:
     empty = np.empty(0)
     return SurfacePoints(
-        np.empty(0, np.int64), np.empty((0, 3)), empty, np.empty((0, media)), np.empty((0, media))
+        np.empty(0, np.int64), np.empty((0, 3)), empty, np.empty((0, media)), np.empty((0, media)), np.empty((0, 3))
     )
