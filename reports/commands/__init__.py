@@ -19,6 +19,7 @@ Read in this order:
 - `doctor.py`: `airlight doctor`
 - `fidelity.py`: `airlight fidelity`
 - `figures.py`: `airlight figures`
+- `fit.py`: `airlight fit`
 - `integrate.py`: `airlight integrate`
 - `lists.py`: `airlight scenes`, `methods`, `kernels`
 - `maps.py`: `airlight maps`
@@ -37,6 +38,6 @@ May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.kernels`,
 `reports.data`, `reports.diff`, `reports.docs`, `reports.figures`, `reports.interchange`, `reports.machine`,
 `reports.papers`, `reports.plotting`, `reports.report`, `reports.tables`, `validation.certified`,
 `validation.comparison`, `validation.configurations`, `validation.estimates`, `validation.fidelity`,
-`validation.frames`, `validation.kernels`, `validation.metrics`, `validation.mutations`, `validation.papers`,
-`validation.scenes`, `validation.slab`.
+`validation.fit`, `validation.frames`, `validation.kernels`, `validation.metrics`, `validation.mutations`,
+`validation.papers`, `validation.scenes`, `validation.slab`.
 """

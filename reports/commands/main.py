@@ -27,6 +27,7 @@ from reports.commands.docs import docs
 from reports.commands.doctor import doctor
 from reports.commands.fidelity import fidelity
 from reports.commands.figures import figures
+from reports.commands.fit import fit
 from reports.commands.integrate import integrate
 from reports.commands.lists import kernels, methods, scenes
 from reports.commands.maps import maps
@@ -56,6 +57,7 @@ _COMMANDS = (
     reference,
     merge,
     compare,
+    fit,
     diff,
     baselines,
     integrate,

@@ -7,7 +7,7 @@ divided by its length, say which: those with a singular value below a millionth 
 them all but as many as can be known are held, the later ones of the list, and the others mean products with them.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,7 +26,8 @@ class Group:
 
     members: tuple[int, ...]  #: numbers of the parameters
     held: tuple[int, ...]  #: which of them are held
-    powers: tuple[float, ...] | None  #: the product of these powers of the members is known; None: several are, or none
+    #: By parameter that is not held, the powers of those held whose product with it is known.
+    powers: Mapping[int, Mapping[int, float]]
 
 
 def confounded_groups(derivatives: Array) -> tuple[Group, ...]:
@@ -50,7 +51,7 @@ def confounded_groups(derivatives: Array) -> tuple[Group, ...]:
     groups, left = [], [number for number in range(count) if linked[number].any()]
     while left:
         members = {left[0]}
-        while more := {j for i in members for j in np.flatnonzero(linked[i])} - members:
+        while more := {int(j) for i in members for j in np.flatnonzero(linked[i])} - members:
             members |= more
         left = [number for number in left if number not in members]
         groups.append(_group(columns, length, null, sorted(members)))
@@ -64,11 +65,12 @@ def _group(columns: Array, length: Array, null: Array, members: Sequence[int]) -
         values = np.linalg.svd(trial, compute_uv=False)
         if values[-1] > _ZERO * max(float(values[0]), 1e-300):
             kept.append(number)
-    held = tuple(number for number in members if number not in kept)
-    if len(kept) != 1:
-        return Group(tuple(members), held, None)
-    # What is known is the direction across all that changes nothing, in steps of the parameters themselves.
-    steps = null[members] / length[members][:, None]
-    known = np.linalg.svd(steps.T)[2][-1]
-    known = known / known[np.argmax(np.abs(known))]
-    return Group(tuple(members), held, tuple(float(power) for power in known))
+    held = [number for number in members if number not in kept]
+    # A step of the null space N changes log p_k + sum_h a_kh log p_h by N_k + sum_h a_kh N_h, which must be nothing.
+    steps = null / np.where(length > 0, length, 1.0)[:, None]
+    powers = -steps[kept] @ np.linalg.pinv(steps[held])
+    known = {
+        number: {h: float(power) for h, power in zip(held, row, strict=True) if abs(power) > _INVOLVED}
+        for number, row in zip(kept, powers, strict=True)
+    }
+    return Group(tuple(members), tuple(held), known)

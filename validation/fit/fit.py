@@ -4,7 +4,7 @@
 import math
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -23,6 +23,7 @@ from validation.fit.least_squares import Solution, best_start, robust_fit, weigh
 from validation.fit.unknowns import AXES, CHANNELS, Unknown, read_unknowns
 from validation.fog_model.fog import scene_fog
 from validation.metrics.errors import plain
+from validation.scenes.loading import LoadedScene
 
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
@@ -31,7 +32,8 @@ _SIGMAS = 1.959964  # standard errors in half of a 95 % interval
 _MOVES = 12  # rounds in which lit intervals are found anew
 _STILL = 1e-6  # of the distance of a light from the camera: it does not move any more
 _KNOWN = 1e-6  # a standard error that is always there: scenes are read, and images written, in float32
-_EXACT = 1e-5  # median relative residual at which pixels are centres beyond doubt
+_EXACT = 1e-5  # mean relative residual at which pixels are centres beyond doubt
+_FEW_RAYS = 3000  # on which starts are compared
 _FEWEST = 16  # pixels
 
 
@@ -48,15 +50,22 @@ class Fitted:
 
 
 @dataclass(frozen=True)
+class Product:
+    """What an image says of parameters that it does not tell apart: a product of powers of them."""
+
+    name: str  #: such as 'albedo * intensity'
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
 class Confounded:
     """Parameters that the image does not tell apart."""
 
-    names: tuple[str, ...]
+    parameters: tuple[str, ...]
     held: tuple[str, ...]  #: which of them were held at the value to begin with
-    product: str  #: what of them is known, such as 'albedo * intensity'; empty where that is no single number
-    value: float | None
-    low: float | None
-    high: float | None
+    products: tuple[Product, ...]  #: what is known of them
     way_out: str
 
 
@@ -96,18 +105,7 @@ class Fit:
             "noise": plain(self.noise),
             "pixels": self.pixels,
             "left_out": self.left_out,
-            "confounded": [
-                {
-                    "parameters": list(each.names),
-                    "held": list(each.held),
-                    "product": each.product,
-                    "value": plain(each.value),
-                    "low": plain(each.low),
-                    "high": plain(each.high),
-                    "way_out": each.way_out,
-                }
-                for each in self.confounded
-            ],
+            "confounded": [asdict(each) for each in self.confounded],
         }
 
 
@@ -117,11 +115,8 @@ def fit_file(
     parameters: Sequence[str],
     *,
     layer: str | None = None,
-    holds: str | None = None,
-    pixel: str | None = None,
     mask: str | os.PathLike[str] | None = None,
-    starts: Mapping[str, float] | None = None,
-    progress: Progress | None = None,
+    **how: Any,
 ) -> Fit:
     """Find the parameters that explain an EXR file.
 
@@ -134,12 +129,54 @@ def fit_file(
         looked for.
     parameters
         What is looked for, see `validation.fit.unknowns`.
-    layer, holds
+    layer
         Which layer, see `validation.comparison.engine_layers.judged_layer`.
-    pixel
-        'centre' or 'area'; by default what the file says, or what fits better.
     mask
         An EXR file that is 0 in pixels to leave out.
+    how
+        More for `fit_image`.
+
+    Raises
+    ------
+    InputError
+        For files, scenes and names that cannot be used, and what `fit_image` refuses.
+    """
+    image = read_exr(path)
+    judged = judged_layer(image, path, name=layer, holds=how.get("holds"))
+    loaded = scene_of_size(scene, judged.size, path)
+    chosen = None if mask is None else read_mask(mask)
+    return fit_image(image, loaded, parameters, path=str(path), layer=layer, mask=chosen, **how)
+
+
+def fit_image(
+    image: Image,
+    loaded: LoadedScene,
+    parameters: Sequence[str],
+    *,
+    path: str = "the image",
+    layer: str | None = None,
+    holds: str | None = None,
+    pixel: str | None = None,
+    mask: NDArray[np.bool_] | None = None,
+    starts: Mapping[str, float] | None = None,
+    progress: Progress | None = None,
+) -> Fit:
+    """Find the parameters that explain an image.
+
+    Parameters
+    ----------
+    image
+        The layers.
+    loaded
+        The scene, at the size of the image.
+    parameters, layer, holds
+        See `fit_file`; what the layer holds is 'airlight', 'surface' or 'total'.
+    path
+        What to call the image.
+    pixel
+        'centre' or 'area'; by default what the image says of itself, or what fits better.
+    mask
+        Which pixels may take part, (height, width); all by default.
     starts
         Values to begin with, by name; the scene's own by default.
     progress
@@ -148,34 +185,41 @@ def fit_file(
     Raises
     ------
     InputError
-        For files, scenes and names that cannot be used, and an image with too few pixels that say something.
+        For layers and names that are not known, a scene that has no truth, a mask of another size, and an image with
+        too few pixels that say something.
+
+    Notes
+    -----
+    Valid for single scattering: homogeneous media, point and spot lights, directional ones where media have bounds;
+    lights with extent are sixteen points here, which leaves some 0.5 % in a pixel. The intervals count pixels as
+    independent of one another.
     """
     if pixel is not None and pixel not in PIXELS:
         raise InputError(f"--pixel {pixel}; wanted 'centre' or 'area'")
-    image = read_exr(path)
     judged = judged_layer(image, path, name=layer, holds=holds)
-    loaded = scene_of_size(scene, judged.size, path)
     truth = read_truth(loaded.scene)
     unknowns = read_unknowns(parameters, truth, scene_fog(truth), starts or {})
     values = _three_channels(judged)
     used = usable_pixels(values)
     if mask is not None:
         used &= _fitting_mask(mask, judged)
-    if int(used.sum()) < max(_FEWEST, 4 * len(unknowns)):
+    fewest = max(_FEWEST, 4 * len(unknowns))
+    if int(used.sum()) < fewest:
         raise InputError(
-            f"{path}: {int(used.sum())} pixels of layer '{judged.name}' say something; wanted at least "
-            f"{max(_FEWEST, 4 * len(unknowns))} finite ones that no mask leaves out"
+            f"{path}: {int(used.sum())} pixels of the layer '{judged.name}' say something; wanted at least {fewest}, "
+            "finite, not cut off at the brightest value, and left by the mask"
         )
     task = Task(truth, values, judged.holds, used, area=False)
-    kinds = [pixel or said_pixel(image)]
+    said = pixel or said_pixel(image)
+    kinds = [said] if said else list(PIXELS)
     results = []
-    for number, kind in enumerate(kinds if kinds[0] else PIXELS):
-        tell = None if progress is None else _stage(progress, number, 1 if kinds[0] else 2)
+    for number, kind in enumerate(kinds):
+        tell = None if progress is None else _stage(progress, number, len(kinds))
         results.append((kind, *_solved(replace(task, area=kind == "area"), unknowns, tell)))
-        if _left(results[-1][3]) < _EXACT:
+        if _wrong(results[-1][3]) < _EXACT:
             break
-    kind, model, groups, solution, unknowns = min(results, key=lambda result: _left(result[3]))
-    return _fit(loaded.name, str(path), judged.holds, str(kind), model, groups, solution, unknowns)
+    kind, model, groups, solution, unknowns = min(results, key=lambda result: _wrong(result[3]))
+    return _fit((loaded.name, path, judged.holds, kind), model, groups, solution, unknowns)
 
 
 def said_pixel(image: Image) -> str | None:
@@ -193,14 +237,14 @@ def _three_channels(judged: JudgedLayer) -> Array:
     return np.broadcast_to(values.reshape(-1, values.shape[-1]), (judged.size[0] * judged.size[1], 3)).copy()
 
 
-def _fitting_mask(mask: str | os.PathLike[str], judged: JudgedLayer) -> NDArray[np.bool_]:
-    chosen = read_mask(mask)
+def _fitting_mask(mask: NDArray[np.bool_], judged: JudgedLayer) -> NDArray[np.bool_]:
+    chosen = np.asarray(mask)
     if chosen.shape != judged.values.shape[:2]:
+        shape = " x ".join(str(side) for side in chosen.shape[::-1])
         raise InputError(
-            f"{mask} is {chosen.shape[1]} x {chosen.shape[0]} pixels, the image {judged.size[0]} x {judged.size[1]}; "
-            "wanted a mask of the image's size"
+            f"the mask is {shape} pixels, the image {judged.size[0]} x {judged.size[1]}; wanted one of the image's size"
         )
-    return chosen.ravel()
+    return chosen.ravel() != 0
 
 
 def _stage(progress: Progress, number: int, count: int) -> Progress:
@@ -215,7 +259,7 @@ def _solved(
     if any(unknown.moves and unknown.start != unknown.scene for unknown in unknowns):
         task, unknowns = _moved(task, unknowns, [unknown.start for unknown in unknowns])
     model = image_model(task, progress=None if progress is None else lambda share, what: progress(0.5 * share, what))
-    start = best_start(model, unknowns)
+    start = best_start(image_model(task, most=_FEW_RAYS), unknowns)
     groups = confounded_groups(weighted_derivatives(model, unknowns, start))
     held = {number for group in groups for number in group.held}
     free = [number for number in range(len(unknowns)) if number not in held]
@@ -253,7 +297,7 @@ def _moved(task: Task, unknowns: Sequence[Unknown], values: Sequence[float]) -> 
     for row, (unknown, value) in enumerate(zip(unknowns, values, strict=True)):
         if unknown.moves:
             places[unknown.number][AXES.index(unknown.kind[-1])] = value
-            moved[row] = replace(unknown, scene=value)
+            moved[row] = replace(unknown, place=value)
     return at_places(task, {number: (x, y, z) for number, (x, y, z) in places.items()}), tuple(moved)
 
 
@@ -271,18 +315,20 @@ def _nothing(model: ImageModel) -> Solution:
     return Solution(np.empty(0), np.empty((0, 0)), model.image - radiance, radiance, kept, np.ones_like(radiance))
 
 
-def _left(solution: Solution) -> float:
-    """Return the median of the relative residual over lit values."""
+def _left(solution: Solution) -> Array:
+    """Return the relative residual of lit values, (n,)."""
     lit = solution.radiance > 1e-3 * solution.radiance.mean()
-    relative = np.abs(solution.residual[lit]) / solution.radiance[lit]
-    return float(np.median(relative)) if relative.size else math.inf
+    return np.asarray(np.abs(solution.residual[lit]) / solution.radiance[lit])
+
+
+def _wrong(solution: Solution) -> float:
+    """Return how far values are off, as `validation.comparison.engine_pixels` does: no single one decides."""
+    left = _left(solution)
+    return float(np.minimum(left, 1.0).mean()) if left.size else math.inf
 
 
 def _fit(
-    scene: str,
-    path: str,
-    holds: str,
-    pixel: str,
+    what: tuple[str, str, str, str],
     model: ImageModel,
     groups: tuple[Group, ...],
     solution: Solution,
@@ -300,28 +346,29 @@ def _fit(
         ends: tuple[float | None, float | None] = (None, None)
         if number not in doubtful:
             reach = _SIGMAS * error[number]
-            ends = float(outward(inner[number] - reach)), float(outward(inner[number] + reach))
-        rows.append(Fitted(unknown.name, float(outward(inner[number])), *ends, unknown.unit, unknown.start))
+            ends = _finite(outward(inner[number] - reach)), _finite(outward(inner[number] + reach))
+        rows.append(Fitted(unknown.name, float(outward(inner[number])), *ends, unknown.unit, unknown.scene))
     kept = solution.kept
     image, residual = model.image[kept], solution.residual[kept]
     mean = float(np.abs(image).mean()) if image.size else math.nan
     spread = float(np.sum((image - image.mean(axis=0)) ** 2)) if image.size else math.nan
     scatter = np.sqrt(np.maximum(np.diag(solution.covariance), 1e-300))
     return Fit(
-        scene,
-        path,
-        holds,
-        pixel,
+        *what,
         tuple(rows),
         _by_name(unknowns),
         float(np.sqrt(np.mean(residual**2))) / mean if mean > 0 else math.nan,
         1 - float(np.sum(residual**2)) / spread if spread > 0 else math.nan,
         len(kept),
         int((~kept).sum()),
-        1.4826 * _left(solution),
-        tuple(_confounded(group, unknowns, inner, error, holds) for group in groups),
+        1.4826 * float(np.median(_left(solution))) if _left(solution).size else math.nan,
+        tuple(_confounded(group, unknowns, inner, error, what[2]) for group in groups),
         solution.covariance / np.outer(scatter, scatter),
     )
+
+
+def _finite(value: Any) -> float | None:
+    return float(value) if math.isfinite(value) else None
 
 
 def _by_name(unknowns: Sequence[Unknown]) -> tuple[tuple[str, tuple[int, ...]], ...]:
@@ -347,22 +394,20 @@ def _whole(unknown: Unknown) -> str:
 def _confounded(
     group: Group, unknowns: Sequence[Unknown], inner: Mapping[int, float], error: Mapping[int, float], holds: str
 ) -> Confounded:
-    names = tuple(unknowns[number].name for number in group.members)
-    held = tuple(unknowns[number].name for number in group.held)
-    product, value, low, high = "", None, None, None
-    relative = all(unknowns[number].scale.relative for number in group.members)
-    if group.powers is not None and relative:
-        product = " * ".join(
-            name if abs(power - 1) < 1e-3 else f"{name}^{power:.3g}"
-            for name, power in zip(names, group.powers, strict=True)
-            if abs(power) > 1e-6
-        )
-        (kept,) = (number for number in group.members if number not in group.held)
-        power = group.powers[group.members.index(kept)]
-        middle = sum(p * inner[number] for number, p in zip(group.members, group.powers, strict=True))
-        reach = _SIGMAS * abs(power) * error[kept]
-        value, low, high = math.exp(middle), math.exp(middle - reach), math.exp(middle + reach)
-    return Confounded(names, held, product, value, low, high, _way_out(group, unknowns, holds))
+    names = {number: unknowns[number].name for number in group.members}
+    products = []
+    for kept, powers in group.powers.items():
+        if all(unknowns[number].scale.relative for number in (kept, *powers)):
+            words = [names[kept], *(_power(names[number], power) for number, power in powers.items())]
+            middle = inner[kept] + sum(power * inner[number] for number, power in powers.items())
+            ends = (math.exp(middle + sign * _SIGMAS * error[kept]) for sign in (-1, 1))
+            products.append(Product(" * ".join(words), math.exp(middle), *ends))
+    held = tuple(names[number] for number in group.held)
+    return Confounded(tuple(names.values()), held, tuple(products), _way_out(group, unknowns, holds))
+
+
+def _power(name: str, power: float) -> str:
+    return name if abs(power - 1) < 1e-3 else f"{name}^{power:.3g}"
 
 
 def _way_out(group: Group, unknowns: Sequence[Unknown], holds: str) -> str:

@@ -24,6 +24,7 @@ Bools = NDArray[np.bool_]
 _MOST_RAYS = 20_000  # that a fit looks at, each with some nodes for every light: more say nothing new of few numbers
 _SIDE = 3  # rays along a side of a pixel, for means over its area
 _AREA_POINTS = 16  # of lights with extent
+_HUGE = 1e100  # whose square is a number too
 _SATURATED = 8  # values that stop at the largest one
 
 
@@ -53,45 +54,49 @@ class ImageModel:
         return self.task.values[self.pixels]
 
     def radiance(self, fog: Fog) -> Array:
-        """Return the radiance of the pixels, (m, 3) [W/(m^2 sr)]."""
-        return np.stack([np.array(column, dtype=np.float64) for column in self._columns(fog)], axis=1)
+        """Return the radiance of the pixels, (m, 3) [W/(m^2 sr)]; numbers out of range are as large as can be."""
+        columns = np.stack([np.array(column, dtype=np.float64) for column in self._columns(fog)], axis=1)
+        return np.nan_to_num(columns, nan=_HUGE, posinf=_HUGE, neginf=-_HUGE)
 
-    def values(self, unknowns: Sequence[Unknown], inner: Sequence[float]) -> Array:
+    def values(self, unknowns: Sequence[Unknown], inner: Sequence[float] | Array) -> Array:
         """Return the radiance for values of parameters, given as numbers on the whole line, (m, 3)."""
         return self.radiance(with_values(unknowns, self.fog, [dr.opaque(mi.Float64, value) for value in inner]))
 
-    def derivatives(self, unknowns: Sequence[Unknown], inner: Sequence[float]) -> Array:
+    def derivatives(self, unknowns: Sequence[Unknown], inner: Sequence[float] | Array) -> Array:
         """Return the derivatives of `values` by each of these numbers, (m, 3, unknowns), by forward mode."""
         variables = [dr.opaque(mi.Float64, value) for value in inner]
         dr.enable_grad(variables)
-        columns = self._columns(with_values(unknowns, self.fog, variables))
+        radiance = self._columns(with_values(unknowns, self.fog, variables))
         slopes = []
         for variable in variables:
             dr.set_grad(variable, 1.0)
             dr.enqueue(dr.ADMode.Forward, variable)
             dr.traverse(dr.ADMode.Forward, flags=dr.ADFlag.ClearVertices)
-            slopes.append([mi.Float64(dr.grad(column)) for column in columns])
+            slopes.append([mi.Float64(dr.grad(column)) for column in radiance])
             dr.set_grad(variable, 0.0)
-            for column in columns:
+            for column in radiance:
                 dr.set_grad(column, 0.0)
         dr.eval(slopes)
         count = len(self.pixels)
-        return np.stack(
-            [np.stack([np.resize(np.array(channel), count) for channel in slope], axis=1) for slope in slopes], axis=2
-        )
+        columns = [np.stack([np.resize(np.array(channel), count) for channel in slope], axis=1) for slope in slopes]
+        return np.nan_to_num(np.stack(columns, axis=2), nan=0.0, posinf=_HUGE, neginf=-_HUGE)
 
     def _columns(self, fog: Fog) -> Any:
         kinds = {AIRLIGHT: fog_airlight, SURFACE: fog_surface}
         return kinds.get(self.task.holds, fog_total)(self.paths, fog)
 
 
-def image_model(task: Task, *, seed: int = 0, progress: Progress | None = None, **how: Any) -> ImageModel:
+def image_model(
+    task: Task, *, most: int = _MOST_RAYS, seed: int = 0, progress: Progress | None = None, **how: Any
+) -> ImageModel:
     """Return the model of an image.
 
     Parameters
     ----------
     task
         The image.
+    most
+        Rays at most.
     seed
         Of the choice of pixels, and of the places of rays in them.
     progress
@@ -100,7 +105,7 @@ def image_model(task: Task, *, seed: int = 0, progress: Progress | None = None, 
         More for `validation.fog_model.build.scattering_paths`.
     """
     rays = (_SIDE**2 if task.area else 1) * (_AREA_POINTS if task.truth.area else 1)
-    pixels = _some(np.flatnonzero(task.used), max(64, _MOST_RAYS // rays), seed)
+    pixels = _some(np.flatnonzero(task.used), max(64, most // rays), seed)
     paths = scattering_paths(
         task.truth,
         pixels=pixels,
@@ -126,11 +131,11 @@ def at_places(task: Task, places: dict[int, tuple[float, float, float]]) -> Task
 
 def usable_pixels(values: Array) -> Bools:
     """Return which pixels say something: finite ones that do not stop, with many others, at the largest value."""
-    finite = np.isfinite(values).all(axis=1)
+    finite: Bools = np.asarray(np.isfinite(values).all(axis=1))
     if not finite.any():
         return finite
     largest = values[finite].max()
-    stopped = np.any(values == largest, axis=1) & finite
+    stopped: Bools = np.asarray(np.any(values == largest, axis=1) & finite)
     return finite & ~stopped if largest > 0 and np.count_nonzero(stopped) >= _SATURATED else finite
 
 

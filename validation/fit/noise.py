@@ -32,13 +32,14 @@ def noise_of(radiance: Array, residual: Array) -> Array:
     radiance, residual
         Of the model, and image minus model, (n,) each [W/(m^2 sr)].
     """
-    least = _ROUNDING * np.abs(radiance) + _ROUNDING * 1e-3 * float(np.mean(np.abs(radiance))) + 1e-300
+    usual = float(np.mean(np.abs(radiance + residual)))  # of the image
+    least = _ROUNDING * (np.abs(radiance) + 1e-3 * usual) + 1e-140
     order = np.argsort(radiance)
     groups = [group for group in np.array_split(order, min(_GROUPS, max(1, len(order) // 8))) if len(group)]
     scatter = np.array([1.4826 * np.median(np.abs(residual[group])) for group in groups])
     scatter = np.maximum(scatter, [np.median(least[group]) for group in groups])
     squares = np.array([np.median(radiance[group] ** 2) for group in groups])
-    scale = max(float(squares.max()), 1e-300)
+    scale = max(float(squares.max()), 1e-280)
     rows = np.stack([np.ones_like(squares), squares / scale], axis=1) / scatter[:, None] ** 2
     (constant, relative), _ = nnls(rows, np.ones(len(rows)))
     return np.sqrt(constant + relative * radiance**2 / scale + least**2)

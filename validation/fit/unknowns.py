@@ -27,6 +27,7 @@ import drjit as dr
 
 from analytic.errors import InputError, nearest
 from reference.scene.read import TruthScene
+from validation.fog_model.build import light_sources
 from validation.fog_model.fog import Fog
 
 CHANNELS = ("r", "g", "b")
@@ -56,10 +57,11 @@ class Unknown:
     kind: str  #: of `NAMES`
     number: int  #: of the medium or light
     channels: tuple[int, ...]  #: which it is about
-    scene: float  #: value in the scene, and of a position that of the paths
+    scene: float  #: value in the scene
     scale: Scale
     unit: str
     start: float = math.nan  #: value to begin with
+    place: float = math.nan  #: of a position: where the paths begin [m]
 
     def put(self, fog: Fog, value: Any) -> Fog:
         """Return the fog with a value of this parameter."""
@@ -76,7 +78,7 @@ class Unknown:
             return replace(fog, exposure=(red, green, blue))
         axis = AXES.index(self.kind[-1])
         place = fog.moved[self.number]
-        new_place = tuple(value - self.scene if each == axis else place[each] for each in range(3))
+        new_place = tuple(value - self.place if each == axis else place[each] for each in range(3))
         return fog.with_entry("moved", self.number, new_place)
 
     @property
@@ -85,7 +87,9 @@ class Unknown:
         return self.kind.startswith("light.")
 
 
-def read_unknowns(names: Sequence[str], truth: TruthScene, fog: Fog, starts: Mapping[str, float]) -> tuple[Unknown, ...]:
+def read_unknowns(
+    names: Sequence[str], truth: TruthScene, fog: Fog, starts: Mapping[str, float]
+) -> tuple[Unknown, ...]:
     """Return the parameters that names stand for.
 
     Parameters
@@ -115,7 +119,9 @@ def read_unknowns(names: Sequence[str], truth: TruthScene, fog: Fog, starts: Map
     for name in starts:
         if name not in {unknown.name for unknown in unknowns}:
             known = [unknown.name for unknown in unknowns]
-            raise InputError(f"--start: '{name}' is not looked for; wanted one of {', '.join(known)}" + nearest(name, known))
+            raise InputError(
+                f"--start: '{name}' is not looked for; wanted one of {', '.join(known)}" + nearest(name, known)
+            )
     return tuple(_started(unknown, starts) for unknown in unknowns)
 
 
@@ -128,7 +134,7 @@ def with_values(unknowns: Sequence[Unknown], fog: Fog, inner: Sequence[Any]) -> 
 
 def _read(name: str, truth: TruthScene, fog: Fog) -> list[Unknown]:
     word, _, place = name.partition(":")
-    kind, channels = word, (0, 1, 2)
+    kind, channels = word, tuple(range(3))
     for channel, letter in enumerate(CHANNELS):
         base = word.removesuffix(f".{letter}")
         if base in ("sigma_t", "albedo", "exposure") and base != word:
@@ -197,11 +203,7 @@ def _medium_name(number: int, truth: TruthScene) -> str:
 
 def light_names(truth: TruthScene) -> list[str]:
     """Return the ids of the lights, in the order of their paths."""
-    ids = {}
-    for emitter in truth.scene.emitters():
-        ids.setdefault(emitter.class_name(), []).append(emitter.id())
-    near = [e.id() for e in truth.scene.emitters() if e.class_name() in ("PointLight", "SpotLight")]
-    return [*near, *ids.get("DirectionalEmitter", []), *(wide.name for wide in truth.area)]
+    return [source.name for source in light_sources(truth)]
 
 
 def _media(name: str, place: str, truth: TruthScene) -> list[int]:
@@ -227,7 +229,8 @@ def _chosen(name: str, place: str, numbers: list[int], names: list[str], what: s
     if place.isdigit() and 1 <= int(place) <= len(numbers):
         return [numbers[int(place) - 1]]
     raise InputError(
-        f"--parameters: got '{name}', wanted a {what} of the scene, {', '.join(names)}, or its number" + nearest(place, names)
+        f"--parameters: got '{name}', wanted a {what} of the scene, {', '.join(names)}, or its number"
+        + nearest(place, names)
     )
 
 
@@ -246,4 +249,4 @@ def _started(unknown: Unknown, starts: Mapping[str, float]) -> Unknown:
         fits, wanted = -1 < value < 1, "a number between -1 and 1"
     if not fits:
         raise InputError(f"--start: {unknown.name}={value:g}, wanted {wanted}")
-    return replace(unknown, start=float(value))
+    return replace(unknown, start=float(value), place=unknown.scene)

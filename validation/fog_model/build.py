@@ -2,7 +2,7 @@
 """All single-scattering paths of some pixels of a scene."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import mitsuba as mi
@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from reference.quadrature.light_points import PointPlan, light_points, square_points
 from reference.quadrature.surface import SurfaceHits, surface_hits
-from reference.scene.area_light import TruthAreaLight
+from reference.scene.area_light import is_area
 from reference.scene.camera import film_directions, pixel_centres
-from reference.scene.directional_light import DirectionalLight
+from reference.scene.directional_light import DirectionalLight, is_directional
 from reference.scene.read import TruthLight, TruthScene
 from reference.scene.shapes import read_shapes
 from reference.visibility.exact_distance import exact_distance
@@ -51,8 +51,8 @@ def scattering_paths(
     pixels
         Numbers of the pixels, row by row; all by default.
     rays_per_side
-        0: one ray through the centre of each pixel. n: n x n rays, one at a random place of each cell of a grid, whose
-        mean is that over the pixel.
+        0: one ray through the centre of each pixel. n: n x n rays, one through the middle of each cell of a grid,
+        whose mean is that over the pixel.
     offset
         Moves all rays on the film, to the right and down [pixels].
     shadows
@@ -62,13 +62,13 @@ def scattering_paths(
     points
         How many points stand for a light with extent.
     seed
-        Of the random places.
+        Of the points on lights with extent.
     progress
         Called with (share done, what).
     """
     size = truth.width, truth.height
     pixels = np.arange(size[0] * size[1]) if pixels is None else np.unique(pixels)
-    positions = _positions(pixel_centres(size)[pixels], rays_per_side, seed) + np.asarray(offset)
+    positions = _positions(pixel_centres(size)[pixels], rays_per_side) + np.asarray(offset)
     directions = film_directions(truth.scene.sensors()[0], positions, size)
     rays = replace(truth, direction=directions)
     shapes = read_shapes(truth.occluders)
@@ -76,12 +76,12 @@ def scattering_paths(
     hits = SurfaceHits(exact_distance(rays, hits.interaction, hits.distance, shapes), hits.interaction)
     open_rays = rays if shadows else replace(rays, occluders=mi.load_dict({"type": "scene"}))
     how: dict[str, Any] = {"shapes": shapes if shadows else None}
-    sources = _sources(truth, points, seed)
+    sources = light_sources(truth, points, seed)
     lights = []
-    for number, (name, intensity, parts) in enumerate(sources):
-        nodes = [_nodes(open_rays, part, hits.distance, how) for part in parts] if airlight else []
-        lit = [surface_points(rays, part, hits, shadows=shadows) for part in parts] if surface else []
-        lights.append(_light_paths(name, intensity, nodes, lit, len(truth.media) + 1))
+    for number, source in enumerate(sources):
+        nodes = [_nodes(open_rays, light, hits.distance, how) for light in source.lights] if airlight else []
+        lit = [surface_points(rays, light, hits, shadows=shadows) for light in source.lights] if surface else []
+        lights.append(_light_paths(source.name, source.intensity, nodes, lit, len(truth.media) + 1))
         if progress is not None:
             progress((number + 1) / len(sources), "lit intervals")
     return ScatteringPaths(
@@ -96,39 +96,42 @@ def scattering_paths(
     )
 
 
-def _positions(centres: Array, rays_per_side: int, seed: int) -> Array:
+def _positions(centres: Array, rays_per_side: int) -> Array:
     """Return places on the film, those of a pixel one after another."""
     if not rays_per_side:
         return centres
     row, column = np.divmod(np.arange(rays_per_side**2), rays_per_side)
     cells = np.stack([column, row], axis=1)
-    random = np.random.default_rng(seed).random((len(centres), rays_per_side**2, 2))
-    return (centres[:, None, :] - 0.5 + (cells + random) / rays_per_side).reshape(-1, 2)
+    # The middles: where the image is smooth, random places would err by its slope, these by its curvature.
+    return (centres[:, None, :] - 0.5 + (cells + 0.5) / rays_per_side).reshape(-1, 2)
 
 
-Source = tuple[str, Array, Sequence[TruthLight | DirectionalLight]]
+@dataclass(frozen=True)
+class Source:
+    """A light of the scene."""
+
+    name: str  #: its id
+    intensity: Array  #: what multiplies the paths from it, (3,)
+    lights: Sequence[TruthLight | DirectionalLight]  #: that stand for it
 
 
-def _sources(truth: TruthScene, points: int, seed: int) -> list[Source]:
-    """Return by light of the scene its name, what multiplies its paths, and the lights that stand for it."""
+def light_sources(truth: TruthScene, points: int = _POINTS, seed: int = 0) -> list[Source]:
+    """Return the lights of a scene: point and spot lights, directional ones, then those with extent."""
     emitters = truth.scene.emitters()
-    names = {
-        "near": [e.id() for e in emitters if e.class_name() in ("PointLight", "SpotLight")],
-        "far": [e.id() for e in emitters if e.class_name() == "DirectionalEmitter"],
-    }
-    sources: list[Source] = []
-    for name, light in zip(names["near"], truth.lights, strict=True):
-        sources.append((name, light.intensity, (light,)))
-    for name, far in zip(names["far"], truth.directional, strict=True):
-        sources.append((name, far.irradiance, (far,)))
-    for number, wide in enumerate(truth.area):
-        sources.append((wide.name, wide.radiance * wide.area / points, _points(wide, number, points, seed)))
-    return sources
-
-
-def _points(light: TruthAreaLight, number: int, points: int, seed: int) -> Sequence[TruthLight]:
+    far_names = [emitter.id() for emitter in emitters if is_directional(emitter)]
+    near_names = [emitter.id() for emitter in emitters if not is_directional(emitter) and not is_area(emitter)]
+    near = [Source(name, light.intensity, (light,)) for name, light in zip(near_names, truth.lights, strict=True)]
+    far = [Source(name, light.irradiance, (light,)) for name, light in zip(far_names, truth.directional, strict=True)]
     plan = PointPlan(most=points, seed=seed)
-    return light_points(light, square_points(plan, number, 0, light.kind))
+    wide = [
+        Source(
+            light.name,
+            light.radiance * light.area / points,
+            light_points(light, square_points(plan, number, 0, light.kind)),
+        )
+        for number, light in enumerate(truth.area)
+    ]
+    return [*near, *far, *wide]
 
 
 def _nodes(truth: TruthScene, light: TruthLight | DirectionalLight, distance: Array, how: dict[str, Any]) -> Nodes:

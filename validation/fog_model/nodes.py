@@ -22,7 +22,9 @@ _PANEL, _NODES = 2.4, 8
 _SHORT, _FEW = 0.6, 4
 
 
-def panel_nodes(start: Array, width: Array, *, most: float = _PANEL, short: float = _SHORT) -> tuple[Index, Array, Array]:
+def panel_nodes(
+    start: Array, width: Array, *, most: float = _PANEL, short: float = _SHORT
+) -> tuple[Index, Array, Array]:
     """Return nodes on intervals.
 
     Parameters
@@ -51,7 +53,6 @@ def panel_nodes(start: Array, width: Array, *, most: float = _PANEL, short: floa
         places.append((start[owner] + size * number)[:, None] + 0.5 * size[:, None] * (1 + node))
         weights.append(0.5 * size[:, None] * weight)
     owner = np.concatenate(owners)
-    order = np.argsort(owner, kind="stable")
-    flat = (np.concatenate([part.ravel() for part in parts]) for parts in (places, weights))
-    place, weight = flat
-    return owner[order], place[order], weight[order]
+    by_owner = np.argsort(owner, kind="stable")
+    place, weight = (np.concatenate([part.ravel() for part in parts]) for parts in (places, weights))
+    return owner[by_owner], place[by_owner], weight[by_owner]

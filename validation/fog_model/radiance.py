@@ -85,7 +85,7 @@ def _device_light(paths: ScatteringPaths, light: LightPaths) -> _DeviceLight:
         mi.Float64(nodes.cosine),
         mi.Float64(nodes.weight / (4 * np.pi)),
         phases,
-        tuple(mi.Float64(np.ascontiguousarray(column)) for column in surface.radiance.T),  # type: ignore[arg-type]
+        tuple(mi.Float64(np.ascontiguousarray(column)) for column in surface.radiance.T),
     )
     dr.eval(device.medium, device.cosine, device.strength, device.phases, device.reflected)
     return device

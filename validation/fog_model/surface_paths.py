@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Paths from lights to visible surfaces, by Mitsuba's materials and shadow rays, without what dims them.
 
-    L = f(w_i, w_o) cos I profile / r^2         (I / r^2: the irradiance of a directional light)
+L = f(w_i, w_o) cos I profile / r^2         (I / r^2: the irradiance of a directional light)
 """
 
 from typing import Any
