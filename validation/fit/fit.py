@@ -199,7 +199,7 @@ def fit_image(
     judged = judged_layer(image, path, name=layer, holds=holds)
     truth = read_truth(loaded.scene)
     unknowns = read_unknowns(parameters, truth, scene_fog(truth), starts or {})
-    values = _three_channels(judged)
+    values = three_channels(judged)
     used = usable_pixels(values)
     if mask is not None:
         used &= _fitting_mask(mask, judged)
@@ -232,7 +232,8 @@ def said_pixel(image: Image) -> str | None:
     return "area" if "airlight:spp" in image.attributes else None
 
 
-def _three_channels(judged: JudgedLayer) -> Array:
+def three_channels(judged: JudgedLayer) -> Array:
+    """Return the values of a layer as rows of pixels, a single channel three times, (pixels, 3)."""
     values = np.asarray(judged.values, dtype=np.float64)
     return np.broadcast_to(values.reshape(-1, values.shape[-1]), (judged.size[0] * judged.size[1], 3)).copy()
 

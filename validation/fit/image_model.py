@@ -15,7 +15,7 @@ from validation.comparison.engine_layers import AIRLIGHT, SURFACE
 from validation.fit.unknowns import Unknown, with_values
 from validation.fog_model.build import Progress, scattering_paths
 from validation.fog_model.fog import Fog, scene_fog
-from validation.fog_model.radiance import DevicePaths, fog_airlight, fog_surface, fog_total, on_device
+from validation.fog_model.radiance import DevicePaths, fog_airlight, fog_surface, fog_total, on_device, opaque_fog
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -55,7 +55,7 @@ class ImageModel:
 
     def radiance(self, fog: Fog) -> Array:
         """Return the radiance of the pixels, (m, 3) [W/(m^2 sr)]; numbers out of range are as large as can be."""
-        columns = np.stack([np.array(column, dtype=np.float64) for column in self._columns(fog)], axis=1)
+        columns = np.stack([np.array(column, dtype=np.float64) for column in self._columns(opaque_fog(fog))], axis=1)
         return np.nan_to_num(columns, nan=_HUGE, posinf=_HUGE, neginf=-_HUGE)
 
     def values(self, unknowns: Sequence[Unknown], inner: Sequence[float] | Array) -> Array:

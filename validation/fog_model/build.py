@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from reference.quadrature.light_points import PointPlan, light_points, square_points
 from reference.quadrature.surface import SurfaceHits, surface_hits
-from reference.scene.area_light import is_area
+from reference.scene.area_light import TruthAreaLight, is_area
 from reference.scene.camera import film_directions, pixel_centres
 from reference.scene.directional_light import DirectionalLight, is_directional
 from reference.scene.read import TruthLight, TruthScene
@@ -35,6 +35,8 @@ def scattering_paths(
     pixels: Index | None = None,
     rays_per_side: int = 0,
     offset: tuple[float, float] = (0.0, 0.0),
+    zoom: float = 1.0,
+    radius: float = 0.0,
     shadows: bool = True,
     airlight: bool = True,
     surface: bool = True,
@@ -55,6 +57,10 @@ def scattering_paths(
         whose mean is that over the pixel.
     offset
         Moves all rays on the film, to the right and down [pixels].
+    zoom
+        Factor on the distance of all rays from the middle of the film, before they are moved.
+    radius
+        Of spheres that take the place of point lights, of the same intensity [m].
     shadows
         False where surfaces hide nothing from the lights.
     airlight, surface
@@ -68,7 +74,9 @@ def scattering_paths(
     """
     size = truth.width, truth.height
     pixels = np.arange(size[0] * size[1]) if pixels is None else np.unique(pixels)
-    positions = _positions(pixel_centres(size)[pixels], rays_per_side) + np.asarray(offset)
+    positions = _positions(pixel_centres(size)[pixels], rays_per_side)
+    middle = 0.5 * np.array(size)
+    positions = middle + zoom * (positions - middle) + np.asarray(offset)
     directions = film_directions(truth.scene.sensors()[0], positions, size)
     rays = replace(truth, direction=directions)
     shapes = read_shapes(truth.occluders)
@@ -76,7 +84,7 @@ def scattering_paths(
     hits = SurfaceHits(exact_distance(rays, hits.interaction, hits.distance, shapes), hits.interaction)
     open_rays = rays if shadows else replace(rays, occluders=mi.load_dict({"type": "scene"}))
     how: dict[str, Any] = {"shapes": shapes if shadows else None}
-    sources = light_sources(truth, points, seed)
+    sources = light_sources(truth, points, seed, radius)
     lights = []
     for number, source in enumerate(sources):
         nodes = [_nodes(open_rays, light, hits.distance, how) for light in source.lights] if airlight else []
@@ -115,12 +123,20 @@ class Source:
     lights: Sequence[TruthLight | DirectionalLight]  #: that stand for it
 
 
-def light_sources(truth: TruthScene, points: int = _POINTS, seed: int = 0) -> list[Source]:
-    """Return the lights of a scene: point and spot lights, directional ones, then those with extent."""
+def light_sources(truth: TruthScene, points: int = _POINTS, seed: int = 0, radius: float = 0.0) -> list[Source]:
+    """Return the lights of a scene: point and spot lights, directional ones, then those with extent.
+
+    The parameters are those of `scattering_paths`.
+    """
     emitters = truth.scene.emitters()
     far_names = [emitter.id() for emitter in emitters if is_directional(emitter)]
     near_names = [emitter.id() for emitter in emitters if not is_directional(emitter) and not is_area(emitter)]
-    near = [Source(name, light.intensity, (light,)) for name, light in zip(near_names, truth.lights, strict=True)]
+    near = [
+        _as_sphere(name, light, points, seed, radius)
+        if radius > 0 and light.axis is None
+        else Source(name, light.intensity, (light,))
+        for name, light in zip(near_names, truth.lights, strict=True)
+    ]
     far = [Source(name, light.irradiance, (light,)) for name, light in zip(far_names, truth.directional, strict=True)]
     plan = PointPlan(most=points, seed=seed)
     wide = [
@@ -132,6 +148,17 @@ def light_sources(truth: TruthScene, points: int = _POINTS, seed: int = 0) -> li
         for number, light in enumerate(truth.area)
     ]
     return [*near, *far, *wide]
+
+
+def _as_sphere(name: str, light: TruthLight, points: int, seed: int, radius: float) -> Source:
+    """Return a sphere of a point light's intensity.
+
+    Seen from anywhere, a sphere of the radiance L has the intensity L pi R^2; one of N points on it stands for the area
+    4 pi R^2/N, of the intensity L 4 pi R^2/N along its normal: four times that of the light over N.
+    """
+    plan = PointPlan(most=points, seed=seed)
+    wide = TruthAreaLight("sphere", light.position, np.eye(3), np.full(2, radius), np.zeros(3), False, None)
+    return Source(name, 4 * light.intensity / points, light_points(wide, square_points(plan, 0, 0, "sphere")))
 
 
 def _nodes(truth: TruthScene, light: TruthLight | DirectionalLight, distance: Array, how: dict[str, Any]) -> Nodes:

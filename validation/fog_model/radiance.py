@@ -14,7 +14,7 @@ paths begin, a node at r v from it (v of unit length, w along the ray) has
 and the lengths of its leg change as r'/r, which is right where the medium has no bounds.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from functools import reduce
 from typing import Any
 
@@ -129,6 +129,22 @@ def as_array(columns: Columns) -> Array:
     return np.stack([np.array(column, dtype=np.float64) for column in columns], axis=1)
 
 
+def opaque_fog(fog: Fog) -> Fog:
+    """Return a fog whose numbers are no constants of the kernels, which then need not be compiled again for others."""
+
+    def opaque(value: Any) -> Any:
+        if isinstance(value, tuple):
+            return tuple(opaque(each) for each in value)
+        return dr.opaque(mi.Float64, value) if isinstance(value, (int, float)) else value
+
+    kept: dict[str, Any] = {"near": fog.near} if _begins(fog) else {}
+    if _is_right(fog):
+        kept["distance_power"] = fog.distance_power
+    moved = tuple(each if _stands(each) else opaque(each) for each in fog.moved)
+    numbers = {field.name: opaque(getattr(fog, field.name)) for field in fields(fog) if field.name not in kept}
+    return replace(fog, **{**numbers, **kept, "moved": moved})
+
+
 def _sums(paths: DevicePaths, fog: Fog, pick: Any, term: Any) -> Columns:
     totals = []
     for channel in range(3):
@@ -155,7 +171,8 @@ def _airlight(light: _DeviceLight, fog: Fog, number: int, channel: int) -> Any:
         source = dr.select(light.medium == medium, value, source)
     r = light.nodes.r if place is None else place.r
     falls = dr.rcp(dr.square(r)) if _is_right(fog) else dr.exp(-fog.distance_power * dr.log(r))
-    return source * light.strength * falls * _dimmed(light.nodes, fog, channel, place)
+    strength = light.strength if _begins(fog) else dr.select(light.nodes.camera[0] >= fog.near, light.strength, 0)
+    return source * strength * falls * _dimmed(light.nodes, fog, channel, place)
 
 
 def _surface(light: _DeviceLight, fog: Fog, number: int, channel: int) -> Any:
@@ -173,10 +190,20 @@ class _Place:
 
 
 def _moved(legs: _Legs, moved: Colour) -> _Place | None:
-    if all(isinstance(each, float) and each == 0 for each in moved):
+    if _stands(moved):
         return None
     away = legs.towards * legs.r - mi.Vector3d(*moved)
     return _Place(away, dr.norm(away))
+
+
+def _stands(moved: Colour) -> bool:
+    """Return whether a light is where its paths begin."""
+    return all(isinstance(each, float) and each == 0 for each in moved)
+
+
+def _begins(fog: Fog) -> bool:
+    """Return whether the medium begins at the camera."""
+    return isinstance(fog.near, float) and fog.near == 0
 
 
 def _is_right(fog: Fog) -> bool:
@@ -186,9 +213,12 @@ def _is_right(fog: Fog) -> bool:
 def _dimmed(legs: _Legs, fog: Fog, channel: int, place: _Place | None) -> Any:
     """Return the share of the light that both legs leave."""
     longer = 1.0 if place is None else place.r / legs.r
+    camera_legs = list(legs.camera)
+    if not _begins(fog):
+        camera_legs[0] = dr.maximum(camera_legs[0] - fog.near, 0)
     parts = [
         sigma_t[channel] * (fog.camera_leg * camera + fog.light_leg * leg * longer)
-        for sigma_t, camera, leg in zip(fog.sigma_t, legs.camera, legs.leg, strict=True)
+        for sigma_t, camera, leg in zip(fog.sigma_t, camera_legs, legs.leg, strict=True)
     ]
     return dr.exp(-reduce(lambda a, b: a + b, parts))
 
