@@ -154,7 +154,7 @@ def commands() -> str:
     from reports.commands.main import app
 
     listed = typer.main.get_group(app).commands
-    return "\n".join(_command(name, command) for name, command in listed.items())
+    return "\n".join(_command(name, command) for name, command in listed.items() if not command.hidden)
 
 
 def _command(name: str, command: Any) -> str:

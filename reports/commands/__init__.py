@@ -5,6 +5,8 @@ Read in this order:
 
 - `start.py`: the entry of the command, signals first
 - `main.py`: the command line: the commands, and how mistakes are reported
+- `help.py`: how `--help` is drawn
+- `completion.py`: what the shell completes
 - `printing.py`: how commands print the tables of one run
 - `options.py`: options that several commands have
 - `own_methods.py`: methods of the user's own
@@ -21,7 +23,7 @@ Read in this order:
 - `figures.py`: `airlight figures`
 - `fit.py`: `airlight fit`
 - `integrate.py`: `airlight integrate`
-- `lists.py`: `airlight scenes`, `methods`, `kernels`
+- `lists.py`: `airlight list`
 - `maps.py`: `airlight maps`
 - `merge.py`: `airlight merge`
 - `mutations.py`: `airlight mutations`
@@ -37,7 +39,7 @@ May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.kernels`,
 `realtime.methods.shadow_planes`, `realtime.parameters`, `realtime.scene`, `realtime.shadow_maps`, `reference.storage`,
 `reports.data`, `reports.diff`, `reports.docs`, `reports.figures`, `reports.interchange`, `reports.machine`,
 `reports.papers`, `reports.plotting`, `reports.report`, `reports.tables`, `validation.certified`,
-`validation.comparison`, `validation.configurations`, `validation.estimates`, `validation.fidelity`,
+`validation.comparison`, `validation.configurations`, `validation.diagnosis`, `validation.estimates`, `validation.fidelity`,
 `validation.fit`, `validation.frames`, `validation.kernels`, `validation.metrics`, `validation.mutations`,
 `validation.papers`, `validation.scenes`, `validation.slab`.
 """

@@ -6,7 +6,8 @@ from typing import Annotated, Any
 
 import typer
 
-from reports.commands.options import listed, numbers_by_name
+from reports.commands import completion
+from reports.commands.options import Json, listed, numbers_by_name
 
 
 def fit(
@@ -14,35 +15,60 @@ def fit(
     scene: Annotated[
         str,
         typer.Option(
+            metavar="SCENE",
             help="What it shows, a built-in scene or a Mitsuba XML file; what is not looked for is taken from it.",
             show_default=False,
+            autocompletion=completion.scenes_and_images,
         ),
     ],
     parameters: Annotated[
         str,
         typer.Option(
+            metavar="NAMES",
             help="What is looked for: sigma_t, albedo (each also with .r, .g or .b), phase.g, intensity, exposure, "
             "light.x, light.y, light.z; of one medium or light NAME as sigma_t:NAME.",
         ),
     ] = "sigma_t,albedo",
-    start: Annotated[str, typer.Option(help="NAME=VALUE,..: values to begin with; the scene's own by default.")] = "",
+    start: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME=VALUE,..",
+            help="Values to begin with; the scene's own by default.",
+            show_default=False,
+        ),
+    ] = "",
     layer: Annotated[
         str | None,
-        typer.Option(help="Layer to explain, 'airlight' by default, or 'total', R/G/B.", show_default=False),
+        typer.Option(
+            metavar="NAME",
+            help="Layer to explain, 'airlight' by default, or 'total', R/G/B.",
+            show_default=False,
+        ),
     ] = None,
     holds: Annotated[
         str | None,
-        typer.Option("--as", help="What the layer holds: 'airlight', 'surface' or 'total'.", show_default=False),
+        typer.Option(
+            "--as",
+            metavar="NAME",
+            help="What the layer holds: 'airlight', 'surface' or 'total'; what its name says by default.",
+            show_default=False,
+            autocompletion=completion.one_of("airlight", "surface", "total"),
+        ),
     ] = None,
     pixel: Annotated[
         str | None,
         typer.Option(
+            metavar="NAME",
             help="Pixels are values at their 'centre' or means over their 'area'; by default what fits.",
             show_default=False,
+            autocompletion=completion.one_of("centre", "area"),
         ),
     ] = None,
-    mask: Annotated[Path | None, typer.Option(help="EXR file that is 0 in pixels to leave out.")] = None,
-    json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    mask: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="EXR file that is 0 in pixels to leave out.", show_default=False),
+    ] = None,
+    json: Json = False,
 ) -> None:
     """Find the parameters of media, lights and exposure that explain an image, each with its 95 % interval.
 

@@ -9,10 +9,11 @@ from reports.tables.table import Interval, Table, Verdict, numbers, table, words
 _PERCENT = {"percent": True, "sign": True, "places": 3}
 COLUMNS = (
     *words(name="the truth of", estimator="checked by"),
-    *numbers("samples", how={"after": " M", "places": 0}),
-    *numbers(relative_bias="bias", interval="95 % interval", uncorrected_bias="uncorrected", how=_PERCENT),
+    *numbers("samples", how={"after": " M", "places": 0, "minor": True}),
+    *numbers(relative_bias="bias", interval="95 % interval", how=_PERCENT),
+    *numbers(uncorrected_bias="uncorrected", how={**_PERCENT, "minor": True}),
     *numbers("margin", how={"percent": True}),
-    *numbers(detectable_bias="detectable", how={"percent": True, "digits": 2}),
+    *numbers(detectable_bias="detectable", how={"percent": True, "digits": 2, "minor": True}),
     *numbers("rejected", "masked", epsilon="shadow-ray epsilon", z_mean="z: mean", z_std="z: st. deviation"),
     *numbers(expected_rejections="expected", how={"digits": 2}),
     *words("effort"),

@@ -2,12 +2,23 @@
 """What commands print: tables, and the same data as JSON."""
 
 import json
+import os
 import shutil
 import sys
 from typing import Any
 
 from reports.tables.drawing import markdown, text
 from reports.tables.table import Table
+
+
+def colours_wanted() -> bool:
+    """Return whether colours and bold letters may be printed: NO_COLOR is not set, or empty (https://no-color.org)."""
+    return not os.environ.get("NO_COLOR")
+
+
+def terminal_width() -> int | None:
+    """Return how wide the terminal is that is printed to [characters]; None where it is none."""
+    return shutil.get_terminal_size().columns if sys.stdout.isatty() else None
 
 
 def print_json(data: Any) -> None:
@@ -36,6 +47,5 @@ def print_table(table: Table, *, as_markdown: bool = False) -> None:
     if as_markdown:
         print(f"\n{markdown(table)}", end="")
         return
-    terminal = sys.stdout.isatty()
-    width = shutil.get_terminal_size().columns if terminal else None
-    print(text(table, width=width, styled=terminal), end="")
+    width = terminal_width()
+    print(text(table, width=width, styled=width is not None and colours_wanted()), end="")
