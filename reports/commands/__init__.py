@@ -36,10 +36,10 @@ Read in this order:
 - `test.py`: `airlight test`
 
 May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.kernels`, `realtime.methods`,
-`realtime.methods.shadow_planes`, `realtime.parameters`, `realtime.scene`, `realtime.shadow_maps`, `reference.storage`,
-`reports.data`, `reports.diff`, `reports.docs`, `reports.figures`, `reports.interchange`, `reports.machine`,
-`reports.papers`, `reports.plotting`, `reports.report`, `reports.tables`, `validation.certified`,
-`validation.comparison`, `validation.configurations`, `validation.diagnosis`, `validation.estimates`, `validation.fidelity`,
-`validation.fit`, `validation.frames`, `validation.kernels`, `validation.metrics`, `validation.mutations`,
-`validation.papers`, `validation.scenes`, `validation.slab`.
+`realtime.methods.shadow_planes`, `realtime.parameters`, `realtime.scene`, `realtime.shadow_maps`,
+`reference.storage`, `reports.data`, `reports.diff`, `reports.docs`, `reports.figures`, `reports.interchange`,
+`reports.machine`, `reports.papers`, `reports.plotting`, `reports.report`, `reports.tables`, `validation.certified`,
+`validation.comparison`, `validation.configurations`, `validation.diagnosis`, `validation.estimates`,
+`validation.fidelity`, `validation.fit`, `validation.frames`, `validation.kernels`, `validation.metrics`,
+`validation.mutations`, `validation.papers`, `validation.scenes`, `validation.slab`.
 """

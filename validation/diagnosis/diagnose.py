@@ -37,6 +37,7 @@ Progress = Callable[[float, str], None]
 HYPOTHESES: tuple[Hypothesis, ...] = (*LIGHTS, *MEDIUM, *CAMERA, *ENCODING)
 RIGHT, UNEXPLAINED = "right", "unexplained"
 
+_REFINED = 5
 _PARTNERS = 5  # of the best explanations that pairs are made of
 _BETTER = 0.7  # what a pair must leave of the error of one alone
 _MUCH = 0.5  # what an explanation must leave of the error to be named although more is wrong
@@ -216,8 +217,16 @@ def _explained(
     for number, hypothesis in enumerate(hypotheses):
         if progress is not None:
             progress(span[0] + (span[1] - span[0]) * number / len(hypotheses), hypothesis.name)
-        explanations.append(explain(predictor, (hypothesis,)))
-    return explanations
+        explanations.append(explain(predictor, (hypothesis,), fine=False))
+    return _refined(predictor, explanations)
+
+
+def _refined(predictor: Predictor, explanations: list[Explanation]) -> list[Explanation]:
+    """Return explanations, those that leave least with all digits."""
+    ordered = sorted(explanations, key=lambda each: each.error)
+    best = [each for each in ordered[:_REFINED] if each.parameters]
+    finer = {id(each): explain(predictor, each.hypotheses, each.values) for each in best}
+    return [finer.get(id(each), each) for each in explanations]
 
 
 def _best(right: Explanation, explanations: Sequence[Explanation], pixel: str) -> Explanation:
@@ -257,8 +266,8 @@ def _pairs(
     for number, pair in enumerate(wanted):
         if progress is not None:
             progress(0.75 + 0.25 * number / len(wanted), " and ".join(each.name for each in pair))
-        explanations.append(explain(predictor, pair))
-    return explanations
+        explanations.append(explain(predictor, pair, fine=False))
+    return _refined(predictor, explanations)
 
 
 _ORDER = ("medium", "light", "camera", "brightness", "values")

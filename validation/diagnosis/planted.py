@@ -6,23 +6,30 @@ Where a fault is one of the scene, such as another extinction, the image is the 
 was done to an image is done to that of the right scene.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
 from analytic.phase import PhaseFunction
 from reference.quadrature.image import quadrature_image
+from reference.quadrature.light_airlight import light_airlight
 from reference.quadrature.ray_values import TruthImage
+from reference.quadrature.surface import lit_surface, surface_hits
 from reference.scene.camera import film_directions, pixel_centres
-from reference.scene.read import TruthScene
+from reference.scene.read import TruthScene, read_truth
+from reference.storage.exr import Image
 from validation.comparison.engine_layers import truth_layer
+from validation.diagnosis.diagnose import diagnose_image
 from validation.diagnosis.encoding import filmic, srgb
 from validation.diagnosis.prediction import Scenery, changed_scene
+from validation.scenes.loading import load_scene
 
 Array = NDArray[np.float64]
+Progress = Callable[[float, str], None]
 
 _SAMPLES = 64  # of visibility: images of planted faults are small
 _HOLDS = "total"
@@ -35,7 +42,6 @@ class Planted:
     name: str
     words: str
     image: Callable[[TruthScene], Array | None]  #: (height, width, 3); None where the scene cannot have it
-    changes: bool = True  #: whether anything is wrong at all
 
 
 def _quadrature(truth: TruthScene, **how: Any) -> TruthImage:
@@ -123,6 +129,18 @@ def _light_leg(truth: TruthScene) -> Array | None:
     return None if truth.directional else _total(_quadrature(truth, shadow_scale=1e-9))
 
 
+def _shadowless(truth: TruthScene) -> Array | None:
+    if not truth.occluders.shapes() or truth.directional or truth.area:
+        return None
+    hits = surface_hits(truth)
+    everywhere = [np.ones(len(hits.distance), dtype=bool) for _ in truth.lights]
+    total = lit_surface(truth, hits, reached=everywhere, shadow_scale=1.0)
+    empty = replace(truth, occluders=mi.load_dict({"type": "scene"}))
+    for light in truth.lights:
+        total += light_airlight(empty, light, hits.distance, shadow_scale=1.0, how={}).radiance
+    return total.reshape(truth.height, truth.width, 3)
+
+
 def _clamped(image: Array) -> Array | None:
     return np.minimum(image, np.quantile(image[image > 0], 0.9))
 
@@ -132,7 +150,7 @@ def _swapped(image: Array) -> Array | None:
 
 
 PLANTED = (
-    Planted("right", "nothing", _of_image(lambda image: image), changes=False),
+    Planted("right", "nothing", _of_image(lambda image: image)),
     Planted("factor", "1.07 times as bright", _of_image(lambda image: 1.07 * image)),
     Planted("factor", "4 pi times as bright", _of_image(lambda image: 4 * np.pi * image)),
     Planted("extinction", "the extinction 1.4 times", _of_scene(_optics(lambda s, a: (1.4 * s, a)))),
@@ -141,7 +159,7 @@ PLANTED = (
     Planted("g-sign", "g with the other sign", _of_scene(_phase(_negative_g))),
     Planted("g", "another g", _of_scene(_phase(_other_g))),
     Planted("light-leg", "the way from the light not attenuated", _light_leg),
-    Planted("no-shadow", "no shadows", lambda truth: None),
+    Planted("no-shadow", "no shadows", _shadowless),
     Planted("spot-angle", "cones twice as wide", _of_scene(_scenery(_spots, cone=2.0))),
     Planted(
         "light-position",
@@ -158,3 +176,48 @@ PLANTED = (
     Planted("tone-map", "filmic", _of_image(filmic)),
     Planted("channels", "B, G, R", _of_image(_swapped)),
 )
+
+
+def planted_answers(
+    scenes: Sequence[str], size: tuple[int, int], *, progress: Progress | None = None
+) -> list[dict[str, Any]]:
+    """Plant every fault in scenes and return the answers, a row each: 'scene', 'planted', 'words', 'first', 'right'.
+
+    Parameters
+    ----------
+    scenes
+        Built-in scenes or Mitsuba XML files.
+    size
+        Of the images [pixels].
+    progress
+        Called with (share done, what).
+
+    Raises
+    ------
+    InputError
+        For scenes that have no truth.
+    """
+    rows = []
+    for number, name in enumerate(scenes):
+        loaded = load_scene(name, size)
+        truth = read_truth(loaded.scene)
+        for turn, planted in enumerate(PLANTED):
+            if progress is not None:
+                share = (number + turn / len(PLANTED)) / len(scenes)
+                progress(share, f"{loaded.name}: {planted.words}")
+            image = planted.image(truth)
+            if image is None:
+                continue
+            diagnosis = diagnose_image(Image({_HOLDS: image}), loaded, layer=_HOLDS, pixel="centre")
+            rows.append(
+                {
+                    "scene": loaded.name,
+                    "planted": planted.name,
+                    "words": planted.words,
+                    "first": diagnosis.first,
+                    "right": diagnosis.first == planted.name,
+                    "residual": diagnosis.residual,
+                    "left": diagnosis.left,
+                }
+            )
+    return rows

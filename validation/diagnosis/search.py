@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 
 _LEAST_SCALE = 1e-6
 _TURNS = 5
+_COARSE = 0.02
 _SIMPLEX = 0.1  # first step, of a logarithm or in units of the parameter
 
 
@@ -48,7 +49,11 @@ class Explanation:
 
 
 def explain(
-    predictor: Predictor, hypotheses: Sequence[Hypothesis], near: Sequence[tuple[float, ...]] = ()
+    predictor: Predictor,
+    hypotheses: Sequence[Hypothesis],
+    near: Sequence[tuple[float, ...]] = (),
+    *,
+    fine: bool = True,
 ) -> Explanation:
     """Return the best explanation by some hypotheses together.
 
@@ -60,6 +65,8 @@ def explain(
         In the order in which they change the guess.
     near
         Values to begin with; by default all starts of the hypotheses are tried.
+    fine
+        Whether the values are looked for to all digits, or to some per cent, which a hypothesis that is wrong needs.
     """
     parameters = [parameter for hypothesis in hypotheses for parameter in hypothesis.parameters]
     starts = [tuple(value for part in near for value in part)] if near else _starts(predictor, hypotheses)
@@ -67,9 +74,9 @@ def explain(
     inner = _inward(
         parameters, min(starts, key=lambda start: _loss(predictor, _guess(predictor, hypotheses, start), scale))
     )
-    for _ in range(2 if parameters else 0):
+    for _ in range((2 if fine else 1) if parameters else 0):
         scale = _scale(predictor, _guess(predictor, hypotheses, _outward(parameters, inner)))
-        inner = _improved(predictor, hypotheses, parameters, inner, scale)
+        inner = _improved(predictor, hypotheses, parameters, inner, scale, fine=fine)
     values = _outward(parameters, inner)
     guess = _guess(predictor, hypotheses, values)
     errors = predictor.errors(guess)
@@ -77,7 +84,13 @@ def explain(
 
 
 def _improved(
-    predictor: Predictor, hypotheses: Sequence[Hypothesis], parameters: Sequence[Parameter], inner: Array, scale: float
+    predictor: Predictor,
+    hypotheses: Sequence[Hypothesis],
+    parameters: Sequence[Parameter],
+    inner: Array,
+    scale: float,
+    *,
+    fine: bool,
 ) -> Array:
     def errors(place: Array) -> Array:
         return predictor.errors(_guess(predictor, hypotheses, _outward(parameters, place)))
@@ -92,10 +105,13 @@ def _improved(
     if len(parameters) == 1:
         step = 0.7 if parameters[0].logarithmic else max(0.3 * abs(inner[0]), 0.1)
         bounds = max(float(low[0]), inner[0] - step), min(float(high[0]), inner[0] + step)
-        solved = minimize_scalar(lambda value: loss(np.array([value])), bounds=bounds, options={"xatol": 1e-7})
+        solved = minimize_scalar(
+            lambda value: loss(np.array([value])), bounds=bounds, options={"xatol": 1e-7 if fine else _COARSE}
+        )
         return np.array([solved.x]) if solved.fun <= loss(inner) else inner
     simplex = np.concatenate([inner[None], inner + _SIMPLEX * np.eye(len(inner))])
-    options = {"initial_simplex": np.clip(simplex, low, high), "maxfev": 60 * len(inner), "xatol": 1e-5, "fatol": 1e-9}
+    most = (60 if fine else 15) * len(inner)
+    options = {"initial_simplex": np.clip(simplex, low, high), "maxfev": most, "xatol": 1e-5, "fatol": 1e-9}
     solved = minimize(loss, inner, method="Nelder-Mead", bounds=list(zip(low, high, strict=True)), options=options)
     return np.asarray(solved.x)
 
