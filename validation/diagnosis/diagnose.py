@@ -25,7 +25,7 @@ from validation.diagnosis.lights import LIGHTS
 from validation.diagnosis.medium import MEDIUM
 from validation.diagnosis.prediction import Predictor
 from validation.diagnosis.search import Explanation, explain
-from validation.diagnosis.verdict import LEAST_EFFECT, LEAST_EVIDENCE, effect, evidence, is_explained, scale_of
+from validation.diagnosis.verdict import LEAST_EFFECT, LEAST_EVIDENCE, LEFT, effect, evidence, is_explained, scale_of
 from validation.fit.fit import said_pixel, three_channels
 from validation.fit.image_model import Task
 from validation.metrics.errors import plain
@@ -40,7 +40,7 @@ RIGHT, UNEXPLAINED = "right", "unexplained"
 _REFINED = 5
 _PARTNERS = 5  # of the best explanations that pairs are made of
 _BETTER = 0.7  # what a pair must leave of the error of one alone
-_MUCH = 0.5  # what an explanation must leave of the error to be named although more is wrong
+_MUCH = 0.2  # what an explanation must leave of the error to be named although more is wrong
 _ALIKE = 5.0  # evidence by which explanations may differ and still be as good as one another
 _SHOWN = 8
 _BATCH = 4  # batches of 16 paths a pixel for the light of multiple scattering
@@ -181,12 +181,12 @@ def _ranked(
     cheap = [hypothesis for hypothesis in there if not hypothesis.costly]
     singles = _explained(predictor, cheap, progress, (0.0, 0.5))
     chosen = _best(right, singles, pixel)
-    if not is_explained(chosen):
+    if not is_explained(chosen, right) or (chosen is right and right.error > LEFT):
         costly = [hypothesis for hypothesis in there if hypothesis.costly]
         singles += _explained(predictor, costly, progress, (0.5, 0.75))
         chosen = _best(right, singles, pixel)
     pairs: list[Explanation] = []
-    if not is_explained(chosen):
+    if not is_explained(chosen, right):
         pairs = _pairs(predictor, right, singles, there, pixel, progress)
         best = _best(right, [chosen, *pairs] if chosen.hypotheses else pairs, pixel)
         if best.error < _BETTER * chosen.error:
@@ -207,7 +207,7 @@ def _ranked(
     elif len(chosen.hypotheses) == 1:
         # Between explanations that leave the same, the one with fewer numbers comes first.
         rows.sort(key=lambda row: row.name != chosen.hypotheses[0].name)
-    return right, chosen, rows, is_explained(chosen)
+    return right, chosen, rows, is_explained(chosen, right)
 
 
 def _explained(

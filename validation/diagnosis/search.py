@@ -127,6 +127,7 @@ def _by_differences(
     steps, low, high = steps_and_ends
     least = loss(inner)
     for _ in range(_TURNS):
+        steps = 0.6 * steps
         left = errors(inner).ravel()
         slopes = np.stack(
             [(errors(inner + step * axis).ravel() - left) / step for step, axis in zip(steps, np.eye(len(inner)))],

@@ -6,9 +6,8 @@ distribution is -sum log(1 + (e/s)^2). The evidence of an explanation with k num
 scene, less k log(n)/2 (Schwarz 1978, Ann. Statist. 6, 461): a hypothesis with a number must beat one without. Channels
 of a pixel share their noise, so that three values count as one.
 
-Errors of neighbours that have the same sign are no noise. With errors that are independent, means over g pixels scatter
-by a g-th root of what single ones do; an explanation leaves nothing to explain if they scatter by less than 0.75 of it,
-or by less than 0.4 %, which no engine need beat.
+Errors of neighbours that go together are no noise. An explanation leaves nothing to explain if they do not (a
+correlation of 0.25 at most), if it leaves 0.4 %, which no engine need beat, or a tenth of what there was.
 """
 
 import math
@@ -22,10 +21,10 @@ Array = NDArray[np.float64]
 
 LEAST_EVIDENCE = 20.0  #: e^20 to one: what nobody doubts
 LEAST_EFFECT = 0.002  #: mean relative change of the image: less is no fault
-LEFT = 0.004  #: mean relative error of groups of pixels that is no fault
-_GROUP = 16  # pixels that lie together
-_NOISE = 0.75
-_WORST = 0.02  # share of the groups that may be as wrong as they like: those at lamps
+LEFT = 0.004  #: mean relative error that is no fault
+_GAIN = 10.0  # what an explanation that leaves nothing makes of the error
+_NOISE = 0.25  # correlation of neighbours
+_WORST = 0.02  # share of the pixels that may be as wrong as they like: those at lamps
 _KNOWN = {"centre": 3e-4, "area": 3e-3}  # relative error of the fog model itself, in most pixels
 
 
@@ -50,11 +49,19 @@ def effect(explanation: Explanation, right: Explanation) -> float:
     return float(np.mean(np.abs(explanation.errors - right.errors)))
 
 
-def is_explained(explanation: Explanation) -> bool:
-    """Return whether what an explanation leaves is noise, or little."""
-    errors = np.clip(explanation.errors, -1, 1).mean(axis=1)
-    groups = np.array([part.mean() for part in np.array_split(errors, max(1, len(errors) // _GROUP))])
-    kept = np.sort(np.abs(groups))[: max(1, int((1 - _WORST) * len(groups)))]
-    structure = float(np.sqrt(np.mean(kept**2)))
-    single = float(np.sqrt(np.mean(np.sort(errors**2)[: max(1, int((1 - _WORST) * len(errors)))])))
-    return structure <= max(LEFT, _NOISE * single)
+def is_explained(explanation: Explanation, right: Explanation) -> bool:
+    """Return whether what an explanation leaves of the unchanged scene's errors is noise, or little."""
+    errors = np.sort(np.abs(explanation.errors).mean(axis=1))
+    usual = float(errors[: max(1, int((1 - _WORST) * len(errors)))].mean())
+    if usual <= LEFT or (explanation.hypotheses and explanation.error <= right.error / _GAIN):
+        return True
+    return correlation(explanation.errors) <= _NOISE
+
+
+def correlation(errors: Array) -> float:
+    """Return the correlation of the errors of neighbours in a row of pixels, clipped at three scales."""
+    means = errors.mean(axis=1)
+    scale = 1.4826 * float(np.median(np.abs(means)))
+    clipped = np.clip(means, -3 * scale, 3 * scale)
+    power = float(np.mean(clipped**2))
+    return float(np.mean(clipped[1:] * clipped[:-1])) / power if power > 0 else 0.0

@@ -159,9 +159,9 @@ def test_every_hypothesis_has_a_name_a_kind_and_words_for_its_numbers():
 
 def test_encodings_are_what_their_standards_say():
     values = np.array([[0.0, 0.0031308, 0.18]])
-    assert srgb(values) == pytest.approx([[0.0, 0.04045, 0.461356]], abs=1e-5)
-    assert srgb_in_8_bits(values) * 255 == pytest.approx([[0, 10, 118]])
-    assert gamma(np.array([[0.25]]), 2.0) == pytest.approx([[0.5]])
+    assert srgb(values) == pytest.approx(np.array([[0.0, 0.04045, 0.461356]]), abs=1e-5)
+    assert srgb_in_8_bits(values) * 255 == pytest.approx(np.array([[0, 10, 118]]))
+    assert gamma(np.array([[0.25]]), 2.0) == pytest.approx(np.array([[0.5]]))
 
 
 def test_a_scenery_changes_lights(truth):
