@@ -103,7 +103,7 @@ def certified_slopes(
     place = (foot, height, x0, x1, sigma_t)
     slopes = []
     with mp.workdps(40):
-        size = abs(_by_path(*map(mpf, place), phase))
+        size = abs(_by_path(mpf(foot), mpf(height), mpf(x0), mpf(x1), mpf(sigma_t), phase))
         for number, name in enumerate(SLOPES):
             if name == "g" and phase.name != "hg":
                 slopes.append(mp.nan)
@@ -119,9 +119,9 @@ def certified_slopes(
 def _difference(place: tuple[float, ...], phase: PhaseFunction, number: int, step: Any) -> Any:
     ends = []
     for sign in (1, -1):
-        moved = [mpf(value) + sign * step * (number == k) for k, value in enumerate(place)]
+        foot, height, x0, x1, sigma_t = (mpf(v) + sign * step * (number == k) for k, v in enumerate(place))
         own = PhaseFunction("hg", g=float(mpf(phase.g) + sign * step)) if number == len(place) else phase
-        ends.append(_by_path(*moved, own))
+        ends.append(_by_path(foot, height, x0, x1, sigma_t, own))
     return (ends[0] - ends[1]) / (2 * step)
 
 

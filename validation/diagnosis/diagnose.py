@@ -25,7 +25,16 @@ from validation.diagnosis.lights import LIGHTS
 from validation.diagnosis.medium import MEDIUM
 from validation.diagnosis.prediction import Predictor
 from validation.diagnosis.search import Explanation, explain
-from validation.diagnosis.verdict import LEAST_EFFECT, LEAST_EVIDENCE, LEFT, effect, evidence, is_explained, scale_of
+from validation.diagnosis.verdict import (
+    LEAST_EFFECT,
+    LEAST_EVIDENCE,
+    LEFT,
+    effect,
+    evidence,
+    gains,
+    is_explained,
+    scale_of,
+)
 from validation.fit.fit import said_pixel, three_channels
 from validation.fit.image_model import Task
 from validation.metrics.errors import plain
@@ -181,12 +190,12 @@ def _ranked(
     cheap = [hypothesis for hypothesis in there if not hypothesis.costly]
     singles = _explained(predictor, cheap, progress, (0.0, 0.5))
     chosen = _best(right, singles, pixel)
-    if not is_explained(chosen, right) or (chosen is right and right.error > LEFT):
+    if not is_explained(chosen) or (chosen is right and right.error > LEFT):
         costly = [hypothesis for hypothesis in there if hypothesis.costly]
         singles += _explained(predictor, costly, progress, (0.5, 0.75))
         chosen = _best(right, singles, pixel)
     pairs: list[Explanation] = []
-    if not is_explained(chosen, right):
+    if not is_explained(chosen):
         pairs = _pairs(predictor, right, singles, there, pixel, progress)
         best = _best(right, [chosen, *pairs] if chosen.hypotheses else pairs, pixel)
         if best.error < _BETTER * chosen.error:
@@ -207,7 +216,7 @@ def _ranked(
     elif len(chosen.hypotheses) == 1:
         # Between explanations that leave the same, the one with fewer numbers comes first.
         rows.sort(key=lambda row: row.name != chosen.hypotheses[0].name)
-    return right, chosen, rows, is_explained(chosen, right)
+    return right, chosen, rows, is_explained(chosen) or gains(chosen, right)
 
 
 def _explained(

@@ -112,6 +112,7 @@ def _improved(
     simplex = np.concatenate([inner[None], inner + _SIMPLEX * np.eye(len(inner))])
     most = (60 if fine else 15) * len(inner)
     options = {"initial_simplex": np.clip(simplex, low, high), "maxfev": most, "xatol": 1e-5, "fatol": 1e-9}
+    inner = np.clip(inner, low, high)
     solved = minimize(loss, inner, method="Nelder-Mead", bounds=list(zip(low, high, strict=True)), options=options)
     return np.asarray(solved.x)
 

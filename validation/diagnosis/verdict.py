@@ -49,13 +49,16 @@ def effect(explanation: Explanation, right: Explanation) -> float:
     return float(np.mean(np.abs(explanation.errors - right.errors)))
 
 
-def is_explained(explanation: Explanation, right: Explanation) -> bool:
-    """Return whether what an explanation leaves of the unchanged scene's errors is noise, or little."""
+def is_explained(explanation: Explanation) -> bool:
+    """Return whether what an explanation leaves is noise, or little."""
     errors = np.sort(np.abs(explanation.errors).mean(axis=1))
     usual = float(errors[: max(1, int((1 - _WORST) * len(errors)))].mean())
-    if usual <= LEFT or (explanation.hypotheses and explanation.error <= right.error / _GAIN):
-        return True
-    return correlation(explanation.errors) <= _NOISE
+    return usual <= LEFT or correlation(explanation.errors) <= _NOISE
+
+
+def gains(explanation: Explanation, right: Explanation) -> bool:
+    """Return whether an explanation leaves a tenth of the errors of the unchanged scene, or less."""
+    return bool(explanation.hypotheses) and explanation.error <= right.error / _GAIN
 
 
 def correlation(errors: Array) -> float:
