@@ -83,9 +83,8 @@ app = typer.Typer(
     help="How fast, how accurate and how stable is a real-time method for volumetric light, against a ground truth "
     "that can be trusted?",
     epilog=_EPILOG.strip(),
-    no_args_is_help=True,
     pretty_exceptions_enable=False,
-    rich_markup_mode="markdown",  # draws `code` as code, without its marks
+    rich_markup_mode=None,  # `reports.commands.help` draws
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 120},
 )
 for _panel, _commands in _PANELS.items():
@@ -137,7 +136,7 @@ def run(arguments: Sequence[str]) -> int:
     except OSError:  # Dr.Jit ends the process over it
         return _fail("the current folder was deleted: change into another folder, then run this again", WRONG_INPUT)
     try:
-        status = command.main(list(arguments), prog_name="airlight", standalone_mode=False, **plain)
+        status = command.main(list(arguments) or ["--help"], prog_name="airlight", standalone_mode=False, **plain)
         sys.stdout.flush()
     except BrokenPipeError:  # the reader of the pipe has left
         return _drop_output(FAILED)
@@ -166,6 +165,8 @@ def run(arguments: Sequence[str]) -> int:
         return _usage(error)
     if status == INTERRUPTED:
         print("interrupted", file=sys.stderr)
+    if not arguments:
+        return WRONG_INPUT
     return status if isinstance(status, int) else DONE
 
 
@@ -183,8 +184,6 @@ def _fail(message: str, status: int) -> int:
 def _usage(error) -> int:
     """Report wrong usage: Typer's message, which names the nearest command, and where help is."""
     message = error.format_message().rstrip(".")
-    if not message:  # no sub-command: its help was printed
-        return WRONG_INPUT
     context = getattr(error, "ctx", None)
     path = context.command_path if context is not None else "airlight"
     return _fail(f"{message} (see `{path} --help`)", WRONG_INPUT)

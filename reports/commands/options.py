@@ -76,6 +76,21 @@ Markdown = Annotated[bool, typer.Option("--markdown", help="Print tables for a R
 OutputFile = Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="The file to write.")]
 
 
+def single(option: str, words: list[str] | None) -> str | None:
+    """Return the word of an option that takes one here and several in other commands; None for none.
+
+    Raises
+    ------
+    InputError
+        If there are several.
+    """
+    if words and len(words) > 1:
+        from analytic.errors import InputError
+
+        raise InputError(f"{option}: got {' and '.join(words)}, wanted one of them; bench and report take several")
+    return words[0] if words else None
+
+
 def listed(option: str, text: str) -> list[str]:
     """Return the words of an option that commas part.
 

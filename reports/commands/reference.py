@@ -45,7 +45,9 @@ def reference(
     output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="The EXR file to write.")] = Path(
         "reference.exr"
     ),
-    estimator: Annotated[Estimator, typer.Option(help="How to compute it.")] = Estimator.quadrature,
+    estimator: Annotated[
+        Estimator, typer.Option(metavar="NAME", help="How to compute it: quadrature, single-scatter or volpath.")
+    ] = Estimator.quadrature,
     spp: Annotated[
         int | None,
         typer.Option(
@@ -65,9 +67,18 @@ def reference(
         typer.Option(metavar="SECONDS", help="Monte Carlo: go on for so many seconds.", show_default=False),
     ] = None,
     target: Annotated[
-        Target, typer.Option(help="The error that --target-error is about: the image's, or its worst pixel's.")
+        Target,
+        typer.Option(
+            metavar="NAME",
+            help="The error that --target-error is about: pooled, the image's, or worst, its worst pixel's.",
+        ),
     ] = Target.pooled,
-    pixel: Annotated[Pixel, typer.Option(help="quadrature: the radiance at the centre, or the mean.")] = Pixel.centre,
+    pixel: Annotated[
+        Pixel,
+        typer.Option(
+            metavar="NAME", help="quadrature: the radiance at the centre of a pixel, or the mean over its area."
+        ),
+    ] = Pixel.centre,
     seed: Annotated[
         int, typer.Option(min=0, metavar="N", help="Monte Carlo: seed of the first batch; the others count up.")
     ] = 0,

@@ -10,20 +10,30 @@ from typing import Annotated, Any
 import typer
 
 from reports.commands import completion
-from reports.commands.options import USUAL_LIMIT, Force, Kernel, MethodLimit, Scene, Settings, Size
+from reports.commands.options import USUAL_LIMIT, Force, MethodLimit, Scene, Settings, Size, single
 
 
 def render(
     scene: Scene,
     method: Annotated[
-        str,
+        list[str] | None,
         typer.Option(
             metavar="NAME",
-            help="A method of `airlight list methods`, or your own as MODULE:FUNCTION or FILE.py:FUNCTION.",
+            help="A method of `airlight list methods`, or your own as MODULE:FUNCTION or FILE.py:FUNCTION; ray-march "
+            "by default.",
+            show_default=False,
             autocompletion=completion.methods,
         ),
-    ] = "ray-march",
-    kernel: Kernel = None,
+    ] = None,
+    kernel: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help="Airlight kernel of the method, see `airlight list kernels`.",
+            show_default=False,
+            autocompletion=completion.kernels,
+        ),
+    ] = None,
     settings: Settings = None,
     size: Size = None,
     precision: Annotated[
@@ -74,12 +84,13 @@ def render(
     from validation.configurations.methods import parse_settings
     from validation.scenes.loading import parse_size
 
-    chosen = checked_configuration(method, kernel, parse_settings(settings or []), limit=method_limit)
+    name = single("--method", method) or "ray-march"
+    chosen = checked_configuration(name, single("--kernel", kernel), parse_settings(settings or []), limit=method_limit)
     outputs = {"exr": output, "png": preview}
     _check_outputs(outputs, frames, animate)
     pixels = parse_size(size) if size else None
     variant = activate()
-    call = partial(in_own_process, name=method, limit=method_limit) if chosen.own else _call
+    call = partial(in_own_process, name=name, limit=method_limit) if chosen.own else _call
     if plan:
         _print_plan(call(_plan, scene, pixels, precision, chosen), json=json)
     elif frames is None:

@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What commands print: tables, and the same data as JSON."""
 
-import json
 import os
 import shutil
 import sys
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from reports.tables.drawing import markdown, text
-from reports.tables.table import Table
+if TYPE_CHECKING:
+    from reports.tables.table import Table
 
 
 def colours_wanted() -> bool:
@@ -29,6 +28,8 @@ def print_json(data: Any) -> None:
     InputError
         For a number that is not finite: what has none is None.
     """
+    import json
+
     try:
         text = json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False)
     except ValueError:
@@ -42,8 +43,10 @@ def print_json(data: Any) -> None:
     print(text)
 
 
-def print_table(table: Table, *, as_markdown: bool = False) -> None:
+def print_table(table: "Table", *, as_markdown: bool = False) -> None:
     """Print a table: as wide as the terminal, as it needs where piped, or as Markdown."""
+    from reports.tables.drawing import markdown, text
+
     if as_markdown:
         print(f"\n{markdown(table)}", end="")
         return

@@ -65,6 +65,11 @@ def test_ctrl_c_keeps_the_finished_frames_and_says_so(variant, tmp_path, capfd, 
     [
         (["--frames", "3"], "--frames: got no place for the files"),
         (["--animate", "light"], "--animate: got no number of frames"),
+        (
+            ["--method", "unshadowed", "--method", "ray-march"],
+            "--method: got unshadowed and ray-march, wanted one of them",
+        ),
+        (["--method", "min-max", "--kernel", "exact", "--kernel", "taylor"], "--kernel: got exact and taylor, wanted"),
         (["--frames", "3", "--animate", "lamp", "-o", "x.exr"], "--animate: got 'lamp'"),
         (["--frames", "3", "--animate", "objects", "-o", "x.exr"], "no closed mesh that could turn"),
     ],
