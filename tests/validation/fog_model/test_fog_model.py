@@ -25,6 +25,7 @@ def relative(values, wanted):
     return np.abs(values - wanted)[finite] / np.maximum(wanted[finite], max(floor, 1e-300))
 
 
+@pytest.mark.claim("fit-model")
 @pytest.mark.parametrize("name", ["open-fog", "sphere-spot", "omni-box", "three-media", "windows", "clutter"])
 def test_radiance_is_that_of_the_truth(variant, name):
     truth = read_truth(load_scene(name, SIZE).scene)
