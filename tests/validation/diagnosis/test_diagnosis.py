@@ -48,14 +48,11 @@ def marked(planted):
     return pytest.param(planted, id=name, marks=() if planted.name in FAST else pytest.mark.slow)
 
 
+# This scene has no g whose sign could be wrong: see below.
 @pytest.mark.claim("diagnosis-planted")
-@pytest.mark.parametrize("planted", [marked(planted) for planted in PLANTED])
+@pytest.mark.parametrize("planted", [marked(planted) for planted in PLANTED if planted.name != "g-sign"])
 def test_a_planted_fault_comes_first(truth, planted):
-    image = planted.image(truth)
-    if image is None:
-        assert planted.name == "g-sign"  # what this scene cannot have, see the test below
-        return
-    diagnosis = diagnosed(image)
+    diagnosis = diagnosed(planted.image(truth))
     assert diagnosis.first == planted.name, [row.words for row in diagnosis.ranked]
     assert diagnosis.ranked[0].name == planted.name
     assert diagnosis.explained
