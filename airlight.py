@@ -10,8 +10,8 @@ Names are imported when they are first used, so that `airlight --help` imports n
 >>> airlight.compare(truth, frame).metrics.relative_rmse < 0.01
 True
 
-`load_scene`, `render`, `reference`, `compare`, `integrate`, `bench`, `slab` and `report` are all that a notebook needs;
-the others are what these are made of.
+`load_scene`, `render`, `reference`, `compare`, `fit`, `integrate`, `bench`, `slab` and `report` are all that a notebook
+needs; the others are what these are made of.
 """
 
 if __name__ == "__main__":  # before all that takes time: what a signal meets during an import ends in a traceback
@@ -35,6 +35,7 @@ if TYPE_CHECKING:  # for editors, which complete names from here; `_API` says th
     from realtime.scene.read_scene import read_scene as read_scene
     from reference.storage.exr import read_exr as read_exr
     from reference.storage.exr import write_exr as write_exr
+    from reports.api.fit import fit as fit
     from reports.api.images import compare as compare
     from reports.api.images import load_scene as load_scene
     from reports.api.images import render as render
@@ -66,6 +67,7 @@ _API = {
     "render": "reports.api.images",
     "reference": "reports.api.reference",
     "compare": "reports.api.images",
+    "fit": "reports.api.fit",
     "integrate": "reports.api.studies",
     "bench": "reports.api.studies",
     "slab": "reports.api.slab",

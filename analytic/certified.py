@@ -72,6 +72,59 @@ def integrate_certified(
     return second
 
 
+#: What J depends on, in the order of `certified_slopes`.
+SLOPES = ("foot", "height", "x0", "x1", "sigma_t", "g")
+_STEP = 2.0**-26  # of differences: exact in float64, which g must be
+
+
+def certified_slopes(
+    foot: float, height: float, x0: float, x1: float, sigma_t: float, phase: PhaseFunction, *, digits: int = 17
+) -> tuple[Any, ...]:
+    """Return the derivatives of J by foot, height, x0, x1 [1/m^2], sigma_t [1] and g [1/m], as mpmath numbers.
+
+    A central difference D_h errs by the square of its step h, (4 D_h - D_2h)/3 by its fourth power. Where the two
+    differ by more than half of the `digits` allow, nothing is certain. A derivative by g is that of Henyey and
+    Greenstein's function; without one it is NaN.
+
+    Parameters
+    ----------
+    foot, height, x0, x1, sigma_t, phase, digits
+        See `integrate_certified`; x1 finite, digits at most 25.
+
+    Raises
+    ------
+    ArithmeticError
+        If two steps disagree: at heights or extinctions that are not large against 2^-26.
+
+    Notes
+    -----
+    Valid where J is smooth over steps of 2^-26.
+    """
+    place = (foot, height, x0, x1, sigma_t)
+    slopes = []
+    with mp.workdps(40):
+        size = abs(_by_path(mpf(foot), mpf(height), mpf(x0), mpf(x1), mpf(sigma_t), phase))
+        for number, name in enumerate(SLOPES):
+            if name == "g" and phase.name != "hg":
+                slopes.append(mp.nan)
+                continue
+            first, second = (_difference(place, phase, number, k * mpf(_STEP)) for k in (1, 2))
+            slope = (4 * first - second) / 3
+            if abs(first - second) > max(abs(slope), size) * mpf(10) ** (-digits / 2):
+                raise ArithmeticError(f"differences by {name} disagree at {place}: {first} and {second}")
+            slopes.append(slope)
+    return tuple(slopes)
+
+
+def _difference(place: tuple[float, ...], phase: PhaseFunction, number: int, step: Any) -> Any:
+    ends = []
+    for sign in (1, -1):
+        foot, height, x0, x1, sigma_t = (mpf(v) + sign * step * (number == k) for k, v in enumerate(place))
+        own = PhaseFunction("hg", g=float(mpf(phase.g) + sign * step)) if number == len(place) else phase
+        ends.append(_by_path(foot, height, x0, x1, sigma_t, own))
+    return (ends[0] - ends[1]) / (2 * step)
+
+
 def isotropic_closed_form(foot: float, height: float, x0: float, x1: float, sigma_t: float, *, digits: int = 20) -> Any:
     """Return J [1/m] of an isotropic medium by the complex exponential integral (module docstring, last equation).
 

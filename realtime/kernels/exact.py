@@ -74,7 +74,8 @@ def exact(geometry: RayGeometry, x0, x1, medium: Medium, light: Light):
 
 def _in_single(geometry: RayGeometry, segment, extinctions, phase: Phase, light: Light):
     """Return one value per extinction."""
-    if light.varies:
+    # Branches hand no derivatives on to what they see from outside. The rule for all segments needs none.
+    if light.varies or dr.grad_enabled(segment, (geometry.foot, geometry.height), extinctions, phase):
         return _over_subsegments(geometry, segment, extinctions, phase, light)
     x0, x1 = segment
     segment_extent = extent(geometry, x0, x1, extinctions)

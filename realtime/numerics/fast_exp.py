@@ -36,10 +36,10 @@ def exp_bounded(x):
     Notes
     -----
     Valid for x <= 88; below -87 the result stays at 1.2e-38 instead of falling to zero. Relative error below 2e-7.
-    NaN stays NaN.
+    NaN stays NaN. What is put together from bits has no derivative: where one is asked for, it is `drjit.exp` too.
     """
     Float = type(x)
-    if not is_single(Float) or dr.backend_v(Float) != dr.JitBackend.LLVM:
+    if not is_single(Float) or dr.backend_v(Float) != dr.JitBackend.LLVM or dr.grad_enabled(x):
         return dr.exp(x)
     # 2^n 2^f with n an integer and |f| <= 1/2; the fused steps keep f exact up to the rounding of log2(e) in two parts.
     clamped = dr.maximum(x, -87.0)
@@ -53,10 +53,11 @@ def exp2_bounded(x):
 
     Notes
     -----
-    Valid for |x| <= 125, unchecked: beyond, the result means nothing. Relative error below 2e-7.
+    Valid for |x| <= 125, unchecked: beyond, the result means nothing. Relative error below 2e-7. Where a derivative is
+    asked for, it is `drjit.exp2` too.
     """
     Float = type(x)
-    if not is_single(Float) or dr.backend_v(Float) != dr.JitBackend.LLVM:
+    if not is_single(Float) or dr.backend_v(Float) != dr.JitBackend.LLVM or dr.grad_enabled(x):
         return dr.exp2(x)
     n = dr.round(x)
     return _scaled_power(x - n, n)

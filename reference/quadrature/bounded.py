@@ -71,7 +71,7 @@ def sum_media(
     for first in range(0, len(rays.foot), _RAYS):
         chosen = (ray >= first) & (ray < first + _RAYS) & (x1 > x0)
         stretches = ray[chosen], x0[chosen], x1[chosen]
-        pieces = cut_pieces(setup, stretches, _kinks(setup, np.unique(ray[chosen])), rays.foot)
+        pieces = cut_pieces(setup, stretches, kinks(setup, np.unique(ray[chosen])), rays.foot)
         if len(pieces.ray):
             block = slice(first, first + _RAYS)
             value, error = _Sum(setup, pieces, first, len(rays.foot[block])).adapt()
@@ -79,7 +79,7 @@ def sum_media(
     return total * light.intensity / (4 * np.pi), bound * light.intensity / (4 * np.pi)
 
 
-def _kinks(setup: Setup, used: Index) -> tuple[Index, Array]:
+def kinks(setup: Setup, used: Index) -> tuple[Index, Array]:
     """Return rays, among those used, and distances of the kinks of the leg from the light and of phase functions."""
     truth, rays = setup.truth, setup.rays
     axes, height = (rays.direction[used], rays.normal[used]), rays.height[used]

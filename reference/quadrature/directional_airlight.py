@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.quadrature.directional_sums import sum_directional
-from reference.quadrature.segments import camera_segments, scattering_range
+from reference.quadrature.segments import Segments, camera_segments, scattering_range
 from reference.scene.directional_light import DirectionalLight
 from reference.scene.read import TruthScene
 from reference.visibility.directional_casting import directional_intervals, edge_scale
@@ -43,11 +43,24 @@ def directional_airlight(
     """
     if not truth.media:
         return None
-    segments = camera_segments(truth, distance)
-    rays = parallel_rays(truth.origin, truth.direction, light, scattering_range(segments))
-    lit = directional_intervals(truth, rays, **how)
+    rays, lit, segments = lit_parallel_rays(truth, light, distance, how)
     radiance, bound = sum_directional(truth, light, rays, lit, segments, scale=edge_scale(truth, rays))
     return DirectionalAirlight(radiance, bound + _worth_of_doubt(truth, light, rays, lit), lit)
+
+
+def lit_parallel_rays(
+    truth: TruthScene, light: DirectionalLight, distance: Array, how: dict[str, Any]
+) -> tuple[ParallelRays, LitIntervals, Segments]:
+    """Return the rays in their planes with a light, which parts of them it reaches, and the media along them.
+
+    Parameters
+    ----------
+    truth, light, distance, how
+        See `directional_airlight`.
+    """
+    segments = camera_segments(truth, distance)
+    rays = parallel_rays(truth.origin, truth.direction, light, scattering_range(segments))
+    return rays, directional_intervals(truth, rays, **how), segments
 
 
 def _worth_of_doubt(truth: TruthScene, light: DirectionalLight, rays: ParallelRays, lit: LitIntervals) -> Array:

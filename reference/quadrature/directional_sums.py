@@ -92,7 +92,7 @@ def sum_directional(
     for first in range(0, count, _RAYS):
         chosen = (lit.ray >= first) & (lit.ray < first + _RAYS) & (x1 > x0)
         stretches = lit.ray[chosen], x0[chosen], x1[chosen]
-        pieces = cut_pieces(setup, stretches, _kinks(truth, rays, np.unique(lit.ray[chosen])))
+        pieces = cut_pieces(setup, stretches, kinks(truth, rays, np.unique(lit.ray[chosen])))
         if not len(pieces.ray):
             continue
         block = slice(first, first + _RAYS)
@@ -105,7 +105,7 @@ def sum_directional(
     return total * factor, bound * factor
 
 
-def _kinks(truth: TruthScene, rays: ParallelRays, used: Index) -> tuple[Index, Array]:
+def kinks(truth: TruthScene, rays: ParallelRays, used: Index) -> tuple[Index, Array]:
     """Return rays, among those used, and the distances at which their legs pass corners or tangents of the bodies."""
     numbers, places = [], []
     along, across, sine, cosine = (part[used] for part in (rays.direction, rays.across, rays.sine, rays.cosine))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from analytic.geometry import foot_and_height
 from reference.quadrature.bounded import sum_media
-from reference.quadrature.segments import camera_segments, scattering_range
+from reference.quadrature.segments import Segments, camera_segments, scattering_range
 from reference.quadrature.unbounded import Rays, sum_intervals
 from reference.scene.read import TruthLight, TruthScene
 from reference.visibility.intervals import LitIntervals
@@ -28,6 +28,16 @@ class LightAirlight:
     angle: Array  #: between the ray and the direction to the light, pi where that is not before the surface [rad]
     lit: LitIntervals  #: the intervals that were integrated
     reached: NDArray[np.bool_] | None  #: whether the light reaches the end of the ray; None if that was not looked at
+
+
+@dataclass(frozen=True)
+class LitRays:
+    """The rays in their planes with one light, and which parts of them it reaches."""
+
+    rays: Rays
+    lit: LitIntervals  #: up to the surface, in the cone of a spot, and where a medium scatters
+    segments: Segments | None  #: the media along the rays, where these have bounds
+    end: Array  #: angle at the light of the visible surface, (rays,) [rad]
 
 
 def light_airlight(
@@ -54,6 +64,28 @@ def light_airlight(
     tolerance
         `rtol` of the integrals in one unbounded medium.
     """
+    reaches = lit_rays(truth, light, distance, how)
+    rays, lit, segments = reaches.rays, reaches.lit, reaches.segments
+    if segments is None:
+        radiance, bound = sum_intervals(truth.medium, light, rays, lit, shadow_scale, **tolerance)
+    else:
+        radiance, bound = sum_media(truth, light, rays, lit, segments, shadow_scale=shadow_scale)
+    in_front = (rays.foot > 0) & (rays.foot < distance)
+    angle = np.where(in_front, np.arctan2(rays.height, rays.foot), np.pi)
+    bound += _worth_of_doubt(light, rays, lit, truth)
+    # Intervals end at a bound of the media, not at the surface, where there are any.
+    reached = None if segments is not None else _reach(lit, reaches.end)
+    return LightAirlight(radiance, bound, angle, lit, reached)
+
+
+def lit_rays(truth: TruthScene, light: TruthLight, distance: Array, how: dict[str, Any]) -> LitRays:
+    """Return which parts of the rays a point or spot light reaches.
+
+    Parameters
+    ----------
+    truth, light, distance, how
+        See `light_airlight`.
+    """
     direction = truth.direction
     foot, height = foot_and_height(np.broadcast_to(truth.origin, direction.shape), direction, light.position)
     normal = perpendicular(truth.origin, direction, light)
@@ -67,17 +99,7 @@ def light_airlight(
         first, last = (np.arctan2(x - foot, height) for x in scattering_range(segments))
         ends = np.maximum(ends[0], first), np.minimum(ends[1], last)
     lit = lit_intervals(truth, light, (direction, normal, height), ends=ends, **how)
-    rays = Rays(direction, normal, foot, height)
-    if segments is None:
-        radiance, bound = sum_intervals(truth.medium, light, rays, lit, shadow_scale, **tolerance)
-    else:
-        radiance, bound = sum_media(truth, light, rays, lit, segments, shadow_scale=shadow_scale)
-    in_front = (foot > 0) & (foot < distance)
-    angle = np.where(in_front, np.arctan2(height, foot), np.pi)
-    bound += _worth_of_doubt(light, rays, lit, truth)
-    # Intervals end at a bound of the media, not at the surface, where there are any.
-    reached = None if segments is not None else _reach(lit, theta1)
-    return LightAirlight(radiance, bound, angle, lit, reached)
+    return LitRays(Rays(direction, normal, foot, height), lit, segments, theta1)
 
 
 def _reach(lit: LitIntervals, end: Array) -> NDArray[np.bool_]:

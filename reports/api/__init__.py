@@ -10,12 +10,13 @@ Read in this order:
 - `tables.py`: tables and reports as results
 - `images.py`: `load_scene`, `render`, `compare`
 - `reference.py`: `reference`
+- `fit.py`: `fit`
 - `studies.py`: `integrate`, `bench`
 - `slab.py`: `slab`
 - `report.py`: `report`
 
 May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.methods`, `realtime.scene`, `reference.storage`,
 `reports.data`, `reports.machine`, `reports.plotting`, `reports.report`, `reports.tables`, `validation.comparison`,
-`validation.configurations`, `validation.estimates`, `validation.frames`, `validation.kernels`, `validation.metrics`,
-`validation.scenes`, `validation.slab`.
+`validation.configurations`, `validation.estimates`, `validation.fit`, `validation.frames`, `validation.kernels`,
+`validation.metrics`, `validation.scenes`, `validation.slab`.
 """

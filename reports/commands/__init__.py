@@ -21,6 +21,7 @@ Read in this order:
 - `doctor.py`: `airlight doctor`
 - `fidelity.py`: `airlight fidelity`
 - `figures.py`: `airlight figures`
+- `fit.py`: `airlight fit`
 - `integrate.py`: `airlight integrate`
 - `lists.py`: `airlight list`
 - `maps.py`: `airlight maps`
@@ -36,10 +37,10 @@ Read in this order:
 - `view.py`: `airlight view`
 
 May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.kernels`, `realtime.methods`,
-`realtime.methods.shadow_planes`, `realtime.parameters`, `realtime.scene`, `realtime.shadow_maps`, `reference.storage`,
-`reports.data`, `reports.diff`, `reports.docs`, `reports.figures`, `reports.interchange`, `reports.machine`,
-`reports.papers`, `reports.plotting`, `reports.report`, `reports.tables`, `reports.view`, `validation.certified`,
-`validation.comparison`, `validation.configurations`, `validation.estimates`, `validation.fidelity`,
-`validation.frames`, `validation.kernels`, `validation.metrics`, `validation.mutations`, `validation.papers`,
-`validation.scenes`, `validation.slab`.
+`realtime.methods.shadow_planes`, `realtime.parameters`, `realtime.scene`, `realtime.shadow_maps`,
+`reference.storage`, `reports.data`, `reports.diff`, `reports.docs`, `reports.figures`, `reports.interchange`,
+`reports.machine`, `reports.papers`, `reports.plotting`, `reports.report`, `reports.tables`, `reports.view`,
+`validation.certified`, `validation.comparison`, `validation.configurations`, `validation.diagnosis`,
+`validation.estimates`, `validation.fidelity`, `validation.fit`, `validation.frames`, `validation.kernels`,
+`validation.metrics`, `validation.mutations`, `validation.papers`, `validation.scenes`, `validation.slab`.
 """

@@ -23,6 +23,7 @@ from reports.commands.options import (
     named,
 )
 
+_SMALL = "64x48"  # of images in which faults are planted: thousands of pixels are enough
 _BATCHES = 4096  # at most: a comparison ends earlier if its interval is narrow enough
 
 
@@ -54,6 +55,9 @@ def bench(
     ] = False,
     decompose: Annotated[
         bool, typer.Option("--decompose", help="Split the error of every method by its causes, in place of timing it.")
+    ] = False,
+    diagnosis: Annotated[
+        bool, typer.Option("--diagnosis", help="Plant faults in scenes and count how often a diagnosis names them.")
     ] = False,
     output: Annotated[
         Path | None,
@@ -103,6 +107,9 @@ def bench(
         return
     if phase is not None:
         raise InputError("--phase: it is for kernels; add --kernels, a scene has its own phase function")
+    if diagnosis:
+        _bench_diagnosis(scenes, size=size, json=json, markdown=markdown)
+        return
     if estimators:
         _bench_estimators(scenes, size=size, force=force, json=json)
         return
@@ -332,6 +339,33 @@ def _bench_kernels(names: list[str] | None, *, phase: str | None, json: bool, ma
     print("ns/ray: the kernel alone by Dr.Jit's history, median; ~ is extrapolated from fewer steps.")
     if orders:
         print_tables([order_table(orders)], as_markdown=markdown)
+
+
+def _bench_diagnosis(scenes: list[str] | None, *, size: str | None, json: bool, markdown: bool) -> None:
+    """Print which planted faults a diagnosis names; exit status 1 if it names a fault of a right image."""
+    from reports.commands.printing import print_heading, print_tables
+    from reports.machine.environment import activate, describe_environment
+    from reports.machine.progress import progress_bar
+    from reports.tables.diagnosis import answers_sentence, answers_table
+    from reports.tables.terminal import print_json
+    from validation.scenes.loading import parse_size
+    from validation.scenes.registry import SCENES
+
+    pixels = parse_size(size or _SMALL)
+    activate()
+    from validation.diagnosis.planted import planted_answers
+
+    with progress_bar("bench --diagnosis") as progress:
+        rows = planted_answers(scenes or list(SCENES), pixels, progress=progress)
+    if json:
+        print_json({"environment": describe_environment(), "size": list(pixels), "diagnosis": rows})
+    else:
+        if markdown:
+            print_heading()
+        print_tables([answers_table(rows)], as_markdown=markdown)
+        print(f"\n{answers_sentence(rows)}")
+    if any(row["planted"] == "right" and not row["right"] for row in rows):
+        raise typer.Exit(1)
 
 
 def _bench_estimators(scenes: list[str] | None, *, size: str | None, force: bool, json: bool) -> None:

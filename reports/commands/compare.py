@@ -86,6 +86,10 @@ def compare(
             show_default=False,
         ),
     ] = None,
+    diagnose: Annotated[
+        bool,
+        typer.Option("--diagnose", help="With a scene: say what is wrong with the image, in place of how far it is."),
+    ] = False,
     json: Json = False,
     scene: Annotated[str | None, typer.Option(hidden=True, help="The scene, which now stands first.")] = None,
 ) -> None:
@@ -95,6 +99,9 @@ def compare(
     factor, what may be wrong with the image as a whole, where most of the error lies, and whether the image is right.
     Exit status 1 if the test image has values that are negative or not finite, or if the bias is not shown to be within
     the margin.
+
+    --diagnose predicts the image that each of some forty faults would make, of medium, lights, camera and encoding, and
+    ranks them by evidence: what is wrong, by how much, and what is left over. See docs/diagnosis.md.
     """
     from analytic.errors import InputError
     from reports.interchange.difference import check_difference, write_difference
@@ -114,6 +121,15 @@ def compare(
             raise InputError(f"{option}: the pixels of a file are what they are; this option goes with a scene")
     if difference is not None:
         check_difference("--difference", difference)
+    if diagnose:
+        if scene is None:
+            raise InputError("--diagnose: it goes with a scene: airlight compare SCENE TEST.exr --diagnose")
+        given = {"--difference": difference, "--margin": margin, "--mask": mask, "--exposure": exposure}
+        others = [option for option, value in given.items() if value is not None] + ["--flip"] * flip
+        if others or metrics != "basic":
+            raise InputError(f"--diagnose: {', '.join(others) or '--metrics'} is about a comparison; leave one out")
+        _diagnose(scene, paths[0], layer=layer, holds=holds, pixel=pixel, json=json)
+        return
     options: dict[str, Any] = {
         "mask": mask,
         "margin": margin,
@@ -139,6 +155,23 @@ def compare(
             print(f"wrote            {difference}: {shown}")
     if comparison.failures:
         raise typer.Exit(1)
+
+
+def _diagnose(scene: str, file: Path, *, json: bool, **options) -> None:
+    """Print what is wrong with an image of a scene."""
+    from reference.storage.exr import read_exr
+    from reports.machine.environment import activate
+    from reports.machine.progress import progress_bar
+    from reports.tables.terminal import print_json
+
+    read_exr(file)  # unreadable files are refused before Mitsuba starts
+    activate()
+    from validation.diagnosis.diagnose import diagnose_file
+    from validation.diagnosis.diagnosis_text import diagnosis_lines
+
+    with progress_bar("diagnosis") as progress:
+        diagnosis = diagnose_file(file, scene, progress=progress, **options)
+    print_json(diagnosis.to_json()) if json else print("\n".join(diagnosis_lines(diagnosis)))
 
 
 def _scene_and_files(scene: str | None, words: list[str]) -> tuple[str | None, list[Path]]:

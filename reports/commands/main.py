@@ -28,6 +28,7 @@ from reports.commands.docs import docs
 from reports.commands.doctor import doctor
 from reports.commands.fidelity import fidelity
 from reports.commands.figures import figures
+from reports.commands.fit import fit
 from reports.commands.help import HelpfulCommand, HelpfulGroup
 from reports.commands.integrate import integrate
 from reports.commands.lists import kernels, list_, methods, scenes
@@ -59,7 +60,7 @@ DONE, FAILED, WRONG_INPUT, MISSING, INTERRUPTED = 0, 1, 2, 3, 130
 _PANELS: dict[str, tuple[Callable[..., None], ...]] = {
     "Start": (doctor, list_, render, view, cache),
     "Measure": (report, diff, bench, maps, stability),
-    "Images": (reference, compare, merge, describe, integrate, slab),
+    "Images": (reference, compare, fit, merge, describe, integrate, slab),
     "Papers": (published, figures, fidelity),
     "Develop": (run_tests, docs, baselines, mutations, certify),
 }

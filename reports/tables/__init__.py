@@ -16,6 +16,8 @@ Read in this order:
 - `decomposition.py`: errors by cause
 - `map_size.py`: error and flicker against the size of the shadow map
 - `slab.py`: a slab by order of scattering
+- `diagnosis.py`: planted faults and the answers
+- `fit.py`: parameters that explain an image
 - `checks.py`: baselines that moved, mutations, light left out
 - `lists.py`: scenes, methods, kernels
 - `scene.py`: the description of a scene for another renderer

@@ -11,6 +11,7 @@ Read in this order:
 - `laws.py`: exact laws of the airlight integral;
 - `convergence.py`: orders and rates of convergence;
 - `biri_misprints.py`: what the misprints of Biri 2006 cost;
+- `slopes.py`: derivatives, against certified ones;
 - `stability.py`: where kernels break;
 - `benchmark.py`: time against error.
 

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`airlight fit`: which parameters of the fog explain an image."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from reports.commands import completion
+from reports.commands.options import Json, listed, numbers_by_name
+
+
+def fit(
+    image: Annotated[Path, typer.Argument(help="The EXR file to explain.", show_default=False)],
+    scene: Annotated[
+        str,
+        typer.Option(
+            metavar="SCENE",
+            help="What it shows, a built-in scene or a Mitsuba XML file; what is not looked for is taken from it.",
+            show_default=False,
+            autocompletion=completion.scenes_and_images,
+        ),
+    ],
+    parameters: Annotated[
+        str,
+        typer.Option(
+            metavar="NAMES",
+            help="What is looked for: sigma_t, albedo (each also with .r, .g or .b), phase.g, intensity, exposure, "
+            "light.x, light.y, light.z; of one medium or light NAME as sigma_t:NAME.",
+        ),
+    ] = "sigma_t,albedo",
+    start: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME=VALUE,..",
+            help="Values to begin with; the scene's own by default.",
+            show_default=False,
+        ),
+    ] = "",
+    layer: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Layer to explain, 'airlight' by default, or 'total', R/G/B.",
+            show_default=False,
+        ),
+    ] = None,
+    holds: Annotated[
+        str | None,
+        typer.Option(
+            "--as",
+            metavar="NAME",
+            help="What the layer holds: 'airlight', 'surface' or 'total'; what its name says by default.",
+            show_default=False,
+            autocompletion=completion.one_of("airlight", "surface", "total"),
+        ),
+    ] = None,
+    pixel: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Pixels are values at their 'centre' or means over their 'area'; by default what fits.",
+            show_default=False,
+            autocompletion=completion.one_of("centre", "area"),
+        ),
+    ] = None,
+    mask: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="EXR file that is 0 in pixels to leave out.", show_default=False),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Find the parameters of media, lights and exposure that explain an image, each with its 95 % interval.
+
+    Pixels that disagree with what explains the others are left out. What the image cannot tell apart, such as albedo
+    and intensity in the airlight, is said, with a way out. See docs/diagnosis.md.
+    """
+    from reference.storage.exr import read_exr
+    from reports.machine.environment import activate
+    from reports.machine.progress import progress_bar
+    from reports.tables.fit import parameters_table
+    from reports.tables.terminal import print_json, print_table
+
+    names, starts = listed("--parameters", parameters), numbers_by_name("--start", start)
+    read_exr(image)  # unreadable files are refused before Mitsuba starts
+    activate()
+    from validation.fit.fit import fit_file
+    from validation.fit.fit_text import fit_lines
+
+    options: dict[str, Any] = {"layer": layer, "holds": holds, "pixel": pixel, "mask": mask, "starts": starts}
+    with progress_bar("fit") as progress:
+        explained = fit_file(image, scene, names, progress=progress, **options)
+    if json:
+        print_json(explained.to_json())
+        return
+    print_table(parameters_table(explained.to_json()))
+    print("\n" + "\n".join(fit_lines(explained)))

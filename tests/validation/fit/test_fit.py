@@ -1,0 +1,267 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`airlight fit`: what explains an image, how sure that is, and what no image can tell."""
+
+import math
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analytic.errors import InputError
+from reference.scene.read import read_truth
+from reference.storage.exr import Image, write_exr
+from validation.estimates.quadrature import truth_image
+from validation.fit.confounding import confounded_groups
+from validation.fit.fit import fit_file, fit_image, said_pixel
+from validation.fit.image_model import Task, image_model, usable_pixels
+from validation.fit.least_squares import best_start, robust_fit, weighted_fit
+from validation.fit.noise import noise_of, outliers
+from validation.fit.unknowns import read_unknowns
+from validation.fog_model.fog import scene_fog
+from validation.scenes.loading import load_scene
+
+SIZE = (48, 36)
+
+
+def scene_file(tmp_path, *, sigma_t="0.31", albedo="0.83", g="0.4", lights=1, position="0.7, 0.3, 1.9"):
+    second = '<emitter type="point" id="side"><point name="position" value="-1.1, 0.6, 0.4"/></emitter>'
+    kind = "rgb" if "," in sigma_t else "float"
+    path = tmp_path / "own.xml"
+    path.write_text(
+        f"""<scene version="3.0.0">
+    <medium type="homogeneous" id="fog"><{kind} name="sigma_t" value="{sigma_t}"/>
+        <float name="albedo" value="{albedo}"/>
+        <phase type="hg"><float name="g" value="{g}"/></phase></medium>
+    <emitter type="point" id="lamp"><point name="position" value="{position}"/></emitter>{second if lights > 1 else ""}
+    <sensor type="perspective">
+        <transform name="to_world"><lookat origin="0.2, -4.1, 1.3" target="0.1, 0, 0.6" up="0, 0, 1"/></transform>
+        <ref name="medium" id="fog"/>
+        <film type="hdrfilm"><integer name="width" value="{SIZE[0]}"/><integer name="height" value="{SIZE[1]}"/></film>
+    </sensor>
+    <shape type="sphere" id="ball"><float name="radius" value="0.4"/></shape>
+</scene>
+"""
+    )
+    return str(path)
+
+
+def image_of(path):
+    truth = truth_image(load_scene(path).scene)
+    return Image({"airlight": truth.airlight, "surface": truth.surface, "total": truth.airlight + truth.surface})
+
+
+def fitted(image, scene, names, **how):
+    return fit_image(image, load_scene(scene, SIZE), names, pixel="centre", **how)
+
+
+@pytest.mark.claim("fit-exact")
+@pytest.mark.parametrize("start", [0.02, 0.31, 4.0])
+def test_another_fog_is_found_from_any_start(variant, tmp_path, start):
+    foggier = image_of(scene_file(tmp_path, sigma_t="0.57", albedo="0.71", g="-0.2"))
+    scene = scene_file(tmp_path)
+    starts = {"sigma_t": start, "phase.g": 0.7}
+    fit = fitted(foggier, scene, ["sigma_t", "albedo", "phase.g"], layer="airlight", starts=starts)
+    wanted = (0.57, 0.71, -0.2)
+    for parameter, value, known in zip(fit.parameters, wanted, (0.31, 0.83, 0.4), strict=True):
+        assert parameter.value == pytest.approx(value, rel=1e-4)
+        assert parameter.low < value < parameter.high
+        assert parameter.scene == pytest.approx(known)
+    assert fit.confounded == ()
+    assert fit.residual < 1e-5
+    assert fit.explained > 0.999999
+
+
+def test_a_fog_with_three_extinctions_has_a_list_of_three(variant, tmp_path):
+    image = image_of(scene_file(tmp_path, sigma_t="0.2, 0.33, 0.47"))
+    scene = scene_file(tmp_path, sigma_t="0.5, 0.4, 0.3")
+    numbers = fitted(image, scene, ["sigma_t", "albedo"], layer="airlight").to_json()["parameters"]
+    assert numbers["sigma_t"]["value"] == pytest.approx([0.2, 0.33, 0.47], rel=1e-4)
+    assert numbers["albedo"]["value"] == pytest.approx(0.83, rel=1e-4)
+    by_channel = fitted(image, scene, ["sigma_t.g"], layer="airlight").to_json()["parameters"]
+    assert list(by_channel) == ["sigma_t.g"]
+
+
+def test_each_of_several_lights_has_a_factor(variant, tmp_path):
+    scene = scene_file(tmp_path, lights=2)
+    truth = read_truth(load_scene(scene).scene)
+    model = image_model(
+        Task(truth, np.ones((SIZE[0] * SIZE[1], 3)), "airlight", np.ones(SIZE[0] * SIZE[1], bool), False)
+    )
+    bright = model.radiance(replace(model.fog, intensity=(1.4, 0.3)))
+    image = Image({"airlight": bright.reshape(SIZE[1], SIZE[0], 3)})
+    fit = fitted(image, scene, ["intensity", "sigma_t"])
+    values = {each.name: each.value for each in fit.parameters}
+    assert values == pytest.approx({"intensity:lamp": 1.4, "intensity:side": 0.3, "sigma_t": 0.31}, rel=1e-5)
+    only = fitted(image, scene, ["intensity:side", "intensity:1"])
+    assert [each.name for each in only.parameters] == ["intensity:side", "intensity:lamp"]
+
+
+def test_a_light_is_found_where_it_is_with_its_shadows(variant, tmp_path):
+    image = image_of(scene_file(tmp_path, position="0.82, 0.17, 1.7"))
+    fit = fitted(image, scene_file(tmp_path), ["light.x", "light.y", "light.z", "sigma_t"], layer="airlight")
+    values = [each.value for each in fit.parameters]
+    assert values == pytest.approx([0.82, 0.17, 1.7, 0.31], rel=1e-3)
+
+
+@pytest.mark.claim("fit-confounded")
+def test_albedo_and_intensity_are_not_told_apart_in_the_airlight_but_with_surfaces(variant, tmp_path):
+    scene = scene_file(tmp_path)
+    image = image_of(scene)
+    fit = fitted(image, scene, ["sigma_t", "albedo", "intensity", "exposure"], layer="airlight")
+    (group,) = fit.confounded
+    assert group.parameters == ("albedo", "intensity", "exposure")
+    assert group.held == ("intensity", "exposure")
+    (product,) = group.products
+    assert product.name == "albedo * intensity * exposure"
+    assert product.low < 0.83 < product.high
+    assert "layer" in group.way_out
+    by_name = {each.name: each for each in fit.parameters}
+    assert by_name["albedo"].low is None
+    assert by_name["sigma_t"].low is not None
+    whole = fitted(image, scene, ["sigma_t", "albedo", "intensity"], layer="total")
+    assert whole.confounded == ()
+    assert [each.value for each in whole.parameters] == pytest.approx([0.31, 0.83, 1.0], rel=1e-3)
+
+
+def test_what_does_nothing_is_said(variant, tmp_path):
+    scene = scene_file(tmp_path)
+    (group,) = fitted(image_of(scene), scene, ["albedo", "sigma_t"], layer="surface", holds="surface").confounded
+    assert (group.parameters, group.products) == (("albedo",), ())
+    assert "nothing" in group.way_out
+
+
+@pytest.mark.claim("fit-robust")
+def test_pixels_that_disagree_are_left_out(variant, tmp_path):
+    scene = scene_file(tmp_path, albedo="0.83")
+    image = image_of(scene)
+    spoiled = np.array(image.layers["airlight"])
+    spoiled[:14, :20] = 7.0  # an object that the scene does not have: a sixth of the image
+    spoiled[20, :10] = np.nan
+    fit = fitted(Image({"airlight": spoiled}), scene, ["sigma_t", "albedo"], starts={"sigma_t": 1.0})
+    assert [each.value for each in fit.parameters] == pytest.approx([0.31, 0.83], rel=1e-4)
+    # 7.0 is the largest value there is: those pixels count as cut off, and take no part at all.
+    assert fit.left_out < 20
+    spoiled[:14, :20] = 7.0 + np.random.default_rng(1).random((14, 20, 3))
+    fit = fitted(Image({"airlight": spoiled}), scene, ["sigma_t", "albedo"])
+    assert [each.value for each in fit.parameters] == pytest.approx([0.31, 0.83], rel=1e-4)
+    assert fit.left_out >= 280
+    mask = np.ones((SIZE[1], SIZE[0]))
+    mask[:14, :20] = 0
+    assert fitted(Image({"airlight": spoiled}), scene, ["sigma_t"], mask=mask).left_out < 20
+
+
+def test_means_over_pixels_are_told_from_centres(variant, tmp_path):
+    scene = scene_file(tmp_path)
+    loaded = load_scene(scene, (24, 18))
+    means = truth_image(loaded.scene, pixel="area")
+    fit = fit_image(Image({"airlight": means.airlight}), loaded, ["sigma_t", "albedo"])
+    assert fit.pixel == "area"
+    assert [each.value for each in fit.parameters] == pytest.approx([0.31, 0.83], rel=1e-3)
+    assert fit_image(image_of(scene), load_scene(scene), ["sigma_t"], layer="airlight").pixel == "centre"
+    assert said_pixel(Image({}, attributes={"airlight:method": "ray-march"})) == "centre"
+    assert said_pixel(Image({}, attributes={"airlight:pixel": "area"})) == "area"
+    assert said_pixel(Image({})) is None
+
+
+@pytest.mark.statistical
+@pytest.mark.claim("fit-coverage")
+@pytest.mark.parametrize("noise", ["relative", "absolute", "skewed"])
+def test_intervals_cover_the_truth_as_often_as_they_say(variant, tmp_path, noise):
+    truth = read_truth(load_scene(scene_file(tmp_path), (32, 24)).scene)
+    fog, count, trials = scene_fog(truth), 32 * 24, 200
+    unknowns = read_unknowns(["sigma_t", "phase.g", "intensity"], truth, fog, {})
+    model = image_model(Task(truth, np.zeros((count, 3)), "airlight", np.ones(count, bool), False))
+    clean = model.radiance(fog)
+    generator = np.random.default_rng(5)
+    wanted = np.array([unknown.scale.inward(unknown.scene) for unknown in unknowns])
+    covered = np.zeros(len(unknowns))
+    for _ in range(trials):
+        noisy = {
+            "relative": lambda: clean * (1 + 0.01 * generator.standard_normal((count, 1))),
+            "absolute": lambda: clean + 0.01 * clean.mean() * generator.standard_normal(clean.shape),
+            "skewed": lambda: clean * generator.gamma(25.0, 0.04, (count, 1)),
+        }[noise]()
+        seen = replace(model, task=replace(model.task, values=noisy))
+        solution = weighted_fit(seen, unknowns, robust_fit(seen, unknowns, best_start(seen, unknowns)))
+        covered += np.abs(solution.inner - wanted) < 1.96 * np.sqrt(np.diag(solution.covariance))
+    # Of 200 trials 190 should cover; the binomial distribution with 0.95 gives fewer than 177 once in 16 000, of which
+    # nine are looked at.
+    assert (covered >= 177).all(), covered / trials
+
+
+def test_noise_is_found_by_its_two_parts():
+    generator = np.random.default_rng(2)
+    radiance = np.exp(generator.normal(0, 2, 20_000))
+    sigma = np.hypot(0.3, 0.02 * radiance)
+    residual = sigma * generator.standard_normal(len(radiance))
+    residual[::50] += 100
+    estimated = noise_of(radiance, residual)
+    # 24 groups of 833 values each know their scatter to 4 %.
+    assert np.median(np.abs(estimated / sigma - 1)) < 0.06
+    pixels = outliers(residual[:, None] * np.ones(3), estimated[:, None])
+    assert pixels[::50].all()
+    assert pixels.mean() < 0.021
+
+
+def test_groups_of_dependent_columns():
+    generator = np.random.default_rng(3)
+    a, b, c = generator.standard_normal((3, 50))
+    assert confounded_groups(np.stack([a, b, c], axis=1)) == ()
+    (group,) = confounded_groups(np.stack([a, b, 2 * a, c], axis=1))
+    assert (group.members, group.held) == ((0, 2), (2,))
+    assert group.powers == {0: {2: pytest.approx(2.0)}}  # steps of (2, -1) change nothing: p_0 p_2^2 is known
+    (group,) = confounded_groups(np.stack([a, 0 * a], axis=1))
+    assert (group.members, group.held, group.powers) == ((1,), (1,), {})
+
+
+def test_cut_off_values_say_nothing():
+    values = np.linspace(0, 1, 60).reshape(20, 3)
+    assert usable_pixels(values).all()
+    clipped = np.minimum(values, 0.6)
+    assert usable_pixels(clipped).sum() == (values.max(axis=1) < 0.6).sum()
+    values[3, 1] = np.inf
+    assert not usable_pixels(values)[3]
+
+
+@pytest.mark.parametrize(
+    ("names", "how", "words"),
+    [
+        ([], {}, "wanted some of sigma_t"),
+        (["sigma"], {}, "did you mean 'sigma_t'"),
+        (["sigma_t", "sigma_t.r"], {}, "there twice"),
+        (["albedo:fog2"], {}, "wanted a medium of the scene"),
+        (["intensity:3"], {}, "wanted a light of the scene"),
+        (["exposure:lamp"], {}, "whole image"),
+        (["sigma_t"], {"starts": {"albedo": 0.5}}, "is not looked for"),
+        (["sigma_t"], {"starts": {"sigma_t": -1.0}}, "a number above 0"),
+        (["phase.g"], {"starts": {"phase.g": 1.0}}, "between -1 and 1"),
+        (["sigma_t"], {"starts": {"sigma_t": math.nan}}, "a number above 0"),
+        (["sigma_t"], {"mask": np.ones((3, 4))}, "the mask is 4 x 3 pixels"),
+        (["sigma_t"], {"mask": np.zeros((36, 48))}, "0 pixels"),
+        (["sigma_t"], {"pixel": "middle"}, "'centre' or 'area'"),
+    ],
+)
+def test_mistakes_have_one_line(variant, tmp_path, names, how, words):
+    scene = scene_file(tmp_path)
+    image = Image({"airlight": np.random.default_rng(1).random((36, 48, 3))})
+    with pytest.raises(InputError, match=re.escape(words)):
+        fit_image(image, load_scene(scene), names, **how)
+
+
+def test_an_image_that_nothing_explains_is_no_error(variant, tmp_path):
+    scene = scene_file(tmp_path)
+    noise = Image({"airlight": np.random.default_rng(1).random((36, 48, 3))})
+    fit = fitted(noise, scene, ["sigma_t", "intensity"])
+    assert fit.explained < 0.5
+    assert all(math.isfinite(each.value) for each in fit.parameters)
+
+
+def test_a_file_is_fitted_too(variant, tmp_path):
+    scene = scene_file(tmp_path)
+    path = tmp_path / "engine.exr"
+    write_exr(path, image_of(scene), finite=False)
+    fit = fit_file(path, scene, ["sigma_t"], layer="airlight")
+    assert (fit.path, fit.pixel, fit.scene) == (str(path), "centre", "own")
+    with pytest.raises(InputError, match="No such file"):
+        fit_file(tmp_path / "missing.exr", scene, ["sigma_t"])

@@ -1,0 +1,314 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The diagnosis of an image of a scene: every hypothesis, then pairs of them, by evidence."""
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analytic.errors import InputError
+from reference.monte_carlo.batches import LAYERS
+from reference.monte_carlo.volpath.integrator import volpath_batch
+from reference.scene.read import TruthScene, read_truth
+from reference.storage.exr import Image, read_exr
+from validation.comparison.engine_compare import scene_of_size
+from validation.comparison.engine_layers import judged_layer
+from validation.comparison.engine_pixels import PIXELS
+from validation.diagnosis.camera import CAMERA
+from validation.diagnosis.encoding import ENCODING
+from validation.diagnosis.hypothesis import Hypothesis
+from validation.diagnosis.lights import LIGHTS
+from validation.diagnosis.medium import MEDIUM
+from validation.diagnosis.prediction import Predictor
+from validation.diagnosis.search import Explanation, explain
+from validation.diagnosis.verdict import (
+    LEAST_EFFECT,
+    LEAST_EVIDENCE,
+    LEFT,
+    effect,
+    evidence,
+    gains,
+    is_explained,
+    scale_of,
+)
+from validation.fit.fit import said_pixel, three_channels
+from validation.fit.image_model import Task
+from validation.metrics.errors import plain
+from validation.scenes.loading import LoadedScene
+
+Array = NDArray[np.float64]
+Progress = Callable[[float, str], None]
+
+HYPOTHESES: tuple[Hypothesis, ...] = (*LIGHTS, *MEDIUM, *CAMERA, *ENCODING)
+RIGHT, UNEXPLAINED = "right", "unexplained"
+
+_REFINED = 5
+_PARTNERS = 5  # of the best explanations that pairs are made of
+_BETTER = 0.7  # what a pair must leave of the error of one alone
+_MUCH = 0.2  # what an explanation must leave of the error to be named although more is wrong
+_ALIKE = 5.0  # evidence by which explanations may differ and still be as good as one another
+_SHOWN = 8
+_BATCH = 4  # batches of 16 paths a pixel for the light of multiple scattering
+_SAMPLES = 16
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """A hypothesis in the order of evidence."""
+
+    name: str
+    parameter: float | None  #: its only number
+    parameters: tuple[float, ...]
+    words: str
+    residual: float  #: mean relative error that it leaves, with what stands beside it
+    evidence: float  #: natural logarithm of the odds against the unchanged scene
+    together: tuple[str, ...]  #: names of all that explain the image together, where it takes more than one
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What is wrong with an image."""
+
+    scene: str
+    path: str
+    pixel: str  #: 'centre' or 'area'
+    first: str  #: name of what comes first; 'right' or 'unexplained' where no hypothesis does
+    ranked: tuple[Ranked, ...]
+    residual: float  #: mean relative error of the image as it is
+    left: float  #: what the first explanation leaves of it
+    explained: bool  #: whether that is noise, or little
+
+    def to_json(self) -> dict[str, Any]:
+        """Return every number by name."""
+        return {
+            "diagnosis": {
+                "first": self.first,
+                "ranked": [plain(row) for row in self.ranked],
+                "residual": plain(self.residual),
+                "left": plain(self.left),
+                "explained": self.explained,
+                "pixel": self.pixel,
+            }
+        }
+
+
+def diagnose_file(path: str | os.PathLike[str], scene: str, *, layer: str | None = None, **how: Any) -> Diagnosis:
+    """Diagnose an EXR file of a scene; see `diagnose_image` for what else can be given.
+
+    Parameters
+    ----------
+    path, scene
+        The EXR file; a built-in scene or a Mitsuba XML file.
+    layer
+        Which layer, see `validation.comparison.engine_layers.judged_layer`.
+
+    Raises
+    ------
+    InputError
+        For files and scenes that cannot be read.
+    """
+    image = read_exr(path)
+    judged = judged_layer(image, path, name=layer, holds=how.get("holds"))
+    return diagnose_image(image, scene_of_size(scene, judged.size, path), path=str(path), layer=layer, **how)
+
+
+def diagnose_image(
+    image: Image,
+    loaded: LoadedScene,
+    *,
+    path: str = "the image",
+    layer: str | None = None,
+    holds: str | None = None,
+    pixel: str | None = None,
+    progress: Progress | None = None,
+) -> Diagnosis:
+    """Say what is wrong with an image of a scene.
+
+    Parameters
+    ----------
+    image, loaded
+        The layers, and the scene at their size.
+    path
+        What to call the image.
+    layer, holds
+        Which layer, and what it holds: 'airlight', 'surface' or 'total'.
+    pixel
+        'centre' or 'area'; by default what the image says of itself, or what fits better.
+    progress
+        Called with (share done, what).
+
+    Raises
+    ------
+    InputError
+        For a layer that is not there, a scene that has no truth, and an image without finite values.
+    """
+    if pixel is not None and pixel not in PIXELS:
+        raise InputError(f"--pixel {pixel}; wanted 'centre' or 'area'")
+    judged = judged_layer(image, path, name=layer, holds=holds)
+    truth = read_truth(loaded.scene)
+    values = three_channels(judged)
+    used = np.asarray(np.isfinite(values).all(axis=1))
+    if not used.any() or not np.any(values[used] > 0):
+        raise InputError(f"{path}: the layer '{judged.name}' has no finite value above 0; there is nothing to diagnose")
+    said = pixel or said_pixel(image)
+    task = Task(truth, values, judged.holds, used, area=False)
+    multiple = cache(lambda: _multiple_light(truth))
+    kinds = [said] if said else list(PIXELS)
+    results = []
+    for number, kind in enumerate(kinds):
+        shape = judged.size[1], judged.size[0]
+        predictor = Predictor(replace(task, area=kind == "area"), shape, multiple=multiple)
+        tell = None if progress is None else _stage(progress, number, len(kinds))
+        results.append((kind, _ranked(predictor, kind, tell)))
+    kind, (right, chosen, rows, explained) = min(results, key=lambda result: result[1][1].error)
+    first = _first(right, chosen, explained)
+    return Diagnosis(loaded.name, path, kind, first, tuple(rows[:_SHOWN]), right.error, chosen.error, explained)
+
+
+def _stage(progress: Progress, number: int, count: int) -> Progress:
+    return lambda share, what: progress((number + share) / count, what)
+
+
+def _first(right: Explanation, chosen: Explanation, explained: bool) -> str:
+    if not chosen.hypotheses:
+        return RIGHT if explained else UNEXPLAINED
+    if explained or chosen.error < _MUCH * right.error:
+        return chosen.hypotheses[0].name
+    return UNEXPLAINED
+
+
+def _ranked(
+    predictor: Predictor, pixel: str, progress: Progress | None
+) -> tuple[Explanation, Explanation, list[Ranked], bool]:
+    """Return the unchanged scene, the explanation that is chosen, all in order, and whether nothing is left."""
+    right = explain(predictor, ())
+    there = [hypothesis for hypothesis in HYPOTHESES if hypothesis.applies(predictor)]
+    cheap = [hypothesis for hypothesis in there if not hypothesis.costly]
+    singles = _explained(predictor, cheap, progress, (0.0, 0.5))
+    chosen = _best(right, singles, pixel)
+    if not is_explained(chosen) or (chosen is right and right.error > LEFT):
+        costly = [hypothesis for hypothesis in there if hypothesis.costly]
+        singles += _explained(predictor, costly, progress, (0.5, 0.75))
+        chosen = _best(right, singles, pixel)
+    pairs: list[Explanation] = []
+    if not is_explained(chosen):
+        pairs = _pairs(predictor, right, singles, there, pixel, progress)
+        best = _best(right, [chosen, *pairs] if chosen.hypotheses else pairs, pixel)
+        if best.error < _BETTER * chosen.error:
+            chosen = best
+    scale = scale_of(chosen, pixel)
+    rows: list[Ranked] = []
+    if len(chosen.hypotheses) > 1:
+        rows += _rows(chosen, evidence(chosen, right, scale))
+    ordered = sorted(singles, key=lambda each: -evidence(each, right, scale))
+    named = {row.name for row in rows}
+    for each in ordered:
+        name = each.hypotheses[0].name
+        if name not in named:
+            named.add(name)
+            rows += _rows(each, evidence(each, right, scale))
+    if not chosen.hypotheses:
+        rows.insert(0, Ranked(RIGHT, None, (), "nothing is wrong", right.error, 0.0, ()))
+    elif len(chosen.hypotheses) == 1:
+        # Between explanations that leave the same, the one with fewer numbers comes first.
+        rows.sort(key=lambda row: row.name != chosen.hypotheses[0].name)
+    return right, chosen, rows, is_explained(chosen) or gains(chosen, right)
+
+
+def _explained(
+    predictor: Predictor, hypotheses: Sequence[Hypothesis], progress: Progress | None, span: tuple[float, float]
+) -> list[Explanation]:
+    explanations = []
+    for number, hypothesis in enumerate(hypotheses):
+        if progress is not None:
+            progress(span[0] + (span[1] - span[0]) * number / len(hypotheses), hypothesis.name)
+        explanations.append(explain(predictor, (hypothesis,), fine=False))
+    return _refined(predictor, explanations)
+
+
+def _refined(predictor: Predictor, explanations: list[Explanation]) -> list[Explanation]:
+    """Return explanations, those that leave least with all digits."""
+    ordered = sorted(explanations, key=lambda each: each.error)
+    best = [each for each in ordered[:_REFINED] if each.parameters]
+    finer = {id(each): explain(predictor, each.hypotheses, each.values) for each in best}
+    return [finer.get(id(each), each) for each in explanations]
+
+
+def _best(right: Explanation, explanations: Sequence[Explanation], pixel: str) -> Explanation:
+    """Return the explanation with the most evidence, or the unchanged scene where none has enough."""
+    if not explanations:
+        return right
+    scale = min(scale_of(each, pixel) for each in [right, *explanations])
+    most = max(evidence(each, right, scale) for each in explanations)
+    # Of those that explain it alike, such as a factor and a near plane before dark fog, the simplest and the first.
+    alike = [each for each in explanations if evidence(each, right, scale) >= most - _ALIKE]
+    best = min(alike, key=lambda each: each.parameters)
+    enough = evidence(best, right, scale) > LEAST_EVIDENCE and effect(best, right) > LEAST_EFFECT
+    return best if enough else right
+
+
+def _pairs(
+    predictor: Predictor,
+    right: Explanation,
+    singles: Sequence[Explanation],
+    there: Sequence[Hypothesis],
+    pixel: str,
+    progress: Progress | None,
+) -> list[Explanation]:
+    """Return explanations by two hypotheses of different kinds."""
+    scale = min(scale_of(each, pixel) for each in singles)
+    ordered = sorted(singles, key=lambda each: -evidence(each, right, scale))
+    partners = [each.hypotheses[0] for each in ordered[:_PARTNERS]]
+    partners += [hypothesis for hypothesis in there if hypothesis.name == "factor" and hypothesis not in partners]
+    wanted = []
+    for partner in partners:
+        for other in there:
+            costly = partner.costly or other.costly
+            pair = _in_order(partner, other)
+            if partner.kind != other.kind and not costly and pair not in wanted:
+                wanted.append(pair)
+    explanations = []
+    for number, pair in enumerate(wanted):
+        if progress is not None:
+            progress(0.75 + 0.25 * number / len(wanted), " and ".join(each.name for each in pair))
+        explanations.append(explain(predictor, pair, fine=False))
+    return _refined(predictor, explanations)
+
+
+_ORDER = ("medium", "light", "camera", "brightness", "values")
+
+
+def _in_order(*hypotheses: Hypothesis) -> tuple[Hypothesis, ...]:
+    """Return hypotheses in the order in which faults happen: the scene, its image, what is done to values."""
+    return tuple(sorted(hypotheses, key=lambda each: _ORDER.index(each.kind)))
+
+
+def _rows(explanation: Explanation, weight: float) -> list[Ranked]:
+    names = tuple(hypothesis.name for hypothesis in explanation.hypotheses)
+    return [
+        Ranked(
+            hypothesis.name,
+            values[0] if len(values) == 1 else None,
+            values,
+            hypothesis.words.format(*values),
+            explanation.error,
+            weight,
+            names if len(names) > 1 else (),
+        )
+        for hypothesis, values in zip(explanation.hypotheses, explanation.values, strict=True)
+    ]
+
+
+def _multiple_light(truth: TruthScene) -> Array | None:
+    """Return the light that the medium scattered more than once, by Mitsuba's path tracer, (pixels, 3)."""
+    if truth.width * truth.height > 1 << 17:
+        return None  # minutes for one hypothesis
+    parts = []
+    for seed in range(_BATCH):
+        whole, single = (volpath_batch(truth, seed, _SAMPLES, max_depth=depth).mean for depth in (64, 2))
+        parts.append((whole - single)[LAYERS.index("airlight")])
+    return np.asarray(np.mean(parts, axis=0))

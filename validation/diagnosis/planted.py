@@ -1,0 +1,223 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Faults that are planted into the truth of a scene, to count how often the diagnosis names them.
+
+Where a fault is one of the scene, such as another extinction, the image is the certified truth of the changed scene
+(`reference.quadrature`), by code that the hypotheses do not have: adaptive integrals in the place of fixed nodes. What
+was done to an image is done to that of the right scene.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from analytic.phase import PhaseFunction
+from reference.quadrature.image import quadrature_image
+from reference.quadrature.light_airlight import light_airlight
+from reference.quadrature.ray_values import TruthImage
+from reference.quadrature.surface import lit_surface, surface_hits
+from reference.scene.camera import film_directions, pixel_centres
+from reference.scene.read import TruthScene, read_truth
+from reference.storage.exr import Image
+from validation.comparison.engine_layers import truth_layer
+from validation.diagnosis.diagnose import diagnose_image
+from validation.diagnosis.encoding import filmic, srgb
+from validation.diagnosis.prediction import Scenery, changed_scene
+from validation.scenes.loading import load_scene
+
+Array = NDArray[np.float64]
+Progress = Callable[[float, str], None]
+
+_SAMPLES = 64  # of visibility: images of planted faults are small
+_HOLDS = "total"
+
+
+@dataclass(frozen=True)
+class Planted:
+    """A fault with the name that a diagnosis should give it."""
+
+    name: str
+    words: str
+    image: Callable[[TruthScene], Array | None]  #: (height, width, 3); None where the scene cannot have it
+
+
+def _quadrature(truth: TruthScene, **how: Any) -> TruthImage:
+    return quadrature_image(truth, samples=_SAMPLES, **how)
+
+
+def _total(image: TruthImage) -> Array:
+    return truth_layer(image, _HOLDS)
+
+
+def _of_scene(change: Callable[[TruthScene], TruthScene | None]) -> Callable[[TruthScene], Array | None]:
+    def image(truth: TruthScene) -> Array | None:
+        changed = change(truth)
+        return None if changed is None else _total(_quadrature(changed))
+
+    return image
+
+
+def _of_image(change: Callable[[Array], Array | None]) -> Callable[[TruthScene], Array | None]:
+    return lambda truth: change(_total(_quadrature(truth)))
+
+
+def _media(truth: TruthScene, change: Callable[[Any], Any]) -> TruthScene:
+    return replace(truth, medium=change(truth.medium), media=tuple(change(medium) for medium in truth.media))
+
+
+def _optics(change: Callable[[Array, Array], tuple[Array, Array]]) -> Callable[[TruthScene], TruthScene]:
+    def changed(medium: Any) -> Any:
+        sigma_t, albedo = change(medium.sigma_t, medium.albedo)
+        return replace(medium, sigma_t=sigma_t, albedo=albedo)
+
+    return lambda truth: _media(truth, changed)
+
+
+def _absorption(factor: float) -> Callable[[Array, Array], tuple[Array, Array]]:
+    def change(sigma_t: Array, albedo: Array) -> tuple[Array, Array]:
+        scattering = sigma_t * albedo
+        extinction = scattering + factor * (sigma_t - scattering)
+        return extinction, np.divide(scattering, extinction, out=albedo.copy(), where=extinction > 0)
+
+    return change
+
+
+def _phase(choose: Callable[[PhaseFunction], PhaseFunction | None]) -> Callable[[TruthScene], TruthScene | None]:
+    def changed(truth: TruthScene) -> TruthScene | None:
+        chosen = [choose(medium.phase) for medium in (truth.medium, *truth.media)]
+        if not any(chosen):
+            return None
+        return _media(truth, lambda medium: replace(medium, phase=choose(medium.phase) or medium.phase))
+
+    return changed
+
+
+def _negative_g(phase: PhaseFunction) -> PhaseFunction | None:
+    return PhaseFunction("hg", g=-phase.g) if phase.name == "hg" and phase.g else None
+
+
+def _other_g(phase: PhaseFunction) -> PhaseFunction | None:
+    if phase.name == "hg":
+        return PhaseFunction("hg", g=0.31 if phase.g > 0.4 else phase.g + 0.37)
+    return PhaseFunction("hg", g=0.43) if phase.is_constant else None
+
+
+def _scenery(wanted: Callable[[TruthScene], bool], **given: Any) -> Callable[[TruthScene], TruthScene | None]:
+    return lambda truth: changed_scene(truth, Scenery(**given)) if wanted(truth) else None
+
+
+def _spots(truth: TruthScene) -> bool:
+    return any(light.axis is not None for light in truth.lights)
+
+
+def _pixels(truth: TruthScene, change: Callable[[Array, tuple[int, int]], Array]) -> TruthScene:
+    """Return a scene whose rays go through other places on the film."""
+    size = truth.width, truth.height
+    sensor = truth.scene.sensors()[0]
+    return replace(truth, direction=film_directions(sensor, change(pixel_centres(size), size), size))
+
+
+def _other_axis(positions: Array, size: tuple[int, int]) -> Array:
+    middle = 0.5 * np.array(size)
+    return middle + (size[0] / size[1]) * (positions - middle)
+
+
+def _light_leg(truth: TruthScene) -> Array | None:
+    return None if truth.directional else _total(_quadrature(truth, shadow_scale=1e-9))
+
+
+def _shadowless(truth: TruthScene) -> Array | None:
+    if not truth.occluders.shapes() or truth.directional or truth.area:
+        return None
+    hits = surface_hits(truth)
+    everywhere = [np.ones(len(hits.distance), dtype=bool) for _ in truth.lights]
+    total = lit_surface(truth, hits, reached=everywhere, shadow_scale=1.0)
+    empty = replace(truth, occluders=mi.load_dict({"type": "scene"}))
+    for light in truth.lights:
+        total += light_airlight(empty, light, hits.distance, shadow_scale=1.0, how={}).radiance
+    return total.reshape(truth.height, truth.width, 3)
+
+
+def _clamped(image: Array) -> Array | None:
+    return np.minimum(image, np.quantile(image[image > 0], 0.9))
+
+
+def _swapped(image: Array) -> Array | None:
+    return image[..., ::-1] if np.ptp(image, axis=2).max() > 1e-3 * image.max() else None
+
+
+PLANTED = (
+    Planted("right", "nothing", _of_image(lambda image: image)),
+    Planted("factor", "1.07 times as bright", _of_image(lambda image: 1.07 * image)),
+    Planted("factor", "4 pi times as bright", _of_image(lambda image: 4 * np.pi * image)),
+    Planted("extinction", "the extinction 1.4 times", _of_scene(_optics(lambda s, a: (1.4 * s, a)))),
+    Planted("absorption", "no absorption", _of_scene(_optics(_absorption(0.0)))),
+    Planted("albedo", "the albedo twice", _of_scene(_optics(lambda s, a: (s, a * a)))),
+    Planted("g-sign", "g with the other sign", _of_scene(_phase(_negative_g))),
+    Planted("g", "another g", _of_scene(_phase(_other_g))),
+    Planted("light-leg", "the way from the light not attenuated", _light_leg),
+    Planted("no-shadow", "no shadows", _shadowless),
+    Planted("spot-angle", "cones twice as wide", _of_scene(_scenery(_spots, cone=2.0))),
+    Planted(
+        "light-position",
+        "the light moved",
+        _of_scene(_scenery(lambda truth: bool(truth.lights), moved=(0.07, -0.05, 0.09))),
+    ),
+    Planted("fov-axis", "the other field of view", _of_scene(lambda truth: _pixels(truth, _other_axis))),
+    Planted("shift", "half a pixel", _of_scene(lambda truth: _pixels(truth, lambda p, size: p - [0.5, 0.5]))),
+    Planted("flip", "upside down", _of_image(lambda image: image[::-1])),
+    Planted("flip", "mirrored", _of_image(lambda image: image[:, ::-1])),
+    Planted("transfer", "sRGB", _of_image(srgb)),
+    Planted("transfer", "gamma 2.2", _of_image(lambda image: image ** (1 / 2.2))),
+    Planted("clamp", "a tenth cut off", _of_image(_clamped)),
+    Planted("tone-map", "filmic", _of_image(filmic)),
+    Planted("channels", "B, G, R", _of_image(_swapped)),
+)
+
+
+def planted_answers(
+    scenes: Sequence[str], size: tuple[int, int], *, progress: Progress | None = None
+) -> list[dict[str, Any]]:
+    """Plant every fault in scenes and return the answers, a row each: 'scene', 'planted', 'words', 'first', 'right'.
+
+    Parameters
+    ----------
+    scenes
+        Built-in scenes or Mitsuba XML files.
+    size
+        Of the images [pixels].
+    progress
+        Called with (share done, what).
+
+    Raises
+    ------
+    InputError
+        For scenes that have no truth.
+    """
+    rows = []
+    for number, name in enumerate(scenes):
+        loaded = load_scene(name, size)
+        truth = read_truth(loaded.scene)
+        for turn, planted in enumerate(PLANTED):
+            if progress is not None:
+                share = (number + turn / len(PLANTED)) / len(scenes)
+                progress(share, f"{loaded.name}: {planted.words}")
+            image = planted.image(truth)
+            if image is None:
+                continue
+            diagnosis = diagnose_image(Image({_HOLDS: image}), loaded, layer=_HOLDS, pixel="centre")
+            rows.append(
+                {
+                    "scene": loaded.name,
+                    "planted": planted.name,
+                    "words": planted.words,
+                    "first": diagnosis.first,
+                    "right": diagnosis.first == planted.name,
+                    "residual": diagnosis.residual,
+                    "left": diagnosis.left,
+                }
+            )
+    return rows

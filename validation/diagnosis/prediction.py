@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What an engine with a fault would show, pixel by pixel: the fog model of a changed scene, then changed values."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.scene.read import TruthScene
+from validation.fit.image_model import ImageModel, Task, image_model
+from validation.fog_model.fog import Fog
+
+Array = NDArray[np.float64]
+
+_MOST_RAYS = 3000
+_FLOOR = 0.01  # of the mean of an image: below it values count relative to this
+
+
+@dataclass(frozen=True)
+class Scenery:
+    """What of a scene decides the paths of light; each combination has paths of its own."""
+
+    shadows: bool = True
+    offset: tuple[float, float] = (0.0, 0.0)  #: of all rays, to the right and down [pixels]
+    zoom: float = 1.0  #: factor on the distance of pixels from the middle of the image
+    moved: tuple[float, float, float] = (0.0, 0.0, 0.0)  #: of the first point or spot light [m]
+    cone: float = 1.0  #: factor on the angles of spots
+    edge: str = ""  #: of spots: 'hard', or 'smooth' from the axis on; the scene's own
+    radius: float = 0.0  #: of spheres in the place of point lights [m]
+
+
+@dataclass(frozen=True)
+class Guess:
+    """What an image could be: a scene, what fills it, and what was done to the values."""
+
+    fog: Fog
+    scenery: Scenery = field(default_factory=Scenery)
+    multiple: float = 0.0  #: share of the light of higher orders that is there
+    values: tuple[Callable[[Array], Array], ...] = ()  #: what was done to the values, in this order
+    undo: Callable[[Array], Array] | None = (
+        None  #: takes back what was done to the grid, (height, width, 3) -> the same
+    )
+
+
+@dataclass
+class Predictor:
+    """Predicts images; paths are found once for each scenery."""
+
+    task: Task
+    shape: tuple[int, int]
+    most: int = _MOST_RAYS
+    multiple: Callable[[], Array | None] | None = None  #: light of higher orders, (all pixels, 3), or None
+    _models: dict[Scenery, ImageModel] = field(default_factory=dict)
+
+    @property
+    def fog(self) -> Fog:
+        """The fog as the scene has it."""
+        return self.model(Scenery()).fog
+
+    def model(self, scenery: Scenery) -> ImageModel:
+        """Return the model of a scenery."""
+        if scenery not in self._models:
+            truth = changed_scene(self.task.truth, scenery)
+            self._models[scenery] = image_model(
+                replace(self.task, truth=truth),
+                most=self.most,
+                shadows=scenery.shadows,
+                offset=scenery.offset,
+                zoom=scenery.zoom,
+                radius=scenery.radius,
+            )
+        return self._models[scenery]
+
+    def predicted(self, guess: Guess) -> Array:
+        """Return the values of the pixels, (m, 3)."""
+        model = self.model(guess.scenery)
+        radiance = model.radiance(guess.fog)
+        if guess.multiple:
+            more = None if self.multiple is None else self.multiple()
+            if more is not None:
+                radiance = radiance + guess.multiple * more[model.pixels]
+        for change in guess.values:
+            radiance = change(radiance)
+        return radiance
+
+    def seen(self, guess: Guess) -> Array:
+        """Return the values of the image in these pixels, (m, 3), with the fault of the grid taken back."""
+        values = self.task.values
+        if guess.undo is not None:
+            values = np.ascontiguousarray(guess.undo(values.reshape(*self.shape, 3))).reshape(-1, 3)
+        return values[self.model(guess.scenery).pixels]
+
+    def errors(self, guess: Guess) -> Array:
+        """Return the errors of a guess, relative to the larger of both values, (m, 3), from -1 to 1."""
+        predicted, seen = self.predicted(guess), self.seen(guess)
+        floor = _FLOOR * max(float(np.mean(np.abs(seen))), 1e-300)
+        scale = np.maximum(np.maximum(np.abs(seen), np.abs(predicted)), floor)
+        errors = (seen - predicted) / scale
+        return np.where(np.isfinite(errors), errors, 1.0)
+
+
+def changed_scene(truth: TruthScene, scenery: Scenery) -> TruthScene:
+    """Return a scene with its point and spot lights as a scenery has them."""
+    lights = []
+    for number, light in enumerate(truth.lights):
+        if number == 0 and any(scenery.moved):
+            light = replace(light, position=light.position + np.array(scenery.moved))
+        if light.axis is not None and scenery.cone != 1:
+            half = 0.499 * np.pi
+            light = replace(
+                light, cutoff=min(light.cutoff * scenery.cone, half), beam=min(light.beam * scenery.cone, half)
+            )
+        if light.axis is not None and scenery.edge:
+            light = replace(light, beam=light.cutoff if scenery.edge == "hard" else 0.0)
+        lights.append(light)
+    return replace(truth, lights=tuple(lights))

@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The parameters with which hypotheses fit an image best, one alone or two together.
+
+The measure is the mean of log(1 + (e/s)^2) over all values, e the relative errors and s a scale: pixels that disagree
+cannot decide (`validation.fit.least_squares`). One parameter is looked for on the line, several by Nelder and Mead's
+simplex, both by SciPy. The scale begins at what the unchanged scene leaves and ends at what the search leaves.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize, minimize_scalar
+
+from validation.diagnosis.hypothesis import Hypothesis, Parameter
+from validation.diagnosis.prediction import Guess, Predictor
+
+Array = NDArray[np.float64]
+
+_LEAST_SCALE = 1e-6
+_TURNS = 5
+_COARSE = 0.02
+_SIMPLEX = 0.1  # first step, of a logarithm or in units of the parameter
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """Hypotheses with their best parameters, and what they leave."""
+
+    hypotheses: tuple[Hypothesis, ...]
+    values: tuple[tuple[float, ...], ...]
+    guess: Guess
+    errors: Array  #: relative, (pixels, 3)
+    error: float  #: mean of their sizes
+
+    @property
+    def parameters(self) -> int:
+        """How many numbers were looked for."""
+        return sum(len(hypothesis.parameters) for hypothesis in self.hypotheses)
+
+    @property
+    def words(self) -> str:
+        """Sentences of all hypotheses."""
+        return "; ".join(
+            hypothesis.words.format(*values) for hypothesis, values in zip(self.hypotheses, self.values, strict=True)
+        )
+
+
+def explain(
+    predictor: Predictor,
+    hypotheses: Sequence[Hypothesis],
+    near: Sequence[tuple[float, ...]] = (),
+    *,
+    fine: bool = True,
+) -> Explanation:
+    """Return the best explanation by some hypotheses together.
+
+    Parameters
+    ----------
+    predictor
+        The image and its scene.
+    hypotheses
+        In the order in which they change the guess.
+    near
+        Values to begin with; by default all starts of the hypotheses are tried.
+    fine
+        Whether the values are looked for to all digits, or to some per cent, which a hypothesis that is wrong needs.
+    """
+    parameters = [parameter for hypothesis in hypotheses for parameter in hypothesis.parameters]
+    starts = [tuple(value for part in near for value in part)] if near else _starts(predictor, hypotheses)
+    scale = min(_scale(predictor, _guess(predictor, hypotheses, start)) for start in starts)
+    inner = _inward(
+        parameters, min(starts, key=lambda start: _loss(predictor, _guess(predictor, hypotheses, start), scale))
+    )
+    for _ in range((2 if fine else 1) if parameters else 0):
+        scale = _scale(predictor, _guess(predictor, hypotheses, _outward(parameters, inner)))
+        inner = _improved(predictor, hypotheses, parameters, inner, scale, fine=fine)
+    values = _outward(parameters, inner)
+    guess = _guess(predictor, hypotheses, values)
+    errors = predictor.errors(guess)
+    return Explanation(tuple(hypotheses), _parted(hypotheses, values), guess, errors, float(np.abs(errors).mean()))
+
+
+def _improved(
+    predictor: Predictor,
+    hypotheses: Sequence[Hypothesis],
+    parameters: Sequence[Parameter],
+    inner: Array,
+    scale: float,
+    *,
+    fine: bool,
+) -> Array:
+    def errors(place: Array) -> Array:
+        return predictor.errors(_guess(predictor, hypotheses, _outward(parameters, place)))
+
+    def loss(place: Array) -> float:
+        return float(np.mean(np.log1p((errors(place) / scale) ** 2)))
+
+    low, high = _inward(parameters, [p.low for p in parameters]), _inward(parameters, [p.high for p in parameters])
+    if any(parameter.step for parameter in parameters):
+        steps = np.array([parameter.step or 1e-4 for parameter in parameters])
+        return _by_differences(errors, loss, inner, scale, (steps, low, high))
+    if len(parameters) == 1:
+        step = 0.7 if parameters[0].logarithmic else max(0.3 * abs(inner[0]), 0.1)
+        bounds = max(float(low[0]), inner[0] - step), min(float(high[0]), inner[0] + step)
+        solved = minimize_scalar(
+            lambda value: loss(np.array([value])), bounds=bounds, options={"xatol": 1e-7 if fine else _COARSE}
+        )
+        return np.array([solved.x]) if solved.fun <= loss(inner) else inner
+    simplex = np.concatenate([inner[None], inner + _SIMPLEX * np.eye(len(inner))])
+    most = (60 if fine else 15) * len(inner)
+    options = {"initial_simplex": np.clip(simplex, low, high), "maxfev": most, "xatol": 1e-5, "fatol": 1e-9}
+    inner = np.clip(inner, low, high)
+    solved = minimize(loss, inner, method="Nelder-Mead", bounds=list(zip(low, high, strict=True)), options=options)
+    return np.asarray(solved.x)
+
+
+def _by_differences(
+    errors: Callable[[Array], Array],
+    loss: Callable[[Array], float],
+    inner: Array,
+    scale: float,
+    steps_and_ends: tuple[Array, Array, Array],
+) -> Array:
+    """Return the end of a few steps of Gauss and Newton with Cauchy's weights, halved while they make it worse."""
+    steps, low, high = steps_and_ends
+    least = loss(inner)
+    for _ in range(_TURNS):
+        steps = 0.6 * steps
+        left = errors(inner).ravel()
+        slopes = np.stack(
+            [(errors(inner + step * axis).ravel() - left) / step for step, axis in zip(steps, np.eye(len(inner)))],
+            axis=1,
+        )
+        weights = 1 / (1 + (left / scale) ** 2)
+        move = -np.linalg.lstsq(slopes * np.sqrt(weights)[:, None], left * np.sqrt(weights), rcond=1e-10)[0]
+        for _ in range(4):
+            trial = np.clip(inner + move, low, high)
+            reached = loss(trial)
+            if reached < least:
+                break
+            move = 0.5 * move
+        else:
+            return inner
+        small = np.all(np.abs(trial - inner) < 0.02 * steps)
+        inner, least = trial, reached
+        if small:
+            break
+    return inner
+
+
+def _guess(predictor: Predictor, hypotheses: Sequence[Hypothesis], values: Sequence[float]) -> Guess:
+    guess = Guess(predictor.fog)
+    for hypothesis, part in zip(hypotheses, _parted(hypotheses, values), strict=True):
+        guess = hypothesis.change(predictor, guess, part)
+    return guess
+
+
+def _parted(hypotheses: Sequence[Hypothesis], values: Sequence[float]) -> tuple[tuple[float, ...], ...]:
+    parts, start = [], 0
+    for hypothesis in hypotheses:
+        end = start + len(hypothesis.parameters)
+        parts.append(tuple(float(value) for value in values[start:end]))
+        start = end
+    return tuple(parts)
+
+
+def _starts(predictor: Predictor, hypotheses: Sequence[Hypothesis]) -> list[tuple[float, ...]]:
+    """Return values to begin with, those of each hypothesis chosen after what those before it change."""
+    starts: list[tuple[float, ...]] = [()]
+    for number, hypothesis in enumerate(hypotheses):
+        starts = [
+            (*start, *more)
+            for start in starts
+            for more in _own_starts(predictor, hypothesis, _guess(predictor, hypotheses[:number], start))
+        ]
+    return starts
+
+
+def _own_starts(predictor: Predictor, hypothesis: Hypothesis, guess: Guess) -> list[tuple[float, ...]]:
+    if hypothesis.begin is not None:
+        return [hypothesis.begin(predictor, guess)]
+    if len(hypothesis.parameters) == 1:
+        return [(start,) for start in hypothesis.parameters[0].starts]
+    return [tuple(parameter.starts[0] for parameter in hypothesis.parameters)]
+
+
+def _inward(parameters: Sequence[Parameter], values: Sequence[float]) -> Array:
+    return np.array(
+        [
+            math.log(value) if parameter.logarithmic else value
+            for parameter, value in zip(parameters, values, strict=True)
+        ]
+    )
+
+
+def _outward(parameters: Sequence[Parameter], inner: Sequence[float] | Array) -> tuple[float, ...]:
+    return tuple(
+        math.exp(value) if parameter.logarithmic else float(value)
+        for parameter, value in zip(parameters, inner, strict=True)
+    )
+
+
+def _loss(predictor: Predictor, guess: Guess, scale: float) -> float:
+    return float(np.mean(np.log1p((predictor.errors(guess) / scale) ** 2)))
+
+
+def _scale(predictor: Predictor, guess: Guess) -> float:
+    return max(1.4826 * float(np.median(np.abs(predictor.errors(guess)))), _LEAST_SCALE)

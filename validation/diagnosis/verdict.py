@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How much speaks for an explanation, and whether it leaves anything to explain.
+
+With e the relative errors of n pixels and s their scale in the best explanation, the log-likelihood of Cauchy's
+distribution is -sum log(1 + (e/s)^2). The evidence of an explanation with k numbers is what it gains over the unchanged
+scene, less k log(n)/2 (Schwarz 1978, Ann. Statist. 6, 461): a hypothesis with a number must beat one without. Channels
+of a pixel share their noise, so that three values count as one.
+
+Errors of neighbours that go together are no noise. An explanation leaves nothing to explain if they do not (a
+correlation of 0.25 at most), if it leaves 0.4 %, which no engine need beat, or a tenth of what there was.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from validation.diagnosis.search import Explanation
+
+Array = NDArray[np.float64]
+
+LEAST_EVIDENCE = 20.0  #: e^20 to one: what nobody doubts
+LEAST_EFFECT = 0.002  #: mean relative change of the image: less is no fault
+LEFT = 0.004  #: mean relative error that is no fault
+_GAIN = 10.0  # what an explanation that leaves nothing makes of the error
+_NOISE = 0.25  # correlation of neighbours
+_WORST = 0.02  # share of the pixels that may be as wrong as they like: those at lamps
+_KNOWN = {"centre": 3e-4, "area": 3e-3}  # relative error of the fog model itself, in most pixels
+
+
+def scale_of(explanation: Explanation, pixel: str) -> float:
+    """Return the scale of the errors that an explanation leaves [1]."""
+    return max(1.4826 * float(np.median(np.abs(explanation.errors))), _KNOWN[pixel])
+
+
+def evidence(explanation: Explanation, right: Explanation, scale: float) -> float:
+    """Return the evidence of an explanation against the unchanged scene, as a natural logarithm."""
+    count = len(explanation.errors)
+    gain = _likelihood(explanation.errors, scale) - _likelihood(right.errors, scale)
+    return gain - 0.5 * explanation.parameters * math.log(count)
+
+
+def _likelihood(errors: Array, scale: float) -> float:
+    return -float(np.sum(np.mean(np.log1p((errors / scale) ** 2), axis=1)))
+
+
+def effect(explanation: Explanation, right: Explanation) -> float:
+    """Return how far an explanation changes the errors, as a mean."""
+    return float(np.mean(np.abs(explanation.errors - right.errors)))
+
+
+def is_explained(explanation: Explanation) -> bool:
+    """Return whether what an explanation leaves is noise, or little."""
+    errors = np.sort(np.abs(explanation.errors).mean(axis=1))
+    usual = float(errors[: max(1, int((1 - _WORST) * len(errors)))].mean())
+    return usual <= LEFT or correlation(explanation.errors) <= _NOISE
+
+
+def gains(explanation: Explanation, right: Explanation) -> bool:
+    """Return whether an explanation leaves a tenth of the errors of the unchanged scene, or less."""
+    return bool(explanation.hypotheses) and explanation.error <= right.error / _GAIN
+
+
+def correlation(errors: Array) -> float:
+    """Return the correlation of the errors of neighbours in a row of pixels, clipped at three scales."""
+    means = errors.mean(axis=1)
+    scale = 1.4826 * float(np.median(np.abs(means)))
+    clipped = np.clip(means, -3 * scale, 3 * scale)
+    power = float(np.mean(clipped**2))
+    return float(np.mean(clipped[1:] * clipped[:-1])) / power if power > 0 else 0.0

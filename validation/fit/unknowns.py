@@ -1,0 +1,252 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The parameters that a fit may look for, by name, and the fog that they make.
+
+| name | what it is |
+|---|---|
+| `sigma_t` | extinction of a medium [1/m]; `sigma_t.r`, `.g`, `.b` one channel of it |
+| `albedo` | single-scattering albedo; `albedo.r`, `.g`, `.b` |
+| `phase.g` | g of Henyey and Greenstein's function |
+| `intensity` | factor on a light |
+| `light.x`, `light.y`, `light.z` | position of a light [m] |
+| `exposure` | factor on the whole image; `exposure.r`, `.g`, `.b` |
+
+Where a scene has several media or lights, the name of one follows after a colon, `sigma_t:fog` or `intensity:lamp`, or
+its number, from 1 on; without it all of them are meant, one parameter for each. In a medium whose channels differ
+`sigma_t` and `albedo` stand for three parameters.
+
+Positive parameters are looked for by their logarithms, g by artanh g: all values are allowed that are possible, and a
+step is a relative change.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import drjit as dr
+
+from analytic.errors import InputError, nearest
+from reference.scene.read import TruthScene
+from validation.fog_model.build import light_sources
+from validation.fog_model.fog import Fog
+
+CHANNELS = ("r", "g", "b")
+AXES = ("x", "y", "z")
+NAMES = ("sigma_t", "albedo", "phase.g", "intensity", "light.x", "light.y", "light.z", "exposure")
+
+
+@dataclass(frozen=True)
+class Scale:
+    """How a parameter is looked for: as a number on the whole line."""
+
+    inward: Callable[[float], float]
+    outward: Callable[[Any], Any]  #: of numbers and of Dr.Jit arrays
+    relative: bool  #: whether a step is a relative change, so that products of such parameters make sense
+
+
+_LOG = Scale(math.log, dr.exp, relative=True)
+_TANH = Scale(math.atanh, dr.tanh, relative=False)
+_PLAIN = Scale(float, lambda value: value, relative=False)
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A parameter that is looked for."""
+
+    name: str  #: as the user calls it
+    kind: str  #: of `NAMES`
+    number: int  #: of the medium or light
+    channels: tuple[int, ...]  #: which it is about
+    scene: float  #: value in the scene
+    scale: Scale
+    unit: str
+    start: float = math.nan  #: value to begin with
+    place: float = math.nan  #: of a position: where the paths begin [m]
+
+    def put(self, fog: Fog, value: Any) -> Fog:
+        """Return the fog with a value of this parameter."""
+        if self.kind in ("sigma_t", "albedo"):
+            old = getattr(fog, self.kind)[self.number]
+            new = tuple(value if channel in self.channels else old[channel] for channel in range(3))
+            return fog.with_entry(self.kind, self.number, new)
+        if self.kind == "phase.g":
+            return fog.with_entry("g", self.number, value)
+        if self.kind == "intensity":
+            return fog.with_entry("intensity", self.number, value)
+        if self.kind == "exposure":
+            red, green, blue = (value if c in self.channels else fog.exposure[c] for c in range(3))
+            return replace(fog, exposure=(red, green, blue))
+        axis = AXES.index(self.kind[-1])
+        place = fog.moved[self.number]
+        new_place = tuple(value - self.place if each == axis else place[each] for each in range(3))
+        return fog.with_entry("moved", self.number, new_place)
+
+    @property
+    def moves(self) -> bool:
+        """Whether it moves a light, and shadows with it."""
+        return self.kind.startswith("light.")
+
+
+def read_unknowns(
+    names: Sequence[str], truth: TruthScene, fog: Fog, starts: Mapping[str, float]
+) -> tuple[Unknown, ...]:
+    """Return the parameters that names stand for.
+
+    Parameters
+    ----------
+    names
+        Words as above.
+    truth, fog
+        The scene, and what it says of the fog.
+    starts
+        Values to begin with, by name; the scene's own by default.
+
+    Raises
+    ------
+    InputError
+        For a name that is not known or given twice, a medium, light or phase function that the scene does not have,
+        and a start that is out of range.
+    """
+    if not names:
+        raise InputError(f"--parameters: got none, wanted some of {', '.join(NAMES)}")
+    unknowns = tuple(unknown for name in names for unknown in _read(name, truth, fog))
+    seen: set[tuple[str, int, int]] = set()
+    for unknown in unknowns:
+        places = {(unknown.kind, unknown.number, channel) for channel in unknown.channels}
+        if places & seen:
+            raise InputError(f"--parameters: '{unknown.name}' is there twice; name each parameter once")
+        seen |= places
+    for name in starts:
+        if name not in {unknown.name for unknown in unknowns}:
+            known = [unknown.name for unknown in unknowns]
+            raise InputError(
+                f"--start: '{name}' is not looked for; wanted one of {', '.join(known)}" + nearest(name, known)
+            )
+    return tuple(_started(unknown, starts) for unknown in unknowns)
+
+
+def with_values(unknowns: Sequence[Unknown], fog: Fog, inner: Sequence[Any]) -> Fog:
+    """Return the fog with the values of parameters, given as numbers on the whole line."""
+    for unknown, value in zip(unknowns, inner, strict=True):
+        fog = unknown.put(fog, unknown.scale.outward(value))
+    return fog
+
+
+def _read(name: str, truth: TruthScene, fog: Fog) -> list[Unknown]:
+    word, _, place = name.partition(":")
+    kind, channels = word, tuple(range(3))
+    for channel, letter in enumerate(CHANNELS):
+        base = word.removesuffix(f".{letter}")
+        if base in ("sigma_t", "albedo", "exposure") and base != word:
+            kind, channels = base, (channel,)
+    if kind not in NAMES:
+        raise InputError(f"--parameters: got '{name}', wanted some of {', '.join(NAMES)}" + nearest(word, NAMES))
+    if kind == "exposure":
+        if place:
+            raise InputError(f"--parameters: got '{name}'; the exposure is that of the whole image: write '{word}'")
+        return [Unknown(name, kind, 0, channels, 1.0, _LOG, "1")]
+    if kind in ("sigma_t", "albedo", "phase.g"):
+        return [
+            each for number in _media(name, place, truth) for each in _of_medium(kind, channels, number, truth, fog)
+        ]
+    return [_of_light(kind, number, truth) for number in _lights(name, place, kind, truth)]
+
+
+def _of_medium(kind: str, channels: tuple[int, ...], number: int, truth: TruthScene, fog: Fog) -> list[Unknown]:
+    several = len(_scattering(truth)) > 1
+    ending = f":{_medium_name(number, truth)}" if several else ""
+    if kind == "phase.g":
+        phase = (truth.medium, *truth.media)[number].phase
+        if not phase.is_constant and phase.name != "hg":
+            raise InputError(
+                f"--parameters: 'phase.g' is for the phase functions 'hg' and 'isotropic'; this medium has "
+                f"'{phase.name}'"
+            )
+        return [Unknown(kind + ending, kind, number, (0, 1, 2), fog.g[number] or 0.0, _TANH, "1")]
+    values = getattr(fog, kind)[number]
+    unit = "1/m" if kind == "sigma_t" else "1"
+    groups = [channels] if len({values[c] for c in channels}) == 1 else [(channel,) for channel in channels]
+    return [
+        Unknown(
+            kind + (f".{CHANNELS[group[0]]}" if len(group) == 1 else "") + ending,
+            kind,
+            number,
+            group,
+            values[group[0]],
+            _LOG,
+            unit,
+        )
+        for group in groups
+    ]
+
+
+def _of_light(kind: str, number: int, truth: TruthScene) -> Unknown:
+    names = light_names(truth)
+    name = kind + (f":{names[number]}" if len(names) > 1 else "")
+    if kind == "intensity":
+        return Unknown(name, kind, number, (0, 1, 2), 1.0, _LOG, "1")
+    if number >= len(truth.lights):
+        raise InputError(f"--parameters: got '{name}', wanted the position of a point or spot light")
+    return Unknown(
+        name, kind, number, (0, 1, 2), float(truth.lights[number].position[AXES.index(kind[-1])]), _PLAIN, "m"
+    )
+
+
+def _scattering(truth: TruthScene) -> list[int]:
+    """Return the numbers of the media that are there."""
+    return [number for number, medium in enumerate((truth.medium, *truth.media)) if max(medium.sigma_t) > 0]
+
+
+def _medium_name(number: int, truth: TruthScene) -> str:
+    return "medium" if number == 0 else truth.media[number - 1].name
+
+
+def light_names(truth: TruthScene) -> list[str]:
+    """Return the ids of the lights, in the order of their paths."""
+    return [source.name for source in light_sources(truth)]
+
+
+def _media(name: str, place: str, truth: TruthScene) -> list[int]:
+    there = _scattering(truth)
+    return _chosen(name, place, there, [_medium_name(number, truth) for number in there], "medium")
+
+
+def _lights(name: str, place: str, kind: str, truth: TruthScene) -> list[int]:
+    names = light_names(truth)
+    numbers = list(range(len(names)))
+    if kind != "intensity" and not place:
+        numbers, names = numbers[: len(truth.lights)], names[: len(truth.lights)]
+    return _chosen(name, place, numbers, names, "light")
+
+
+def _chosen(name: str, place: str, numbers: list[int], names: list[str], what: str) -> list[int]:
+    if not place:
+        if not numbers:
+            raise InputError(f"--parameters: got '{name}'; the scene has no {what} of this kind")
+        return numbers
+    if place in names:
+        return [numbers[names.index(place)]]
+    if place.isdigit() and 1 <= int(place) <= len(numbers):
+        return [numbers[int(place) - 1]]
+    raise InputError(
+        f"--parameters: got '{name}', wanted a {what} of the scene, {', '.join(names)}, or its number"
+        + nearest(place, names)
+    )
+
+
+def _started(unknown: Unknown, starts: Mapping[str, float]) -> Unknown:
+    value = starts.get(unknown.name, unknown.scene)
+    fits = math.isfinite(value)
+    wanted = "a finite number"
+    if unknown.scale is _LOG:
+        fits, wanted = fits and value > 0, "a number above 0"
+        if unknown.name not in starts and value <= 0:
+            raise InputError(
+                f"--parameters: '{unknown.name}' is {value:g} in the scene, where nothing can begin; give --start "
+                f"{unknown.name}=VALUE"
+            )
+    if unknown.scale is _TANH:
+        fits, wanted = -1 < value < 1, "a number between -1 and 1"
+    if not fits:
+        raise InputError(f"--start: {unknown.name}={value:g}, wanted {wanted}")
+    return replace(unknown, start=float(value), place=unknown.scene)

@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""All single-scattering paths of some pixels of a scene."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.quadrature.light_points import PointPlan, light_points, square_points
+from reference.quadrature.surface import SurfaceHits, surface_hits
+from reference.scene.area_light import TruthAreaLight, is_area
+from reference.scene.camera import film_directions, pixel_centres
+from reference.scene.directional_light import DirectionalLight, is_directional
+from reference.scene.read import TruthLight, TruthScene
+from reference.scene.shapes import read_shapes
+from reference.visibility.exact_distance import exact_distance
+from validation.fog_model.directional_paths import directional_nodes
+from validation.fog_model.paths import LightPaths, Nodes, ScatteringPaths, SurfacePoints
+from validation.fog_model.point_paths import point_nodes
+from validation.fog_model.surface_paths import surface_points
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+Progress = Callable[[float, str], None]
+
+_POINTS = 16  # of lights with extent
+
+
+def scattering_paths(
+    truth: TruthScene,
+    *,
+    pixels: Index | None = None,
+    rays_per_side: int = 0,
+    offset: tuple[float, float] = (0.0, 0.0),
+    zoom: float = 1.0,
+    radius: float = 0.0,
+    shadows: bool = True,
+    airlight: bool = True,
+    surface: bool = True,
+    points: int = _POINTS,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> ScatteringPaths:
+    """Return the paths of some pixels.
+
+    Parameters
+    ----------
+    truth
+        The scene.
+    pixels
+        Numbers of the pixels, row by row; all by default.
+    rays_per_side
+        0: one ray through the centre of each pixel. n: n x n rays, one through the middle of each cell of a grid,
+        whose mean is that over the pixel.
+    offset
+        Moves all rays on the film, to the right and down [pixels].
+    zoom
+        Factor on the distance of all rays from the middle of the film, before they are moved.
+    radius
+        Of spheres that take the place of point lights, of the same intensity [m].
+    shadows
+        False where surfaces hide nothing from the lights.
+    airlight, surface
+        Which paths are wanted.
+    points
+        How many points stand for a light with extent.
+    seed
+        Of the points on lights with extent.
+    progress
+        Called with (share done, what).
+    """
+    size = truth.width, truth.height
+    pixels = np.arange(size[0] * size[1]) if pixels is None else np.unique(pixels)
+    positions = _positions(pixel_centres(size)[pixels], rays_per_side)
+    middle = 0.5 * np.array(size)
+    positions = middle + zoom * (positions - middle) + np.asarray(offset)
+    directions = film_directions(truth.scene.sensors()[0], positions, size)
+    rays = replace(truth, direction=directions)
+    shapes = read_shapes(truth.occluders)
+    hits = surface_hits(rays)
+    hits = SurfaceHits(exact_distance(rays, hits.interaction, hits.distance, shapes), hits.interaction)
+    open_rays = rays if shadows else replace(rays, occluders=mi.load_dict({"type": "scene"}))
+    how: dict[str, Any] = {"shapes": shapes if shadows else None}
+    sources = light_sources(truth, points, seed, radius)
+    lights = []
+    for number, source in enumerate(sources):
+        nodes = [_nodes(open_rays, light, hits.distance, how) for light in source.lights] if airlight else []
+        lit = [surface_points(rays, light, hits, shadows=shadows) for light in source.lights] if surface else []
+        lights.append(_light_paths(source.name, source.intensity, nodes, lit, len(truth.media) + 1))
+        if progress is not None:
+            progress((number + 1) / len(sources), "lit intervals")
+    return ScatteringPaths(
+        shape=(truth.height, truth.width),
+        pixels=pixels,
+        ray_pixel=np.repeat(np.arange(len(pixels)), max(1, rays_per_side) ** 2),
+        rays_per_pixel=max(1, rays_per_side) ** 2,
+        direction=directions,
+        media=(truth.medium, *truth.media),
+        media_names=("medium", *(medium.name for medium in truth.media)),
+        lights=tuple(lights),
+    )
+
+
+def _positions(centres: Array, rays_per_side: int) -> Array:
+    """Return places on the film, those of a pixel one after another."""
+    if not rays_per_side:
+        return centres
+    row, column = np.divmod(np.arange(rays_per_side**2), rays_per_side)
+    cells = np.stack([column, row], axis=1)
+    # The middles: where the image is smooth, random places would err by its slope, these by its curvature.
+    return (centres[:, None, :] - 0.5 + (cells + 0.5) / rays_per_side).reshape(-1, 2)
+
+
+@dataclass(frozen=True)
+class Source:
+    """A light of the scene."""
+
+    name: str  #: its id
+    intensity: Array  #: what multiplies the paths from it, (3,)
+    lights: Sequence[TruthLight | DirectionalLight]  #: that stand for it
+
+
+def light_sources(truth: TruthScene, points: int = _POINTS, seed: int = 0, radius: float = 0.0) -> list[Source]:
+    """Return the lights of a scene: point and spot lights, directional ones, then those with extent.
+
+    The parameters are those of `scattering_paths`.
+    """
+    emitters = truth.scene.emitters()
+    far_names = [emitter.id() for emitter in emitters if is_directional(emitter)]
+    near_names = [emitter.id() for emitter in emitters if not is_directional(emitter) and not is_area(emitter)]
+    near = [
+        _as_sphere(name, light, points, seed, radius)
+        if radius > 0 and light.axis is None
+        else Source(name, light.intensity, (light,))
+        for name, light in zip(near_names, truth.lights, strict=True)
+    ]
+    far = [Source(name, light.irradiance, (light,)) for name, light in zip(far_names, truth.directional, strict=True)]
+    plan = PointPlan(most=points, seed=seed)
+    wide = [
+        Source(
+            light.name,
+            light.radiance * light.area / points,
+            light_points(light, square_points(plan, number, 0, light.kind)),
+        )
+        for number, light in enumerate(truth.area)
+    ]
+    return [*near, *far, *wide]
+
+
+def _as_sphere(name: str, light: TruthLight, points: int, seed: int, radius: float) -> Source:
+    """Return a sphere of a point light's intensity.
+
+    Seen from anywhere, a sphere of the radiance L has the intensity L pi R^2; one of N points on it stands for the area
+    4 pi R^2/N, of the intensity L 4 pi R^2/N along its normal: four times that of the light over N.
+    """
+    plan = PointPlan(most=points, seed=seed)
+    wide = TruthAreaLight("sphere", light.position, np.eye(3), np.full(2, radius), np.zeros(3), False, None)
+    return Source(name, 4 * light.intensity / points, light_points(wide, square_points(plan, 0, 0, "sphere")))
+
+
+def _nodes(truth: TruthScene, light: TruthLight | DirectionalLight, distance: Array, how: dict[str, Any]) -> Nodes:
+    if isinstance(light, DirectionalLight):
+        if not truth.media:
+            return _light_paths("", np.zeros(3), [], [], 1).nodes  # nothing scatters
+        return directional_nodes(truth, light, distance, how)
+    return point_nodes(truth, light, distance, how)
+
+
+def _light_paths(
+    name: str, intensity: Array, nodes: list[Nodes], surface: list[SurfacePoints], media: int
+) -> LightPaths:
+    empty, none, lengths, vectors = np.empty(0), np.empty(0, np.int64), np.empty((0, media)), np.empty((0, 3))
+    no_nodes = Nodes(none, none, empty, empty, empty, empty, lengths, lengths, vectors)
+    no_surface = SurfacePoints(none, vectors, empty, lengths, lengths, vectors)
+    return LightPaths(
+        name, np.asarray(intensity), Nodes.joined([no_nodes, *nodes]), SurfacePoints.joined([no_surface, *surface])
+    )

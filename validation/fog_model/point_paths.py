@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Paths from point and spot lights, and from points of lights with extent, to camera rays."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.quadrature.bounded import kinks
+from reference.quadrature.light_airlight import lit_rays
+from reference.quadrature.pieces import Setup, cut_pieces
+from reference.quadrature.unbounded import lit_stretches
+from reference.scene.read import TruthLight, TruthScene
+from reference.visibility.line_crossings import crossings
+from reference.visibility.spot_cone import falloff
+from validation.fog_model.nodes import panel_nodes
+from validation.fog_model.paths import AROUND, Nodes
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+_NOTHING_LEFT = 40.0  # optical depth after which e^-40 = 4e-18 of the light is left
+_THINNEST = 1 / 30  # share of the scene's extinction down to which endless rays are long enough
+_AT_LIGHT = 1e-290  # height [m] below which a ray meets the light
+_NEAR_ZERO = 1e-15  # height over distance below which a light beside a piece may as well be at this height
+
+
+def point_nodes(truth: TruthScene, light: TruthLight, distance: Array, how: dict[str, Any]) -> Nodes:
+    """Return the nodes of a point or spot light on the lit parts of all rays.
+
+    Parameters
+    ----------
+    truth
+        The scene, with any rays.
+    light
+        The light; its intensity is left out.
+    distance
+        To the visible surface, (rays,) [m].
+    how
+        What `reference.visibility.lit_intervals.lit_intervals` takes.
+    """
+    reach = lit_rays(truth, light, distance, how)
+    rays = reach.rays
+    ray, x0, x1 = lit_stretches(light, rays, reach.lit)
+    used = x1 > x0
+    ray, x0, x1 = ray[used], x0[used], x1[used]
+    if reach.segments is None:
+        medium = np.full(len(ray), AROUND)
+        x1 = np.where(np.isinf(x1), np.maximum(x0, rays.foot[ray]) + _reach(truth), x1)
+    else:
+        setup = Setup(truth, rays.direction, reach.segments, light, rays, 1.0, reach.lit.edge)
+        pieces = cut_pieces(setup, (ray, x0, x1), kinks(setup, np.unique(ray)), rays.foot)
+        # The truth counts media with bounds from 0 and calls what surrounds them -1.
+        ray, x0, x1, medium = pieces.ray, pieces.x0, pieces.x1, pieces.medium + 1
+    foot, s0, s1 = rays.foot[ray], x0 - rays.foot[ray], x1 - rays.foot[ray]
+    beside = np.where(s0 > 0, s0, np.where(s1 < 0, -s1, 0.0))
+    height = np.maximum(rays.height[ray], np.maximum(_NEAR_ZERO * beside, _AT_LIGHT))
+    start = np.arcsinh(s0 / height)
+    owner, w, weight = panel_nodes(start, np.arcsinh(s1 / height) - start)
+    ray, foot, height, medium = ray[owner], foot[owner], height[owner], medium[owner]
+    sine, r = np.tanh(w), height * np.cosh(w)
+    x = foot + height * np.sinh(w)
+    profile = np.ones_like(x)
+    if light.is_soft:
+        profile = falloff(np.arcsin(sine)[:, None], rays.direction[ray], rays.normal[ray], light)[:, 0]
+    towards = sine[:, None] * rays.direction[ray] + (1 / np.cosh(w))[:, None] * rays.normal[ray]
+    return Nodes(
+        ray,
+        medium,
+        x,
+        r,
+        -sine,
+        weight * r * profile,
+        lengths(truth, truth.origin, truth.direction[ray], np.zeros_like(x), x),
+        lengths(truth, light.position, towards, np.zeros_like(x), r),
+        towards,
+    )
+
+
+def lengths(truth: TruthScene, origin: Array, direction: Array, low: Array, high: Array) -> Array:
+    """Return how much of parts of straight lines lies in each medium, that without bounds first, (n, media) [m].
+
+    Parameters
+    ----------
+    truth
+        The scene.
+    origin, direction
+        Of the lines, (n, 3), the origin also (3,) [m].
+    low, high
+        Distances between which the lines are looked at, (n,) [m]; `high` may be infinite where nothing surrounds the
+        media: the length around them is then not finite and multiplies no extinction.
+    """
+    inside = []
+    for medium in truth.media:
+        enter, leave = crossings(medium.bounds, origin, direction)
+        inside.append(np.maximum(np.minimum(leave, high) - np.maximum(enter, low), 0.0))
+    around = np.where(np.isfinite(high), high, 0.0) - np.where(np.isfinite(high), low, 0.0) - sum(inside)
+    return np.stack([np.maximum(around, 0.0), *inside], axis=1)
+
+
+def _reach(truth: TruthScene) -> float:
+    """Return how far behind its foot point an endless ray is followed [m]."""
+    sigma_t = truth.medium.sigma_t
+    return float(_NOTHING_LEFT / (_THINNEST * sigma_t[sigma_t > 0].min())) if np.any(sigma_t > 0) else 0.0
