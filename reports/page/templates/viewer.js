@@ -63,6 +63,10 @@ class Viewer {
       const button = target.closest("button");
       if (button) this.set({method: Number(button.dataset.method)});
     });
+    this.find(".speed")?.addEventListener("click", ({target}) => {
+      const point = target.closest("g[id^='point-']");
+      if (point) this.set({method: Number(point.id.slice("point-".length))});
+    });
     for (const canvas of Object.values(this.canvases)) {
       canvas.addEventListener("pointermove", (event) => this.state.pinned || this.probe(this.pixelAt(event), false));
       canvas.addEventListener("pointerdown", (event) => this.pin(this.pixelAt(event)));
@@ -240,6 +244,8 @@ class Viewer {
       this.find(`.${name}`).classList.toggle("shown", name === state.shown);
     for (const button of this.element.querySelectorAll(".strip button"))
       button.setAttribute("aria-pressed", String(Number(button.dataset.method) === state.method));
+    for (const point of this.element.querySelectorAll(".speed g[id^='point-']"))
+      point.classList.toggle("chosen", point.id === `point-${state.method}`);
   }
 
   // --- the probe ---

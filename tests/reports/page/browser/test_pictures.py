@@ -18,11 +18,18 @@ def test_pictures_are_those_of_the_files(page, folder):
 
 
 def test_the_page_opens_with_pictures(page):
-    """Truth, method, error and the strip of all errors lie in a window of 1300 x 1000."""
+    """Truth, method, error, the strip of all errors and the chart lie in a window of 1300 x 1000."""
     assert page.viewport_size == {"width": 1300, "height": 1000}
-    for shown in (".reference canvas", ".method canvas", ".error canvas", ".strip"):
+    for shown in (".reference canvas", ".method canvas", ".error canvas", ".strip", ".speed .chart"):
         box = viewer(page).locator(shown).first.bounding_box()
         assert box["y"] + box["height"] <= 1000, shown
+
+
+def test_a_point_of_the_chart_shows_its_image(page):
+    assert drawn(page) == "0 airlight signed 0"
+    page.locator("#point-1 use").first.click()
+    assert drawn(page) == "1 airlight signed 0"
+    assert page.locator("#point-1").get_attribute("class") == "chosen"
 
 
 def test_error_map_is_that_of_the_pictures(page, folder):
