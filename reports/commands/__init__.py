@@ -19,6 +19,7 @@ Read in this order:
 - `doctor.py`: `airlight doctor`
 - `fidelity.py`: `airlight fidelity`
 - `figures.py`: `airlight figures`
+- `gallery.py`: `airlight gallery`
 - `integrate.py`: `airlight integrate`
 - `lists.py`: `airlight scenes`, `methods`, `kernels`
 - `maps.py`: `airlight maps`
@@ -34,8 +35,8 @@ Read in this order:
 
 May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.kernels`, `realtime.methods`,
 `realtime.methods.shadow_planes`, `realtime.parameters`, `realtime.scene`, `realtime.shadow_maps`, `reference.storage`,
-`reports.data`, `reports.diff`, `reports.docs`, `reports.figures`, `reports.interchange`, `reports.machine`,
-`reports.papers`, `reports.plotting`, `reports.report`, `reports.tables`, `validation.certified`,
+`reports.data`, `reports.diff`, `reports.docs`, `reports.figures`, `reports.gallery`, `reports.interchange`,
+`reports.machine`, `reports.papers`, `reports.plotting`, `reports.report`, `reports.tables`, `validation.certified`,
 `validation.comparison`, `validation.configurations`, `validation.estimates`, `validation.fidelity`,
 `validation.frames`, `validation.kernels`, `validation.metrics`, `validation.mutations`, `validation.papers`,
 `validation.scenes`, `validation.slab`.

@@ -11,7 +11,7 @@ def docs(
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the pages.")] = Path("airlight-docs"),
     report: Annotated[
         Path | None,
-        typer.Option(help="First take the numbers and pictures from this report's folder; changes docs/data."),
+        typer.Option(help="First take the numbers from this report's folder; changes docs/data."),
     ] = None,
     kernels: Annotated[
         Path | None,

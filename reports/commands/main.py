@@ -27,6 +27,7 @@ from reports.commands.docs import docs
 from reports.commands.doctor import doctor
 from reports.commands.fidelity import fidelity
 from reports.commands.figures import figures
+from reports.commands.gallery import gallery
 from reports.commands.integrate import integrate
 from reports.commands.lists import kernels, methods, scenes
 from reports.commands.maps import maps
@@ -68,6 +69,7 @@ _COMMANDS = (
     mutations,
     certify,
     figures,
+    gallery,
     docs,
     cache,
 )
