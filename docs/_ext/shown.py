@@ -9,7 +9,7 @@ from typing import Any
 from reports.tables.table import number
 
 FOLDER = Path(__file__).resolve().parents[1] / "gallery"
-_METHODS = ("method", "error", "sketch")
+_METHODS = ("sketch", "method", "error")  # in the order of a page
 
 
 @cache
@@ -46,14 +46,14 @@ def _of_method(method: str, kind: str) -> dict[str, Any] | None:
 def _caption(present: dict[str, dict[str, Any]]) -> str:
     rendered, error = present["method"], present["error"]
     text = (
-        f"What it renders: `{rendered['command']}`. Its error: blue where it is too dark, red where it is too bright, "
-        f"white below 1e-4 of the truth, full colour from 1 on; relative RMSE {number(error['relative_rmse'], 2)}."
+        f"what it renders, `{rendered['command']}`, and its error: blue where it is too dark, red where it is too "
+        f"bright, white below 1e-4 of the truth, full colour from 1 on; relative RMSE "
+        f"{number(error['relative_rmse'], 2)}."
     )
-    if "sketch" in present:
-        text += (
-            " How it works, in `sphere-spot` seen from the side: some rays of the camera, with what is lit in yellow."
-        )
-    return text
+    if "sketch" not in present:
+        return text[0].upper() + text[1:]
+    how = "How it works, in `sphere-spot` seen from the side: some rays of the camera, what is lit in yellow."
+    return f"{how} Beside it {text}"
 
 
 def gallery_scenes() -> str:
@@ -77,7 +77,7 @@ def gallery_methods() -> str:
     for name, method in METHODS.items():
         cards = [
             _card(entry, f"{name}: {what}", what)
-            for kind, what in (("method", "what it renders"), ("error", "its error"), ("sketch", "how it works"))
+            for kind, what in (("sketch", "how it works"), ("method", "what it renders"), ("error", "its error"))
             if (entry := _of_method(name, kind))
         ]
         if cards:
@@ -92,4 +92,4 @@ def scene_picture(name: str) -> str:
 
 
 def _card(entry: dict[str, Any], alt: str, words: str) -> str:
-    return f":::{{container}} card\n![{alt}](gallery/{entry['file']})\n\n{words}\n\n`{entry['command']}`\n:::\n"
+    return f"```{{container}} card\n![{alt}](gallery/{entry['file']})\n\n{words}\n\n`{entry['command']}`\n```\n"

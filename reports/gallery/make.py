@@ -5,6 +5,7 @@ The list has for each picture its file, command, scene and method; the revision 
 with which it was made; for an error map the relative RMSE; and the versions and the day.
 """
 
+import hashlib
 import io
 import json
 from collections.abc import Callable, Iterable
@@ -18,8 +19,9 @@ from PIL import Image
 from analytic.errors import InputError, nearest
 from realtime.frame.samples import render_samples
 from realtime.scene.read_scene import read_scene
-from reference.storage.files import ensure_folder, write_bytes, write_text
-from reports.gallery.recipes import SIZE, SMALL, STRIP, Picture, pictures, scene_picture
+from reference.storage.files import ensure_folder, temporary_folder, write_bytes, write_text
+from reports.docs.build import source_folder
+from reports.gallery.recipes import SIZE, SMALL, STRIP, TUTORIAL, Picture, pictures, scene_picture
 from reports.gallery.sketches import sketch
 from reports.machine.environment import versions
 from reports.plotting.pictures import error_map, preview, tone_curve
@@ -27,7 +29,8 @@ from validation.configurations.methods import configuration, parse_settings, pre
 from validation.estimates.quadrature import truth_image
 from validation.frames.baseline_files import read_baseline
 from validation.metrics.errors import error_metrics
-from validation.scenes.loading import load_scene
+from validation.scenes.loading import LoadedScene, load_scene
+from validation.scenes.registry import SCENES
 
 SCHEMA = "airlight-gallery/1"
 LIST = "gallery.json"
@@ -85,7 +88,7 @@ def make(wanted: list[Picture], folder: Path, progress: Progress) -> list[Path]:
 
 
 def _entry(picture: Picture) -> dict[str, Any]:
-    scenes = STRIP if picture.kind == "strip" else (picture.scene,)
+    scenes = STRIP if picture.kind == "strip" else (picture.scene,) if picture.scene in SCENES else ()
     made_by = versions()
     return {
         "file": picture.file,
@@ -94,6 +97,7 @@ def _entry(picture: Picture) -> dict[str, Any]:
         "scene": picture.scene,
         "method": picture.method,
         "baselines": {name: (read_baseline(name) or {}).get("revision") for name in scenes},
+        "digest": tutorial_digest() if picture.scene == TUTORIAL else None,
         "versions": {name: made_by[name] for name in ("airlight", "mitsuba", "drjit")},
         "made": datetime.now(UTC).date().isoformat(),
     }
@@ -126,8 +130,28 @@ def _rendered(picture: Picture, size: tuple[int, int]) -> Pixels:
     return preview(total, tone_curve(total))
 
 
+def tutorial_digest() -> str:
+    """Return what tells one scene of the tutorial from another."""
+    return hashlib.blake2b(_tutorial_scene().encode(), digest_size=8).hexdigest()
+
+
+def _tutorial_scene() -> str:
+    """Return the scene that stands in docs/tutorial.md; raises MissingError if this is no checkout."""
+    page = (source_folder() / "tutorial.md").read_text(encoding="utf-8")
+    return page.partition("```xml\n")[2].partition("```")[0]
+
+
+def _loaded(scene: str, size: tuple[int, int]) -> LoadedScene:
+    if scene != TUTORIAL:
+        return load_scene(scene, size)
+    with temporary_folder() as folder:
+        path = folder / TUTORIAL
+        path.write_text(_tutorial_scene(), encoding="utf-8")
+        return load_scene(str(path), size)
+
+
 def _frame(picture: Picture, size: tuple[int, int]):
-    loaded = load_scene(picture.scene, size)
+    loaded = _loaded(picture.scene, size)
     chosen = configuration(picture.method, None, parse_settings(picture.settings))
     return loaded, render_samples(prepared(read_scene(loaded.scene), chosen), picture.samples)
 

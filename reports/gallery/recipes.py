@@ -13,6 +13,7 @@ _OTHERWISE = {
 } | dict.fromkeys(("penumbra-plane", "fence", "soft-hall", "overlap"), _SOFT)
 #: The scene in which a method is shown, and its settings, where that is not `hall` and its defaults.
 _METHOD_SCENES = {"soft-shafts": ("penumbra-plane", ())}
+TUTORIAL = "gate.xml"  #: the scene of docs/tutorial.md, in which it stands
 STRIP = ("hall", "clutter", "three-media", "windows")  #: at the top of the README
 
 
@@ -40,7 +41,7 @@ class Picture:
         width, height = SIZE if self.kind == "scene" else SMALL
         words = [f"airlight render {self.scene} --method {self.method}", *(f"--set {word}" for word in self.settings)]
         words += [f"--size {width}x{height}", f"--samples {self.samples}" if self.samples > 1 else ""]
-        return " ".join([*filter(None, words), f"--preview {self.scene}.png"])
+        return " ".join([*filter(None, words), f"--preview {self.scene.removesuffix('.xml')}.png"])
 
 
 def scene_picture(scene: str) -> Picture:
@@ -73,3 +74,4 @@ def pictures() -> Iterator[Picture]:
         if method in SKETCHES:
             yield sketch
     yield Picture("strip", "strip", STRIP[0])
+    yield Picture("tutorial-gate", "scene", TUTORIAL, "shadow-planes", (), SAMPLES)

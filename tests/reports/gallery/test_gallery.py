@@ -12,7 +12,7 @@ from PIL import Image
 
 from analytic.errors import InputError
 from reports.commands import main as cli
-from reports.gallery.make import LARGEST, SCHEMA, _coded, chosen_pictures
+from reports.gallery.make import LARGEST, SCHEMA, _coded, chosen_pictures, tutorial_digest
 from reports.gallery.recipes import pictures
 from validation.frames import baseline_files
 
@@ -38,6 +38,8 @@ def stale(kept):
         entry, recipe = kept[name], recipes[name]
         if (entry["file"], entry["command"]) != (recipe.file, recipe.command):
             told.append(f"{name}: made by another recipe")
+        if entry["digest"] not in (None, tutorial_digest()):
+            told.append(f"{name}: made of another scene of the tutorial")
         for scene, revision in entry["baselines"].items():
             now = (baseline_files.read_baseline(scene) or {}).get("revision")
             if revision != now:
@@ -58,6 +60,8 @@ def test_stale_pictures_are_told(variant, kept, monkeypatch):
     assert "scene-hall: made by another recipe" in stale(kept | {name: kept[name] | {"command": "airlight"}})
     assert "scene-hall: never made" in stale({key: value for key, value in kept.items() if key != name})
     assert "lost: no such picture any more" in stale(kept | {"lost": old})
+    other = kept["tutorial-gate"] | {"digest": "00"}
+    assert "tutorial-gate: made of another scene of the tutorial" in stale(kept | {"tutorial-gate": other})
 
 
 def test_the_folder_holds_the_pictures_and_nothing_else(kept):
