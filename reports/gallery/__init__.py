@@ -11,6 +11,6 @@ Read in this order:
 - `make.py`: the files and their list
 
 May import: `analytic.errors`, `realtime.frame`, `realtime.methods`, `realtime.methods.shadow_planes`, `realtime.scene`,
-`reference.storage`, `reports.docs`, `reports.machine`, `reports.plotting`, `validation.configurations`,
+`reference.storage`, `reports.data`, `reports.docs`, `reports.machine`, `reports.plotting`, `validation.configurations`,
 `validation.estimates`, `validation.frames`, `validation.metrics`, `validation.scenes`.
 """

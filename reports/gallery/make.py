@@ -8,6 +8,7 @@ with which it was made; for an error map the relative RMSE; and the versions and
 import hashlib
 import io
 import json
+import shutil
 from collections.abc import Callable, Iterable
 from datetime import UTC, datetime
 from pathlib import Path
@@ -20,10 +21,11 @@ from analytic.errors import InputError, nearest
 from realtime.frame.samples import render_samples
 from realtime.scene.read_scene import read_scene
 from reference.storage.files import ensure_folder, temporary_folder, write_bytes, write_text
+from reports.data.reader import read_report
 from reports.docs.build import source_folder
 from reports.gallery.recipes import SIZE, SMALL, STRIP, TUTORIAL, Picture, pictures, scene_picture
 from reports.gallery.sketches import sketch
-from reports.machine.environment import versions
+from reports.machine.environment import MissingError, versions
 from reports.plotting.pictures import error_map, preview, tone_curve
 from validation.configurations.methods import configuration, parse_settings, prepared
 from validation.estimates.quadrature import truth_image
@@ -34,6 +36,7 @@ from validation.scenes.registry import SCENES
 
 SCHEMA = "airlight-gallery/1"
 LIST = "gallery.json"
+REPORT = Path("airlight-report")  #: of which the picture of a page is
 LARGEST = 150_000  #: bytes of a file
 COARSER = 3  #: by which error maps of lights with extent are coarser
 
@@ -43,6 +46,8 @@ Progress = Callable[[float, str], None]
 
 def chosen_pictures(names: Iterable[str]) -> list[Picture]:
     """Return the pictures of those names, all for no name; a scene's or a method's name stands for all of its own.
+
+    That of a report's page, which takes a browser and a report in `airlight-report`, is made only by its name.
 
     Raises
     ------
@@ -57,7 +62,7 @@ def chosen_pictures(names: Iterable[str]) -> list[Picture]:
             near = nearest(name, [picture.name for picture in known])
             raise InputError(f"gallery: got {name!r}, wanted the name of a picture, a scene or a method{near}")
         chosen |= {picture.name: picture for picture in found}
-    return list(chosen.values()) or known
+    return list(chosen.values()) or [picture for picture in known if picture.kind != "page"]
 
 
 def make(wanted: list[Picture], folder: Path, progress: Progress) -> list[Path]:
@@ -88,7 +93,9 @@ def make(wanted: list[Picture], folder: Path, progress: Progress) -> list[Path]:
 
 
 def _entry(picture: Picture) -> dict[str, Any]:
-    scenes = STRIP if picture.kind == "strip" else (picture.scene,) if picture.scene in SCENES else ()
+    scenes: Iterable[str] = STRIP if picture.kind == "strip" else (picture.scene,) if picture.scene in SCENES else ()
+    if picture.kind == "page":
+        scenes = [scene["name"] for scene in read_report(REPORT)["scenes"] if scene["name"] in SCENES]
     made_by = versions()
     return {
         "file": picture.file,
@@ -109,6 +116,8 @@ def _pixels(picture: Picture) -> tuple[Pixels, dict[str, Any]]:
         parts = [_rendered(scene_picture(name), (360, 270)) for name in STRIP]
         gap = np.full((270, 6, 3), 255, np.uint8)
         return np.concatenate([part for each in parts for part in (each, gap)][:-1], axis=1), {}
+    if picture.kind == "page":
+        return _page(), {}
     if picture.kind == "sketch":
         return sketch(picture.method, SIZE), {}
     if picture.kind == "scene":
@@ -122,6 +131,25 @@ def _pixels(picture: Picture) -> tuple[Pixels, dict[str, Any]]:
     error = error_metrics(truth, frame.airlight).relative_rmse
     colours = error_map(truth, np.asarray(frame.airlight, dtype=np.float64))
     return colours.repeat(coarser, axis=0).repeat(coarser, axis=1), {"relative_rmse": error}
+
+
+def _page() -> Pixels:
+    """Return the first window of the page of a report, as a browser shows it."""
+    try:
+        from playwright.sync_api import sync_playwright
+    except ImportError as error:
+        raise MissingError("gallery: report-page is taken by playwright, which the extra `dev` installs") from error
+    chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    if chromium is None:
+        raise MissingError("gallery: report-page is taken by Chromium; install Debian's package chromium")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        window = browser.new_page(viewport={"width": 1300, "height": 1000}, color_scheme="light")
+        window.goto((REPORT / "report.html").resolve().as_uri())
+        window.wait_for_selector("html[data-drawn]", timeout=120_000, state="attached")
+        shot = window.screenshot()
+        browser.close()
+    return np.asarray(Image.open(io.BytesIO(shot)).convert("RGB").resize((1040, 800), Image.Resampling.LANCZOS))
 
 
 def _rendered(picture: Picture, size: tuple[int, int]) -> Pixels:

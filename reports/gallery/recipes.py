@@ -22,7 +22,7 @@ class Picture:
     """A picture of the gallery."""
 
     name: str
-    kind: str  #: "scene", "method" (what it renders), "error", "sketch" or "strip"
+    kind: str  #: "scene", "method" (what it renders), "error", "sketch", "strip" or "page" (of a report)
     scene: str  #: that it shows; the first of a strip
     method: str = ""
     settings: tuple[str, ...] = ()
@@ -74,4 +74,5 @@ def pictures() -> Iterator[Picture]:
         if method in SKETCHES:
             yield sketch
     yield Picture("strip", "strip", STRIP[0])
+    yield Picture("report-page", "page", "")
     yield Picture("tutorial-gate", "scene", TUTORIAL, "shadow-planes", (), SAMPLES)

@@ -93,7 +93,8 @@ def test_pictures_are_chosen_by_their_name_a_scene_or_a_method(variant):
     assert [picture.name for picture in chosen_pictures(["windows"])] == ["scene-windows"]
     of_method = ["method-min-max", "method-min-max-error", "method-min-max-sketch"]
     assert [picture.name for picture in chosen_pictures(["min-max"])] == of_method
-    assert len(chosen_pictures([])) == len(list(pictures()))
+    everything = [picture.name for picture in pictures()]
+    assert [picture.name for picture in chosen_pictures([])] == [name for name in everything if name != "report-page"]
     with pytest.raises(InputError, match=r"gallery: got 'scene-hal', .*did you mean 'scene-hall'"):
         chosen_pictures(["scene-hal"])
 
