@@ -189,12 +189,22 @@ class Viewer {
     const missing = this.mode === state.mode ? "" : " (no HDR-FLIP here)";
     this.find(".reference figcaption").textContent = `Reference (quadrature), ${layer}${holes(bad.reference)}`;
     this.find(".method figcaption").textContent = `${label}, ${layer}${other}${holes(bad.method)}`;
-    this.find(".error .what").textContent = `Error of ${label}: ${map}${missing}${holes(bad.error)}`;
+    const white = this.allWhite() ? `; all white: below ${percentWords(state.floor)} in every pixel` : "";
+    this.find(".error .what").textContent = `Error of ${label}: ${map}${missing}${white}${holes(bad.error)}`;
     const probe = "Arrow keys move the probe.";
     this.canvases.reference.setAttribute("aria-label", `${index.name}: reference, ${layer}. ${probe}`);
     this.canvases.method.setAttribute("aria-label", `${index.name}: ${label}, ${layer}. ${probe}`);
     this.canvases.error.setAttribute("aria-label", `${index.name}: error map of ${label}, ${map}. ${probe}`);
     this.showScale();
+  }
+
+  // Whether the map of signed errors shows none: an empty picture should say that it is meant.
+  allWhite() {
+    const {images, state, layer} = this;
+    if (this.mode !== "signed") return false;
+    for (let i = 0; i < images.width * images.height; i++)
+      if (!(Math.abs(images.worst(state.method, layer, i)) < state.floor)) return false;
+    return true;
   }
 
   showScale() {

@@ -45,6 +45,17 @@ def test_error_map_is_that_of_the_pictures(page, folder):
     assert "1 pixel not finite" in viewer(page).locator(".error .what").inner_text()
 
 
+def test_an_error_map_without_colour_says_that_it_is_meant(page):
+    """`good` is wrong by 3e-6: below 1e-4 everywhere, and not below 1e-6."""
+    words = viewer(page).locator(".error .what")
+    assert "all white: below 0.01 % in every pixel" in words.inner_text()
+    page.keyboard.press("r")
+    page.keyboard.press("r")
+    assert "all white" not in words.inner_text()
+    page.keyboard.press("2")
+    assert "all white" not in words.inner_text()
+
+
 def test_kinds_of_error_maps_follow_one_another(page, folder):
     page.keyboard.press("2")
     reference, flat = layer(folder, "reference"), layer(folder, "flat")
