@@ -2,7 +2,7 @@
 """Typed parameters: each stands once, with its default, its choices or range, its unit and a sentence of help.
 
 A method has a frozen dataclass of them, derived from `Parameters`, whose fields are made by `parameter`. Conversion of
-words, checks, their messages, `airlight methods` and the tables of the documentation all follow from the fields.
+words, checks, their messages, `airlight list methods` and the tables of the documentation all follow from the fields.
 
 >>> from dataclasses import dataclass
 >>> @dataclass(frozen=True)

@@ -5,6 +5,7 @@ The real installation takes a minute and a network; it happens wherever `./airli
 """
 
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -360,3 +361,24 @@ class TestLibraries:
             shutil.rmtree(machine / "a project" / ".venv", ignore_errors=True)
             assert ("missing" not in _start(machine).stderr) == version, name
             file.unlink()
+
+
+@pytest.mark.claim("launcher-for-windows")
+def test_the_twin_for_windows_takes_the_same_steps():
+    """Read as text: nobody has Windows here. What can be checked without it: its steps, its labels, its line ends."""
+    script = (ROOT / "airlight.cmd").read_bytes()
+    assert script.count(b"\n") == script.count(b"\r\n") > 40  # cmd.exe loses labels otherwise
+    text = script.decode("ascii").replace("\r\n", "\n")
+    lines = text.splitlines()
+    assert "airlight.cmd text eol=crlf" in (ROOT / ".gitattributes").read_text()
+    labels = {line[1:] for line in lines if line.startswith(":")}
+    assert set(re.findall(r"(?:goto|call) :?(\w+)", text)) == labels
+    steps = ("-m venv", "requirements.lock", "--no-deps --no-build-isolation -e", "doctor --missing", 'airlight.py" %*')
+    places = [text.rindex(step) for step in steps]
+    assert places[0] < text.index("install -r") < places[2] < places[3] < places[4]
+    for name in ("requirements.lock", "pyproject.toml"):  # compared at each start, copied at the end of the first
+        assert f'fc /b "%root%{name}" "%venv%\\{name}"' in text
+        assert f'copy /y "%root%{name}" "%venv%\\{name}"' in text
+    assert "exit /b %errorlevel%" in text
+    for line in lines:  # a bracket in the name of a folder would end a block
+        assert not re.match(r"(if|else).*\($", line), line

@@ -154,7 +154,7 @@ def commands() -> str:
     from reports.commands.main import app
 
     listed = typer.main.get_group(app).commands
-    return "\n".join(_command(name, command) for name, command in listed.items())
+    return "\n".join(_command(name, command) for name, command in listed.items() if not command.hidden)
 
 
 def _command(name: str, command: Any) -> str:
@@ -175,13 +175,17 @@ def _prose(words: str) -> str:
 
 
 def _argument(argument: Any) -> str:
-    name = argument.name.upper() + ("..." if argument.nargs == -1 else "")
-    return name if argument.required else f"[{name}]"
+    name = argument.metavar or argument.name.upper()
+    if " " in name:  # says by itself how many words there are
+        return name
+    several = f"{name}..." if argument.nargs == -1 else name
+    return several if argument.required else f"[{several}]"
 
 
 def _option(parameter: Any) -> str:
     if parameter.param_type_name == "argument":
-        return f"`{parameter.name.upper()}`"
+        name = parameter.metavar or parameter.name.upper()
+        return "`{}`".format(name.replace("|", "\\|"))
     return ", ".join(f"`{name}`" for name in [*parameter.opts, *parameter.secondary_opts])
 
 

@@ -3,7 +3,7 @@
 
     airlight describe sphere-spot --size 160x120 --json --gltf sphere-spot.glb > sphere-spot.json
     python3.11 render_cycles.py sphere-spot.json sphere-spot.glb sphere-spot.exr --samples 512
-    airlight compare --scene sphere-spot sphere-spot.exr
+    airlight compare sphere-spot sphere-spot.exr
 
 The interpreter needs the module `bpy` (`pip install bpy==5.0.1` for Python 3.11), or run
 `blender --background --python render_cycles.py -- sphere-spot.json ...`. With `--layers` the file is Blender's

@@ -3,7 +3,7 @@
 
     airlight describe open-fog --size 160x120 --json --gltf open-fog.glb > open-fog.json
     python render_luxcore.py open-fog.json open-fog.glb open-fog.exr --samples 4096
-    airlight compare --scene open-fog open-fog.exr
+    airlight compare open-fog open-fog.exr
 
 The interpreter needs the packages `pyluxcore` and `numpy`. Rendered with pyluxcore 2.11.2. Its media have Schlick's
 phase function alone, and its spots shine by 1/cos brighter off the axis: scenes with others are refused.

@@ -38,7 +38,10 @@ class Stopper:
         number = os.read(signals, 1)[0]
         self.ending = True
         threading.Thread(target=self._end, args=(number,), daemon=True).start()
-        select.select([signals], [], [], _PATIENCE)
+        try:
+            select.select([signals], [], [], _PATIENCE)
+        except OSError:  # on Windows it waits for sockets alone
+            time.sleep(_PATIENCE)
         os._exit(128 + number)
 
     def _end(self, number: int) -> None:
@@ -74,7 +77,8 @@ def stop_on_signals(*, quiet: bool = False) -> None:
         return
     stopper = Stopper(quiet=quiet)
     end, start = os.pipe()
-    os.set_blocking(start, False)
+    with suppress(AttributeError):  # on Windows from Python 3.12 on
+        os.set_blocking(start, False)
     threading.Thread(target=stopper.watch, args=(end,), name="signals", daemon=True).start()
     signal.set_wakeup_fd(start, warn_on_full_buffer=False)
     for number in _WORDS:

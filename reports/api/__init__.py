@@ -14,8 +14,8 @@ Read in this order:
 - `slab.py`: `slab`
 - `report.py`: `report`
 
-May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.scene`, `reference.storage`, `reports.data`,
-`reports.machine`, `reports.plotting`, `reports.report`, `reports.tables`, `validation.comparison`,
+May import: `analytic`, `realtime.errors`, `realtime.frame`, `realtime.methods`, `realtime.scene`, `reference.storage`,
+`reports.data`, `reports.machine`, `reports.plotting`, `reports.report`, `reports.tables`, `validation.comparison`,
 `validation.configurations`, `validation.estimates`, `validation.frames`, `validation.kernels`, `validation.metrics`,
 `validation.scenes`, `validation.slab`.
 """

@@ -19,7 +19,7 @@ def report(
     *,
     scenes: Sequence[str] | None = None,
     methods: "Sequence[MethodLike] | None" = None,
-    effort: Literal["quick", "default", "full"] = "quick",
+    effort: Literal["quick", "default", "full"] = "default",
     images: str | os.PathLike[str] | None = None,
     fresh: bool = False,
     progress: Progress = None,
@@ -35,8 +35,8 @@ def report(
     methods
         As for `bench`; those of `airlight report` by default.
     effort
-        'quick', 'default' or 'full': minutes or an hour. What was measured before, with the same sources on the same
-        machine, is not measured again.
+        'quick' (some minutes), 'default' or 'full' (an hour), as the options of `airlight report`. What was measured
+        before, with the same sources on the same machine, is not measured again.
     images
         A folder with EXR files that another renderer wrote, SCENE.exr or SCENE.NAME.exr, to be judged too.
     fresh
@@ -58,20 +58,21 @@ def report(
     >>> report.claims[0]  # doctest: +SKIP
     'The truth is confirmed by our own Mitsuba integrator in 1 of 1 comparisons: ...'
     """
+    from realtime.methods.registry import METHODS
     from reference.storage.files import ensure_folder
     from reports.api.tables import Report
     from reports.machine.environment import activate
     from reports.machine.progress import Interrupted
     from reports.report.asked import notes_on, scenes_of_images
     from reports.report.measure import write_report
-    from validation.configurations.methods import QUICK, STANDARD
+    from validation.configurations.methods import QUICK, chosen_configurations
     from validation.frames.scene_study import EFFORTS
 
     if effort not in EFFORTS:
         raise InputError(f"effort: got {effort!r}, wanted one of {', '.join(EFFORTS)}" + nearest(effort, EFFORTS))
     target = ensure_folder(folder)
     activate()
-    usual = QUICK if effort == "quick" else STANDARD
+    usual = QUICK if effort == "quick" else chosen_configurations(list(METHODS))
     chosen = usual if methods is None else chosen_methods(methods)
     asked = None if scenes is None else [os.fspath(path) for path in several(scenes)]
     names, shown = scenes_of_images(asked, images, EFFORTS[effort].scenes)

@@ -5,6 +5,8 @@ Read in this order:
 
 - `start.py`: the entry of the command, signals first
 - `main.py`: the command line: the commands, and how mistakes are reported
+- `help.py`: how `--help` is drawn
+- `completion.py`: what the shell completes
 - `printing.py`: how commands print the tables of one run
 - `options.py`: options that several commands have
 - `own_methods.py`: methods of the user's own
@@ -21,7 +23,7 @@ Read in this order:
 - `figures.py`: `airlight figures`
 - `gallery.py`: `airlight gallery`
 - `integrate.py`: `airlight integrate`
-- `lists.py`: `airlight scenes`, `methods`, `kernels`
+- `lists.py`: `airlight list`
 - `maps.py`: `airlight maps`
 - `merge.py`: `airlight merge`
 - `mutations.py`: `airlight mutations`

@@ -7,26 +7,37 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from reports.commands import completion
+from reports.commands.options import Json
+
 if TYPE_CHECKING:
     from validation.frames.baseline_files import Baseline, Move
 
 
 def baselines(
     scenes: Annotated[
-        list[str] | None, typer.Argument(help="Built-in scenes; all by default.", show_default=False)
+        list[str] | None,
+        typer.Argument(
+            metavar="SCENE",
+            help="Built-in scenes; all by default.",
+            show_default=False,
+            autocompletion=completion.scenes,
+        ),
     ] = None,
     update: Annotated[bool, typer.Option("--update", help="Write what moved into the baselines.")] = False,
     because: Annotated[
-        str | None, typer.Option(help="Why numbers moved; CHANGELOG.md must say the same.", show_default=False)
+        str | None,
+        typer.Option(metavar="TEXT", help="Why numbers moved; CHANGELOG.md must say the same.", show_default=False),
     ] = None,
     times: Annotated[bool, typer.Option("--times/--no-times", help="Also time frames beside unshadowed.")] = True,
-    json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    json: Json = False,
 ) -> None:
-    """Compare the errors of every configuration with the baselines in the repository; small images of every scene.
+    """Compare the errors of all methods with those kept in the source.
 
-    Errors may move by rounding in either direction; a frame may take up to three times as long, relative to a frame of
-    `unshadowed`. A configuration without a baseline fails too, and so does a baseline without its configuration. Exit
-    status 1 if anything moved. --update writes what moved with a new revision, which CHANGELOG.md must name.
+    Every configuration renders small images of every scene. Errors may move by rounding in either direction; a
+    frame may take up to three times as long, relative to a frame of `unshadowed`. A configuration without a
+    baseline fails too, and so does a baseline without its configuration. Exit status 1 if anything moved. --update
+    writes what moved with a new revision, which CHANGELOG.md must name.
     """
     from analytic.errors import InputError, nearest
     from reports.machine.environment import activate

@@ -8,18 +8,46 @@ from typing import Annotated, Any
 
 import typer
 
-from reports.commands.options import USUAL_LIMIT, Force, MethodLimit, listed
+from reports.commands import completion
+from reports.commands.options import (
+    USUAL_LIMIT,
+    Force,
+    Json,
+    Markdown,
+    MethodLimit,
+    Methods,
+    OldMethods,
+    Scenes,
+    Settings,
+    Size,
+    named,
+)
 
 _BATCHES = 4096  # at most: a comparison ends earlier if its interval is narrow enough
 
 
 def bench(
-    scenes: Annotated[
-        list[str] | None, typer.Argument(help="Scenes, or with --kernels kernels; all built-in ones by default.")
+    scenes: Scenes = None,
+    method: Methods = None,
+    kernel: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help="Airlight kernel of the methods, or with --kernels a kernel to time; may be given several times.",
+            show_default=False,
+            autocompletion=completion.kernels,
+        ),
     ] = None,
+    settings: Settings = None,
+    size: Size = None,
     kernels: Annotated[bool, typer.Option("--kernels", help="Time the kernels alone, on 480 000 rays.")] = False,
     phase: Annotated[
-        str | None, typer.Option(help="With --kernels: the only phase function, such as hg-draine:12 or mie:6.")
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="With --kernels: the only phase function, such as hg-draine:12 or mie:6.",
+            show_default=False,
+        ),
     ] = None,
     estimators: Annotated[
         bool, typer.Option("--estimators", help="Time single-scatter and volpath at equal error.")
@@ -29,26 +57,31 @@ def bench(
     ] = False,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="With --decompose: write images of the parts into this folder, by scene."),
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="DIR",
+            help="With --decompose: write images of the parts into this folder, by scene.",
+            show_default=False,
+        ),
     ] = None,
-    methods: Annotated[
-        str | None, typer.Option(help="Comma-separated methods, also your own MODULE:FUNCTION; all by default.")
-    ] = None,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option("--set", help="Parameter of all named methods, NAME=VALUE; one configuration of each then."),
-    ] = None,
-    method_limit: MethodLimit = USUAL_LIMIT,
-    size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels; the scene's own by default.")] = None,
     truth: Annotated[bool, typer.Option(help="Also compare the truth with single-scatter and volpath.")] = True,
     margin: Annotated[
-        float, typer.Option(help="Relative bias of volpath that counts as agreement; the time grows like 1/margin^2.")
+        float,
+        typer.Option(
+            metavar="SHARE",
+            help="Relative bias of volpath that counts as agreement; the time grows like 1/margin^2.",
+        ),
     ] = 0.01,
+    method_limit: MethodLimit = USUAL_LIMIT,
     force: Force = False,
-    json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
-    markdown: Annotated[bool, typer.Option("--markdown", help="Print tables for a README, dated.")] = False,
+    json: Json = False,
+    markdown: Markdown = False,
+    methods: OldMethods = None,
 ) -> None:
-    """Time every method in every scene, or every kernel on many rays, and compare it with the truth.
+    """Print tables of speed against error: methods, or kernels.
+
+    Every method is timed in every scene and compared with the truth, or with --kernels every kernel on many rays.
 
     `airlight` is the airlight alone (the kernel with its ray set-up), `frame` a frame with static geometry and light,
     `light moved` a frame after the light moved. Exit status 1 if single-scatter does not confirm the truth within
@@ -63,44 +96,32 @@ def bench(
         raise InputError(f"--margin: got {margin:g}, wanted a share between 0 and 1, such as 0.002 for 0.2 %")
     if output is not None and not decompose:
         raise InputError("--output: got a folder without --decompose, which alone writes images; add --decompose")
+    named_kernels = named("--kernel", kernel, "--kernel", None)
     if kernels:
-        _bench_kernels(scenes, phase=phase, json=json, markdown=markdown)
+        _refuse_scenes(scenes)
+        _bench_kernels(named_kernels or None, phase=phase, json=json, markdown=markdown)
         return
     if phase is not None:
-        from analytic.errors import InputError
-
         raise InputError("--phase: it is for kernels; add --kernels, a scene has its own phase function")
     if estimators:
         _bench_estimators(scenes, size=size, force=force, json=json)
         return
-    from realtime.methods.registry import METHODS
     from realtime.scene.read_scene import read_scene
-    from reports.commands.own_methods import checked_configuration
+    from reports.commands.own_methods import named_configurations
     from reports.commands.printing import print_notes
     from reports.data.own_faults import own_faults
     from reports.machine.environment import activate
     from reports.machine.own_process import in_own_process
     from reports.machine.progress import part_of, progress_bar
     from reports.tables.terminal import print_json
-    from validation.configurations.methods import (
-        Configuration,
-        chosen_configurations,
-        parse_settings,
-        rendered_lights,
-    )
+    from validation.configurations.methods import rendered_lights
     from validation.frames.expected_work import check_work, frame_work, truth_work
     from validation.scenes.loading import load_scene, parse_size
     from validation.scenes.registry import SCENES
 
-    given = parse_settings(settings or [])
-    if given and not methods:
-        raise InputError("--set: got parameters without --methods; name the methods that have them")
-    chosen: list[Configuration] = []
-    for name in METHODS if methods is None else listed("--methods", methods):
-        if ":" in name or given:
-            chosen.append(checked_configuration(name, None, given, limit=method_limit))
-            continue
-        chosen += chosen_configurations([name])
+    chosen = named_configurations(
+        named("--method", method, "--methods", methods), named_kernels, settings or [], limit=method_limit
+    )
     apart = partial(in_own_process, limit=method_limit)
     pixels = parse_size(size) if size else None
     activate()
@@ -264,6 +285,22 @@ def _bench_scene(name: str, pixels, chosen, *, margin: float | None, apart, prog
         )
     size = [camera.width, camera.height] if camera else None
     return {"name": loaded.name, "size": size, "methods": rows, "agreement": agreed}
+
+
+def _refuse_scenes(scenes: list[str] | None) -> None:
+    """Refuse scenes beside --kernels, which needs none; in version 0.1 the words there were kernels."""
+    from analytic.errors import InputError
+
+    if not scenes:
+        return
+    known = completion.kernel_names()
+    meant = [word for word in scenes if word.rpartition("-")[0] in known or word in known or ":" in word]
+    if meant:
+        options = " ".join(f"--kernel {word}" for word in meant)
+        raise InputError(f"bench --kernels: {meant[0]!r} is a kernel and stands where scenes stand: write {options}")
+    raise InputError(
+        f"bench --kernels: got the scene {scenes[0]!r}, but kernels are timed without a scene: leave it out"
+    )
 
 
 def _bench_kernels(names: list[str] | None, *, phase: str | None, json: bool, markdown: bool) -> None:

@@ -13,9 +13,10 @@ def cache(
     ] = False,
     json: Annotated[bool, typer.Option("--json", help="Print the numbers as JSON.")] = False,
 ) -> None:
-    """Show place, size and kinds of what is kept between runs, or clear it.
+    """Show, or clear, what is kept between runs.
 
-    AIRLIGHT_CACHE_DIR names another folder, AIRLIGHT_CACHE_SIZE another limit than 4 GiB (500MB, 20GiB; 0 keeps
+    Finished references and results lie in `~/.cache/airlight` (`$XDG_CACHE_HOME/airlight` where that is set).
+    `AIRLIGHT_CACHE_DIR` names another folder, `AIRLIGHT_CACHE_SIZE` another limit than 4 GiB (500MB, 20GiB; 0 keeps
     nothing): above it the entries that were used longest ago are dropped. Exit status 1 if some could not be removed.
     """
     from analytic.errors import InputError

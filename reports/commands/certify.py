@@ -8,11 +8,14 @@ import typer
 
 
 def certify(
-    output: Annotated[Path, typer.Option("--output", "-o", help="The file to write.")] = Path("certified_fog.json"),
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="The file to write.")] = Path(
+        "certified_fog.json"
+    ),
 ) -> None:
-    """Certify the airlight of 12 small scenes of fog to 12 digits, and write scenes, radiances and lit intervals.
+    """Certify the airlight of small scenes of fog to 12 digits.
 
-    See docs/certified-fog.md. Takes about ten minutes, and writes the same file every time.
+    Writes scenes, radiances and lit intervals of 12 scenes. See docs/certified-fog.md. Takes about ten minutes, and
+    writes the same file every time.
     """
     from reference.storage.files import ensure_writable, write_text
     from reports.machine.progress import progress_bar

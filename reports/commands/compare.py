@@ -6,26 +6,26 @@ from typing import Annotated, Any
 
 import typer
 
+from reports.commands import completion
+from reports.commands.options import Json
+
 
 def compare(
     files: Annotated[
-        list[Path],
+        list[str],
         typer.Argument(
-            help="The EXR file to compare with and the one to judge; with --scene the one to judge.",
-            metavar="[REFERENCE] TEST",
+            help="What to compare with, an EXR file or a scene (built-in or a Mitsuba XML file), and the EXR file "
+            "to judge.",
+            metavar="REFERENCE|SCENE TEST",
             show_default=False,
+            autocompletion=completion.scenes_and_images,
         ),
     ],
-    scene: Annotated[
-        str | None,
-        typer.Option(
-            help="Compare with the truth of this scene, a built-in one or a Mitsuba XML file.", show_default=False
-        ),
-    ] = None,
     layer: Annotated[
         str | None,
         typer.Option(
-            help="Layer to compare, 'airlight' by default; 'total' is R/G/B, the default with --scene where there is "
+            metavar="NAME",
+            help="Layer to compare, 'airlight' by default; 'total' is R/G/B, the default with a scene where there is "
             "no airlight.",
             show_default=False,
         ),
@@ -34,46 +34,74 @@ def compare(
         str | None,
         typer.Option(
             "--as",
-            help="With --scene: what the layer holds, 'airlight', 'surface' or 'total'; what its name says by default.",
+            metavar="NAME",
+            help="With a scene: what the layer holds, 'airlight', 'surface' or 'total'; what its name says by default.",
             show_default=False,
+            autocompletion=completion.one_of("airlight", "surface", "total"),
         ),
     ] = None,
     pixel: Annotated[
         str | None,
         typer.Option(
-            help="With --scene: the truth at the 'centre' of each pixel, or its mean over the 'area'. By default both "
+            metavar="NAME",
+            help="With a scene: the truth at the 'centre' of each pixel, or its mean over the 'area'. By default both "
             "are computed and kept and what fits is used; the means take several times as long as the centres.",
+            show_default=False,
+            autocompletion=completion.one_of("centre", "area"),
+        ),
+    ] = None,
+    difference: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Write the difference: a .png file shows the signed relative error of each pixel in false colours, an "
+            ".exr file has the values.",
             show_default=False,
         ),
     ] = None,
     margin: Annotated[
-        float | None, typer.Option(help="Largest relative bias that counts as agreement, such as 0.005.")
+        float | None,
+        typer.Option(
+            metavar="SHARE", help="Largest relative bias that counts as agreement, such as 0.005.", show_default=False
+        ),
     ] = None,
-    mask: Annotated[Path | None, typer.Option(help="EXR file that is 0 in pixels to leave out.")] = None,
+    mask: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="EXR file that is 0 in pixels to leave out.", show_default=False),
+    ] = None,
     metrics: Annotated[
-        str, typer.Option(help="'all' adds the errors of other tools and the colour differences.")
+        str,
+        typer.Option(
+            metavar="WHICH",
+            help="'all' adds the errors of other tools and the colour differences.",
+            autocompletion=completion.one_of("basic", "all"),
+        ),
     ] = "basic",
     flip: Annotated[bool, typer.Option("--flip", help="Add HDR-FLIP, by the package flip-evaluator.")] = False,
     exposure: Annotated[
-        float | None, typer.Option(help="Stops, for the colour differences and FLIP; from the reference by default.")
+        float | None,
+        typer.Option(
+            metavar="STOPS",
+            help="For the colour differences and FLIP; from the reference by default.",
+            show_default=False,
+        ),
     ] = None,
-    json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    json: Json = False,
+    scene: Annotated[str | None, typer.Option(hidden=True, help="The scene, which now stands first.")] = None,
 ) -> None:
-    """Compare two EXR images, or one with the truth of a scene, as `airlight describe SCENE` wants it.
+    """Compare an image with another, or with the truth of a scene.
 
-    Prints bias and error quantiles, statistics if there are standard errors, and with --scene also the best-fitting
+    Prints bias and error quantiles, statistics if there are standard errors, and with a scene also the best-fitting
     factor, what may be wrong with the image as a whole, where most of the error lies, and whether the image is right.
     Exit status 1 if the test image has values that are negative or not finite, or if the bias is not shown to be within
     the margin.
     """
     from analytic.errors import InputError
+    from reports.interchange.difference import check_difference, write_difference
     from reports.tables.terminal import print_json
+    from validation.comparison.images import read_mask
 
-    wanted = 2 if scene is None else 1
-    if len(files) != wanted:
-        usage = "REFERENCE.exr TEST.exr" if scene is None else "one EXR file beside --scene"
-        hint = "; or name a scene by --scene" if scene is None else ""
-        raise InputError(f"compare: got {len(files)} file{'s' * (len(files) != 1)}, wanted {usage}{hint}")
+    scene, paths = _scene_and_files(scene, files)
     if metrics not in ("basic", "all"):
         raise InputError(f"--metrics {metrics}; wanted 'basic' or 'all'")
     for option, value, known in (
@@ -83,7 +111,9 @@ def compare(
         if value is not None and value not in known:
             raise InputError(f"{option} {value}; wanted {', '.join(map(repr, known[:-1]))} or {known[-1]!r}")
         if value is not None and scene is None:
-            raise InputError(f"{option}: the pixels of a file are what they are; this option goes with --scene")
+            raise InputError(f"{option}: the pixels of a file are what they are; this option goes with a scene")
+    if difference is not None:
+        check_difference("--difference", difference)
     options: dict[str, Any] = {
         "mask": mask,
         "margin": margin,
@@ -92,12 +122,52 @@ def compare(
         "exposure": exposure,
     }
     if scene is None:
-        comparison: Any = _two_files(files, "airlight" if layer is None else layer, **options)
+        comparison: Any = _two_files(paths, "airlight" if layer is None else layer, **options)
     else:
-        comparison = _with_scene(scene, files[0], layer=layer, holds=holds, pixel=pixel, **options)
-    print_json(comparison.to_json()) if json else print(comparison.summary())
+        comparison = _with_scene(scene, paths[0], layer=layer, holds=holds, pixel=pixel, **options)
+    written = {}
+    if difference is not None:
+        images = _images(paths, comparison.layer) if scene is None else (comparison.truth, comparison.image)
+        kept = None if mask is None else read_mask(mask)
+        written = {"difference": str(difference)}
+        shown = write_difference(difference, *images, kept=kept)
+    if json:
+        print_json(comparison.to_json() | written)
+    else:
+        print(comparison.summary())
+        if written:
+            print(f"wrote            {difference}: {shown}")
     if comparison.failures:
         raise typer.Exit(1)
+
+
+def _scene_and_files(scene: str | None, words: list[str]) -> tuple[str | None, list[Path]]:
+    """Return the scene, if the first word is one, and the files."""
+    from analytic.errors import InputError
+
+    if scene is None and len(words) == 2 and _names_scene(words[0]):
+        return words[0], [Path(words[1])]
+    if scene is None and len(words) == 2 and _names_scene(words[1]) and not Path(words[1]).is_file():
+        raise InputError(f"compare: the scene stands first: airlight compare {words[1]} {words[0]}")
+    wanted = 2 if scene is None else 1
+    if len(words) != wanted:
+        usage = "REFERENCE.exr TEST.exr, or SCENE TEST.exr" if scene is None else "one EXR file beside --scene"
+        raise InputError(f"compare: got {len(words)} file{'s' * (len(words) != 1)}, wanted {usage}")
+    return scene, [Path(word) for word in words]
+
+
+def _names_scene(word: str) -> bool:
+    """Return whether a word is meant as a scene: a built-in one, an XML file, or a name that no file has."""
+    path = Path(word)
+    return word in completion.scene_names() or path.suffix.lower() == ".xml" or not (path.suffix or path.exists())
+
+
+def _images(paths: list[Path], layer: str):
+    """Return a layer of both files."""
+    from reference.storage.exr import layer as image_layer
+    from reference.storage.exr import read_exr
+
+    return tuple(image_layer(read_exr(path), layer, path) for path in paths)
 
 
 def _two_files(files: list[Path], layer: str, **options):

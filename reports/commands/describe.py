@@ -6,19 +6,23 @@ from typing import Annotated
 
 import typer
 
+from reports.commands.options import Json, Scene, Size
+
 
 def describe(
-    scene: Annotated[str, typer.Argument(help="A built-in scene or a Mitsuba XML file.", show_default=False)],
-    size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels; the scene's own by default.")] = None,
+    scene: Scene,
+    size: Size = None,
     gltf: Annotated[
-        Path | None, typer.Option(help="Write the scene as binary glTF 2.0, a .glb file.", show_default=False)
+        Path | None,
+        typer.Option(metavar="FILE", help="Write the scene as binary glTF 2.0, a .glb file.", show_default=False),
     ] = None,
-    json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    json: Json = False,
 ) -> None:
-    """Print everything that another renderer needs to render a scene, so that its image can be judged.
+    """Print all that another renderer needs to render a scene.
 
-    Camera, media, lights, surfaces, what the pixels hold and what file to write. The glTF file has the same camera,
-    lights and meshes; media are in its extras.
+    Its image can then be judged, by `airlight compare SCENE IMAGE.exr`. Camera, media, lights, surfaces, what the
+    pixels hold and what file to write. The glTF file has the same camera, lights and meshes; media are in its
+    extras.
     """
     from analytic.errors import InputError
     from reference.storage.files import ensure_writable
@@ -26,7 +30,7 @@ def describe(
     from reports.interchange.scene import describe_scene
     from reports.machine.environment import activate
     from reports.tables.scene import description_text
-    from reports.tables.terminal import print_json
+    from reports.tables.terminal import print_json, terminal_width
     from validation.scenes.loading import load_scene, parse_size
 
     if gltf is not None:
@@ -41,7 +45,7 @@ def describe(
     if json:
         print_json(described | ({} if written is None else {"gltf": written}))
         return
-    print(description_text(described))
+    print(description_text(described, terminal_width() or 120))
     if written is not None:
         cut = ", ".join(written["tessellated"])
         print(f"{written['path']}: {written['triangles']} triangles" + (f"; cut into triangles: {cut}" if cut else ""))

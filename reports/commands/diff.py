@@ -8,13 +8,21 @@ import typer
 
 
 def diff(
-    old: Annotated[Path, typer.Argument(help="report.json, or its folder, to compare with.", show_default=False)],
-    new: Annotated[Path, typer.Argument(help="report.json, or its folder, to judge.", show_default=False)],
+    old: Annotated[
+        Path,
+        typer.Argument(metavar="OLD", help="report.json, or its folder, to compare with.", show_default=False),
+    ],
+    new: Annotated[
+        Path, typer.Argument(metavar="NEW", help="report.json, or its folder, to judge.", show_default=False)
+    ],
     error_tolerance: Annotated[
-        float, typer.Option(help="Relative change of an error that is noise; that of a maximum is twice as wide.")
+        float,
+        typer.Option(
+            metavar="SHARE", help="Relative change of an error that is noise; that of a maximum is twice as wide."
+        ),
     ] = 0.02,
     time_tolerance: Annotated[
-        float, typer.Option(help="Relative change of a time that is noise, on a quiet machine.")
+        float, typer.Option(metavar="SHARE", help="Relative change of a time that is noise, on a quiet machine.")
     ] = 0.25,
     times: Annotated[bool, typer.Option("--times/--no-times", help="Compare times too.")] = True,
     common: Annotated[
@@ -23,7 +31,9 @@ def diff(
     ] = False,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Compare two reports: what got slower or less accurate beyond the noise, what got better, what is new or gone.
+    """Compare two reports: what got slower or less accurate.
+
+    Also what got better, what is new and what is gone.
 
     Errors have little noise: they may change by a relative band, or by float32 rounding. Times have much: the quartiles
     of both reports tell how busy the machine was, and a change must show in all stages that share it. Between two

@@ -8,17 +8,30 @@ import typer
 
 
 def docs(
-    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the pages.")] = Path("airlight-docs"),
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder of the pages.")] = Path(
+        "airlight-docs"
+    ),
     report: Annotated[
         Path | None,
-        typer.Option(help="First take the numbers from this report's folder; changes docs/data."),
+        typer.Option(
+            metavar="DIR",
+            show_default=False,
+            help="First take the numbers from this report's folder; changes docs/data.",
+        ),
     ] = None,
     kernels: Annotated[
         Path | None,
-        typer.Option(help="First take the kernels' costs from what `airlight bench --kernels --json` printed."),
+        typer.Option(
+            metavar="FILE",
+            show_default=False,
+            help="First take the kernels' costs from what `airlight bench --kernels --json` printed.",
+        ),
     ] = None,
 ) -> None:
-    """Build the documentation: HTML pages that need no network. Warnings of Sphinx are errors: exit status 1."""
+    """Build the documentation, HTML pages that need no network.
+
+    Warnings of Sphinx are errors: exit status 1.
+    """
     from reports.docs.build import build_docs, source_folder
 
     source = source_folder()

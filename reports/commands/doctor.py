@@ -10,9 +10,10 @@ def doctor(
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
     missing: Annotated[bool, typer.Option("--missing", hidden=True, help="For the launcher.")] = False,
 ) -> None:
-    """Show what works here: LLVM, CUDA, OptiX, versions; and how to mend what does not.
+    """Show what works on this machine, and how to mend what does not.
 
-    Exit status 3 if no kernel can be run.
+    That is Python and its packages, LLVM, CUDA, OptiX, and a test kernel in a process of its own. Exit status 3 if no
+    kernel can be run.
     """
     from reports.machine.doctor import diagnose, print_diagnosis
     from reports.machine.environment import install_line, missing_packages

@@ -8,17 +8,21 @@ import typer
 
 def fidelity(
     paper: Annotated[
-        str | None, typer.Option(help="biri, billeter, bouthors, sun, pegoraro or chen; all by default.")
+        str | None,
+        typer.Option(
+            metavar="NAME", show_default=False, help="biri, billeter, bouthors, sun, pegoraro or chen; all by default."
+        ),
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Only the rows that need no image.")] = False,
     fresh: Annotated[bool, typer.Option("--fresh", help="Measure again what was kept from earlier runs.")] = False,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
     markdown: Annotated[bool, typer.Option("--markdown", help="Print tables for a README, dated.")] = False,
 ) -> None:
-    """Print every equation, figure, table and claim of the papers with its verdict: published beside measured.
+    """Print a verdict on every claim of the papers.
 
-    A verdict is reproduced, refuted, differs (it depends on machine or scene) or impossible. Each is computed from what
-    this command measures, or from what is kept from an earlier run.
+    Every equation, figure, table and sentence: published beside measured. A verdict is reproduced, refuted, differs
+    (it depends on machine or scene) or impossible. Each is computed from what this command measures, or from what
+    is kept from an earlier run.
     """
     from analytic.errors import InputError
     from reports.commands.printing import print_heading, print_tables

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from reports.commands import completion
+
 if TYPE_CHECKING:
     from types import ModuleType
 
@@ -35,37 +37,75 @@ FIGURES: dict[str, tuple[str, tuple[str, ...]]] = {
 
 def figures(
     names: Annotated[
-        list[str] | None, typer.Argument(help=f"Figures: {', '.join(FIGURES)}; all by default.", show_default=False)
+        list[str] | None,
+        typer.Argument(
+            metavar="[FIGURE]... [SCENE]",
+            help=f"Figures: {', '.join(FIGURES)}; all by default. A scene of the report is the strip's, the first "
+            "with shadows by default.",
+            show_default=False,
+            autocompletion=completion.figures_and_scenes(*FIGURES),
+        ),
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="Folder of the figures; airlight-figures by default.", show_default=False),
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="DIR",
+            help="Folder of the figures; airlight-figures by default.",
+            show_default=False,
+        ),
     ] = None,
     report: Annotated[
         Path | None,
-        typer.Option(help="Folder of a report; airlight-report by default, if it is there.", show_default=False),
+        typer.Option(
+            metavar="DIR", help="Folder of a report; airlight-report by default, if it is there.", show_default=False
+        ),
     ] = None,
     source: Annotated[
         Path | None,
-        typer.Option("--from", help="Draw again from the data in this folder; nothing is measured."),
+        typer.Option(
+            "--from",
+            metavar="DIR",
+            help="Draw again from the data in this folder; nothing is measured.",
+            show_default=False,
+        ),
     ] = None,
-    column: Annotated[str, typer.Option(help="Width: single (3.5 inches) or double (7.16 inches).")] = "double",
+    column: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME",
+            help="Width: single (3.5 inches) or double (7.16 inches).",
+            autocompletion=completion.one_of("single", "double"),
+        ),
+    ] = "double",
     style: Annotated[
-        list[str] | None, typer.Option(help="A style sheet of matplotlib on top of ours, by name or path; repeatable.")
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help="A style sheet of matplotlib on top of ours, by name or path; may be given several times.",
+            show_default=False,
+        ),
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Fewer rays, smaller images, shorter timings.")] = False,
-    rays: Annotated[int, typer.Option(min=64, max=1_000_000, help="polynomials: rays to count.")] = 100_000,
-    scene: Annotated[
-        str | None, typer.Option(help="strip: the scene of the report; the first with shadows by default.")
-    ] = None,
+    rays: Annotated[
+        int, typer.Option(min=64, max=1_000_000, metavar="N", help="polynomials: rays to count.")
+    ] = 100_000,
     methods: Annotated[
-        str | None, typer.Option(help="strip: labels of the report, separated by ';'; the best of each by default.")
+        str | None,
+        typer.Option(
+            metavar="LABELS",
+            help="strip: labels of the report, separated by ';'; the best of each by default.",
+            show_default=False,
+        ),
     ] = None,
+    scene: Annotated[str | None, typer.Option(hidden=True, help="The scene, which now stands behind.")] = None,
 ) -> None:
-    """Write figures as PDF and PNG and tables as LaTeX, with the data of each as CSV beside it.
+    """Write figures and tables for papers, with their data.
 
-    Computing writes the data, drawing only reads them: the same data give the same bytes. Figures of whole frames and
-    images are made from a report (`airlight report`); the others are measured here.
+    Figures are PDF and PNG, tables LaTeX, data CSV. Computing writes the data, drawing only reads them: the same
+    data give the same bytes. Figures of whole frames and images are made from a report (`airlight report`); the
+    others are measured here.
     """
     from analytic.errors import InputError, nearest
     from reference.storage.files import ensure_folder
@@ -73,9 +113,14 @@ def figures(
     from reports.machine.progress import part_of, progress_bar
     from reports.plotting.style import WIDTHS
 
-    for name in names or ():
-        if name not in FIGURES:
-            raise InputError(f"figure: got {name!r}, wanted one of {', '.join(FIGURES)}" + nearest(name, FIGURES))
+    words = [name for name in names or () if name not in FIGURES]
+    if words:
+        if len(words) > 1 or words[0] not in _scene_names(report):
+            raise InputError(
+                f"figure: got {words[0]!r}, wanted one of {', '.join(FIGURES)}; or a scene of the report, for the strip"
+                + nearest(words[0], FIGURES)
+            )
+        scene, names = words[0], [name for name in names or () if name in FIGURES] or None
     if column not in WIDTHS:
         raise InputError(f"--column: got {column!r}, wanted one of {', '.join(WIDTHS)}" + nearest(column, WIDTHS))
     drawing: dict[str, Any] = {"column": column, "extra": tuple(style or ())}
@@ -87,7 +132,7 @@ def figures(
     chosen = _chosen(names, report_path)
     if (scene or methods) and "strip" not in chosen:
         raise InputError(
-            "--scene and --methods choose images of the figure strip, which is not asked for: leave them out"
+            "a scene and --methods choose images of the figure strip, which is not asked for: leave them out"
         )
     folder = ensure_folder(output or "airlight-figures")
     with progress_bar("figures") as progress:
@@ -112,6 +157,15 @@ def _report_folder(report: Path | None) -> Path | None:
         read_report(report)
         return report
     return FOLDER if (FOLDER / "report.json").is_file() else None
+
+
+def _scene_names(report: Path | None) -> set[str]:
+    """Return the built-in scenes and those of a report."""
+    from reports.data.reader import read_report
+
+    folder = _report_folder(report)
+    own = [] if folder is None else [scene["name"] for scene in read_report(folder)["scenes"]]
+    return {*completion.scene_names(), *own}
 
 
 def _chosen(names: list[str] | None, report: Path | None) -> list[str]:

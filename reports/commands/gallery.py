@@ -9,9 +9,12 @@ import typer
 
 def gallery(
     names: Annotated[
-        list[str] | None, typer.Argument(help="Pictures, scenes or methods; all by default.", show_default=False)
+        list[str] | None,
+        typer.Argument(metavar="NAME", help="Pictures, scenes or methods; all by default.", show_default=False),
     ] = None,
-    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the pictures.")] = Path("gallery"),
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder of the pictures.")] = Path(
+        "gallery"
+    ),
 ) -> None:
     """Make the pictures of README and documentation: scenes, methods, their errors, and how they work.
 

@@ -6,26 +6,48 @@ from typing import Annotated
 
 import typer
 
+from reports.commands import completion
+
 
 def integrate(
     cases: Annotated[
-        Path, typer.Argument(help="CSV with the columns of tests/data; x1 may be inf.", show_default=False)
+        Path,
+        typer.Argument(
+            metavar="CASES.csv", help="CSV with the columns of tests/data; x1 may be inf.", show_default=False
+        ),
     ],
-    kernel: Annotated[str, typer.Option(help="Airlight kernel, see `airlight kernels`.")] = "exact",
-    precision: Annotated[str, typer.Option(help="single or double.")] = "single",
+    kernel: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME",
+            help="Airlight kernel, see `airlight list kernels`.",
+            autocompletion=completion.kernels,
+        ),
+    ] = "exact",
+    precision: Annotated[
+        str,
+        typer.Option(metavar="NAME", help="single or double.", autocompletion=completion.one_of("single", "double")),
+    ] = "single",
     phase: Annotated[
         str | None,
         typer.Option(
+            metavar="NAME",
+            show_default=False,
             help="Phase function of all rows, in place of the file's: hg:G, hg-draine:DIAMETER, "
-            "mie:RADIUS:GAMMA:WAVELENGTH, mie-modified, ..."
+            "mie:RADIUS:GAMMA:WAVELENGTH, mie-modified, ...",
         ),
     ] = None,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="Write the rows with a column `result`.")
+        Path | None,
+        typer.Option(
+            "--output", "-o", metavar="FILE", help="Write the rows with a column `result`.", show_default=False
+        ),
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print a summary as JSON.")] = False,
 ) -> None:
-    """Evaluate J for each row of a CSV file; rows that have a value are compared with it.
+    """Integrate the airlight of each row of a CSV file by a kernel.
+
+    Rows that have a value are compared with it.
 
     Results that are not finite are refused, with the first row.
     """

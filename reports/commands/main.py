@@ -4,14 +4,14 @@
 Each sub-command is a function in a module `reports/commands/*.py` that imports nothing heavy at the top: Mitsuba,
 Dr.Jit, NumPy, SciPy and matplotlib are imported inside the function, after the arguments were read. So `--help`
 answers at once, and a mistake in the arguments costs no start-up. To add a command, write such a module and add the
-function to `_COMMANDS`.
+function to its panel in `_PANELS`.
 """
 
 import errno
 import os
 import sys
-from collections.abc import Sequence
-from typing import Annotated
+from collections.abc import Callable, Sequence
+from typing import Annotated, Any
 
 import typer
 
@@ -21,6 +21,7 @@ from reports.commands.bench import bench
 from reports.commands.cache import cache
 from reports.commands.certify import certify
 from reports.commands.compare import compare
+from reports.commands.completion import one_of
 from reports.commands.describe import describe
 from reports.commands.diff import diff
 from reports.commands.docs import docs
@@ -28,8 +29,9 @@ from reports.commands.doctor import doctor
 from reports.commands.fidelity import fidelity
 from reports.commands.figures import figures
 from reports.commands.gallery import gallery
+from reports.commands.help import HelpfulCommand, HelpfulGroup
 from reports.commands.integrate import integrate
-from reports.commands.lists import kernels, methods, scenes
+from reports.commands.lists import kernels, list_, methods, scenes
 from reports.commands.maps import maps
 from reports.commands.merge import merge
 from reports.commands.mutations import mutations
@@ -40,55 +42,58 @@ from reports.commands.report import report
 from reports.commands.slab import slab
 from reports.commands.stability import stability
 from reports.commands.test import run_tests
-from reports.machine.environment import VARIANT_VARIABLE, MissingError, check_variant, install_line, missing_packages
+from reports.machine.environment import (
+    VARIANT_VARIABLE,
+    VARIANTS,
+    MissingError,
+    check_variant,
+    install_line,
+    missing_packages,
+)
 from reports.machine.progress import Interrupted
+from reports.tables.terminal import colours_wanted
 
 DONE, FAILED, WRONG_INPUT, MISSING, INTERRUPTED = 0, 1, 2, 3, 130
 
-# In the order of --help.
-_COMMANDS = (
-    report,
-    doctor,
-    scenes,
-    methods,
-    kernels,
-    describe,
-    render,
-    reference,
-    merge,
-    compare,
-    diff,
-    baselines,
-    integrate,
-    slab,
-    bench,
-    maps,
-    published,
-    fidelity,
-    stability,
-    mutations,
-    certify,
-    figures,
-    gallery,
-    docs,
-    cache,
-)
+#: The panels of --help, by what one wants to do, and their commands in its order.
+_PANELS: dict[str, tuple[Callable[..., None], ...]] = {
+    "Start": (doctor, list_, render, cache),
+    "Measure": (report, diff, bench, maps, stability),
+    "Images": (reference, compare, merge, describe, integrate, slab, gallery),
+    "Papers": (published, figures, fidelity),
+    "Develop": (run_tests, docs, baselines, mutations, certify),
+}
+_NAMES = {list_: "list", run_tests: "test"}  #: where the function cannot have the name
+_EPILOG = f"""
+**Environment**
+
+`{VARIANT_VARIABLE}` does what `--variant` does.
+
+`AIRLIGHT_CACHE_DIR` is the folder of what is kept between runs, `~/.cache/airlight` by default;
+`AIRLIGHT_CACHE_SIZE` is how large it may become, `4GiB` by default. See `airlight cache --help`.
+
+`NO_COLOR` turns off colours and bold letters.
+
+**Exit status** 0 done, 1 a check failed, 2 wrong usage or input, 3 something is missing on this machine.
+"""
 
 app = typer.Typer(
     name="airlight",
+    cls=HelpfulGroup,
     help="How fast, how accurate and how stable is a real-time method for volumetric light, against a ground truth "
     "that can be trusted?",
-    epilog="Exit status: 0 done, 1 a check failed, 2 wrong usage or input, 3 something is missing on this machine.",
-    add_completion=False,
-    no_args_is_help=True,
+    epilog=_EPILOG.strip(),
     pretty_exceptions_enable=False,
-    rich_markup_mode="markdown",  # draws `code` as code, without its marks
+    rich_markup_mode=None,  # `reports.commands.help` draws
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 120},
 )
-for _command in _COMMANDS:
-    app.command()(_command)
-# Typer hands unknown arguments on to pytest.
-app.command("test", context_settings={"allow_extra_args": True, "ignore_unknown_options": True})(run_tests)
+for _panel, _commands in _PANELS.items():
+    for _command in _commands:
+        # Typer hands unknown arguments of `test` on to pytest.
+        _more = {"allow_extra_args": True, "ignore_unknown_options": True} if _command is run_tests else None
+        app.command(_NAMES.get(_command), cls=HelpfulCommand, rich_help_panel=_panel, context_settings=_more)(_command)
+for _command in (scenes, methods, kernels):  # as `list` was called in version 0.1
+    app.command(cls=HelpfulCommand, hidden=True)(_command)
 
 
 def _print_version(wanted: bool) -> None:
@@ -101,7 +106,11 @@ def _print_version(wanted: bool) -> None:
 def _global_options(
     variant: Annotated[
         str | None,
-        typer.Option(help="Mitsuba variant: cuda_ad_rgb or llvm_ad_rgb; the first that works by default."),
+        typer.Option(
+            metavar="NAME",
+            help="Where kernels run: cuda_ad_rgb or llvm_ad_rgb; the first that works by default.",
+            autocompletion=one_of(*VARIANTS),
+        ),
     ] = None,
     version: Annotated[
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
@@ -121,12 +130,13 @@ def run(arguments: Sequence[str]) -> int:
     is a fault of the program and keeps its traceback.
     """
     command = typer.main.get_command(app)
+    plain: dict[str, Any] = {} if colours_wanted() else {"color": False}
     try:
         os.getcwd()
     except OSError:  # Dr.Jit ends the process over it
         return _fail("the current folder was deleted: change into another folder, then run this again", WRONG_INPUT)
     try:
-        status = command.main(list(arguments), prog_name="airlight", standalone_mode=False)
+        status = command.main(list(arguments) or ["--help"], prog_name="airlight", standalone_mode=False, **plain)
         sys.stdout.flush()
     except BrokenPipeError:  # the reader of the pipe has left
         return _drop_output(FAILED)
@@ -155,6 +165,8 @@ def run(arguments: Sequence[str]) -> int:
         return _usage(error)
     if status == INTERRUPTED:
         print("interrupted", file=sys.stderr)
+    if not arguments:
+        return WRONG_INPUT
     return status if isinstance(status, int) else DONE
 
 
@@ -172,8 +184,6 @@ def _fail(message: str, status: int) -> int:
 def _usage(error) -> int:
     """Report wrong usage: Typer's message, which names the nearest command, and where help is."""
     message = error.format_message().rstrip(".")
-    if not message:  # no sub-command: its help was printed
-        return WRONG_INPUT
     context = getattr(error, "ctx", None)
     path = context.command_path if context is not None else "airlight"
     return _fail(f"{message} (see `{path} --help`)", WRONG_INPUT)

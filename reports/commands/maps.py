@@ -6,35 +6,42 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from reports.commands.options import USUAL_LIMIT, Force, MethodLimit
+from reports.commands import completion
+from reports.commands.options import USUAL_LIMIT, Force, Json, Kernel, Markdown, MethodLimit, Scenes, Settings
 
 if TYPE_CHECKING:
     from validation.frames.map_size import MapErrors, MapFlicker
 
 
 def maps(
-    scenes: Annotated[list[str] | None, typer.Argument(help="Scenes; all built-in ones by default.")] = None,
-    method: Annotated[str, typer.Option(help="A method with a shadow map.")] = "light-volumes",
-    kernel: Annotated[str | None, typer.Option(help="Airlight kernel; exact by default.")] = None,
-    settings: Annotated[list[str] | None, typer.Option("--set", help="Parameter of the method, NAME=VALUE.")] = None,
+    scenes: Scenes = None,
+    method: Annotated[
+        str,
+        typer.Option(metavar="NAME", help="A method with a shadow map.", autocompletion=completion.methods),
+    ] = "light-volumes",
+    kernel: Kernel = None,
+    settings: Settings = None,
     sizes: Annotated[
-        str, typer.Option(help="Comma-separated sizes of the shadow map [texels].")
+        str, typer.Option(metavar="SIZES", help="Comma-separated sizes of the shadow map [texels].")
     ] = "32,64,128,256,512,1024,2048,4096",
-    size: Annotated[str, typer.Option(help="WIDTHxHEIGHT of the image in pixels.")] = "160x120",
+    size: Annotated[str, typer.Option(metavar="WxH", help="Width and height of the image in pixels.")] = "160x120",
     flicker: Annotated[
         bool, typer.Option("--flicker", help="Also move the light and measure how it flickers.")
     ] = False,
-    frames: Annotated[int, typer.Option(min=2, help="Frames of the moving light.")] = 9,
-    step: Annotated[float, typer.Option(help="By how much the light turns from frame to frame [rad].")] = 1e-3,
+    frames: Annotated[int, typer.Option(min=2, metavar="N", help="Frames of the moving light.")] = 9,
+    step: Annotated[
+        float, typer.Option(metavar="RAD", help="By how much the light turns from frame to frame [rad].")
+    ] = 1e-3,
     method_limit: MethodLimit = USUAL_LIMIT,
     force: Force = False,
-    json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
-    markdown: Annotated[bool, typer.Option("--markdown", help="Print tables for a README, dated.")] = False,
+    json: Json = False,
+    markdown: Markdown = False,
 ) -> None:
-    """Measure how the error of a method falls with the size of its shadow map, against the ray-traced truth.
+    """Measure error and flicker against the size of the shadow map.
 
-    Also prints the slope of the relative RMSE, fitted to the logarithms. With --flicker the light circles slowly, and
-    the change of the image from frame to frame is measured, less that of the truth.
+    The error is against the ray-traced truth. Also prints the slope of the relative RMSE, fitted to the logarithms.
+    With --flicker the light circles slowly, and the change of the image from frame to frame is measured, less that
+    of the truth.
     """
     from analytic.errors import InputError
     from reports.commands.own_methods import checked_configuration

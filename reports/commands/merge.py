@@ -8,13 +8,19 @@ import typer
 
 
 def merge(
-    files: Annotated[list[Path], typer.Argument(help="References of one scene by one estimator.", show_default=False)],
-    output: Annotated[Path, typer.Option("--output", "-o", help="The EXR file to write.")] = Path("merged.exr"),
+    files: Annotated[
+        list[Path],
+        typer.Argument(metavar="A.exr B.exr...", help="References of one scene by one estimator.", show_default=False),
+    ],
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="The EXR file to write.")] = Path(
+        "merged.exr"
+    ),
     json: Annotated[bool, typer.Option("--json", help="Print a summary as JSON.")] = False,
 ) -> None:
-    """Merge Monte Carlo references that were computed with different seeds, for example on two machines.
+    """Merge the samples of several machines as one reference.
 
-    Means and standard errors are those of all batches together, computed from the files' single precision.
+    The files are Monte Carlo references of one scene, computed with different seeds. Means and standard errors are
+    those of all batches together, computed from the files' single precision.
     """
     from reference.storage.exr import read_exr, write_exr
     from reference.storage.files import ensure_writable

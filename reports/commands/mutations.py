@@ -11,21 +11,25 @@ if TYPE_CHECKING:
 
 
 def mutations(
-    names: Annotated[list[str] | None, typer.Argument(metavar="[NAME]...", help="All by default.")] = None,
+    names: Annotated[
+        list[str] | None, typer.Argument(metavar="NAME", help="All by default.", show_default=False)
+    ] = None,
     margin: Annotated[
         float,
         typer.Option(
             min=1e-4,
             max=0.1,
+            metavar="SHARE",
             help="Relative bias that counts as agreement with volpath; with single-scatter, a twentieth.",
         ),
     ] = 0.01,
-    size: Annotated[str, typer.Option(help="Size of the images, WIDTHxHEIGHT.")] = "48x36",
+    size: Annotated[str, typer.Option(metavar="WxH", help="Size of the images in pixels.")] = "48x36",
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Put faults of the physics into copies of the estimators and count how many the standard run catches.
+    """Count how many faults of the physics the checks find.
 
-    Exit status 1 if fewer than nine in ten are caught, or if the unchanged copy does not agree.
+    The faults are put into copies of the estimators, which the standard run then checks. Exit status 1 if fewer
+    than nine in ten are caught, or if the unchanged copy does not agree.
     """
     from reports.machine.environment import activate, describe_environment
     from reports.machine.progress import progress_bar

@@ -1,19 +1,94 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Options that several commands have, and lists in options."""
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from reports.commands import completion
 from reports.machine.own_process import LIMIT
 
+Scene = Annotated[
+    str,
+    typer.Argument(
+        metavar="SCENE",
+        help="A built-in scene or a Mitsuba XML file.",
+        show_default=False,
+        autocompletion=completion.scenes,
+    ),
+]
+Scenes = Annotated[
+    list[str] | None,
+    typer.Argument(
+        metavar="SCENE",
+        help="Built-in scenes and Mitsuba XML files; all built-in ones by default.",
+        show_default=False,
+        autocompletion=completion.scenes,
+    ),
+]
+#: Of `bench` and `report`; `render` takes one, by the same name.
+Methods = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--method",
+        metavar="NAME",
+        help="A method of `airlight list methods`, your own as MODULE:FUNCTION or FILE.py:FUNCTION, or `all`; may be "
+        "given several times; all by default.",
+        show_default=False,
+        autocompletion=completion.methods,
+    ),
+]
+OldMethods = Annotated[str | None, typer.Option("--methods", hidden=True, help="Several of --method, with commas.")]
+OldScenes = Annotated[str | None, typer.Option("--scenes", hidden=True, help="Several of SCENE, with commas.")]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="NAME=VALUE",
+        help="A parameter of the method, or of each that --method names; may be given several times.",
+        show_default=False,
+    ),
+]
+Kernel = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME",
+        help="Airlight kernel of the method, see `airlight list kernels`.",
+        show_default=False,
+        autocompletion=completion.kernels,
+    ),
+]
+Size = Annotated[
+    str | None,
+    typer.Option(metavar="WxH", help="Width and height in pixels; the scene's own by default.", show_default=False),
+]
 Force = Annotated[
     bool, typer.Option("--force", help="Start also what will take more than an hour, or more memory than there is.")
 ]
 MethodLimit = Annotated[
-    float, typer.Option("--method-limit", help="Your own method is stopped after so long in a scene [s].")
+    float,
+    typer.Option("--method-limit", metavar="SECONDS", help="Your own method is stopped after so long in a scene."),
 ]
 USUAL_LIMIT = LIMIT
+Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+Markdown = Annotated[bool, typer.Option("--markdown", help="Print tables for a README, dated.")]
+OutputFile = Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="The file to write.")]
+
+
+def single(option: str, words: list[str] | None) -> str | None:
+    """Return the word of an option that takes one here and several in other commands; None for none.
+
+    Raises
+    ------
+    InputError
+        If there are several.
+    """
+    if words and len(words) > 1:
+        from analytic.errors import InputError
+
+        raise InputError(f"{option}: got {' and '.join(words)}, wanted one of them; bench and report take several")
+    return words[0] if words else None
 
 
 def listed(option: str, text: str) -> list[str]:
@@ -30,3 +105,15 @@ def listed(option: str, text: str) -> list[str]:
 
         raise InputError(f"{option}: got {text!r}, wanted names with commas between them, none of them empty")
     return words
+
+
+def named(option: str, words: list[str] | None, old_option: str, old: str | None) -> list[str]:
+    """Return the words of an option that may be given several times, after those of its older form with commas.
+
+    Raises
+    ------
+    InputError
+        If one of them is empty.
+    """
+    first = [] if old is None else listed(old_option, old)
+    return [*first, *(word for given in words or () for word in listed(option, given))]

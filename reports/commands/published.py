@@ -6,34 +6,54 @@ from typing import Annotated, Any
 
 import typer
 
-from reports.commands.options import Force, listed
+from reports.commands import completion
+from reports.commands.options import Force, Json, Markdown, OldScenes, listed, named
 
 PAPERS = ("biri", "billeter", "ali")
 
 
 def published(
-    paper: Annotated[str | None, typer.Option(help="biri, billeter or ali; all by default.")] = None,
     scenes: Annotated[
-        str | None, typer.Option(help="Comma-separated scenes of the papers; all that are built in by default.")
+        list[str] | None,
+        typer.Argument(
+            metavar="SCENE",
+            help="Scenes of the papers; all that are built in by default.",
+            show_default=False,
+            autocompletion=completion.scenes,
+        ),
+    ] = None,
+    paper: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="biri, billeter or ali; all by default.",
+            show_default=False,
+            autocompletion=completion.one_of(*PAPERS),
+        ),
     ] = None,
     kernels: Annotated[
-        str, typer.Option(help="Comma-separated airlight kernels; for billeter the first counts.")
+        str, typer.Option(metavar="NAMES", help="Comma-separated airlight kernels; for billeter the first counts.")
     ] = "exact,taylor",
-    scale: Annotated[float, typer.Option(help="Of width and height; 1 for the published sizes.")] = 1.0,
+    scale: Annotated[float, typer.Option(metavar="X", help="Of width and height; 1 for the published sizes.")] = 1.0,
     maps: Annotated[
-        str, typer.Option(help="billeter: comma-separated sizes of the shadow map in Table 1, ascending.")
+        str,
+        typer.Option(metavar="SIZES", help="billeter: comma-separated sizes of the shadow map in Table 1, ascending."),
     ] = "1024,2048,4096",
     limit: Annotated[
-        float, typer.Option(help="billeter: frames that take longer are left out, with the reason [s].")
+        float,
+        typer.Option(metavar="SECONDS", help="billeter: frames that take longer are left out, with the reason."),
     ] = 30.0,
     zero_cost: Annotated[
         bool, typer.Option(help="biri: also measure that casters which are not there or not seen cost nothing.")
     ] = True,
     force: Force = False,
-    json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
-    markdown: Annotated[bool, typer.Option("--markdown", help="Print tables for a README, dated.")] = False,
+    json: Json = False,
+    markdown: Markdown = False,
+    old_scenes: OldScenes = None,
 ) -> None:
-    """Measure the results of Biri, Arques, Michelin 2006, Billeter, Sintorn, Assarsson 2010 and Ali 2016 again.
+    """Measure tables and figures of papers again.
+
+    The papers are Biri, Arques, Michelin 2006, Billeter, Sintorn, Assarsson 2010 and Ali 2016.
 
     biri: Tables 1 and 2 with `shadow-planes`: share of time by stage, frames a second; with `three-media`, the
     error of the constant R of section 4.2 by size and depth. billeter: Figures 6 and 7 and Table 1 with `light-
@@ -57,7 +77,7 @@ def published(
     if not limit > 0:
         raise InputError(f"--limit: got {limit:g}, wanted more than 0 [s]")
     papers = PAPERS if paper is None else (paper,)
-    wanted = _wanted_scenes(scenes, papers)
+    wanted = _wanted_scenes((scenes or []) + named("SCENE", None, "--scenes", old_scenes), papers)
     names = listed("--kernels", kernels)
     for name in names:
         find_kernel(name)
@@ -113,8 +133,8 @@ def _ali(*, scale: float, progress: Callable) -> dict[str, Any]:
     return {"ali": study_data(shafts_study(size, progress=progress))}
 
 
-def _wanted_scenes(scenes: str | None, papers: Sequence[str]) -> list[str]:
-    from analytic.errors import InputError
+def _wanted_scenes(scenes: Sequence[str], papers: Sequence[str]) -> list[str]:
+    from analytic.errors import InputError, nearest
     from validation.papers.billeter_images import FIGURES
     from validation.papers.billeter_tessellation import TABLE
     from validation.papers.biri import PUBLISHED
@@ -126,11 +146,10 @@ def _wanted_scenes(scenes: str | None, papers: Sequence[str]) -> list[str]:
         "billeter": [figure.scene for figure in FIGURES] + [view.scene for view in TABLE],
     }
     known = list(dict.fromkeys(name for paper in papers for name in of_paper[paper]))
-    wanted = known if scenes is None else listed("--scenes", scenes)
-    for name in wanted:
+    for name in scenes:
         if name not in known:
-            raise InputError(f"--scenes: got {name!r}, wanted some of {', '.join(known)}")
-    return wanted
+            raise InputError(f"scene: got {name!r}, wanted some of {', '.join(known)}" + nearest(name, known))
+    return list(scenes) or known
 
 
 def _biri(

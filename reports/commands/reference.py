@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from reports.commands.options import Force
+from reports.commands.options import Force, Scene, Size
 
 if TYPE_CHECKING:
     from reports.machine.progress import Progress
@@ -41,32 +41,55 @@ class Target(StrEnum):
 
 
 def reference(
-    scene: Annotated[str, typer.Argument(help="A built-in scene or a Mitsuba XML file.", show_default=False)],
-    output: Annotated[Path, typer.Option("--output", "-o", help="The EXR file to write.")] = Path("reference.exr"),
-    estimator: Annotated[Estimator, typer.Option(help="How to compute it.")] = Estimator.quadrature,
+    scene: Scene,
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="The EXR file to write.")] = Path(
+        "reference.exr"
+    ),
+    estimator: Annotated[
+        Estimator, typer.Option(metavar="NAME", help="How to compute it: quadrature, single-scatter or volpath.")
+    ] = Estimator.quadrature,
     spp: Annotated[
         int | None,
-        typer.Option(min=64, help=f"Monte Carlo: samples a pixel, {_USUAL_SPP} by default.", show_default=False),
+        typer.Option(
+            min=64, metavar="N", help=f"Monte Carlo: samples a pixel, {_USUAL_SPP} by default.", show_default=False
+        ),
     ] = None,
     target_error: Annotated[
         float | None,
-        typer.Option(help="Monte Carlo: go on to this relative standard error, such as 0.001.", show_default=False),
+        typer.Option(
+            metavar="SHARE",
+            help="Monte Carlo: go on to this relative standard error, such as 0.001.",
+            show_default=False,
+        ),
     ] = None,
     time_budget: Annotated[
-        float | None, typer.Option(help="Monte Carlo: go on for so many seconds.", show_default=False)
+        float | None,
+        typer.Option(metavar="SECONDS", help="Monte Carlo: go on for so many seconds.", show_default=False),
     ] = None,
     target: Annotated[
-        Target, typer.Option(help="The error that --target-error is about: the image's, or its worst pixel's.")
+        Target,
+        typer.Option(
+            metavar="NAME",
+            help="The error that --target-error is about: pooled, the image's, or worst, its worst pixel's.",
+        ),
     ] = Target.pooled,
-    pixel: Annotated[Pixel, typer.Option(help="quadrature: the radiance at the centre, or the mean.")] = Pixel.centre,
-    seed: Annotated[int, typer.Option(min=0, help="Monte Carlo: seed of the first batch; the others count up.")] = 0,
-    size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels; the scene's own by default.")] = None,
+    pixel: Annotated[
+        Pixel,
+        typer.Option(
+            metavar="NAME", help="quadrature: the radiance at the centre of a pixel, or the mean over its area."
+        ),
+    ] = Pixel.centre,
+    seed: Annotated[
+        int, typer.Option(min=0, metavar="N", help="Monte Carlo: seed of the first batch; the others count up.")
+    ] = 0,
+    size: Size = None,
     force: Force = False,
     json: Annotated[bool, typer.Option("--json", help="Print a summary as JSON.")] = False,
 ) -> None:
-    """Compute the ground truth of a scene and write it as layered EXR, with its error.
+    """Compute the ground truth of a scene, with its error.
 
-    Finished batches are kept: a Monte Carlo run continues from them, after an interruption or with more samples.
+    It is written as layered EXR. Finished batches are kept: a Monte Carlo run continues from them, after an
+    interruption or with more samples.
 
     Exit status 1 if the target error was not reached.
     """

@@ -9,38 +9,72 @@ from typing import Annotated, Any
 
 import typer
 
-from reports.commands.options import USUAL_LIMIT, Force, MethodLimit
-
-Scene = Annotated[str, typer.Argument(help="A built-in scene or a Mitsuba XML file.", show_default=False)]
-Size = Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels; the scene's own by default.")]
+from reports.commands import completion
+from reports.commands.options import USUAL_LIMIT, Force, MethodLimit, Scene, Settings, Size, single
 
 
 def render(
     scene: Scene,
     method: Annotated[
-        str, typer.Option(help="Real-time method, see `airlight methods`, or MODULE:FUNCTION.")
-    ] = "ray-march",
-    kernel: Annotated[str | None, typer.Option(help="Airlight kernel, see `airlight kernels`.")] = None,
-    set_: Annotated[list[str] | None, typer.Option("--set", help="NAME=VALUE, a parameter of the method.")] = None,
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help="A method of `airlight list methods`, or your own as MODULE:FUNCTION or FILE.py:FUNCTION; ray-march "
+            "by default.",
+            show_default=False,
+            autocompletion=completion.methods,
+        ),
+    ] = None,
+    kernel: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help="Airlight kernel of the method, see `airlight list kernels`.",
+            show_default=False,
+            autocompletion=completion.kernels,
+        ),
+    ] = None,
+    settings: Settings = None,
     size: Size = None,
-    precision: Annotated[str, typer.Option(help="single or double.")] = "single",
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Write layered EXR here.")] = None,
+    precision: Annotated[
+        str,
+        typer.Option(metavar="NAME", help="single or double.", autocompletion=completion.one_of("single", "double")),
+    ] = "single",
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", metavar="FILE", help="Write the layers here, an .exr file.", show_default=False),
+    ] = None,
     preview: Annotated[
-        Path | None, typer.Option(help="Write a PNG picture here, through the tone curve x (1 + x/w^2) / (1 + x).")
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Write a picture here, a .png file, through the tone curve x (1 + x/w^2) / (1 + x).",
+            show_default=False,
+        ),
     ] = None,
     samples: Annotated[
         int,
         typer.Option(
-            min=1, help="Camera rays a pixel, for pictures without stairs; a method's error is judged at pixel centres."
+            min=1,
+            metavar="N",
+            help="Camera rays a pixel, for pictures without stairs; a method's error is judged at pixel centres.",
         ),
     ] = 1,
     frames: Annotated[
-        int | None, typer.Option(min=1, help="Render an animation of so many frames, as name-0001.exr and so on.")
+        int | None,
+        typer.Option(
+            min=1,
+            metavar="N",
+            help="Render an animation of so many frames, as NAME-0001.exr and so on.",
+            show_default=False,
+        ),
     ] = None,
     animate: Annotated[
         str | None,
         typer.Option(
-            help="What moves: light, objects, medium, colour, or several with commas; the scene's by default."
+            metavar="WHAT",
+            help="What moves: light, objects, medium, colour, or several with commas; the scene's by default.",
+            show_default=False,
         ),
     ] = None,
     force: Force = False,
@@ -48,10 +82,12 @@ def render(
     plan: Annotated[bool, typer.Option("--plan", help="Print what the scene needs of a method, and stop.")] = False,
     json: Annotated[bool, typer.Option("--json", help="Print times as JSON.")] = False,
 ) -> None:
-    """Render a frame, or an animation, with a real-time method and print what it costs.
+    """Render a frame or an animation and print what it costs.
 
     An animation is one turn: lights circle, objects turn, the medium's density swings, colours go round. Each frame
     recomputes only what depends on the motion. Ctrl-C keeps the finished frames.
+
+    Without --output and --preview no file is written.
     """
     from functools import partial
 
@@ -61,13 +97,14 @@ def render(
     from validation.configurations.methods import parse_settings
     from validation.scenes.loading import parse_size
 
-    chosen = checked_configuration(method, kernel, parse_settings(set_ or []), limit=method_limit)
+    name = single("--method", method) or "ray-march"
+    chosen = checked_configuration(name, single("--kernel", kernel), parse_settings(settings or []), limit=method_limit)
     outputs = {"exr": output, "png": preview}
     _check_outputs(outputs, frames, animate)
     _check_samples(samples, outputs, frames)
     pixels = parse_size(size) if size else None
     variant = activate()
-    call = partial(in_own_process, name=method, limit=method_limit) if chosen.own else _call
+    call = partial(in_own_process, name=name, limit=method_limit) if chosen.own else _call
     if plan:
         _print_plan(call(_plan, scene, pixels, precision, chosen), json=json)
     elif frames is None:
@@ -207,6 +244,7 @@ def _render(
         frame = render_samples(renderer, samples, lambda done: progress(done, "the picture"))
     curve = write_frame(loaded.name, chosen, frame, outputs=outputs, samples=samples)
     times = time_frame(renderer)
+    files = [str(path) for path in outputs.values() if path is not None]
     return {
         "scene": loaded.name,
         "method": chosen.label,
@@ -224,6 +262,7 @@ def _render(
         "threads": dr.thread_count(),
         "samples": samples,
         "tone_curve": curve and curve.words,
+        "files": files,
     }
 
 
@@ -270,19 +309,22 @@ def _print_times(times: dict[str, Any], *, json: bool) -> None:
         return
     stages = ", ".join(f"{stage['name']} {stage['ms']:.3g} ms" for stage in times["stages"])
     print(f"{times['scene']}, {times['method']}: {times['frame_ms']:.3g} ms a frame ({rate_words(times['frame_ms'])})")
-    print(
-        f"  {stages}; {times['light_moved_ms']:.3g} ms after the light moved, {times['objects_moved_ms']:.3g} ms after "
-        "objects moved"
-    )
-    print(
-        f"  camera rays kept: {times['light_moved_camera_kept_ms']:.3g} ms after the light moved, "
-        f"{times['colours_changed_ms']:.3g} ms after only medium or colours changed"
-    )
+    print(f"  {stages}")
+    moved, objects = times["light_moved_ms"], times["objects_moved_ms"]
+    print(f"  {moved:.3g} ms after the light moved, {objects:.3g} ms after objects moved")
+    print(f"  camera rays kept: {times['light_moved_camera_kept_ms']:.3g} ms after the light moved,")
+    print(f"    {times['colours_changed_ms']:.3g} ms after only medium or colours changed")
     print(f"  {times['device']}, {times['threads']} threads")
     if times["tone_curve"]:
         print(f"  picture: {times['tone_curve']}")
     if times["samples"] > 1:
         print(f"  {times['samples']} rays a pixel: for looking at; a method's error is judged at pixel centres")
+    size = " x ".join(map(str, times["size"]))
+    for path in times["files"]:
+        what = "airlight, surface, their sum, depth" if path.lower().endswith(".exr") else "a picture"
+        print(f"wrote {path}: {what}, {size} pixels")
+    if not times["files"]:
+        print("nothing written: --preview NAME.png writes a picture, --output NAME.exr the layers")
 
 
 def _print_frames(written: dict[str, Any], *, json: bool) -> None:
@@ -294,8 +336,11 @@ def _print_frames(written: dict[str, Any], *, json: bool) -> None:
         return
     move, rendered, moves = written["move_ms"], written["render_ms"], " and ".join(written["moves"])
     print(f"{written['scene']}, {written['method']}: {written['frames']} frames, {moves} moving")
-    print(f"  {written['files'][0]} to {written['files'][-1]}")
     print(
         f"  {written['frame_ms']:.3g} ms a frame ({rate_words(written['frame_ms'])}): {move:.3g} ms to move, "
         f"{rendered:.3g} ms to render, keeping what stood still; {written['device']}"
     )
+    size = " x ".join(map(str, written["size"]))
+    for ending in dict.fromkeys(Path(path).suffix for path in written["files"]):
+        files = [path for path in written["files"] if path.endswith(ending)]
+        print(f"wrote {files[0]} to {files[-1]}: {len(files)} files, {size} pixels")

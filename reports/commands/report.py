@@ -8,41 +8,79 @@ from typing import Annotated, Any
 
 import typer
 
-from reports.commands.options import USUAL_LIMIT, Force, MethodLimit, listed
+from reports.commands import completion
+from reports.commands.options import (
+    USUAL_LIMIT,
+    Force,
+    MethodLimit,
+    Methods,
+    OldMethods,
+    OldScenes,
+    Settings,
+    named,
+)
 
 
 def report(
-    quick: Annotated[
-        bool, typer.Option("--quick", help="Three scenes, small images: less than three minutes.")
-    ] = False,
-    full: Annotated[bool, typer.Option("--full", help="Large images, many samples, all tables: an hour.")] = False,
     scenes: Annotated[
-        str | None,
-        typer.Option(
-            help="Comma-separated built-in scenes and Mitsuba XML files; three with --quick, all with --full."
+        list[str] | None,
+        typer.Argument(
+            metavar="SCENE",
+            help="Built-in scenes and Mitsuba XML files; four with --quick, all with --full.",
+            show_default=False,
+            autocompletion=completion.scenes,
         ),
     ] = None,
-    methods: Annotated[str | None, typer.Option(help="Comma-separated methods; all by default.")] = None,
-    method: Annotated[
+    quick: Annotated[bool, typer.Option("--quick", help="Few scenes, small images: some minutes.")] = False,
+    full: Annotated[bool, typer.Option("--full", help="Large images, many samples, all tables: an hour.")] = False,
+    method: Methods = None,
+    kernel: Annotated[
         list[str] | None,
-        typer.Option(help="Your own method as module:function or file.py:function; may be given several times."),
+        typer.Option(
+            metavar="NAME",
+            help="Airlight kernel of the methods; may be given several times.",
+            show_default=False,
+            autocompletion=completion.kernels,
+        ),
     ] = None,
+    settings: Settings = None,
     images: Annotated[
         Path | None,
-        typer.Option(help="Folder with your engine's images, SCENE.exr or SCENE.NAME.exr, judged against the truth."),
-    ] = None,
-    method_limit: MethodLimit = USUAL_LIMIT,
-    force: Force = False,
-    fresh: Annotated[bool, typer.Option("--fresh", help="Measure again what is kept from earlier runs.")] = False,
-    redraw: Annotated[
-        Path | None, typer.Option("--from", help="Draw the page of this report.json again, without measuring.")
+        typer.Option(
+            metavar="DIR",
+            help="Folder with your engine's images, SCENE.exr or SCENE.NAME.exr, judged against the truth.",
+            show_default=False,
+        ),
     ] = None,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="Folder of the report; airlight-report by default.")
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="DIR",
+            help="Folder of the report; airlight-report by default.",
+            show_default=False,
+        ),
     ] = None,
+    redraw: Annotated[
+        Path | None,
+        typer.Option(
+            "--from",
+            metavar="FILE",
+            help="Draw the page of this report.json again, without measuring.",
+            show_default=False,
+        ),
+    ] = None,
+    fresh: Annotated[bool, typer.Option("--fresh", help="Measure again what is kept from earlier runs.")] = False,
+    method_limit: MethodLimit = USUAL_LIMIT,
+    force: Force = False,
     json: Annotated[bool, typer.Option("--json", help="Print report.json.")] = False,
+    old_scenes: OldScenes = None,
+    methods: OldMethods = None,
 ) -> None:
-    """Measure every method in every scene and write the report: one HTML page, report.json, EXR and PNG files.
+    """Measure methods in scenes and write the report, one page.
+
+    The page is report.html; beside it lie report.json and each image as EXR and PNG.
 
     Results that this machine measured before, with the same code and scenes, come from the cache. Exit status 1 if
     single-scatter or volpath does not confirm the truth within the margin, or a method of your own is at fault: the
@@ -59,9 +97,10 @@ def report(
         given = {
             "--quick": quick,
             "--full": full,
-            "--scenes": scenes,
-            "--methods": methods,
-            "--method": method,
+            "a scene": scenes or old_scenes,
+            "--method": method or methods,
+            "--kernel": kernel,
+            "--set": settings,
             "--images": images,
             "--fresh": fresh,
         }
@@ -78,9 +117,10 @@ def report(
         data = _measured(
             target,
             effort,
-            scenes=scenes,
-            methods=methods,
-            own=method or [],
+            scenes=named("SCENE", None, "--scenes", old_scenes) + (scenes or []),
+            methods=named("--method", method, "--methods", methods),
+            kernels=named("--kernel", kernel, "--kernel", None),
+            settings=settings or [],
             images=images,
             fresh=fresh,
             method_limit=method_limit,
@@ -116,9 +156,10 @@ def _measured(
     target: Path,
     effort_name: str,
     *,
-    scenes: str | None,
-    methods: str | None,
-    own: list[str],
+    scenes: list[str],
+    methods: list[str],
+    kernels: list[str],
+    settings: list[str],
     images: Path | None,
     fresh: bool,
     method_limit: float,
@@ -126,21 +167,25 @@ def _measured(
 ) -> dict[str, Any]:
     """Measure and write a report; unusable input is refused before the work begins."""
     from reference.storage.files import ensure_folder
+    from reports.commands.own_methods import named_configurations
     from reports.commands.printing import print_notes
     from reports.machine.environment import activate
     from reports.machine.progress import progress_bar
     from reports.report.asked import notes_on, scenes_of_images
     from reports.report.measure import write_report
     from validation.comparison.engine_images import images_size
+    from validation.configurations.methods import QUICK
     from validation.frames.expected_work import check_work, frame_work, truth_work
     from validation.frames.scene_study import EFFORTS
 
-    asked = None if scenes is None else listed("--scenes", scenes)
-    names, shown = scenes_of_images(asked, images, EFFORTS[effort_name].scenes)
-    chosen = _configurations(effort_name, methods, own, method_limit)
-    ensure_folder(target)
+    names, shown = scenes_of_images(scenes or None, images, EFFORTS[effort_name].scenes)
+    usual = QUICK if effort_name == "quick" else None
+    chosen = named_configurations(methods, kernels, settings, usual=usual, limit=method_limit)
+    if methods and all(":" in name for name in methods):
+        print_notes(["what --method names is measured alone; --method all adds the built-in methods"])
     activate()
     print_notes(notes_on(names))
+    ensure_folder(target)  # not before the scenes are known to be right: a mistake leaves no empty folder
     # The sizes of an effort are known to be right; those of images are the user's.
     sizes = [images_size(tuple(several)) for several in shown.values()]
     works = [truth_work(size) for size in sizes]
@@ -158,21 +203,6 @@ def _measured(
             method_limit=method_limit,
             progress=progress,
         )
-
-
-def _configurations(effort_name: str, methods: str | None, own: list[str], limit: float) -> list[Any]:
-    """Return what to measure: the methods that were named, or the usual ones, and the user's own."""
-    from realtime.methods.registry import METHODS
-    from reports.commands.own_methods import check_limit, checked_configuration
-    from validation.configurations.methods import QUICK, chosen_configurations
-
-    check_limit(limit)
-
-    if effort_name == "quick" and methods is None:
-        chosen = list(QUICK)
-    else:
-        chosen = list(chosen_configurations(list(METHODS) if methods is None else listed("--methods", methods)))
-    return chosen + [checked_configuration(name, limit=limit) for name in own]
 
 
 def _kept_words(data: dict[str, Any]) -> str:

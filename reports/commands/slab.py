@@ -9,27 +9,45 @@ from reports.commands.options import Force
 
 
 def slab(
-    tau: Annotated[float, typer.Option(help="Thickness of the slab [mean free paths].")],
-    sun: Annotated[float, typer.Option(help="Zenith angle of the sun [degrees].")],
+    tau: Annotated[float, typer.Option(metavar="T", help="Thickness of the slab [mean free paths].")],
+    sun: Annotated[float, typer.Option(metavar="DEG", help="Zenith angle of the sun [degrees].")],
     phase: Annotated[
-        str, typer.Option(help="isotropic, hg:G, mie, mie-modified, or a CSV file of angles [degrees] and values.")
+        str,
+        typer.Option(
+            metavar="NAME", help="isotropic, hg:G, mie, mie-modified, or a CSV file of angles [degrees] and values."
+        ),
     ] = "isotropic",
-    albedo: Annotated[float, typer.Option(help="Single-scattering albedo.")] = 1.0,
+    albedo: Annotated[float, typer.Option(metavar="A", help="Single-scattering albedo.")] = 1.0,
     orders: Annotated[
-        str, typer.Option(help="Orders, such as 1,2,3-4,31-inf; sets: those of Bouthors 2008; all: their sum.")
+        str,
+        typer.Option(
+            metavar="WHICH", help="Orders, such as 1,2,3-4,31-inf; sets: those of Bouthors 2008; all: their sum."
+        ),
     ] = "sets",
     depths: Annotated[
-        str | None, typer.Option(help="Comma-separated depths [mean free paths]; top and bottom by default.")
+        str | None,
+        typer.Option(
+            metavar="T,..",
+            show_default=False,
+            help="Comma-separated depths [mean free paths]; top and bottom by default.",
+        ),
     ] = None,
     directions: Annotated[
-        str, typer.Option(help="MU:PHI,.. of the radiance: mu positive upwards, phi [degrees] 0 forward.")
+        str,
+        typer.Option(
+            metavar="MU:PHI,..",
+            show_default=False,
+            help="Of the radiance: mu positive upwards, phi [degrees] 0 forward.",
+        ),
     ] = "",
-    photons: Annotated[int, typer.Option(help="Check with so many photons.")] = 0,
-    seed: Annotated[int, typer.Option(help="Of the photons.")] = 0,
+    photons: Annotated[int, typer.Option(metavar="N", help="Check with so many photons.")] = 0,
+    seed: Annotated[int, typer.Option(metavar="N", help="Of the photons.")] = 0,
     force: Force = False,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Compute what a slab reflects and transmits by order of scattering, and where that light leaves it.
+    """Compute the light of a slab in sunlight by order of scattering.
+
+    That is what it reflects and transmits, and where that light leaves it.
 
     Order n is light that was scattered n times. The numbers come from a deterministic computation with an estimate of
     its error; --photons puts a random walk with standard errors beside them. See docs/slab.md.

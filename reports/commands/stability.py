@@ -10,13 +10,19 @@ from reports.commands.options import listed
 
 def stability(
     kernels: Annotated[
-        str | None, typer.Option(help="Comma-separated: a kernel, 'name-N' or 'module:function'; all by default.")
+        str | None,
+        typer.Option(
+            metavar="NAMES",
+            show_default=False,
+            help="Comma-separated: a kernel, 'name-N' or 'module:function'; all by default.",
+        ),
     ] = None,
-    rays: Annotated[int, typer.Option(min=64, max=1_000_000, help="Number of generated rays.")] = 100_000,
+    rays: Annotated[int, typer.Option(min=64, max=1_000_000, metavar="N", help="Number of generated rays.")] = 100_000,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Try every kernel on certified values, on rays of every magnitude and against exact laws, and sums of many planes.
+    """Look for rays and sums of planes on which kernels break.
 
+    Tries every kernel on certified values, on rays of every magnitude and against exact laws, and sums of many planes.
     Prints the ray of each largest error in the format of `airlight integrate`. Exit status 1 if a kernel that claims to
     be exact, or shadow planes, exceed the error that they claim; --kernels without 'exact' leaves the planes out.
     """

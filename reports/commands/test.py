@@ -15,11 +15,16 @@ def run_tests(
     workers: Annotated[
         int | None,
         typer.Option(
-            min=0, help="Processes that share the tests; 0 for this one; 2 by default if there are two cores."
+            min=0,
+            metavar="N",
+            show_default=False,
+            help="Processes that share the tests; 0 for this one; 2 by default if there are two cores.",
         ),
     ] = None,
 ) -> None:
-    """Run the fast tests of the source checkout, or all; other arguments go to pytest, paths are relative to it.
+    """Run the fast tests of the source checkout, or all tests.
+
+    Other arguments go to pytest; paths are relative to the checkout.
 
     --all also prints a summary and writes the date, the machine and the counts into docs/verification.md. With --all
     and arguments for pytest, tests of all tiers run and nothing is written. Exit status 1 if anything failed.

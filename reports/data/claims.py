@@ -43,7 +43,8 @@ def unstudied(names: Sequence[str], known: Sequence[str]) -> list[Claim]:
     if not left:
         return []
     text = (
-        f"Scenes not studied, for the time that they take: {', '.join(left)}. `--scenes` names them, `--full` has all."
+        f"Scenes not studied, for the time that they take: {', '.join(left)}. "
+        "A scene that is named is studied, `--full` has all."
     )
     return [_claim("not-measured", text)]
 

@@ -7,6 +7,7 @@ Read in this order:
 - `data.py`: numbers and pictures of a report, and whether they are stale
 - `fidelity.py`: the page of verdicts on papers
 - `full_run.py`: the last full run of all tests
+- `release.py`: one number, a source distribution, a wheel
 - `verification.py`: the page of claims and of the tests that protect them
 
 May import: `analytic`, `reference.storage`, `reports.data`, `reports.machine`, `reports.papers`, `reports.tables`,

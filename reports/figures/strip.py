@@ -74,7 +74,7 @@ def _scene(data: dict[str, Any], name: str | None) -> dict[str, Any]:
 
     scenes = {scene["name"]: scene for scene in data["scenes"] if _shown(scene, "airlight") or _shown(scene, "total")}
     if name is not None and name not in scenes:
-        raise InputError(f"--scene: got {name!r}, wanted one of {', '.join(scenes)}" + nearest(name, scenes))
+        raise InputError(f"scene: got {name!r}, wanted one of {', '.join(scenes)}" + nearest(name, scenes))
     if not scenes:
         raise InputError("the report has no scene with an image of a method: nothing to show")
     shadowed = [scene for scene in scenes.values() if not str(scene["plan"].get("shadows", "none")).startswith("none")]

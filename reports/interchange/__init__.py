@@ -8,7 +8,8 @@ Read in this order:
 - `meshes.py`: its shapes as triangles
 - `gltf.py`: the scene as glTF
 - `frames.py`: frames of an animation as files
+- `difference.py`: the difference of two images as an image
 
 May import: `analytic`, `realtime.frame`, `reference.scene`, `reference.storage`, `reports.machine`, `reports.plotting`,
-`validation.configurations`, `validation.estimates`, `validation.scenes`.
+`validation.configurations`, `validation.estimates`, `validation.metrics`, `validation.scenes`.
 """

@@ -32,7 +32,8 @@ def cuda_status() -> Status:
     """Return whether Dr.Jit's CUDA backend can work, with the device's name or the reason."""
     cuda = _load("libcuda.so.1", "DRJIT_LIBCUDA_PATH")
     if cuda is None:
-        return Status(False, "no NVIDIA driver: libcuda.so.1 cannot be loaded")
+        why = "libcuda.so.1 cannot be loaded" if sys.platform == "linux" else "it is looked for on Linux alone"
+        return Status(False, f"no NVIDIA driver: {why}")
     error = cuda.cuInit(0)
     if error:
         return Status(False, f"cuInit fails with error {error}" + (": no device" if error == 100 else ""))

@@ -20,6 +20,7 @@ from typing import Any
 from analytic.errors import InputError
 from reports.machine.environment import VARIANT_VARIABLE
 
+_POSIX = os.name == "posix"
 LIMIT = 300.0  #: seconds that a user's method may take for one scene, or one command
 _FAREWELL = 2.0  # seconds in which a process that is to end may remove what it has half-written
 
@@ -62,9 +63,8 @@ def in_own_process(function: Callable[..., Any], *arguments: Any, name: str, lim
                 [sys.executable, "-P", "-m", "reports.machine.own_process", str(folder), str(alive)],
                 stdin=subprocess.DEVNULL,
                 stdout=_error_stream(),
-                pass_fds=(alive,),
                 env=_environment(),
-                start_new_session=True,
+                **_kept_open(alive),
             )
             with cleaned_up(lambda: _end(process)):
                 try:
@@ -88,6 +88,11 @@ def in_own_process(function: Callable[..., Any], *arguments: Any, name: str, lim
     if not returned:
         raise value
     return value
+
+
+def _kept_open(alive: int) -> dict[str, Any]:
+    """Return the options of a process that notices the end of this one, and leads a group; Windows has neither."""
+    return {"pass_fds": (alive,), "start_new_session": True} if _POSIX else {}
 
 
 def _error_stream() -> int:
@@ -115,9 +120,12 @@ def _end(process: subprocess.Popen) -> None:
         process.terminate()
         with suppress(subprocess.TimeoutExpired):
             process.wait(_FAREWELL)
-    # macOS denies it for a group of which only a zombie is left.
-    with suppress(ProcessLookupError, PermissionError):
-        os.killpg(process.pid, signal.SIGKILL)
+    if not _POSIX:
+        process.kill()
+    else:
+        # macOS denies it for a group of which only a zombie is left.
+        with suppress(ProcessLookupError, PermissionError):
+            os.killpg(process.pid, signal.SIGKILL)
     process.wait()
 
 
@@ -137,7 +145,8 @@ def main() -> None:
 
     stop_on_signals(quiet=True)
     folder, alive = Path(sys.argv[1]), int(sys.argv[2])
-    threading.Thread(target=_follow, args=(alive,), daemon=True).start()
+    if _POSIX:
+        threading.Thread(target=_follow, args=(alive,), daemon=True).start()
     from reports.machine.environment import MissingError, activate
 
     activate()

@@ -64,6 +64,8 @@ def _rich_bar(title: str) -> Iterator[Progress]:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
+    from reports.tables.terminal import colours_wanted
+
     columns = (
         TextColumn("{task.description}"),
         BarColumn(bar_width=30),
@@ -73,7 +75,8 @@ def _rich_bar(title: str) -> Iterator[Progress]:
         TextColumn("{task.fields[what]}"),
     )
     start = time.monotonic()
-    bar = Progress(*columns, console=Console(stderr=True), transient=True)
+    console = Console(stderr=True, color_system="auto" if colours_wanted() else None)
+    bar = Progress(*columns, console=console, transient=True)
     task = bar.add_task(title, total=1.0, what="", left="")
     shown = False
 

@@ -6,16 +6,17 @@ from typing import Any
 
 from reports.tables.table import Column, Interval, Row, Table, Value, Verdict, numbers, table, words
 
+_UNCORRECTED = "the bias without the shadow-ray epsilon"
 _DETECTABLE = "the least bias that is found in nine runs of ten"
 _PERCENT = {"percent": True, "sign": True, "places": 3}
 COLUMNS = (
     *words(name="the truth of", estimator="checked by"),
-    *numbers("samples", how={"after": " M", "places": 0}),
+    *numbers("samples", how={"after": " M", "places": 0, "minor": True}),
     *numbers(relative_bias="bias", how={**_PERCENT, "meaning": "mean of the estimator less the truth, over the truth"}),
     *numbers(interval="95 % interval", how={**_PERCENT, "meaning": "where 19 of 20 such runs find the bias"}),
-    *numbers(uncorrected_bias="uncorrected", how={**_PERCENT, "meaning": "the bias without the shadow-ray epsilon"}),
+    *numbers(uncorrected_bias="uncorrected", how={**_PERCENT, "minor": True, "meaning": _UNCORRECTED}),
     *numbers("margin", how={"percent": True, "meaning": "agreement: the whole interval lies inside it, either way"}),
-    *numbers(detectable_bias="detectable", how={"percent": True, "digits": 2, "meaning": _DETECTABLE}),
+    *numbers(detectable_bias="detectable", how={"percent": True, "digits": 2, "minor": True, "meaning": _DETECTABLE}),
     *numbers("rejected", how={"meaning": "pixels that differ by more than their noise explains"}),
     *numbers("masked", how={"meaning": "pixels left out: their ray passes close to a light"}),
     *numbers(epsilon="shadow-ray epsilon", how={"meaning": "by what share Mitsuba's shadow rays end before the light"}),

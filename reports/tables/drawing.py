@@ -16,6 +16,8 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from html import escape
+from textwrap import wrap
+from typing import Literal
 
 from reports.tables.table import Column, Interval, Measured, Name, Row, Table, Value, Verdict, digits_of, with_spread
 
@@ -54,7 +56,8 @@ def text(table: Table, *, width: int | None = None, styled: bool = False) -> str
     table
         What to draw.
     width
-        Of the terminal [characters], to which cells are folded; as wide as the table needs by default.
+        Of the terminal [characters]; as wide as the table needs by default. Where it is too narrow, sentences are
+        wrapped, and columns that are still too many are left out and named below; a table of sentences becomes a list.
     styled
         Whether headings are bold, by the codes of terminals.
     """
@@ -62,16 +65,92 @@ def text(table: Table, *, width: int | None = None, styled: bool = False) -> str
     from rich.console import Console
     from rich.table import Table as Grid
 
-    headed = any(column.title for column in table.columns)
-    grid = Grid(box=box.SIMPLE_HEAD if headed else None, pad_edge=False, show_header=headed)
-    for column in _with_spreads(table.columns):
-        grid.add_column(column.title, justify="left" if column.words else "right", overflow="fold")
-    for cells in _open_rows(table, _Style(str)):
-        grid.add_row(*cells)
-    drawn = io.StringIO()
-    Console(file=drawn, highlight=False, markup=False, width=width or 10_000, force_terminal=styled).print(grid)
-    lines = [line.rstrip() for line in drawn.getvalue().splitlines()]
-    return "\n".join([*([table.title] if table.title else []), *lines, *_below(table)]) + "\n"
+    columns, rows = _with_spreads(table.columns), list(_open_rows(table, _Style(str)))
+    kept, widths, note = _fitted(columns, rows, width)
+    if width is not None and len(kept) < len(columns) and any(column.long for column in columns):
+        lines = _records(columns, rows, width, styled=styled)
+    else:
+        headed = any(column.title for column in columns)
+        grid = Grid(box=box.SIMPLE_HEAD if headed else None, pad_edge=False, show_header=headed)
+        for place, wide in zip(kept, widths):
+            side: Literal["left", "right"] = "left" if columns[place].words else "right"
+            grid.add_column(columns[place].title, justify=side, overflow="fold", width=wide)
+        for cells in rows:
+            grid.add_row(*(cells[place] for place in kept))
+        drawn = io.StringIO()
+        Console(file=drawn, highlight=False, markup=False, width=width or 10_000, force_terminal=styled).print(grid)
+        lines = [
+            *(line.rstrip() for line in drawn.getvalue().splitlines()),
+            *([*_wrapped(note, width), ""] if note else []),
+        ]
+    below = [line for words in _below(table) for line in _wrapped(words, width)]
+    return "\n".join([*_wrapped(table.title, width), *lines, *below]) + "\n"
+
+
+_LONGEST = 30  #: a longer word of text, such as a path, may be broken in a narrow terminal
+
+
+def _fitted(
+    columns: Sequence[Column], rows: Sequence[Sequence[str]], width: int | None
+) -> tuple[list[int], list[int | None], str]:
+    """Return the places of the columns that fit, how wide they are drawn, and in words what is left out.
+
+    Columns that are `minor` and quartiles go first, then those to the right; the first column stays.
+    """
+    places = list(range(len(columns)))
+    cells = [[columns[place].title, *(row[place] for row in rows)] for place in places]
+    natural = [max(map(len, column)) for column in cells]
+    if width is None or _width(natural) <= width:
+        return places, [None] * len(places), ""
+    # A number is not broken, but its heading may be, between words.
+    least = [
+        max([_longest(words) if words is column[0] or columns[place].words else len(words) for words in column])
+        for place, column in zip(places, cells)
+    ]
+    least = [min(wide, _LONGEST) if columns[place].words else wide for place, wide in zip(places, least)]
+    order = sorted(places[1:], key=lambda place: (columns[place].minor, place))
+    left: list[int] = []
+    while len(places) > 1 and _width([least[place] for place in places]) > width:
+        left.append(order.pop())
+        places.remove(left[-1])
+    room = width - _width([least[place] for place in places])
+    wanted = [natural[place] - least[place] for place in places]
+    share = min(1.0, max(0, room) / (sum(wanted) or 1))
+    widths: list[int | None] = [least[place] + int(share * more) for place, more in zip(places, wanted)]
+    if not left:
+        return places, widths, ""
+    names = ", ".join(columns[place].title for place in sorted(left))
+    return (
+        places,
+        widths,
+        f"Left out at {width} columns: {names}. A pipe (| less -S) or {_width(natural)} columns show all.",
+    )
+
+
+def _width(widths: Sequence[int]) -> int:
+    """Return how wide a table of such columns is drawn."""
+    return sum(widths) + 3 * (len(widths) - 1) + 2
+
+
+def _longest(words: str) -> int:
+    return max(map(len, words.split()), default=0)
+
+
+def _wrapped(words: str, width: int | None, indent: str = "") -> list[str]:
+    """Return words in lines that fit, none for none."""
+    if width is None:
+        return [words] if words else []
+    return wrap(words, max(width, 20), subsequent_indent=indent, break_on_hyphens=False)
+
+
+def _records(columns: Sequence[Column], rows: Sequence[Sequence[str]], width: int, *, styled: bool) -> list[str]:
+    """Return a table as a list: what the first column names, and under it a line for each other column."""
+    lines = []
+    for cells in rows:
+        lines += ["", f"\x1b[1m{cells[0]}\x1b[0m" if styled else cells[0]]
+        for column, cell in zip(columns[1:], cells[1:]):
+            lines += _wrapped(f"  {column.title}: {cell}" if cell else "", width, indent="    ")
+    return [*lines, ""]
 
 
 def markdown(table: Table) -> str:
@@ -219,7 +298,7 @@ def _with_spreads(columns: Iterable[Column]) -> list[Column]:
     for column in columns:
         shown.append(column)
         if column.spread:
-            shown.append(replace(column, heading=column.spread, unit="", spread=""))
+            shown.append(replace(column, heading=column.spread, unit="", spread="", minor=True))
     return shown
 
 

@@ -14,8 +14,8 @@ Entry = Mapping[str, Any]
 COSTS = (
     *words("kernel"),
     Column("device", "", "ns/ray", spread="quartiles"),
-    Column("wall", "wall", "ns/ray", spread="quartiles"),
-    *numbers("rays"),
+    Column("wall", "wall", "ns/ray", spread="quartiles", minor=True),
+    *numbers("rays", how={"minor": True}),
     *numbers("median", p99="99 %", max="", how={"digits": 2}),
     *numbers(nonfinite="not finite", how={"alarm": True}),
 )

@@ -42,16 +42,21 @@ _MEANINGS = {
     "nonfinite": "pixels that are no number, which errors leave out",
 }
 
-_MS, _RATE, _SHARE = {"unit": "ms"}, {"whole": True}, {"digits": 2, "share": True}
+_MS, _RATE, _SHARE, _MINOR = {"unit": "ms"}, {"whole": True}, {"digits": 2, "share": True}, {"minor": True}
 COLUMNS = {
     column.key: replace(column, meaning=_MEANINGS.get(column.key, ""))
     for column in (
         *words(label="method"),
         *numbers("frame", how={**_MS, "spread": "quartiles"}),
-        *numbers(frame_rate="frames/s", airlight_rate="airlight/s", how=_RATE),
-        *numbers("airlight", surface="rays + surface", how=_MS),
-        *numbers(light_moved="light moved", objects_moved="objects moved", how=_MS),
-        *numbers(light_moved_camera_kept="light moved, camera rays kept", colours_changed="colours changed", how=_MS),
+        *numbers(frame_rate="frames/s", how=_RATE),
+        *numbers(airlight_rate="airlight/s", how=_RATE | _MINOR),
+        *numbers("airlight", surface="rays + surface", how=_MS | _MINOR),
+        *numbers(light_moved="light moved", objects_moved="objects moved", how=_MS | _MINOR),
+        *numbers(
+            light_moved_camera_kept="light moved, camera rays kept",
+            colours_changed="colours changed",
+            how=_MS | _MINOR,
+        ),
         *numbers("p99", "max", relative_rmse="rel. RMSE", relative_bias="rel. bias", p50="median error", how=_SHARE),
         *numbers(flip="HDR-FLIP"),
         *numbers(nonfinite="not finite", how={"alarm": True}),

@@ -14,11 +14,11 @@ _WIDTH = 120
 Cells = tuple[str, str, str]  # what it is, which part of it, and its value
 
 
-def description_text(described: dict[str, Any]) -> str:
+def description_text(described: dict[str, Any], width: int = _WIDTH) -> str:
     """Return what `reports.interchange.scene.describe_scene` found for a terminal, and how to judge the image."""
-    command = shlex.join(["airlight", "compare", "--scene", described["source"], described["file"]["name"]])
+    command = shlex.join(["airlight", "compare", described["source"], described["file"]["name"]])
     # The command is never folded: it is there to be copied.
-    return f"{text(description_table(described), width=_WIDTH)}\nto judge it: {command}"
+    return f"{text(description_table(described), width=min(width, _WIDTH))}\nto judge it: {command}"
 
 
 def description_table(described: dict[str, Any]) -> Table:

@@ -72,6 +72,7 @@ class Column:
     spread: str = ""  #: heading of the quartiles of `Measured`, in a column of their own where cells have no room
     alarm: bool = False  #: anything but zero is bad
     meaning: str = ""  #: what its values are, in words; HTML explains it below the table
+    minor: bool = False  #: left out first where a terminal is narrow
 
     @property
     def title(self) -> str:

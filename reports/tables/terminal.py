@@ -1,13 +1,23 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What commands print: tables, and the same data as JSON."""
 
-import json
+import os
 import shutil
 import sys
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from reports.tables.drawing import markdown, text
-from reports.tables.table import Table
+if TYPE_CHECKING:
+    from reports.tables.table import Table
+
+
+def colours_wanted() -> bool:
+    """Return whether colours and bold letters may be printed: NO_COLOR is not set, or empty (https://no-color.org)."""
+    return not os.environ.get("NO_COLOR")
+
+
+def terminal_width() -> int | None:
+    """Return how wide the terminal is that is printed to [characters]; None where it is none."""
+    return shutil.get_terminal_size().columns if sys.stdout.isatty() else None
 
 
 def print_json(data: Any) -> None:
@@ -18,6 +28,8 @@ def print_json(data: Any) -> None:
     InputError
         For a number that is not finite: what has none is None.
     """
+    import json
+
     try:
         text = json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False)
     except ValueError:
@@ -31,11 +43,12 @@ def print_json(data: Any) -> None:
     print(text)
 
 
-def print_table(table: Table, *, as_markdown: bool = False) -> None:
+def print_table(table: "Table", *, as_markdown: bool = False) -> None:
     """Print a table: as wide as the terminal, as it needs where piped, or as Markdown."""
+    from reports.tables.drawing import markdown, text
+
     if as_markdown:
         print(f"\n{markdown(table)}", end="")
         return
-    terminal = sys.stdout.isatty()
-    width = shutil.get_terminal_size().columns if terminal else None
-    print(text(table, width=width, styled=terminal), end="")
+    width = terminal_width()
+    print(text(table, width=width, styled=width is not None and colours_wanted()), end="")

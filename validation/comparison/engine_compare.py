@@ -7,7 +7,7 @@ The errors of the whole image are those against the truth that fits, at pixel ce
 import math
 import os
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any
 
@@ -46,6 +46,13 @@ class EngineComparison:
     verdict: Verdict
     note: str  #: what the reader of the file changed or left out
     margin: float | None  #: largest relative bias that counts as agreement
+    truth: NDArray[np.floating] = field(repr=False, compare=False)  #: what the image was compared with
+    image: NDArray[np.floating] = field(repr=False, compare=False)  #: the layer that was judged
+
+    @property
+    def layer(self) -> str:
+        """The layer that was judged."""
+        return self.comparison.layer
 
     @property
     def pixel(self) -> str:
@@ -186,6 +193,8 @@ def compare_scene(
         verdict=judge(compared, test, fit.hints, comparison.failures),
         note=str(image.attributes.get(NOTE, "")),
         margin=margin,
+        truth=wanted,
+        image=judged.values,
     )
 
 

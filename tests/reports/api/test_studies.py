@@ -123,6 +123,8 @@ def test_bench_refuses_what_is_not_known_before_any_work(variant):
 
 
 def test_report_hands_on_what_it_was_given(variant, tmp_path, monkeypatch):
+    from validation.configurations.methods import QUICK
+
     given = {}
 
     def write(folder, **options):
@@ -134,7 +136,7 @@ def test_report_hands_on_what_it_was_given(variant, tmp_path, monkeypatch):
     assert report.folder == tmp_path / "out"
     assert report.claims == ("so",)
     assert given["scenes"] == ["open-fog"]
-    assert given["effort"].name == "quick"
+    assert given["effort"].name == "default"
     names = [configuration.method.rpartition(":")[2] for configuration in given["configurations"]]
     assert names == ["min-max", "brighter"]
     assert given["images"] == {}
@@ -144,6 +146,8 @@ def test_report_hands_on_what_it_was_given(variant, tmp_path, monkeypatch):
     assert given["scenes"] == ["open-fog"]
     assert [image.label for image in given["images"]["open-fog"]] == ["engine"]
     assert given["fresh"]
+    airlight.report(tmp_path / "out", effort="quick")
+    assert (given["effort"].name, given["configurations"]) == ("quick", QUICK)
     with pytest.raises(airlight.InputError, match="did you mean 'full'"):
         airlight.report(tmp_path, effort="ful")
     with pytest.raises(airlight.InputError, match="did you mean 'hall'"):
@@ -161,9 +165,27 @@ def test_ctrl_c_in_a_report_is_ctrl_c(variant, tmp_path, monkeypatch):
         airlight.report(tmp_path, scenes=["open-fog"])
 
 
+@pytest.mark.claim("report-defaults")
+def test_a_report_without_options_is_the_commands(variant, tmp_path, monkeypatch):
+    from reports.commands.main import run
+
+    given = []
+
+    def write(folder, **options):
+        given.append({name: options[name] for name in ("scenes", "effort", "images", "fresh")})
+        given[-1] |= {"configurations": list(options["configurations"])}
+        claims = [{"text": "so"}]
+        return {"claims": claims, "scenes": [], "created": "", "seconds": 1, "kept": 0, "computed": 1, "measured": None}
+
+    monkeypatch.setattr("reports.report.measure.write_report", write)
+    airlight.report(tmp_path / "python")
+    assert run(["report", "-o", str(tmp_path / "command")]) == 0
+    assert given[0] == given[1]
+
+
 @pytest.mark.slow
 def test_a_report_from_python(variant, tmp_path):
-    report = airlight.report(tmp_path / "out", scenes=["open-fog"], methods=["unshadowed", brighter])
+    report = airlight.report(tmp_path / "out", scenes=["open-fog"], methods=["unshadowed", brighter], effort="quick")
     assert report.page.is_file()
     assert report.confirmed
     assert [entry["method"].rpartition(":")[2] for entry in report.data["scenes"][0]["methods"]] == [

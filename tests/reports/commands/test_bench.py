@@ -65,6 +65,48 @@ def test_named_methods_are_benched_with_the_parameters_that_are_set(variant, cap
     (scene,) = json.loads(capfd.readouterr().out)["scenes"]
     assert [entry["parameters"] for entry in scene["methods"]] == [{"slices": 9, "width": 8}]
     assert cli.run([*arguments[:-2], "--set", "slices=9"]) == 2
-    assert "--set: got parameters without --methods" in capfd.readouterr().err
+    assert "--set: got no single method that it is for; name methods by --method" in capfd.readouterr().err
     assert cli.run([*arguments, "--set", "slice=9"]) == 2
     assert "did you mean 'slices'" in capfd.readouterr().err
+
+
+def test_the_older_list_of_methods_means_the_same(variant, capfd):
+    arguments = ["bench", "open-fog", "--decompose", "--size", "16x12", "--json", "--set", "width=8"]
+    printed = []
+    for words in (["--methods", "froxel-fog"], ["--method", "froxel-fog"]):
+        assert cli.run([*arguments, *words]) == 0
+        printed.append(json.loads(capfd.readouterr().out)["scenes"])
+    assert printed[0] == printed[1]
+
+
+@pytest.mark.claim("kernels-are-named-by-kernel")
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["hall"], "got the scene 'hall', but kernels are timed without a scene: leave it out"),
+        (["taylor-8"], "'taylor-8' is a kernel and stands where scenes stand: write --kernel taylor-8"),
+        (["exact", "fog.py:mine"], "write --kernel exact --kernel fog.py:mine"),
+    ],
+)
+def test_scenes_are_not_taken_for_kernels(capfd, arguments, words):
+    assert cli.run(["bench", *arguments, "--kernels"]) == 2
+    printed = capfd.readouterr().err
+    assert words in printed
+    assert printed.count("\n") == 1
+
+
+@pytest.mark.claim("kernels-are-named-by-kernel")
+def test_kernels_are_named_by_an_option(variant, capfd, monkeypatch):
+    import validation.kernels.benchmark
+
+    asked = []
+
+    def bench_kernels(names, **options):
+        asked.append(names)
+        return {"costs": [], "levels": []}
+
+    monkeypatch.setattr(validation.kernels.benchmark, "bench_kernels", bench_kernels)
+    monkeypatch.setattr("validation.kernels.convergence.declared", lambda: [])
+    for words in ([], ["--kernel", "exact"], ["--kernel", "exact,table", "--kernel", "taylor-8"]):
+        assert cli.run(["bench", "--kernels", *words, "--json"]) == 0
+    assert asked == [None, ["exact"], ["exact", "table", "taylor-8"]]

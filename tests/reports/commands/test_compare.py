@@ -89,9 +89,9 @@ def test_a_file_is_compared_with_the_truth_of_a_scene(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["a.exr"], "got 1 file, wanted REFERENCE.exr TEST.exr; or name a scene by --scene"),
+        (["a.exr"], "got 1 file, wanted REFERENCE.exr TEST.exr, or SCENE TEST.exr"),
         (["a.exr", "b.exr", "--scene", "open-fog"], "got 2 files, wanted one EXR file beside --scene"),
-        (["a.exr", "b.exr", "--pixel", "area"], "this option goes with --scene"),
+        (["a.exr", "b.exr", "--pixel", "area"], "this option goes with a scene"),
         (["a.exr", "--scene", "open-fog", "--pixel", "corner"], "--pixel corner; wanted 'centre' or 'area'"),
         (["a.exr", "--scene", "open-fog"], "cannot read a.exr"),
     ],
@@ -99,3 +99,79 @@ def test_a_file_is_compared_with_the_truth_of_a_scene(tmp_path, capsys):
 def test_wrong_files_are_refused(capsys, arguments, message):
     assert run(["compare", *arguments]) == 2
     assert message in capsys.readouterr().err
+
+
+@pytest.mark.claim("difference-image")
+def test_a_difference_is_written_as_values_and_as_a_picture(files, tmp_path, capsys):
+    from PIL import Image as Picture
+
+    images, mask = files
+    values, picture = tmp_path / "out" / "difference.exr", tmp_path / "difference.png"
+    assert run(["compare", *images, "--difference", str(values), "--mask", mask]) == 0
+    assert f"wrote            {values}: test - reference" in capsys.readouterr().out
+    reference, test = (read_exr(path).layers["airlight"].astype(float) for path in images)
+    layers = read_exr(values).layers
+    np.testing.assert_allclose(layers["total"][2:], (test - reference)[2:], atol=1e-6)
+    mean = reference[2:].mean()
+    relative = (test - reference) / np.maximum(reference, 1e-3 * mean)
+    np.testing.assert_allclose(layers["relative"][2:], relative[2:], rtol=1e-4, atol=1e-6)
+    assert not layers["total"][:2].any()
+    assert run(["compare", *images, "--difference", str(picture), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["difference"] == str(picture)
+    shown = np.asarray(Picture.open(picture))
+    assert shown.shape == SHAPE
+    red, blue = shown[..., 0].astype(int), shown[..., 2].astype(int)
+    brighter = (relative > 0.005).all(axis=-1)
+    assert brighter.any()
+    assert (red > blue)[brighter].all()
+
+
+@pytest.mark.claim("difference-image")
+def test_a_difference_of_pixels_that_are_not_finite_is_finite(files, tmp_path, capsys):
+    from reference.storage.exr import Image
+
+    images, _ = files
+    broken = np.array(read_exr(images[1]).layers["airlight"])
+    broken[3, 4] = np.nan
+    write_exr(images[1], Image({"airlight": broken}), finite=False)
+    assert run(["compare", *images, "--difference", str(tmp_path / "d.exr")]) == 1
+    image = read_exr(tmp_path / "d.exr")
+    assert image.attributes["airlight:not_finite"] == 1
+    assert all(np.isfinite(layer).all() for layer in image.layers.values())
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--difference", "d.jpg"], "--difference: got 'd.jpg', wanted a name that ends in .exr (values) or .png"),
+        (["--difference", "."], "wanted a name that ends in"),
+        (["--layer", "nothing", "--difference", "d.exr"], "has no layer 'nothing'"),
+    ],
+)
+def test_a_difference_that_cannot_be_written_leaves_no_file(files, tmp_path, monkeypatch, capsys, words, message):
+    monkeypatch.chdir(tmp_path)
+    assert run(["compare", *files[0], *words]) == 2
+    assert message in capsys.readouterr().err
+    assert not list(tmp_path.glob("d.*"))
+
+
+@pytest.mark.claim("scenes-stand-first")
+def test_a_scene_stands_in_place_of_the_reference(tmp_path, capsys):
+    path, difference = tmp_path / "open-fog.exr", tmp_path / "difference.exr"
+    assert run(["reference", "open-fog", "--size", "16x12", "-o", str(path)]) == 0
+    capsys.readouterr()
+    printed = []
+    for words in (["open-fog", str(path), "--difference", str(difference)], ["--scene", "open-fog", str(path)]):
+        assert run(["compare", *words, "--json"]) == 0
+        printed.append(json.loads(capsys.readouterr().out))
+    assert printed[0].pop("difference") == str(difference)
+    assert printed[0] == printed[1]
+    assert np.abs(read_exr(difference).layers["relative"]).max() < 1e-5
+    for words, message in (
+        ([str(path), "open-fog"], "the scene stands first: airlight compare open-fog"),
+        (["opn-fog", str(path)], "did you mean 'open-fog'"),
+        (["nowhere.xml", str(path)], "there is no file nowhere.xml"),
+        (["nowhere.exr", str(path)], "nowhere.exr"),
+    ):
+        assert run(["compare", *words]) == 2
+        assert message in capsys.readouterr().err

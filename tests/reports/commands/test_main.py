@@ -1,12 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The command line's own duties: help, usage, exit statuses, one line for each mistake."""
 
+import json
 import os
+import re
+import resource
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
+import typer
 
 import airlight
 from analytic.errors import InputError
@@ -16,6 +21,11 @@ from reports.commands import main as cli
 from reports.machine.environment import MissingError
 
 ROOT = Path(__file__).resolve().parents[3]
+
+
+_GROUP = typer.main.get_command(cli.app)
+_COMMANDS = list(_GROUP.commands)
+_SHOWN = [name for name, command in _GROUP.commands.items() if not command.hidden]
 
 
 def _raising(error):
@@ -81,7 +91,7 @@ def test_a_library_missing_at_import_is_named(command_that_raises, capfd, monkey
     ("arguments", "words"),
     [
         (["rendr"], ["rendr", "'render'", "airlight --help"]),
-        (["render"], ["scene", "airlight render --help"]),
+        (["render"], ["SCENE", "airlight render --help"]),
         (["compare", "--layr", "x", "a", "b"], ["--layr", "--layer"]),
         (["--variant", "llvm_rgb", "scenes"], ["'llvm_rgb'", "llvm_ad_rgb"]),
     ],
@@ -100,13 +110,77 @@ def test_no_command_shows_the_help(capfd):
 
 
 @pytest.mark.claim("documented-commands")
-@pytest.mark.parametrize("command", [None, *(entry.callback.__name__ for entry in cli.app.registered_commands)])
-def test_every_command_has_help(command, capfd):
-    name = {"run_tests": "test"}.get(command, command)
-    assert cli.run([*filter(None, [name]), "--help"]) == 0
+@pytest.mark.parametrize("command", [None, *_COMMANDS])
+def test_every_command_has_help_that_fits_80_columns(command, capfd, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    assert cli.run([*filter(None, [command]), "--help"]) == 0
     printed = capfd.readouterr().out
+    assert max(map(len, printed.splitlines())) <= 80
+    assert not re.search(r"<\w+>|\[\[|…", printed)  # no types of Python, nothing in brackets twice, nothing cut off
     assert "Usage: airlight" in printed
     assert "`" not in printed  # code is drawn as code
+
+
+@pytest.mark.claim("commands-by-purpose")
+def test_commands_stand_in_panels_by_purpose_on_a_line_each(capfd, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    cli.run(["--help"])
+    printed = capfd.readouterr().out
+    panels = dict(re.findall(r"^╭─ (\w+) ─+╮\n(.*?)^╰", printed, flags=re.MULTILINE | re.DOTALL))
+    listed = {panel: re.findall(r"^│ (\w+) ", lines, flags=re.MULTILINE) for panel, lines in panels.items()}
+    assert list(listed) == ["Start", "Measure", "Images", "Papers", "Develop", "Options"]
+    assert {"doctor", "list", "render"} <= set(listed["Start"])
+    assert {"report", "diff", "bench"} <= set(listed["Measure"])
+    assert {"reference", "compare", "merge", "describe", "integrate"} <= set(listed["Images"])
+    assert {"published", "figures", "fidelity"} <= set(listed["Papers"])
+    assert {"test", "docs", "baselines", "mutations", "certify"} == set(listed["Develop"])
+    shown = [name for panel, names in listed.items() if panel != "Options" for name in names]
+    assert sorted(shown) == sorted(_SHOWN)
+    for panel, lines in panels.items():
+        assert panel == "Options" or lines.count("\n") == len(listed[panel]), panel
+    for variable in ("AIRLIGHT_VARIANT", "AIRLIGHT_CACHE_DIR", "AIRLIGHT_CACHE_SIZE", "NO_COLOR"):
+        assert variable in printed
+
+
+@pytest.mark.claim("no-color")
+@pytest.mark.parametrize("arguments", [["--help"], ["render", "--help"], ["list", "kernels"]], ids=" ".join)
+def test_no_color_leaves_letters_alone_on_a_terminal(arguments):
+    """On a pseudo-terminal, as `script` gives it: with NO_COLOR there is no escape sequence, without it there is."""
+    import pty
+
+    def printed(**variables):
+        ours, theirs = pty.openpty()
+        own = {key: value for key, value in os.environ.items() if key not in ("NO_COLOR", "FORCE_COLOR")}
+        environment = own | {"TERM": "xterm-256color", **variables}
+        command = [sys.executable, str(ROOT / "airlight.py"), *arguments]
+        process = subprocess.Popen(command, stdout=theirs, stderr=theirs, stdin=subprocess.DEVNULL, env=environment)
+        os.close(theirs)
+        pieces = []
+        with suppress(OSError):  # the end of a terminal is an error
+            while piece := os.read(ours, 65536):
+                pieces.append(piece)
+        os.close(ours)
+        assert process.wait(timeout=60) == 0
+        return b"".join(pieces).decode()
+
+    assert "\x1b[" in printed()
+    assert "\x1b" not in printed(NO_COLOR="1")
+    assert "\x1b[" in printed(NO_COLOR="")
+
+
+def test_lists_have_one_command(capfd):
+    assert cli.run(["list", "--json"]) == 0
+    data = json.loads(capfd.readouterr().out)
+    assert list(data) == ["scenes", "methods", "kernels"]
+    for name, rows in data.items():
+        for command in (["list", name], [name]):  # the second as version 0.1 had it
+            assert cli.run([*command, "--json"]) == 0
+            assert json.loads(capfd.readouterr().out) == rows
+    assert cli.run(["list"]) == 0
+    printed = capfd.readouterr().out
+    assert all(f"{name.capitalize()}\n" in printed for name in data)
+    assert cli.run(["list", "scene"]) == 2
+    assert "did you mean 'scenes'" in capfd.readouterr().err
 
 
 def test_version(capfd):
@@ -187,3 +261,34 @@ def test_a_deleted_working_folder_is_one_line(tmp_path):
     assert (ran.returncode, ran.stdout) == (2, "")
     assert ran.stderr.startswith("airlight: error: the current folder was deleted: change into another")
     assert ran.stderr.count("\n") == 1
+
+
+@pytest.mark.claim("help-is-light")
+def test_help_takes_less_than_three_tenths_of_a_second():
+    """Of the processor: the median of three starts, which are not slowed by what else runs."""
+    seconds = []
+    for _ in range(3):
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        command = [sys.executable, "-S", str(ROOT / "airlight.py"), "--help"]  # as the launcher starts it
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL, timeout=60)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        seconds.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+    assert sorted(seconds)[1] < 0.3
+
+
+def test_help_is_drawn_in_ascii_where_the_output_has_no_more():
+    environment = os.environ | {"PYTHONIOENCODING": "ascii", "COLUMNS": "80"}
+    command = [sys.executable, str(ROOT / "airlight.py"), "render", "--help"]
+    ran = subprocess.run(command, env=environment, capture_output=True, timeout=60, check=True)
+    assert ran.stdout.decode("ascii").count("\n+- ") == 2
+    assert b"?" not in ran.stdout
+
+
+@pytest.mark.parametrize("width", [60, 80, 200])
+def test_help_says_what_is_typed_with_limits_and_defaults(width, capfd, monkeypatch):
+    monkeypatch.setenv("COLUMNS", str(width))
+    assert cli.run(["stability", "--help"]) == 0
+    printed = capfd.readouterr().out
+    assert max(map(len, printed.splitlines())) <= min(width, 100)
+    assert "--rays N" in printed
+    assert "64 to 1000000, default: 100000]" in " ".join(re.sub("[│ \n]+", " ", printed).split())

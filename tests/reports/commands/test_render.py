@@ -80,6 +80,11 @@ def test_ctrl_c_keeps_the_finished_frames_and_says_so(variant, tmp_path, capfd, 
         (["--samples", "3"], "--samples: got no place for the picture"),
         (["--samples", "3", "--frames", "3", "-o", "x.exr"], "--samples: got --frames too"),
         (["--animate", "light"], "--animate: got no number of frames"),
+        (
+            ["--method", "unshadowed", "--method", "ray-march"],
+            "--method: got unshadowed and ray-march, wanted one of them",
+        ),
+        (["--method", "min-max", "--kernel", "exact", "--kernel", "taylor"], "--kernel: got exact and taylor, wanted"),
         (["--frames", "3", "--animate", "lamp", "-o", "x.exr"], "--animate: got 'lamp'"),
         (["--frames", "3", "--animate", "objects", "-o", "x.exr"], "no closed mesh that could turn"),
     ],
@@ -126,3 +131,23 @@ def test_render_warns_of_open_casters_once_each(variant, capfd):
 def test_a_file_whose_name_says_another_kind_is_refused(capsys, arguments, wanted):
     assert cli.run(arguments) == cli.WRONG_INPUT
     assert wanted in capsys.readouterr().err
+
+
+@pytest.mark.claim("render-says-what-it-wrote")
+def test_what_was_written_is_said(variant, tmp_path, capfd):
+    layers, picture = str(tmp_path / "fog.exr"), str(tmp_path / "fog.png")
+    run("open-fog", *SMALL, "-o", layers, "--preview", picture)
+    printed = capfd.readouterr().out
+    assert f"wrote {layers}: airlight, surface, their sum, depth, 8 x 6 pixels\n" in printed
+    assert f"wrote {picture}: a picture, 8 x 6 pixels\n" in printed
+    run("open-fog", *SMALL, "-o", layers, "--json")
+    assert json.loads(capfd.readouterr().out)["files"] == [layers]
+    run("open-fog", *SMALL)
+    assert (
+        "nothing written: --preview NAME.png writes a picture, --output NAME.exr the layers\n" in capfd.readouterr().out
+    )
+    run("open-fog", *SMALL, "-o", layers, "--preview", picture, "--frames", "2")
+    printed = capfd.readouterr().out
+    for path in (layers, picture):
+        first, last = (str(numbered(tmp_path / path, number, 2)) for number in (1, 2))
+        assert f"wrote {first} to {last}: 2 files, 8 x 6 pixels\n" in printed

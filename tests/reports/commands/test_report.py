@@ -174,6 +174,48 @@ def test_without_scenes_those_of_the_effort_are_studied(variant, mine, handed_on
     assert str(handed_on["folder"]) == "elsewhere"
 
 
+def _measured(handed_on):
+    return [(each.method, each.kernel, dict(each.parameters)) for each in handed_on["configurations"]]
+
+
+@pytest.mark.claim("methods-are-named-alike")
+def test_methods_and_parameters_are_those_of_render_and_bench(variant, handed_on, capsys):
+    """One configuration of each method that is named, with the kernel and the parameters that are given."""
+    assert run(["report", "open-fog", "hall", "--method", "ray-march", "--set", "steps=32"]) == 0
+    assert handed_on["scenes"] == ["open-fog", "hall"]
+    assert _measured(handed_on) == [("ray-march", None, {"steps": 32})]
+    named = ["--method", "shadow-planes", "--method", "light-volumes", "--kernel", "taylor"]
+    assert run(["report", *named, "--set", "tolerance=0.01"]) == 0
+    assert _measured(handed_on) == [
+        ("shadow-planes", "taylor", {"tolerance": 0.01}),
+        ("light-volumes", "taylor", {"tolerance": 0.01}),
+    ]
+    assert "--set: got no single method that it is for" in refused(capsys, "--quick", "--set", "steps=3")
+    assert "--kernel: got no single method" in refused(capsys, "--method", "all", "--kernel", "taylor")
+    assert "did you mean 'steps'" in refused(capsys, "--method", "ray-march", "--set", "step=3")
+
+
+@pytest.mark.claim("methods-are-named-alike")
+def test_what_is_named_is_measured_alone_and_all_are_a_word(variant, mine, handed_on, capsys):
+    from validation.configurations.methods import QUICK
+
+    assert run(["report", "--quick", "--method", "fog_of_mine:half"]) == 0
+    assert [each[0] for each in _measured(handed_on)] == ["fog_of_mine:half"]
+    assert "note: what --method names is measured alone; --method all adds" in capsys.readouterr().err
+    assert run(["report", "--quick", "--method", "all", "--method", "fog_of_mine:half"]) == 0
+    assert handed_on["configurations"][:-1] == list(QUICK)
+    assert handed_on["configurations"][-1].method == "fog_of_mine:half"
+    assert capsys.readouterr().err == ""
+
+
+def test_older_options_mean_the_same(variant, handed_on):
+    asked = []
+    for words in (["--scenes", "open-fog,hall", "--methods", "min-max"], ["open-fog", "hall", "--method", "min-max"]):
+        assert run(["report", *words]) == 0
+        asked.append((handed_on["scenes"], handed_on["configurations"]))
+    assert asked[0] == asked[1]
+
+
 @pytest.fixture
 def images(tmp_path):
     folder = tmp_path / "engine"
@@ -208,6 +250,12 @@ def test_two_sizes_of_one_scene_are_refused_before_any_work(variant, images, cap
     write_exr(images / "open-fog.b.exr", Image({"total": np.ones((6, 9, 3))}))
     printed = refused(capsys, "--images", str(images), "--scenes", "open-fog", "-o", str(tmp_path / "out"))
     assert "render all images of a scene at one size" in printed
+
+
+def test_a_mistake_leaves_no_folder(variant, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert "did you mean 'hall'" in refused(capsys, "--quick", "hal")
+    assert not list(tmp_path.iterdir())
 
 
 def test_two_efforts_at_once_are_refused(capsys):

@@ -51,7 +51,8 @@ def test_the_tutorial_ends_with_a_figure(variant, tmp_path, monkeypatch, capfd):
 @pytest.mark.claim("notebook-cells")
 def test_the_cells_of_the_notebook_page_run_and_display(variant, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    plt = pytest.importorskip("matplotlib.pyplot")
+    import matplotlib.pyplot as plt
+
     plt.switch_backend("agg")
     space: dict = {}
     displayed = []

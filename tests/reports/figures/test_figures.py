@@ -118,5 +118,23 @@ def test_drawing_from_a_folder_without_data_says_what_to_run(tmp_path):
 
 
 def test_options_of_the_strip_are_refused_without_it(tmp_path):
-    with pytest.raises(InputError, match="--scene and --methods choose images of the figure strip"):
+    with pytest.raises(InputError, match="a scene and --methods choose images of the figure strip"):
         figures(["polynomials"], output=tmp_path, scene="hall")
+
+
+@pytest.mark.claim("scenes-stand-first")
+def test_a_scene_behind_the_figures_is_that_of_the_strip(tmp_path, monkeypatch):
+    asked = []
+    monkeypatch.setattr("reports.commands.figures._compute", lambda name, folder, given: asked.append((name, given)))
+    monkeypatch.setattr("reports.commands.figures.plot", lambda *arguments, **options: None, raising=False)
+    monkeypatch.setattr("reports.figures.files.plot", lambda *arguments, **options: None)
+    monkeypatch.setattr("reports.commands.figures._print_files", lambda *arguments: None)
+    monkeypatch.setattr("reports.commands.figures._report_folder", lambda path: tmp_path)
+    monkeypatch.setattr("reports.data.reader.read_report", lambda path: {"scenes": [{"name": "mine"}]})
+    for scene in ("hall", "mine"):
+        figures(["strip", scene], output=tmp_path)
+    assert [(name, given["scene"]) for name, given in asked] == [("strip", "hall"), ("strip", "mine")]
+    with pytest.raises(InputError, match=r"figure: got 'strp', wanted one of .*; did you mean 'strip'"):
+        figures(["strp"], output=tmp_path)
+    with pytest.raises(InputError, match="a scene and --methods choose images of the figure strip"):
+        figures(["polynomials", "hall"], output=tmp_path)

@@ -202,7 +202,7 @@ def test_the_strip_shows_where_methods_are_wrong(report, tmp_path):
 
 
 def test_the_strip_refuses_what_the_report_has_not(report, tmp_path):
-    with pytest.raises(InputError, match="--scene: got 'a_scnee', wanted one of a_scene; did you mean 'a_scene'"):
+    with pytest.raises(InputError, match="scene: got 'a_scnee', wanted one of a_scene; did you mean 'a_scene'"):
         figure_strip.compute(tmp_path, report=report, scene="a_scnee")
     with pytest.raises(InputError, match=r"--methods: got 'sond', wanted some of .*; did you mean 'sound'"):
         figure_strip.compute(tmp_path, report=report, methods="sond")

@@ -209,7 +209,7 @@ def test_text_says_what_the_numbers_are(variant):
         "49 degrees horizontally, 37.7",
         "beam 25, cut-off 40 degrees from the axis",
         "(5, 4, 3) W/sr",
-        "airlight compare --scene tiny tiny.exr",
+        "airlight compare tiny tiny.exr",
     ):
         assert words in text
     assert re.search(r"^ *surfaces +none$", text, flags=re.MULTILINE)
@@ -254,7 +254,7 @@ def test_command_takes_an_xml(capsys, tmp_path):
     path.write_text(XML)
     assert run(["describe", str(path), "--gltf", str(glb)]) == 0
     out = capsys.readouterr().out
-    assert f"airlight compare --scene {path} own.exr" in out
+    assert f"airlight compare {path} own.exr" in out
     assert f"{glb}: " in out
     assert "cut into triangles: ball" in out
 

@@ -302,3 +302,98 @@ def test_the_headings_of_tables_name_the_gpu(monkeypatch, capsys):
     print_heading()
     assert capsys.readouterr().out.endswith(", A GPU, P, 2 threads, cuda_ad_rgb.\n")
     assert BenchTable(rows=(), environment=machine)._title().startswith("A GPU, ")
+
+
+_WINDOWS = {"ProgramFiles": "{root}/Program Files", "LOCALAPPDATA": "{root}/Local", "USERPROFILE": "{root}/me"}
+
+
+@linux
+class TestElsewhere:
+    """Where other systems and installers put LLVM, with folders that stand for theirs; nobody tried the real ones."""
+
+    @pytest.mark.claim("llvm-is-found")
+    @pytest.mark.parametrize(
+        ("platform", "processor", "environment", "place", "version"),
+        [
+            ("darwin", "arm64", {}, "opt/homebrew/opt/llvm/lib/libLLVM.dylib", None),
+            ("darwin", "arm64", {}, "opt/homebrew/opt/llvm@19/lib/libLLVM.dylib", (19, 0)),
+            ("darwin", "arm64", {}, "opt/homebrew/Cellar/llvm@18/18.1.8/lib/libLLVM.dylib", (18, 1)),
+            ("darwin", "x86_64", {}, "usr/local/Cellar/llvm/20.1.7/lib/libLLVM.dylib", (20, 1)),
+            ("darwin", "x86_64", {}, "opt/local/libexec/llvm-19/lib/libLLVM.dylib", (19, 0)),
+            ("darwin", "arm64", {"CONDA_PREFIX": "{root}/conda"}, "conda/lib/libLLVM.21.1.dylib", (21, 1)),
+            ("darwin", "arm64", {}, "prefix/lib/libLLVM-19.dylib", (19, 0)),
+            ("linux", "x86_64", {"CONDA_PREFIX": "{root}/conda"}, "conda/lib/libLLVM.so.21.1", (21, 1)),
+            ("linux", "x86_64", {}, "prefix/lib/libLLVM-19.so", (19, 0)),
+            ("linux", "aarch64", {}, "usr/lib/aarch64-linux-gnu/libLLVM.so.19.1", (19, 1)),
+            ("linux", "x86_64", {}, "usr/lib/llvm-20/lib/libLLVM.so.20.1", (20, 1)),
+            ("linux", "x86_64", {}, "home/linuxbrew/.linuxbrew/opt/llvm/lib/libLLVM.so.21.1", (21, 1)),
+            ("linux", "x86_64", {}, "opt/LLVM-19.1.7-Linux-X64/lib/libLLVM.so", (19, 1)),
+            ("win32", "AMD64", _WINDOWS, "Program Files/LLVM/bin/LLVM-C.dll", None),
+            ("win32", "AMD64", _WINDOWS, "Local/Programs/LLVM/bin/LLVM-C.dll", None),
+            ("win32", "AMD64", _WINDOWS, "me/scoop/apps/llvm/current/bin/LLVM-C.dll", None),
+            ("win32", "AMD64", {"PATH": "{root}/nothing;{root}/on path"}, "on path/LLVM-C.dll", None),
+            ("win32", "AMD64", {"CONDA_PREFIX": "{root}/conda"}, "conda/Library/bin/LLVM-C.dll", None),
+            ("win32", "AMD64", {}, "prefix/Library/bin/LLVM-C.dll", None),
+        ],
+    )
+    def test_llvm_is_found(self, tmp_path, monkeypatch, platform, processor, environment, place, version):
+        monkeypatch.delenv("DRJIT_LIBLLVM_PATH", raising=False)
+        # A file whose name does not tell is loaded and asked; here it is no library.
+        monkeypatch.setattr(llvm, "_version_asked", lambda path: (22, 1))
+        path = tmp_path / place
+        path.parent.mkdir(parents=True)
+        path.write_bytes(HEADER)
+        machine = llvm.Machine(
+            platform,
+            processor,
+            root=tmp_path,
+            prefix=tmp_path / "prefix",
+            environment={name: value.format(root=tmp_path) for name, value in environment.items()},
+        )
+        (found,) = find_llvm(llvm.llvm_folders(machine))
+        assert (found.path, found.version, found.works) == (str(path), version or (22, 1), True)
+
+    def test_what_the_other_processor_loads_is_not_found(self, tmp_path, monkeypatch):
+        monkeypatch.delenv("DRJIT_LIBLLVM_PATH", raising=False)
+        path = tmp_path / "usr/local/opt/llvm/lib/libLLVM.dylib"
+        path.parent.mkdir(parents=True)
+        path.write_bytes(HEADER)
+        machine = llvm.Machine("darwin", "arm64", root=tmp_path, prefix=tmp_path / "prefix", environment={})
+        assert find_llvm(llvm.llvm_folders(machine)) == []
+
+    @pytest.mark.claim("llvm-is-found")
+    @pytest.mark.parametrize(
+        ("platform", "programs", "line"),
+        [
+            ("linux", ["apt-get"], "sudo apt-get install -y libllvm19 libatomic1"),
+            ("linux", ["dnf"], "sudo dnf install -y llvm-libs libatomic"),
+            ("linux", ["pacman"], "sudo pacman -S llvm-libs gcc-libs"),
+            ("linux", [], "your system's installer for libllvm19 and libatomic1"),
+            ("darwin", ["brew", "port"], "brew install llvm gcc"),
+            ("darwin", ["port"], "sudo port install llvm-19"),
+            ("darwin", [], "Homebrew (https://brew.sh), and then brew install llvm"),
+            ("win32", ["winget", "choco"], "winget install -e --id LLVM.LLVM"),
+            ("win32", ["choco"], "choco install -y llvm"),
+            ("win32", ["scoop"], "scoop install llvm"),
+            ("win32", [], "LLVM's installer for Windows, LLVM-*-win64.exe of https://github.com/llvm/llvm-project/rel"),
+        ],
+    )
+    def test_the_line_to_type_is_that_of_the_installer_at_hand(self, monkeypatch, tmp_path, platform, programs, line):
+        monkeypatch.setattr(environment.sys, "platform", platform)
+        monkeypatch.setattr(environment.sys, "prefix", str(tmp_path))
+        monkeypatch.setattr(environment.shutil, "which", lambda name: name if name in programs else None)
+        monkeypatch.setattr(environment.os, "geteuid", lambda: 1000)
+        packages = ["libllvm19", "libatomic1"] if "libatomic" in line or "gcc" in line else ["libllvm19"]
+        assert environment.install_line(packages).startswith(line)
+        monkeypatch.setattr(environment.os, "geteuid", lambda: 0)
+        assert environment.install_line(packages).startswith(line.removeprefix("sudo "))
+        if platform == "win32":
+            monkeypatch.delattr(environment.os, "geteuid")  # which Windows has not
+            assert environment.install_line(packages).startswith(line)
+
+    @pytest.mark.parametrize(("platform", "package"), [("linux", "libllvm19"), ("win32", "libllvm-c19")])
+    def test_in_an_environment_of_conda_the_line_is_condas(self, monkeypatch, tmp_path, platform, package):
+        (tmp_path / "conda-meta").mkdir()
+        monkeypatch.setattr(environment.sys, "platform", platform)
+        monkeypatch.setattr(environment.sys, "prefix", str(tmp_path))
+        assert environment.install_line(["libllvm19"]) == f"conda install -y -c conda-forge {package}"

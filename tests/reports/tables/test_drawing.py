@@ -5,6 +5,7 @@ import csv as comma_separated
 import io
 import math
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import pytest
@@ -12,7 +13,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from reports.tables.drawing import DASH, csv, html, latex, markdown, text, typeset
-from reports.tables.table import Column, Interval, Measured, Name, Row, Table, Verdict, number, table, with_spread
+from reports.tables.table import (
+    Column,
+    Interval,
+    Measured,
+    Name,
+    Row,
+    Table,
+    Verdict,
+    number,
+    numbers,
+    table,
+    with_spread,
+    words,
+)
 
 COLUMNS = (
     Column("name", "what is_it", words=True),
@@ -295,3 +309,45 @@ def test_a_value_without_a_column_is_a_mistake():
     with pytest.raises(ValueError, match="no column for nmae"):
         drawn_row(nmae="a")
     assert drawn_row(name="a", count=2).only("count").columns == (COLUMNS[5],)
+
+
+def _wide(*, long: bool = False) -> Table:
+    columns = (
+        *words(name="method", how={"long": long}),
+        *numbers(time="frame", how={"unit": "ms", "spread": "quartiles"}),
+        *numbers(other="light moved", how={"unit": "ms", "minor": True}),
+        *numbers(*(f"error {n}" for n in range(5))),
+    )
+    values = {"name": "shadow-planes (exact, order=paper)", "time": Measured(1.2345, 1.1, 1.3), "other": 3.21}
+    return Table("A title that is long " * 6, columns, (Row(values | {f"error {n}": 1e-5 / 3 for n in range(5)}),))
+
+
+@pytest.mark.claim("tables-at-80-columns")
+@pytest.mark.parametrize("width", [80, 60])
+def test_a_narrow_terminal_shows_whole_numbers_and_says_what_it_leaves_out(width):
+    drawn = text(_wide(), width=width)
+    assert max(map(len, drawn.splitlines())) <= width
+    assert "3.33e-06" in drawn
+    assert "shadow-planes" in drawn  # no word is broken
+    said = " ".join(drawn.split())
+    assert f"Left out at {width} columns: quartiles, light moved ms" in said
+    whole = max(map(len, text(replace(_wide(), title="")).splitlines()))
+    columns = int(re.search(r"or (\d+) columns show all", said)[1])
+    assert whole <= columns <= whole + 2
+    assert "Left out" not in text(_wide(), width=columns)
+    assert "1.1..1.3" in text(_wide(), width=columns)
+
+
+@pytest.mark.claim("tables-at-80-columns")
+def test_sentences_are_wrapped_and_listed_where_they_are_too_many():
+    from reports.tables.lists import kernel_list, method_list, scene_list
+
+    for made in (scene_list, method_list, kernel_list):
+        drawn = text(made(), width=80)
+        assert max(map(len, drawn.splitlines())) <= 80
+        assert "Left out" not in drawn
+        for row in made().rows:  # nothing is lost, no word is broken
+            for value in row.values.values():
+                if isinstance(value, str):
+                    assert all(word in drawn for word in value.split()), value
+    assert "\nmin-max\n  what: epipolar slices" in text(method_list(), width=80)

@@ -298,7 +298,7 @@ def test_what_is_not_measured_is_printed_with_its_reason():
     ("arguments", "words"),
     [
         (["--paper", "biry"], "--paper: got 'biry', wanted one of biri, billeter"),
-        (["--paper", "billeter", "--scenes", "hall"], "--scenes: got 'hall', wanted some of omni-box"),
+        (["--paper", "billeter", "--scenes", "hall"], "scene: got 'hall', wanted some of omni-box"),
         (["--maps", "1024,many"], "--maps: got '1024,many', wanted sizes in texels"),
         (["--maps", "100"], "map: got 100, wanted a power of two"),
         (["--limit", "0"], "--limit: got 0, wanted more than 0"),
