@@ -16,7 +16,9 @@ def gallery(
         "gallery"
     ),
 ) -> None:
-    """Make the pictures of README and documentation: scenes, methods, their errors, and how they work.
+    """Make the pictures of README and documentation.
+
+    They show scenes, what methods render, their errors, and how they work.
 
     Pictures of scenes have 16 rays a pixel and a tone curve; error maps are of pixel centres. `gallery.json` says what
     each shows and which command makes it. In a checkout `-o docs/gallery` brings those of the documentation up to date.
